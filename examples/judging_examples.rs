@@ -14,7 +14,7 @@ use mocban::domain::{Affine2, MetricOutcome, PairName, ThresholdMetric};
 use mocban::export::SourcePrint;
 use mocban::export::pictures::PrintView;
 use mocban::raster::{DepthMap, ImageLimits, jpeg_rgb8, png_grey8, png_mask};
-use mocban::report::pair_artifacts::PairArtifacts;
+use mocban::results::pair_artifacts::PairArtifacts;
 use mocban::stages::normalize::PrintMasks;
 use mocban::stages::register::StrokeMap;
 use mocban::store::Project;

@@ -7,6 +7,8 @@ const BLOCK_MESSAGES = {
   relief: { en: "Relief", vi: "Mặt khắc" },
   overlay: { en: "Overlay", vi: "Chồng lớp" },
   boxes: { en: "Boxes", vi: "Khung chữ" },
+  drawing: { en: "Drawing the {layer} …", vi: "Đang vẽ {layer} …" },
+  no_layer: { en: "This layer could not be drawn. Choose it again.", vi: "Không vẽ được lớp này. Hãy chọn lại." },
   closer: { en: "Closer", vi: "Phóng to" },
   farther: { en: "Farther", vi: "Thu nhỏ" },
   whole: { en: "Whole page", vi: "Cả trang" },

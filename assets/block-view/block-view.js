@@ -42,9 +42,11 @@ class BlockPage {
     this.overview = element("img", { class: "block-overview", alt: "", draggable: "false" });
     this.region = element("img", { class: "block-region", alt: "", draggable: "false", hidden: "" });
     this.boxes = this.makeBoxes();
+    this.work = element("p", { class: "block-work", role: "status", hidden: "" });
     this.stage = element("div", { class: "block-stage" }, this.overview, this.region, this.boxes);
-    this.canvas = element("div", { class: "block-canvas", tabindex: "0", role: "application", "aria-label": text("page_view") }, this.stage);
+    this.canvas = element("div", { class: "block-canvas", tabindex: "0", role: "application", "aria-label": text("page_view") }, this.stage, this.work);
     this.tip = element("div", { class: "block-tip", role: "status", hidden: "" });
+    for (const name of ["load", "error"]) this.overview.addEventListener(name, () => this.endWork(name === "error"));
     container.classList.add("block-view");
     container.replaceChildren(this.bar(), this.canvas, this.tip);
     for (const part of [this.stage, this.overview]) this.place(part, { x: 0, y: 0, width: block.page_size[0], height: block.page_size[1] });
@@ -105,6 +107,7 @@ class BlockPage {
   /** Shows a layer of the page. */
   show(layer) {
     this.layer = layer;
+    this.beginWork(layer);
     this.overview.src = `layer/${layer}`;
     this.overview.alt = text(layer);
     this.region.hidden = true;
@@ -113,6 +116,25 @@ class BlockPage {
     const occurs = (key) => !STATUSES.includes(key) || this.block.characters.some((one) => one.status === key);
     this.legend.replaceChildren(...entries.filter(occurs).map((key) => this.mark(key)));
     if (this.camera) this.moved();
+  }
+
+  /** Says that a layer is drawn, which takes seconds the first time. Until it has loaded, a browser shows the layer before it. */
+  beginWork(layer) {
+    if (this.overview.getAttribute("src") === `layer/${layer}`) return;
+    this.overview.classList.add("block-loading");
+    this.tell(text("drawing", { layer: text(layer).toLowerCase() }), true);
+  }
+
+  endWork(hasFailed) {
+    this.overview.classList.remove("block-loading");
+    this.tell(hasFailed ? text("no_layer") : "");
+  }
+
+  /** Shows a line over the page; an empty one hides it. */
+  tell(line, isBusy = false) {
+    this.work.textContent = line;
+    this.work.hidden = !line;
+    this.work.classList.toggle("block-busy", isBusy);
   }
 
   /** Returns an entry of the legend: an outline for a status, a colour for the overlay. */

@@ -92,15 +92,18 @@ export class AlignmentEditor {
 
   /** Handles a key; returns whether the editor uses it. */
   handleKey(action, event) {
-    const fine = event.shiftKey;
+    const arrows = { ArrowLeft: "move_left", ArrowRight: "move_right", ArrowUp: "move_up", ArrowDown: "move_down" };
+    return this.step(arrows[event.code] ?? action, event.shiftKey);
+  }
+
+  /** Changes the alignment by one step, a small one if `fine`. Returns whether there is such a step. */
+  step(action, fine) {
     const step = fine ? 0.25 : 2;
-    const arrows = {
-      ArrowLeft: () => this.shift(-step, 0),
-      ArrowRight: () => this.shift(step, 0),
-      ArrowUp: () => this.shift(0, -step),
-      ArrowDown: () => this.shift(0, step),
-    };
     const actions = {
+      move_left: () => this.shift(-step, 0),
+      move_right: () => this.shift(step, 0),
+      move_up: () => this.shift(0, -step),
+      move_down: () => this.shift(0, step),
       rotate_left: () => this.rotate(fine ? -0.1 : -1),
       rotate_right: () => this.rotate(fine ? 0.1 : 1),
       larger: () => this.scale(fine ? 1.002 : 1.01),
@@ -108,7 +111,7 @@ export class AlignmentEditor {
       mirror: () => this.mirror(),
       reset: () => this.reset(),
     };
-    const handler = arrows[event.code] ?? actions[action];
+    const handler = actions[action];
     handler?.();
     return Boolean(handler);
   }

@@ -41,7 +41,7 @@ export async function showEnd(heading, hasItems) {
     create("ul", "", ...lines(summary).map((text) => create("li", text))),
     create("h3", translate("next_steps")),
     create("p", `${translate("next_report")} `, command("report -o report.html")),
-    create("p", `${translate("next_reviewer")} `, command("review --reviewer NAME")),
+    create("p", `${translate("next_reviewer")} `, command(summary.next_reviewer)),
   );
   element.dataset.ready = "true";
 }

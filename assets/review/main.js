@@ -130,6 +130,7 @@ function refresh() {
   ui.markActive(on);
   ui.legend(editor || !viewer.layers ? [] : viewer.legend(), caption());
   ui.hint(editor ? translate("alignment_hint") : "");
+  ui.alignmentBar(Boolean(editor));
 }
 
 /** Returns the text below the image, apart from the legend. */
@@ -321,6 +322,8 @@ function perform(action, event, at) {
 }
 
 addEventListener("click", (event) => {
+  const step = event.target.closest("[data-align]");
+  if (step) return editor?.step(step.dataset.align, event.shiftKey || ui.isFine());
   const button = event.target.closest("[data-action]");
   if (!button) return;
   perform(button.dataset.action, null, event.timeStamp);

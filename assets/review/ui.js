@@ -72,6 +72,14 @@ export function answerText(answer) {
   return `${translate(answer.verdict)}${reason}`;
 }
 
+/** Shows the buttons of the alignment editor. */
+export function alignmentBar(isOpen) {
+  byId("alignment").hidden = !isOpen;
+}
+
+/** Returns whether the buttons of the alignment editor make small steps. */
+export const isFine = () => byId("alignment-fine").checked;
+
 /** Returns a manual alignment as text. */
 export function alignmentText({ reviewer, rotation_deg: deg, shift_px: [x, y], scale, mirrored, iou }) {
   return translate("aligned_by", {

@@ -34,9 +34,10 @@ const SCAN_MESSAGES = {
   no_data: { en: "The scan cannot be displayed: {why}", vi: "Không hiển thị được bản quét: {why}" },
 };
 
-/** Returns the first supported language of the browser, or English if there is none. */
+/** Returns the language that the server gives, or else the first supported one of the browser, or English. */
 export function preferredLanguage() {
-  return navigator.languages?.find((language) => /^(vi|en)\b/.test(language))?.slice(0, 2) ?? "en";
+  const given = document.querySelector("meta[name=page-language]")?.content;
+  return given ?? navigator.languages?.find((language) => /^(vi|en)\b/.test(language))?.slice(0, 2) ?? "en";
 }
 
 /** Formats a number with a fixed number of digits, without a sign on zero, in the language of the page. */

@@ -2,8 +2,8 @@
 
 use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
-use mocban::report::ground_truth::MAX_ANGLE_DEG;
-use mocban::report::stats::{quantile, wilson_95};
+use mocban::results::ground_truth::MAX_ANGLE_DEG;
+use mocban::results::stats::{quantile, wilson_95};
 
 use super::markdown::{Table, number, two};
 use super::method::Method;

@@ -2,7 +2,7 @@
 
 use mocban::domain::ThresholdMetric;
 use mocban::mesh::write::MeshFormat;
-use mocban::report::stats::quantile;
+use mocban::results::stats::quantile;
 
 use super::accuracy::share;
 use super::case::Case;

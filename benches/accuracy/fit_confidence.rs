@@ -9,10 +9,10 @@
 //! because they are rarer in practice. All are fitted by logistic regression with a ridge penalty on standardized
 //! inputs, using Newton's method (iteratively reweighted least squares).
 
-use mocban::report::ground_truth::{
+use mocban::results::ground_truth::{
     MAX_ANGLE_DEG, MAX_TRE_PCT, MIN_MASK_IOU, TruthErrors, TruthRecord,
 };
-use mocban::report::tops_iou;
+use mocban::results::tops_iou;
 use mocban::stages::AlignedPair;
 use mocban::stages::register::ConfidenceInputs;
 use nalgebra::{DMatrix, DVector};

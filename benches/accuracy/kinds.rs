@@ -2,7 +2,7 @@
 
 use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
-use mocban::report::ground_truth::{MAX_ANGLE_DEG, MAX_TRE_PCT};
+use mocban::results::ground_truth::{MAX_ANGLE_DEG, MAX_TRE_PCT};
 
 use super::accuracy::share;
 use super::markdown::Table;

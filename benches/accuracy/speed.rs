@@ -1,7 +1,7 @@
 //! Time of each part by tier and method.
 
 use mocban::demo::Tier;
-use mocban::report::stats::median;
+use mocban::results::stats::median;
 
 use super::markdown::{Table, number};
 use super::method::Method;

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use mocban::demo::{DemoPair, Tier};
 use mocban::domain::{MetricOutcome, ThresholdMetric};
-use mocban::report::{
+use mocban::results::{
     ground_truth::{TruthErrors, TruthRecord},
     tops_iou,
 };

@@ -79,8 +79,8 @@ impl Worker {
     fn compute(&self, pair: &PairAttributes, writes: &mut Writes) -> anyhow::Result<()> {
         let (settings, meshes, images) = (
             &self.settings,
-            &self.options.mesh_limits,
-            &self.options.image_limits,
+            &self.options.limits.mesh,
+            &self.options.limits.image,
         );
         let input = self.project.input(&pair.mesh_path);
         let mut file = open_input(&input, meshes.max_bytes, "limits.mesh.max_bytes")?;

@@ -160,7 +160,7 @@ fn checkpoints(
         };
         StageCheckpoint {
             stage,
-            made_with: PairProvenance {
+            provenance: PairProvenance {
                 fingerprint: fingerprints.of(stage),
                 mesh_hash: Some(mesh.hash),
                 print_hash: reads_print.then_some(print.hash),

@@ -94,15 +94,15 @@ async fn checkpoint(
 ) -> anyhow::Result<()> {
     let (done, at) = (fake.done(stage), stage.index() as i64);
     let hash = |hash: Option<ContentHash>| hash.map(|hash| hash.as_bytes().to_vec());
-    let mesh = hash(done.made_with.mesh_hash);
-    let print = hash(done.made_with.print_hash);
+    let mesh = hash(done.provenance.mesh_hash);
+    let print = hash(done.provenance.print_hash);
     sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await?;
     let step = sqlx::query(STEP).bind(pair).bind(at + 1).bind(token);
     anyhow::ensure!(step.execute(&mut *conn).await?.rows_affected() == 1);
     let result = sqlx::query(RESULT).bind(pair).bind(at).bind(&mesh);
     let result = result
         .bind(&print)
-        .bind(done.made_with.attributes)
+        .bind(done.provenance.attributes)
         .bind(done.outcome);
     let result = result.bind(done.result_hash.as_bytes().to_vec());
     result.bind(fake.worker.0).execute(&mut *conn).await?;

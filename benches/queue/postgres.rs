@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use mocban::catalog::{Catalog, ImportChunk, ImportRow};
+use mocban::catalog::{Catalog, ImportChunk, ImportRow, ImportTerms};
 use mocban::domain::PairName;
 use tokio::sync::mpsc;
 
@@ -109,7 +109,7 @@ pub(super) async fn import(catalog: &Catalog, pairs: usize) -> anyhow::Result<()
         sender.send(ImportChunk::End).await?;
         anyhow::Ok(())
     };
-    let (sent, stored) = tokio::join!(send, catalog.import_all(rows, Vec::new(), 1));
+    let (sent, stored) = tokio::join!(send, catalog.import_all(rows, ImportTerms::default(), 1));
     stored?;
     sent
 }

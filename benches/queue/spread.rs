@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use mocban::report::stats::quantile;
+use mocban::results::stats::quantile;
 
 use super::markdown::two;
 

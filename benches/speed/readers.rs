@@ -39,12 +39,8 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
 fn from_file(path: &Path, name: &str) -> anyhow::Result<Mesh> {
     let mut file = File::open(path)?;
     let about = file.metadata()?.len();
-    Ok(mesh::read_from(
-        &mut file,
-        about,
-        name,
-        &mesh::MeshLimits::SUGGESTED,
-    )?)
+    let read = mesh::read_from(&mut file, about, name, &mesh::MeshLimits::SUGGESTED)?;
+    Ok(read.mesh)
 }
 
 fn by_tobj(mut bytes: &[u8]) -> Result<Vec<tobj::Model>, tobj::LoadError> {

@@ -3,7 +3,7 @@
 -- changes numbers. Keys are compared byte by byte, whatever the collation of the database.
 
 CREATE TABLE catalog_version (version bigint NOT NULL);
-INSERT INTO catalog_version (version) VALUES (13);
+INSERT INTO catalog_version (version) VALUES (14);
 
 -- Half of a page is free, so that a heartbeat changes its row without changing the index.
 CREATE TABLE worker (
@@ -272,6 +272,7 @@ CREATE TABLE retired_pair (
     token bigint NOT NULL CHECK (token >= 0),
     fingerprint bigint,
     low_confidence bigint NOT NULL CHECK (low_confidence IN (0, 1)),
+    cause text NOT NULL CHECK (cause IN ('person', 'list', 'labels')),
     at bigint NOT NULL
 );
 

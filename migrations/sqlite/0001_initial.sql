@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`. In SQLite before 3.45, `json_valid(NULL)` is 0, so checks of columns that may be NULL ask for NULL first.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 13;
+PRAGMA user_version = 14;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -262,8 +262,9 @@ CREATE TRIGGER manual_alignment_no_delete BEFORE DELETE ON manual_alignment BEGI
 CREATE TRIGGER manual_alignment_undo_no_update BEFORE UPDATE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
 CREATE TRIGGER manual_alignment_undo_no_delete BEFORE DELETE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
 
--- The job of a pair whose box is gone from the labels of its block. It has no row in `job`, so runs and reports leave it
--- out; its results and verdicts stay. `token` is the fencing token of the job.
+-- The job of a retired pair. It has no row in `job`, so runs and reports leave it out; its results and verdicts stay.
+-- `cause` is who retired it: a person, a list without it, or the labels of its block, from which its box is gone. `token` is
+-- the fencing token of the job.
 CREATE TABLE retired_pair (
     pair INTEGER PRIMARY KEY REFERENCES pair (id),
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 4),
@@ -271,6 +272,7 @@ CREATE TABLE retired_pair (
     token INTEGER NOT NULL CHECK (token >= 0),
     fingerprint INTEGER REFERENCES fingerprint (id),
     low_confidence INTEGER NOT NULL CHECK (low_confidence IN (0, 1)),
+    cause TEXT NOT NULL CHECK (cause IN ('person', 'list', 'labels')),
     at INTEGER NOT NULL
 ) STRICT;
 

@@ -7,31 +7,13 @@ use clap::builder::{Resettable, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use super::commands::backup;
-use super::commands::check;
-use super::commands::completions;
-use super::commands::config;
-use super::commands::contact_sheet;
-use super::commands::copy;
-use super::commands::db;
-use super::commands::demo;
-use super::commands::docs;
-use super::commands::export;
-use super::commands::import;
-use super::commands::man;
-use super::commands::report;
-use super::commands::restore;
-use super::commands::retry;
-use super::commands::review;
-use super::commands::run;
-use super::commands::show;
-use super::commands::status;
-use super::commands::verdict;
-use super::commands::view;
-use super::commands::worker;
+use super::commands::{
+    align, backup, check, completions, config, contact_sheet, copy, db, demo, docs, export, import,
+    man, report, restore, retire, retry, review, run, show, status, verdict, view, worker,
+};
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
-use mocban_project::exit::ExitCode;
+use mocban_project::ExitCode;
 use mocban_project::shell::shell_quoted;
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -55,6 +37,8 @@ pub(super) struct Cli {
 pub(super) enum Command {
     /// Create the built-in dataset, run it and print the report
     Demo(demo::DemoArgs),
+    /// Align one scan with one print, without a project
+    Align(align::AlignArgs),
     /// Add pairs of meshes and prints to the project
     Import(import::ImportArgs),
     /// Align the pairs that are not aligned yet
@@ -69,6 +53,8 @@ pub(super) enum Command {
     Show(show::ShowArgs),
     /// Let failed pairs run again
     Retry(retry::RetryArgs),
+    /// Take pairs out of every count, or bring them back; their results and verdicts are kept
+    Retire(retire::RetireArgs),
     /// Check files, rows and counters against each other
     Check(check::CheckArgs),
     /// Copy pairs, results, verdicts and settings to one file, also during a run

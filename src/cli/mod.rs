@@ -13,17 +13,18 @@ use tokio::runtime::{Builder, Runtime};
 
 use args::Command;
 use commands::{
-    agreement, backup, check, completions, config, contact_sheet, copy, db, demo, docs, export,
-    import, man, report, restore, retry, review, run, show, status, verdict, view, worker,
+    agreement, align, backup, check, completions, config, contact_sheet, copy, db, demo, docs,
+    export, import, man, report, restore, retire, retry, review, run, show, status, verdict, view,
+    worker,
 };
 use input::nearby_projects;
-pub use mocban_project::exit::ExitCode;
+pub use mocban_project::ExitCode;
 use output::context::Context;
 use output::screen::Screen;
 use output::{logging, panics};
 
-use mocban_core::domain::is_hidden;
-use mocban_project::error_text;
+use mocban_core::domain::{ErrorCode, is_hidden};
+use mocban_project::{ProjectError, ProjectResult};
 
 /// Parses the command line, executes the command and returns the exit code. Prints each error once.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
@@ -53,10 +54,12 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(code) => code,
         Err(error) => report_error(&error, &context),
     };
-    panics::catch(work, |text| context.error(text, ExitCode::Error))
+    let code = panics::catch(work, |text| context.error(text, ExitCode::Error));
+    context.screen.count_warnings();
+    code
 }
 
-fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
+fn start(command: Command, context: &Context) -> ProjectResult<ExitCode> {
     logging::start(&context.global, &context.screen)?;
     let runtime = runtime(&command)?;
     let result = runtime.block_on(dispatch(command, context));
@@ -74,9 +77,10 @@ fn runtime(command: &Command) -> std::io::Result<Runtime> {
     builder.worker_threads(2).enable_all().build()
 }
 
-async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
+async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode> {
     match command {
-        Command::Demo(args) => demo::demo(args, context).await,
+        Command::Demo(args) => Box::pin(demo::demo(args, context)).await,
+        Command::Align(args) => align::align(args, context).await,
         Command::Import(args) => import::import(args, context).await,
         Command::Run(args) => run::run(args, context).await,
         Command::Plan(args) => worker::plan(args, context).await,
@@ -84,6 +88,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Status(args) => status::status(args, context).await,
         Command::Show(args) => show::show(args, context).await,
         Command::Retry(args) => retry::retry(args, context).await,
+        Command::Retire(args) => retire::retire(args, context).await,
         Command::Check(args) => check::check(args, context).await,
         Command::Backup(args) => backup::backup(args, context).await,
         Command::Copy(args) => copy::copy(args, context).await,
@@ -97,28 +102,27 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Export(args) => export::export(args, context).await,
         Command::ContactSheet(args) => contact_sheet::contact_sheet(args, context).await,
         Command::Config(command) => config::config(&command, context),
-        Command::Completions(args) => completions::completions(&args, args::command()),
-        Command::Docs(args) => docs::docs(&args, context),
-        Command::Man(args) => man::man(&args, args::command(), context),
+        Command::Completions(args) => completions::completions(&args, args::command()).await,
+        Command::Docs(args) => docs::docs(args, context),
+        Command::Man(args) => man::man(args, args::command(), context),
     }
 }
 
 /// Prints an error, suggests commands that help, and returns the exit code of the error.
-fn report_error(error: &anyhow::Error, context: &Context) -> ExitCode {
-    if error_text::is_closed_pipe(error) {
+fn report_error(error: &ProjectError, context: &Context) -> ExitCode {
+    let code = error.code();
+    if code == ErrorCode::ClosedPipe {
         return ExitCode::Done;
     }
-    let code = error_text::exit_code(error);
-    let text = error_text::describe(error, &context.dir());
-    context.error(&text, code);
-    if code == ExitCode::NoProject {
-        for project in nearby_projects::nearby_projects(&context.dir()) {
+    context.error(&error.text(&context.location.dir), code.into());
+    if code == ErrorCode::NoProject {
+        for project in nearby_projects::nearby_projects(&context.location.dir) {
             context.at(&project).next("status");
         }
         context.next("import pairs.csv");
         context.next_command(&context.program_with("demo"));
-    } else if error_text::is_run_in_use(error) {
+    } else if code == ErrorCode::ProjectInUse {
         context.next("status --watch");
     }
-    code
+    code.into()
 }

@@ -1,6 +1,7 @@
 //! The files of `docs/`, which are part of the program.
 
 use super::html::{Outline, web_page, web_path};
+use super::search::search_index;
 
 /// Returns pairs of paths below `docs/` and the content of these files.
 macro_rules! of_docs {
@@ -57,6 +58,9 @@ const PICTURES: &[(&str, &[u8])] = of_docs! {
 /// The appearance of the pages.
 const STYLE: &str = include_str!("../../assets/documentation/documentation.css");
 
+/// The script of the pages.
+const SCRIPT: &str = include_str!("../../assets/documentation/documentation.js");
+
 /// Returns the files of the documentation: their paths below a folder, and their content. `index.html` is the first page.
 pub fn web_files() -> Vec<(String, Vec<u8>)> {
     let outline = Outline::parse(SUMMARY);
@@ -66,8 +70,14 @@ pub fn web_files() -> Vec<(String, Vec<u8>)> {
     });
     let pictures = PICTURES.iter();
     let pictures = pictures.map(|(path, bytes)| ((*path).to_owned(), bytes.to_vec()));
-    let style = ("style.css".to_owned(), STYLE.as_bytes().to_vec());
-    pages.chain(pictures).chain([style]).collect()
+    let index = search_index(PAGES, &outline);
+    let others = [
+        ("style.css", STYLE),
+        ("documentation.js", SCRIPT),
+        ("search-index.js", &index),
+    ];
+    let others = others.map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
+    pages.chain(pictures).chain(others).collect()
 }
 
 #[cfg(test)]
@@ -98,9 +108,7 @@ mod tests {
             path.to_string_lossy().replace('\\', "/")
         };
         let mut expected: BTreeSet<String> = found.iter().map(relative).collect();
-        for other in ["SUMMARY.md", "book.toml"] {
-            assert!(expected.remove(other), "{other}");
-        }
+        assert!(expected.remove("SUMMARY.md"));
         let listed = PAGES.iter().map(|(path, _)| path);
         let listed = listed.chain(PICTURES.iter().map(|(path, _)| path));
         assert_eq!(

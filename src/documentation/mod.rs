@@ -2,6 +2,7 @@
 
 mod files;
 mod html;
+mod search;
 
 pub use files::web_files;
 pub use html::anchor;

@@ -122,7 +122,13 @@ fn use_page(tab: &Tab<'_>) {
     let zoom = |tab: &Tab<'_>| number(tab, "mocbanBlock.camera.zoom");
     tab.screenshot("block-page");
     for (key, layer) in [("KeyR", "relief"), ("KeyO", "overlay"), ("KeyP", "page")] {
+        let is_new = format!("mocbanBlock.overview.getAttribute('src') !== 'layer/{layer}'");
+        let is_new = tab.eval(&is_new) == true;
         tab.key(key);
+        // Drawing a layer takes a while, and the page says so.
+        let is_told = tab.eval("!mocbanBlock.work.hidden || mocbanBlock.overview.complete");
+        assert!(is_told == true || !is_new, "no sign of work on {layer}");
+        tab.wait("mocbanBlock.work.hidden");
         tab.wait(&format!(
             "mocbanBlock.overview.complete && mocbanBlock.overview.naturalWidth > 100 && mocbanBlock.layer === '{layer}'"
         ));
@@ -163,6 +169,11 @@ fn use_page(tab: &Tab<'_>) {
     tab.drag([x, y], [x, y]);
     tab.wait("window.mocbanViewer && mocbanBlock.dialog.open");
     assert_eq!(tab.eval("mocbanViewer.header.pair"), format!("b1_{label}"));
+    let is_inside = "(() => {
+        const [view, dialog] = ['dialog .scan-viewer', 'dialog'].map((one) => document.querySelector(one).getBoundingClientRect());
+        return view.bottom <= dialog.bottom + 0.5 && view.right <= dialog.right + 0.5;
+    })()";
+    assert_eq!(tab.eval(is_inside), true, "the 3D view is cut off");
     tab.screenshot("block-dialog");
     tab.key("Escape");
     tab.wait("!window.mocbanViewer && !mocbanBlock.dialog.open");

@@ -71,6 +71,7 @@ fn a_finished_copy_is_compared_and_never_written_to() {
     let dir = empty();
     let root = dir.path();
     done(root);
+    on(root, "p", &["retire", "upright-0000"]).expect(0);
     let mut copies = vec![("p".to_owned(), "file".to_owned())];
     if let (Some(first), Some(second)) = (schema(), schema()) {
         copies.push(("p".to_owned(), first.clone()));
@@ -80,6 +81,8 @@ fn a_finished_copy_is_compared_and_never_written_to() {
     for (from, to) in &copies {
         let made = copy(root, from, to).expect(0).json();
         assert_eq!(made["existed"], false);
+        let status = on(root, to, &["status", "--json"]).expect(0).json();
+        assert_eq!(status["retired"], 1);
         let again = copy(root, from, to).expect(0);
         assert_eq!(again.json()["existed"], true);
         assert_eq!(again.json()["tables"], made["tables"]);
@@ -89,6 +92,7 @@ fn a_finished_copy_is_compared_and_never_written_to() {
     for (_, to) in &copies {
         let verdict = ["verdict", "set", "upright-0001", "fail"];
         on(root, to, &[&verdict[..], &["--reviewer", "minh"]].concat()).expect(0);
+        on(root, to, &["retire", "--undo", "upright-0000"]).expect(0);
     }
     import(root, "p", "later", 2);
     for (from, to) in &copies {

@@ -124,3 +124,53 @@ fn uncarved_decoy_is_flat_within_the_noise() {
         assert!(highest < 0.02, "{index}: {highest} mm");
     }
 }
+
+/// Returns why a pair is refused.
+fn refusal(decoy: &DecoyPair) -> String {
+    let refused = align(decoy, &settings()).expect_err("the pair does not match");
+    refused.to_string()
+}
+
+/// Two blocks beside each other in one file, with the print of another character.
+fn two_pieces(index: u64) -> DecoyPair {
+    let mut wrong = made(Tier::Upright, 77, Decoy::WrongPrint, index);
+    let second = made(Tier::Upright, 77, Decoy::WrongPrint, index + 1).mesh;
+    let across = |mesh: &Mesh| -> Vec<f64> {
+        let places = 0..mesh.vertices.len();
+        places.map(|place| mesh.vertices.at(place)[0]).collect()
+    };
+    let end = across(&wrong.mesh).into_iter().fold(f64::MIN, f64::max);
+    let start = across(&second).into_iter().fold(f64::MAX, f64::min);
+    let first = wrong.mesh.vertices.len() as u32;
+    for place in 0..second.vertices.len() {
+        let [x, y, z] = second.vertices.at(place);
+        wrong.mesh.vertices.push([x - start + end + 2.0, y, z]);
+    }
+    for corners in &second.triangles {
+        wrong.mesh.triangles.push(corners.map(|at| at + first));
+    }
+    wrong
+}
+
+#[test]
+fn refusals_say_what_was_seen() {
+    let seen = ["separate pieces", "nearly flat", "half of the print only"];
+    let (mut wrong, mut pieces, mut flat) = (Vec::new(), Vec::new(), Vec::new());
+    for index in 0..COUNT {
+        for tier in [Tier::Upright, Tier::Pose] {
+            wrong.push(refusal(&made(tier, 77, Decoy::WrongPrint, index)));
+            flat.push(refusal(&made(tier, 77, Decoy::Uncarved, index)));
+        }
+        pieces.push(refusal(&two_pieces(index)));
+    }
+    let of_others = wrong
+        .iter()
+        .filter(|text| seen.iter().any(|what| text.contains(what)));
+    assert_eq!(of_others.count(), 0, "{wrong:#?}");
+    let named = |texts: &[String], what: &str| texts.iter().any(|text| text.contains(what));
+    assert!(named(&pieces, "2 separate pieces"), "{pieces:#?}");
+    assert!(
+        flat.iter().all(|text| !text.contains("another character?")),
+        "{flat:#?}"
+    );
+}

@@ -49,12 +49,8 @@ fn wrong_projects_and_outputs() {
         ("project_forgotten", &["status"]),
         ("project_as_command", &["khối-4", "status"]),
         (
-            "output_in_missing_folder",
-            &["-C", "khối-4", "report", "-o", "new/report.html"],
-        ),
-        (
-            "backup_in_missing_folder",
-            &["-C", "khối-4", "backup", "new/b.sqlite"],
+            "output_among_results",
+            &["-C", "khối-4", "report", "-o", "khối-4/artifacts/r.html"],
         ),
         (
             "export_to_a_file",

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::check::at;
 use crate::cli::mocban;
-use crate::export_readback::{FORMATS, agreeing_lines, lines};
+use crate::export_readback::{agreeing_lines, every_format, lines};
 use crate::resume::copy;
 
 /// Returns whether an export with certain options must hold a line.
@@ -92,7 +92,7 @@ fn export(project: &Project, name: &str, options: &[&str]) -> PathBuf {
     let args = [
         "export",
         "--to",
-        FORMATS,
+        &every_format(),
         "-o",
         out.to_str().expect("UTF-8"),
     ];

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::cli::{Call, empty, mocban};
 
-/// All formats of this file.
+/// The formats that this file compares in detail.
 const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset";
 
 /// Names that checks outside the repository rely on.

@@ -5,19 +5,21 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use mocban::export::ExportFormat;
 use mocban::store::Project;
 
 use crate::backup::files as names;
 use crate::check::{at, done};
 use crate::cli::{binary, call};
-use crate::export_readback::FORMATS;
+use crate::export_readback::every_format;
 use crate::fault::{ENOSPC, Fault};
 use crate::uninterrupted::files;
 
 /// Files of each format, whose writes are interrupted.
-const FILES: [&str; 10] = [
+const FILES: [&str; 11] = [
     ".out.*/new/jsonl/pairs/*",
     ".out.*/new/csv/pairs.csv",
+    ".out.*/new/csv/matrices.csv",
     ".out.*/new/parquet/pairs.parquet",
     ".out.*/new/huggingface/data/*",
     ".out.*/new/webdataset/*.tar",
@@ -27,6 +29,15 @@ const FILES: [&str; 10] = [
     ".out.*/new/viewer/pairs/*/viewer.html",
     ".out.*/new/export.json",
 ];
+
+#[test]
+fn writes_of_every_format_are_interrupted() {
+    for format in ExportFormat::ALL {
+        let folder = format!(".out.*/new/{format}/");
+        let is_listed = FILES.iter().any(|path| path.starts_with(&folder));
+        assert!(is_listed, "no file of {format}");
+    }
+}
 
 /// How long an interrupted write takes, in milliseconds: until the process is killed.
 const UNTIL_KILLED: u32 = 600_000;
@@ -96,7 +107,7 @@ fn export(root: &Path, out: &str) -> Command {
     let mut command = binary();
     let project = Project::at(&root.join("p"));
     command.arg("-C").arg(project.dir());
-    command.args(["export", "--to", FORMATS, "--images", "-o"]);
+    command.args(["export", "--to", &every_format(), "--images", "-o"]);
     command.arg(root.join(out));
     command
 }

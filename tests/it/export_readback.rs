@@ -5,13 +5,15 @@ use std::fs::{self, File};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use mocban::export::ExportFormat;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::Field;
 use serde_json::Value;
 
-/// Every format.
-pub(crate) const FORMATS: &str =
-    "jsonl,csv,parquet,huggingface,webdataset,mesh,fiji,annotations,viewer";
+/// Returns every format, as `--to` expects them.
+pub(crate) fn every_format() -> String {
+    ExportFormat::ALL.map(ExportFormat::name).join(",")
+}
 
 /// What a format says about one result. Missing texts are empty.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -184,32 +186,42 @@ fn of_huggingface(folder: &Path) -> Vec<ResultLabel> {
     .collect()
 }
 
-/// Reads the labels of a format, sorted.
-fn labels(folder: &Path, format: &str) -> Vec<ResultLabel> {
-    let mut found = match format {
-        "csv" => of_csv(&folder.join("pairs.csv")),
-        "parquet" => of_parquet(&folder.join("pairs.parquet")),
-        "huggingface" => of_huggingface(folder),
-        "webdataset" => of_shards(folder),
-        "coco" => of_coco(folder),
-        _ => lines(folder).iter().map(ResultLabel::of_json).collect(),
+/// Which results a format has, of those that are exported.
+enum ExportedResults {
+    /// All of them.
+    All,
+    /// One per pair: that of `ensemble`, or else of the first metric.
+    OnePerPair,
+    /// One per pair that did not fail.
+    OnePerDonePair,
+}
+
+/// Reads the labels of a format from its folder, sorted. Returns also which results they should be.
+fn labels(folder: &Path, format: ExportFormat) -> (Vec<ResultLabel>, ExportedResults) {
+    let of_lines = || lines(folder).iter().map(ResultLabel::of_json).collect();
+    let (mut found, results): (Vec<_>, _) = match format {
+        ExportFormat::Jsonl => (of_lines(), ExportedResults::All),
+        ExportFormat::Csv => (of_csv(&folder.join("pairs.csv")), ExportedResults::All),
+        ExportFormat::Parquet => {
+            let table = of_parquet(&folder.join("pairs.parquet"));
+            (table, ExportedResults::All)
+        }
+        ExportFormat::HuggingFace => (of_huggingface(folder), ExportedResults::OnePerDonePair),
+        ExportFormat::WebDataset => (of_shards(folder), ExportedResults::OnePerDonePair),
+        ExportFormat::Mesh
+        | ExportFormat::Fiji
+        | ExportFormat::Annotations
+        | ExportFormat::Viewer => (of_lines(), ExportedResults::OnePerPair),
     };
     found.sort();
-    found
+    (found, results)
 }
 
 /// Asserts that all formats of an export have the same pairs and labels. Returns the lines of `jsonl`.
 pub(crate) fn agreeing_lines(export: &Path) -> Vec<Value> {
     let lines = lines(&export.join("jsonl"));
-    let expected = labels(&export.join("jsonl"), "jsonl");
-    for format in ["csv", "parquet"] {
-        let found = labels(&export.join(format), format);
-        assert!(
-            found == expected,
-            "{format}: {found:#?}\njsonl: {expected:#?}"
-        );
-    }
-    // The other formats show one result per pair: that of `ensemble`, or else of the first metric.
+    let mut all: Vec<ResultLabel> = lines.iter().map(ResultLabel::of_json).collect();
+    all.sort();
     let mut shown: BTreeMap<String, (ResultLabel, bool)> = BTreeMap::new();
     for line in &lines {
         let label = ResultLabel::of_json(line);
@@ -221,20 +233,23 @@ pub(crate) fn agreeing_lines(export: &Path) -> Vec<Value> {
     let every: Vec<ResultLabel> = shown.values().map(|(label, _)| label.clone()).collect();
     let done = shown.into_values().filter(|(_, is_done)| *is_done);
     let done: Vec<ResultLabel> = done.map(|(label, _)| label).collect();
-    for (folder, format, expected) in [
-        ("mesh", "mesh", &every),
-        ("fiji", "fiji", &every),
-        ("viewer", "viewer", &every),
-        ("annotations", "annotations", &every),
-        ("annotations", "coco", &done),
-        ("webdataset", "webdataset", &done),
-        ("huggingface", "huggingface", &done),
-    ] {
-        let found = labels(&export.join(folder), format);
+    let assert_equal = |name: &str, found: &[ResultLabel], expected: &[ResultLabel]| {
         assert!(
-            found == *expected,
-            "{format}: {found:#?}\njsonl: {expected:#?}"
+            found == expected,
+            "{name}: {found:#?}\njsonl: {expected:#?}"
         );
+    };
+    for format in ExportFormat::ALL {
+        let (found, results) = labels(&export.join(format.name()), format);
+        let expected = match results {
+            ExportedResults::All => &all,
+            ExportedResults::OnePerPair => &every,
+            ExportedResults::OnePerDonePair => &done,
+        };
+        assert_equal(format.name(), &found, expected);
     }
+    let mut coco = of_coco(&export.join(ExportFormat::Annotations.name()));
+    coco.sort();
+    assert_equal("COCO", &coco, &done);
     lines
 }

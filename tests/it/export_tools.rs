@@ -12,6 +12,7 @@ use tiff::decoder::{Decoder, DecodingResult};
 
 use crate::cli::mocban;
 
+/// The formats that other tools open, and the lines to compare them with.
 const FORMATS: &str = "jsonl,mesh,fiji,annotations";
 
 /// Makes two pairs and a third with the print of the first, and exports them.

@@ -2,7 +2,7 @@
 //! the processes crash. `MOCBAN_KILLS` and `MOCBAN_KILLED_PAIRS` set the numbers of crashes and pairs.
 
 use std::fs::File;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -60,8 +60,42 @@ impl Fleet {
             .envs(variables.iter().copied());
         command.args(["-C", "shared", "--catalog", self.server.url()]);
         let command = command.args(["worker", "-j", "1"]);
-        let worker = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        let errors = File::options()
+            .create(true)
+            .append(true)
+            .open(self.worker_errors());
+        let worker = command
+            .stdout(Stdio::null())
+            .stderr(errors.expect("a file"))
+            .spawn();
         worker.expect("the binary starts")
+    }
+
+    /// The file to which all workers write their errors.
+    fn worker_errors(&self) -> PathBuf {
+        self.path().join("workers.txt")
+    }
+
+    /// Waits until a worker ends, and requires that it ends without an error.
+    fn assert_success(&self, mut worker: Child) {
+        let code = worker.wait().expect("an exit code");
+        let errors = || std::fs::read_to_string(self.worker_errors()).unwrap_or_default();
+        assert!(code.success(), "{code}: {}", errors());
+    }
+
+    /// Starts a worker, and waits until the server knows it. A crash of the server before that ends a worker.
+    fn registered_worker(&self) -> Child {
+        let mut worker = self.worker();
+        let pid = i64::from(worker.id());
+        let is_known = || {
+            self.on_server(async |conn| {
+                let exists = "SELECT EXISTS (SELECT 1 FROM mocban.worker WHERE pid = $1)";
+                let exists = sqlx::query_scalar::<_, bool>(exists).bind(pid);
+                exists.fetch_one(conn).await
+            })
+        };
+        while !is_known() && worker.try_wait().expect("a state").is_none() {}
+        worker
     }
 
     /// Calls a function with a connection to the server.
@@ -130,8 +164,8 @@ fn workers_on_postgres_give_the_results_of_one_run_on_a_file() {
     };
     fleet.shared(&["plan"]).expect(0);
     let workers = [(); 3].map(|()| fleet.worker());
-    for mut worker in workers {
-        assert!(worker.wait().expect("an exit code").success());
+    for worker in workers {
+        fleet.assert_success(worker);
     }
     fleet.assert_same();
     // Back to a file, with the verdicts.
@@ -168,7 +202,7 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
     };
     fleet.shared(&["plan"]).expect(0);
     let mut dice = ChaCha8Rng::seed_from_u64(24);
-    let mut workers = vec![fleet.worker(), fleet.worker(), fleet.worker()];
+    let mut workers = [(); 3].map(|()| fleet.registered_worker());
     let mut crashes_at_work = 0;
     for kill in 0..kills {
         // The crash must come at a random moment, so the test waits for a time and not for an event.
@@ -183,15 +217,15 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
             // It may have ended.
             let _ = workers[victim].kill();
             workers[victim].wait().expect("an exit code");
-            workers[victim] = fleet.worker();
+            workers[victim] = fleet.registered_worker();
         }
     }
     assert!(
         crashes_at_work > 0,
         "every worker had ended before the first crash"
     );
-    for mut worker in workers {
-        assert!(worker.wait().expect("an exit code").success());
+    for worker in workers {
+        fleet.assert_success(worker);
     }
     fleet.assert_same();
 }
@@ -219,8 +253,8 @@ fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
     // Leases end by time alone, so there is no event to wait for.
     std::thread::sleep(OUTAGE);
     fleet.server.start_again();
-    for mut worker in workers {
-        assert!(worker.wait().expect("an exit code").success());
+    for worker in workers {
+        fleet.assert_success(worker);
     }
     let count = "SELECT count(*) FROM public.taken";
     let taken: i64 = fleet.on_server(async |conn| sqlx::query_scalar(count).fetch_one(conn).await);
@@ -292,7 +326,7 @@ fn a_worker_that_may_not_connect_again_says_why_and_ends() {
     let text = String::from_utf8_lossy(&ended.stderr);
     assert!(!ended.status.success(), "{text}");
     assert!(text.contains("not permitted to log in"), "{text}");
-    assert!(fleet.worker().wait().expect("an exit code").success());
+    fleet.assert_success(fleet.worker());
     fleet.assert_same();
 }
 

@@ -8,7 +8,7 @@ use mocban::store::Project;
 use rustix::fs::{CWD, FileType, Mode, mknodat};
 use rustix::process::Signal;
 
-use crate::cli::{binary, call};
+use crate::cli::{binary, call, mocban};
 use crate::fault::Fault;
 use crate::processes::Running;
 use crate::resume::{pairs, project, run, run_with_progress};
@@ -234,4 +234,40 @@ fn a_file_of_settings_that_became_a_device_is_refused() {
     std::os::unix::fs::symlink("/dev/zero", disk.project.settings_path()).expect("a link");
     let refused = call(&mut disk.command(&["run"])).expect(2);
     assert!(refused.err.contains("it is a device"), "{}", refused.err);
+}
+
+/// The catalog is locked when all files of a list have been looked at, not before.
+#[test]
+fn an_import_that_waits_for_a_file_keeps_nobody_from_writing() {
+    let disk = HangingDisk::new("3");
+    let manifest = std::fs::read_to_string(disk.dir.path().join("p/data/manifest.csv"));
+    let mut lines: Vec<String> = manifest
+        .expect("a list")
+        .lines()
+        .map(str::to_owned)
+        .collect();
+    lines.truncate(3);
+    let path = disk.dir.path().join("p/data/two.csv");
+    std::fs::write(path, lines.join("\n").replace("upright-0000", "again-0000")).expect("a list");
+    let hold = disk.dir.path().join("held");
+    let mut import = binary();
+    import
+        .current_dir(disk.dir.path())
+        .args(["-C", "p", "import", "p/data/two.csv"])
+        .env("MOCBAN_HOLD_AT", "import:computed@upright-0001")
+        .env("MOCBAN_HOLD_FILE", &hold);
+    let mut import = Running::start(&mut import);
+    import.wait_until("a file is looked at", || hold.exists());
+    mocban(
+        disk.dir.path(),
+        &["-C", "p", "import", "p/data/manifest.csv"],
+    )
+    .expect(0);
+    let retire = ["-C", "p", "retire", "upright-0002"];
+    mocban(disk.dir.path(), &retire).expect(0);
+    std::fs::remove_file(&hold).expect("released");
+    let (code, _, err) = import.end();
+    assert_eq!(code, Some(0), "{err}");
+    let status = mocban(disk.dir.path(), &["-C", "p", "status", "--json"]).expect(0);
+    assert_eq!(status.json()["pairs"], 3);
 }

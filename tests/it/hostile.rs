@@ -38,19 +38,15 @@ fn case(id: &'static str, bad: BadInput, class: &'static str, message: &'static 
 }
 
 fn cases() -> Vec<Case> {
+    bad_meshes().into_iter().chain(bad_prints()).collect()
+}
+
+fn bad_meshes() -> Vec<Case> {
     let mesh = |bytes: Vec<u8>| BadInput::Mesh(Some(bytes));
-    let print = |bytes: Vec<u8>| BadInput::Print(Some(bytes));
-    let plain = |level| png_grey8(&Grid::new(120, 120, level));
     vec![
         case(
             "empty_mesh",
             mesh(vec![]),
-            "bad_input",
-            "is empty (0 bytes)",
-        ),
-        case(
-            "empty_print",
-            print(vec![]),
             "bad_input",
             "is empty (0 bytes)",
         ),
@@ -68,7 +64,7 @@ fn cases() -> Vec<Case> {
                 [0.0, 1.0, 0.0],
             ]])),
             "bad_input",
-            "vertex 2 has the coordinate NaN",
+            "1 of 3 vertices have no position (NaN, infinite or repeated 0 0 0)",
         ),
         case("no_faces", mesh(stl(&[])), "bad_input", "has no faces"),
         case(
@@ -88,6 +84,26 @@ fn cases() -> Vec<Case> {
             mesh(b"Dear reader,\n".to_vec()),
             "bad_input",
             "the file is text",
+        ),
+        case("missing_mesh", BadInput::Mesh(None), "io", "is not there"),
+        case(
+            "mesh_folder",
+            BadInput::MeshDirectory,
+            "io",
+            "is a directory, not a file",
+        ),
+    ]
+}
+
+fn bad_prints() -> Vec<Case> {
+    let print = |bytes: Vec<u8>| BadInput::Print(Some(bytes));
+    let plain = |level| png_grey8(&Grid::new(120, 120, level));
+    vec![
+        case(
+            "empty_print",
+            print(vec![]),
+            "bad_input",
+            "is empty (0 bytes)",
         ),
         case(
             "all_white",
@@ -114,14 +130,23 @@ fn cases() -> Vec<Case> {
             "bad_input",
             "the file is text",
         ),
-        case("missing_mesh", BadInput::Mesh(None), "io", "is not there"),
-        case("missing_print", BadInput::Print(None), "io", "is not there"),
         case(
-            "mesh_folder",
-            BadInput::MeshDirectory,
-            "io",
-            "is a directory, not a file",
+            "bmp_as_png",
+            print(b"BM\x36\0\0\0\0\0\0\0\x36\0\0\0".to_vec()),
+            "bad_input",
+            "the file is a BMP image; PNG, JPEG and TIFF images are read: convert them, such as with \
+                ImageMagick: `magick mogrify -format png *.bmp`",
         ),
+        case(
+            "lfs_pointer",
+            print(
+                b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
+                    .to_vec(),
+            ),
+            "bad_input",
+            "the file is a pointer of Git LFS and does not hold the image; fetch the image with `git lfs pull`",
+        ),
+        case("missing_print", BadInput::Print(None), "io", "is not there"),
         case(
             "print_folder",
             BadInput::PrintDirectory,

@@ -7,17 +7,22 @@ use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 
 /// Dependencies that only these crates may have.
 const ONLY_IN: &[(&str, &[&str])] = &[
-    ("anyhow", &["mocban", "project"]),
+    ("anyhow", &[]),
     ("clap", &["mocban"]),
+    ("fax", &["core"]),
+    ("flate2", &["core", "lists"]),
     ("indicatif", &["mocban"]),
     ("pulldown-cmark", &["mocban"]),
     ("toml", &["mocban", "config"]),
     ("tracing-subscriber", &["mocban"]),
+    ("moxcms", &["core"]),
     ("object_store", &["store"]),
     ("pulp", &["core"]),
     ("quick-xml", &["lists"]),
     ("sqlx", &["catalog"]),
-    ("tiff", &["core", "export"]),
+    ("tiff", &["export"]),
+    ("weezl", &["core"]),
+    ("zune-jpeg", &["core"]),
 ];
 
 /// Crates without files, processes, clocks and async code.

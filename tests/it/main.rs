@@ -2,6 +2,7 @@
 
 mod accessible;
 mod agreement;
+mod align_command;
 mod all_pages;
 #[cfg(target_os = "linux")]
 mod attacks;
@@ -16,6 +17,7 @@ mod browser;
 mod check;
 mod check_files;
 mod cli;
+mod colour_profiles;
 #[cfg(unix)]
 mod copies;
 mod corruption;
@@ -54,6 +56,7 @@ mod hostile;
 #[cfg(target_os = "linux")]
 mod hostile_pairs;
 mod image_pages;
+mod import_snapshots;
 mod invariance;
 mod kill;
 #[cfg(unix)]
@@ -68,6 +71,7 @@ mod manners;
 mod many_reviewers;
 #[cfg(target_os = "linux")]
 mod memory;
+mod mesh_forms;
 mod names;
 mod object_store;
 mod object_store_blocks;
@@ -76,6 +80,8 @@ mod odd;
 #[cfg(unix)]
 mod old_snapshots;
 mod one_pair;
+#[cfg(unix)]
+mod outputs;
 mod page;
 mod parsers;
 mod place_owner;
@@ -93,6 +99,7 @@ mod refused_writes;
 mod renamed;
 mod report;
 mod resume;
+mod retire;
 mod review_alignment;
 mod review_browser;
 mod review_data;
@@ -133,5 +140,6 @@ mod tiff_kinds;
 #[cfg(unix)]
 mod tls_to_server;
 mod uninterrupted;
+mod unusual_scans;
 #[cfg(unix)]
 mod watch_workers;

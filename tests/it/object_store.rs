@@ -13,6 +13,7 @@ use mocban::check::{CheckOptions, check};
 use mocban::store::Project;
 
 use crate::cli::{Call, binary, call, empty, mocban};
+use crate::fault::{ENOSPC, Fault};
 use crate::resume::project;
 use crate::s3_server::{Faults, Outage, S3Server, proxy, proxy_with_outage};
 use crate::uninterrupted::{assert_same_files, files};
@@ -169,6 +170,21 @@ fn a_store_that_loses_requests_and_killed_processes_change_no_result() {
         requests.disturbed.load(Ordering::Relaxed) > 5,
         "{requests:?}"
     );
+    remote.assert_same_results();
+}
+
+#[test]
+fn a_full_cache_folder_is_named_and_the_next_run_continues() {
+    let Some(remote) = Remote::new() else { return };
+    let port = remote.server.port();
+    let full = Fault::once("write", "cache/*", ENOSPC).and_later();
+    let mut run = remote.command(port, "cache", &["run"]);
+    full.inject(4, remote.path(), remote.path(), &mut run);
+    let run = call(&mut run).expect(1);
+    assert!(Fault::injected(remote.path()) > 0);
+    let advice = "cache/mocban: No space left on device; free some space";
+    assert!(run.err.contains(advice), "{}", run.err);
+    remote.remote(port, &["run"]).expect(0);
     remote.assert_same_results();
 }
 

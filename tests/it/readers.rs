@@ -10,14 +10,13 @@ use std::sync::OnceLock;
 use serde_json::Value;
 
 use crate::cli::{Call, call, mocban};
+use crate::export_readback::every_format;
 use crate::source_text::package_dir;
 
 /// Number of pairs of the project.
 const PAIRS: usize = 12;
 /// Number of blocks of the project; splits have whole blocks.
 const BLOCKS: usize = 4;
-/// Every format.
-const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset,mesh,fiji,annotations,viewer";
 /// Exit code of a script whose module or program is not installed.
 const SKIPPED: i32 = 77;
 
@@ -54,7 +53,14 @@ impl ExportedDemo {
         let split = ["--split", "50/25/25", "--by", "block", "--seed", "1"];
         made.call(
             &[
-                &["export", "--to", FORMATS, "--images", "-o", "export"],
+                &[
+                    "export",
+                    "--to",
+                    &every_format(),
+                    "--images",
+                    "-o",
+                    "export",
+                ],
                 &split[..],
             ]
             .concat(),

@@ -3,14 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mocban::catalog::{Catalog, ImportChunk, ImportRow, NewVerdict, ReviewContext};
+use mocban::catalog::{Catalog, ImportChunk, ImportRow, ImportTerms, NewVerdict, ReviewContext};
 use mocban::config::{self, Sources};
 use mocban::demo::{DemoOptions, Tier, write_dataset};
 use mocban::domain::{PairName, ThresholdMetric, Verdict};
 use mocban::export::pictures::SHEET_WIDTH;
 use mocban::export::{
-    ContactSheetOptions, ContactSheetOrder, ExportFormat, ExportOptions, InputFileLimits,
-    draw_contact_sheet,
+    ContactSheetOptions, ContactSheetOrder, ExportFormat, ExportOptions, draw_contact_sheet,
 };
 use mocban::manifest::parse_csv;
 use mocban::mesh::MeshLimits;
@@ -18,6 +17,7 @@ use mocban::raster::{self, Grid, decode_grey8, decode_grey16};
 use mocban::report::{Report, build};
 use mocban::runner::{self, RunOptions, Stop};
 use mocban::store::Project;
+use mocban_core::InputLimits;
 use serde_json::Value;
 
 /// An arbitrary time.
@@ -101,8 +101,11 @@ impl FinishedRun {
             value["tops_mask"] = stored(Path::new(tops)).into();
             (name(value["id"].as_str().expect("an id")), value)
         });
-        let truths = truths.collect();
-        let imported = self.catalog.import_all(chunks, truths, NOW).await;
+        let terms = ImportTerms {
+            truths: truths.collect(),
+            ..ImportTerms::default()
+        };
+        let imported = self.catalog.import_all(chunks, terms, NOW).await;
         imported.expect("imported");
     }
 
@@ -114,7 +117,7 @@ impl FinishedRun {
 
     async fn export(&self, to: &str) -> PathBuf {
         let target = self.dir.path().join(to);
-        let limits = InputFileLimits {
+        let limits = InputLimits {
             mesh: MeshLimits::SUGGESTED,
             image: raster::ImageLimits::SUGGESTED,
         };
@@ -349,7 +352,7 @@ async fn verdicts_make_acc(run: &FinishedRun) {
         reviewer: "lan".to_owned(),
         reason: None,
         note: None,
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: None,
     };
     let set = vec![
@@ -365,7 +368,7 @@ async fn verdicts_make_acc(run: &FinishedRun) {
         assert_eq!((row.judged, row.passed, row.failed), (2, 1, 1));
         assert_eq!(row.acc, Some(0.5));
     }
-    assert_eq!(report.comparisons.len(), 8);
+    assert!(report.comparisons.is_empty(), "two pairs are too few");
     let verdicts: Vec<Value> = lines(&run.export("judged").await)
         .into_iter()
         .map(|line| line["verdict"].clone())

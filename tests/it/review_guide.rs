@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::browser::{Browser, Tab};
 use crate::page::{Page, open_review, read_project};
-use crate::review_browser::{PLAIN, enter, judge, on_a_page_of};
+use crate::review_browser::{PLAIN, accepts_an_answer, enter, judge, on_a_page_of};
 
 /// Position and size of the large image.
 fn picture(tab: &Tab<'_>) -> Value {
@@ -158,7 +158,7 @@ fn the_end_page_sums_up_and_names_the_next_commands() {
         for _ in 1..all as usize {
             judge(&tab, key);
         }
-        tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+        accepts_an_answer(&tab);
         tab.key(key);
         tab.wait("document.getElementById('end').dataset.ready");
         tab.screenshot(&format!("end-{reviewer}"));
@@ -178,6 +178,8 @@ fn the_end_page_sums_up_and_names_the_next_commands() {
         let missed = text.contains("Most attention checks were missed");
         assert_eq!(missed, noticed == 0, "{text}");
         assert!(text.contains("report -o report.html"), "{text}");
+        let same_results = "review --reviewer NAME --metric density --sample 3";
+        assert!(text.contains(same_results), "{text}");
         let agrees = text.contains("3 of 3 answers are the same as those of bo");
         assert_eq!(agrees, reviewer == "lan", "{text}");
         tab.key("Backspace");
@@ -275,4 +277,19 @@ fn the_summary_is_a_secret_until_every_item_is_answered() {
     let reply = page.get("/api/summary");
     assert_eq!(reply.status, 403, "{:?}", reply.json());
     assert_eq!(reply.json()["error"], "answer every image first");
+}
+
+#[test]
+fn keys_work_as_soon_as_a_dialog_is_closed() {
+    on_a_page_of(read_project, &PLAIN, [1440, 900], |_, tab| {
+        tab.key("KeyJ");
+        tab.wait("document.activeElement.id === 'jump-to'");
+        // In the same task of the event loop that closes the dialog, the focus is still inside the dialog.
+        tab.eval(
+        "document.getElementById('jump').close();
+        document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));
+        null",
+    );
+        tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+    });
 }

@@ -4,7 +4,7 @@ use mocban::config::{self, Sources};
 use mocban::demo::{DemoPair, PairGenerator, Tier};
 use mocban::domain::MetricOutcome;
 use mocban::raster;
-use mocban::report::{
+use mocban::results::{
     ground_truth::{TruthErrors, TruthRecord},
     tops_iou,
 };

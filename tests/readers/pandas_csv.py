@@ -1,4 +1,4 @@
-"""Reads the table of `csv` in pandas, and compares it with the lines of `jsonl`."""
+"""Reads the tables of `csv` in pandas, joins them, and compares it with the lines of `jsonl`."""
 
 from common import apply, check, check_labels, check_landmarks, folders, read_lines
 import numpy as np
@@ -23,6 +23,10 @@ path = export / "csv" / "pairs.csv"
 # pandas would turn a column of the user with `true` and `false` into booleans.
 texts = {name: str for name in pandas.read_csv(path, nrows=0) if name == "id" or name.startswith("meta_")}
 table = pandas.read_csv(path, dtype=texts, keep_default_na=False, na_values=dict.fromkeys(NUMBERS, ""))
+first = ["id", "character", "block", "metric", "verdict", "confidence"]
+check(list(table)[:6] == first, f"the table begins with {list(table)[:6]}")
+matrices = pandas.read_csv(export / "csv" / "matrices.csv", dtype={"id": str}, keep_default_na=False)
+table = table.merge(matrices, on=["id", "metric"], how="left", validate="one_to_one")
 lines = read_lines(export / "jsonl" / "pairs.jsonl")
 check(len(table) == len(lines), f"pandas reads {len(table)} rows of {len(lines)}")
 check(all(table[name].dtype == np.float64 for name in NUMBERS), f"pandas reads the types {table[NUMBERS].dtypes.to_dict()}")

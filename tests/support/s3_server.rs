@@ -53,6 +53,8 @@ impl S3Server {
                 "-s3.port.lance=0",
                 "-ip=127.0.0.1",
                 "-volume.max=10",
+                // A disk that is nearly full would make it refuse all objects.
+                "-volume.minFreeSpace=1MiB",
                 "-master.telemetry=false",
             ])
             .args([
@@ -85,16 +87,16 @@ impl S3Server {
             port,
             _dir: dir,
         };
-        // A PUT of the bucket succeeds when all parts of the server have found each other.
+        // An object with a body is stored when all parts of the server have found each other.
         let deadline = std::time::Instant::now() + Duration::from_mins(1);
         while std::time::Instant::now() < deadline {
             if server.process.try_wait().expect("its state").is_some() {
                 return None;
             }
-            if request(port, "PUT", &format!("/{BUCKET}")) == Some(200)
-                && request(port, "PUT", &format!("/{BUCKET}/ready")) == Some(200)
+            if request(port, "PUT", &format!("/{BUCKET}"), "") == Some(200)
+                && request(port, "PUT", &format!("/{BUCKET}/ready"), "ready") == Some(200)
             {
-                request(port, "DELETE", &format!("/{BUCKET}/ready"));
+                request(port, "DELETE", &format!("/{BUCKET}/ready"), "");
                 return Some(server);
             }
             std::thread::sleep(Duration::from_millis(100));
@@ -194,16 +196,17 @@ fn free_ports() -> [u16; 4] {
     listeners.map(|listener| listener.local_addr().expect("an address").port())
 }
 
-/// Sends a request without a body. Returns the status of the reply.
-fn request(port: u16, method: &str, path: &str) -> Option<u16> {
+/// Sends a request. Returns the status of the reply.
+fn request(port: u16, method: &str, path: &str, body: &str) -> Option<u16> {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).ok()?;
     stream
         .set_read_timeout(Some(Duration::from_secs(20)))
         .ok()?;
-    let head = format!(
-        "{method} {path} HTTP/1.1\r\nHost: s3\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+    let length = body.len();
+    let request = format!(
+        "{method} {path} HTTP/1.1\r\nHost: s3\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
     );
-    stream.write_all(head.as_bytes()).ok()?;
+    stream.write_all(request.as_bytes()).ok()?;
     let mut reply = String::new();
     stream.read_to_string(&mut reply).ok()?;
     reply.split(' ').nth(1)?.parse().ok()

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sqlx::{PgPool, SqlitePool};
 use tokio::sync::{mpsc, oneshot};
 
-use crate::db::conn::{Conn, Held, Work};
+use crate::db::conn::{Conn, ConnectionKind, Work};
 use crate::db::error::{CatalogError, Result};
 use crate::db::open;
 use crate::db::postgres_address::PostgresAddress;
@@ -74,7 +74,7 @@ impl Catalog {
     ) -> Result<Self> {
         let conn = open::write_conn(path, allow_empty).await?;
         let readers = ReaderPool::Sqlite(open::reader_pool(path).await?);
-        let writer = WriteConnection::new(Conn::Sqlite(Held::Owned(conn)), path.into());
+        let writer = WriteConnection::new(Conn::Sqlite(ConnectionKind::Owned(conn)), path.into());
         Ok(Self::start(readers, writer, delay, Arc::default()))
     }
 
@@ -181,8 +181,7 @@ impl Catalog {
     /// Sends the writer a message.
     pub(crate) async fn send(&self, message: Message) -> Result<()> {
         let inbox = self.inbox.as_ref().ok_or(CatalogError::ReadOnly)?;
-        let sent = inbox.send(message).await;
-        sent.or(Err(CatalogError::Closed))
+        inbox.send(message).await.or(Err(CatalogError::Closed))
     }
 
     /// Sends the writer a message and waits for the reply.
@@ -194,18 +193,20 @@ impl Catalog {
 
     pub(crate) async fn read_conn(&self) -> Result<Conn> {
         Ok(match &self.readers {
-            ReaderPool::Sqlite(pool) => Conn::Sqlite(Held::Pooled(pool.acquire().await?)),
-            ReaderPool::Postgres(pool) => Conn::Postgres(Held::Pooled(pool.acquire().await?)),
+            ReaderPool::Sqlite(pool) => Conn::Sqlite(ConnectionKind::Pooled(pool.acquire().await?)),
+            ReaderPool::Postgres(pool) => {
+                Conn::Postgres(ConnectionKind::Pooled(pool.acquire().await?))
+            }
         })
     }
 
     /// Begins a read transaction, which sees the catalog as of one moment.
     pub(crate) async fn snapshot(&self) -> Result<Conn> {
         Ok(match &self.readers {
-            ReaderPool::Sqlite(pool) => Conn::Sqlite(Held::Snapshot(pool.begin().await?)),
+            ReaderPool::Sqlite(pool) => Conn::Sqlite(ConnectionKind::Snapshot(pool.begin().await?)),
             ReaderPool::Postgres(pool) => {
                 let begin = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY";
-                Conn::Postgres(Held::Snapshot(pool.begin_with(begin).await?))
+                Conn::Postgres(ConnectionKind::Snapshot(pool.begin_with(begin).await?))
             }
         })
     }

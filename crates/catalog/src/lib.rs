@@ -2,8 +2,8 @@
 //!
 //! - `queue`: the job queue; `blocks`: the data of whole blocks; `records`: the data of pairs, verdicts and imports;
 //!   `audit`: checks and repairs; `transfer`: copies to another catalog; `db`: connections, statements, errors
-//! - One writer task owns the only write connection of a process and commits the requests of several pairs at once, after at
-//!   most 250 ms. Reads use other connections, also during a run. Callers pass the current time.
+//! - A process has one write connection, which a task owns. It commits the requests of several pairs together, each at most
+//!   250 ms after it arrived. Reads use other connections and go on during a run. Callers pass the current time.
 //! - A statement has one text for both databases, which `db/dialect.rs` translates; claims and checkpoints have one for each.
 //!   In SQLite, a group of them is one transaction. In PostgreSQL, each is one statement that commits by itself, with one
 //!   array per column, and claims begin behind the last claimed pair, because a snapshot that another session holds would
@@ -13,13 +13,16 @@
 //! - Rows that no run can compute again, such as verdicts, have checksums (`records/checksums.rs`).
 //! - `db init --roles` gives the tables to group roles: the database refuses what a role may not do.
 //!
-//! **Invariant:** no other crate contains SQL, a write under a lost lease changes nothing, and every test of this crate runs
+//! Every call fails if a database operation fails. `# Errors` names other reasons, and what an error leaves behind.
+//!
+//! **Invariant:** no other crate contains SQL, what a worker stores for a job whose lease it has lost is refused, and every test of this crate runs
 //! on both databases.
 
 mod audit;
 mod blocks;
 mod db;
 mod handle;
+mod lease_recovery;
 mod new_catalog;
 #[cfg(test)]
 #[path = "../../../tests/support/postgres_server.rs"]
@@ -28,10 +31,8 @@ mod postgres_server;
 mod query_plans;
 mod queue;
 mod records;
-mod recovery;
 mod retry;
 #[cfg(any(test, feature = "test-helpers"))]
-#[expect(clippy::missing_errors_doc, reason = "only tests call these methods")]
 mod test_helpers;
 #[cfg(test)]
 mod tests;
@@ -53,14 +54,11 @@ pub use blocks::control_points::ControlPointsChange;
 pub use blocks::cut::{CutReply, CutSummary};
 pub use blocks::import::BlockImportSummary;
 pub use blocks::model::{
-    BlockAttributes, BlockInputVersions, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith,
-    NewCharacter, StoredCharacter,
+    BlockAttributes, BlockInputVersions, BlockProvenance, BlockWork, CharacterMaps, CutOrigin,
+    CutPair, NewCharacter, StoredCharacter,
 };
 pub use blocks::queue::OutstandingBlocks;
-pub use blocks::records::{
-    AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
-    StoredBlockFailure,
-};
+pub use blocks::records::{AuditedBlock, BlockDetail, BlockStageDetail, BlockState, KnownBlock};
 pub use blocks::selection::BlockSelection;
 pub use blocks::staleness::{BlockPlanEntry, BlockReason};
 pub use db::error::{CatalogError, LogLoss, Result};
@@ -84,6 +82,7 @@ pub use queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
 pub use queue::provenance::{FingerprintId, InputVersions, PairProvenance};
 pub use queue::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use queue::requeue::RetrySelection;
+pub use queue::retired::RetiredPair;
 pub use queue::selection::PairSelection;
 pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;
@@ -92,7 +91,7 @@ pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo, WorkerSettings};
 pub use records::append_verdicts::{ImportedVerdicts, ListedVerdict};
 pub use records::checksums::ChecksummedTable;
 pub use records::faulty_rows::{FaultyRow, RowFault};
-pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
+pub use records::import::{ImportChunk, ImportRow, ImportSummary, ImportTerms, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageCounts,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::db::error::{CatalogError, Result};
 use crate::db::network_fs;
-use crate::db::unplaced::{self, UnplacedFile};
+use crate::db::pending_catalog::{self, PendingCatalog};
 use crate::handle::Catalog;
 use crate::queue::commit::commit_delay::CommitDelay;
 
@@ -12,7 +12,7 @@ use crate::queue::commit::commit_delay::CommitDelay;
 #[derive(Debug)]
 pub struct NewCatalog {
     catalog: Catalog,
-    file: UnplacedFile,
+    file: PendingCatalog,
 }
 
 impl NewCatalog {
@@ -26,7 +26,7 @@ impl NewCatalog {
         if path.symlink_metadata().is_ok() {
             return Ok(None);
         }
-        let file = UnplacedFile::create(path)?;
+        let file = PendingCatalog::create(path)?;
         let catalog = Catalog::with_writer(file.path(), true, CommitDelay::new()).await;
         let catalog = catalog.map_err(|error| match error {
             CatalogError::NotWritable(_) => CatalogError::NotCreated(path.to_owned()),
@@ -42,9 +42,6 @@ impl NewCatalog {
 
     /// Closes the catalog and durably renames its file to the final path. Returns `false`, and drops the new catalog,
     /// if another process created a catalog there first.
-    ///
-    /// # Errors
-    /// Returns an error if the disk returns one.
     pub async fn place(self) -> Result<bool> {
         self.catalog.close().await;
         self.file.place()
@@ -70,6 +67,6 @@ impl Catalog {
 
     /// Removes the hidden files of creators that were killed, if no process is creating a catalog in this folder.
     pub fn remove_stale_files(&self) {
-        unplaced::remove_stale(&self.path);
+        pending_catalog::remove_stale(&self.path);
     }
 }

@@ -4,7 +4,6 @@ use sqlx::{AssertSqlSafe, Row as _};
 
 use super::tests::{Place, World};
 use crate::audit::audited_pairs;
-use crate::audit::repair;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::queue::checkpoint;
@@ -67,7 +66,7 @@ async fn fenced_writes_find_their_jobs_by_key() {
         fail::FAIL.of::<PairJob>(),
         claim::RELEASE.of::<PairJob>(),
         requeue::REQUEUE.of::<PairJob>(),
-        repair::RESTORE.into(),
+        requeue::SEND_BACK.of::<PairJob>(),
     ] {
         let plan = plan(sql).await;
         assert!(
@@ -83,7 +82,7 @@ async fn fenced_writes_find_their_jobs_by_key() {
 async fn recovery_and_holders_use_the_index_of_leases() {
     for sql in [
         recovery::RECOVER.of::<PairJob>(),
-        recovery::LEFT_BY.into(),
+        recovery::ORPHANED.into(),
         recovery::OVERDUE.of::<PairJob>(),
         recovery::HOLDERS.into(),
         recovery::AFFECTED.of::<PairJob>(),
@@ -151,8 +150,8 @@ async fn jobs_are_counted_by_ranges_of_their_key() {
 
 #[tokio::test]
 async fn inspected_jobs_are_found_by_key() {
-    let among = plan(staleness::INSPECT).await;
-    assert_only(&among, &["VIRTUAL TABLE", "SCAN found"]);
+    let selection = plan(staleness::INSPECT).await;
+    assert_only(&selection, &["VIRTUAL TABLE", "SCAN found"]);
 }
 
 #[tokio::test]

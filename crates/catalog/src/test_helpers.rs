@@ -9,7 +9,7 @@ use tokio::sync::{mpsc, oneshot};
 use crate::db::query::query_scalar;
 use crate::queue::commit::commit_delay::CommitDelay;
 use crate::{
-    Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, Lease, Result,
+    Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, ImportTerms, Lease, Result,
     StageCheckpoint,
 };
 use mocban_core::domain::{PairId, PairName, Stage, UnixMillis, WorkerId};
@@ -21,7 +21,7 @@ impl Catalog {
         for chunk in [ImportChunk::Rows(rows), ImportChunk::End] {
             sender.try_send(chunk).expect("room for both");
         }
-        let (summary, _) = self.import_all(chunks, Vec::new(), now).await?;
+        let (summary, _) = self.import_all(chunks, ImportTerms::default(), now).await?;
         Ok(summary)
     }
 
@@ -29,7 +29,11 @@ impl Catalog {
     pub async fn set_truth(&self, truths: Vec<(PairName, Value)>) -> Result<u64> {
         let (sender, chunks) = mpsc::channel(1);
         sender.try_send(ImportChunk::End).expect("room");
-        let (_, stored) = self.import_all(chunks, truths, 1).await?;
+        let terms = ImportTerms {
+            truths,
+            ..ImportTerms::default()
+        };
+        let (_, stored) = self.import_all(chunks, terms, 1).await?;
         Ok(stored)
     }
 

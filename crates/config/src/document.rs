@@ -9,8 +9,7 @@ use super::error::ConfigError;
 use super::sources::Preset;
 use super::tree::{Setting, Tree};
 use mocban_align::stages::Settings;
-use mocban_core::mesh;
-use mocban_core::raster;
+use mocban_core::InputLimits;
 
 /// Every setting as a typed value. [`Tree`] has already refused unknown sections and keys.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,16 +41,6 @@ impl Config {
         }
         Ok(settings)
     }
-}
-
-/// Size limits above which an input file is refused.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct InputLimits {
-    /// Limits of mesh files.
-    pub mesh: mesh::MeshLimits,
-    /// Limits of print images.
-    pub image: raster::ImageLimits,
 }
 
 /// Resources of a run.

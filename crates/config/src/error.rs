@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use mocban_core::domain::sanitize;
+use mocban_core::domain::{ErrorCode, Explained, sanitize};
 
 /// Longest quotation in a message, in characters.
 const MAX_QUOTE: usize = 160;
@@ -59,6 +59,12 @@ pub enum ConfigError {
     /// The embedded texts and the structs disagree: a defect of this program.
     #[error("the built-in settings are inconsistent: {0}")]
     BuiltIn(String),
+}
+
+impl Explained for ConfigError {
+    fn code(&self) -> ErrorCode {
+        ErrorCode::Settings
+    }
 }
 
 /// Sanitizes and shortens text from outside, so that messages can quote it.

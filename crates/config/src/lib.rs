@@ -13,7 +13,7 @@ mod ranges;
 mod sources;
 mod tree;
 
-pub use document::{Config, InputLimits, ReviewSettings, RunSettings, StorageSettings};
+pub use document::{Config, ReviewSettings, RunSettings, StorageSettings};
 pub use error::{ConfigError, Origin};
 pub use local::{LocalSettings, make_local};
 pub use sources::{BaseLayer, Preset, Sources, explanation};

@@ -10,7 +10,10 @@
 //! so each function returns the same for the same arguments.
 
 pub mod domain;
+mod input_limits;
 pub mod mesh;
 pub mod page_vec;
 pub mod raster;
 pub mod simd;
+
+pub use input_limits::InputLimits;

@@ -16,7 +16,7 @@ const MARGIN_MM: f64 = 2.2;
 const STEP_MM: f64 = 0.035;
 /// Sample spacing for scenes that show 3 x 3 characters, mm.
 const WIDE_STEP_MM: f64 = 0.05;
-/// Margin of crops that show 3 x 3 characters, as a share of the character's size.
+/// Margin of crops that show 3 x 3 characters, as a fraction of the character's size.
 pub(super) const WIDE_MARGIN: f64 = 1.1;
 /// Minimum gap between the character and its neighbours, mm.
 const CLEARANCE_MM: f64 = 0.35;
@@ -52,15 +52,7 @@ impl Artwork {
                 SampleFrame::covering(half_mm, WIDE_STEP_MM)
             }
         };
-        let mut coverage = Grid::new(frame.side, frame.side, 0.0);
-        let outline_mm = size_mm - 2.0 * weight_mm;
-        glyphs.ink(character, frame, [0.0, 0.0], outline_mm, &mut coverage);
-        let mut strokes = knife_outline(
-            &ScalarField::signed_distance(frame, &coverage),
-            weight_mm,
-            rng,
-        );
-        chip_edges(&mut strokes, rng);
+        let strokes = carved_strokes(glyphs, character, frame, [size_mm, weight_mm], rng);
         Self::new(strokes, size_mm)
     }
 
@@ -107,8 +99,8 @@ impl Artwork {
         let pitch = self.size_mm * rng.random_range(1.0..1.08) + 0.2;
         let column = self.size_mm * rng.random_range(1.04..1.18) + 0.4;
         let beside = [[0.0, -pitch], [0.0, pitch], [-column, 0.0], [column, 0.0]];
-        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-        let corners = corners.map(|[across, down]| [across * column, down * pitch]);
+        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
+            .map(|[across, down]| [across * column, down * pitch]);
         let (offsets, probability) = match crop {
             Crop::Character => (beside.to_vec(), 0.75),
             Crop::WideMesh | Crop::WidePrint => ([beside, corners].concat(), 1.0),
@@ -123,11 +115,7 @@ impl Artwork {
             }
         }
         let weight_mm = draw_stroke_weight(self.size_mm, rng);
-        let mut neighbours = knife_outline(
-            &ScalarField::signed_distance(frame, &coverage),
-            weight_mm,
-            rng,
-        );
+        let mut neighbours = knife_outline(frame, &coverage, weight_mm, rng);
         for u in [-column / 2.0, column / 2.0] {
             if rng.random_bool(0.4) {
                 add_rule(&mut neighbours, u, rng);
@@ -158,17 +146,36 @@ fn draw_stroke_weight(size_mm: f64, rng: &mut ChaCha8Rng) -> f64 {
     size_mm * rng.random_range(0.013..0.022)
 }
 
-/// Returns the signed distance to the outline as a knife would cut it. The outline is moved outwards by about
+/// Carves a character of the font, centred on the frame. Returns the signed distance to its outline in mm, positive
+/// inside. Its longest side has `size_mm`, and its outline is moved outwards by about `weight_mm`.
+pub(super) fn carved_strokes(
+    glyphs: &Glyphs,
+    character: char,
+    frame: SampleFrame,
+    [size_mm, weight_mm]: [f64; 2],
+    rng: &mut ChaCha8Rng,
+) -> ScalarField {
+    let mut coverage = Grid::new(frame.side, frame.side, 0.0);
+    let outline_mm = size_mm - 2.0 * weight_mm;
+    glyphs.ink(character, frame, [0.0; 2], outline_mm, &mut coverage);
+    let mut strokes = knife_outline(frame, &coverage, weight_mm, rng);
+    chip_edges(&mut strokes, rng);
+    strokes
+}
+
+/// Returns the signed distance to the outline as a knife would cut it. The outline of the ink is moved outwards by about
 /// `weight_mm`, and has rounded corners and a slightly irregular edge.
-pub(super) fn knife_outline(
-    distance: &ScalarField,
+fn knife_outline(
+    frame: SampleFrame,
+    coverage: &Grid<f32>,
     weight_mm: f64,
     rng: &mut ChaCha8Rng,
 ) -> ScalarField {
+    let distance = ScalarField::signed_distance(frame, coverage);
     let (coarse, fine) = (Noise::draw(rng), Noise::draw(rng));
     let (coarse_mm, fine_mm) = (rng.random_range(0.03..0.07), rng.random_range(0.015..0.035));
     let round = distance.blurred(rng.random_range(0.05..0.09));
-    ScalarField::from_fn(distance.frame, |[u, v], x, y| {
+    ScalarField::from_fn(frame, |[u, v], x, y| {
         round.at(x, y)
             + weight_mm
             + coarse_mm * coarse.at(u / 0.9, v / 0.9)
@@ -177,7 +184,7 @@ pub(super) fn knife_outline(
 }
 
 /// Removes small chips along the stroke outline.
-pub(super) fn chip_edges(strokes: &mut ScalarField, rng: &mut ChaCha8Rng) {
+fn chip_edges(strokes: &mut ScalarField, rng: &mut ChaCha8Rng) {
     for _ in 0..rng.random_range(2..9_u32) {
         let Some([u, v]) = random_boundary_point(strokes, rng) else {
             return;
@@ -188,14 +195,10 @@ pub(super) fn chip_edges(strokes: &mut ScalarField, rng: &mut ChaCha8Rng) {
 
 /// Removes a disc from the strokes.
 fn remove_disc(strokes: &mut ScalarField, [u, v]: [f64; 2], radius_mm: f64) {
-    let frame = strokes.frame;
-    let extent_mm = radius_mm + 0.3;
-    for (x, y) in frame.box_around([u, v], extent_mm) {
-        let [pu, pv] = frame.position(x, y);
-        let outside = (pu - u).hypot(pv - v) - radius_mm;
-        let value = strokes.at(x, y).min(outside);
-        strokes.values.set(x, y, value as f32);
-    }
+    let around = strokes.frame.box_around([u, v], radius_mm + 0.3);
+    strokes.change(around, |[pu, pv], before| {
+        before.min((pu - u).hypot(pv - v) - radius_mm)
+    });
 }
 
 /// Returns a random point within 0.05 mm of the outline, or `None` if 4000 draws find none.
@@ -212,16 +215,10 @@ fn add_rule(neighbours: &mut ScalarField, at_mm: f64, rng: &mut ChaCha8Rng) {
     let noise = Noise::draw(rng);
     let half_width = rng.random_range(0.10..0.2);
     let lean = rng.random_range(-0.02..0.02);
-    let frame = neighbours.frame;
-    for y in 0..frame.side {
-        for x in 0..frame.side {
-            let [u, v] = frame.position(x, y);
-            let middle = at_mm + lean * v + 0.08 * noise.at(v / 1.5, 0.0);
-            let inside = half_width + 0.04 * noise.at(v / 0.4, 7.0) - (u - middle).abs();
-            let value = neighbours.at(x, y).max(inside);
-            neighbours.values.set(x, y, value as f32);
-        }
-    }
+    neighbours.change(neighbours.frame.samples(), |[u, v], before| {
+        let middle = at_mm + lean * v + 0.08 * noise.at(v / 1.5, 0.0);
+        before.max(half_width + 0.04 * noise.at(v / 0.4, 7.0) - (u - middle).abs())
+    });
 }
 
 /// Removes neighbours closer than [`CLEARANCE_MM`] to the character.

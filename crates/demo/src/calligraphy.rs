@@ -49,9 +49,6 @@ static CELLS: [PhotographedCharacter; REAL_PAIRS as usize] = cells! {
 };
 
 /// Makes a pair. The print is the unchanged photograph. The relief is carved from the clean mask, in a random pose.
-///
-/// # Errors
-/// Returns an error if an embedded image cannot be decoded.
 pub(super) fn pair(
     glyphs: &Glyphs,
     seed: u64,

@@ -19,11 +19,11 @@ pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) 
     // Wear is scaled down on a shallow block, so that its tops stay above its floor.
     let worn_share = scene.conditions.depth.clamp(0.5, 1.0);
     let wear = Wear::draw(rng);
+    let all = strokes.union(&scene.block_neighbours);
     let cut = ScalarField::from_fn(frame, |point, x, y| {
-        let neighbour = scene.block_neighbours.at(x, y);
-        let inside = strokes.at(x, y).max(neighbour);
+        let inside = all.at(x, y);
         if inside > 0.0 {
-            let raised_mm = if neighbour > 0.0 {
+            let raised_mm = if scene.block_neighbours.at(x, y) > 0.0 {
                 scene.conditions.raised_mm
             } else {
                 0.0
@@ -36,12 +36,7 @@ pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) 
     let rounded = cut.blurred(rng.random_range(0.03..0.05));
     let rounded = match &scene.conditions.weathering {
         None => rounded,
-        Some(weathering) => {
-            let all = ScalarField::from_fn(frame, |_, x, y| {
-                strokes.at(x, y).max(scene.block_neighbours.at(x, y))
-            });
-            weathering.applied(&rounded, &all, knife.scale * knife.depth_mm)
-        }
+        Some(weathering) => weathering.applied(&rounded, &all, knife.scale * knife.depth_mm),
     };
     let bend = Bend::draw(scene.tier.bend_mm(), strokes, rng);
     let bent = ScalarField::from_fn(frame, |point, x, y| {
@@ -103,14 +98,11 @@ fn gouges(frame: SampleFrame, rng: &mut ChaCha8Rng) -> ScalarField {
         let centre = frame.random_position(rng);
         let (length, width) = (rng.random_range(0.5..1.6), rng.random_range(0.12..0.35));
         let depth = rng.random_range(0.05..0.22);
-        for (x, y) in frame.box_around(centre, length) {
-            let [u, v] = frame.position(x, y);
+        field.change(frame.box_around(centre, length), |[u, v], before| {
             let [along, across] = axis.along_across([u - centre[0], v - centre[1]]);
             let (along, across) = (along / length, across / width);
-            let hollow = depth * (1.0 - along * along - across * across).max(0.0);
-            let value = field.at(x, y).max(hollow);
-            field.values.set(x, y, value as f32);
-        }
+            before.max(depth * (1.0 - along * along - across * across).max(0.0))
+        });
     }
     field
 }

@@ -16,13 +16,13 @@ pub(super) struct Conditions {
     pub depth: f64,
     /// Wear and dirt, if any.
     pub weathering: Option<Weathering>,
-    /// Minimum and maximum share of the stroke area that is lost, if any is.
+    /// Minimum and maximum fraction of the stroke area that is lost, if any is.
     pub lost: Option<NumberRange>,
     /// Errors of the scan.
     pub scan: ScanErrors,
     /// What the scan contains besides the carved face.
     pub base: Base,
-    /// Thickness of the block as a share of the character's size.
+    /// Thickness of the block as a fraction of the character's size.
     pub thickness: f64,
     /// Amount of ink. `None` if the tier's own rule applies.
     pub ink: Option<InkAmount>,
@@ -63,7 +63,7 @@ pub(super) struct InkAmount {
     pub strength: f64,
     /// Degree of dryness.
     pub dryness: f64,
-    /// Largest share of missing ink.
+    /// Largest fraction of missing ink.
     pub uneven: f64,
     /// Where the contact was poor.
     pub contact: Noise,

@@ -9,7 +9,7 @@ use super::kind::NumberRange;
 use super::noise::Noise;
 use super::scalar_field::ScalarField;
 
-/// Minimum and maximum share of the stroke area lost on a damaged block.
+/// Minimum and maximum fraction of the stroke area lost on a damaged block.
 const LOST_SHARE: NumberRange = [0.05, 0.20];
 
 /// Damage to one block.
@@ -39,7 +39,8 @@ impl Damage {
         Self::draw_with(LOST_SHARE, artwork, rng)
     }
 
-    /// Draws the damage of a block that lost a share of its stroke area within `share`. The block has up to two cracks.
+    /// Draws the damage of a block that lost a fraction of its stroke area within `share`. The block has up to two
+    /// cracks.
     pub(super) fn draw_with(share: NumberRange, artwork: &Artwork, rng: &mut ChaCha8Rng) -> Self {
         let lost = Some(draw_lost_regions(share, artwork, rng));
         let cracks = (0..rng.random_range(0..3_u32))
@@ -86,14 +87,12 @@ impl Crack {
     }
 }
 
-/// Draws ragged blobs over the strokes until a random share of the stroke area is lost.
+/// Draws ragged blobs over the strokes until a random fraction of the stroke area is lost.
 fn draw_lost_regions(share: NumberRange, artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
     let strokes = &artwork.strokes;
     let frame = strokes.frame;
-    let ink: Vec<(usize, usize)> = (0..frame.side * frame.side)
-        .map(|i| (i % frame.side, i / frame.side))
-        .filter(|(x, y)| strokes.at(*x, *y) > 0.0)
-        .collect();
+    let ink = frame.samples().filter(|(x, y)| strokes.at(*x, *y) > 0.0);
+    let ink: Vec<(usize, usize)> = ink.collect();
     let target = rng.random_range(share[0]..share[1] - 0.04);
     let edge_noise = Noise::draw(rng);
     let mut lost = ScalarField::from_fn(frame, |_, _, _| -9.0);

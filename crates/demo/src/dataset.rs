@@ -10,6 +10,8 @@ use super::generator::PairGenerator;
 use super::pair::DemoPair;
 use super::scene::pair_id;
 use super::tier::Tier;
+use super::truth_line::tops_file;
+use mocban_core::domain::Explained;
 use mocban_core::raster::png_grey8;
 
 /// Increased whenever the same options produce different bytes.
@@ -76,6 +78,8 @@ pub enum DatasetError {
     #[error("stopped while the demo files were written")]
     Stopped,
 }
+
+impl Explained for DatasetError {}
 
 /// Content of `dataset.json`.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -191,7 +195,7 @@ fn write_pair(
         &pair.mesh_format.encode(&pair.mesh),
     )?;
     write(&dir.join(&manifest_line.print), &pair.print)?;
-    write(&dir.join(&pair.truth.tops_mask), &png_grey8(&pair.tops))?;
+    write(&dir.join(tops_file(&pair.id)), &png_grey8(&pair.tops))?;
     let truth = json_line(&dir.join("truth.jsonl"), &pair.truth)?;
     Ok((manifest_line, truth))
 }

@@ -54,12 +54,18 @@ fn add_lump(mesh: &mut Mesh, centre: [f64; 3], radius_mm: f64, rng: &mut ChaCha8
                 .push([0, 1, 2].map(|i| centre[i] + radii[i] * rough * way[i]));
         }
     }
-    for row in 0..rows {
-        for column in 0..columns {
-            let at = |row: u32, column: u32| start + row * columns + column % columns;
-            let (a, b) = (at(row, column), at(row, column + 1));
-            let (c, d) = (at(row + 1, column + 1), at(row + 1, column));
-            mesh.triangles.extend([[a, d, c], [a, c, b]]);
-        }
+    for [a, b, c, d] in ring_quads(start, rows, columns) {
+        mesh.triangles.extend([[a, b, c], [a, c, d]]);
     }
+}
+
+/// Returns the quads between `rings` + 1 closed rings of `spokes` vertices each, which are numbered from `first` ring by
+/// ring.
+pub(super) fn ring_quads(first: u32, rings: u32, spokes: u32) -> impl Iterator<Item = [u32; 4]> {
+    let quad = move |ring: u32, spoke: u32| {
+        let [this, next] = [ring, ring + 1].map(|ring| first + ring * spokes);
+        let after = (spoke + 1) % spokes;
+        [this + spoke, next + spoke, next + after, this + after]
+    };
+    (0..rings).flat_map(move |ring| (0..spokes).map(move |spoke| quad(ring, spoke)))
 }

@@ -38,9 +38,6 @@ impl PairGenerator {
     }
 
     /// Makes a pair. In the `real` tier, the photographs repeat after 20 pairs.
-    ///
-    /// # Errors
-    /// Returns an error if an image cannot be encoded, or an embedded image cannot be decoded.
     pub fn pair(&self, index: u64) -> Result<DemoPair, ImageError> {
         let (kind, index) = self.tier.tier_and_index(index);
         if kind == Tier::Real {
@@ -51,9 +48,6 @@ impl PairGenerator {
 
     /// Makes a pair of a character, which must be in the font. In the `real` tier, the print is drawn, not a
     /// photograph.
-    ///
-    /// # Errors
-    /// Returns an error if an image cannot be encoded.
     pub fn pair_of(&self, character: char, index: u64) -> Result<DemoPair, ImageError> {
         let (kind, index) = self.tier.tier_and_index(index);
         self.drawn(kind, index, &[character])

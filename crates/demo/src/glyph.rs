@@ -6,8 +6,8 @@ use super::scalar_field::SampleFrame;
 use mocban_core::raster::Grid;
 use mocban_core::raster::fonts::MINCHO;
 
-/// Minimum ratio of height to width of usable characters. Errors are measured as shares of the character's height, so
-/// flat characters, such as a single horizontal bar, are left out.
+/// Minimum ratio of height to width of usable characters. Errors are measured as fractions of the character's height,
+/// so flat characters, such as a single horizontal bar, are left out.
 const MIN_HEIGHT_BY_WIDTH: f32 = 0.5;
 
 /// The embedded font.
@@ -16,7 +16,7 @@ pub(super) struct Glyphs {
     characters: Vec<char>,
 }
 
-/// Position of a character's ink in its em square. Lengths are shares of the em.
+/// Position of a character's ink in its em square. Lengths are fractions of the em.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GlyphExtent {
     /// Longest side of the ink's bounding box.
@@ -74,7 +74,7 @@ impl Glyphs {
         })
     }
 
-    /// Draws a character into `coverage`, which holds the inked share, 0..=1, of each sample's cell. The character's
+    /// Draws a character into `coverage`, which holds the inked fraction, 0..=1, of each sample's cell. The character's
     /// bounding box is centred on `centre_mm`, and its longest side is `size_mm`.
     pub(super) fn ink(
         &self,

@@ -41,9 +41,7 @@ impl Inking {
     pub(super) fn draw(scene: &Scene, rng: &mut ChaCha8Rng) -> Self {
         let (tier, strokes) = (scene.tier, &scene.artwork.strokes);
         let load = draw_ink_load(tier, rng);
-        let union = ScalarField::from_fn(strokes.frame, |_, x, y| {
-            strokes.at(x, y).max(scene.print_neighbours.at(x, y))
-        });
+        let union = strokes.union(&scene.print_neighbours);
         let gap_count = rng.random_range(0..if tier.is_damaged() { 9 } else { 5 });
         let gaps = (0..gap_count)
             .filter_map(|_| draw_gap(strokes, rng))
@@ -109,7 +107,7 @@ impl Inking {
         })
     }
 
-    /// Returns the share of ink that is missing inside a stroke because of dry patches and gaps.
+    /// Returns the fraction of ink that is missing inside a stroke because of dry patches and gaps.
     fn missing_share(&self, point: [f64; 2], px_mm: f64) -> f64 {
         let [u, v] = point;
         let dry = self.dryness * smoothstep(0.0, 0.8, self.dry_patches.at(u / 2.4, v / 2.4));

@@ -32,15 +32,15 @@ pub(super) enum Crop {
 /// Ranges from which the conditions of a pair are drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DemoKind {
-    /// Carved depth as a share of an ordinary block's, which is 1.0 to 1.4 mm.
+    /// Carved depth as a fraction of an ordinary block's, which is 1.0 to 1.4 mm.
     pub depth: NumberRange,
     /// Height that wear removes from the stroke tops in patches, mm.
     pub abrasion_mm: NumberRange,
     /// Height that wear removes from the stroke edges, mm.
     pub rounding_mm: NumberRange,
-    /// Share of the carved depth that is filled with dirt.
+    /// Fraction of the carved depth that is filled with dirt.
     pub fill: NumberRange,
-    /// Share of the stroke area that broke off after printing.
+    /// Fraction of the stroke area that broke off after printing.
     pub lost: NumberRange,
     /// Factor of the height noise of an ordinary scan.
     pub noise: NumberRange,
@@ -62,7 +62,7 @@ pub(super) struct DemoKind {
     pub blobs: NumberRange,
     /// What the scan contains besides the carved face; each is as likely as the others.
     pub bases: &'static [Base],
-    /// Thickness of the block as a share of the character's size.
+    /// Thickness of the block as a fraction of the character's size.
     pub thickness: NumberRange,
     /// Distance by which the ink spreads beyond the printing surface, mm; may be negative.
     pub spread_mm: NumberRange,
@@ -70,7 +70,7 @@ pub(super) struct DemoKind {
     pub strength: NumberRange,
     /// Degree of dryness in dry patches, where ink is missing inside the strokes. 0 for none.
     pub dryness: NumberRange,
-    /// Share of the ink that is missing where the sheet had the least contact.
+    /// Fraction of the ink that is missing where the sheet had the least contact.
     pub uneven: NumberRange,
     /// Density of ink smeared on the carved background.
     pub smear: NumberRange,
@@ -78,7 +78,7 @@ pub(super) struct DemoKind {
     pub tilt_deg: NumberRange,
     /// Amplitude of the smooth warp of the sheet, mm.
     pub warp_mm: NumberRange,
-    /// Share by which the sheet shrank along one axis. It shrank less along the other.
+    /// Fraction by which the sheet shrank along one axis. It shrank less along the other.
     pub shrink: NumberRange,
     /// Which of mesh and print shows all neighbours.
     pub crop: Crop,

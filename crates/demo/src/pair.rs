@@ -64,9 +64,6 @@ pub(super) struct Printed {
 
 /// Makes a pair whose print is drawn, so not a photograph. The character is one of `characters`, which are in the font.
 /// If the tier has a kind, draws again until print and relief both show the character.
-///
-/// # Errors
-/// Returns an error if the print cannot be encoded.
 pub(super) fn drawn_pair(
     glyphs: &Glyphs,
     characters: &[char],
@@ -209,7 +206,7 @@ mod tests {
     }
 
     /// Maps a mesh point to the print by the ground truth. Returns the mask's value there, and the point's height over
-    /// the true plane as a share of the character's height. Returns `None` outside the mask.
+    /// the true plane as a fraction of the character's height. Returns `None` outside the mask.
     fn height_at(pair: &DemoPair, tops: &Grid<u8>, point: [f64; 3]) -> Option<(u8, f64)> {
         let map = pair.truth.print_from_mesh;
         let [x, y, height] = map.apply(point);

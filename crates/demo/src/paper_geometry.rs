@@ -8,7 +8,7 @@ use super::ellipse::Axis;
 use super::kind::DemoKind;
 use super::noise::Noise;
 
-/// Largest number of steps of the fixed-point iteration that inverts the warp.
+/// Largest number of steps of the iteration that inverts the warp.
 const INVERSION_STEPS: usize = 30;
 /// Size of the warp's features, mm.
 const WARP_SIZE_MM: [f64; 2] = [4.5, 9.0];
@@ -70,16 +70,7 @@ impl PaperGeometry {
         let [along, across] = self.shrink_axis.along_across(shrunk);
         let unshrunk = [along / self.shrink[0], across / self.shrink[1]];
         let warped = self.shrink_axis.point(unshrunk);
-        let mut uv = warped;
-        for _ in 0..INVERSION_STEPS {
-            let shift = self.warp_at(uv);
-            let next = [warped[0] - shift[0], warped[1] - shift[1]];
-            if next == uv {
-                break;
-            }
-            uv = next;
-        }
-        uv
+        unwarped(warped, INVERSION_STEPS, 0.0, |uv| self.warp_at(uv))
     }
 
     fn warp_at(&self, [u, v]: [f64; 2]) -> [f64; 2] {
@@ -90,4 +81,25 @@ impl PaperGeometry {
         self.warp
             .map(|noise| self.warp_mm * noise.at(u / size, v / size))
     }
+}
+
+/// Returns the point that a warp moves to `warped`, by a fixed-point iteration of at most `steps` steps. It ends when a step
+/// moves the point by at most `tolerance_mm`. It converges if the warp is much smaller than its wavelength.
+pub(super) fn unwarped(
+    warped: [f64; 2],
+    steps: usize,
+    tolerance_mm: f64,
+    warp_at: impl Fn([f64; 2]) -> [f64; 2],
+) -> [f64; 2] {
+    let mut uv = warped;
+    for _ in 0..steps {
+        let shift = warp_at(uv);
+        let next = [warped[0] - shift[0], warped[1] - shift[1]];
+        let moved = (next[0] - uv[0]).abs() + (next[1] - uv[1]).abs();
+        uv = next;
+        if moved <= tolerance_mm {
+            break;
+        }
+    }
+    uv
 }

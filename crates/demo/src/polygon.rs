@@ -12,6 +12,37 @@ pub(super) struct BoundsMm {
     pub max: [f64; 2],
 }
 
+impl BoundsMm {
+    /// Returns the bounding box of some points. Without points, its minimum is infinite.
+    pub(super) fn around(points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for point in points {
+            min = [0, 1].map(|i| min[i].min(point[i]));
+            max = [0, 1].map(|i| max[i].max(point[i]));
+        }
+        Self { min, max }
+    }
+
+    /// Returns width and height.
+    pub(super) fn size(self) -> [f64; 2] {
+        [0, 1].map(|i| self.max[i] - self.min[i])
+    }
+
+    /// Returns the box with a margin around it.
+    pub(super) fn with_margin(self, margin_mm: f64) -> Self {
+        Self {
+            min: self.min.map(|c| c - margin_mm),
+            max: self.max.map(|c| c + margin_mm),
+        }
+    }
+
+    /// Returns the corners in order around the box, from the minimum.
+    pub(super) const fn corners(self) -> [[f64; 2]; 4] {
+        let ([u0, v0], [u1, v1]) = (self.min, self.max);
+        [[u0, v0], [u1, v0], [u1, v1], [u0, v1]]
+    }
+}
+
 /// A closed polygon in (u, v), in mm.
 #[derive(Debug, Clone)]
 pub(super) struct Polygon {
@@ -28,17 +59,12 @@ impl Polygon {
         max_excess_mm: f64,
         rng: &mut ChaCha8Rng,
     ) -> Self {
-        let [u0, v0] = inner.min.map(|c| c - margin_mm);
-        let [u1, v1] = inner.max.map(|c| c + margin_mm);
-        let sides = [
-            ([u0, v0], [u1, v0], [0.0, -1.0]),
-            ([u1, v0], [u1, v1], [1.0, 0.0]),
-            ([u1, v1], [u0, v1], [0.0, 1.0]),
-            ([u0, v1], [u0, v0], [-1.0, 0.0]),
-        ];
+        let around = inner.with_margin(margin_mm).corners();
+        let outward = [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]];
         let mut corners = Vec::new();
-        for (i, (from, to, out)) in sides.into_iter().enumerate() {
-            let before = sides[(i + 3) % 4].2;
+        for i in 0..4 {
+            let (from, to) = (around[i], around[(i + 1) % 4]);
+            let (out, before): ([f64; 2], [f64; 2]) = (outward[i], outward[(i + 3) % 4]);
             corners.push([0, 1].map(|k| {
                 from[k] + (out[k] + before[k]) * rng.random_range(0.0..0.7 * max_excess_mm)
             }));
@@ -53,16 +79,7 @@ impl Polygon {
 
     /// Returns the bounding box.
     pub(super) fn bounds(&self) -> BoundsMm {
-        let extreme = |start: f64, pick: fn(f64, f64) -> f64| {
-            let corners = self.corners.iter();
-            corners.fold([start; 2], |found, corner| {
-                [0, 1].map(|i| pick(found[i], corner[i]))
-            })
-        };
-        BoundsMm {
-            min: extreme(f64::INFINITY, f64::min),
-            max: extreme(f64::NEG_INFINITY, f64::max),
-        }
+        BoundsMm::around(self.corners.iter().copied())
     }
 
     /// Returns whether a point lies inside (crossing-number test).

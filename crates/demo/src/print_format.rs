@@ -10,9 +10,6 @@ use rand_chacha::ChaCha8Rng;
 use super::rendered_print::RenderedPrint;
 
 /// Encodes a print in a random format, mostly colour PNG or JPEG. Returns the bytes and the file name extension.
-///
-/// # Errors
-/// Returns an error if the codec rejects the image.
 pub(super) fn encode_print(
     print: &RenderedPrint,
     rng: &mut ChaCha8Rng,

@@ -70,7 +70,7 @@ impl Stain {
         }
     }
 
-    /// Returns the share of reflected light, 0..=1.
+    /// Returns the fraction of reflected light, 0..=1.
     fn transmittance(&self, [u, v]: [f64; 2]) -> f64 {
         let distance = (u - self.centre[0]).hypot(v - self.centre[1]);
         let rim = self.radius_mm + 0.6 * self.edge_noise.two_octaves(u / 1.1, v / 1.1);

@@ -59,7 +59,7 @@ impl PrintFrame {
                 .collect(),
         };
         let bounds = rotated.bounds();
-        let size_mm = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
+        let size_mm = bounds.size();
         // Most published prints are crops of 300 dpi scans, about 135 px on the longest side. Some are larger.
         let longest_px: f64 = if rng.random_bool(0.5) {
             rng.random_range(112.0..170.0)

@@ -37,6 +37,11 @@ impl SampleFrame {
         ]
     }
 
+    /// Returns the column and row of each sample, row by row.
+    pub(super) fn samples(self) -> impl Iterator<Item = (usize, usize)> {
+        (0..self.side).flat_map(move |y| (0..self.side).map(move |x| (x, y)))
+    }
+
     /// Returns the column and row of each sample in the square with the given centre and half side length.
     pub(super) fn box_around(
         self,
@@ -108,6 +113,26 @@ impl ScalarField {
     /// Returns the value at a sample.
     pub(super) fn at(&self, x: usize, y: usize) -> f64 {
         f64::from(self.values.at(x, y))
+    }
+
+    /// Returns the larger of the values of two fields, for signed distances that of their union.
+    pub(super) fn union(&self, other: &Self) -> Self {
+        Self {
+            frame: self.frame,
+            values: self.values.zip_map(&other.values, f32::max),
+        }
+    }
+
+    /// Replaces the values of some samples. `value` receives the position of a sample, mm, and its value.
+    pub(super) fn change(
+        &mut self,
+        samples: impl IntoIterator<Item = (usize, usize)>,
+        value: impl Fn([f64; 2], f64) -> f64,
+    ) {
+        for (x, y) in samples {
+            let changed = value(self.frame.position(x, y), self.at(x, y));
+            self.values.set(x, y, changed as f32);
+        }
     }
 
     /// Returns the interpolated value at a point in mm. Points outside the frame get the value at its border.

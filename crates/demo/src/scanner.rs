@@ -113,7 +113,7 @@ impl SampledSurface {
         rng: &mut ChaCha8Rng,
     ) -> Self {
         let bounds = outline.bounds();
-        let [width, height] = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
+        let [width, height] = bounds.size();
         // The polygon fills about 84 % of its bounding box. A closed scan has a base, which uses half of the vertices.
         let wanted = style.vertices * if style.body.has_bottom() { 0.5 } else { 1.0 };
         let spacing = (width * height * 0.84 / wanted).sqrt();

@@ -31,10 +31,11 @@ pub struct TruthLine {
     pub plane: TopsPlane,
     /// Points on stroke tops, in mesh coordinates.
     pub landmarks: Vec<[f64; 3]>,
-    /// Height of the true stroke bounding box, in print pixels.
+    /// Height of the true stroke bounding box, in print pixels. Errors are measured relative to it.
     pub char_height_px: f64,
-    /// Path of the tops mask, relative to `truth.jsonl`.
-    pub tops_mask: String,
+    /// Path of the tops mask, relative to `truth.jsonl`, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tops_mask: Option<String>,
 }
 
 /// The geometry of a pair before it is posed and printed.
@@ -45,6 +46,11 @@ pub(super) struct TruthSource<'a> {
     pub remaining: &'a ScalarField,
     /// Heights of the surface, mm.
     pub surface: &'a ScalarField,
+}
+
+/// Returns the path of the tops mask of a pair below the dataset.
+pub(super) fn tops_file(id: &str) -> String {
+    format!("tops/{id}.png")
 }
 
 impl TruthSource<'_> {
@@ -62,7 +68,7 @@ impl TruthSource<'_> {
             plane: pose.tops_plane(),
             landmarks: self.landmarks(pose, rng),
             char_height_px: self.character_height_px(frame),
-            tops_mask: format!("tops/{id}.png"),
+            tops_mask: Some(tops_file(id)),
         }
     }
 

@@ -7,9 +7,9 @@ use super::kind::DemoKind;
 use super::noise::{Noise, smoothstep};
 use super::scalar_field::ScalarField;
 
-/// Largest share of the carved depth that wear removes from the tops.
+/// Largest fraction of the carved depth that wear removes from the tops.
 const MAX_WORN_SHARE: f64 = 0.45;
-/// Smallest share of the carved depth that dirt leaves free below the lowest tops.
+/// Smallest fraction of the carved depth that dirt leaves free below the lowest tops.
 const MIN_FREE_SHARE: f64 = 0.2;
 
 /// Wear and dirt of one block.

@@ -49,9 +49,6 @@ impl GridCell {
 
 /// Returns the nodes of the map of a face to its page: the corners of all cells of 5 mm in which the face was scanned and
 /// agrees with the page.
-///
-/// # Errors
-/// Returns an error if the heights of the face cannot be read.
 pub(super) fn face_grid(
     registered: &RegisteredFace,
     project: &Project,

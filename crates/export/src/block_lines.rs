@@ -111,9 +111,6 @@ impl BlockLine {
 pub(super) type UnreadableBlock = (BlockName, String);
 
 /// Returns the names of all blocks, or of those in `only`, sorted.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read.
 pub(super) async fn chosen_blocks(
     catalog: &Catalog,
     only: Option<&BTreeSet<String>>,
@@ -125,9 +122,6 @@ pub(super) async fn chosen_blocks(
 
 /// Writes the lines of all blocks, or of some, sorted by name. Writes no file if there are none. Returns whether there is a
 /// file, and the blocks whose stored results cannot be read.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read, the file cannot be written or a worker task panics.
 pub(super) async fn write_blocks(
     catalog: &Catalog,
     project: &Project,

@@ -7,12 +7,12 @@ use super::pictures::{
 };
 use super::source_print::result_images;
 use mocban_catalog::{Catalog, CatalogError, PairResults, SetApart};
-use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
+use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names, explained_by_cause};
 use mocban_core::raster::ImageLimits;
-use mocban_report::ground_truth::TruthErrors;
-use mocban_report::number_format::NumberStyle::{Degrees, Percent, Score};
-use mocban_report::number_format::{counted, format_count, format_number};
-use mocban_report::{Consensus, evaluate_pairs};
+use mocban_results::ground_truth::TruthErrors;
+use mocban_results::number_format::NumberStyle::{Degrees, Percent, Score};
+use mocban_results::number_format::{counted, format_count, format_number};
+use mocban_results::{Consensus, evaluate_pairs};
 use mocban_store::Project;
 
 /// Pairs in memory at a time while the worst are selected.
@@ -68,6 +68,19 @@ pub struct ContactSheetOptions {
     pub limits: ImageLimits,
 }
 
+impl Default for ContactSheetOptions {
+    fn default() -> Self {
+        Self {
+            metric: ThresholdMetric::DEFAULT,
+            pairs: None,
+            order: ContactSheetOrder::Worst,
+            limit: 60,
+            columns: 5,
+            limits: ImageLimits::SUGGESTED,
+        }
+    }
+}
+
 /// A contact sheet, and how much of the project it shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactSheet {
@@ -94,6 +107,8 @@ pub enum DrawError {
     Stopped(#[from] tokio::task::JoinError),
 }
 
+explained_by_cause! { DrawError: Catalog }
+
 /// A pair that may be drawn.
 struct SheetCandidate {
     /// Sort key, lowest first.
@@ -107,9 +122,6 @@ struct SheetCandidate {
 /// Draws the contact sheet of a project. Unfinished pairs are left out.
 ///
 /// An image that cannot be drawn is left blank. If a pair's print or depth map cannot be read, its cell states why.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read, or a worker task panics.
 pub async fn draw_contact_sheet(
     catalog: &Catalog,
     project: &Project,
@@ -284,8 +296,8 @@ mod tests {
     use crate::pictures::FrameKind;
     use mocban_core::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
     use mocban_core::raster::ImageLimits;
-    use mocban_report::Consensus;
-    use mocban_report::test_fixtures;
+    use mocban_results::Consensus;
+    use mocban_results::test_fixtures;
 
     fn options(order: ContactSheetOrder) -> ContactSheetOptions {
         ContactSheetOptions {

@@ -5,7 +5,8 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, MANIFEST};
-use mocban_store::{Leftover, ReplaceError, ReplacementFolder};
+use mocban_core::domain::{ErrorCode, Explained};
+use mocban_store::{Leftover, ReplaceError, ReplacementFolder, create_folders};
 
 /// An export that is written next to its target and then replaces the target.
 #[derive(Debug)]
@@ -35,6 +36,16 @@ pub enum FolderError {
     },
 }
 
+impl Explained for FolderError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::NotAnExport(_) | Self::IsFile(_) => ErrorCode::Usage,
+            Self::Replace(error) => error.code(),
+            Self::Io { .. } => ErrorCode::Unexpected,
+        }
+    }
+}
+
 impl Folder {
     /// Creates an empty folder next to `target`, which must be new, empty or an earlier export.
     ///
@@ -51,9 +62,6 @@ impl Folder {
     }
 
     /// Returns whether finishing would replace an earlier export.
-    ///
-    /// # Errors
-    /// Returns an error if the disk fails.
     pub(super) fn replaces(&self) -> Result<bool, FolderError> {
         let manifest = self.0.target().join(MANIFEST);
         manifest.try_exists().map_err(at(&manifest))
@@ -98,11 +106,9 @@ pub(super) fn at(path: &Path) -> impl Fn(io::Error) -> FolderError {
 /// Writes a file below a folder, and creates its parent folders.
 pub(super) fn write_below(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FolderError> {
     let path = root.join(below);
-    match path.parent().map_or(Ok(()), fs::create_dir_all) {
-        // `AlreadyExists` means that the folder exists but cannot be inspected. The write below reports the cause.
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(at(&path)(error)),
-        Ok(()) | Err(_) => {}
-    }
+    path.parent()
+        .map_or(Ok(()), create_folders)
+        .map_err(at(&path))?;
     fs::write(&path, bytes).map_err(at(&path))
 }
 
@@ -131,9 +137,6 @@ pub(super) struct SharedFile {
 
 impl SharedFile {
     /// Creates an empty file below a folder.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be created.
     pub(super) fn create(root: &Path, below: &str) -> Result<Self, FolderError> {
         let path = root.join(below);
         let file = BufWriter::new(File::create(&path).map_err(at(&path))?);
@@ -141,17 +144,11 @@ impl SharedFile {
     }
 
     /// Appends bytes.
-    ///
-    /// # Errors
-    /// Returns an error if they cannot be written.
     pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), FolderError> {
         self.file.write_all(bytes).map_err(at(&self.path))
     }
 
     /// Writes what is buffered.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be written.
     pub(super) fn flush(&mut self) -> Result<(), FolderError> {
         self.file.flush().map_err(at(&self.path))
     }

@@ -35,9 +35,6 @@ pub(super) fn json_lines<T: Serialize>(values: &[T]) -> String {
 
 /// Writes the logs page by page, oldest first, including undone entries. Leaves out empty logs except that of verdicts.
 /// Returns the names of the files.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read or a file cannot be written.
 pub(super) async fn write_logs(
     catalog: &Catalog,
     root: &Path,

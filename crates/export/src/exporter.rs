@@ -25,7 +25,7 @@ use super::record::ManualAlignmentFields;
 use super::split::{SplitCounts, SplitPlan};
 use mocban_catalog::{Catalog, CatalogError, CutOrigin, PairResults, SetApart, StoredAlignment};
 use mocban_core::domain::{BlockName, PairName};
-use mocban_store::Project;
+use mocban_store::{Project, create_folders};
 
 /// Pairs whose rows are in memory at a time.
 const PAGE: usize = 32;
@@ -174,7 +174,7 @@ impl ExportRun {
                 _ => format!("{format}/"),
             };
             let root = folder.path().join(&prefix);
-            std::fs::create_dir_all(&root).map_err(super::export_folder::at(&root))?;
+            create_folders(&root).map_err(super::export_folder::at(&root))?;
             let context = Arc::clone(&context);
             outputs.push(FormatOutput {
                 format: *format,
@@ -272,8 +272,7 @@ impl ExportRun {
             let mut files = BTreeSet::new();
             let mut unreadable = Vec::new();
             if format == ExportFormat::Jsonl {
-                let logs = write_logs(catalog, &root).await?;
-                files.extend(logs.map(str::to_owned));
+                files.extend(write_logs(catalog, &root).await?.map(str::to_owned));
                 let (is_written, lost) = write_blocks(catalog, project, &root, only).await?;
                 files.extend(is_written.then(|| BLOCKS_FILE[0].to_owned()));
                 unreadable = lost;

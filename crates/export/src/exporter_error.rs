@@ -2,6 +2,7 @@
 
 use super::export_folder::FolderError;
 use mocban_catalog::CatalogError;
+use mocban_core::domain::explained_by_cause;
 use mocban_store::ArtifactError;
 
 /// Why nothing was exported.
@@ -20,3 +21,5 @@ pub enum ExportError {
     #[error("the export stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
+
+explained_by_cause! { ExportError: Catalog, Folder }

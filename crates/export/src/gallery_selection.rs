@@ -7,12 +7,12 @@ use super::source_print::result_images;
 use mocban_catalog::{Catalog, CatalogError, MetricRecord, PairResults, VerdictEvent};
 use mocban_core::domain::{ContentHash, SeededRandom, ThresholdMetric};
 use mocban_core::raster::{ImageLimits, jpeg_rgb8};
-use mocban_report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, verdict_text};
-use mocban_report::ground_truth::TruthErrors;
-use mocban_report::number_format::NumberStyle::{Degrees, Percent, Score};
-use mocban_report::number_format::format_number;
-use mocban_report::pair_artifacts::group_identical;
-use mocban_report::{Consensus, TruthEvaluation};
+use mocban_results::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, verdict_text};
+use mocban_results::ground_truth::TruthErrors;
+use mocban_results::number_format::NumberStyle::{Degrees, Percent, Score};
+use mocban_results::number_format::format_number;
+use mocban_results::pair_artifacts::group_identical;
+use mocban_results::{Consensus, TruthEvaluation};
 use mocban_store::Project;
 
 /// Longest side of an image, pixels.
@@ -35,8 +35,8 @@ struct GallerySubject {
     log: Vec<VerdictEvent>,
 }
 
-/// The results to draw: at most 80 that reviewers failed, 80 on which they disagree, 80 that miss the ground truth, and
-/// a random sample of 20.
+/// The results to draw: at most 80 that reviewers failed, 80 on which they disagree, 80 that miss the ground truth, the 80
+/// of lowest confidence, and a random sample of 20.
 #[derive(Debug)]
 pub struct GallerySelection {
     seed: u64,
@@ -50,15 +50,13 @@ pub struct GallerySelection {
 struct SelectedResults {
     /// Number of such results in the project.
     total: u64,
-    /// The results to draw, each with its sort key: a random number in the random sample, and otherwise 0.
+    /// The results to draw, each with its sort key: the confidence where it is low, a random number in the random sample,
+    /// and otherwise 0.
     subjects: Vec<(f64, GallerySubject)>,
 }
 
 /// Draws the images of a project's report. An image that cannot be drawn is left out. If the print or depth map of a
 /// result cannot be read, its gallery item states the reason.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read, or a worker task panics.
 pub async fn draw_gallery(
     mut selection: GallerySelection,
     catalog: &Catalog,
@@ -91,13 +89,22 @@ impl GallerySelection {
                     continue;
                 }
                 group.total += 1;
-                let (number, limit) = if reason == GalleryReason::Random {
-                    shown.clone_from(&records);
-                    let name = ContentHash::of(pair.attributes.name.as_str().as_bytes());
-                    (self.random.draw(&name, "picture"), SAMPLE_SIZE)
-                } else {
-                    (0.0, MAX_PER_REASON)
+                let (number, limit) = match reason {
+                    GalleryReason::Random => {
+                        let name = ContentHash::of(pair.attributes.name.as_str().as_bytes());
+                        (self.random.draw(&name, "picture"), SAMPLE_SIZE)
+                    }
+                    GalleryReason::LowConfidence => {
+                        let confidence = shown[0].outcome.confidence;
+                        (confidence.unwrap_or_default(), MAX_PER_REASON)
+                    }
+                    GalleryReason::Failed | GalleryReason::Conflict | GalleryReason::OffTruth => {
+                        (0.0, MAX_PER_REASON)
+                    }
                 };
+                if matches!(reason, GalleryReason::Random | GalleryReason::LowConfidence) {
+                    shown.clone_from(&records);
+                }
                 let subjects = &mut group.subjects;
                 let place = subjects.partition_point(|(other, _)| *other <= number);
                 if place < limit {
@@ -110,8 +117,7 @@ impl GallerySelection {
 
     /// Reads the verdicts on what is shown.
     async fn read_log(&mut self, catalog: &Catalog) -> Result<(), CatalogError> {
-        let groups = self.groups.iter_mut();
-        for (_, subject) in groups.flat_map(|group| &mut group.subjects) {
+        for (_, subject) in self.groups.iter_mut().flat_map(|group| &mut group.subjects) {
             if subject.is_judged() {
                 let name = &subject.pair.attributes.name;
                 subject.log = catalog.verdict_log(Some(name)).await?;
@@ -122,8 +128,11 @@ impl GallerySelection {
 
     fn draw(self, project: &Project, limits: &ImageLimits) -> Gallery {
         let draw = |(reason, mut group): (GalleryReason, SelectedResults)| {
-            let names = |(_, subject): &(f64, GallerySubject)| subject.pair.attributes.name.clone();
-            group.subjects.sort_by_cached_key(names);
+            if reason != GalleryReason::LowConfidence {
+                let name =
+                    |(_, subject): &(f64, GallerySubject)| subject.pair.attributes.name.clone();
+                group.subjects.sort_by_cached_key(name);
+            }
             let subjects = group.subjects.par_iter();
             GalleryGroup {
                 reason,
@@ -153,6 +162,9 @@ fn reason_applies(reason: GalleryReason, record: &MetricRecord, truth: &TruthEva
             .errors
             .get(&record.outcome.metric)
             .is_some_and(|errors| !errors.pass()),
+        GalleryReason::LowConfidence => {
+            record.outcome.metric == SAMPLE_METRIC && record.outcome.is_low_confidence()
+        }
         GalleryReason::Random => record.outcome.metric == SAMPLE_METRIC,
     }
 }
@@ -244,7 +256,8 @@ fn file_name(stored: &str) -> String {
 mod tests {
     use super::{GallerySelection, MAX_PER_REASON, SAMPLE_SIZE};
     use mocban_core::domain::Verdict::{Fail, Pass};
-    use mocban_report::{TruthEvaluation, test_fixtures};
+    use mocban_results::TruthEvaluation;
+    use mocban_results::test_fixtures;
 
     fn selection(seed: u64, pairs: usize) -> GallerySelection {
         let mut selection = GallerySelection::new(seed);
@@ -270,9 +283,25 @@ mod tests {
         let selection = selection(1, 30);
         let groups = selection.groups.each_ref();
         let counts = groups.map(|group| (group.total, group.subjects.len()));
-        assert_eq!(counts, [(10, 10), (10, 10), (1, 1), (30, SAMPLE_SIZE)]);
+        let sample = (30, SAMPLE_SIZE);
+        assert_eq!(counts, [(10, 10), (10, 10), (1, 1), (0, 0), sample]);
         let (_, first) = &selection.groups[0].subjects[0];
         assert_eq!(first.metrics.len(), 4, "all look the same");
+    }
+
+    #[test]
+    fn the_lowest_confidence_is_shown_first() {
+        let mut selection = GallerySelection::new(1);
+        for (name, confidence) in [("a", 0.4), ("b", 0.9), ("c", 0.1), ("d", 0.3)] {
+            let pair = test_fixtures::with_confidence(name, confidence);
+            selection.add(&pair, &TruthEvaluation::default());
+        }
+        let [.., low, _] = &selection.groups;
+        let subjects = low.subjects.iter();
+        let names: Vec<&str> = subjects
+            .map(|(_, subject)| subject.pair.attributes.name.as_str())
+            .collect();
+        assert_eq!((low.total, names), (3, vec!["c", "d", "a"]));
     }
 
     #[test]

@@ -4,14 +4,19 @@
 //! - `record.rs` has the fields of a pair that all formats share, `record_fields.rs` their units and frames,
 //!   `pair_pictures.rs` reads inputs and artifacts when a format needs them
 //! - `formats/` has the formats, which implement `format_writer.rs`; `manifest.rs` recognizes an earlier export
+//! - `alignment_files.rs` encodes the pictures of one pair that has no project
 //! - `block_lines.rs`, `block_grid.rs` and `page_labels.rs` write whole blocks, their maps and their boxes
 //! - `pictures` and `contact_sheet.rs` draw overlays and sheets; `block_view` draws any part of a page, of its relief, or of
 //!   both
 //! - `scan_view` encodes a scan in the frame of its print for the viewer, on pages of a server and in files
 //!
+//! Every call fails if the catalog, an input or an artifact cannot be read, or the output cannot be written. `# Errors` names
+//! other reasons, and what an error leaves behind.
+//!
 //! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs, and an earlier export is
 //! replaced as a whole or not at all.
 
+mod alignment_files;
 mod annotations;
 mod block_grid;
 mod block_lines;
@@ -46,6 +51,7 @@ mod split;
 mod stage_outcomes;
 mod table_columns;
 
+pub use alignment_files::{ALIGNMENT_FILES, alignment_files};
 pub use contact_sheet::{
     ContactSheet, ContactSheetOptions, ContactSheetOrder, DrawError, draw_contact_sheet,
 };
@@ -54,9 +60,9 @@ pub use exporter::{ExportSummary, export};
 pub use exporter_error::ExportError;
 pub use format::ExportFormat;
 pub use gallery_selection::{GallerySelection, draw_gallery};
-pub use manifest::PairCounts;
+pub use manifest::{MANIFEST as EXPORT_MANIFEST, PairCounts};
 pub use options::{ExportOptions, ResultFilter, UnusedOption};
-pub use pair_pictures::{InputFileLimits, PictureError};
+pub use pair_pictures::PictureError;
 pub use record::{
     ManualAlignmentFields, MetricFields, PairFields, PairRecord, RecordStatus, ReviewerFields,
     SplitName,

@@ -16,7 +16,7 @@ use super::options::ExportOptions;
 use mocban_core::domain::PairName;
 
 /// Name of the manifest.
-pub(super) const MANIFEST: &str = "export.json";
+pub const MANIFEST: &str = "export.json";
 /// Version of the manifest.
 const VERSION: u32 = 1;
 /// Longest manifest that is read, in bytes.
@@ -91,9 +91,6 @@ impl<'a> ExportManifest<'a> {
 }
 
 /// Returns a file or folder below `dir` that no export wrote, or `None` if `dir` is empty or an earlier export.
-///
-/// # Errors
-/// Returns an error if a folder or file cannot be read.
 pub(super) fn foreign_entry(dir: &Path) -> io::Result<Option<PathBuf>> {
     let files = listed_files(&dir.join(MANIFEST))?.unwrap_or_default();
     let patterns: Vec<Vec<&str>> = files.iter().map(|file| file.split('/').collect()).collect();

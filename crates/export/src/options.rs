@@ -4,11 +4,11 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::format::ExportFormat;
-use super::pair_pictures::InputFileLimits;
 use super::split::SplitSettings;
 use mocban_catalog::MetricRecord;
+use mocban_core::InputLimits;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
-use mocban_report::Consensus;
+use mocban_results::Consensus;
 
 /// Default size of shards in MiB.
 const SHARD_MIB: u64 = 256;
@@ -59,7 +59,7 @@ pub struct ExportOptions {
     pub settings: Value,
     /// Limits of the input files.
     #[serde(skip)]
-    pub limits: InputFileLimits,
+    pub limits: InputLimits,
 }
 
 /// An option that no chosen format can use.
@@ -73,7 +73,7 @@ pub struct UnusedOption {
 
 impl ExportOptions {
     /// Returns options that export everything about `metrics`.
-    pub fn all_of(metrics: &[ThresholdMetric], limits: InputFileLimits) -> Self {
+    pub fn all_of(metrics: &[ThresholdMetric], limits: InputLimits) -> Self {
         Self {
             metrics: metrics.to_vec(),
             only: ResultFilter::All,

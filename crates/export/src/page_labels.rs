@@ -49,9 +49,6 @@ pub(super) struct WrittenPages {
 }
 
 /// Writes the pages of all finished blocks, or of some, each with the boxes of its characters as VIA 2 and COCO.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read, a file cannot be written or a worker task panics.
 pub(super) async fn write_page_labels(
     catalog: &Catalog,
     project: &Project,

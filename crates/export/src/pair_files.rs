@@ -11,7 +11,7 @@ use mocban_core::domain::{
     DepthScale, LengthUnit, Levelling, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
 use mocban_core::raster::{compact_rgb8, png_grey16, png_mask};
-use mocban_report::pair_artifacts::same_alignment;
+use mocban_results::pair_artifacts::same_alignment;
 
 /// Folder of the files of a pair; `*` stands for its id.
 const PAIR: &str = "pairs/*";
@@ -207,11 +207,12 @@ fn first_of_each<T>(items: &[T], is_same: impl Fn(&T, &T) -> bool) -> Vec<usize>
     found.collect()
 }
 
-fn sidecar(scale: &DepthScale, levelling: Option<Levelling>) -> String {
+/// Returns the text of the file beside a depth map that gives its scale.
+pub(super) fn sidecar(scale: &DepthScale, levelling: Option<Levelling>) -> String {
     let sidecar = DepthSidecar {
         no_data: 0,
         scale,
-        curvature: scale.bow.map_or([0.0; 6], |bow| bow.0),
+        curvature: scale.curvature.map_or([0.0; 6], |curvature| curvature.0),
         mm_per_mesh_unit: scale.unit.map(LengthUnit::mm),
         levelling,
     };

@@ -8,13 +8,14 @@ use super::pictures::{PrintView, Rgb, eight_bits};
 use super::source_print::{SourcePrint, SourcePrintError};
 use super::stage_outcomes::StageOutcomes;
 use mocban_catalog::{MetricRecord, PairResults};
+use mocban_core::InputLimits;
 use mocban_core::domain::artifact_role::DEPTH;
-use mocban_core::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
-use mocban_core::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
+use mocban_core::domain::{Affine2, ArtifactRef, Explained, MetricOutcome, Stage};
+use mocban_core::mesh::{self, Mesh, MeshError, MeshReadError};
 use mocban_core::raster::{
-    DepthMap, Grid, ImageLimits, Mask, png_grey16, png_rgb8, warp_depth, warp_mask, warp_rgb,
+    DepthMap, Grid, Mask, png_grey16, png_rgb8, warp_depth, warp_mask, warp_rgb,
 };
-use mocban_report::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use mocban_results::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_store::{InputError, Project, open_input};
 
 /// Why the pictures or the mesh of a pair cannot be used. The other pairs are exported.
@@ -45,14 +46,7 @@ pub enum PictureError {
     Unencodable(String),
 }
 
-/// Limits of the input files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct InputFileLimits {
-    /// Limits of mesh files.
-    pub mesh: MeshLimits,
-    /// Limits of print images.
-    pub image: ImageLimits,
-}
+impl Explained for PictureError {}
 
 /// The frame of the exported pictures of a pair: the print's, or the square canvas that was requested.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +61,7 @@ pub(super) struct PictureFrame {
 pub(super) struct PairPictures<'a> {
     project: &'a Project,
     pair: &'a PairResults,
-    limits: InputFileLimits,
+    limits: InputLimits,
     /// Map of a square canvas of the given side, if all pictures have this size.
     canvas: Option<(usize, Affine2)>,
     /// The parsed outcomes of the stages.
@@ -90,7 +84,7 @@ impl<'a> PairPictures<'a> {
         pair: &'a PairResults,
         outcomes: &'a StageOutcomes,
         metrics: Vec<&'a MetricRecord>,
-        limits: InputFileLimits,
+        limits: InputLimits,
         canvas_px: Option<u32>,
     ) -> Self {
         Self {
@@ -269,7 +263,7 @@ impl<'a> PairPictures<'a> {
         let mesh = match mesh::read_from(&mut file, size, stored, limits) {
             Err(MeshReadError::Io(error)) => return Err(file.error(error).into()),
             Err(MeshReadError::Mesh(source)) => Err(source),
-            Ok(mesh) => Ok(mesh),
+            Ok(read) => Ok(read.mesh),
         };
         let digest = file.finish()?;
         let aligned = self.pair.stage(Stage::Fit).map(|record| record.mesh_hash);

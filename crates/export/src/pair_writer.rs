@@ -12,7 +12,7 @@ use super::split::SplitPlan;
 use super::stage_outcomes::StageOutcomes;
 use mocban_catalog::{CutOrigin, MetricRecord, PairResults};
 use mocban_core::domain::{Affine2, Failure, FailureClass};
-use mocban_report::pair_artifacts::PairArtifacts;
+use mocban_results::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
 /// One format of an export.

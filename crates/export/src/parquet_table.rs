@@ -47,9 +47,6 @@ pub(super) struct ParquetTable {
 
 impl ParquetTable {
     /// Creates a file.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be created.
     pub(super) fn create(path: &Path, layout: &TableLayout) -> Result<Self, FolderError> {
         let file = File::create(path).map_err(at(path))?;
         let writer = open(file, layout).map_err(|error| folder_error(path, error))?;
@@ -66,9 +63,6 @@ impl ParquetTable {
     }
 
     /// Appends a row with a cell for each column.
-    ///
-    /// # Errors
-    /// Returns an error if a row group cannot be written.
     pub(super) fn append(&mut self, row: Vec<CellValue>) -> Result<(), FolderError> {
         let mut first = 0;
         for ((_, kind), cell) in self.columns.iter().zip(row) {
@@ -93,9 +87,6 @@ impl ParquetTable {
     }
 
     /// Writes the last row group and the footer.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be written.
     pub(super) fn finish(mut self) -> Result<(), FolderError> {
         self.flush()?;
         let closed = self.writer.close();

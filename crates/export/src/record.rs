@@ -10,7 +10,7 @@ use mocban_core::domain::{
     Affine2, ContentHash, Failure, FailureClass, HeightFromMesh, JobStatus, LengthUnit, PairName,
     PrintFromMesh, Reason, ReviewOrder, Rigid3, Stage, ThresholdMetric, UnixMillis, Verdict,
 };
-use mocban_report::Consensus;
+use mocban_results::Consensus;
 
 /// State of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -146,7 +146,7 @@ pub struct PairFields {
 }
 
 /// The fields of one metric of a pair.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct MetricFields {
     /// The metric that chose the depth threshold.
     pub metric: ThresholdMetric,
@@ -264,20 +264,13 @@ impl PairRecord {
         outcomes: Option<&StageOutcomes>,
         metrics: &[&MetricRecord],
     ) -> Self {
-        let mut fields = PairFields::without_result(pair);
-        let Some(outcomes) = outcomes else {
-            return Self {
-                pair: fields,
-                metrics: Vec::new(),
-            };
-        };
-        fields.add_result(outcomes);
+        let metrics = outcomes.into_iter().flat_map(|outcomes| {
+            let metrics = metrics.iter();
+            metrics.map(|record| MetricFields::of(record, outcomes))
+        });
         Self {
-            pair: fields,
-            metrics: metrics
-                .iter()
-                .map(|record| MetricFields::of(record, outcomes))
-                .collect(),
+            pair: PairFields::of(pair, outcomes),
+            metrics: metrics.collect(),
         }
     }
 
@@ -288,7 +281,7 @@ impl PairRecord {
                 status: RecordStatus::Failed,
                 error_class: Some(why.class),
                 error: Some(why.message.clone()),
-                ..PairFields::without_result(pair)
+                ..PairFields::of(pair, None)
             },
             metrics: Vec::new(),
         }
@@ -296,8 +289,12 @@ impl PairRecord {
 }
 
 impl PairFields {
-    fn without_result(pair: &PairResults) -> Self {
+    fn of(pair: &PairResults, outcomes: Option<&StageOutcomes>) -> Self {
         let attributes = &pair.attributes;
+        let plane_from_mesh = outcomes.map(|found| found.fit.plane_from_mesh);
+        let scale = outcomes.map(|found| &found.depth.scale);
+        let ink = outcomes.and_then(StageOutcomes::ink);
+        let unit = scale.and_then(|scale| scale.unit).or(attributes.unit);
         let failure = pair.failure.as_ref().map(|stored| &stored.failure);
         let [fit, normalize, register] =
             [Stage::Fit, Stage::Normalize, Stage::Register].map(|stage| pair.stage(stage));
@@ -316,20 +313,22 @@ impl PairFields {
             status: RecordStatus::of(pair.status),
             error_class: failure.map(|failure| failure.class),
             error: failure.map(|failure| failure.message.clone()),
-            plane_from_mesh: None,
-            depth_from_plane: None,
-            height_from_mesh: None,
-            height_min: None,
-            height_per_level: None,
-            mesh_unit_per_px: None,
-            mm_per_mesh_unit: attributes.unit.map(LengthUnit::mm),
-            depth_size_px: None,
-            threshold_print: None,
-            light_on_dark: None,
-            print_orientation: None,
-            canvas_px: None,
-            canvas_from_print: None,
-            picture_from_print: None,
+            plane_from_mesh,
+            depth_from_plane: scale.map(|scale| scale.depth_from_plane),
+            height_from_mesh: plane_from_mesh
+                .zip(scale)
+                .map(|(plane, scale)| HeightFromMesh::new(&plane, scale.curvature.as_ref())),
+            height_min: scale.map(|scale| scale.height_min),
+            height_per_level: scale.map(|scale| scale.height_per_level),
+            mesh_unit_per_px: scale.map(|scale| scale.mesh_unit_per_px),
+            mm_per_mesh_unit: unit.map(LengthUnit::mm),
+            depth_size_px: outcomes.map(|found| [found.depth.width, found.depth.height]),
+            threshold_print: ink.map(|ink| ink.threshold_print),
+            light_on_dark: ink.map(|ink| ink.light_on_dark),
+            print_orientation: outcomes.and_then(|found| found.normalize.print_orientation),
+            canvas_px: outcomes.map(|found| found.normalize.canvas_px),
+            canvas_from_print: ink.map(|ink| ink.canvas_from_print),
+            picture_from_print: outcomes.map(|_| Affine2::IDENTITY),
             page_from_crop: None,
             page_from_mesh: None,
             manual_alignment: None,
@@ -347,55 +346,14 @@ impl PairFields {
         self.page_from_crop = origin.maps.map(|maps| maps.page_from_crop);
         self.page_from_mesh = origin.maps.map(|maps| maps.page_from_mesh);
     }
-
-    fn add_result(&mut self, outcomes: &StageOutcomes) {
-        let (scale, ink) = (&outcomes.depth.scale, outcomes.ink());
-        let plane_from_mesh = outcomes.fit.plane_from_mesh;
-        self.plane_from_mesh = Some(plane_from_mesh);
-        self.depth_from_plane = Some(scale.depth_from_plane);
-        self.height_from_mesh = Some(HeightFromMesh::new(&plane_from_mesh, scale.bow.as_ref()));
-        self.height_min = Some(scale.height_min);
-        self.height_per_level = Some(scale.height_per_level);
-        self.mesh_unit_per_px = Some(scale.mesh_unit_per_px);
-        self.mm_per_mesh_unit = scale.unit.or(self.unit).map(LengthUnit::mm);
-        self.depth_size_px = Some([outcomes.depth.width, outcomes.depth.height]);
-        self.threshold_print = ink.map(|ink| ink.threshold_print);
-        self.light_on_dark = ink.map(|ink| ink.light_on_dark);
-        self.print_orientation = outcomes.normalize.print_turned;
-        self.canvas_px = Some(outcomes.normalize.canvas_px);
-        self.canvas_from_print = ink.map(|ink| ink.canvas_from_print);
-        self.picture_from_print = Some(Affine2::IDENTITY);
-    }
 }
 
 impl MetricFields {
     /// Returns the fields of a metric without a result.
-    pub(super) const fn without_result(metric: ThresholdMetric) -> Self {
+    pub(super) fn without_result(metric: ThresholdMetric) -> Self {
         Self {
             metric,
-            threshold_level: None,
-            threshold_depth: None,
-            angle_deg: None,
-            scale: None,
-            shift_px: None,
-            ssim: None,
-            nl_ssim: None,
-            iou: None,
-            iou_box: None,
-            dice: None,
-            density_print: None,
-            density_depth: None,
-            disagreements: None,
-            missing_ink: None,
-            missing_wood: None,
-            confidence: None,
-            margin: None,
-            at_bound: None,
-            print_from_mesh: None,
-            print_from_depth: None,
-            verdict: None,
-            verdicts: Vec::new(),
-            result_hash: None,
+            ..Self::default()
         }
     }
 

@@ -280,6 +280,14 @@ mod tests {
     }
 
     #[test]
+    fn descriptions_contain_no_links_or_examples_of_the_code() {
+        for schema in [schema_of::<PairRecord>(), schema_of::<Files>()] {
+            let text = schema.to_string();
+            assert!(!text.contains("[`") && !text.contains("```"), "{text}");
+        }
+    }
+
+    #[test]
     fn matrices_and_choices_are_named_in_the_table() {
         let schema = schema_of::<PairRecord>();
         let table = markdown_table(&schema, &[("Fields", &PAIR_FIELDS)]);

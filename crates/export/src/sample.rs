@@ -119,9 +119,6 @@ fn is_plain(file: &[u8], extension: &str) -> bool {
 
 /// Draws the pictures of a sample under one metric. The print is the original file if it is PNG or JPEG of 8 bits and
 /// `keep_print`, otherwise an 8-bit PNG.
-///
-/// # Errors
-/// Returns an error if an input or artifact cannot be read.
 pub(super) fn pictures(
     result: &PairPictures<'_>,
     record: &MetricRecord,

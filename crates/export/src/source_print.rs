@@ -7,7 +7,7 @@ use super::pictures::{PrintView, Rgb, eight_bits};
 use mocban_catalog::PairResults;
 use mocban_core::domain::{ContentHash, FileKind, Stage, ThresholdMetric};
 use mocban_core::raster::{self, DecodeError, ImageLimits, PrintImage, png_rgb8};
-use mocban_report::pair_artifacts::PairArtifacts;
+use mocban_results::pair_artifacts::PairArtifacts;
 use mocban_store::{InputError, InputFile, Project, read_input};
 
 /// Why a print cannot be used.

@@ -169,7 +169,7 @@ impl SplitPlan {
 #[cfg(test)]
 mod tests {
     use super::{SplitBy, SplitCounts, SplitName, SplitPlan, SplitSettings, SplitShares};
-    use mocban_report::test_fixtures;
+    use mocban_results::test_fixtures;
     use std::collections::BTreeMap;
 
     fn settings(shares: &str, seed: u64) -> SplitSettings {

@@ -3,7 +3,7 @@
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, NormalizeOutcome, RegisterOutcome, Stage,
 };
-use mocban_report::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use mocban_results::pair_artifacts::{PairArtifacts, PairArtifactsError};
 
 /// The outcomes of the stages of a finished pair.
 #[derive(Debug, Clone, PartialEq)]

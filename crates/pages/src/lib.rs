@@ -5,6 +5,8 @@
 //! - [`local_server`]: what both have in common: a server for the browser of one user, with its session, its guard
 //!   against other pages, connection limits and the frame of its pages
 //!
+//! Every call fails if the catalog cannot be read. `# Errors` names other reasons.
+//!
 //! **Invariant:** a request changes nothing unless it comes from a page of this server in a session of this server.
 
 pub mod local_server;

@@ -4,9 +4,9 @@ use std::fs::Metadata;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use anyhow::Context as _;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
-use crate::error_text::describe;
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
 use crate::location::Location;
@@ -28,15 +28,17 @@ pub struct Backup {
 }
 
 /// Writes a backup of a project. An existing backup is replaced only when the new one is complete.
-///
-/// # Errors
-/// Returns an error if there is no project, the file is refused, or the disk fails.
-pub async fn backup(file: &Path, location: &Location) -> anyhow::Result<Backup> {
+pub async fn backup(
+    file: &Path,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<Backup> {
+    let _work = LongWork::begin(listener, "copying the catalog");
     let (project, catalog) = location.open_read_only().await?;
     let shown = file.display();
     let failed = || format!("cannot write the backup {shown}");
     check_target(file, &project)?;
-    files::refuse_missing_folder(file)?;
+    files::create_parent(file)?;
     let _lock = TargetLock::acquire(file).with_context(failed)?;
     let settings = files::small(&project.settings_path())?;
     let staging = StagingFolder::beside(file).with_context(failed)?;
@@ -57,10 +59,7 @@ pub async fn backup(file: &Path, location: &Location) -> anyhow::Result<Backup> 
 }
 
 /// Returns the numbers of pairs and verdicts in the catalog of a directory. Errors name that catalog.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read; it names the file.
-pub async fn count_rows(dir: &Path) -> anyhow::Result<(u64, u64)> {
+pub async fn count_rows(dir: &Path) -> ProjectResult<(u64, u64)> {
     let count = async {
         let catalog = Catalog::open_read_only(&dir.join(CATALOG_FILE)).await?;
         let verdicts = catalog.verdict_log(None).await?.len() as u64;
@@ -70,11 +69,11 @@ pub async fn count_rows(dir: &Path) -> anyhow::Result<(u64, u64)> {
     };
     count
         .await
-        .map_err(|error: anyhow::Error| anyhow::anyhow!(describe(&error, dir)))
+        .map_err(|error: ProjectError| ProjectError::unexpected(error.text(dir)))
 }
 
 /// Refuses a target that exists and is not a backup.
-fn check_target(file: &Path, project: &Project) -> anyhow::Result<()> {
+fn check_target(file: &Path, project: &Project) -> ProjectResult<()> {
     let shown = file.display();
     let refuse = |reason: &str| Err(Refusal::Usage(format!("{shown} {reason}")).into());
     let failed = || format!("cannot read {shown}");
@@ -101,7 +100,7 @@ fn check_target(file: &Path, project: &Project) -> anyhow::Result<()> {
 }
 
 /// Returns whether two paths name the same existing file or folder.
-fn is_same(one: &Path, other: &Path) -> anyhow::Result<bool> {
+fn is_same(one: &Path, other: &Path) -> ProjectResult<bool> {
     let identity = |path: &Path| match stat(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         found => found

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::Context as _;
+use crate::error::{ProjectResult, TaskStopped, WithContext as _};
 
 use crate::exit::Refusal;
 use crate::files;
@@ -30,7 +30,7 @@ pub enum DemoContent {
 
 impl DemoContent {
     /// Returns what the data of a demo contain, if they are complete.
-    fn of(data: &Path) -> anyhow::Result<Option<Self>> {
+    fn of(data: &Path) -> ProjectResult<Option<Self>> {
         let stamp = files::small(&data.join("dataset.json"))?;
         let pairs = stamp.and_then(|bytes| serde_json::from_slice::<DemoOptions>(&bytes).ok());
         Ok(match pairs {
@@ -55,10 +55,7 @@ impl DemoContent {
 }
 
 /// Refuses a directory that holds another demo, another project or foreign data, so that nothing is overwritten.
-///
-/// # Errors
-/// Returns an error if the directory is refused or cannot be read.
-pub fn check_directory(dir: &Path, data: &Path, wanted: &DemoContent) -> anyhow::Result<()> {
+pub fn check_directory(dir: &Path, data: &Path, wanted: &DemoContent) -> ProjectResult<()> {
     let refuse = |reason: &str| {
         let shown = dir.display();
         let text = format!("{shown} {reason}; name another directory for this demo");
@@ -104,7 +101,7 @@ pub fn check_directory(dir: &Path, data: &Path, wanted: &DemoContent) -> anyhow:
 }
 
 /// Returns whether a directory has the note of a demo. Compares the text, because any project may have a `README.txt`.
-fn has_note(data: &Path) -> anyhow::Result<bool> {
+fn has_note(data: &Path) -> ProjectResult<bool> {
     let note = files::small(&data.join(NOTE))?;
     Ok(note.is_some_and(|text| text == NOTE_TEXT.as_bytes()))
 }
@@ -112,19 +109,19 @@ fn has_note(data: &Path) -> anyhow::Result<bool> {
 /// Writes the data of a demo next to `data` and then replaces `data`, so that a project never sees half of them. Calls
 /// `write` on another thread. The paths that it returns lie in a folder that was moved since. Returns `None` if `write`
 /// was stopped, and otherwise a warning if the earlier data could not be removed.
-///
-/// # Errors
-/// Returns an error if the files cannot be written.
 pub async fn replace_data<T: Send + 'static>(
     data: &Path,
     stop: &Stop,
     write: impl FnOnce(&Path, &Stop) -> Result<T, DatasetError> + Send + 'static,
-) -> anyhow::Result<Option<(T, Option<String>)>> {
+) -> ProjectResult<Option<(T, Option<String>)>> {
     let folder = ReplacementFolder::begin(data)?;
     let note = folder.path().join(NOTE);
     std::fs::write(&note, NOTE_TEXT).with_context(|| format!("cannot write {}", note.display()))?;
     let (target, stop) = (folder.path().to_owned(), stop.clone());
-    let written = match tokio::task::spawn_blocking(move || write(&target, &stop)).await? {
+    let written = match tokio::task::spawn_blocking(move || write(&target, &stop))
+        .await
+        .map_err(TaskStopped)?
+    {
         Err(DatasetError::Stopped) => return Ok(None),
         written => written?,
     };

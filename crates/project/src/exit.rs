@@ -1,5 +1,7 @@
 //! Exit codes, and errors of commands that cannot be carried out as given.
 
+use mocban_core::domain::{ErrorCode, Explained};
+
 /// The exit status of the process; the numbers are fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -60,7 +62,22 @@ impl From<ExitCode> for std::process::ExitCode {
     }
 }
 
-/// A command that cannot be carried out as given, with its own exit code.
+impl From<ErrorCode> for ExitCode {
+    fn from(code: ErrorCode) -> Self {
+        match code {
+            ErrorCode::Usage | ErrorCode::Settings | ErrorCode::NotPermitted => Self::Usage,
+            ErrorCode::Incomplete => Self::SomeFailed,
+            ErrorCode::NothingSelected => Self::NothingSelected,
+            ErrorCode::NoProject => Self::NoProject,
+            ErrorCode::ProjectInUse | ErrorCode::OutputInUse => Self::InUse,
+            ErrorCode::Damaged | ErrorCode::LogLost => Self::Damaged,
+            ErrorCode::ClosedPipe => Self::Done,
+            _ => Self::Error,
+        }
+    }
+}
+
+/// A command that cannot be carried out as given.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
     /// An unknown pair, or a selection without pairs.
@@ -72,15 +89,22 @@ pub enum Refusal {
     /// An output that is not complete, and would replace an earlier file.
     #[error("{0}")]
     Incomplete(String),
+    /// A catalog that is damaged, empty or not a catalog.
+    #[error("{0}")]
+    Damaged(String),
+    /// A failure of the system, or of another process.
+    #[error("{0}")]
+    Unexpected(String),
 }
 
-impl Refusal {
-    /// Returns the exit code.
-    pub const fn code(&self) -> ExitCode {
+impl Explained for Refusal {
+    fn code(&self) -> ErrorCode {
         match self {
-            Self::NothingSelected(_) => ExitCode::NothingSelected,
-            Self::Usage(_) => ExitCode::Usage,
-            Self::Incomplete(_) => ExitCode::SomeFailed,
+            Self::NothingSelected(_) => ErrorCode::NothingSelected,
+            Self::Usage(_) => ErrorCode::Usage,
+            Self::Incomplete(_) => ErrorCode::Incomplete,
+            Self::Damaged(_) => ErrorCode::Damaged,
+            Self::Unexpected(_) => ErrorCode::Unexpected,
         }
     }
 }

@@ -4,33 +4,61 @@ use std::fs::File;
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use super::exit::Refusal;
 use mocban_catalog::Catalog;
-use mocban_config::Config;
-use mocban_core::domain::sanitize;
-use mocban_export::InputFileLimits;
+use mocban_core::domain::{ErrorCode, sanitize};
+use mocban_export::EXPORT_MANIFEST;
+use mocban_lists::workbook::{is_workbook, read_sheet};
 use mocban_store::{
-    CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
+    CATALOG_FILE, Project, SETTINGS_FILE, create_folders, open_regular, read_file_or_pipe,
+    write_atomic,
 };
 
 /// Longest list that is read, in bytes.
 const MAX_LIST_BYTES: u64 = 512 << 20;
 
 /// Reads a list that is named on the command line, from a file or a pipe.
-///
-/// # Errors
-/// Returns an error if there is no such file, it cannot be read, or it is too long.
 pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     read_file_or_pipe(path, MAX_LIST_BYTES)
         .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))
 }
 
+/// A list that was read.
+#[derive(Debug)]
+pub struct ListFile {
+    /// Its text; of a workbook, the table of a sheet as CSV.
+    pub bytes: Vec<u8>,
+    /// Says which sheet was read if there are others.
+    pub warning: Option<String>,
+}
+
+/// Reads a list that is named on the command line. Of a workbook, reads the sheet that is named, or else the first one.
+pub fn read_list(path: &Path, sheet: Option<&str>) -> Result<ListFile, Refusal> {
+    let bytes = read(path)?;
+    let shown = path.display();
+    if is_workbook(&bytes) {
+        let table = read_sheet(&bytes, sheet)
+            .map_err(|error| Refusal::Usage(format!("{shown}: {error}")))?;
+        return Ok(ListFile {
+            bytes: table.csv,
+            warning: table.warning.map(|warning| format!("{shown}: {warning}")),
+        });
+    }
+    match sheet {
+        None => Ok(ListFile {
+            bytes,
+            warning: None,
+        }),
+        Some(sheet) => {
+            let text = format!("{shown} is not an XLSX workbook, so it has no sheet {sheet:?}");
+            Err(Refusal::Usage(text))
+        }
+    }
+}
+
 /// Returns the metadata of a file or folder, or `None` if it does not exist.
-///
-/// # Errors
-/// Returns the error of the system, unless the file does not exist.
 pub fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
     match std::fs::metadata(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
@@ -42,10 +70,7 @@ pub fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
 const MAX_SMALL: u64 = 1 << 20;
 
 /// Reads a small file, such as settings. Returns `None` if it does not exist.
-///
-/// # Errors
-/// Returns an error if the file cannot be read or is longer than 1 MiB.
-pub fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
+pub fn small(path: &Path) -> ProjectResult<Option<Vec<u8>>> {
     let shown = path.display();
     let failed = || format!("cannot read {shown}");
     // A link to a missing file exists, and cannot be read.
@@ -60,36 +85,28 @@ pub fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
         .read_to_end(&mut bytes)
         .with_context(failed)?;
     if bytes.len() as u64 > MAX_SMALL {
-        anyhow::bail!("{shown} is longer than 1 MiB");
+        return Err(ProjectError::unexpected(format!(
+            "{shown} is longer than 1 MiB"
+        )));
     }
     Ok(Some(bytes))
 }
 
-/// Refuses to write into a folder that does not exist.
-///
-/// # Errors
-/// Returns an error if the folder does not exist.
-pub fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    match folder.filter(|folder| matches!(metadata(folder), Ok(None))) {
+/// Creates the folder of a file that will be written.
+pub fn create_parent(path: &Path) -> ProjectResult<()> {
+    let parent = path.parent();
+    match parent.filter(|folder| !folder.as_os_str().is_empty()) {
         None => Ok(()),
-        Some(folder) => Err(Refusal::Usage(format!(
-            "{} cannot be written, because there is no folder {}; create it first",
-            path.display(),
-            folder.display()
-        ))),
+        Some(folder) => create_folders(folder).with_context(|| {
+            let (shown, folder) = (path.display(), folder.display());
+            format!("cannot write {shown}, because the folder {folder} cannot be created")
+        }),
     }
 }
 
-/// Refuses to write over a catalog, a backup, or another file that a project needs, or into a missing folder.
-///
-/// # Errors
-/// Returns an error if the path is one of these files.
+/// Refuses to write over a catalog, a backup, or another file that a project needs, or into its folder of results.
 pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
-    refuse_missing_folder(path)?;
-    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let real = real_path(path);
     let name = real.file_name().unwrap_or_default().to_string_lossy();
     let is_known = name.starts_with(CATALOG_FILE)
         || [SETTINGS_FILE, "run.lock", "run.members"].contains(&&*name);
@@ -97,6 +114,8 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     let folder = Path::new(".").join(real.parent().unwrap_or(&real));
     let reason = if is_known && folder.join(CATALOG_FILE).exists() {
         "is a file of a project"
+    } else if is_among_results(&real) {
+        "belongs to the results of a project"
     } else if is_backup(&real).unwrap_or(false) {
         "is a backup"
     } else {
@@ -108,15 +127,38 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     )))
 }
 
-/// Refuses to write over a file of a project, or over a mesh, a print or a true mask of its pairs.
-///
-/// # Errors
-/// Returns an error if the path is one of these files, or the catalog cannot be read.
+/// Returns the absolute path of a file that need not exist, without links.
+fn real_path(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let found = absolute.ancestors().find_map(|folder| {
+        let below = absolute.strip_prefix(folder).ok()?;
+        let real = folder.canonicalize().ok()?;
+        // Joining an empty path would add a separator.
+        Some(if below == Path::new("") {
+            real
+        } else {
+            real.join(below)
+        })
+    });
+    found.unwrap_or(absolute)
+}
+
+/// Returns whether a path is the folder of results of a project, or inside it.
+fn is_among_results(real: &Path) -> bool {
+    real.ancestors().any(|folder| {
+        let project = folder.parent().map(Project::at);
+        project.is_some_and(|project| {
+            project.artifacts_dir() == folder && project.catalog_path().exists()
+        })
+    })
+}
+
+/// Refuses to write over a file of a project, or over an input of its pairs and blocks.
 pub async fn refuse_used_file(
     path: &Path,
     project: &Project,
     catalog: &Catalog,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     refuse_project_file(path)?;
     // A file that does not exist is not an input.
     let Ok(real) = path.canonicalize() else {
@@ -144,9 +186,6 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).
-///
-/// # Errors
-/// Returns an error if the file cannot be read.
 pub fn is_backup(file: &Path) -> std::io::Result<bool> {
     if !std::fs::metadata(file)?.is_file() {
         return Ok(false);
@@ -161,11 +200,8 @@ pub fn is_backup(file: &Path) -> std::io::Result<bool> {
 }
 
 /// Writes an output that may be incomplete. An incomplete output does not replace an earlier file, which may be
-/// complete.
-///
-/// # Errors
-/// Returns an error if an incomplete output would replace a file, or the file cannot be written.
-pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
+/// complete. Creates the folder of the file.
+pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> ProjectResult<()> {
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
     if !is_complete && metadata(path).with_context(failed)?.is_some() {
@@ -174,42 +210,52 @@ pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Res
         );
         return Err(Refusal::Incomplete(text).into());
     }
+    create_parent(path)?;
     write_atomic(path, bytes).with_context(failed)
 }
 
 /// Adds what to do if an output could not be written to its place in the project because no other was named.
-///
-/// # Errors
-/// Returns the error of the write.
-pub fn or_elsewhere(written: anyhow::Result<()>, named: Option<&Path>) -> anyhow::Result<()> {
+pub fn or_elsewhere(written: ProjectResult<()>, named: Option<&Path>) -> ProjectResult<()> {
     match written {
-        Err(error) if named.is_none() && !error.is::<Refusal>() => {
+        Err(error) if named.is_none() && error.code() != ErrorCode::Incomplete => {
             Err(error.context("name a file elsewhere with -o"))
         }
         written => written,
     }
 }
 
-/// Lists the files of a directory, without its subdirectories and links to directories.
-///
-/// # Errors
-/// Returns an error if there is no such directory, or it cannot be listed.
-pub fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let refuse = |error: std::io::Error| match error.kind() {
-        ErrorKind::NotADirectory => Refusal::Usage(format!("{} is not a directory", dir.display())),
-        _ => refusal(dir, &error, "there is no directory", "cannot list"),
-    };
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(dir).map_err(refuse)? {
-        let entry = entry.map_err(refuse)?;
-        let path = entry.path();
-        // The listing has the type already; only a link must be followed.
-        let is_dir = match entry.file_type() {
-            Ok(kind) if !kind.is_symlink() => kind.is_dir(),
-            _ => path.is_dir(),
+/// Folders that hold no scans and prints of their own.
+const SKIPPED_FOLDERS: [&str; 2] = ["__MACOSX", "@eaDir"];
+
+/// Lists the files of a directory and of the folders in it. Leaves out hidden folders, links to folders, exports, and
+/// the folder of results of a project.
+pub fn list_below(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
+    let (mut files, mut folders) = (Vec::new(), vec![dir.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        let refuse = |error: std::io::Error| match error.kind() {
+            ErrorKind::NotADirectory => {
+                Refusal::Usage(format!("{} is not a directory", folder.display()))
+            }
+            _ => refusal(&folder, &error, "there is no directory", "cannot list"),
         };
-        if !is_dir {
-            files.push(path);
+        let results = Project::at(&folder).artifacts_dir();
+        let is_project = folder.join(CATALOG_FILE).exists();
+        if folder != dir && folder.join(EXPORT_MANIFEST).exists() {
+            continue;
+        }
+        for entry in std::fs::read_dir(&folder).map_err(refuse)? {
+            let entry = entry.map_err(refuse)?;
+            let (path, name) = (entry.path(), entry.file_name());
+            let is_skipped = name.as_encoded_bytes().starts_with(b".")
+                || SKIPPED_FOLDERS.iter().any(|skipped| name == *skipped)
+                || is_project && path == results;
+            // The listing has the type already; only a link must be followed.
+            match entry.file_type() {
+                Ok(kind) if kind.is_dir() && is_skipped => {}
+                Ok(kind) if kind.is_dir() => folders.push(path),
+                Ok(kind) if kind.is_symlink() && path.is_dir() => {}
+                _ => files.push(path),
+            }
         }
     }
     Ok(files)
@@ -223,7 +269,7 @@ pub fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
         Some("csv" | "tsv") => false,
         Some(_) | None => {
             let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-            text.trim_ascii_start().starts_with(b"{")
+            matches!(text.trim_ascii_start(), [b'{' | b'[', ..])
         }
     }
 }
@@ -260,19 +306,47 @@ fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> 
     })
 }
 
-/// Returns the limits of input files in the settings.
-pub const fn input_file_limits(config: &Config) -> InputFileLimits {
-    InputFileLimits {
-        mesh: config.limits.mesh,
-        image: config.limits.image,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
-    use super::{is_jsonl, write_output};
+    use super::{is_jsonl, list_below, write_output};
+
+    #[test]
+    fn files_in_folders_are_listed_without_hidden_folders_and_results() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        for path in [
+            "1.stl",
+            "b1/stl/1.stl",
+            ".git/1.stl",
+            "__MACOSX/1.stl",
+            "artifacts/1.stl",
+            "p/catalog.sqlite",
+            "p/artifacts/00/1.png",
+            "p/data/1.stl",
+            "out/export.json",
+            "out/1.png",
+        ] {
+            let path = dir.path().join(path);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("created");
+            std::fs::write(path, "").expect("written");
+        }
+        let mut found = list_below(dir.path()).expect("listed");
+        found.sort();
+        let expected = [
+            "1.stl",
+            "artifacts/1.stl",
+            "b1/stl/1.stl",
+            "p/catalog.sqlite",
+            "p/data/1.stl",
+        ];
+        assert_eq!(found, expected.map(|path| dir.path().join(path)));
+        let refused = list_below(&dir.path().join("1.stl")).expect_err("a file");
+        assert!(
+            refused.to_string().ends_with("1.stl is not a directory"),
+            "{refused}"
+        );
+    }
 
     #[test]
     fn an_incomplete_file_replaces_none() {
@@ -291,6 +365,7 @@ mod tests {
         assert!(is_jsonl(Path::new("a.jsonl"), b""));
         assert!(!is_jsonl(Path::new("a.csv"), b"{"));
         assert!(is_jsonl(Path::new("a"), b"\xef\xbb\xbf {\"id\":1}"));
+        assert!(is_jsonl(Path::new("a.txt"), b" [{\"id\":1}]"));
         assert!(!is_jsonl(Path::new("a.txt"), b"id,mesh,print"));
     }
 }

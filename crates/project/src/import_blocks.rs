@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::error::ProjectResult;
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
-use crate::files;
-use crate::import_pairs::PairSource;
+use crate::files::{self, ListFile};
+use crate::import_pairs::{AllowedChanges, PairSource};
+use crate::input_paths::SimilarFiles;
 use crate::location::{Location, now};
 use crate::manifest_file::{locate_file, refuse};
 use crate::missing_files::MissingFiles;
@@ -71,55 +74,54 @@ pub enum ListedItems {
 }
 
 impl ListedItems {
-    /// Reads a list and decides from its header what it names.
-    ///
-    /// # Errors
-    /// Returns an error if the list cannot be read.
-    pub fn of(file: &Path) -> anyhow::Result<Self> {
+    /// Reads a list, or a sheet of a workbook, and decides from its header what it names. Returns a warning about other
+    /// sheets, too.
+    pub fn of(file: &Path, sheet: Option<&str>) -> ProjectResult<(Self, Option<String>)> {
         let pairs = |bytes| PairSource::List {
             file: file.to_owned(),
             bytes,
         };
         if file.is_dir() {
-            return Ok(Self::Pairs(pairs(None)));
+            return Ok((Self::Pairs(pairs(None)), None));
         }
-        let bytes = files::read(file)?;
+        let ListFile { bytes, warning } = files::read_list(file, sheet)?;
         let is_list = !files::is_jsonl(file, &bytes) && is_block_list(&bytes);
-        Ok(if is_list {
+        let items = if is_list {
             Self::Blocks(BlockSource::List {
                 file: file.to_owned(),
                 bytes,
             })
         } else {
             Self::Pairs(pairs(Some(bytes)))
-        })
+        };
+        Ok((items, warning))
     }
 }
 
 /// Imports blocks. If the import fails, no block is imported.
-///
-/// # Errors
-/// Returns an error if the list is refused, files are missing, or the catalog or the disk fails.
 pub async fn import_blocks(
     source: &BlockSource,
-    allow_missing: bool,
+    allowed: AllowedChanges,
     location: &Location,
-) -> anyhow::Result<BlockImportOutcome> {
+    listener: &dyn Listener,
+) -> ProjectResult<BlockImportOutcome> {
+    let _work = LongWork::begin(listener, "importing");
     let mut listing = listing(source)?;
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
-    let mut missing = MissingFiles::default();
+    let (mut missing, mut searches) = (MissingFiles::default(), SimilarFiles::default());
     for row in &mut listing.rows {
-        locate(row, &listing.label, &project, &mut missing);
+        locate(row, &listing.label, &project, &mut missing, &mut searches);
     }
-    if missing.count > 0 && !allow_missing {
+    if missing.count > 0 && !allowed.missing {
         return Err(missing.refusal().into());
     }
     let rows = listing.rows.iter().map(|row| stored_row(row, &project));
     let rows: Vec<BlockAttributes> = rows.collect::<Result<_, _>>()?;
-    let checked = async || Ok(());
-    let summary = import_with(&project, url.as_deref(), checked, async |catalog| {
-        Ok(catalog.import_blocks(rows.clone(), now()).await?)
+    let summary = import_with(&project, url.as_deref(), async |catalog| {
+        Ok(catalog
+            .import_blocks(rows.clone(), allowed.files, now())
+            .await?)
     });
     Ok(BlockImportOutcome {
         summary: summary.await?,
@@ -127,7 +129,7 @@ pub async fn import_blocks(
     })
 }
 
-fn listing(source: &BlockSource) -> anyhow::Result<BlockListing> {
+fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
     let (file, bytes) = match source {
         BlockSource::List { file, bytes } => (file, bytes),
         BlockSource::One(files) => {
@@ -160,7 +162,7 @@ fn listing(source: &BlockSource) -> anyhow::Result<BlockListing> {
 }
 
 /// Returns the given name, or the name of the mesh file without its extension.
-fn name(given: Option<&str>, mesh: &Path) -> anyhow::Result<BlockName> {
+fn name(given: Option<&str>, mesh: &Path) -> ProjectResult<BlockName> {
     let stem = mesh.file_stem().unwrap_or_default().to_string_lossy();
     BlockName::new(given.unwrap_or(&stem)).map_err(|error| {
         let text = format!("{}: {error}; give another one with --name", mesh.display());
@@ -169,17 +171,23 @@ fn name(given: Option<&str>, mesh: &Path) -> anyhow::Result<BlockName> {
 }
 
 /// Replaces the paths of a row by those on disk, and records missing files.
-fn locate(row: &mut BlockRow, label: &str, project: &Project, missing: &mut MissingFiles) {
+fn locate(
+    row: &mut BlockRow,
+    label: &str,
+    project: &Project,
+    missing: &mut MissingFiles,
+    searches: &mut SimilarFiles,
+) {
     let (line, name) = (row.line, row.name.clone());
     let required = [("mesh", &mut row.mesh), ("page", &mut row.page)].into_iter();
     for (kind, path) in required.chain(row.labels.as_mut().map(|path| ("labels", path))) {
-        if let Some(line) = locate_file((label, line), kind, path, &name, project) {
+        if let Some(line) = locate_file((label, line), kind, path, &name, project, searches) {
             missing.add(line);
         }
     }
 }
 
-fn stored_row(row: &BlockRow, project: &Project) -> anyhow::Result<BlockAttributes> {
+fn stored_row(row: &BlockRow, project: &Project) -> ProjectResult<BlockAttributes> {
     let stored = |path: &PathBuf| project.stored_path(path);
     Ok(BlockAttributes {
         name: row.name.clone(),

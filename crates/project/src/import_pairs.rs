@@ -1,29 +1,29 @@
 //! Imports pairs of meshes and prints into a project, which is created if there is none.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use anyhow::Context as _;
+use crate::error::{ProjectResult, TaskStopped, WithContext as _};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files;
 use crate::location::{Location, now};
 use crate::manifest_file::Listing;
 use crate::missing_files::MissingFiles;
 use crate::new_project::import_with;
+use crate::row_spool::RowSpool;
 use crate::truth_file::{self, TruthRow};
-use mocban_catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
+use mocban_catalog::{Catalog, ImportRow, ImportSummary, ImportTerms};
 use mocban_core::domain::{LengthUnit, PairName};
 use mocban_lists::manifest::{ManifestRow, RowIds};
 use mocban_store::Project;
+use mocban_system::failpoint::{self, Point};
 
-/// Maximum number of rows of a chunk that is sent to the catalog, and of the chunks that may wait there.
-const CHUNK_ROWS: usize = 2_000;
+/// Maximum number of chunks of rows that wait for the catalog.
 const WAITING_CHUNKS: usize = 2;
-/// A chunk ends with the row that reaches this many bytes of memory.
-const CHUNK_BYTES: usize = 2 << 20;
 
 /// End of the message when the file of true alignments is refused.
 const NOT_IMPORTED: &str = "nothing was imported";
@@ -56,8 +56,19 @@ pub struct PairImport {
     pub source: PairSource,
     /// A file of true alignments, one JSON object per line.
     pub truth: Option<PathBuf>,
-    /// Whether files may be missing; such pairs fail if they are run before the files exist.
-    pub allow_missing: bool,
+    /// What is accepted.
+    pub allowed: AllowedChanges,
+}
+
+/// What an import accepts only if it is asked for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AllowedChanges {
+    /// Whether files may be missing; such pairs and blocks fail if they are run before the files exist.
+    pub missing: bool,
+    /// Whether most known pairs or blocks may get other files.
+    pub files: bool,
+    /// Whether pairs that the list does not have are retired.
+    pub replace: bool,
 }
 
 /// What an import changed.
@@ -74,13 +85,12 @@ pub struct ImportOutcome {
 }
 
 /// Imports pairs. If the import fails, no pair is imported.
-///
-/// # Errors
-/// Returns an error if a list is refused, or the catalog or the disk fails.
 pub async fn import_pairs(
     import: PairImport,
     location: &Location,
-) -> anyhow::Result<ImportOutcome> {
+    listener: &dyn Listener,
+) -> ProjectResult<ImportOutcome> {
+    let _work = LongWork::begin(listener, "importing");
     let mut listing = listing(import.source)?;
     let warnings = std::mem::take(&mut listing.warnings);
     let truths = match &import.truth {
@@ -90,14 +100,20 @@ pub async fn import_pairs(
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
     let truths = stored_truths(truths, &project)?;
-    let list = Arc::new(ImportList {
-        listing,
-        truths,
-        allow_missing: import.allow_missing,
-    });
-    let check = async || check_rows(&project, &list).await;
-    let store = async |catalog: &Catalog| store_in(catalog, &project, &list).await;
-    let (summary, truths, missing) = import_with(&project, url.as_deref(), check, store).await?;
+    // The files are looked at before the catalog is locked, because a disk may be slow and a list long.
+    let looked_at = project.clone();
+    let spooled = tokio::task::spawn_blocking(move || spool(&listing, &looked_at, import.allowed));
+    let (rows, missing) = spooled.await.map_err(TaskStopped)??;
+    let (rows, terms) = (
+        Arc::new(Mutex::new(rows)),
+        ImportTerms {
+            truths,
+            changed_files: import.allowed.files,
+            replace: import.allowed.replace,
+        },
+    );
+    let store = async |catalog: &Catalog| store_in(catalog, &rows, terms.clone()).await;
+    let (summary, truths) = import_with(&project, url.as_deref(), store).await?;
     Ok(ImportOutcome {
         summary,
         truths,
@@ -106,85 +122,57 @@ pub async fn import_pairs(
     })
 }
 
-/// What to import.
-struct ImportList {
-    listing: Listing,
-    truths: Vec<(PairName, Value)>,
-    /// Whether files may be missing.
-    allow_missing: bool,
-}
-
-/// The summary of an import, the number of stored true alignments, and the missing files.
-type StoredList = (ImportSummary, u64, MissingFiles);
-
-/// Imports the list into a catalog.
+/// Imports the rows into a catalog. Returns the summary and the number of stored true alignments.
 async fn store_in(
     catalog: &Catalog,
-    project: &Project,
-    list: &Arc<ImportList>,
-) -> anyhow::Result<StoredList> {
-    let (sender, rows) = mpsc::channel(WAITING_CHUNKS);
-    let (project, shared) = (project.clone(), Arc::clone(list));
-    let sent = tokio::task::spawn_blocking(move || send_rows(&shared, &project, &sender));
-    let stored = catalog.import_all(rows, list.truths.clone(), now()).await;
-    // Return a row's error first, because the catalog then only reports that the list ended early.
-    let missing = sent
-        .await
-        .context("the task that reads the list stopped")??;
-    let (summary, truths) = stored?;
-    Ok((summary, truths, missing))
+    rows: &Arc<Mutex<RowSpool>>,
+    terms: ImportTerms,
+) -> ProjectResult<(ImportSummary, u64)> {
+    let (sender, chunks) = mpsc::channel(WAITING_CHUNKS);
+    let rows = Arc::clone(rows);
+    let sent = tokio::task::spawn_blocking(move || {
+        let mut rows = rows.lock().unwrap_or_else(PoisonError::into_inner);
+        rows.send(&sender)
+    });
+    let stored = catalog.import_all(chunks, terms, now()).await;
+    // Return the error of reading first, because the catalog then only reports that the list ended early.
+    let sent = sent.await.map_err(TaskStopped)?;
+    sent.with_context(|| "cannot read the temporary file of the list".to_owned())?;
+    Ok(stored?)
 }
 
-/// Refuses a list that [`store_in`] would refuse because of a file.
-async fn check_rows(project: &Project, list: &Arc<ImportList>) -> anyhow::Result<()> {
-    // Nobody receives the rows.
-    let (sender, _) = mpsc::channel(1);
-    let (project, list) = (project.clone(), Arc::clone(list));
-    let checked = tokio::task::spawn_blocking(move || send_rows(&list, &project, &sender));
-    checked.await?.map(|_| ())
-}
-
-/// Sends the rows to the catalog in chunks. Returns the missing files.
+/// Looks at the files of all rows. Returns the rows as they are stored, and the missing files.
 ///
 /// # Errors
-/// Returns an error if files are missing that must exist, or the path of a file cannot be stored. The catalog then
-/// imports nothing.
-fn send_rows(
-    list: &ImportList,
+/// Returns an error if files are missing that must exist, if the path of a file cannot be stored, or if there is no space
+/// for a temporary file.
+fn spool(
+    listing: &Listing,
     project: &Project,
-    sender: &mpsc::Sender<ImportChunk>,
-) -> anyhow::Result<MissingFiles> {
-    let (mut missing, mut chunk, mut bytes) = (MissingFiles::default(), Vec::new(), 0);
+    allowed: AllowedChanges,
+) -> ProjectResult<(RowSpool, MissingFiles)> {
+    let failed = || "cannot write a temporary file for the list".to_owned();
+    let mut spool = RowSpool::new().with_context(failed)?;
+    let mut missing = MissingFiles::default();
     let mut outcome = Ok(());
-    list.listing.rows(project, |row, lines| {
+    listing.rows(project, |row, lines| {
+        failpoint::hit("import", Point::Computed, Some(&row.name));
         for line in lines {
             missing.add(line);
         }
-        match stored_row(&row, project) {
-            Ok(row) => {
-                bytes += memory(&row);
-                chunk.push(row);
-            }
-            Err(error) if outcome.is_ok() => outcome = Err(error),
-            Err(_) => {}
-        }
-        if chunk.len() == CHUNK_ROWS || bytes >= CHUNK_BYTES {
-            // The catalog stops receiving after an error, which it reports itself.
-            let _ = sender.blocking_send(ImportChunk::Rows(std::mem::take(&mut chunk)));
-            bytes = 0;
+        if outcome.is_ok() {
+            outcome =
+                stored_row(&row, project).and_then(|row| spool.push(&row).with_context(failed));
         }
     });
     outcome?;
-    if missing.count > 0 && !list.allow_missing {
+    if missing.count > 0 && !allowed.missing {
         return Err(missing.refusal().into());
     }
-    for last in [ImportChunk::Rows(chunk), ImportChunk::End] {
-        let _ = sender.blocking_send(last);
-    }
-    Ok(missing)
+    Ok((spool, missing))
 }
 
-fn listing(source: PairSource) -> anyhow::Result<Listing> {
+fn listing(source: PairSource) -> ProjectResult<Listing> {
     match source {
         PairSource::List {
             file,
@@ -204,7 +192,7 @@ async fn read_truths(
     file: &Path,
     listed: &RowIds,
     location: &Location,
-) -> anyhow::Result<Vec<TruthRow>> {
+) -> ProjectResult<Vec<TruthRow>> {
     let text = String::from_utf8(files::read(file)?)
         .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
     let truths =
@@ -214,16 +202,20 @@ async fn read_truths(
     if others.is_empty() {
         return Ok(truths);
     }
-    let unknown = match location.open_read_only().await {
+    let (unknown, known) = match location.open_read_only().await {
         Ok((_, catalog)) => {
             let unknown = catalog.unknown_names(&others).await?;
+            let known = match unknown.as_slice() {
+                [] => Vec::new(),
+                _ => catalog.pair_names().await?,
+            };
             catalog.close().await;
-            unknown
+            (unknown, known)
         }
-        Err(_) => others,
+        Err(_) => (others, Vec::new()),
     };
     match truths.iter().find(|truth| unknown.contains(&truth.name)) {
-        Some(truth) => Err(truth_file::unknown_pair(truth)
+        Some(truth) => Err(truth_file::unknown_pair(truth, &known)
             .in_file(file, NOT_IMPORTED)
             .into()),
         None => Ok(truths),
@@ -235,7 +227,7 @@ async fn read_truths(
 fn stored_truths(
     truths: Vec<TruthRow>,
     project: &Project,
-) -> anyhow::Result<Vec<(PairName, Value)>> {
+) -> ProjectResult<Vec<(PairName, Value)>> {
     truths
         .into_iter()
         .map(|mut truth| {
@@ -247,7 +239,7 @@ fn stored_truths(
         .collect()
 }
 
-fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow> {
+fn stored_row(row: &ManifestRow, project: &Project) -> ProjectResult<ImportRow> {
     Ok(ImportRow {
         name: row.name.clone(),
         mesh_path: project.stored_path(&row.mesh)?,
@@ -259,31 +251,4 @@ fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow>
         meta: row.meta.clone().into_iter().collect(),
         prior: None,
     })
-}
-
-/// Returns roughly the memory that a row needs, in bytes.
-fn memory(row: &ImportRow) -> usize {
-    let cells = [&row.character, &row.block].into_iter().flatten();
-    let meta = row.meta.iter();
-    size_of::<ImportRow>()
-        + row.mesh_path.len()
-        + row.print_path.len()
-        + cells.map(String::len).sum::<usize>()
-        + meta
-            .map(|(key, value)| key.len() + value_memory(value))
-            .sum::<usize>()
-}
-
-/// Returns roughly the memory that a JSON value needs, in bytes. A number of one digit needs much more than its text.
-fn value_memory(value: &Value) -> usize {
-    size_of::<Value>()
-        + match value {
-            Value::Null | Value::Bool(_) | Value::Number(_) => 0,
-            Value::String(text) => text.len(),
-            Value::Array(values) => values.iter().map(value_memory).sum(),
-            Value::Object(entries) => entries
-                .iter()
-                .map(|(key, value)| size_of::<String>() + key.len() + value_memory(value))
-                .sum(),
-        }
 }

@@ -3,12 +3,14 @@
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+use mocban_core::domain::NO_BREAK_SPACES;
+use mocban_core::domain::spelling::plain_form;
+use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
 use unicode_normalization::UnicodeNormalization as _;
-use unicode_normalization::char::is_combining_mark;
 
 /// Replaces the path of a file whose name is written differently in a list by its path on disk: with the other Unicode
-/// form of accented letters (macOS writes some names decomposed, Windows and Linux composed), or without the
-/// backslashes of Windows. Returns whether the file exists.
+/// form of accented letters (macOS writes some names decomposed, Windows and Linux composed), without the backslashes of
+/// Windows, or with plain spaces for the no-break spaces of text programs. Returns whether the file exists.
 ///
 /// # Errors
 /// Returns an error if this cannot be found out, such as for a folder that cannot be entered.
@@ -27,8 +29,16 @@ pub fn find_on_disk(path: &mut PathBuf) -> io::Result<bool> {
 fn written_differently(path: &Path) -> Option<PathBuf> {
     let text = path.to_str()?;
     let slashes = (cfg!(unix) && text.contains('\\')).then(|| text.replace('\\', "/"));
-    let mut written = [Some(text.to_owned()), slashes].into_iter().flatten();
-    written.find_map(|text| in_any_form(Path::new(&text)))
+    let mut written: Vec<String> = [Some(text.to_owned()), slashes]
+        .into_iter()
+        .flatten()
+        .collect();
+    let spaced = written
+        .iter()
+        .map(|text| text.replace(NO_BREAK_SPACES, " "));
+    let spaced: Vec<String> = spaced.filter(|_| text.contains(NO_BREAK_SPACES)).collect();
+    written.extend(spaced);
+    written.iter().find_map(|text| in_any_form(Path::new(text)))
 }
 
 /// Returns the existing path whose parts are those of a path, as written, composed or decomposed.
@@ -47,29 +57,66 @@ fn in_any_form(path: &Path) -> Option<PathBuf> {
     Some(found)
 }
 
-/// Largest number of entries of a folder that are compared with the name of a missing file.
+/// Largest number of entries of a folder that are compared with a name.
 const MAX_ENTRIES: usize = 10_000;
+/// Largest number of missing files for which a similar one is searched: a search lists folders.
+const MAX_SEARCHES: usize = 10;
 
-/// Returns the name of a file in the folder of a missing file that differs from it only in accents or in upper and lower
-/// case.
-pub fn similar_file(missing: &Path) -> Option<String> {
-    let wanted = plain_letters(missing.file_name()?.to_str()?);
-    // The parent of a bare file name is empty.
-    let folder = Path::new(".").join(missing.parent()?);
-    let entries = std::fs::read_dir(folder).ok()?;
-    let names = entries.take(MAX_ENTRIES).flatten();
-    let mut names = names.filter_map(|entry| entry.file_name().into_string().ok());
-    names.find(|name| plain_letters(name) == wanted)
+/// Searches files with similar names in place of the first missing ones.
+#[derive(Debug, Default)]
+pub struct SimilarFiles {
+    searches: usize,
 }
 
-/// Returns a name in lower case and without accents, so that `Khoi-4` is similar to `khối-4`.
-pub fn plain_letters(name: &str) -> String {
-    let letters = name.nfd().filter(|c| !is_combining_mark(*c));
-    let letters = letters.map(|c| match c {
-        'đ' | 'Đ' => 'd',
-        c => c,
-    });
-    letters.collect::<String>().to_lowercase()
+impl SimilarFiles {
+    /// Returns the path of a file that differs from a missing one only in accents, in upper and lower case, in zeros before
+    /// a number, or in the kind of file, from the first part that differs.
+    pub fn find(&mut self, missing: &Path) -> Option<String> {
+        self.searches += 1;
+        if self.searches > MAX_SEARCHES {
+            return None;
+        }
+        let mut found = PathBuf::new();
+        let mut shown: Option<PathBuf> = None;
+        for part in missing.components() {
+            let mut next = found.join(part);
+            if let Component::Normal(name) = part
+                && (shown.is_some() || !next.exists())
+            {
+                let name = similar_entry(&found, name.to_str()?)?;
+                next = found.join(&name);
+                shown.get_or_insert_default().push(name);
+            }
+            found = next;
+        }
+        shown?.to_str().map(str::to_owned)
+    }
+}
+
+/// Returns the entry of a folder whose name is that given, or similar to it.
+fn similar_entry(folder: &Path, name: &str) -> Option<String> {
+    // The folder of a bare file name is empty.
+    let entries = std::fs::read_dir(Path::new(".").join(folder)).ok()?;
+    let names = entries.take(MAX_ENTRIES).flatten();
+    let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+    let wanted = plain_form(name);
+    let rank = |entry: &String| {
+        let plain = plain_form(entry);
+        let both = [entry.as_str(), name].map(Path::new);
+        let is_other_kind = (both.into_iter().all(is_named_like_mesh)
+            || both.into_iter().all(is_named_like_print))
+            && Path::new(&plain).file_stem() == Path::new(&wanted).file_stem();
+        match () {
+            () if *entry == name => Some(0),
+            () if plain == wanted => Some(1),
+            () if is_other_kind => Some(2),
+            () => None,
+        }
+    };
+    names
+        .filter_map(|entry| Some((rank(&entry)?, entry)))
+        .min()
+        .map(|(_, entry)| entry)
 }
 
 /// Returns whether a part of a path begins like an absolute path of Windows, such as `C:\scans\1.stl`, on another system.
@@ -90,7 +137,11 @@ mod tests {
     use std::fs;
     use std::path::Path;
 
-    use super::{find_on_disk, similar_file};
+    use super::{SimilarFiles, find_on_disk};
+
+    fn similar_file(path: &Path) -> Option<String> {
+        SimilarFiles::default().find(path)
+    }
 
     #[test]
     fn other_unicode_forms_and_backslashes_are_found() {
@@ -108,6 +159,10 @@ mod tests {
             assert!(find_on_disk(&mut path).expect("readable"), "{written}");
             assert_eq!(path, file, "{written}");
         }
+        fs::write(dir.path().join("tờ 3.stl"), "").expect("written");
+        let mut path = dir.path().join("tờ\u{a0}3.stl");
+        assert!(find_on_disk(&mut path).expect("readable"));
+        assert_eq!(path, dir.path().join("tờ 3.stl"));
         let other = dir.path().join("other.stl");
         let mut path = other.clone();
         assert!(!find_on_disk(&mut path).expect("readable"));
@@ -115,13 +170,22 @@ mod tests {
     }
 
     #[test]
-    fn a_file_with_other_accents_is_similar() {
+    fn a_file_with_other_accents_or_zeros_is_similar() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         fs::write(dir.path().join("chữ số 1.stl"), "").expect("written");
         let similar = |name: &str| similar_file(&dir.path().join(name));
         assert_eq!(similar("Chu so 1.stl").as_deref(), Some("chữ số 1.stl"));
         assert_eq!(similar_file(Path::new("SRC")).as_deref(), Some("src"));
+        assert_eq!(similar("Chu so 001.stl").as_deref(), Some("chữ số 1.stl"));
         assert_eq!(similar("chu so 2.stl"), None);
         assert_eq!(similar("missing/chu so 1.stl"), None);
+        fs::create_dir(dir.path().join("STL")).expect("a folder");
+        fs::write(dir.path().join("STL/Nét 7.PLY"), "").expect("written");
+        assert_eq!(similar("stl/nét 7.ply").as_deref(), Some("STL/Nét 7.PLY"));
+        assert_eq!(similar("stl/nét 07.stl").as_deref(), Some("STL/Nét 7.PLY"));
+        assert_eq!(similar("stl/nét 7.txt"), None);
+        let mut many = SimilarFiles::default();
+        let found = (0..12).filter_map(|_| many.find(&dir.path().join("CHU SO 1.STL")));
+        assert_eq!(found.count(), 10);
     }
 }

@@ -1,19 +1,45 @@
 //! What a command does, without the terminal: the same for the command line, a Python package and a page.
 //!
 //! - [`location`]: a project folder with the settings that say where its catalog and its files are; opens both
+//! - [`align`]: one scan with one print, without a project
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
-//! - [`backup`], [`restore`]: copy a project to one file, and make a project of it
+//! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
+//! - [`retire`]: takes pairs out of every count, and brings them back
+//! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
+//!   block, and whether files and rows are sound
+//! - [`verdicts`]: records, imports, lists and undoes what people say about results
+//! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
+//! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
-//! - [`demo_folder`]: what a demo may replace
-//! - [`exit`], [`error_text`]: the code of an error, and one sentence that says what was seen and what to do
+//! - [`demo_folder`], [`generated_folder`]: what may be replaced
+//! - [`events`]: what a function reports while it works
+//! - [`error`], [`exit`]: the code of an error, one sentence that says what was seen and what to do, and the exit code
+//!
+//! A function that needs the catalog, the disk or the settings fails if they do. `# Errors` says what else it refuses.
 //!
 //! **Invariant:** a function checks everything that can refuse it before it writes, and prints nothing.
 
+#![expect(
+    clippy::missing_errors_doc,
+    reason = "the page of the crate says what can fail in all functions"
+)]
+
+pub mod align;
 pub mod backup;
+pub mod block_status;
+pub mod check;
+pub mod closing;
+pub mod copy;
 pub mod demo_folder;
-pub mod error_text;
+pub mod details;
+pub mod error;
+pub mod events;
 pub mod exit;
+pub mod export;
+pub mod failures;
 pub mod files;
+pub mod generated_folder;
+pub mod hosts;
 pub mod import_blocks;
 pub mod import_pairs;
 pub mod input_paths;
@@ -21,8 +47,22 @@ pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
 pub mod new_project;
+pub mod pair_table;
+pub mod report;
 pub mod restore;
+pub mod retire;
+pub mod retry;
+mod row_spool;
+pub mod run;
+pub mod selection;
+pub mod sheets;
 pub mod shell;
-pub mod time_text;
+pub mod status;
 pub mod truth_file;
+mod unread_files;
 pub mod verdict_file;
+pub mod verdicts;
+pub mod worker_totals;
+
+pub use error::{ProjectError, ProjectResult};
+pub use exit::{ExitCode, Refusal};

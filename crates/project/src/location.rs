@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use mocban_catalog::Catalog;
 use mocban_config::{BaseLayer, ConfigError, Loaded, Sources, load};
@@ -57,10 +58,7 @@ impl Location {
     }
 
     /// Opens the project and its catalog for reading; works during a run.
-    ///
-    /// # Errors
-    /// Returns an error if there is no project, a setting of the storage is invalid, or the catalog cannot be read.
-    pub async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
+    pub async fn open_read_only(&self) -> ProjectResult<(Project, Catalog)> {
         let (project, url) = self.project()?;
         let catalog = match url {
             Some(url) => Catalog::connect_read_only(&url).await?,
@@ -70,10 +68,7 @@ impl Location {
     }
 
     /// Opens the project and its catalog for reading and writing.
-    ///
-    /// # Errors
-    /// Returns an error under the conditions of [`Self::open_read_only`], or if the catalog cannot be written.
-    pub async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
+    pub async fn open(&self) -> ProjectResult<(Project, Catalog)> {
         let (project, url) = self.project()?;
         let catalog = match url {
             Some(url) => Catalog::connect(&url, false).await?,
@@ -83,7 +78,7 @@ impl Location {
     }
 
     /// Returns the project, and the URL of its catalog if that is in PostgreSQL.
-    fn project(&self) -> anyhow::Result<(Project, Option<String>)> {
+    fn project(&self) -> ProjectResult<(Project, Option<String>)> {
         let (storage, url) = self.data_locations()?;
         let project = match url {
             Some(_) => Project::open_directory(&self.dir)?,
@@ -93,23 +88,18 @@ impl Location {
     }
 
     /// Returns the named roots with the object store, and the URL of the catalog if that is in PostgreSQL.
-    ///
-    /// # Errors
-    /// Returns an error under the conditions of [`Self::catalog_url`], or if a setting of the storage is invalid.
-    pub fn data_locations(&self) -> anyhow::Result<(Option<ProjectStorage>, Option<String>)> {
-        let settings = self.settings();
-        if let Err(error) = &settings
-            && self.may_name_places(error)
-        {
-            return settings.map(|_| (None, None));
-        }
+    pub fn data_locations(&self) -> ProjectResult<(Option<ProjectStorage>, Option<String>)> {
+        let settings = match self.settings() {
+            Err(error) if self.may_name_places(&error) => return Err(error.into()),
+            settings => settings,
+        };
         let storage = Self::storage(settings.as_ref().ok())?;
         Ok((storage, self.catalog_of(settings)?))
     }
 
     /// Returns the named roots and the object store of the settings. Sends no request. Returns `None` if the settings
     /// name none, or are invalid.
-    fn storage(settings: Option<&Loaded>) -> anyhow::Result<Option<ProjectStorage>> {
+    fn storage(settings: Option<&Loaded>) -> ProjectResult<Option<ProjectStorage>> {
         let Some(settings) = settings.map(|settings| &settings.config.storage) else {
             return Ok(None);
         };
@@ -127,11 +117,11 @@ impl Location {
     /// # Errors
     /// Returns an error if the URL on the command line has a password, or if the settings are invalid and may name a
     /// catalog elsewhere, or no catalog file shows where the catalog is.
-    pub fn catalog_url(&self) -> anyhow::Result<Option<String>> {
+    pub fn catalog_url(&self) -> ProjectResult<Option<String>> {
         self.catalog_of(self.settings())
     }
 
-    fn catalog_of(&self, settings: anyhow::Result<Loaded>) -> anyhow::Result<Option<String>> {
+    fn catalog_of(&self, settings: Result<Loaded, ConfigError>) -> ProjectResult<Option<String>> {
         if let Some(url) = &self.catalog {
             refuse_password(url)?;
             return Ok(Some(url.clone()).filter(|url| !url.is_empty()));
@@ -145,25 +135,18 @@ impl Location {
             Err(error) if self.dir.join(CATALOG_FILE).exists() && !self.may_name_places(&error) => {
                 Ok(None)
             }
-            Err(error) => Err(error),
+            Err(error) => Err(error.into()),
         }
     }
 
     /// Returns the settings in effect for this project. The file is read once, so that all parts of a command have the
     /// same settings.
-    ///
-    /// # Errors
-    /// Returns an error if a layer cannot be read or has an invalid setting.
-    pub fn settings(&self) -> anyhow::Result<Loaded> {
+    pub fn settings(&self) -> Result<Loaded, ConfigError> {
         if let Some(settings) = self.settings.get() {
             return Ok(settings.clone());
         }
-        let settings = self.load_settings()?;
+        let settings = load(&self.sources())?;
         Ok(self.settings.get_or_init(|| settings).clone())
-    }
-
-    fn load_settings(&self) -> anyhow::Result<Loaded> {
-        Ok(load(&self.sources())?)
     }
 
     fn sources(&self) -> Sources {
@@ -182,10 +165,7 @@ impl Location {
 
     /// Refuses settings of the environment, of flags or of a file in the directory that lead commands on a new project to a
     /// catalog on a server or to an object store, instead of its folder.
-    ///
-    /// # Errors
-    /// Returns an error with the setting, where it comes from, and how to do without it.
-    pub fn require_local(&self, project: &str) -> anyhow::Result<()> {
+    pub fn require_local(&self, project: &str) -> ProjectResult<()> {
         let settings = self.settings()?;
         let storage = &settings.config.storage;
         let catalog = self.catalog_url()?.unwrap_or_default();
@@ -215,15 +195,12 @@ impl Location {
 
     /// Returns whether invalid settings may name a catalog or artifacts elsewhere. Then a command must not use the files in
     /// the project's folder instead.
-    fn may_name_places(&self, error: &anyhow::Error) -> bool {
-        is_unread(error) || self.sources().may_set("storage")
+    fn may_name_places(&self, error: &ConfigError) -> bool {
+        matches!(error, ConfigError::Read { .. }) || self.sources().may_set("storage")
     }
 }
 
 /// Returns the settings of the file in a project folder, without those of the environment and of flags.
-///
-/// # Errors
-/// Returns an error if the file cannot be read, or has an invalid setting.
 pub fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
     load(&Sources {
         base: BaseLayer::Project(dir.join(SETTINGS_FILE)),
@@ -231,15 +208,7 @@ pub fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
     })
 }
 
-/// Returns whether the settings could not be read.
-fn is_unread(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(ConfigError::Read { .. }))
-}
-
 /// Refuses an address of PostgreSQL with a password, which other users of the machine could read.
-///
-/// # Errors
-/// Returns an error if the address has a password.
 pub fn refuse_password(url: &str) -> Result<(), Refusal> {
     if has_password(url) {
         let text = "other users of this machine can read a password on the command line; put it into ~/.pgpass or PGPASSWORD";

@@ -1,15 +1,18 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
-use std::collections::HashSet;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::{find_on_disk, is_windows_path, similar_file};
+use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
 use super::missing_files::WINDOWS_HINT;
-use mocban_core::domain::{ContentHash, LengthUnit, PairName, sanitize};
+use super::unread_files::UnreadFiles;
+use crate::error::ProjectResult;
+use mocban_core::domain::{FileKind, LengthUnit, sanitize};
 use mocban_lists::manifest::{
-    ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
+    ListedFolder, ManifestError, ManifestRow, MisspeltColumns, ReadRows, RowIds, pair_folders,
+    read_csv, read_jsonl,
 };
 use mocban_store::Project;
 
@@ -38,11 +41,11 @@ enum ListingSource {
     Folders(Vec<ManifestRow>),
 }
 
-/// Calls a function for each row; returns the ids of all rows.
-type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError>;
+/// Calls a function for each row; returns the ids of all rows, and which columns have other names.
+type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<ReadRows, ManifestError>;
 
 /// Refuses a manifest as a whole.
-pub fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
+pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
     let problems = problems.to_string().replace('\n', "\n  ");
     let from = from.display();
     Refusal::Usage(format!(
@@ -52,10 +55,7 @@ pub fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
 
 impl Listing {
     /// Reads a CSV or JSON Lines file. If its extension is unknown, the first character decides the format.
-    ///
-    /// # Errors
-    /// Returns an error if the list cannot be read or is refused.
-    pub fn from_file(file: &Path) -> anyhow::Result<Self> {
+    pub fn from_file(file: &Path) -> ProjectResult<Self> {
         let shown = file.display();
         if file.is_dir() {
             let text =
@@ -66,25 +66,18 @@ impl Listing {
     }
 
     /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`].
-    ///
-    /// # Errors
-    /// Returns an error if the list is refused.
-    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> anyhow::Result<Self> {
+    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> ProjectResult<Self> {
         let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {
             read_jsonl
         } else {
             read_csv
         };
-        let mut similar = SimilarIds::default();
         let mut misspelt = MisspeltColumns::default();
-        let mut each = |row: ManifestRow| {
-            similar.add(&row.name);
-            misspelt.add(&row);
-        };
-        let ids = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
+        let mut each = |row: ManifestRow| misspelt.add(&row);
+        let read = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
         let mut warnings = misspelt.warnings();
-        warnings.extend(similar.warning());
+        warnings.extend(renamed(&read));
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
@@ -92,13 +85,13 @@ impl Listing {
                 parse,
                 folder,
             },
-            ids,
+            ids: read.ids,
             warnings,
             row_label: format!("{shown}: line"),
         })
     }
 
-    /// Pairs each mesh of one directory with the print of the same file stem in the other directory.
+    /// Pairs each mesh of one directory with the print of the same folder and file stem in the other directory.
     ///
     /// # Errors
     /// Returns an error if a directory cannot be listed, or two files of one directory have the same stem.
@@ -106,25 +99,34 @@ impl Listing {
         meshes: &Path,
         prints: &Path,
         unit: Option<LengthUnit>,
-    ) -> anyhow::Result<Self> {
-        let found = pair_folders(&files::list(meshes)?, &files::list(prints)?)
-            .map_err(|problems| refuse(meshes, &problems))?;
+    ) -> ProjectResult<Self> {
+        let listed = |root: &Path| {
+            let root = root.to_owned();
+            files::list_below(&root).map(|files| ListedFolder { root, files })
+        };
+        let (mesh_folder, print_folder) = (listed(meshes)?, listed(prints)?);
+        let mut unread = UnreadFiles::of(&mesh_folder.files, FileKind::mesh_advice);
+        unread.append(UnreadFiles::of(&print_folder.files, FileKind::image_advice));
+        let found = pair_folders(&mesh_folder, &print_folder).map_err(|problems| {
+            let lines = [&[problems.to_string()][..], &unread.sentences].concat();
+            refuse(meshes, &lines.join("\n"))
+        })?;
+        let mut others = found.ignored;
+        others.retain(|path| !unread.paths.contains(path));
         let mut rows = found.rows;
-        let mut similar = SimilarIds::default();
         for row in &mut rows {
             row.unit = unit;
-            similar.add(&row.name);
         }
         let warnings = [
             ignored_files("mesh without print", &found.meshes_alone),
             ignored_files("print without mesh", &found.prints_alone),
-            ignored_files("neither mesh nor print", &found.ignored),
-            similar.warning(),
+            ignored_files("neither mesh nor print", &others),
         ];
+        let warnings = warnings.into_iter().flatten().chain(unread.sentences);
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
-            warnings: warnings.into_iter().flatten().collect(),
+            warnings: warnings.chain(found.similar).collect(),
             row_label: "pair".to_owned(),
         })
     }
@@ -136,21 +138,13 @@ impl Listing {
             path.to_str()
                 .is_some_and(|path| project.is_below_root(path))
         };
-        // A search for a similar name lists a folder, so only the first missing files get one.
-        let mut searches = MAX_SEARCHES;
+        let mut searches = SimilarFiles::default();
         let mut each = |mut row: ManifestRow| {
             let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
             let place = (self.row_label.as_str(), row.line);
             let missing = files
                 .filter_map(|(kind, path)| {
-                    let text = locate_file(place, kind, path, &row.name, project)?;
-                    if searches == 0 || path.exists() {
-                        return Some(text);
-                    }
-                    searches -= 1;
-                    let similar = similar_file(path).map(|name| sanitize(&name, MAX_PATH_CHARS));
-                    let hint = similar.map(|name| format!("; there is {name}"));
-                    Some(text + &hint.unwrap_or_default())
+                    locate_file(place, kind, path, &row.name, project, &mut searches)
                 })
                 .collect();
             each(row, missing);
@@ -176,42 +170,18 @@ impl Listing {
     }
 }
 
-/// Finds ids that differ only in upper and lower case.
-#[derive(Debug, Default)]
-struct SimilarIds {
-    /// Hash prefixes of the lower-case ids: a list may have millions of rows.
-    seen: HashSet<[u8; 8]>,
-    first: Option<PairName>,
-    more: usize,
+/// Says which columns were read under other names.
+fn renamed(read: &ReadRows) -> Option<String> {
+    let columns = read.renamed.iter();
+    let columns =
+        columns.map(|(written, name)| format!("{:?} as {name}", sanitize(written, MAX_NAME_CHARS)));
+    let columns: Vec<String> = columns.collect();
+    (!columns.is_empty())
+        .then(|| format!("columns with other names were read: {}", columns.join(", ")))
 }
 
-impl SimilarIds {
-    fn add(&mut self, name: &PairName) {
-        let hash = ContentHash::of(name.as_str().to_lowercase().as_bytes());
-        let prefix = std::array::from_fn(|at| hash.as_bytes()[at]);
-        let is_new = self.seen.insert(prefix);
-        match (is_new, &self.first) {
-            (true, _) => {}
-            (false, None) => self.first = Some(name.clone()),
-            (false, Some(_)) => self.more += 1,
-        }
-    }
-
-    fn warning(self) -> Option<String> {
-        let name = self.first?;
-        let more = match self.more {
-            0 => String::new(),
-            more => format!(", and so do {more} more ids"),
-        };
-        Some(format!(
-            "id {name} differs from another id only in case{more}; an export to a file system that ignores case \
-             (Windows, macOS, memory sticks) would mix their directories"
-        ))
-    }
-}
-
-/// Maximum number of missing files for which a similar name is searched.
-const MAX_SEARCHES: usize = 10;
+/// Longest name of a column in a message, in characters.
+const MAX_NAME_CHARS: usize = 60;
 
 /// Longest path in a message, in characters.
 const MAX_PATH_CHARS: usize = 300;
@@ -224,6 +194,7 @@ pub fn locate_file(
     path: &mut PathBuf,
     name: &dyn std::fmt::Display,
     project: &Project,
+    searches: &mut SimilarFiles,
 ) -> Option<String> {
     let exists = match path.to_str() {
         Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
@@ -232,7 +203,13 @@ pub fn locate_file(
     let problem = match exists {
         Ok(true) => return None,
         Ok(false) if is_windows_path(path) => format!("does not exist{WINDOWS_HINT}"),
-        Ok(false) => "does not exist".to_owned(),
+        Ok(false) => {
+            let similar = searches
+                .find(path)
+                .map(|path| sanitize(&path, MAX_PATH_CHARS));
+            let hint = similar.map(|path| format!("; there is {path}"));
+            format!("does not exist{}", hint.unwrap_or_default())
+        }
         Err(error) => format!("cannot be read: {error}"),
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
@@ -254,20 +231,6 @@ fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{Listing, Project};
-
-    #[test]
-    fn ids_that_differ_only_in_case_are_reported() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let file = dir.path().join("pairs.csv");
-        std::fs::write(&file, "id,mesh,print\nA1,m,p\nb,m,p\na1,m,p\nB,m,p\n").expect("written");
-        let warnings = Listing::from_file(&file).expect("valid").warnings;
-        assert_eq!(warnings.len(), 1);
-        assert!(
-            warnings[0]
-                .starts_with("id a1 differs from another id only in case, and so do 1 more ids"),
-            "{warnings:?}"
-        );
-    }
 
     #[test]
     fn a_long_path_is_cut_in_messages() {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::error::ProjectResult;
 use mocban_catalog::{Catalog, CatalogError, NewCatalog};
 use mocban_store::Project;
 
@@ -14,19 +15,15 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded. A new catalog on a
-/// server is created when `check` has succeeded, which refuses what `import` would refuse.
-///
-/// # Errors
-/// Returns the error of `check` or `import`, or an error if the catalog or the disk fails.
+/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded; a new catalog on a
+/// server is created before.
 pub async fn import_with<T>(
     project: &Project,
     url: Option<&str>,
-    check: impl AsyncFnOnce() -> anyhow::Result<()>,
-    import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
+    import: impl AsyncFn(&Catalog) -> ProjectResult<T>,
+) -> ProjectResult<T> {
     let missing_dirs = missing_dirs(project.dir());
-    let stored = store(project, url, check, import).await;
+    let stored = store(project, url, import).await;
     if stored.is_err() {
         // Fails, as it should, if another process put something there.
         let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
@@ -37,16 +34,12 @@ pub async fn import_with<T>(
 async fn store<T>(
     project: &Project,
     url: Option<&str>,
-    check: impl AsyncFnOnce() -> anyhow::Result<()>,
-    import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
+    import: impl AsyncFn(&Catalog) -> ProjectResult<T>,
+) -> ProjectResult<T> {
     if let Some(url) = url {
         Project::create(project.dir())?;
         let catalog = match Catalog::connect(url, false).await {
-            Err(CatalogError::NoSchema(_)) => {
-                check().await?;
-                Catalog::connect(url, true).await?
-            }
+            Err(CatalogError::NoSchema(_)) => Catalog::connect(url, true).await?,
             catalog => catalog?,
         };
         let stored = import(&catalog).await;
@@ -71,7 +64,7 @@ async fn store<T>(
 }
 
 /// Begins a catalog if the project has none. Tries again if a failing import removes the project directory meanwhile.
-async fn begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
+async fn begin(project: &Project) -> ProjectResult<Option<NewCatalog>> {
     const ATTEMPTS: usize = 20;
     for _ in 1..ATTEMPTS {
         let begun = try_begin(project).await;
@@ -82,7 +75,7 @@ async fn begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
     try_begin(project).await
 }
 
-async fn try_begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
+async fn try_begin(project: &Project) -> ProjectResult<Option<NewCatalog>> {
     Project::create(project.dir())?;
     Ok(NewCatalog::begin(&project.catalog_path()).await?)
 }

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use anyhow::Context as _;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use crate::backup::count_rows;
-use crate::error_text::describe;
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
 use crate::location::Location;
@@ -45,7 +45,12 @@ pub struct Restored {
 ///
 /// # Errors
 /// Returns an error if the backup, the folders or the settings are refused, or the disk fails. Then there is no project.
-pub async fn restore(request: &RestoreRequest, location: &Location) -> anyhow::Result<Restored> {
+pub async fn restore(
+    request: &RestoreRequest,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<Restored> {
+    let _work = LongWork::begin(listener, "restoring the project");
     let RestoreRequest {
         backup,
         dir,
@@ -67,11 +72,7 @@ pub async fn restore(request: &RestoreRequest, location: &Location) -> anyhow::R
 }
 
 /// Creates the project. The catalog comes last: a directory without a catalog is no project.
-async fn restore_into(
-    backup: &Path,
-    dir: &Path,
-    inputs: Option<&Path>,
-) -> anyhow::Result<Restored> {
+async fn restore_into(backup: &Path, dir: &Path, inputs: Option<&Path>) -> ProjectResult<Restored> {
     let failed = || format!("cannot restore {} to {}", backup.display(), dir.display());
     let project = Project::create(dir).with_context(failed)?;
     let catalog = project.catalog_path();
@@ -85,7 +86,7 @@ async fn restore_into(
         None => Vec::new(),
         Some(inputs) => {
             let located = locate_inputs(&project, &new, inputs).await;
-            located.map_err(|error| anyhow::anyhow!(describe(&error, staging.path())))?
+            located.map_err(|error| ProjectError::unexpected(error.text(staging.path())))?
         }
     };
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
@@ -114,11 +115,7 @@ async fn restore_into(
 
 /// Changes the paths of meshes and prints that exist below `inputs` and not at their old places. Returns the paths of
 /// missing meshes and prints. A file that cannot be looked up is an error, because it may not be missing.
-async fn locate_inputs(
-    project: &Project,
-    new: &Path,
-    inputs: &Path,
-) -> anyhow::Result<Vec<String>> {
+async fn locate_inputs(project: &Project, new: &Path, inputs: &Path) -> ProjectResult<Vec<String>> {
     let catalog = Catalog::open(new).await?;
     let (project, inputs) = (project.clone(), inputs.to_owned());
     let unreadable = Arc::new(OnceLock::new());
@@ -135,20 +132,21 @@ async fn locate_inputs(
     let missing = replaced.await;
     catalog.close().await;
     if let Some(error) = unreadable.get() {
-        anyhow::bail!("cannot look for a mesh or print: {error}");
+        let text = format!("cannot look for a mesh or print: {error}");
+        return Err(ProjectError::unexpected(text));
     }
     // Changes that are still in the write-ahead log would be lost when the file is renamed.
     let log = metadata(&new.with_file_name(format!("{CATALOG_FILE}-wal")))?;
-    anyhow::ensure!(
-        log.is_none_or(|log| log.len() == 0),
-        "the disk is full or reported an error"
-    );
+    if log.is_some_and(|log| log.len() > 0) {
+        let text = "the disk is full or reported an error";
+        return Err(ProjectError::unexpected(text));
+    }
     Ok(missing?)
 }
 
 /// Writes the settings file of a project. An equal file may exist: a restore that was killed has written it. Returns
 /// whether the file was written.
-fn write_settings(project: &Project, text: &str, staging: &Path) -> anyhow::Result<bool> {
+fn write_settings(project: &Project, text: &str, staging: &Path) -> ProjectResult<bool> {
     let path = project.settings_path();
     let new = staging.join(SETTINGS_FILE);
     write_synced(&new, text.as_bytes())?;
@@ -166,7 +164,7 @@ fn write_settings(project: &Project, text: &str, staging: &Path) -> anyhow::Resu
 }
 
 /// Refuses inputs that are not a directory.
-fn check_inputs(inputs: &Path) -> anyhow::Result<()> {
+fn check_inputs(inputs: &Path) -> ProjectResult<()> {
     let shown = inputs.display();
     let found = metadata(inputs).with_context(|| format!("cannot read {shown}"))?;
     if found.is_some_and(|found| found.is_dir()) {
@@ -178,7 +176,7 @@ fn check_inputs(inputs: &Path) -> anyhow::Result<()> {
 }
 
 /// Refuses a file that is not a backup.
-fn check_backup(backup: &Path) -> anyhow::Result<()> {
+fn check_backup(backup: &Path) -> ProjectResult<()> {
     let shown = backup.display();
     let failed = || format!("cannot read {shown}");
     let refuse = |text: String| Err(Refusal::Usage(text).into());
@@ -201,7 +199,7 @@ fn check_backup(backup: &Path) -> anyhow::Result<()> {
 }
 
 /// Refuses a directory that is a project.
-fn check_directory(project: &Project) -> anyhow::Result<()> {
+fn check_directory(project: &Project) -> ProjectResult<()> {
     let shown = project.dir().display();
     let catalog = metadata(&project.catalog_path());
     if catalog
@@ -213,7 +211,7 @@ fn check_directory(project: &Project) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn is_project_already(project: &Project) -> anyhow::Error {
+fn is_project_already(project: &Project) -> ProjectError {
     let shown = project.dir().display();
     Refusal::Usage(format!(
         "{shown} is a project already; name another directory"

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::files::RefusedLine;
+use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{PairName, UniqueKeys};
-use mocban_report::ground_truth::TruthRecord;
+use mocban_results::ground_truth::TruthRecord;
 
 /// Longest line in bytes. The values of a line take about ten times as much memory.
 const MAX_LINE_BYTES: usize = 16 << 20;
@@ -61,9 +62,10 @@ pub fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
     Ok(rows)
 }
 
-/// Refuses a row whose pair does not exist.
-pub fn unknown_pair(row: &TruthRow) -> RefusedLine {
-    RefusedLine::new(row.line, &format!("there is no pair {}", row.name))
+/// Refuses a row whose pair does not exist, and suggests one of the known pairs.
+pub fn unknown_pair(row: &TruthRow, known: &[PairName]) -> RefusedLine {
+    let hint = hint(row.name.as_str(), known.iter().map(PairName::as_str));
+    RefusedLine::new(row.line, &format!("there is no pair {}{hint}", row.name))
 }
 
 #[cfg(test)]

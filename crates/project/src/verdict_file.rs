@@ -10,18 +10,60 @@ use csv::StringRecord;
 use serde::Deserialize;
 
 use super::files::RefusedLine;
-use super::time_text::parse_utc;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext};
 use mocban_core::domain::spelling::hint;
-use mocban_core::domain::{ContentHash, PairName, UnixMillis};
-use mocban_lists::manifest::{LineCounter, as_utf8, delimiter};
+use mocban_core::domain::{ContentHash, PairName, Reason, UnixMillis, Verdict};
+use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn, plain_name};
+use mocban_lists::json_numbers::nan_as_null;
+use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, trimmed};
 use mocban_lists::quotes::check_quotes;
+use mocban_system::time_text::parse_utc;
 
-const COLUMNS: [&str; 7] = [
-    "pair", "verdict", "reviewer", "metric", "reason", "note", "at",
-];
-/// The first columns, which every file must have.
+/// The columns, and their other names in English and Vietnamese. Every file must have the first three.
+const COLUMNS: KnownColumns = KnownColumns {
+    names: &[
+        "pair", "verdict", "reviewer", "metric", "reason", "note", "at",
+    ],
+    other_names: &[
+        ("id", "pair"),
+        ("ma_so", "pair"),
+        ("so_hieu", "pair"),
+        ("ma_cap", "pair"),
+        ("cap", "pair"),
+        ("ma", "pair"),
+        ("danh_gia", "verdict"),
+        ("ket_qua", "verdict"),
+        ("ket_luan", "verdict"),
+        ("reader", "reviewer"),
+        ("nguoi_danh_gia", "reviewer"),
+        ("nguoi_cham", "reviewer"),
+        ("thuoc_do", "metric"),
+        ("ly_do", "reason"),
+        ("li_do", "reason"),
+        ("ghi_chu", "note"),
+        ("thoi_gian", "at"),
+        ("ngay", "at"),
+    ],
+};
 const REQUIRED: usize = 3;
+
+/// Verdicts and reasons in other words, as [`plain_name`] writes them: those of the page in Vietnamese.
+const VERDICTS: [(&str, Verdict); 4] = [
+    ("dat", Verdict::Pass),
+    ("khong_dat", Verdict::Fail),
+    ("chua_chac", Verdict::Unsure),
+    ("khong_chac", Verdict::Unsure),
+];
+const REASONS: [(&str, Reason); 8] = [
+    ("sai_goc", Reason::Angle),
+    ("mat_net", Reason::StrokesLost),
+    ("lan_nen", Reason::BackgroundIn),
+    ("sai_vi_tri_hoac_ti_le", Reason::ShiftOrScale),
+    ("bi_lat_guong", Reason::Mirrored),
+    ("lat_guong", Reason::Mirrored),
+    ("sai_cap_hoac_du_lieu_hong", Reason::WrongPair),
+    ("sai_cap", Reason::WrongPair),
+];
 
 /// One verdict and its line number.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +78,8 @@ pub struct VerdictRow {
 #[derive(Debug, Clone)]
 pub struct VerdictList {
     text: ListText,
-    is_jsonl: bool,
+    /// The separator of columns; `None` for JSON Lines.
+    delimiter: Option<u8>,
 }
 
 /// Text that clones share.
@@ -58,46 +101,52 @@ impl VerdictList {
     /// # Errors
     /// Returns an error if the bytes are not text, or if a quotation mark is never closed.
     pub fn new(bytes: Vec<u8>, is_jsonl: bool) -> Result<Self, RefusedLine> {
-        let decoded = as_utf8(&bytes).map_err(|error| RefusedLine::new(1, &error.to_string()))?;
-        let text = match decoded {
+        let refuse = |error: NotText| RefusedLine::new(1, &error.to_string());
+        let (text, delimiter) = if is_jsonl {
+            (as_utf8(&bytes).map_err(refuse)?, None)
+        } else {
+            let CsvText { bytes, delimiter } = CsvText::new(&bytes).map_err(refuse)?;
+            check_quotes(&bytes, delimiter)
+                .map_err(|error| RefusedLine::new(error.line, &error.to_string()))?;
+            (bytes, Some(delimiter))
+        };
+        if is_jsonl && text.trim_ascii_start().starts_with(b"[") {
+            let reason = "the file is a JSON array; write one object on each line";
+            return Err(RefusedLine::new(1, reason));
+        }
+        let text = match text {
             Cow::Borrowed(text) if text.len() == bytes.len() => bytes,
             decoded => decoded.into_owned(),
         };
-        if !is_jsonl {
-            check_quotes(&text, delimiter(&text))
-                .map_err(|error| RefusedLine::new(error.line, &error.to_string()))?;
-        }
         let text = ListText(Arc::new(text));
-        Ok(Self { text, is_jsonl })
+        Ok(Self { text, delimiter })
     }
 
     /// Parses the rows.
     pub fn rows(&self) -> VerdictRows {
-        if self.is_jsonl {
-            Box::new(json_rows(self.text.clone()))
-        } else {
-            match csv_rows(self.text.clone()) {
+        let text = self.text.clone();
+        match self.delimiter {
+            None => Box::new(json_rows(text)),
+            Some(delimiter) => match csv_rows(text, delimiter) {
                 Ok(rows) => Box::new(rows),
                 Err(refused) => Box::new(std::iter::once(Err(refused))),
-            }
+            },
         }
     }
 }
 
 /// Parses a CSV file.
-///
-/// # Errors
-/// Returns an error if the header is invalid.
 fn csv_rows(
     text: ListText,
+    delimiter: u8,
 ) -> Result<impl Iterator<Item = Result<VerdictRow, RefusedLine>> + Send, RefusedLine> {
     let mut reader = csv::ReaderBuilder::new()
-        .delimiter(delimiter(text.as_ref()))
+        .delimiter(delimiter)
         .trim(csv::Trim::All)
         .from_reader(Cursor::new(text.clone()));
     let headers = reader.headers().map_err(|error| csv_error(&error, &text))?;
-    let positions = positions(headers)?;
     let mut lines = LineCounter::new(text.clone());
+    let positions = positions(headers, lines.at(headers.position()))?;
     Ok(reader.into_records().map(move |record| {
         let record = record.map_err(|error| csv_error(&error, &text))?;
         let line = lines.at(record.position());
@@ -106,49 +155,49 @@ fn csv_rows(
 }
 
 /// Refuses a row with values that no verdict has.
-///
-/// # Errors
-/// Returns an error with the line and the reason.
 pub fn check_values(row: &VerdictRow, now: UnixMillis) -> Result<(), RefusedLine> {
     let checked = row.listed.verdict.check(now);
     checked.map_err(|error| RefusedLine::new(row.line, &error.to_string()))
 }
 
-/// Refuses a list with unknown pairs. `first_lines` has the first line of each pair.
-///
-/// # Errors
-/// Returns an error for the first line with such a pair.
+/// Refuses a list with unknown pairs. `first_lines` has the first line of each pair, `known` the pairs that exist, of which
+/// a similar one is suggested.
 pub fn refuse_unknown(
     first_lines: &BTreeMap<PairName, usize>,
     unknown: &[PairName],
+    known: &[PairName],
 ) -> Result<(), RefusedLine> {
     let lines = unknown.iter().map(|pair| (first_lines.get(pair), pair));
     match lines.min() {
         Some((line, pair)) => {
             let line = line.copied().unwrap_or_default();
-            Err(RefusedLine::new(line, &format!("there is no pair {pair}")))
+            let hint = hint(pair.as_str(), known.iter().map(PairName::as_str));
+            Err(RefusedLine::new(
+                line,
+                &format!("there is no pair {pair}{hint}"),
+            ))
         }
         None => Ok(()),
     }
 }
 
-/// Returns the position of each of [`COLUMNS`] in the file.
-fn positions(headers: &StringRecord) -> Result<[Option<usize>; 7], RefusedLine> {
-    if let Some(unknown) = headers.iter().find(|name| !COLUMNS.contains(name)) {
-        let reason = format!("there is no column {unknown}{}", hint(unknown, COLUMNS));
-        return Err(RefusedLine::new(1, &reason));
+/// Returns the position of each of [`COLUMNS`] in the file. The header is on this line.
+fn positions(headers: &StringRecord, line: usize) -> Result<[Option<usize>; 7], RefusedLine> {
+    let names: Vec<&str> = headers.iter().map(trimmed).collect();
+    let refuse = |reason: &str| RefusedLine::new(line, reason);
+    let same = |same: SameColumn| refuse(&same.reason(&names));
+    let HeaderColumns { columns, .. } = COLUMNS.assign(&names).map_err(same)?;
+    if let Some(unknown) = columns.iter().position(Option::is_none) {
+        let unknown = names[unknown];
+        let hint = hint(unknown, COLUMNS.names.iter().copied());
+        return Err(refuse(&format!("there is no column {unknown}{hint}")));
     }
-    let count = |name: &str| headers.iter().filter(|header| *header == name).count();
-    if let Some(twice) = COLUMNS.iter().find(|name| count(name) > 1) {
-        let reason = format!("column {twice} is there twice");
-        return Err(RefusedLine::new(1, &reason));
+    let mut positions = [None; 7];
+    for (position, name) in positions.iter_mut().zip(COLUMNS.names) {
+        *position = columns.iter().position(|column| *column == Some(name));
     }
-    let positions = COLUMNS.map(|name| headers.iter().position(|header| header == name));
     match positions[..REQUIRED].iter().position(Option::is_none) {
-        Some(at) => Err(RefusedLine::new(
-            1,
-            &format!("column {} is missing", COLUMNS[at]),
-        )),
+        Some(at) => Err(refuse(&format!("column {} is missing", COLUMNS.names[at]))),
         None => Ok(positions),
     }
 }
@@ -161,19 +210,21 @@ fn row(
     let cell = |column: usize| {
         positions[column]
             .and_then(|position| record.get(position))
+            .map(trimmed)
             .filter(|text| !text.is_empty())
     };
     let required = |column: usize| {
-        cell(column).ok_or_else(|| RefusedLine::new(line, &format!("{} is empty", COLUMNS[column])))
+        cell(column)
+            .ok_or_else(|| RefusedLine::new(line, &format!("{} is empty", COLUMNS.names[column])))
     };
     let verdict = NewVerdict {
         pair: value(required(0)?, line)?,
-        verdict: value(required(1)?, line)?,
+        verdict: word(required(1)?, &VERDICTS, line)?,
         reviewer: required(2)?.to_owned(),
-        metric: cell(3).map(|text| value(text, line)).transpose()?,
-        reason: cell(4).map(|text| value(text, line)).transpose()?,
+        metric: cell(3).map(|text| word(text, &[], line)).transpose()?,
+        reason: cell(4).map(|text| word(text, &REASONS, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: cell(6).map(|text| time(text, line)).transpose()?,
     };
     let judged = None;
@@ -195,6 +246,19 @@ where
 {
     text.parse()
         .map_err(|error: T::Err| RefusedLine::new(line, &error.to_string()))
+}
+
+/// Parses a name in any case and with blanks, or one of some other words.
+fn word<T>(text: &str, other: &[(&str, T)], line: usize) -> Result<T, RefusedLine>
+where
+    T: FromStr<Err: std::fmt::Display> + Copy,
+{
+    let plain = plain_name(text);
+    let found = other.iter().find(|(word, _)| *word == plain);
+    let found = found.map(|(_, found)| *found);
+    found
+        .or_else(|| plain.parse().ok())
+        .map_or_else(|| value(text, line), Ok)
 }
 
 fn csv_error(error: &csv::Error, text: &ListText) -> RefusedLine {
@@ -226,11 +290,19 @@ fn json_rows(text: ListText) -> impl Iterator<Item = Result<VerdictRow, RefusedL
         let line = rest.split(|byte| *byte == b'\n').next()?;
         at += line.len() + 1;
         let is_blank = line.trim_ascii().is_empty();
-        Some((!is_blank).then(|| serde_json::from_slice(line)))
+        Some((!is_blank).then(|| parsed(line)))
     };
     let lines = (1..).zip(std::iter::from_fn(next_line));
     let parsed = lines.filter_map(|(line, parsed)| Some((line, parsed?)));
     parsed.filter_map(|(line, parsed)| json_row(line, parsed).transpose())
+}
+
+/// Parses a line. If it is not JSON, tries again with `NaN` as no value.
+fn parsed(line: &[u8]) -> serde_json::Result<VerdictLine> {
+    serde_json::from_slice(line).or_else(|error| {
+        let text = std::str::from_utf8(line).ok().and_then(nan_as_null);
+        text.map_or(Err(error), |text| serde_json::from_str(&text))
+    })
 }
 
 /// Returns the row of a parsed line, or `None` if the verdict was undone.

@@ -7,25 +7,25 @@
 use std::collections::BTreeMap;
 
 use super::adjudication::AdjudicationRules;
-use super::attention_checks::AttentionCheckRates;
 use super::comparison::{Basis, ComparisonSums};
-use super::consensus::Consensus;
 use super::fail_reasons::FailReasonSums;
-use super::ground_truth::TruthErrors;
 use super::headline::headline;
-use super::manual_alignment::{ManualAlignmentErrors, ManualErrors};
 use super::model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
 use super::provenance::ProvenanceSums;
 use super::risk_coverage::RiskCoverageCurve;
 use super::score_bootstrap::{MeanIntervals, ScoreSample};
 use super::stage_times::StageTimes;
-use super::stats::{IntervalMethod, Rate, ratio};
 use super::thresholds::{ThresholdDistribution, relative_height};
-use super::truth_evaluation::{TruthEvaluation, TruthProblems};
 use super::truth_summary::TruthSummary;
-use super::warnings::warnings;
+use super::warnings::{TruthProblems, warnings};
 use mocban_catalog::{MetricRecord, PairResults, SetApart};
 use mocban_core::domain::{FailureClass, JobStatus, Stage, ThresholdMetric};
+use mocban_results::TruthEvaluation;
+use mocban_results::attention_checks::AttentionCheckRates;
+use mocban_results::consensus::Consensus;
+use mocban_results::ground_truth::TruthErrors;
+use mocban_results::manual_alignment::{ManualAlignmentErrors, ManualErrors};
+use mocban_results::stats::{IntervalMethod, Rate, ratio};
 
 /// The sums from which a report is made.
 #[derive(Debug, Clone, Default)]
@@ -279,8 +279,9 @@ impl MetricSums {
 #[cfg(test)]
 mod tests {
     use super::ReportAccumulator;
-    use crate::{TruthEvaluation, test_fixtures};
+    use crate::test_fixtures;
     use mocban_core::domain::{FailureClass, ThresholdMetric, Verdict};
+    use mocban_results::TruthEvaluation;
 
     #[test]
     fn means_are_over_finished_pairs_only() {
@@ -342,8 +343,10 @@ mod tests {
     #[test]
     fn the_papers_method_has_the_papers_rows_only() {
         let mut report = ReportAccumulator::default();
-        let pair = test_fixtures::done_by_paper("a", 0.8, &[Verdict::Pass]);
-        report.add(&pair, &TruthEvaluation::default());
+        for name in ["a", "b", "c", "d", "e", "f"] {
+            let pair = test_fixtures::done_by_paper(name, 0.8, &[Verdict::Pass]);
+            report.add(&pair, &TruthEvaluation::default());
+        }
         let report = report.finish();
         let metrics: Vec<_> = report.rows.iter().map(|row| row.metric).collect();
         assert_eq!(metrics, ThresholdMetric::PAPER);

@@ -1,20 +1,22 @@
-//! The sentence of the headline on Acc: the value, what does not count, and what speaks against it.
+//! The sentences of the headline on Acc: the value, what does not count, and what speaks against it.
 
-use super::attention_checks::AttentionCheckRates;
 use super::model::{MetricRow, Report};
-use super::number_format::{NumberStyle, counted};
-use super::number_format::{format_count, format_interval, format_rate, format_share, joined};
-use super::stats::Rate;
 use mocban_core::domain::{ThresholdMetric, sanitize};
+use mocban_results::attention_checks::AttentionCheckRates;
+use mocban_results::number_format::{NumberStyle, counted};
+use mocban_results::number_format::{
+    format_count, format_interval, format_rate, format_share, joined,
+};
+use mocban_results::stats::Rate;
 
-/// Returns the sentence on Acc of the default metric, or of the first metric with an Acc, and on ground truth.
+/// Returns the sentences on Acc of the default metric, or of the first metric with an Acc, and on ground truth.
 pub(super) fn accuracy(report: &Report) -> String {
     let by_default = report.row(ThresholdMetric::DEFAULT);
     let judged = by_default.filter(|row| row.acc.is_some());
     let judged = judged.or_else(|| report.rows.iter().find(|row| row.acc.is_some()));
     let mut sentence = match judged.and_then(|row| Some((row, row.acc?, row.acc_ci95?))) {
         Some((row, acc, bounds)) => format!(
-            "Acc of {} is {} % ({}, {} interval): reviewers passed {} of {}",
+            "Acc of {} is {} % ({}, {} interval): reviewers passed {} of {}.",
             row.metric.title(),
             format_share(acc),
             format_interval(bounds, NumberStyle::Share),
@@ -24,16 +26,16 @@ pub(super) fn accuracy(report: &Report) -> String {
         ) + &undecided(row)
             + &inattentive(report),
         None if report.has_verdicts() => {
-            "There is no Acc, because reviewers were unsure about every judged result".to_owned()
+            "There is no Acc, because reviewers were unsure about every judged result.".to_owned()
         }
-        None => "Nobody has judged a result yet, so there is no Acc (`mocban review --reviewer NAME` starts judging)"
+        None => "Nobody has judged a result yet, so there is no Acc (`mocban review --reviewer NAME` starts judging)."
             .to_owned(),
     };
     sentence.extend(judged.or(by_default).and_then(truth));
-    sentence + "."
+    sentence
 }
 
-/// Returns the clause on results that were judged and count neither as passed nor as failed, or an empty text.
+/// Returns the sentence on results that were judged and count neither as passed nor as failed, or an empty text.
 fn undecided(row: &MetricRow) -> String {
     let unsure = row.unsure - row.conflicts;
     let rest = [
@@ -44,33 +46,32 @@ fn undecided(row: &MetricRow) -> String {
     let rest: Vec<String> = rest
         .map(|(n, what)| format!("{} {what}", format_count(n)))
         .collect();
-    let verb = if row.unsure == 1 { "is" } else { "are" };
     match rest.as_slice() {
         [] => String::new(),
-        rest => format!("; {} {verb} not counted", joined(rest)),
+        rest => format!(" Not counted: {}.", joined(rest)),
     }
 }
 
-/// Returns the clause on reviewers who missed most planted faults, or an empty text.
+/// Returns the sentence on reviewers who missed most planted faults, or an empty text.
 fn inattentive(report: &Report) -> String {
     let rates = report.attention_checks.iter();
     let found: Vec<(&str, &Rate)> = rates.flat_map(AttentionCheckRates::inattentive).collect();
     match found.as_slice() {
         [] => String::new(),
         [(reviewer, rate)] => format!(
-            "; {} noticed only {} of {} attention checks, so this Acc may be wrong",
+            " {} noticed only {} of {} attention checks, so this Acc may be wrong.",
             sanitize(reviewer, 60),
             format_count(rate.count),
             format_count(rate.n)
         ),
         more => format!(
-            "; {} reviewers missed most of their attention checks, so this Acc may be wrong",
+            " {} reviewers missed most of their attention checks, so this Acc may be wrong.",
             format_count(more.len() as u64)
         ),
     }
 }
 
-/// Returns the clause on a metric's errors against ground truth, or `None` without ground truth.
+/// Returns the sentence on a metric's errors against ground truth, or `None` without ground truth.
 fn truth(row: &MetricRow) -> Option<String> {
     let truth = row.truth.as_ref()?;
     let rate = format_rate(truth.acc?, truth.acc_ci95);
@@ -78,6 +79,6 @@ fn truth(row: &MetricRow) -> Option<String> {
     let title = row.metric.title();
     let verb = if truth.passed == 1 { "is" } else { "are" };
     Some(format!(
-        "; against ground truth, {passed} of {n} results of {title} {verb} right, {rate}"
+        " Against ground truth, {passed} of {n} results of {title} {verb} right, {rate}."
     ))
 }

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::consensus::{Consensus, partition_verdicts};
-use super::stats::{IntervalMethod, Rate};
 use mocban_catalog::MetricRecord;
 use mocban_core::domain::Verdict;
+use mocban_results::consensus::{Consensus, partition_verdicts};
+use mocban_results::stats::{IntervalMethod, Rate};
 
 /// Acc of a metric under three rules for disagreement. Each rule decides which results pass, fail or are left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]

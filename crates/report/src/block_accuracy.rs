@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::box_matching::BoxMatches;
-use super::ground_truth::TruthErrors;
-use super::stats::ratio;
-use super::truth_evaluation::TruthEvaluation;
 use mocban_catalog::{BlockDetail, Catalog, CatalogError, PairResults};
 use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, ThresholdMetric, TrueBox};
+use mocban_results::TruthEvaluation;
+use mocban_results::ground_truth::TruthErrors;
+use mocban_results::stats::ratio;
 
 /// A result is tight if it is right and its mean landmark error is at most this percentage of the character's height.
 const TIGHT_TRE_PCT: f64 = 1.5;
@@ -186,8 +186,8 @@ fn has_found_boxes(detail: &BlockDetail) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{BlockBoxes, BlockSums};
-    use crate::ground_truth::TruthErrors;
     use crate::test_fixtures::block_boxes;
+    use mocban_results::ground_truth::TruthErrors;
 
     fn errors(angle_deg: f64, tre_pct: f64) -> TruthErrors {
         TruthErrors {

@@ -1,17 +1,17 @@
 //! Builds the report of a project from its catalog, page by page.
 
 use super::accumulate::ReportAccumulator;
-use super::attention_checks;
 use super::block_accuracy::BlockSums;
-use super::manual_alignment;
 use super::model::Report;
 use super::report_error::ReportError;
-use super::truth_evaluation::{TruthEvaluation, evaluate_pairs};
 use mocban_catalog::{Catalog, PairResults, SetApart};
+use mocban_results::attention_checks;
+use mocban_results::manual_alignment;
+use mocban_results::{TruthEvaluation, evaluate_pairs};
 use mocban_store::Project;
 
 /// Pairs in memory at a time.
-pub(super) const PAIRS_PER_PAGE: usize = 256;
+const PAIRS_PER_PAGE: usize = 256;
 
 /// Builds the report of a project from the current state of its catalog.
 ///

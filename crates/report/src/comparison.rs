@@ -2,20 +2,23 @@
 
 use serde::Serialize;
 
-use super::number_format::format_count;
-use super::stats::{McNemarTest, SIGNIFICANCE_LEVEL, holm_of_known};
 use mocban_core::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
 use mocban_core::domain::enum_names;
+use mocban_results::number_format::format_count;
+use mocban_results::stats::{McNemarTest, SIGNIFICANCE_LEVEL, holm_of_known};
 
 /// Largest sample size that is stated. Above it, texts say "more than".
 const MAX_SAMPLE_SIZE: u64 = 100_000;
 
+/// Fewest pairs on which metrics are compared. With fewer, no difference can be significant at the 5 % level.
+pub(super) const MIN_PAIRS: u64 = 6;
+
 /// Fewest pairs from which a sample size is estimated.
 const MIN_PAIRS_FOR_ESTIMATE: u64 = 20;
 
-/// Replaces the sample size in texts if there are fewer pairs.
+/// The sentence on the sample size if there are fewer pairs.
 pub(super) const TOO_FEW_TO_ESTIMATE: &str =
-    "how many pairs would show one cannot be estimated from fewer than 20";
+    "How many pairs would show one cannot be estimated from fewer than 20.";
 
 /// The comparisons between metrics: every two of the paper's metrics, and `relief` with `ensemble`.
 pub const COMPARED_METRICS: [(ThresholdMetric, ThresholdMetric); 4] = [
@@ -97,10 +100,10 @@ impl ComparisonSums {
         }
     }
 
-    /// Returns the comparisons with at least one pair on which both metrics are known to be right or wrong.
+    /// Returns the comparisons with enough pairs on which both metrics are known to be right or wrong.
     pub(super) fn finish(self, basis: Basis) -> Vec<Comparison> {
         let compared = self.0.into_iter().zip(COMPARED_METRICS);
-        let compared: Vec<_> = compared.filter(|(test, _)| test.n > 0).collect();
+        let compared: Vec<_> = compared.filter(|(test, _)| test.n >= MIN_PAIRS).collect();
         let p_values: Vec<Option<f64>> = compared.iter().map(|(test, _)| test.p()).collect();
         let adjusted = compared.into_iter().zip(holm_of_known(&p_values));
         adjusted
@@ -135,7 +138,7 @@ fn conclusion(
 ) -> String {
     let better = if test.a_only > test.b_only { a } else { b }.title();
     let Some((p, p_holm)) = test.p().zip(p_holm) else {
-        return "Both are right on the same pairs.".to_owned();
+        return "No difference: on each pair both are right, or both are wrong.".to_owned();
     };
     if p_holm < SIGNIFICANCE_LEVEL {
         return format!("{better} is right significantly more often.");
@@ -147,7 +150,7 @@ fn conclusion(
     }
     let Some(pairs) = pairs_needed(test) else {
         if test.a_only != test.b_only {
-            return format!("No significant difference; {TOO_FEW_TO_ESTIMATE}.");
+            return format!("No significant difference. {TOO_FEW_TO_ESTIMATE}");
         }
         return "No significant difference: each alone is right on as many pairs as the other."
             .to_owned();
@@ -240,15 +243,15 @@ mod tests {
     #[test]
     fn an_even_split_names_no_sample_size() {
         let found = compare(&[
-            (2, [Some(true), Some(false), Some(true)]),
-            (2, [Some(true), Some(true), Some(false)]),
+            (3, [Some(true), Some(false), Some(true)]),
+            (3, [Some(true), Some(true), Some(false)]),
         ]);
         assert!(found[1].conclusion.contains("each alone"), "{found:?}");
     }
 
     #[test]
     fn few_pairs_estimate_no_sample_size() {
-        for (times, is_estimated) in [(1, false), (19, false), (20, true)] {
+        for (times, is_estimated) in [(6, false), (19, false), (20, true)] {
             let found = compare(&[
                 (1, [Some(true), Some(false), Some(true)]),
                 (times - 1, [Some(true), Some(true), Some(true)]),
@@ -270,12 +273,17 @@ mod tests {
     #[test]
     fn only_pairs_judged_for_both_count() {
         let found = compare(&[
-            (4, [Some(true), None, Some(true)]),
+            (5, [Some(false), None, Some(false)]),
+            (1, [Some(true), None, Some(true)]),
             (2, [None, None, Some(true)]),
         ]);
         assert_eq!(found.len(), 1);
-        assert_eq!((found[0].n, found[0].p), (4, None));
-        assert_eq!(found[0].conclusion, "Both are right on the same pairs.");
+        assert_eq!((found[0].n, found[0].p), (6, None));
+        assert_eq!(
+            found[0].conclusion,
+            "No difference: on each pair both are right, or both are wrong."
+        );
+        assert_eq!(compare(&[(5, [Some(true), Some(false), Some(true)])]), []);
     }
 
     #[test]

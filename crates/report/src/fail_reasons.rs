@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::consensus::Consensus;
 use mocban_catalog::{MetricRecord, ReviewerVerdict};
 use mocban_core::domain::{Reason, Verdict};
+use mocban_results::consensus::Consensus;
 
 /// The number of failed results for which a reason was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

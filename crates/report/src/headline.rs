@@ -1,15 +1,15 @@
-//! The answer in at most three sentences: how many pairs are aligned, Acc, and which differences are significant.
+//! The answer in at most three short paragraphs: how many pairs are aligned, Acc, and which differences are significant.
 //!
 //! A command in a sentence stands in backticks, which renderers turn into the code of their format.
 
 use super::accuracy_sentence::accuracy;
-use super::comparison::{Basis, Comparison, TOO_FEW_TO_ESTIMATE, about};
+use super::comparison::{Basis, Comparison, MIN_PAIRS, TOO_FEW_TO_ESTIMATE, about};
 use super::model::{MetricRow, Report};
-use super::number_format::{format_count, format_p, joined};
-use super::stats::SIGNIFICANCE_LEVEL;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric};
+use mocban_results::number_format::{format_count, format_p, joined};
+use mocban_results::stats::SIGNIFICANCE_LEVEL;
 
-/// Returns the sentences, in order. There are fewer than three if there are no results.
+/// Returns the paragraphs, in order. There are fewer than three if there are no results.
 pub(super) fn headline(report: &Report) -> Vec<String> {
     if report.pairs == 0 {
         return vec!["The project has no pairs yet; `mocban import` adds them.".to_owned()];
@@ -89,15 +89,16 @@ fn significance(report: &Report) -> String {
     if significant.is_empty() {
         return no_difference(basis, &family);
     }
-    let mut sentence = format!(
-        "{} by {} (McNemar's exact test, Holm's correction)",
-        better_than(&significant),
-        basis.title()
-    );
-    if significant.len() < family.len() {
-        sentence += "; no other tested difference is significant";
-    }
-    sentence + "."
+    let others = if significant.len() < family.len() {
+        "No other"
+    } else {
+        "Every"
+    };
+    format!(
+        "By {}, {}. {others} tested difference is significant (McNemar's exact test, Holm's correction).",
+        basis.title(),
+        better_than(&significant)
+    )
 }
 
 /// Returns which metrics are right more often than others, such as `Ensemble (p = 0.016) and Relief (p = 0.003) are right
@@ -136,8 +137,7 @@ fn no_difference(basis: Basis, family: &[&Comparison]) -> String {
     let p_values = family.iter().filter_map(|found| found.p_holm);
     let Some(smallest) = p_values.reduce(f64::min) else {
         return format!(
-            "By {}, all metrics are right on the same pairs, so no difference is significant, and how many pairs would \
-             show one cannot be estimated.",
+            "By {}, no two metrics differ on a pair: both are right, or both are wrong.",
             basis.title()
         );
     };
@@ -146,22 +146,22 @@ fn no_difference(basis: Basis, family: &[&Comparison]) -> String {
         .filter(|found| found.pairs_needed > Some(found.n));
     let needed = match larger.min_by_key(|found| found.pairs_needed) {
         Some(found) => format!(
-            "{} {} would be needed to show one between {} and {} (80 % power, 5 % level)",
-            about(found.pairs_needed.unwrap_or_default()),
-            basis.pairs(),
+            "To show one between {} and {}, {} {} would be needed (80 % power, 5 % level).",
             found.a.title(),
-            found.b.title()
+            found.b.title(),
+            about(found.pairs_needed.unwrap_or_default()),
+            basis.pairs()
         ),
         None if family.iter().any(|found| found.pairs_needed.is_some()) => {
-            "more pairs would be needed to show one after the correction".to_owned()
+            "More pairs would be needed to show one after the correction.".to_owned()
         }
         None if family.iter().any(|found| found.a_only != found.b_only) => {
             TOO_FEW_TO_ESTIMATE.to_owned()
         }
-        None => "each metric alone is right on as many pairs as the others".to_owned(),
+        None => "Each metric alone is right on as many pairs as the others.".to_owned(),
     };
     format!(
-        "No difference between metrics is significant by {} (smallest {} after Holm's correction); {needed}.",
+        "No difference between metrics is significant by {} (smallest {} after Holm's correction). {needed}",
         basis.title(),
         format_p(smallest)
     )
@@ -176,7 +176,12 @@ fn without_basis(report: &Report) -> String {
     let (n, significant) = tested.fold((0_u64, 0_u64), |(n, k), p| {
         (n + 1, k + u64::from(p < SIGNIFICANCE_LEVEL))
     });
-    let start = if report.has_verdicts() {
+    let is_known = |row: &&MetricRow| row.acc.is_some() || row.truth.is_some();
+    let start = if report.rows.iter().filter(is_known).count() > 1 {
+        &format!(
+            "Metrics are not compared, because fewer than {MIN_PAIRS} pairs are judged for two of them"
+        )
+    } else if report.has_verdicts() {
         "Reviewers judged the results of one metric only, so no metric is known to be right more often than another"
     } else {
         "Without verdicts, no metric is known to be right more often than another"
@@ -186,7 +191,7 @@ fn without_basis(report: &Report) -> String {
     }
     let [n, significant] = [n, significant].map(format_count);
     format!(
-        "{start}; by score, {significant} of {n} differences between metrics are significant (paired bootstrap, Holm's \
+        "{start}. By score, {significant} of {n} differences between metrics are significant (paired bootstrap, Holm's \
          correction)."
     )
 }
@@ -194,14 +199,12 @@ fn without_basis(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::headline;
-    use crate::{
-        AttentionCheckRates, IntervalMethod, Rate, Report, ReportAccumulator, TruthEvaluation,
-        test_fixtures,
-    };
+    use crate::{Report, ReportAccumulator, test_fixtures};
     use mocban_catalog::PairResults;
     use mocban_core::domain::ThresholdMetric::{Density, Ensemble};
     use mocban_core::domain::Verdict::{Fail, Pass};
     use mocban_core::domain::{FailureClass, ThresholdMetric, Verdict};
+    use mocban_results::{AttentionCheckRates, IntervalMethod, Rate, TruthEvaluation};
 
     /// Returns a report on `n` pairs whose verdicts `verdict` chooses, by pair and metric.
     fn judged(n: u32, verdict: impl Fn(u32, ThresholdMetric) -> Verdict) -> Report {
@@ -274,8 +277,7 @@ mod tests {
                 "All 24 pairs are aligned.",
                 "Acc of Ensemble is 100.0 % (86.2–100.0, 95 % Wilson interval): reviewers passed 24 of 24 decided \
                  results.",
-                "By verdicts, all metrics are right on the same pairs, so no difference is significant, and how many \
-                 pairs would show one cannot be estimated.",
+                "By verdicts, no two metrics differ on a pair: both are right, or both are wrong.",
             ]
         );
         let exact = found.with_interval(IntervalMethod::Exact);
@@ -313,8 +315,8 @@ mod tests {
         });
         assert_eq!(
             found.headline[2],
-            "Ensemble (p = 0.002) and Non-luminous SSIM (p = 0.002) are right significantly more often than Pixel density \
-             by verdicts (McNemar's exact test, Holm's correction); no other tested difference is significant."
+            "By verdicts, Ensemble (p = 0.002) and Non-luminous SSIM (p = 0.002) are right significantly more often than \
+             Pixel density. No other tested difference is significant (McNemar's exact test, Holm's correction)."
         );
     }
 
@@ -327,8 +329,8 @@ mod tests {
         });
         assert_eq!(
             found.headline[2],
-            "No difference between metrics is significant by verdicts (smallest p = 1.000 after Holm's correction); about \
-             160 judged pairs would be needed to show one between Ensemble and Non-luminous SSIM (80 % power, 5 % \
+            "No difference between metrics is significant by verdicts (smallest p = 1.000 after Holm's correction). To \
+             show one between Ensemble and Non-luminous SSIM, about 160 judged pairs would be needed (80 % power, 5 % \
              level)."
         );
     }
@@ -353,7 +355,7 @@ mod tests {
             (found.headline[1].clone(), found.warnings)
         };
         let (one, warnings) = sentence(&[("lan", 0, 5), ("minh", 5, 5)]);
-        let ending = "; lan noticed only 0 of 5 attention checks, so this Acc may be wrong.";
+        let ending = " lan noticed only 0 of 5 attention checks, so this Acc may be wrong.";
         assert!(one.ends_with(ending), "{one}");
         let warned = |text: &String| text.starts_with("lan noticed 0 of 5 attention checks. ");
         assert_eq!(
@@ -363,7 +365,7 @@ mod tests {
         );
         let (two, _) = sentence(&[("lan", 1, 5), ("minh", 2, 5)]);
         assert!(
-            two.contains("; 2 reviewers missed most of their attention checks"),
+            two.contains(" 2 reviewers missed most of their attention checks"),
             "{two}"
         );
         for (count, n) in [(0, 3), (2, 4), (5, 5)] {
@@ -386,10 +388,10 @@ mod tests {
             "All 20 pairs are aligned, none with a confidence below 0.5."
         );
         let truth =
-            "; against ground truth, 19 of 20 results of Ensemble are right, 95.0 % (76.4–99.1).";
+            " Against ground truth, 19 of 20 results of Ensemble are right, 95.0 % (76.4–99.1).";
         assert!(found[1].ends_with(truth), "{found:?}");
         assert!(
-            found[2].starts_with("By ground truth, all metrics"),
+            found[2].starts_with("By ground truth, no two metrics differ"),
             "{found:?}"
         );
     }

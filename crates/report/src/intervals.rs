@@ -2,7 +2,7 @@
 
 use super::headline::headline;
 use super::model::Report;
-use super::stats::IntervalMethod;
+use mocban_results::stats::IntervalMethod;
 
 impl Report {
     /// Returns the same report with intervals of shares computed by `method`.

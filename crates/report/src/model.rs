@@ -3,22 +3,22 @@
 use serde::Serialize;
 
 use super::adjudication::AdjudicationRules;
-use super::attention_checks::AttentionCheckRates;
 use super::block_accuracy::BlockAccuracy;
 use super::comparison::{Basis, Comparison};
 use super::fail_reasons::FailReasonCount;
-use super::manual_alignment::ManualAlignmentErrors;
-use super::number_format::count_list;
 use super::provenance::Provenance;
 use super::risk_coverage::RiskCoverageCurve;
 use super::score_bootstrap::{BootstrapSettings, MeanIntervals};
 use super::score_comparison::ScoreComparison;
 use super::stage_times::StageTimes;
-use super::stats::IntervalMethod;
 use super::thresholds::ThresholdDistribution;
 use super::truth_summary::TruthSummary;
 use mocban_catalog::SetApart;
 use mocban_core::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
+use mocban_results::attention_checks::AttentionCheckRates;
+use mocban_results::manual_alignment::ManualAlignmentErrors;
+use mocban_results::number_format::count_list;
+use mocban_results::stats::IntervalMethod;
 
 /// Version of the JSON form.
 pub const SCHEMA: u32 = 1;

@@ -1,7 +1,7 @@
 //! Checks that a report is good enough (`--fail-under`) and complete (`--require-complete`).
 
 use super::model::Report;
-use super::number_format::format_count;
+use mocban_results::number_format::format_count;
 
 /// Returns the reasons why a report misses the required Acc. The list is empty if there are none.
 ///
@@ -51,8 +51,9 @@ pub fn missing(report: &Report) -> Vec<String> {
 mod tests {
     use super::{below, missing};
     use crate::test_fixtures;
-    use crate::{Report, ReportAccumulator, TruthEvaluation};
+    use crate::{Report, ReportAccumulator};
     use mocban_core::domain::{FailureClass, Verdict};
+    use mocban_results::TruthEvaluation;
 
     fn report(verdicts: &[Option<Verdict>]) -> Report {
         let mut tally = ReportAccumulator::default();

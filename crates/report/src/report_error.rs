@@ -1,7 +1,8 @@
 //! Why no report can be made.
 
-use super::pair_artifacts::PairArtifactsError;
 use mocban_catalog::CatalogError;
+use mocban_core::domain::explained_by_cause;
+use mocban_results::pair_artifacts::PairArtifactsError;
 
 /// Why no report can be made.
 #[derive(Debug, thiserror::Error)]
@@ -16,3 +17,5 @@ pub enum ReportError {
     #[error("comparing with the truth stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
+
+explained_by_cause! { ReportError: Catalog }

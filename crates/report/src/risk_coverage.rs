@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::comparison::Basis;
-use super::stats::Rate;
 use mocban_core::domain::ThresholdMetric;
+use mocban_results::stats::Rate;
 
 /// Coverages of a curve, in percent of the results. At each coverage, the most confident results are kept.
 pub const COVERAGE_PERCENT: [u64; 7] = [100, 99, 97, 95, 90, 80, 50];
@@ -93,8 +93,8 @@ fn point(percent: u64, kept: &[(f64, bool)]) -> RiskCoveragePoint {
 mod tests {
     use super::{COVERAGE_PERCENT, RiskCoverageCurve};
     use crate::comparison::Basis;
-    use crate::stats::wilson_95;
     use mocban_core::domain::ThresholdMetric;
+    use mocban_results::stats::wilson_95;
 
     /// The curve of density over results in the order given.
     fn curve(judged: &[(f64, bool)]) -> RiskCoverageCurve {

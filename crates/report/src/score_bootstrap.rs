@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use super::comparison::COMPARED_METRICS;
 use super::score_comparison::{Score, ScoreComparison, conclude};
-use super::stats::{
-    BOOTSTRAP_SEED, ClusterSample, MIN_UNITS, ResampledMeans, ResamplingUnit, resample_count,
-};
 use mocban_catalog::PairResults;
 use mocban_core::domain::ThresholdMetric;
+use mocban_results::stats::{
+    BOOTSTRAP_SEED, ClusterSample, MIN_UNITS, ResampledMeans, ResamplingUnit, resample_count,
+};
 
 const METRICS: usize = ThresholdMetric::ALL.len();
 const SCORES: usize = Score::ALL.len();
@@ -209,10 +209,10 @@ fn comparisons(resampled: &mut ResampledMeans, by: ResamplingUnit) -> Vec<ScoreC
 #[cfg(test)]
 mod tests {
     use super::{BootstrapResults, ScoreSample};
-    use crate::stats::{MIN_UNITS, ResamplingUnit};
     use crate::test_fixtures;
     use mocban_catalog::PairResults;
     use mocban_core::domain::ThresholdMetric;
+    use mocban_results::stats::{MIN_UNITS, ResamplingUnit};
 
     /// Resamples pairs on which the ensemble has a higher IoU than all other metrics. Every seventh pair fails.
     fn resampled(pairs: u32, has_blocks: bool) -> BootstrapResults {

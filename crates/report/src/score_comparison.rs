@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::comparison::versus;
-use super::stats::{ResamplingUnit, SIGNIFICANCE_LEVEL, holm_of_known};
 use mocban_core::domain::{Scores, ThresholdMetric};
+use mocban_results::stats::{ResamplingUnit, SIGNIFICANCE_LEVEL, holm_of_known};
 
 /// A score of the paper's table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -141,8 +141,8 @@ pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::{Score, ScoreComparison, conclude, conclusions};
-    use crate::stats::ResamplingUnit;
     use mocban_core::domain::ThresholdMetric::{Density, Ensemble, NlSsim, Relief};
+    use mocban_results::stats::ResamplingUnit;
 
     fn difference(score: Score, difference: f64, p: Option<f64>) -> ScoreComparison {
         ScoreComparison {

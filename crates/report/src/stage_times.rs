@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::stats::{median, quantile};
 use mocban_core::domain::Stage;
+use mocban_results::stats::{median, quantile};
 
 /// Computing times of one stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::stats::{median, quantile};
 use mocban_core::domain::ThresholdMetric;
+use mocban_results::stats::{median, quantile};
 
 /// Equal bins of a distribution.
 pub const BINS: usize = 40;

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::ground_truth::{MAX_ANGLE_DEG, TruthErrors};
-use super::stats::{Rate, median};
+use mocban_results::ground_truth::{MAX_ANGLE_DEG, TruthErrors};
+use mocban_results::stats::{Rate, median};
 
 /// A metric's errors against ground truth. Verdicts are not part of these numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]

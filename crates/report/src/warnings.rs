@@ -1,16 +1,37 @@
 //! Caveats on the numbers of a report, in whole sentences.
 
-use super::attention_checks::AttentionCheckRates;
 use super::model::{MetricRow, PairProgress};
-use super::number_format::NumberStyle::Score;
-use super::number_format::{counted, format_count, format_number};
 use super::score_bootstrap::BootstrapSkipped;
-use super::stats::{MAX_UNITS, MIN_UNITS};
-use super::truth_evaluation::TruthProblems;
+use mocban_catalog::PairResults;
 use mocban_core::domain::sanitize;
+use mocban_results::TruthEvaluation;
+use mocban_results::attention_checks::AttentionCheckRates;
+use mocban_results::number_format::NumberStyle::Score;
+use mocban_results::number_format::{counted, format_count, format_number};
+use mocban_results::stats::{MAX_UNITS, MIN_UNITS};
 
 /// Tolerance for rounding in sums before a mean is called impossible.
 const ROUNDING: f64 = 1e-9;
+
+/// Ground truth that could not be used.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct TruthProblems {
+    /// Number of pairs.
+    pub(super) count: u64,
+    /// The first pair with its problem.
+    pub(super) first: Option<String>,
+}
+
+impl TruthProblems {
+    /// Counts one pair, if its ground truth cannot be used.
+    pub(super) fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
+        if let Some(problem) = &truth.problem {
+            self.count += 1;
+            let first = || format!("{}: {problem}", pair.attributes.name);
+            self.first.get_or_insert_with(first);
+        }
+    }
+}
 
 /// Returns the warnings that apply to the numbers of a report.
 pub(super) fn warnings(
@@ -142,9 +163,9 @@ mod tests {
     use super::{bootstrap_skipped, impossible_dice, missing_pairs, qualified_results};
     use crate::model::PairProgress;
     use crate::score_bootstrap::BootstrapSkipped;
-    use crate::stats::ResamplingUnit;
     use crate::test_fixtures;
     use mocban_core::domain::ThresholdMetric;
+    use mocban_results::stats::ResamplingUnit;
 
     #[test]
     fn the_reason_for_no_bootstrap_is_given() {

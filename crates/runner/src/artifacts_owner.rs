@@ -1,7 +1,8 @@
 //! Makes the catalog the owner of the places of its artifacts, before anything is written or removed there.
 
-use super::compute_thread::run_blocking;
+use super::blocking::run_blocking;
 use super::error::RunError;
+use super::retry::retried;
 use mocban_catalog::Catalog;
 use mocban_store::Project;
 
@@ -18,13 +19,10 @@ pub async fn claim_artifacts(
     catalog: &Catalog,
     take_over: bool,
 ) -> Result<(), RunError> {
-    let identity = catalog.retry_while_unavailable(async || catalog.identity().await);
-    let identity = identity.await?;
-    let known = async || catalog.first_artifacts(SAMPLES).await;
-    let known = catalog.retry_while_unavailable(known).await?;
+    let identity = retried!(catalog.identity())?;
+    let known = retried!(catalog.first_artifacts(SAMPLES))?;
     let project = project.clone();
-    let claimed = run_blocking(move || project.claim_places(&identity, &known, take_over));
-    for message in claimed.await? {
+    for message in run_blocking(move || project.claim_places(&identity, &known, take_over)).await? {
         tracing::warn!("{message}");
     }
     Ok(())

@@ -46,9 +46,6 @@ pub trait BlockArtifacts: Sync {
     /// Writes an artifact, named by its content. It is durable when the stage ends. A file that exists already is kept.
     /// `role` is unique in the stage, such as `front.png` or `c03-r12.ply`; `ext` is the extension without the dot. The
     /// mesh and the print of a character that is cut are artifacts too.
-    ///
-    /// # Errors
-    /// Returns an error if the disk or the object store fails.
     fn write(&self, role: &str, ext: &str, bytes: Vec<u8>) -> Result<ArtifactRef, BlockStageError>;
 
     /// Reads an artifact of an earlier stage and checks its hash.
@@ -91,9 +88,6 @@ impl BlockFile {
     }
 
     /// Opens the file at its beginning.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be opened.
     pub fn open(&self) -> Result<File, BlockStageError> {
         self.input.open().map_err(BlockStageError::from)
     }

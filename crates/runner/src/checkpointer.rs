@@ -7,19 +7,22 @@ use std::sync::Arc;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
-use super::compute_thread::{ComputedStage, task_result};
+use super::blocking::task_result;
+use super::compute_thread::ComputedStage;
 use super::error::RunError;
 use super::events::RunEvent;
 use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stage_files::{Unwritten, write_batch};
 use mocban_catalog::{CheckpointOutcome, Lease};
-use mocban_core::domain::{Failure, FailureClass, PairName, Stage};
+use mocban_core::domain::{Failure, FailureClass, PairName, Stage, WorkerId};
 use mocban_system::failpoint::{self, Point};
 
 /// The task that holds a pair's lease and stores its stages.
 pub(super) struct Checkpointer {
     context: Arc<RunContext>,
+    /// The worker that holds the lease.
+    worker: WorkerId,
     stages: mpsc::UnboundedSender<ComputedStage>,
     task: JoinHandle<Result<StoredStages, RunError>>,
 }
@@ -46,8 +49,9 @@ impl StoredStages {
         }
     }
 
-    /// Ends the lease if it is still held: stores a failure if something else has the name of a file. Returns how the
-    /// pair ended: `end`, unless the lease was lost or a stage is unstored.
+    /// Ends the lease if it is still held. If something else has the name of a file, stores that as the failure of the
+    /// stage; otherwise releases the pair. Returns `end`, but `LeaseLost` if the lease was lost, and `Released` if a stage
+    /// could not be stored.
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
         let stages = self.stages;
         let end = match (self.lease, self.unwritten) {
@@ -58,7 +62,7 @@ impl StoredStages {
             (CheckpointOutcome::Lease(lease), Some(Unwritten::Blocked(stage, error))) => {
                 let failed = PairFailure {
                     name: self.pair,
-                    attributes: stage.made_with.attributes,
+                    attributes: stage.provenance.attributes,
                     stage: stage.stage,
                     failure: Failure::new(FailureClass::Io, error.to_string()),
                     is_transient: false,
@@ -69,8 +73,11 @@ impl StoredStages {
             }
             (CheckpointOutcome::Lease(lease), unwritten) => {
                 let end = unwritten.map_or(end, |_| PairEnd::Released);
-                let released = context.catalog.release(lease).await;
-                released.map(|_| end).map_err(RunError::from)
+                match context.catalog.release(lease).await {
+                    Ok(true) => Ok(end),
+                    Ok(false) => Ok(PairEnd::LeaseLost),
+                    Err(error) => Err(error.into()),
+                }
             }
             (CheckpointOutcome::Done, _) => Ok(end),
         };
@@ -82,9 +89,11 @@ impl Checkpointer {
     /// Starts the task for a leased pair.
     pub(super) fn start(context: Arc<RunContext>, pair: PairName, lease: Lease) -> Self {
         let (sender, stages) = mpsc::unbounded_channel();
+        let worker = lease.worker();
         let task = tokio::spawn(store_stages(Arc::clone(&context), pair, lease, stages));
         Self {
             context,
+            worker,
             stages: sender,
             task,
         }
@@ -94,6 +103,14 @@ impl Checkpointer {
     /// catalog returned an error, or a stage was not stored because of a stop request or an unavailable object store.
     pub(super) fn store(&self, stage: ComputedStage) -> bool {
         self.stages.send(stage).is_ok()
+    }
+
+    /// Waits until no later stage can be stored, for a reason of [`Self::store`] or because the lease has expired.
+    pub(super) async fn closed(&self) {
+        tokio::select! {
+            () = self.stages.closed() => {}
+            () = self.context.expired(self.worker) => {}
+        }
     }
 
     /// Waits until the task has stored the sent stages. Meanwhile the catalog does not delay commits.

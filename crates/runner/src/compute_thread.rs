@@ -4,21 +4,20 @@
 //! system, its thread can be abandoned without blocking other pairs. All stages of a pair run on the same thread, because waking another thread
 //! for each stage can leave a core idle for some milliseconds.
 
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
-use tokio::task::JoinError;
 
+use super::blocking::panic_text;
 use super::pair_context::{PairContext, StoredStage};
 use super::run_context::RunContext;
-use super::stage_output::{self, ExecutionError, StageOutput};
+use super::stage_output::{self, PairStageError, PairStageOutput};
 use super::stop::{Stop, StopLevel};
 use mocban_catalog::{InputVersions, PairProvenance, StageCheckpoint};
 use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
-use mocban_core::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
+use mocban_core::domain::{ArtifactSet, Failure, FailureClass, Stage};
 use mocban_store::{ArtifactError, NewArtifact};
 use mocban_system::failpoint::{self, Point};
 use mocban_system::platform::sleep_active;
@@ -50,6 +49,8 @@ pub(super) enum ComputeEvent {
     TimedOut,
     /// The run is to stop at once.
     Stopped,
+    /// Later stages cannot be stored: the lease is lost, or an earlier stage was not stored.
+    Cancelled,
 }
 
 /// Longest time to wait for the end of a cancelled thread. Only a thread that waits for a file takes longer.
@@ -139,9 +140,9 @@ fn run_stages(
                 }
                 None => break ComputeEvent::Finished(Box::new(computed), None),
             },
-            Ok(Err(ExecutionError::RerunFrom(earlier))) => stage = earlier,
-            Ok(Err(ExecutionError::Store(error))) => break ComputeEvent::StoreFailed(error),
-            Ok(Err(ExecutionError::Failed {
+            Ok(Err(PairStageError::RerunFrom(earlier))) => stage = earlier,
+            Ok(Err(PairStageError::Store(error))) => break ComputeEvent::StoreFailed(error),
+            Ok(Err(PairStageError::Failed {
                 failure,
                 is_transient,
             })) => {
@@ -165,12 +166,12 @@ fn run_stage(
     context: &RunContext,
     stage: Stage,
     pair: &mut PairContext,
-) -> Result<ComputedStage, ExecutionError> {
+) -> Result<ComputedStage, PairStageError> {
     let begun = Instant::now();
-    let output = context.executor.run(stage, pair);
+    let output = context.pairs.run(stage, pair);
     let elapsed = begun.elapsed();
     context.add_compute_time(stage, elapsed);
-    let StageOutput {
+    let PairStageOutput {
         outcome,
         files,
         metrics,
@@ -178,7 +179,7 @@ fn run_stage(
     failpoint::hit(stage, Point::Computed, Some(&pair.attributes.name));
     let Some(mesh_hash) = pair.mesh_hash() else {
         let text = "a stage finished before the mesh was read";
-        return Err(ExecutionError::failed(FailureClass::Bug, text));
+        return Err(PairStageError::failed(FailureClass::Bug, text));
     };
     let print_hash = pair.print_hash();
     let artifacts = files.iter();
@@ -196,7 +197,7 @@ fn run_stage(
     pair.stored.insert(stage, stored);
     let checkpoint = StageCheckpoint {
         stage,
-        made_with: PairProvenance {
+        provenance: PairProvenance {
             fingerprint: context.fingerprints.of(stage),
             mesh_hash: Some(mesh_hash),
             print_hash,
@@ -214,49 +215,4 @@ fn run_stage(
         written: Instant::now(),
     };
     Ok((checkpoint, files))
-}
-
-/// Longest excerpt of a panic's message, in characters.
-const MAX_PANIC_CHARS: usize = 160;
-
-/// Describes a panic and what to do about it.
-pub(super) fn panic_text(payload: &(dyn Any + Send)) -> String {
-    let message = payload
-        .downcast_ref::<&str>()
-        .copied()
-        .or_else(|| payload.downcast_ref::<String>().map(String::as_str));
-    let message = message.map_or_else(String::new, |text| {
-        format!(" ({})", sanitize(text, MAX_PANIC_CHARS))
-    });
-    format!(
-        "the stage panicked{message}: this is a bug, please report it with the output of `run --rerun failed -v`"
-    )
-}
-
-/// Runs a blocking call on a thread for such calls; resumes its panic.
-pub(super) async fn run_blocking<T: Send + 'static>(
-    call: impl FnOnce() -> T + Send + 'static,
-) -> T {
-    task_result(tokio::task::spawn_blocking(call).await)
-}
-
-/// Returns what a task returned; resumes its panic.
-pub(super) fn task_result<T>(ended: Result<T, JoinError>) -> T {
-    match ended {
-        Ok(result) => result,
-        Err(error) => std::panic::resume_unwind(error.into_panic()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{MAX_PANIC_CHARS, panic_text};
-
-    #[test]
-    fn the_message_of_a_panic_is_sanitized_and_shortened() {
-        for message in ["a\u{1b}[2J".to_owned(), "a".repeat(MAX_PANIC_CHARS + 1)] {
-            let text = panic_text(&message);
-            assert!(!text.contains(&message), "{text:?}");
-        }
-    }
 }

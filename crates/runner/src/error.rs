@@ -1,7 +1,7 @@
 //! Why a run cannot go on.
 
 use mocban_catalog::{CatalogError, FieldChange};
-use mocban_core::domain::{BlockName, PairName};
+use mocban_core::domain::{BlockName, ErrorCode, Explained, PairName};
 use mocban_store::{ArtifactError, LockError, PlaceError, StorageError, StoreError};
 
 /// An error that ends a run. A failed pair is not such an error; the run's summary counts failed pairs.
@@ -43,6 +43,28 @@ pub enum RunError {
     /// An artifact could not be written.
     #[error(transparent)]
     Artifact(#[from] ArtifactError),
+}
+
+impl Explained for RunError {
+    fn wrapped(&self) -> Option<&dyn Explained> {
+        match self {
+            Self::Catalog(error) => Some(error),
+            Self::Store(error) => Some(error),
+            Self::Storage(error) => Some(error),
+            _ => None,
+        }
+    }
+
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::InUse(_) => ErrorCode::ProjectInUse,
+            Self::OtherSettings(_) | Self::OtherPlan(_) | Self::Place(_) => ErrorCode::Usage,
+            Self::NoSuchPair(_) | Self::NoSuchBlock(_) => ErrorCode::NothingSelected,
+            _ => self
+                .wrapped()
+                .map_or(ErrorCode::Unexpected, Explained::code),
+        }
+    }
 }
 
 /// Formats changed settings as ` (register.smoothing_px: 1.0 -> 1.5)`. Returns an empty text if no change is known.

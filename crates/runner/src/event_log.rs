@@ -13,9 +13,10 @@ pub(super) fn log_event(event: &RunEvent) {
         RunEvent::Started {
             pairs,
             stages,
+            blocks,
             workers,
             ..
-        } => tracing::info!(pairs, stages, workers, "the run starts"),
+        } => tracing::info!(pairs, stages, blocks, workers, "the run starts"),
         RunEvent::StageStarted { .. } | RunEvent::BlockStageStarted { .. } => {}
         RunEvent::StageFinished { pair, stage, ms } => {
             tracing::debug!(%pair, %stage, ms, "a stage is stored");
@@ -157,6 +158,7 @@ mod tests {
                     pairs: 1,
                     stages: 4,
                     by_stage: [1; 4],
+                    blocks: 0,
                     workers: 1,
                 },
                 vec![Level::INFO],

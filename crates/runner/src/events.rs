@@ -19,7 +19,9 @@ pub enum RunEvent {
         /// Total number of stages to run, over all pairs.
         stages: u64,
         /// Pairs that each stage has to run for.
-        by_stage: [u64; 4],
+        by_stage: [u64; Stage::COUNT],
+        /// Blocks with stages to run. Their pairs are counted when they are cut, not here.
+        blocks: u64,
         /// Pairs computed at the same time.
         workers: usize,
     },
@@ -158,7 +160,7 @@ pub struct BlockSummary {
 }
 
 /// How a run ended.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunSummary {
     /// Pairs that this run finished.
     pub done: u64,
@@ -177,6 +179,7 @@ pub struct RunSummary {
     /// Whether the run ended early because of [`RunOptions::max_failures`](super::RunOptions::max_failures).
     pub too_many_failures: bool,
     /// Time that stages were computed, all threads together.
+    #[serde(skip)]
     pub compute_time: Duration,
     /// Wall-clock time in milliseconds.
     pub elapsed_ms: u64,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::compute_thread::run_blocking;
+use super::blocking::run_blocking;
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
 use super::run_context::RunContext;
@@ -41,8 +41,7 @@ pub(super) async fn check_folders<const N: usize>(
         project: context.project.clone(),
         stored,
     });
-    let checked = read_each(items.into(), &limits).await;
-    for outcome in checked.into_iter().flatten() {
+    for outcome in read_each(items.into(), &limits).await.into_iter().flatten() {
         outcome?;
     }
     Ok(())

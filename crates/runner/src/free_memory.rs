@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Share of the free memory that a run takes by default.
+/// Fraction of the free memory that a run takes by default.
 const SHARE: f64 = 0.8;
 
 /// Returns the default memory limit of a run in bytes: 80 % of the free memory. Returns `None` if the free memory is

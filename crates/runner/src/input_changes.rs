@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
+use super::retry::retried;
 use mocban_catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
 use mocban_core::domain::{ContentHash, PairId};
 use mocban_store::{Input, InputError, Project, hash_input, stat_input};
@@ -17,14 +18,10 @@ const PAGE: usize = 1_000;
 pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
-    among: Option<&PairSelection>,
+    selection: Option<&PairSelection>,
     limits: &ReadLimits,
 ) -> Result<(), RunError> {
-    let read = async |after| {
-        let page = catalog
-            .retry_while_unavailable(async || catalog.known_inputs(after, PAGE, among).await);
-        page.await
-    };
+    let read = async |after| retried!(catalog.known_inputs(after, PAGE, selection));
     let mut page = read(None).await?;
     while let Some(last) = page.last()
         && limits.stop.level() < limits.until
@@ -38,9 +35,7 @@ pub(super) async fn store_changes(
         let (changed, next) = tokio::join!(read_each(compared.collect(), limits), read(after));
         let changed: Vec<_> = changed.into_iter().flatten().flatten().collect();
         if !changed.is_empty() {
-            let stored = catalog
-                .retry_while_unavailable(async || catalog.store_inputs(changed.clone()).await);
-            stored.await?;
+            retried!(catalog.store_inputs(changed.clone()))?;
         }
         page = next?;
     }
@@ -63,20 +58,15 @@ pub(super) async fn store_inputs_of_quarantined(
         number,
         "pairs failed because their workers died or hung, several times or alone"
     );
-    let among = PairSelection::of(pairs);
-    let known = catalog.retry_while_unavailable(async || {
-        catalog.known_inputs(None, pairs.len(), Some(&among)).await
-    });
-    let known = known.await?;
+    let selection = PairSelection::of(pairs);
+    let known = retried!(catalog.known_inputs(None, pairs.len(), Some(&selection)))?;
     let unread = known.into_iter().map(|known| UnreadInputs {
         project: project.clone(),
         known,
     });
     let inputs = read_each(unread.collect(), limits).await;
     let inputs: Vec<_> = inputs.into_iter().flatten().collect();
-    let stored = catalog
-        .retry_while_unavailable(async || catalog.record_poisoned_inputs(inputs.clone()).await);
-    Ok(stored.await?)
+    Ok(retried!(catalog.record_poisoned_inputs(inputs.clone()))?)
 }
 
 /// Returns the current versions of two files. Returns `None` for a file if reading it fails or is ended by `limits`.

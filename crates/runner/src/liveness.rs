@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use mocban_catalog::LeaseHolder;
 use mocban_core::domain::{UnixMillis, WorkerId};
 
-/// Time without a connection and without a new heartbeat after which a worker is dead, as a share of the lease: 7 of 50
-/// seconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then
-/// usually connects again at once.
+/// Time without a connection and without a new heartbeat after which a worker is dead, as a fraction of the lease: 7 of
+/// 50 seconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then usually
+/// connects again at once.
 const UNCONNECTED_SHARE: f64 = 0.14;
-/// Longest time between two observations that is no sign of an outage of the server, as a share of the lease: 5 of 50
-/// seconds.
+/// Longest time between two observations that is no sign of an outage of the server, as a fraction of the lease: 5 of
+/// 50 seconds.
 const USUAL_GAP_SHARE: f64 = 0.1;
 
 /// Finds dead workers. A worker is dead if its heartbeat does not change during one lease length on the clock of this

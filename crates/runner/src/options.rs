@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use super::run_metrics::RunMetrics;
 use mocban_catalog::RerunPolicy;
+use mocban_core::InputLimits;
 use mocban_core::domain::{BlockName, PairName, Stage};
-use mocban_core::{mesh, raster};
 
 /// Options of a run.
 #[derive(Debug, Clone)]
@@ -30,10 +30,8 @@ pub struct RunOptions {
     pub until: Stage,
     /// Longest time for one stage of one pair.
     pub stage_timeout: Duration,
-    /// Limits on mesh files.
-    pub mesh_limits: mesh::MeshLimits,
-    /// Limits on print images.
-    pub image_limits: raster::ImageLimits,
+    /// Limits of input files.
+    pub limits: InputLimits,
     /// Where the run counts pairs and times.
     pub metrics: RunMetrics,
 }
@@ -70,8 +68,7 @@ impl Default for RunOptions {
             rerun: RerunPolicy::Changed,
             until: Stage::Register,
             stage_timeout: Duration::from_mins(10),
-            mesh_limits: mesh::MeshLimits::SUGGESTED,
-            image_limits: raster::ImageLimits::SUGGESTED,
+            limits: InputLimits::SUGGESTED,
             metrics: RunMetrics::default(),
         }
     }

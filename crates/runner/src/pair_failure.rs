@@ -23,9 +23,6 @@ pub(super) struct PairFailure {
 
 impl PairFailure {
     /// Stores the failure under the lease. Returns how the pair ended.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog returns one.
     pub(super) async fn store(
         self,
         context: &RunContext,
@@ -38,14 +35,14 @@ impl PairFailure {
             class: failure.class,
             is_transient: self.is_transient,
             attempt: lease.attempt(),
-            exclusive: lease.exclusive(),
+            ran_alone: lease.exclusive(),
         };
         let action = policy::failure_action(attempt, now);
         let record = StageFailure {
             stage,
             failure: failure.clone(),
             action,
-            made_with: PairProvenance::new(
+            provenance: PairProvenance::new(
                 context.fingerprints.of(stage),
                 &self.inputs,
                 self.attributes,

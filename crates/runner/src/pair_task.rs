@@ -66,6 +66,7 @@ async fn compute(
             biased;
             event = thread.next_event(timeout, &context.stop) => event,
             () = reading_after_stop(&pair.file_in_use, &context.stop) => ComputeEvent::Stopped,
+            () = checkpointer.closed() => ComputeEvent::Cancelled,
         };
         match event {
             ComputeEvent::Started(started, inputs) => {
@@ -75,9 +76,7 @@ async fn compute(
             }
             ComputeEvent::Finished(computed, next) => {
                 if !checkpointer.store(*computed) {
-                    // The lease is lost, the disk or the catalog returned an error, or the run stops at once.
-                    thread.end().await;
-                    return PairOutcome::Ended(checkpointer.finish(PairEnd::LeaseLost).await);
+                    return end_cancelled(checkpointer, thread).await;
                 }
                 match next {
                     Some(_) => {}
@@ -111,12 +110,19 @@ async fn compute(
                 thread.end().await;
                 break FailedStage::without_pair(FailureClass::Resource, text);
             }
+            ComputeEvent::Cancelled => return end_cancelled(checkpointer, thread).await,
             ComputeEvent::Stopped => {
                 return PairOutcome::Ended(checkpointer.finish(PairEnd::Released).await);
             }
         }
     };
     PairOutcome::Ended(fail(context, checkpointer, stage, pair, failed).await)
+}
+
+/// Cancels a pair whose later stages cannot be stored.
+async fn end_cancelled(checkpointer: Checkpointer, thread: ComputeThread) -> PairOutcome {
+    thread.end().await;
+    PairOutcome::Ended(checkpointer.finish(PairEnd::Released).await)
 }
 
 /// Longest time for which a file is read after a stop request. It includes decoding, so it is longer than that of the
@@ -185,7 +191,7 @@ async fn fail(
     let stages = settled.stages;
     let lease = match settled.into_lease() {
         Ok(lease) => lease,
-        Err(settled) => return settled.finish(context, PairEnd::LeaseLost).await,
+        Err(settled) => return settled.finish(context, PairEnd::Released).await,
     };
     let end = store_failure(context, lease, stage, pair, failed).await;
     let waited = begun.elapsed();
@@ -249,8 +255,8 @@ impl PairSummary {
         if read.mesh.is_some() && read.print.is_some() {
             return read;
         }
-        let paths = [&self.attributes.mesh_path, &self.attributes.print_path];
-        let paths = paths.map(|path| context.project.input(path));
+        let paths = [&self.attributes.mesh_path, &self.attributes.print_path]
+            .map(|path| context.project.input(path));
         let limits = ReadLimits {
             timeout: context.stage_timeout.min(MAX_REREAD),
             stop: context.stop.clone(),

@@ -13,6 +13,7 @@ use super::events::RunEvent;
 use super::input_reads::{ReadLimits, read_each};
 use super::memory_budget::{EstimatedPair, MemoryBudget};
 use super::options::RunOptions;
+use super::retry::retried;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use mocban_catalog::{ClaimRequest, Lease, PairSelection, PairWork};
@@ -83,7 +84,7 @@ impl Prefetch {
         Self {
             context,
             selection,
-            image_limits: options.image_limits,
+            image_limits: options.limits.image,
             slots: options.workers.max(1),
             queue: VecDeque::new(),
             arriving: VecDeque::new(),
@@ -235,8 +236,7 @@ impl Prefetch {
             pairs.leased.into_iter().map(|(lease, _)| lease)
         });
         let queued = std::mem::take(&mut self.queue);
-        let queued = queued.into_iter().map(|pair| pair.lease);
-        for lease in queued.chain(arriving) {
+        for lease in queued.into_iter().map(|pair| pair.lease).chain(arriving) {
             self.context.catalog.release(lease).await?;
         }
         Ok(())
@@ -280,7 +280,7 @@ impl Prefetch {
             slots: count,
             until: context.until,
             exclusive,
-            among: self.selection.clone(),
+            selection: self.selection.clone(),
             deadline: context.deadline() + wait,
             alive_since: context.alive_since(),
         };
@@ -290,8 +290,7 @@ impl Prefetch {
             return Ok(());
         }
         let catalog = &context.catalog;
-        let works = catalog.retry_while_unavailable(async || catalog.work(&leases).await);
-        let works = works.await?;
+        let works = retried!(catalog.work(&leases))?;
         let waited = begun.elapsed() * waiting;
         context.metrics.add_wait(WaitReason::Database, waited);
         let leased: Vec<_> = leases.into_iter().zip(works).collect();
@@ -320,7 +319,7 @@ impl Prefetch {
         };
         let estimates = estimates.into_iter().chain(std::iter::repeat(None));
         let leased = leased.into_iter().zip(estimates);
-        let map_bytes = self.context.executor.map_bytes();
+        let map_bytes = self.context.pairs.map_bytes();
         self.queue
             .extend(leased.map(|((lease, work), bytes)| LeasedPair {
                 lease,
@@ -341,7 +340,7 @@ impl Prefetch {
             attributes: work.attributes.clone(),
             from: lease.cursor(),
             limits: self.image_limits,
-            map_bytes: self.context.executor.map_bytes(),
+            map_bytes: self.context.pairs.map_bytes(),
         });
         let estimated: Vec<_> = estimated.take_while(|_| is_needed).collect();
         let others = vec![Some(0); leased.len() - estimated.len()];

@@ -5,27 +5,29 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 
 use super::artifacts_owner::claim_artifacts;
+use super::block::inputs;
 use super::block::pipeline::BlockPipeline;
-use super::block::plan;
 use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::event_log::{log_end, log_event};
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
-use super::input_reads::read_limits;
+use super::input_reads::{ReadLimits, read_limits};
 use super::options::{RunOptions, RunPart};
-use super::policy::{self, Clock, Timing};
+use super::pair_pipeline::{PairPipeline, PairStages};
+use super::policy;
+use super::retry::retried;
 use super::run_context::RunContext;
 use super::run_end::{RunEnd, block_limits, compute, stop_waiting_after_stop};
 use super::run_guard::RunGuard;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
-use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::Stop;
+use super::timing::{Clock, Timing};
 use super::worker_session::this_process;
 use mocban_align::stages::Settings;
 use mocban_catalog::{
@@ -41,8 +43,8 @@ pub fn fingerprints(settings: &Settings) -> Fingerprints {
 }
 
 /// What computes the stages of a run.
-pub(super) struct Executors {
-    pub(super) pairs: Arc<dyn StageExecutor>,
+pub(super) struct RunStages {
+    pub(super) pairs: Arc<dyn PairStages>,
     pub(super) blocks: Arc<dyn BlockStages>,
 }
 
@@ -60,8 +62,8 @@ pub async fn run(
     mut on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
     page_vec::keep_memory(options.memory);
-    let executors = Executors {
-        pairs: Arc::new(PipelineExecutor::new(project, settings, options)),
+    let stages = RunStages {
+        pairs: Arc::new(PairPipeline::new(project, settings, options)),
         blocks: Arc::new(BlockPipeline::new(options)),
     };
     let fingerprints = fingerprints(settings);
@@ -69,7 +71,7 @@ pub async fn run(
         project,
         catalog,
         &fingerprints,
-        executors,
+        stages,
         options,
         stop,
         |event| {
@@ -82,12 +84,12 @@ pub async fn run(
     ended
 }
 
-/// Like [`run`], with any executors.
+/// Like [`run`], with any stages.
 pub(super) async fn run_with(
     project: &Project,
     catalog: &Catalog,
     fingerprints: &Fingerprints,
-    executors: Executors,
+    stages: RunStages,
     options: &RunOptions,
     stop: &Stop,
     mut on_event: impl FnMut(RunEvent) + Send,
@@ -99,7 +101,7 @@ pub(super) async fn run_with(
     claim_artifacts(project, catalog, false).await?;
     let settings = WorkerSettings {
         fingerprints: fingerprint_ids,
-        blocks: block_settings(&*executors.blocks),
+        blocks: block_settings(&*stages.blocks),
     };
     guard
         .require_same_settings(catalog, fingerprints, &settings, options.part)
@@ -111,27 +113,27 @@ pub(super) async fn run_with(
         project,
         catalog,
         fingerprints,
-        blocks: &executors.blocks,
+        blocks: &stages.blocks,
         options,
         selection: selection.as_ref(),
         clock,
         stop,
     };
+    // The task is aborted when this function returns.
+    let mut waiting = JoinSet::new();
+    waiting.spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
     if let Err(error) = start.prepare(&mut guard, worker, &mut on_event).await {
         // This error says more than one from ending the worker would.
         let _ = catalog.end_worker(worker, clock.now(), None).await;
         return Err(error);
     }
-    // The task is aborted when this function returns.
-    let mut waiting = JoinSet::new();
-    waiting.spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
     let counted = if options.part == RunPart::Plan {
         catalog.end_worker(worker, clock.now(), None).await?;
         (RunCounts::default(), Duration::ZERO)
     } else {
         let (events, received) = mpsc::unbounded_channel();
-        let context = Arc::new(start.context(executors.pairs, fingerprint_ids, events));
-        let scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
+        let context = Arc::new(start.context(stages.pairs, fingerprint_ids, worker, events));
+        let scheduler = Scheduler::new(Arc::clone(&context), selection.clone(), options);
         compute(&context, scheduler, received, &mut on_event).await?
     };
     if let Some(selection) = &mut selection {
@@ -169,8 +171,12 @@ impl RunStart<'_> {
             guard.unlock_planning(catalog).await?;
             planned?;
         }
-        let left = catalog.work_left(options.until, self.pairs()).await?;
+        let (until, pairs) = (options.until, self.pairs());
+        let left = retried!(catalog.work_left(until, pairs))?;
+        let blocks = self.selection.map(|selection| &selection.blocks);
+        let blocks = retried!(catalog.outstanding_blocks(blocks))?;
         on_event(RunEvent::Started {
+            blocks: blocks.left(),
             pairs: left.pairs,
             stages: left.by_stage.iter().sum(),
             by_stage: left.by_stage,
@@ -188,38 +194,43 @@ impl RunStart<'_> {
         let limits = read_limits(options, self.stop);
         input_changes::store_changes(self.project, catalog, self.pairs(), &limits).await?;
         let (fingerprints, selection) = (self.fingerprints, self.pairs());
-        let requeued = async || {
-            catalog
-                .requeue_stale(fingerprints, selection, options.rerun)
-                .await
-        };
-        catalog.retry_while_unavailable(requeued).await?;
+        retried!(catalog.requeue_stale(fingerprints, selection, options.rerun))?;
         let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
-        let ended = catalog
-            .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
-        ended.await?;
-        let among = self.selection.map(|selection| &selection.blocks);
-        let what = (options.rerun, among);
-        plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
+        retried!(catalog.release_due_backoffs(now, longest))?;
+        self.plan_blocks(&limits).await
+    }
+
+    /// Looks at the inputs of blocks, requeues blocks to run again, and ends back-offs that are due.
+    async fn plan_blocks(&self, limits: &ReadLimits) -> Result<(), RunError> {
+        let (catalog, rerun) = (self.catalog, self.options.rerun);
+        let selection = self.selection.map(|selection| &selection.blocks);
+        inputs::store_changes(self.project, catalog, selection, limits).await?;
+        let settings = block_settings(&**self.blocks);
+        retried!(catalog.requeue_stale_blocks(&settings, rerun, selection))?;
+        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
+        retried!(catalog.release_due_blocks(now, longest))?;
+        Ok(())
     }
 
     /// Returns what the tasks of the run share.
     fn context(
         &self,
-        pairs: Arc<dyn StageExecutor>,
+        pairs: Arc<dyn PairStages>,
         fingerprints: FingerprintIds,
+        worker: WorkerId,
         events: mpsc::UnboundedSender<RunEvent>,
     ) -> RunContext {
         let options = self.options;
         RunContext {
             catalog: self.catalog.clone(),
             project: self.project.clone(),
-            executor: pairs,
+            pairs,
             blocks: Arc::clone(self.blocks),
             block_limits: block_limits(options),
             fingerprints,
             clock: self.clock,
             timing: Timing::of_this_build(),
+            worker: watch::Sender::new(worker),
             stop: self.stop.clone(),
             drain: Stop::new(),
             until: options.until,
@@ -241,8 +252,8 @@ impl RunStart<'_> {
         let Some(lock) = guard.exclusive() else {
             return Ok(0);
         };
-        let (dead, now) = (DeadWorker::AllExcept(worker), self.clock.now());
-        let recovered = self.catalog.recover(dead, now).await?;
+        let (catalog, now) = (self.catalog, self.clock.now());
+        let recovered = retried!(catalog.recover(DeadWorker::AllExcept(worker), now))?;
         let (project, poisoned) = (self.project, &recovered.poisoned);
         let limits = read_limits(self.options, self.stop);
         input_changes::store_inputs_of_quarantined(project, self.catalog, poisoned, &limits)

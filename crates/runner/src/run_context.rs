@@ -4,24 +4,24 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::RunEvent;
-use super::policy::{Clock, Timing};
+use super::pair_pipeline::PairStages;
 use super::run_metrics::RunMetrics;
-use super::stage_executor::StageExecutor;
 use super::stop::{Stop, StopLevel};
+use super::timing::{Clock, Timing};
 use mocban_catalog::{Catalog, FingerprintIds, WorkerSettings};
-use mocban_core::domain::{Stage, UnixMillis, WorkerMetrics};
+use mocban_core::domain::{Stage, UnixMillis, WorkerId, WorkerMetrics};
 use mocban_store::Project;
 
 /// What all pairs of a run have in common.
 pub(super) struct RunContext {
     pub(super) catalog: Catalog,
     pub(super) project: Project,
-    pub(super) executor: Arc<dyn StageExecutor>,
+    pub(super) pairs: Arc<dyn PairStages>,
     /// Computes the stages of blocks.
     pub(super) blocks: Arc<dyn BlockStages>,
     /// Largest mesh and largest other file of a block in bytes, with the names of the settings.
@@ -29,6 +29,8 @@ pub(super) struct RunContext {
     pub(super) fingerprints: FingerprintIds,
     pub(super) clock: Clock,
     pub(super) timing: Timing,
+    /// This process as a worker. Another one if its leases have expired.
+    pub(super) worker: watch::Sender<WorkerId>,
     /// Raised from outside, by a signal.
     pub(super) stop: Stop,
     /// Raised by the run itself, such as after too many failures.
@@ -77,6 +79,18 @@ impl RunContext {
     pub(super) fn next_stage(&self, done: Stage) -> Option<Stage> {
         done.next()
             .filter(|next| *next <= self.until && !self.is_draining())
+    }
+
+    /// Returns the id under which this process works now.
+    pub(super) fn worker_id(&self) -> WorkerId {
+        *self.worker.borrow()
+    }
+
+    /// Waits until the leases of this worker have expired.
+    pub(super) async fn expired(&self, worker: WorkerId) {
+        let mut now = self.worker.subscribe();
+        // The sender lives in `self`, so the channel cannot close while this waits.
+        let _ = now.wait_for(|now| *now != worker).await;
     }
 
     /// Returns when a stage that begins now has to be finished.

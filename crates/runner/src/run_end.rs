@@ -8,19 +8,20 @@ use tokio::sync::mpsc;
 use super::error::RunError;
 use super::events::{BlockSummary, RunEvent, RunSummary};
 use super::options::RunOptions;
-use super::policy::Clock;
+use super::retry::retried;
 use super::run_context::RunContext;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::{Stop, StopLevel};
+use super::timing::Clock;
 use mocban_catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
 use mocban_core::domain::Stage;
 
 /// Returns the largest mesh and the largest other file of a block, with the names of the settings.
 pub(super) const fn block_limits(options: &RunOptions) -> [(u64, &'static str); 2] {
     [
-        (options.mesh_limits.max_bytes, "limits.mesh.max_bytes"),
-        (options.image_limits.max_bytes, "limits.image.max_bytes"),
+        (options.limits.mesh.max_bytes, "limits.mesh.max_bytes"),
+        (options.limits.image.max_bytes, "limits.image.max_bytes"),
     ]
 }
 
@@ -37,13 +38,9 @@ pub(super) async fn compute(
     let catalog = &context.catalog;
     let counts = scheduler.run(&mut events, on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
-    let (worker, now) = (scheduler.worker(), context.clock.now());
+    let (worker, now) = (context.worker_id(), context.clock.now());
     let metrics = context.worker_metrics();
-    let ended = catalog.retry_while_unavailable(async || {
-        let ended = catalog.end_worker(worker, now, Some(&metrics));
-        ended.await
-    });
-    let ended = ended.await;
+    let ended = retried!(catalog.end_worker(worker, now, Some(&metrics)));
     // A lost log explains other errors.
     let ended = match ended {
         Err(error) if error.log_loss().is_some() => return Err(error.into()),
@@ -85,17 +82,11 @@ impl RunEnd {
         let pairs = selection.map(|selection| &selection.pairs);
         let blocks = selection.map(|selection| &selection.blocks);
         let (counts, compute_time) = counted;
-        let status = catalog.retry_while_unavailable(async || catalog.status(fingerprints).await);
-        let status = status.await?;
-        let left = catalog.retry_while_unavailable(async || catalog.work_left(until, pairs).await);
-        let left = left.await?;
-        let blocks =
-            catalog.retry_while_unavailable(async || catalog.outstanding_blocks(blocks).await);
         Ok(Self {
             counts,
-            status,
-            left,
-            blocks: blocks.await?,
+            status: retried!(catalog.status(fingerprints))?,
+            left: retried!(catalog.work_left(until, pairs))?,
+            blocks: retried!(catalog.outstanding_blocks(blocks))?,
             compute_time,
         })
     }

@@ -100,9 +100,6 @@ impl RunGuard {
 }
 
 /// Returns whether a process works on the project.
-///
-/// # Errors
-/// Returns an error if a database operation fails.
 pub async fn is_running(
     project: &Project,
     catalog: &Catalog,

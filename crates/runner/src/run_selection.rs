@@ -2,6 +2,7 @@
 
 use super::error::RunError;
 use super::options::NamedWork;
+use super::retry::retried;
 use mocban_catalog::{BlockSelection, Catalog, PairSelection};
 
 /// Some pairs and blocks.
@@ -46,15 +47,10 @@ impl RunSelection {
     }
 
     /// Adds the pairs that were cut from the blocks since the last call, and removes retired ones.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub(super) async fn refresh(&mut self, catalog: &Catalog) -> Result<(), RunError> {
         if !self.blocks.is_empty() {
             let (named, blocks) = (&self.named, &self.blocks);
-            let all = catalog
-                .retry_while_unavailable(async || catalog.with_cut_pairs(named, blocks).await);
-            self.pairs = all.await?;
+            self.pairs = retried!(catalog.with_cut_pairs(named, blocks))?;
         }
         Ok(())
     }

@@ -9,19 +9,20 @@ use tokio::time::{Interval, MissedTickBehavior, interval};
 
 use super::block::slot::{BlockRunCounts, BlockSlot};
 use super::block::task::BlockReport;
-use super::compute_thread::task_result;
+use super::blocking::task_result;
 use super::error::RunError;
 use super::events::RunEvent;
 use super::options::RunOptions;
 use super::pair_task::{PairOutcome, process_pair};
 use super::policy;
 use super::prefetch::{Prefetch, SlotId};
+use super::retry::retried;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::run_selection::RunSelection;
 use super::stop::StopLevel;
 use super::worker_session::{HeartbeatOutcome, WorkerSession};
 use mocban_catalog::{Outstanding, Waiting};
-use mocban_core::domain::{WaitReason, WorkerId};
+use mocban_core::domain::WaitReason;
 
 /// Interval between searches for pairs that other workers released or whose back-off is over.
 const POLL_EVERY: Duration = Duration::from_millis(250);
@@ -65,7 +66,6 @@ pub(super) struct Scheduler {
 impl Scheduler {
     pub(super) fn new(
         context: Arc<RunContext>,
-        worker: WorkerId,
         selection: Option<RunSelection>,
         options: &RunOptions,
     ) -> Self {
@@ -74,7 +74,7 @@ impl Scheduler {
         let pairs = selection.as_ref().map(|selection| selection.pairs.clone());
         let blocks = selection.as_ref().map(|selection| selection.blocks.clone());
         Self {
-            session: WorkerSession::new(worker, now, context.timing.lease_ms()),
+            session: WorkerSession::new(now, context.timing.lease_ms()),
             prefetch: Prefetch::new(Arc::clone(&context), pairs, options),
             block: BlockSlot::new(Arc::clone(&context), blocks, options),
             context,
@@ -88,11 +88,6 @@ impl Scheduler {
             fatal: None,
             reported_stop: StopLevel::Go,
         }
-    }
-
-    /// Returns the id under which this process works now.
-    pub(super) const fn worker(&self) -> WorkerId {
-        self.session.worker()
     }
 
     /// Runs until nothing is left to do or the run is stopped. Returns the run's counts, or the error that ended the
@@ -155,7 +150,7 @@ impl Scheduler {
             return Ok(self.is_idle());
         }
         self.start_pairs().await?;
-        let worker = self.session.worker();
+        let worker = self.context.worker_id();
         if self.block.start(worker, &mut self.prefetch).await? {
             return Ok(false);
         }
@@ -240,9 +235,7 @@ impl Scheduler {
         let until = self.context.until;
         let catalog = &self.context.catalog;
         let selection = self.selection.as_ref().map(|selection| &selection.pairs);
-        let left =
-            catalog.retry_while_unavailable(async || catalog.outstanding(until, selection).await);
-        Ok(left.await?)
+        Ok(retried!(catalog.outstanding(until, selection))?)
     }
 
     fn finish_computing(&mut self, (slot, outcome): (SlotId, PairOutcome)) {
@@ -334,9 +327,7 @@ impl Scheduler {
         if left.next_due.is_some_and(|due| due <= now) {
             let longest = policy::longest_backoff_ms();
             let catalog = &self.context.catalog;
-            catalog
-                .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await)
-                .await?;
+            retried!(catalog.release_due_backoffs(now, longest))?;
         }
         self.block.poll().await?;
         self.prefetch.expect_more();

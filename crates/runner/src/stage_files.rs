@@ -8,7 +8,8 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout_at};
 
-use super::compute_thread::{ComputedStage, run_blocking};
+use super::blocking::run_blocking;
+use super::compute_thread::ComputedStage;
 use super::error::RunError;
 use super::run_context::RunContext;
 use super::stop::StopLevel;

@@ -14,7 +14,7 @@ use mocban_store::{ArtifactError, NewArtifact};
 
 /// What a stage returns.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct StageOutput {
+pub(super) struct PairStageOutput {
     /// The numbers as JSON.
     pub(super) outcome: Value,
     pub(super) files: Vec<NewArtifact>,
@@ -24,7 +24,7 @@ pub(super) struct StageOutput {
 
 /// Why a stage returned nothing.
 #[derive(Debug)]
-pub(super) enum ExecutionError {
+pub(super) enum PairStageError {
     /// The result of an earlier stage is missing, or belongs to other inputs. The pair runs again from that stage on.
     RerunFrom(Stage),
     /// An object store failed, which is not the fault of the pair.
@@ -37,7 +37,7 @@ pub(super) enum ExecutionError {
     },
 }
 
-impl ExecutionError {
+impl PairStageError {
     /// A failure that a retry does not change.
     pub(super) fn failed(class: FailureClass, message: impl Into<String>) -> Self {
         Self::Failed {
@@ -47,7 +47,7 @@ impl ExecutionError {
     }
 }
 
-impl StageOutput {
+impl PairStageOutput {
     /// Numbers without files.
     pub(super) const fn numbers(outcome: Value) -> Self {
         Self {

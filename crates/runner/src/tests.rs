@@ -1,11 +1,11 @@
-//! Runs with a fake executor: pairs that fail, hang, panic, or are stopped.
+//! Runs with fake stages: pairs that fail, hang, panic, or are stopped.
 
 mod block_kills;
 mod block_limits;
 mod blocks;
 mod cancelled;
 mod fake_blocks;
-mod fake_executor;
+mod fake_pairs;
 mod gate;
 mod prefetch;
 pub(super) mod values;
@@ -17,9 +17,9 @@ use std::time::Duration;
 use serde_json::json;
 
 use fake_blocks::FakeBlocks;
-use fake_executor::FakeExecutor;
+use fake_pairs::FakePairs;
 
-use super::run::{Executors, run_with};
+use super::run::{RunStages, run_with};
 use super::{
     BlockStages as _, NamedWork, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel,
 };
@@ -29,11 +29,11 @@ use mocban_catalog::{
 use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage};
 use mocban_store::Project;
 
-/// A project whose pairs only the fake executor can run, and the events of all runs.
+/// A project whose pairs only the fake stages can run, and the events of all runs.
 struct RunFixture {
     project: Project,
     catalog: Catalog,
-    executor: Arc<FakeExecutor>,
+    pairs: Arc<FakePairs>,
     blocks: Arc<FakeBlocks>,
     stop: Stop,
     events: Mutex<Vec<RunEvent>>,
@@ -74,7 +74,7 @@ impl RunFixture {
         Self {
             project,
             catalog,
-            executor: Arc::default(),
+            pairs: Arc::default(),
             blocks: Arc::default(),
             stop: Stop::new(),
             events: Mutex::default(),
@@ -83,8 +83,8 @@ impl RunFixture {
     }
 
     async fn try_run(&self, options: &RunOptions) -> Result<RunSummary, RunError> {
-        let executors = Executors {
-            pairs: Arc::clone(&self.executor) as _,
+        let stages = RunStages {
+            pairs: Arc::clone(&self.pairs) as _,
             blocks: Arc::clone(&self.blocks) as _,
         };
         let record = |event| self.events.lock().expect("an unpoisoned lock").push(event);
@@ -93,7 +93,7 @@ impl RunFixture {
             project,
             catalog,
             &fingerprints(),
-            executors,
+            stages,
             options,
             &self.stop,
             record,
@@ -126,10 +126,10 @@ async fn every_pair_is_done_and_each_stage_is_computed_once() {
     );
     for pair in ["a", "b", "c", "d", "e"] {
         for stage in Stage::ALL {
-            assert_eq!(fixture.executor.count(pair, stage), 1);
+            assert_eq!(fixture.pairs.count(pair, stage), 1);
         }
     }
-    assert!(fixture.executor.most.load(Ordering::SeqCst) <= 2);
+    assert!(fixture.pairs.most.load(Ordering::SeqCst) <= 2);
     let again = fixture.run(&options(2)).await;
     assert_eq!(
         (
@@ -170,8 +170,8 @@ async fn a_bad_pair_does_not_stop_the_others_and_shows_in_the_summary() {
         ..options(2)
     };
     assert_eq!(fixture.run(&failed).await.failed, 2);
-    assert_eq!(fixture.executor.count("panics_1", Stage::Fit), 1);
-    assert_eq!(fixture.executor.count("panics_1", Stage::Depth), 2);
+    assert_eq!(fixture.pairs.count("panics_1", Stage::Fit), 1);
+    assert_eq!(fixture.pairs.count("panics_1", Stage::Depth), 2);
 }
 
 #[tokio::test]
@@ -182,7 +182,7 @@ async fn a_pair_that_panicked_runs_again_when_its_mesh_changes() {
         std::fs::write(&mesh, content).expect("written");
         fixture.run(&options(1)).await;
         assert_eq!(
-            fixture.executor.count("bursts_1", Stage::Fit),
+            fixture.pairs.count("bursts_1", Stage::Fit),
             tries,
             "{content}"
         );
@@ -194,7 +194,7 @@ async fn a_transient_failure_is_retried_in_the_same_run() {
     let fixture = RunFixture::new(&["flaky_1"]).await;
     let summary = fixture.run(&options(1)).await;
     assert_eq!((summary.done, summary.failed), (1, 0));
-    assert_eq!(fixture.executor.count("flaky_1", Stage::Fit), 2);
+    assert_eq!(fixture.pairs.count("flaky_1", Stage::Fit), 2);
     let detail = fixture
         .catalog
         .pair(&name("flaky_1"))
@@ -219,17 +219,17 @@ async fn a_stage_that_times_out_is_retried_exclusively_and_then_quarantined() {
     };
     let summary = fixture.run(&limited).await;
     assert_eq!((summary.done, summary.failed), (1, 1));
-    assert_eq!(fixture.executor.count("hangs_1", Stage::Fit), 2);
+    assert_eq!(fixture.pairs.count("hangs_1", Stage::Fit), 2);
     let failures = fixture.catalog.failures(9).await.expect("a read");
     assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
-    fixture.executor.open();
+    fixture.pairs.open();
 }
 
 #[tokio::test]
 async fn an_earlier_stage_runs_again_when_its_result_is_missing() {
     let fixture = RunFixture::new(&["loses_1"]).await;
     assert_eq!(fixture.run(&options(1)).await.done, 1);
-    let counts = Stage::ALL.map(|stage| fixture.executor.count("loses_1", stage));
+    let counts = Stage::ALL.map(|stage| fixture.pairs.count("loses_1", stage));
     assert_eq!(counts, [1, 2, 2, 2]);
     let counters = fixture.catalog.counters().await.expect("counters");
     assert_eq!(
@@ -243,11 +243,11 @@ async fn a_drain_finishes_the_stage_in_progress_and_does_not_count_the_attempt()
     let fixture = RunFixture::new(&["wait_1", "wait_2"]).await;
     let options = options(1);
     let drain = async {
-        while fixture.executor.count("wait_1", Stage::Fit) == 0 {
+        while fixture.pairs.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
         assert_eq!(fixture.stop.escalate(), StopLevel::Drain);
-        fixture.executor.open();
+        fixture.pairs.open();
     };
     let (summary, ()) = tokio::join!(fixture.run(&options), drain);
     assert_eq!(
@@ -261,7 +261,7 @@ async fn a_drain_finishes_the_stage_in_progress_and_does_not_count_the_attempt()
         (JobStatus::Ready, 0)
     );
     assert_eq!(detail.results.next_stage, Some(Stage::Depth));
-    assert_eq!(fixture.executor.count("wait_2", Stage::Fit), 0);
+    assert_eq!(fixture.pairs.count("wait_2", Stage::Fit), 0);
 }
 
 #[tokio::test]
@@ -269,7 +269,7 @@ async fn an_immediate_stop_leaves_every_pair_resumable() {
     let fixture = RunFixture::new(&["wait_1"]).await;
     let options = options(1);
     let stop = async {
-        while fixture.executor.count("wait_1", Stage::Fit) == 0 {
+        while fixture.pairs.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
         fixture.stop.escalate();
@@ -283,7 +283,7 @@ async fn an_immediate_stop_leaves_every_pair_resumable() {
         (detail.results.status, detail.attempt, detail.crashes),
         (JobStatus::Ready, 0, 0)
     );
-    fixture.executor.open();
+    fixture.pairs.open();
 }
 
 #[tokio::test]
@@ -371,7 +371,7 @@ async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
         },
     );
     let others = async {
-        while fixture.executor.count("wait_1", Stage::Fit) == 0 {
+        while fixture.pairs.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
         let refused = fixture.try_run(&one).await;
@@ -382,7 +382,7 @@ async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
             while fixture.status("f").await != JobStatus::Done {
                 tokio::task::yield_now().await;
             }
-            fixture.executor.open();
+            fixture.pairs.open();
         };
         tokio::join!(fixture.run(&joined), open).0
     };
@@ -436,5 +436,5 @@ async fn a_run_up_to_a_stage_does_not_wait_for_the_retry_of_a_later_one() {
     assert_eq!(again.status("breaks_1").await, JobStatus::Backoff);
     // The next run completes what the stopped one left.
     assert_eq!(again.run(&options(1)).await.done, 2);
-    assert_eq!(again.executor.count("breaks_1", Stage::Depth), 2);
+    assert_eq!(again.pairs.count("breaks_1", Stage::Depth), 2);
 }

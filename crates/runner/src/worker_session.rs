@@ -6,16 +6,16 @@ use super::error::RunError;
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::liveness::Liveness;
+use super::retry::retried;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use mocban_catalog::{CatalogError, DeadWorker, WorkerInfo};
-use mocban_core::domain::{UnixMillis, WorkerId};
+use mocban_core::domain::UnixMillis;
 use mocban_system::platform;
 
-/// The worker that this process is registered as.
+/// What this process has seen as a worker.
 #[derive(Debug)]
 pub(super) struct WorkerSession {
-    worker: WorkerId,
     /// When the last heartbeat was stored, by the run's clock.
     last_heartbeat: UnixMillis,
     /// When overdue leases were last searched for.
@@ -36,18 +36,12 @@ pub(super) enum HeartbeatOutcome {
 
 impl WorkerSession {
     /// A worker that has just been registered.
-    pub(super) const fn new(worker: WorkerId, now: UnixMillis, lease_ms: i64) -> Self {
+    pub(super) const fn new(now: UnixMillis, lease_ms: i64) -> Self {
         Self {
-            worker,
             last_heartbeat: now,
             overdue_checked: 0,
             liveness: Liveness::new(lease_ms),
         }
-    }
-
-    /// Returns the worker's current id.
-    pub(super) const fn worker(&self) -> WorkerId {
-        self.worker
     }
 
     /// Stores a heartbeat, with the counts and times of the run.
@@ -56,7 +50,7 @@ impl WorkerSession {
         let alive_since = context.alive_since();
         let catalog = &context.catalog;
         let metrics = context.worker_metrics();
-        let stored = catalog.heartbeat(self.worker, now, alive_since, Some(&metrics));
+        let stored = catalog.heartbeat(context.worker_id(), now, alive_since, Some(&metrics));
         match stored.await {
             Ok(true) => {
                 self.last_heartbeat = now;
@@ -75,40 +69,30 @@ impl WorkerSession {
     }
 
     /// Registers the process as a new worker after its leases expired. Pairs that the old worker still holds become
-    /// ready again. Stages that are being computed under the old leases cannot be stored.
+    /// ready again, and stages that are being computed under the old leases are cancelled.
     pub(super) async fn register_again(&mut self, context: &RunContext) -> Result<(), RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
-        let expired = self.worker;
-        catalog
-            // The counts go on in the row of the new worker.
-            .retry_while_unavailable(async || catalog.end_worker(expired, now, None).await)
-            .await?;
+        let expired = context.worker_id();
+        // The counts go on in the row of the new worker.
+        retried!(catalog.end_worker(expired, now, None))?;
         let settings = context.worker_settings();
-        self.worker = catalog
-            .retry_while_unavailable(async || {
-                catalog
-                    .register_worker(this_process(), settings.clone(), now)
-                    .await
-            })
-            .await?;
+        let worker = retried!(catalog.register_worker(this_process(), settings.clone(), now))?;
+        context.worker.send_replace(worker);
         self.last_heartbeat = now;
         let dead = DeadWorker::Known(expired);
-        catalog
-            .retry_while_unavailable(async || catalog.recover(dead.clone(), now).await)
-            .await?;
+        retried!(catalog.recover(dead.clone(), now))?;
         Ok(())
     }
 
     /// Keeps the lock that shows that this process is connected. Recovers the leases of dead workers, and leases of other
     /// workers that are long past their deadline. Returns how many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
-        let (catalog, me) = (&context.catalog, self.worker);
+        let (catalog, me) = (&context.catalog, context.worker_id());
         if let Err(error) = catalog.keep_worker_lock(me).await {
             // The lock is only a hint for others. Whether the run can go on is decided by the heartbeat.
             tracing::debug!(%error, "the worker's lock is not held");
         }
-        let holders = catalog.retry_while_unavailable(async || catalog.lease_holders().await);
-        let holders = holders.await?;
+        let holders = retried!(catalog.lease_holders())?;
         // The time after the reply, which may have been waited for.
         let (now, replied) = (context.clock.now(), Instant::now());
         let dead = self.liveness.observe(&holders, me, now);
@@ -118,9 +102,7 @@ impl WorkerSession {
                 workers: dead,
                 valid_until: replied + context.timing.recover_every,
             };
-            let recovered =
-                catalog.retry_while_unavailable(async || catalog.recover(dead.clone(), now).await);
-            let recovered = recovered.await?;
+            let recovered = retried!(catalog.recover(dead.clone(), now))?;
             ready += recovered.ready;
             poisoned.extend(recovered.poisoned);
         }
@@ -133,9 +115,7 @@ impl WorkerSession {
         if is_due && is_steady && holders.iter().any(|holder| holder.worker != me) {
             self.overdue_checked = now;
             let margin = context.timing.deadline_margin.as_millis() as i64;
-            let overdue = catalog
-                .retry_while_unavailable(async || catalog.recover_overdue(me, margin, now).await);
-            let overdue = overdue.await?;
+            let overdue = retried!(catalog.recover_overdue(me, margin, now))?;
             ready += overdue.ready;
             poisoned.extend(overdue.poisoned);
         }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::input_error::InputError;
 use super::open_file::file_kind;
 use super::remote::BucketError;
+use mocban_core::domain::Explained;
 
 /// Why an artifact could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -47,16 +48,12 @@ pub enum ArtifactError {
     },
 }
 
+impl Explained for ArtifactError {}
+
 impl ArtifactError {
     /// Returns whether an object store did not answer, so that the same request may succeed later.
     pub const fn is_unavailable(&self) -> bool {
         matches!(self, Self::Bucket(BucketError::Unavailable { .. }))
-    }
-
-    /// Returns whether the error shows that the content is gone, so that only computing it again helps. After any
-    /// other error, the file may be sound.
-    pub const fn is_loss(&self) -> bool {
-        matches!(self, Self::Missing(_) | Self::Changed(_))
     }
 
     /// Returns whether other artifacts may be sound and readable. After any other error, none can be read.

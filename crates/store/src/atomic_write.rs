@@ -15,9 +15,6 @@ const NEW: &str = "new";
 /// Writes a file atomically: an existing file is replaced only after the new content is on the disk. If two processes
 /// write the same file, the complete file of the last process stays. If `path` is not a regular file, such as a pipe or
 /// a terminal, writes to it directly.
-///
-/// # Errors
-/// Returns an error if the file cannot be written.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A symbolic link stays; its target is replaced.
     let path = match canonicalize(path) {

@@ -14,6 +14,7 @@ use std::time::{Duration, SystemTime};
 
 use super::Project;
 use super::artifact_error::ArtifactError;
+use super::create_folders::create_folders;
 use super::referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 use super::remote::{Bucket, PACKS, pack_key, pack_number};
 use mocban_core::domain::{ARTIFACTS, ArtifactRef};
@@ -25,9 +26,6 @@ impl ReferencedArtifacts {
     /// Removes unreferenced files and packs that are older than `age` by the clock of their file system or store. Calls
     /// `each` for every unreferenced one, with whether it was removed. With `is_idle`, does the same with objects that
     /// are named by their content; otherwise, these are not listed.
-    ///
-    /// # Errors
-    /// Returns an error if a folder cannot be listed or a request fails.
     pub fn collect(
         mut self,
         project: &Project,
@@ -49,7 +47,7 @@ impl ReferencedArtifacts {
             path: aside.clone(),
             source,
         };
-        std::fs::create_dir_all(&aside).map_err(failed)?;
+        create_folders(&aside).map_err(failed)?;
         let marker = tempfile::NamedTempFile::new_in(&aside).map_err(failed)?;
         let meta = marker.as_file().metadata().map_err(failed)?;
         let now = meta.modified().map_err(failed)?;

@@ -4,7 +4,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::remote::BucketError;
-use mocban_core::domain::FailureClass;
+use mocban_core::domain::{Explained, FailureClass};
 use mocban_system::platform::{is_out_of_files, is_system_out_of_files};
 
 /// Why an input file could not be read.
@@ -54,6 +54,8 @@ pub enum InputError {
         source: std::io::Error,
     },
 }
+
+impl Explained for InputError {}
 
 impl From<BucketError> for InputError {
     fn from(error: BucketError) -> Self {

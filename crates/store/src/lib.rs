@@ -9,6 +9,8 @@
 //! - `remote/`: `client.rs`, `request.rs` and `bucket.rs` send requests, `cache.rs` keeps copies of inputs, `listing.rs`
 //!   notices changes
 //!
+//! Every call fails if the disk or the object store fails. `# Errors` names other reasons, and what an error leaves behind.
+//!
 //! **Invariant:** a file gets its name when it is whole and on the disk, and nothing that another project may use is
 //! removed. "Cannot be read" is an error, not an absent file.
 
@@ -18,6 +20,7 @@ mod artifacts;
 mod artifacts_place;
 mod atomic_write;
 mod collect;
+mod create_folders;
 mod input_error;
 mod input_place;
 mod inputs;
@@ -38,13 +41,15 @@ mod target_lock;
 pub use artifact_error::ArtifactError;
 pub use artifacts::NewArtifact;
 pub use atomic_write::{place_new_file, rename_into_place, write_atomic, write_synced};
+pub use create_folders::create_folders;
 pub use input_error::InputError;
 pub use input_place::Input;
 pub use inputs::{InputFile, InputReader, hash_input, open_input, read_input, stat_input};
 pub use lock::{LockError, RunLock};
+pub use mocban_core::domain::CATALOG_FILE;
 pub use open_file::{open_regular, read_file_or_pipe};
 pub use place_owner::PlaceError;
-pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
+pub use project::{Project, SETTINGS_FILE, StoreError};
 pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 pub use remote::{BucketError, ProjectStorage, StorageError, StorageOptions};
 pub use replacement_folder::{Leftover, ReplaceError, ReplacementFolder};

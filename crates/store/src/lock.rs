@@ -106,17 +106,11 @@ impl RunLock {
 
     /// Writes this run's settings. Joining processes compare them with their own. Call this function only while the
     /// lock is exclusive.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be written.
     pub fn set_settings(&mut self, settings: &str) -> Result<(), LockError> {
         replace_text(&mut self.members, settings).map_err(io(&self.path))
     }
 
     /// Returns the working processes' settings, or an empty text if none were written.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be read.
     pub fn settings(&mut self) -> Result<String, LockError> {
         let mut text = String::new();
         self.members
@@ -127,9 +121,6 @@ impl RunLock {
     }
 
     /// Lets other processes join from now on.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be locked.
     pub fn downgrade(&mut self) -> Result<(), LockError> {
         if self.is_exclusive {
             unlock(&self.members).map_err(io(&self.path))?;

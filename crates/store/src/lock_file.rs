@@ -29,9 +29,6 @@ pub(super) enum LockAttempt {
 
 impl LockFile {
     /// Tries to lock a file, which is created if it does not exist. Writes the pid of this process to the file.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be opened or locked.
     pub(super) fn create(path: &Path) -> Result<LockAttempt> {
         let mut options = OpenOptions::new();
         options.create(true).truncate(false).read(true).write(true);
@@ -55,9 +52,6 @@ impl LockFile {
     }
 
     /// Removes the file and ends the lock. A process that has already opened the file notices the removal.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be removed.
     pub(super) fn remove(self) -> Result<()> {
         std::fs::remove_file(&self.path)
     }

@@ -9,11 +9,10 @@ use super::atomic_write::{write_atomic, write_synced};
 use super::open_file::read_file_or_pipe;
 use super::owner_record::{MAX_BYTES, OWNER, OwnerRecord, OwnerTraces, Standing};
 use super::parent_folder::sync_folder;
-use super::project::CATALOG_FILE;
 use super::referenced::{ReferencedArtifacts, UnreferencedKind};
 use super::remote::{Bucket, BucketError, PACKS};
 use super::{Project, ProjectStorage, StagingFolder};
-use mocban_core::domain::{ARTIFACTS, ArtifactRef, CatalogIdentity};
+use mocban_core::domain::{ARTIFACTS, ArtifactRef, CATALOG_FILE, CatalogIdentity};
 use mocban_system::platform::{generation, stat};
 
 /// Why a catalog may not use a place of artifacts.

@@ -3,13 +3,12 @@
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use super::create_folders::create_folders;
 use super::parent_folder::{parent_folder, sync_folder};
 use super::remote::ProjectStorage;
-use mocban_core::domain::ARTIFACTS;
+use mocban_core::domain::{ARTIFACTS, CATALOG_FILE, ErrorCode, Explained};
 use mocban_system::platform::{FileId, stat, with_slashes};
 
-/// Name of the catalog file in a project.
-pub const CATALOG_FILE: &str = "catalog.sqlite";
 /// Name of the settings file in a project.
 pub const SETTINGS_FILE: &str = "mocban.toml";
 
@@ -43,6 +42,16 @@ pub enum StoreError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl Explained for StoreError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::NoProject(_) => ErrorCode::NoProject,
+            Self::NotAFolder(_) | Self::NotUtf8(_) => ErrorCode::Usage,
+            Self::Io { .. } => ErrorCode::Unexpected,
+        }
+    }
 }
 
 impl StoreError {
@@ -97,9 +106,6 @@ impl Project {
     }
 
     /// Returns whether the directory is still at its path. If not, nothing may be created at that path.
-    ///
-    /// # Errors
-    /// Returns an error if the disk fails.
     pub(super) fn is_in_place(&self) -> std::io::Result<bool> {
         let Some(identity) = self.identity else {
             return Ok(true);
@@ -112,12 +118,9 @@ impl Project {
     }
 
     /// Creates the project directory durably if it is missing. `Catalog::create` creates the catalog.
-    ///
-    /// # Errors
-    /// Returns an error if the directory cannot be created.
     pub fn create(dir: &Path) -> Result<Self, StoreError> {
         let missing: Vec<_> = dir.ancestors().take_while(|dir| !dir.exists()).collect();
-        std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;
+        create_folders(dir).map_err(StoreError::io(dir))?;
         for created in missing {
             let folder = parent_folder(created);
             sync_folder(&folder).map_err(StoreError::io(&folder))?;

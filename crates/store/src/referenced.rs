@@ -68,9 +68,6 @@ impl ReferencedArtifacts {
 
     /// Calls `each` for every unreferenced file in the artifacts folder. Call this only while no process writes
     /// artifacts, because a new file exists before the row that names it.
-    ///
-    /// # Errors
-    /// Returns an error if a folder cannot be listed.
     pub fn for_each_unreferenced(
         mut self,
         project: &Project,

@@ -5,9 +5,11 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::create_folders::create_folders;
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
 use super::target_lock::{TargetLock, TargetLockError};
+use mocban_core::domain::explained_by_cause;
 use mocban_system::platform::{canonicalize, exchange, rename, sync_tree};
 
 /// The new content in the staging folder.
@@ -63,6 +65,8 @@ pub enum ReplaceError {
     },
 }
 
+explained_by_cause! { ReplaceError: Lock }
+
 /// A staging folder that `ReplacementFolder::finish` could not remove, with the reason.
 pub type Leftover = Option<(PathBuf, io::Error)>;
 
@@ -73,7 +77,7 @@ impl ReplacementFolder {
     /// Returns an error if another process writes the target, or the folder cannot be created.
     pub fn begin(target: &Path) -> Result<Self, ReplaceError> {
         let (parent, name) = place(target)?;
-        fs::create_dir_all(&parent).map_err(at(&parent))?;
+        create_folders(&parent).map_err(at(&parent))?;
         let target = parent.join(name);
         let lock = TargetLock::acquire(&target)?;
         for stale in StagingFolder::stale(&target) {

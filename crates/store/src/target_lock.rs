@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::lock_file::{LockAttempt, LockFile};
 use super::staging::hidden_sibling;
+use mocban_core::domain::{ErrorCode, Explained};
 
 /// The right to replace an output. It ends when the value is dropped or the process dies.
 #[derive(Debug)]
@@ -34,6 +35,15 @@ pub enum TargetLockError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl Explained for TargetLockError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::InUse { .. } => ErrorCode::OutputInUse,
+            Self::Io { .. } => ErrorCode::Unexpected,
+        }
+    }
 }
 
 impl TargetLock {

@@ -1,9 +1,13 @@
-//! What differs between operating systems, and the points at which tests make a process die.
+//! What differs between operating systems and computers, and the points at which tests make a process die.
 //!
 //! - [`platform`]: identity of files, syncing, memory of the process, signals, time during which the process runs
 //! - [`failpoint`]: named points of a run
+//! - [`time_text`]: times and durations as text, in the time zone of the computer
+//!
+//! Every call fails if the operating system refuses it. `# Errors` names other reasons.
 //!
 //! **Invariant:** no other crate names an operating system in production code, apart from `cfg` of Linux.
 
 pub mod failpoint;
 pub mod platform;
+pub mod time_text;

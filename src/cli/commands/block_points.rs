@@ -7,7 +7,8 @@ use mocban_catalog::{Catalog, ControlPointsChange};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, replaced_file};
 use mocban_pages::view::{CorrectionStore, PointsSaved};
-use mocban_project::error_text::describe;
+use mocban_project::error::TaskStopped;
+use mocban_project::{ProjectError, ProjectResult};
 use mocban_store::Project;
 
 /// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays
@@ -31,16 +32,16 @@ impl BlockPoints {
     /// not `Send`.
     async fn on_thread<T: Send + 'static>(
         &self,
-        work: impl FnOnce() -> anyhow::Result<T> + Send + 'static,
+        work: impl FnOnce() -> ProjectResult<T> + Send + 'static,
     ) -> Result<T, String> {
         let done = tokio::task::spawn_blocking(work).await;
-        let done = done.map_err(anyhow::Error::from).flatten();
-        done.map_err(|error| describe(&error, &self.context.dir()))
+        let done = done.map_err(|error| TaskStopped(error).into()).flatten();
+        done.map_err(|error| error.text(&self.context.location.dir))
     }
 
-    async fn read_block(&self) -> anyhow::Result<BlockCorrection> {
-        let (project, catalog) = self.context.open_read_only().await?;
-        let limits = self.context.settings()?.config.limits.image;
+    async fn read_block(&self) -> ProjectResult<BlockCorrection> {
+        let (project, catalog) = self.context.location.open_read_only().await?;
+        let limits = self.context.location.settings()?.config.limits.image;
         let read = BlockCorrection::read(&catalog, &project, &self.block, limits).await;
         catalog.close().await;
         Ok(read?)
@@ -50,8 +51,8 @@ impl BlockPoints {
         &self,
         read: Option<ContentHash>,
         points: Option<&ControlPoints>,
-    ) -> anyhow::Result<PointsSaved> {
-        let (project, catalog) = self.context.open().await?;
+    ) -> ProjectResult<PointsSaved> {
+        let (project, catalog) = self.context.location.open().await?;
         let stored = self.store_in(&catalog, &project, read, points).await;
         catalog.close().await;
         stored
@@ -63,7 +64,7 @@ impl BlockPoints {
         project: &Project,
         read: Option<ContentHash>,
         points: Option<&ControlPoints>,
-    ) -> anyhow::Result<PointsSaved> {
+    ) -> ProjectResult<PointsSaved> {
         let block = &self.block;
         if let Some(points) = points
             && let Some(path) = replaced_file(catalog, project, block, points).await?
@@ -73,7 +74,10 @@ impl BlockPoints {
         match catalog.set_control_points(block, read, points).await? {
             ControlPointsChange::Stored => Ok(PointsSaved::Saved),
             ControlPointsChange::Outdated => Ok(PointsSaved::OthersSaved),
-            ControlPointsChange::NoBlock => anyhow::bail!("block {block} was removed meanwhile"),
+            ControlPointsChange::NoBlock => {
+                let text = format!("block {block} was removed meanwhile");
+                Err(ProjectError::unexpected(text))
+            }
         }
     }
 }

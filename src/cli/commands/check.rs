@@ -1,27 +1,18 @@
 //! `check`: checks the consistency of a project, and repairs it on request.
 
-use std::fs::File;
-use std::io;
-use std::path::Path;
 use std::time::Duration;
 
-use anyhow::Context as _;
 use clap::Args;
 
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::table::{columns, count, pairs_and_blocks};
-use mocban_catalog::{Catalog, CatalogError};
+use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::one_line;
-use mocban_project::error_text;
-use mocban_project::exit::ExitCode;
-use mocban_project::location::now;
-use mocban_runner::check::{
-    CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
-};
-use mocban_runner::{self as runner, RunError};
-use mocban_store::{CATALOG_FILE, LockError, Project, RunLock};
+use mocban_project::check::check as check_project;
+use mocban_project::error::without_error_numbers;
+use mocban_project::{ExitCode, ProjectResult};
+use mocban_runner::check::{CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -53,25 +44,16 @@ pub(crate) struct CheckArgs {
 /// Findings of each kind, and inputs, that are listed.
 const MAX_LISTED: usize = 5;
 
-pub(crate) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let busy = Busy::start(context, "checking the catalog and the files");
-    let mut checked = once(&args, context).await;
-    if is_database_damage(&checked) {
-        // SQLite reports some disk read errors as damage. Check again, and then test whether the file can be read.
-        checked = once(&args, context).await;
-    }
-    drop(busy);
-    let path = context.dir().join(CATALOG_FILE);
-    if is_database_damage(&checked) && !is_readable(&path) {
-        return Err(CatalogError::Unread(path).into());
-    }
-    let summary = match checked {
-        Ok(summary) => summary,
-        Err(error) => return report_unreadable(error, context),
+pub(crate) async fn check(args: CheckArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let options = CheckOptions {
+        quick: args.quick,
+        repair: args.repair,
+        accept_missing: args.accept_missing,
+        take_over: args.take_over,
+        collect: args.collect.map(|hours| Duration::from_secs(hours * 3600)),
+        ..CheckOptions::default()
     };
-    if let Some(reason) = &summary.foreign_artifacts {
-        context.warn(reason);
-    }
+    let summary = check_project(options, &context.location, &Terminal::new(context)).await?;
     context.print(&summary, || text(&summary, &args, context.stdout))?;
     for command in next_steps(&summary, args.repair) {
         context.next(command);
@@ -81,90 +63,6 @@ pub(crate) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
     } else {
         ExitCode::Done
     })
-}
-
-/// Checks the project. Without `--repair`, nothing is changed and a run may be active. A repair holds the run's lock,
-/// and fails if another process works on the project.
-async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummary> {
-    // What removes files or names an owner needs a project that can be written to, and says so at once.
-    let writes = args.repair || args.take_over || args.collect.is_some();
-    let (project, catalog) = if writes {
-        context.open().await?
-    } else {
-        context.open_read_only().await?
-    };
-    // The lock of a repair excludes other processes, except on a server.
-    let asks = !args.repair || catalog.is_shared();
-    let running = asks && runner::is_running(&project, &catalog, now()).await?;
-    let lock = if args.repair {
-        exclusive_lock(&project, &catalog, running).context("nothing was repaired")?
-    } else {
-        None
-    };
-    let options = CheckOptions {
-        quick: args.quick,
-        repair: args.repair,
-        accept_missing: args.accept_missing,
-        take_over: args.take_over,
-        in_use: !args.repair && running,
-        now: now(),
-        collect: args.collect.map(|hours| Duration::from_secs(hours * 3600)),
-    };
-    let summary = check_project(&project, &catalog, options).await;
-    catalog.close().await;
-    drop(lock);
-    Ok(summary?)
-}
-
-/// Returns whether the database itself is reported as damaged.
-fn is_database_damage(checked: &anyhow::Result<CheckSummary>) -> bool {
-    match checked {
-        Ok(summary) => summary.damage.contains_key(&Kind::Database) && summary.left() > 0,
-        Err(error) => error_text::catalog_error(error).is_some_and(error_text::is_damaged_file),
-    }
-}
-
-/// Returns whether every byte of a file can be read.
-fn is_readable(path: &Path) -> bool {
-    let read = File::open(path).and_then(|mut file| io::copy(&mut file, &mut io::sink()));
-    read.is_ok()
-}
-
-/// Takes the run's lock if no other process works on the project. A shared catalog has no such lock.
-fn exclusive_lock(
-    project: &Project,
-    catalog: &Catalog,
-    running: bool,
-) -> Result<Option<RunLock>, RunError> {
-    let in_use = || RunError::from(LockError::InUse { pid: None });
-    if catalog.is_shared() {
-        return if running { Err(in_use()) } else { Ok(None) };
-    }
-    let lock = RunLock::acquire(project, false)?;
-    if lock.is_exclusive() {
-        Ok(Some(lock))
-    } else {
-        Err(in_use())
-    }
-}
-
-/// Reports a catalog that cannot be opened as damage.
-fn report_unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<ExitCode> {
-    let of_catalog = error_text::catalog_error(&error);
-    let Some(found) = of_catalog.filter(|error| error_text::is_damage(error)) else {
-        return Err(error);
-    };
-    let dir = context.dir();
-    let text = match error_text::explain_catalog(found, &dir) {
-        Some(text) if !error_text::is_damaged_file(found) => text,
-        None if !error_text::is_damaged_file(found) => found.to_string(),
-        Some(_) | None => format!(
-            "{} is too damaged to be read; replace it with a backup, then run `check --repair`",
-            error_text::catalog_path(&dir)
-        ),
-    };
-    context.error(&text, ExitCode::Damaged);
-    Ok(ExitCode::Damaged)
 }
 
 fn next_steps(summary: &CheckSummary, repaired: bool) -> Vec<&'static str> {
@@ -189,7 +87,9 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
         };
         let head = format!("{}: {}", kind.heading(), found.found);
         lines.push(palette.paint(tone, head));
-        lines.push(listed(&found.first, found.found));
+        let is_one_reason = *kind == Kind::FileMissing && summary.lacks_most_files();
+        let limit = if is_one_reason { 1 } else { MAX_LISTED };
+        lines.push(listed(&found.first, found.found, limit));
     }
     lines.extend(missing_files(summary));
     if summary.damage.contains_key(&Kind::FileUnreadable) {
@@ -217,7 +117,7 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
     lines.extend(unreferenced(summary.unreferenced.as_ref(), args));
     lines.retain(|line| !line.is_empty());
     let lines = lines.iter().map(|line| line.trim_end());
-    error_text::without_error_numbers(&lines.collect::<Vec<_>>().join("\n")) + "\n"
+    without_error_numbers(&lines.collect::<Vec<_>>().join("\n")) + "\n"
 }
 
 /// Says what to do if most result files are missing and their results stay.
@@ -274,14 +174,14 @@ fn headline(summary: &CheckSummary, palette: Palette) -> String {
 }
 
 /// Formats the first findings of a kind, one line each.
-fn listed(first: &[Finding], found: u64) -> String {
+fn listed(first: &[Finding], found: u64, limit: usize) -> String {
     let row = |finding: &Finding| match (&finding.pair, finding.stage) {
         (Some(pair), Some(stage)) => {
             vec![format!("  {pair}"), stage.to_string(), finding.what.clone()]
         }
         _ => vec![format!("  {}", finding.what)],
     };
-    let mut rows: Vec<_> = first.iter().take(MAX_LISTED).map(row).collect();
+    let mut rows: Vec<_> = first.iter().take(limit).map(row).collect();
     let more = found.saturating_sub(rows.len() as u64);
     if more > 0 {
         rows.push(vec![format!("  and {more} more")]);

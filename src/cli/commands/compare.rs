@@ -1,9 +1,9 @@
 //! `report --compare`: the tables of two projects side by side.
 
 use crate::cli::output::table::columns;
-use mocban_report::number_format::NumberStyle::{self, Score, Share};
-use mocban_report::number_format::{format_number, format_share};
 use mocban_report::{MetricRow, Report};
+use mocban_results::number_format::NumberStyle::{self, Score, Share};
+use mocban_results::number_format::{format_number, format_share};
 
 /// Formats the numbers of both projects and their differences, one line per metric and number.
 ///

@@ -6,7 +6,7 @@ use serde_json::{Map, json};
 use crate::cli::output::context::Context;
 use crate::cli::output::screen::{Palette, Tone};
 use mocban_config::{Origin, Setting, explanation};
-use mocban_project::exit::ExitCode;
+use mocban_project::{ExitCode, ProjectResult};
 
 /// Commands on settings.
 #[derive(Debug, Subcommand)]
@@ -26,9 +26,9 @@ pub(crate) struct ConfigShowArgs {
     pub(crate) explain: bool,
 }
 
-pub(crate) fn config(command: &ConfigCommand, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) fn config(command: &ConfigCommand, context: &Context) -> ProjectResult<ExitCode> {
     let ConfigCommand::Show(args) = command;
-    let settings = context.settings()?.tree.settings();
+    let settings = context.location.settings()?.tree.settings();
     context.print(&as_json(&settings), || {
         as_toml(&settings, args, context.stdout)
     })?;

@@ -5,16 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::block_sheet::{self, BlockSheetOptions};
-use crate::cli::input::select;
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
+use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::ThresholdMetric;
-use mocban_core::raster::png_rgb8;
-use mocban_export::{ContactSheet, ContactSheetOptions, ContactSheetOrder, draw_contact_sheet};
-use mocban_project::exit::{ExitCode, Refusal};
-use mocban_project::files;
+use mocban_export::{ContactSheetOptions, ContactSheetOrder};
+use mocban_project::sheets::{self, block_sheet};
+use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]
@@ -47,36 +44,37 @@ pub(crate) struct ContactSheetArgs {
     pub(crate) allow_missing: bool,
 }
 
-impl Default for ContactSheetArgs {
-    fn default() -> Self {
-        Self {
-            pairs: Vec::new(),
-            block: None,
-            overlay: false,
-            output: None,
-            metric: None,
-            order: ContactSheetOrder::Worst,
-            limit: 60,
-            columns: 5,
-            allow_missing: false,
-        }
-    }
-}
-
 pub(crate) async fn contact_sheet(
     args: ContactSheetArgs,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
+    let (location, terminal) = (&context.location, Terminal::new(context));
+    let output = args.output.as_deref();
     if let Some(block) = &args.block {
-        let options = BlockSheetOptions {
+        let drawn = block_sheet(
             block,
-            is_overlay: args.overlay,
-            metric: args.metric,
-            output: args.output.as_deref(),
-        };
-        return block_sheet::write(&options, context).await;
+            args.overlay,
+            args.metric,
+            output,
+            location,
+            &terminal,
+        );
+        let (path, characters) = drawn.await?;
+        context.print_json(&json!({"schema": 1, "file": path, "characters": characters}))?;
+        let number = count(characters as u64, "character");
+        context.info(&format!("{number} on {}", path.display()));
+        return Ok(ExitCode::Done);
     }
-    let (path, sheet) = write(&args, context).await?;
+    let options = ContactSheetOptions {
+        metric: args.metric.unwrap_or(ThresholdMetric::DEFAULT),
+        order: args.order,
+        limit: usize::from(args.limit),
+        columns: usize::from(args.columns),
+        ..ContactSheetOptions::default()
+    };
+    let missing = args.allow_missing;
+    let drawn = sheets::contact_sheet(&args.pairs, options, output, missing, location, &terminal);
+    let (path, sheet) = drawn.await?;
     context
         .print_json(&json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}))?;
     context.info(&format!(
@@ -90,55 +88,4 @@ pub(crate) async fn contact_sheet(
     } else {
         ExitCode::SomeFailed
     })
-}
-
-/// Maximum number of incomplete pairs that are named.
-const MAX_WARNINGS: usize = 5;
-
-/// Draws the sheet, writes it and returns its path.
-///
-/// # Errors
-/// Returns an error if no pair to draw has a result of the metric, or if the catalog or the disk fails.
-pub(crate) async fn write(
-    args: &ContactSheetArgs,
-    context: &Context,
-) -> anyhow::Result<(PathBuf, ContactSheet)> {
-    let (project, catalog) = context.open_read_only().await?;
-    let path = match &args.output {
-        Some(path) => path.clone(),
-        None => project.dir().join("sheet.png"),
-    };
-    files::refuse_used_file(&path, &project, &catalog).await?;
-    let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
-    let options = ContactSheetOptions {
-        metric,
-        pairs: select::some_or_all(&catalog, &args.pairs).await?,
-        order: args.order,
-        limit: usize::from(args.limit),
-        columns: usize::from(args.columns),
-        limits: context.settings()?.config.limits.image,
-    };
-    let busy = Busy::start(context, "drawing the contact sheet");
-    let sheet = draw_contact_sheet(&catalog, &project, options).await;
-    drop(busy);
-    let sheet = sheet?;
-    context.warn_about_set_apart(&sheet.set_apart);
-    catalog.close().await;
-    if sheet.shown == 0 {
-        let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");
-        return Err(Refusal::NothingSelected(text).into());
-    }
-    for (pair, why) in sheet.problems.iter().take(MAX_WARNINGS) {
-        context.warn(&format!("{pair} is not drawn completely: {why}"));
-    }
-    let more = sheet.problems.len().saturating_sub(MAX_WARNINGS);
-    if more > 0 {
-        context.warn(&format!(
-            "{more} more are not drawn completely; `check` lists all missing files"
-        ));
-    }
-    let is_complete = args.allow_missing || sheet.problems.is_empty();
-    let written = files::write_output(&path, &png_rgb8(&sheet.picture), is_complete);
-    files::or_elsewhere(written, args.output.as_deref())?;
-    Ok((path, sheet))
 }

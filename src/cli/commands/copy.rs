@@ -1,21 +1,14 @@
 //! `copy`: copies a catalog between a project folder and PostgreSQL.
 
-use std::path::Path;
-
-use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::{columns, count};
-use mocban_catalog::{Catalog, CatalogCopy, CatalogError, CopiedTable};
-use mocban_core::domain::is_address;
-use mocban_project::error_text::ErrorPlace;
-use mocban_project::exit::{ExitCode, Refusal};
-use mocban_project::location::{now, refuse_password, settings_of};
-use mocban_runner as runner;
-use mocban_store::{Project, SETTINGS_FILE};
+use crate::cli::output::terminal::Terminal;
+use mocban_catalog::{CatalogCopy, CopiedTable};
+use mocban_project::copy::copy as copy_catalog;
+use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `copy`.
 #[derive(Debug, Args)]
@@ -27,27 +20,10 @@ pub(crate) struct CopyArgs {
     pub(crate) to: String,
 }
 
-pub(crate) async fn copy(args: CopyArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn copy(args: CopyArgs, context: &Context) -> ProjectResult<ExitCode> {
     let CopyArgs { from, to } = args;
-    // Before these addresses are part of any message.
-    for place in [&from, &to] {
-        if is_address(place) {
-            refuse_password(place)?;
-        } else {
-            require_own_catalog(Path::new(place))?;
-        }
-    }
-    let source = open(&from, context).await;
-    let source = source.with_context(|| of_source(&from))?;
-    let busy = Busy::start(context, "copying the catalog");
-    let copied = write(&source, &to).await;
-    drop(busy);
-    source.close().await;
-    let CatalogCopy { tables, existed } = copied.map_err(|error| match error.downcast() {
-        Ok(CatalogError::Original(error)) => anyhow::Error::new(*error).context(of_source(&from)),
-        Ok(error) => anyhow::Error::new(error).context(of_target(&to)),
-        Err(error) => error.context(of_target(&to)),
-    })?;
+    let copied = copy_catalog(&from, &to, &Terminal::new(context)).await?;
+    let CatalogCopy { tables, existed } = copied;
     let document = json!({"schema": 1, "tables": tables, "existed": existed});
     context.print(&document, || text(&tables))?;
     context.info(&if existed {
@@ -58,65 +34,6 @@ pub(crate) async fn copy(args: CopyArgs, context: &Context) -> anyhow::Result<Ex
         "all rows were compared; artifacts and input files were not copied".to_owned()
     });
     Ok(ExitCode::Done)
-}
-
-fn of_source(from: &str) -> ErrorPlace {
-    ErrorPlace::new(from, format!("cannot copy {from}"))
-}
-
-fn of_target(to: &str) -> ErrorPlace {
-    ErrorPlace::new(to, format!("cannot copy to {to}"))
-}
-
-/// Opens the catalog of a project folder or an address for reading. Warns if a run is active.
-async fn open(place: &str, context: &Context) -> anyhow::Result<Catalog> {
-    let (catalog, is_running) = if is_address(place) {
-        let catalog = Catalog::connect_read_only(place).await?;
-        let workers = catalog.active_workers(now()).await?;
-        (catalog, workers > 0)
-    } else {
-        let project = Project::open(Path::new(place))?;
-        let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
-        let is_running = runner::is_running(&project, &catalog, now()).await?;
-        (catalog, is_running)
-    };
-    if is_running {
-        context.warn(&format!(
-            "a run is active on {place}: the copy has what is stored now, and not what the run stores from now on"
-        ));
-    }
-    Ok(catalog)
-}
-
-/// Copies the catalog to a project folder or an address, and creates what is missing there.
-async fn write(source: &Catalog, place: &str) -> anyhow::Result<CatalogCopy> {
-    let progress = |table, rows| tracing::info!(table, rows, "copied");
-    if is_address(place) {
-        return Ok(source.copy_to_server(place, progress).await?);
-    }
-    let dir = Path::new(place);
-    let existed = dir.exists();
-    let project = Project::create(dir)?;
-    let copied = source.copy_to_file(&project.catalog_path(), progress).await;
-    if copied.is_err() && !existed {
-        // Fails unless the directory is empty.
-        let _ = std::fs::remove_dir(dir);
-    }
-    Ok(copied?)
-}
-
-/// Refuses a folder whose settings name a catalog on a server, because commands in it do not use its file.
-fn require_own_catalog(dir: &Path) -> anyhow::Result<()> {
-    let url = settings_of(dir)?.config.storage.catalog;
-    if url.is_empty() {
-        return Ok(());
-    }
-    let file = dir.join(SETTINGS_FILE);
-    Err(Refusal::Usage(format!(
-        "{} names the catalog {url}, so commands in this folder do not use the file catalog.sqlite; give that address instead of the folder, or another folder",
-        file.display()
-    ))
-    .into())
 }
 
 fn text(tables: &[CopiedTable]) -> String {

@@ -6,7 +6,7 @@ use serde_json::json;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
 use mocban_catalog::{ROLES, initialize_database, roles_sql};
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// Commands on the database of a catalog.
 #[derive(Debug, Subcommand)]
@@ -27,7 +27,7 @@ pub(crate) struct DbInitArgs {
     pub(crate) print_sql: bool,
 }
 
-pub(crate) async fn db(command: DbCommand, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn db(command: DbCommand, context: &Context) -> ProjectResult<ExitCode> {
     let DbCommand::Init(args) = command;
     if args.print_sql {
         let sql = roles_sql(context.location.catalog_url()?.as_deref())?;

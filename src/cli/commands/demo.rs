@@ -3,33 +3,36 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use clap::Args;
 
 use super::config::{ConfigShowArgs, as_toml};
-use super::contact_sheet::{self, ContactSheetArgs};
 use super::demo_block;
 use super::demo_data::replace_data;
 use super::import;
 use super::import_blocks;
 use super::report;
-use super::run::{self, drive};
+use super::run::{code, drive};
 use super::run_text;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::screen::Palette;
 use crate::cli::output::table::count;
+use crate::cli::output::terminal::Terminal;
 use mocban_config::{Origin, Tree};
 use mocban_core::domain::JobStatus;
 use mocban_demo::block::{BlockKind, BlockOptions};
 use mocban_demo::{DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
+use mocban_export::ContactSheetOptions;
 use mocban_project::demo_folder::{DemoContent, STOPPED, check_directory};
-use mocban_project::exit::ExitCode;
+use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::import_blocks::import_blocks;
-use mocban_project::import_pairs::{PairImport, PairSource, import_pairs};
+use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
+use mocban_project::run::{PreparedRun, options};
+use mocban_project::sheets::contact_sheet;
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{Stop, StopLevel};
-use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
+use mocban_store::{SETTINGS_FILE, TargetLock, create_folders, write_atomic};
 
 /// Smallest and largest distance of the vertices of a block. A mesh of the smallest has 60 million triangles.
 const SPACING_MM: RangeInclusive<f64> = 0.05..=2.0;
@@ -62,7 +65,7 @@ pub(crate) struct DemoArgs {
     pub(crate) no_run: bool,
 }
 
-pub(crate) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn demo(args: DemoArgs, context: &Context) -> ProjectResult<ExitCode> {
     let dir = demo_dir(&args, context);
     let content = content(&args);
     let context = context.at(&dir);
@@ -86,9 +89,9 @@ pub(crate) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
     let import = PairImport {
         source,
         truth: Some(files.truth),
-        allow_missing: false,
+        allowed: AllowedChanges::default(),
     };
-    let outcome = import_pairs(import, &context.location).await?;
+    let outcome = import_pairs(import, &context.location, &()).await?;
     import::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");
@@ -120,13 +123,14 @@ async fn block_demo(
     options: BlockOptions,
     args: &DemoArgs,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
     let Some(files) = demo_block::create_files(dir, options, context).await? else {
         context.info(STOPPED);
         return Ok(ExitCode::Stopped);
     };
     let source = demo_block::import_source(&files, !args.no_labels);
-    let outcome = import_blocks(&source, false, &context.location).await?;
+    let allowed = AllowedChanges::default();
+    let outcome = import_blocks(&source, allowed, &context.location, &()).await?;
     import_blocks::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");
@@ -141,35 +145,38 @@ async fn align(
     dir: &Path,
     block_truth: Option<&Path>,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
-    let config = context.settings()?.config;
-    let (project, catalog) = context.open().await?;
-    let options = run::from_config(&config);
-    let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
-    run_text::print_outcome(&summary, &failures, context);
-    let done = summary.status.jobs.get(&JobStatus::Done).copied();
-    if summary.stopped || done.unwrap_or(0) == 0 {
-        for command in run_text::next_steps(&summary, &failures, false) {
+) -> ProjectResult<ExitCode> {
+    let options = options(&context.location.settings()?.config);
+    let terminal = Terminal::new(context);
+    let prepared = PreparedRun::new(&[], options, false, &context.location, &terminal).await?;
+    let outcome = drive(prepared, context).await?;
+    run_text::print_outcome(&outcome, context);
+    let code = code(&outcome.summary);
+    let done = outcome.summary.status.jobs.get(&JobStatus::Done).copied();
+    if outcome.summary.stopped || done.unwrap_or(0) == 0 {
+        for command in run_text::next_steps(&outcome) {
             context.next(&command);
         }
-        return Ok(run::code(&summary));
+        return Ok(code);
     }
     if let Some(file) = block_truth {
-        let (_, catalog) = context.open().await?;
+        let (_, catalog) = context.location.open().await?;
         let stored = demo_block::store_truths(file, &catalog).await;
         catalog.close().await;
         let stored = count(stored?, "true alignment");
         context.info(&format!("{stored} of the cut pairs stored"));
     }
     report::print_summary(context).await?;
-    let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
+    let (sheet, location) = (ContactSheetOptions::default(), &context.location);
+    let drawn = contact_sheet(&[], sheet, None, false, location, &terminal);
+    let (picture, _) = drawn.await?;
     let (data, picture) = (dir.join("data"), picture.display());
     context.info(&format!("meshes, prints and truth: {}", data.display()));
     context.info(&format!("results in one image, worst first: {picture}"));
     context.next("review --reviewer me");
     context.next("report");
     context.next("export -o export");
-    Ok(run::code(&summary))
+    Ok(code)
 }
 
 /// Parses the distance of a block's vertices.
@@ -191,7 +198,7 @@ async fn create_dataset(
     dir: &Path,
     options: DemoOptions,
     context: &Context,
-) -> anyhow::Result<Option<DatasetFiles>> {
+) -> ProjectResult<Option<DatasetFiles>> {
     let data = dir.join("data");
     check_directory(dir, &data, &DemoContent::Pairs(options))?;
     let found = find_dataset(&data, &options);
@@ -216,7 +223,7 @@ async fn replace_dataset(
     data: &Path,
     options: DemoOptions,
     context: &Context,
-) -> anyhow::Result<Option<DatasetFiles>> {
+) -> ProjectResult<Option<DatasetFiles>> {
     let busy = Busy::of_pairs(context, "creating demo data", options.pairs);
     let write = move |folder: &Path, stop: &Stop| {
         let is_stopped = || {
@@ -237,15 +244,15 @@ async fn replace_dataset(
 /// Saves the settings of `--config` and `--set` in the project's settings file, for later commands.
 ///
 /// A file with other settings is not changed. In that case the flags apply to this call only.
-fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
+fn save_settings(dir: &Path, context: &Context) -> ProjectResult<Context> {
     let global = &context.global;
     if global.config.is_none() && global.set.is_empty() {
         return Ok(context.clone());
     }
-    let text = changed_settings(&context.settings()?.tree);
+    let text = changed_settings(&context.location.settings()?.tree);
     let file = dir.join(SETTINGS_FILE);
     let shown = file.display();
-    std::fs::create_dir_all(dir).with_context(|| format!("cannot create {}", dir.display()))?;
+    create_folders(dir).with_context(|| format!("cannot create {}", dir.display()))?;
     let _lock = TargetLock::acquire(&file)?;
     match files::small(&file)? {
         Some(there) if there == text.as_bytes() => {}

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use anyhow::Context as _;
 use serde_json::Value;
 use tokio::sync::mpsc;
 
@@ -10,10 +9,12 @@ use super::demo_data::replace_data;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
-use mocban_catalog::{Catalog, ImportChunk, StoredCharacter};
+use mocban_catalog::{Catalog, ImportChunk, ImportTerms, StoredCharacter};
 use mocban_core::domain::{Affine2, BlockName, PairName};
 use mocban_demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
+use mocban_project::ProjectResult;
 use mocban_project::demo_folder::{DemoContent, check_directory};
+use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::import_blocks::{BlockSource, ImportedBlock};
 use mocban_project::location::now;
@@ -36,10 +37,7 @@ pub(crate) fn import_source(files: &BlockFiles, has_labels: bool) -> BlockSource
 
 /// Stores the true boxes of the block, and the true alignments of the pairs that were cut from it. Returns how many of these
 /// there are.
-///
-/// # Errors
-/// Returns an error if the truth cannot be read or the catalog fails.
-pub(crate) async fn store_truths(file: &Path, catalog: &Catalog) -> anyhow::Result<u64> {
+pub(crate) async fn store_truths(file: &Path, catalog: &Catalog) -> ProjectResult<u64> {
     let bytes = files::read(file)?;
     let truth: BlockTruth = serde_json::from_slice(&bytes)
         .with_context(|| format!("{} is not the truth of a block", file.display()))?;
@@ -54,8 +52,13 @@ pub(crate) async fn store_truths(file: &Path, catalog: &Catalog) -> anyhow::Resu
         .filter_map(|found| pair_truth(&truth, found))
         .collect();
     let (sender, chunks) = mpsc::channel(1);
-    sender.send(ImportChunk::End).await?;
-    let (_, stored) = catalog.import_all(chunks, truths, now()).await?;
+    // The receiver exists.
+    let _ = sender.send(ImportChunk::End).await;
+    let terms = ImportTerms {
+        truths,
+        ..ImportTerms::default()
+    };
+    let (_, stored) = catalog.import_all(chunks, terms, now()).await?;
     Ok(stored)
 }
 
@@ -74,7 +77,7 @@ pub(crate) async fn create_files(
     dir: &Path,
     options: BlockOptions,
     context: &Context,
-) -> anyhow::Result<Option<BlockFiles>> {
+) -> ProjectResult<Option<BlockFiles>> {
     let data = dir.join("data");
     check_directory(dir, &data, &DemoContent::Block(options))?;
     let files = match find_block(&data, &options) {
@@ -100,7 +103,7 @@ async fn replace_block(
     data: &Path,
     options: BlockOptions,
     context: &Context,
-) -> anyhow::Result<Option<BlockFiles>> {
+) -> ProjectResult<Option<BlockFiles>> {
     let busy = Busy::start(context, "creating a block");
     let write = move |folder: &Path, stop: &Stop| {
         let is_stopped = || stop.level() != StopLevel::Go;

@@ -7,16 +7,16 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde_json::json;
 
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
+use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{
     ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
     SplitShares,
 };
-use mocban_project::exit::{ExitCode, Refusal};
-use mocban_project::files::input_file_limits;
+use mocban_project::export::export as export_project;
+use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -121,24 +121,9 @@ impl ExportArgs {
     }
 }
 
-pub(crate) async fn export(args: ExportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.open_read_only().await?;
-    let loaded = context.settings()?;
-    let (config, formats) = (&loaded.config, args.formats());
-    let computed = config.stages.pipeline.method.metrics();
-    let unknown = args.metric.iter().find(|metric| !computed.contains(metric));
-    if let Some(metric) = unknown {
-        let names: Vec<&str> = computed.iter().map(|metric| metric.name()).collect();
-        let text = format!(
-            "the settings compute no {metric}; choose from {}",
-            names.join(", ")
-        );
-        return Err(Refusal::Usage(text).into());
-    }
-    let selected =
-        |metric: &&ThresholdMetric| args.metric.is_empty() || args.metric.contains(*metric);
+pub(crate) async fn export(args: ExportArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let limits = context.location.settings()?.config.limits;
     let options = ExportOptions {
-        metrics: computed.iter().filter(selected).copied().collect(),
         only: args.only,
         min_confidence: args.min_confidence,
         canvas_px: args.canvas,
@@ -152,25 +137,12 @@ pub(crate) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
         images: args.images,
         shard_mib: args.shard_mib,
         license: args.license.clone(),
-        settings: config.that_change_results()?,
-        limits: input_file_limits(config),
+        ..ExportOptions::all_of(&args.metric, limits)
     };
-    if let Err(unused) = options.check(&formats) {
-        return Err(Refusal::Usage(unused.to_string()).into());
-    }
-    context.warn_about_stale(&catalog).await?;
-    let busy = Busy::start(context, "exporting");
-    let summary = mocban_export::export(&catalog, &project, &args.output, &formats, options).await;
-    drop(busy);
-    let summary = summary?;
-    catalog.close().await;
-    if summary.is_nothing_selected {
-        let text = format!(
-            "no result is selected by --only or --min-confidence; nothing was written to {}",
-            args.output.display()
-        );
-        return Err(Refusal::NothingSelected(text).into());
-    }
+    let (location, terminal) = (&context.location, Terminal::new(context));
+    let formats = args.formats();
+    let exported = export_project(&args.output, &formats, options, location, &terminal);
+    let summary = exported.await?;
     print_summary(&summary, &args, context)?;
     Ok(if summary.is_complete() {
         ExitCode::Done
@@ -183,12 +155,11 @@ fn print_summary(
     summary: &ExportSummary,
     args: &ExportArgs,
     context: &Context,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     let unreadable = summary.unreadable.iter();
     let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
     let blocks = summary.unreadable_blocks.iter();
     let blocks = blocks.map(|(block, why)| json!({"block": block, "error": why}));
-    context.warn_about_set_apart(&summary.set_apart);
     context.print_json(&json!({
         "schema": 1,
         "set_apart": summary.set_apart,

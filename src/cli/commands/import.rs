@@ -7,13 +7,15 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::import_blocks::{self, BlockArgs};
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
+use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::LengthUnit;
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::import_blocks::{ListedItems, import_blocks};
-use mocban_project::import_pairs::{ImportOutcome, PairImport, PairSource, import_pairs};
+use mocban_project::import_pairs::{
+    AllowedChanges, ImportOutcome, PairImport, PairSource, import_pairs,
+};
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// The three ways to name what is imported.
 const USAGE: &str = "mocban import [OPTIONS] FILE
@@ -24,15 +26,18 @@ const USAGE: &str = "mocban import [OPTIONS] FILE
 #[derive(Debug, Default, Args)]
 #[command(override_usage = USAGE)]
 pub(crate) struct ImportArgs {
-    /// A CSV or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
-    /// `scanned_face_down`; or a CSV file of whole blocks with the columns block, mesh, page and optionally labels,
+    /// A CSV, XLSX or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
+    /// `scanned_face_down`; or a CSV or XLSX file of whole blocks with the columns block, mesh, page and optionally labels,
     /// unit, side; paths are relative to the file
     #[arg(required_unless_present_any = ["meshes", "block"], conflicts_with_all = ["meshes", "block"])]
     pub(crate) file: Option<PathBuf>,
-    /// A directory of meshes, paired with --prints by file stem
+    /// Sheet of an XLSX file [default: the first one]
+    #[arg(long, value_name = "NAME", requires = "file")]
+    pub(crate) sheet: Option<String>,
+    /// A directory of meshes, paired with --prints by file stem; in folders, also by their names, and ids are `FOLDER_STEM`
     #[arg(long, value_name = "DIR", requires = "prints")]
     pub(crate) meshes: Option<PathBuf>,
-    /// A directory of prints
+    /// A directory of prints; it may be that of --meshes
     #[arg(long, value_name = "DIR", requires = "meshes")]
     pub(crate) prints: Option<PathBuf>,
     #[command(flatten)]
@@ -46,19 +51,33 @@ pub(crate) struct ImportArgs {
     /// Import pairs whose files do not exist yet; they fail if they are run before
     #[arg(long)]
     pub(crate) allow_missing: bool,
+    /// Let most of the pairs that the project has get another mesh and another print, because the files have moved; or
+    /// blocks another scan and another page
+    #[arg(long)]
+    pub(crate) allow_changed_files: bool,
+    /// Retire the pairs that the list does not have, except for those cut from blocks: they are in no count, and their
+    /// results and verdicts are kept; a list that has them brings them back
+    #[arg(long)]
+    pub(crate) replace: bool,
 }
 
-pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let items = items(&args)?;
+pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let (items, warning) = items(&args)?;
     if matches!(items, ListedItems::Blocks(_)) {
-        refuse_truths(&args)?;
+        refuse_options_of_pairs(&args)?;
     }
-    let busy = Busy::start(context, "importing");
+    let allowed = AllowedChanges {
+        missing: args.allow_missing,
+        files: args.allow_changed_files,
+        replace: args.replace,
+    };
+    let (location, terminal) = (&context.location, Terminal::new(context));
     match items {
         ListedItems::Blocks(source) => {
-            let outcome = import_blocks(&source, args.allow_missing, &context.location).await;
-            drop(busy);
-            let outcome = outcome?;
+            let outcome = import_blocks(&source, allowed, location, &terminal).await?;
+            if let Some(warning) = warning {
+                context.warn(&warning);
+            }
             context.print_json(&import_blocks::as_json(&outcome))?;
             import_blocks::print_outcome(&outcome, context);
         }
@@ -66,11 +85,10 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
             let import = PairImport {
                 source,
                 truth: args.truth,
-                allow_missing: args.allow_missing,
+                allowed,
             };
-            let outcome = import_pairs(import, &context.location).await;
-            drop(busy);
-            let outcome = outcome?;
+            let mut outcome = import_pairs(import, location, &terminal).await?;
+            outcome.warnings.extend(warning);
             context.print_json(&as_json(&outcome))?;
             print_outcome(&outcome, context);
         }
@@ -79,28 +97,37 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-/// Returns what the arguments name.
-fn items(args: &ImportArgs) -> anyhow::Result<ListedItems> {
+/// Returns what the arguments name, and a warning about other sheets of a workbook.
+fn items(args: &ImportArgs) -> ProjectResult<(ListedItems, Option<String>)> {
     if let Some(source) = args.block.source(args.unit) {
-        return Ok(ListedItems::Blocks(source));
+        return Ok((ListedItems::Blocks(source), None));
     }
     match (&args.file, &args.meshes, &args.prints) {
-        (Some(file), ..) => ListedItems::of(file),
-        (None, Some(meshes), Some(prints)) => Ok(ListedItems::Pairs(PairSource::Folders {
-            meshes: meshes.clone(),
-            prints: prints.clone(),
-            unit: args.unit,
-        })),
-        (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
+        (Some(file), ..) => ListedItems::of(file, args.sheet.as_deref()),
+        (None, Some(meshes), Some(prints)) => {
+            let folders = PairSource::Folders {
+                meshes: meshes.clone(),
+                prints: prints.clone(),
+                unit: args.unit,
+            };
+            Ok((ListedItems::Pairs(folders), None))
+        }
+        (None, ..) => {
+            let text = "give a manifest, or --meshes and --prints";
+            Err(Refusal::Usage(text.to_owned()).into())
+        }
     }
 }
 
-/// Refuses true alignments of pairs in an import of blocks.
-fn refuse_truths(args: &ImportArgs) -> anyhow::Result<()> {
-    if args.truth.is_none() {
+/// Refuses options of pairs in an import of blocks.
+fn refuse_options_of_pairs(args: &ImportArgs) -> ProjectResult<()> {
+    let text = if args.truth.is_some() {
+        "--truth holds true alignments of pairs, but blocks are imported"
+    } else if args.replace {
+        "--replace retires pairs that a list of pairs does not have, but blocks are imported"
+    } else {
         return Ok(());
-    }
-    let text = "--truth holds true alignments of pairs, but blocks are imported";
+    };
     Err(Refusal::Usage(text.to_owned()).into())
 }
 
@@ -128,6 +155,17 @@ pub(crate) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
         summary.changed.len(),
         summary.unchanged
     ));
+    for (number, text) in [
+        (
+            summary.retired,
+            "retired, not in the list; results and verdicts are kept",
+        ),
+        (summary.restored, "back in every count"),
+    ] {
+        if number > 0 {
+            context.info(&format!("{} {text}", count(number, "pair")));
+        }
+    }
     for change in summary.changed.iter().take(MAX_CHANGES) {
         let fields = change.fields.join(", ");
         context.info(&format!("  {}: {fields} changed", change.name));
@@ -146,6 +184,8 @@ fn as_json(outcome: &ImportOutcome) -> Value {
         "added": summary.added,
         "changed": changed.collect::<Value>(),
         "unchanged": summary.unchanged,
+        "retired": summary.retired,
+        "restored": summary.restored,
         "truths": outcome.truths,
         "missing_files": outcome.missing.lines,
         "more_missing_files": outcome.missing.count - outcome.missing.lines.len(),

@@ -2,45 +2,51 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use clap::{Args, Command};
 
 use crate::cli::output::context::Context;
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::shell::shell_quoted;
-use mocban_store::{StagingFolder, rename_into_place};
+use mocban_project::{ExitCode, ProjectResult, Refusal};
+use mocban_store::{StagingFolder, create_folders, rename_into_place};
 
 /// Arguments of `man`.
 #[derive(Debug, Args)]
 pub(crate) struct ManArgs {
     /// The directory for the pages; created if it does not exist
-    pub(crate) dir: PathBuf,
+    #[arg(required_unless_present = "output")]
+    pub(crate) dir: Option<PathBuf>,
+    /// The same as DIR
+    #[arg(short, long, value_name = "DIR", conflicts_with = "dir")]
+    pub(crate) output: Option<PathBuf>,
 }
 
-pub(crate) fn man(args: &ManArgs, command: Command, context: &Context) -> anyhow::Result<ExitCode> {
-    let dir = args.dir.display();
-    std::fs::create_dir_all(&args.dir).with_context(|| format!("cannot create {dir}"))?;
+pub(crate) fn man(args: ManArgs, command: Command, context: &Context) -> ProjectResult<ExitCode> {
+    let folder = args.dir.or(args.output).unwrap_or_default();
+    let dir = folder.display();
+    files::refuse_project_file(&folder)?;
+    create_folders(&folder).with_context(|| format!("cannot create {dir}"))?;
     let failed = || format!("cannot write manual pages to {dir}");
-    let staging = StagingFolder::beside(&args.dir.join("mocban.1")).with_context(failed)?;
+    let staging = StagingFolder::beside(&folder.join("mocban.1")).with_context(failed)?;
     let pages = write_pages(command, staging.path()).with_context(failed)?;
     for page in &pages {
-        refuse_foreign(page, &args.dir)?;
+        refuse_foreign(page, &folder)?;
     }
     for page in &pages {
-        let target = args.dir.join(page.file_name().unwrap_or_default());
+        let target = folder.join(page.file_name().unwrap_or_default());
         rename_into_place(page, &target).with_context(failed)?;
     }
     drop(staging);
     context.info(&format!("the manual pages are in {dir}"));
-    let page = args.dir.join("mocban.1");
+    let page = folder.join("mocban.1");
     let page = shell_quoted(&page.to_string_lossy());
     context.next_command(&format!("man -l {page}"));
     Ok(ExitCode::Done)
 }
 
 /// Writes the pages to a staging folder first, so that each page is replaced as a whole. Returns their paths.
-fn write_pages(command: Command, staging: &Path) -> anyhow::Result<Vec<PathBuf>> {
+fn write_pages(command: Command, staging: &Path) -> ProjectResult<Vec<PathBuf>> {
     let folder = staging.join("pages");
     std::fs::create_dir(&folder)?;
     clap_mangen::generate_to(command, &folder)?;
@@ -50,7 +56,7 @@ fn write_pages(command: Command, staging: &Path) -> anyhow::Result<Vec<PathBuf>>
 }
 
 /// Refuses to replace a file that is not an earlier version of a page.
-fn refuse_foreign(page: &Path, dir: &Path) -> anyhow::Result<()> {
+fn refuse_foreign(page: &Path, dir: &Path) -> ProjectResult<()> {
     let there = dir.join(page.file_name().unwrap_or_default());
     let Some(earlier) = files::small(&there)? else {
         return Ok(());

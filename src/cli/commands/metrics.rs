@@ -14,7 +14,7 @@ use tokio::task::AbortHandle;
 
 use crate::cli::output::context::Context;
 use mocban_pages::local_server::{ConnectionLimits, ServedNames, listen, serve};
-use mocban_project::exit::Refusal;
+use mocban_project::Refusal;
 use mocban_runner::RunMetrics;
 use mocban_system::failpoint::time_scale;
 use mocban_system::platform::host_name;

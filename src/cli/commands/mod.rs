@@ -1,11 +1,10 @@
 //! The commands, one per file.
 
 pub(crate) mod agreement;
+pub(crate) mod align;
 pub(crate) mod backup;
 pub(crate) mod block_points;
-pub(crate) mod block_sheet;
 pub(crate) mod check;
-pub(crate) mod closing;
 pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod config;
@@ -23,6 +22,7 @@ pub(crate) mod man;
 pub(crate) mod metrics;
 pub(crate) mod report;
 pub(crate) mod restore;
+pub(crate) mod retire;
 pub(crate) mod retry;
 pub(crate) mod review;
 pub(crate) mod run;

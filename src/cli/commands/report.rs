@@ -6,24 +6,14 @@ use clap::Args;
 use serde_json::json;
 
 use super::compare::side_by_side;
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
-use mocban_catalog::Catalog;
-use mocban_config::{self as config, Sources};
-use mocban_export::{GallerySelection, draw_gallery};
-use mocban_project::exit::{ExitCode, Refusal};
+use crate::cli::output::terminal::Terminal;
 use mocban_project::files;
-use mocban_project::location::now;
-use mocban_project::time_text::day;
-use mocban_report::{
-    Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
-    summary,
-};
-use mocban_store::Project;
-
-/// Seed of the random choice of images; the HTML page states it.
-const IMAGE_SEED: u64 = 1;
+use mocban_project::report::{self, RenderedReport, ReportOptions};
+use mocban_project::{ExitCode, ProjectResult, Refusal};
+use mocban_report::{Report, ReportFormat, quality_gate, render, summary};
+use mocban_results::IntervalMethod;
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
@@ -64,52 +54,36 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(crate) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.open_read_only().await?;
-    if let Some(path) = &args.output {
-        files::refuse_used_file(path, &project, &catalog).await?;
-    }
-    context.warn_about_stale(&catalog).await?;
+pub(crate) async fn report(args: ReportArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let output = args.output.as_deref();
     let format = match args.format {
         Some(format) => format,
-        None => args
-            .output
-            .as_deref()
-            .map_or(Ok(ReportFormat::Text), format_of_file)?,
+        None => output.map_or(Ok(ReportFormat::Text), format_of_file)?,
     };
-    let format = chosen_format(format, context);
+    let format = if context.global.json {
+        ReportFormat::Json
+    } else {
+        format
+    };
     if args.compare.is_some() && !matches!(format, ReportFormat::Text | ReportFormat::Json) {
         let text = format!("--compare needs the format text or json, not {format}");
         return Err(Refusal::Usage(text).into());
     }
-    let busy = Busy::start(context, "reading the results");
-    let mut pictures = GallerySelection::new(IMAGE_SEED);
-    let report = if format == ReportFormat::Html {
-        build_with(&catalog, &project, |pair, truth| pictures.add(pair, truth)).await?
-    } else {
-        build(&catalog, &project).await?
+    let options = ReportOptions {
+        format,
+        interval: args.ci,
+        with_times: args.with_times,
     };
-    let mut report = with_defaults(report)?.with_interval(args.ci);
-    if !args.with_times && format != ReportFormat::Html {
-        report = report.without_times();
+    let (location, terminal) = (&context.location, Terminal::new(context));
+    let RenderedReport {
+        report,
+        mut text,
+        is_complete,
+    } = report::report(options, output, location, &terminal).await?;
+    if let Some(other) = &args.compare {
+        text = compared(&report, (&text, format), other, context).await?;
     }
-    if let Some(problem) = &report.unusable_truth {
-        context.warn(&format!("the report lacks the true alignment of {problem}"));
-    }
-    context.warn_about_set_apart(&report.set_apart);
-    let mut is_complete = report.unusable_truth.is_none();
-    let text = if let Some(other) = &args.compare {
-        compared(&report, other, format, context).await?
-    } else if format == ReportFormat::Html {
-        let (page, has_all) = pictured(&report, pictures, (&project, &catalog), context).await?;
-        is_complete &= has_all;
-        page
-    } else {
-        render(&report, format)
-    };
-    catalog.close().await;
-    drop(busy);
-    match &args.output {
+    match output {
         Some(path) => {
             files::write_output(path, text.as_bytes(), args.allow_missing || is_complete)?;
             context.info(&format!("the report is in {}", path.display()));
@@ -123,10 +97,8 @@ pub(crate) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     })
 }
 
-/// Returns the format that belongs to the extension of a file, or text for an unknown extension.
-///
-/// # Errors
-/// Returns an error if the extension is that of a format which is not written.
+/// Returns the format that belongs to the extension of a file, or text for an unknown extension. Refuses formats that are
+/// not written.
 fn format_of_file(path: &Path) -> Result<ReportFormat, Refusal> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     Ok(match &*extension.to_ascii_lowercase() {
@@ -146,82 +118,34 @@ fn format_of_file(path: &Path) -> Result<ReportFormat, Refusal> {
     })
 }
 
-/// Renders the report as a page with images. Warns about each missing image. Returns `true` if no image is missing.
-async fn pictured(
-    report: &Report,
-    pictures: GallerySelection,
-    (project, catalog): (&Project, &Catalog),
-    context: &Context,
-) -> anyhow::Result<(String, bool)> {
-    let limits = context.settings()?.config.limits.image;
-    let gallery = draw_gallery(pictures, catalog, project, limits).await?;
-    let name = std::path::absolute(project.dir()).unwrap_or_else(|_| project.dir().to_owned());
-    let name = name.file_name().map(|name| name.to_string_lossy());
-    let cover = Cover {
-        project: name.map(Into::into),
-        date: Some(day(now())),
-    };
-    let problems = (gallery.groups.iter())
-        .flat_map(|group| &group.items)
-        .filter_map(|item| Some(format!("{}: {}", item.pair, item.problem.as_ref()?)))
-        .collect::<std::collections::BTreeSet<_>>();
-    for problem in &problems {
-        context.warn(&format!("the report lacks images of {problem}"));
-    }
-    Ok((page(report, &gallery, &cover), problems.is_empty()))
-}
-
-/// Renders this project's report with another one, as text or JSON.
+/// Returns this project's report with another one, as text or JSON.
 async fn compared(
     here: &Report,
+    (text, format): (&str, ReportFormat),
     other: &Path,
-    format: ReportFormat,
     context: &Context,
-) -> anyhow::Result<String> {
-    let there = read(&context.at(other)).await?.with_interval(here.interval);
-    let names = [context.dir(), other.to_owned()].map(|dir| dir.display().to_string());
+) -> ProjectResult<String> {
+    let there = report::read(&context.location.at(other)).await?;
+    let there = there.with_interval(here.interval);
+    let names = [&*context.location.dir, other].map(|dir| dir.display().to_string());
     if format == ReportFormat::Json {
         let mut value = serde_json::to_value(here)?;
         value["compared_with"] = json!({"project": names[1], "report": there});
         return Ok(serde_json::to_string_pretty(&value)?);
     }
     let tables = side_by_side(here, &there, [&names[0], &names[1]]);
-    Ok(format!("{}\n{tables}", render(here, format)))
+    Ok(format!("{text}\n{tables}"))
 }
 
 /// Prints the beginning of the report to stdout, or with `--json` the whole report.
-pub(crate) async fn print_summary(context: &Context) -> anyhow::Result<()> {
-    let report = read(context).await?;
+pub(crate) async fn print_summary(context: &Context) -> ProjectResult<()> {
+    let report = report::read(&context.location).await?;
     if context.global.json {
         streams::print_json_text(&render(&report, ReportFormat::Json))?;
     } else {
         streams::print(&summary(&report))?;
     }
     Ok(())
-}
-
-/// Returns the format; `--json` overrides `--format`.
-const fn chosen_format(format: ReportFormat, context: &Context) -> ReportFormat {
-    if context.global.json {
-        ReportFormat::Json
-    } else {
-        format
-    }
-}
-
-async fn read(context: &Context) -> anyhow::Result<Report> {
-    let (project, catalog) = context.open_read_only().await?;
-    let report = build(&catalog, &project).await?.without_times();
-    catalog.close().await;
-    with_defaults(report)
-}
-
-/// Names the settings of the results that are not the default ones.
-fn with_defaults(mut report: Report) -> anyhow::Result<Report> {
-    let defaults = config::load(&Sources::default())?.config.stages;
-    let fields = |stage| defaults.fingerprint_fields(stage);
-    report.provenance.compare_with(fields);
-    Ok(report)
 }
 
 /// Warns about the unmet requirements of `--require-complete` and `--fail-under`. Returns the exit code. If both are

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
-use mocban_project::exit::ExitCode;
+use crate::cli::output::terminal::Terminal;
 use mocban_project::restore::{self, RestoreRequest};
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_store::SETTINGS_FILE;
 
 /// Arguments of `restore`.
@@ -24,16 +24,14 @@ pub(crate) struct RestoreArgs {
     pub(crate) inputs: Option<PathBuf>,
 }
 
-pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResult<ExitCode> {
     let request = RestoreRequest {
         backup: args.backup,
         dir: args.dir,
         inputs: args.inputs,
     };
-    let busy = Busy::start(context, "restoring the project");
-    let restored = restore::restore(&request, &context.location).await;
-    drop(busy);
-    let restored = restored?;
+    let terminal = Terminal::new(context);
+    let restored = restore::restore(&request, &context.location, &terminal).await?;
     let RestoreRequest { dir, inputs, .. } = request;
     let (pairs, verdicts) = (restored.pairs, restored.verdicts);
     context.print_json(&json!({

@@ -3,13 +3,11 @@
 use clap::Args;
 use serde_json::json;
 
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::pairs_and_blocks;
-use mocban_catalog::{BlockJob, Catalog, RetrySelection};
 use mocban_core::domain::FailureClass;
-use mocban_project::exit::{ExitCode, Refusal};
-use mocban_runner::NamedWork;
+use mocban_project::retry::{self, Retried, RetryRequest};
+use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `retry`.
 #[derive(Debug, Args)]
@@ -22,46 +20,20 @@ pub(crate) struct RetryArgs {
     pub(crate) class: Option<FailureClass>,
 }
 
-pub(crate) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.open().await?;
-    let (selection, block_selection) = selection(&args, &catalog).await?;
-    let [retried, blocks] = catalog
-        .retry_pairs_and_blocks(&selection, &block_selection)
-        .await?;
-    catalog.close().await;
-    if retried + blocks == 0 {
-        return Err(Refusal::NothingSelected(no_match(&selection)).into());
-    }
-    let mut json = json!({"schema": 1, "retried": retried});
+pub(crate) async fn retry(args: RetryArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let request = match args.class {
+        Some(class) => RetryRequest::Class(class),
+        None if args.names.is_empty() => RetryRequest::All,
+        None => RetryRequest::Names(args.names),
+    };
+    let Retried { pairs, blocks } = retry::retry(&request, &context.location).await?;
+    let mut json = json!({"schema": 1, "retried": pairs});
     if blocks > 0 {
         json["blocks"] = blocks.into();
     }
     context.print_json(&json)?;
-    let numbers = pairs_and_blocks(retried, blocks);
+    let numbers = pairs_and_blocks(pairs, blocks);
     context.info(&format!("{numbers} will run again"));
     context.next("run");
     Ok(ExitCode::Done)
-}
-
-/// Returns the pairs and the blocks to retry.
-async fn selection(
-    args: &RetryArgs,
-    catalog: &Catalog,
-) -> anyhow::Result<(RetrySelection, RetrySelection<BlockJob>)> {
-    if let Some(class) = args.class {
-        return Ok((RetrySelection::Class(class), RetrySelection::Class(class)));
-    }
-    if args.names.is_empty() {
-        return Ok((RetrySelection::All, RetrySelection::All));
-    }
-    let NamedWork { pairs, blocks } = select::pairs_and_blocks(catalog, &args.names).await?;
-    Ok((RetrySelection::Names(pairs), RetrySelection::Names(blocks)))
-}
-
-fn no_match(selection: &RetrySelection) -> String {
-    match selection {
-        RetrySelection::All => "no pair or block has failed".to_owned(),
-        RetrySelection::Class(class) => format!("no pair or block has failed with class {class}"),
-        RetrySelection::Names(_) => "none of these has failed".to_owned(),
-    }
 }

@@ -6,9 +6,9 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::json;
 
-use super::closing::{AFTER_SILENCE, close_within};
 use super::verdict::reviewer_name;
 use crate::cli::input::browser::open;
+use crate::cli::input::language::language_of_system;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
@@ -20,11 +20,11 @@ use mocban_pages::review::{
     self, CheckRates, FaultShortage, Language, QueueCounts, QueueOptions, ReviewOptions,
     ReviewServer,
 };
-use mocban_project::error_text;
-use mocban_project::exit::{ExitCode, Refusal};
-use mocban_project::files::input_file_limits;
+use mocban_project::closing::{AFTER_SILENCE, close_within};
+use mocban_project::error::explanation;
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
 
 /// Time after a signal during which answers still wait for an unavailable database server.
@@ -48,7 +48,7 @@ pub(crate) struct ReviewArgs {
     #[arg(long)]
     metric: Vec<ThresholdMetric>,
     /// Seed of the random order
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value_t = QueueOptions::DEFAULT_SEED)]
     seed: u64,
     /// Review only the first N results; attention checks and duplicates are added to them
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -97,9 +97,9 @@ fn percent(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
-    let settings = context.settings()?;
+    let settings = context.location.settings()?;
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
     if args.listen.is_some_and(|address| address.is_unspecified()) {
@@ -107,7 +107,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         let text = "--listen needs the address of this machine at which the page will be opened";
         return Err(Refusal::Usage(text.to_owned()).into());
     }
-    let (project, catalog) = context.open().await?;
+    let (project, catalog) = context.location.open().await?;
     let rights = catalog.review_rights().await?;
     rights.require_review(Some(&args.reviewer))?;
     let (catalog, damaged) = catalog.without_faulty_rows().await?;
@@ -127,8 +127,8 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         keys,
         min_view_ms: args.min_view_ms,
         opens_guide: !args.no_guide,
-        limits: input_file_limits(&settings.config),
-        explain: error_text::catalog_text,
+        limits: settings.config.limits,
+        explain: explanation,
         now,
         queue: queue_options(&args),
     };
@@ -161,6 +161,9 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     signals.abort();
     context.info(closing_line(kept == 0));
     context.next("report");
+    if !args.adjudicate {
+        context.next(&queue_options(&args).for_another_reviewer());
+    }
     Ok(ExitCode::Done)
 }
 
@@ -200,7 +203,7 @@ fn queue_options(args: &ReviewArgs) -> QueueOptions {
 }
 
 /// Reports that there is nothing to adjudicate.
-fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+fn no_conflict(args: &ReviewArgs, context: &Context) -> ProjectResult<ExitCode> {
     if context.global.json {
         streams::print_json_text(&json!({"schema": 1, "url": null}).to_string())?;
     }
@@ -229,7 +232,7 @@ fn announce(
     page: &ReviewServer,
     args: &ReviewArgs,
     context: &Context,
-) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
+) -> ProjectResult<Option<tempfile::NamedTempFile>> {
     let (url, address) = (page.url(), page.address());
     if context.global.json {
         streams::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;
@@ -282,15 +285,6 @@ fn review_command(user: Option<&str>) -> String {
 fn user_name() -> Option<String> {
     let mut names = ["USER", "USERNAME"].into_iter();
     names.find_map(|name| std::env::var(name).ok())
-}
-
-/// Returns Vietnamese if the locale is Vietnamese. Otherwise, the browser decides.
-fn language_of_system() -> Option<Language> {
-    let names = ["LC_ALL", "LC_MESSAGES", "LANG"];
-    let set = names.iter().filter_map(|name| std::env::var(name).ok());
-    let mut set = set.filter(|value| !value.is_empty());
-    let locale = set.next()?;
-    locale.starts_with("vi").then_some(Language::Vietnamese)
 }
 
 #[cfg(test)]

@@ -1,27 +1,20 @@
 //! `run`: aligns the pairs that are not aligned yet and reports the outcome.
 
-use std::time::Duration;
-
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 
-use super::closing::close;
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
-use crate::cli::input::select;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
-use crate::cli::output::failures::Failures;
 use crate::cli::output::missing_results;
-use crate::cli::output::progress::ProgressReporter;
-use mocban_catalog::{Catalog, RerunPolicy};
+use crate::cli::output::terminal::Terminal;
+use mocban_catalog::RerunPolicy;
 use mocban_config::Config;
 use mocban_core::domain::Stage;
-use mocban_project::error_text;
-use mocban_project::exit::ExitCode;
-use mocban_project::location::now;
-use mocban_runner::{self as runner, RunOptions, RunPart, RunPlan, RunSummary, Stop};
-use mocban_store::Project;
+use mocban_project::run::{self, PreparedRun, RunOutcome};
+use mocban_project::{ExitCode, ProjectResult};
+use mocban_runner::{RunOptions, RunPart, RunPlan, RunSummary, Stop};
 
 /// Arguments of `run`.
 #[derive(Debug, Default, Args)]
@@ -66,7 +59,7 @@ pub(crate) fn rerun(text: &str) -> Result<RerunPolicy, String> {
     }
 }
 
-pub(crate) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn run(args: RunArgs, context: &Context) -> ProjectResult<ExitCode> {
     execute(args, RunPart::All, context).await
 }
 
@@ -75,42 +68,37 @@ pub(crate) async fn execute(
     args: RunArgs,
     part: RunPart,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
     let server = MetricsServer::bind(&args.metrics).await?;
-    let config = context.settings()?.config;
-    let (project, catalog) = match context.open_for_run().await {
-        Err(error) if args.dry_run && error_text::is_not_writable(&error) => {
-            context.warn("the project cannot be written to, so input files that changed since the last run are not noticed");
-            context.open_read_only().await?
-        }
-        opened => opened?,
-    };
-    let options = options(&args, &config, &catalog, part).await?;
+    let options = options(&args, &context.location.settings()?.config, part);
+    let (names, location) = (&args.names, &context.location);
+    let metrics = options.metrics.clone();
+    let terminal = Terminal::new(context);
+    let prepared = PreparedRun::new(names, options, args.dry_run, location, &terminal).await?;
     if args.dry_run {
-        let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;
-        let running = runner::is_running(&project, &catalog, now()).await?;
-        catalog.close().await;
+        let (plan, running) = prepared.plan().await?;
         return print_plan(&plan, running, context);
     }
-    let serving = server.map(|server| server.serve(options.metrics.clone(), context));
-    let driven = drive(&project, catalog, &config, &options, context).await;
+    let serving = server.map(|server| server.serve(metrics, context));
+    let outcome = drive(prepared, context).await;
     drop(serving);
-    let (summary, failures) = driven?;
-    context.print_json(&as_json(&summary))?;
-    print_outcome(&summary, &failures, context);
-    let are_results_missing = missing_results::are_missing(&project, &summary.status.jobs);
-    if are_results_missing {
+    let outcome = outcome?;
+    let mut json = serde_json::to_value(&outcome.summary)?;
+    json["schema"] = json!(1);
+    context.print_json(&json)?;
+    print_outcome(&outcome, context);
+    if outcome.are_results_missing {
         context.warn(missing_results::TEXT);
         context.next(missing_results::NEXT);
     }
-    for command in next_steps(&summary, &failures, are_results_missing) {
+    for command in next_steps(&outcome) {
         let command = match (part, command.as_str()) {
             (RunPart::Work, "run") => "worker",
             (_, command) => command,
         };
         context.next(command);
     }
-    Ok(code(&summary))
+    Ok(code(&outcome.summary))
 }
 
 /// Parses a number of bytes with an optional unit: 4G, 512M, 900K.
@@ -129,81 +117,31 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
         .ok_or_else(|| "a size is a whole number with K, M, G or T, such as 4G".to_owned())
 }
 
-pub(crate) async fn options(
-    args: &RunArgs,
-    config: &Config,
-    catalog: &Catalog,
-    part: RunPart,
-) -> anyhow::Result<RunOptions> {
-    let only = match args.names.as_slice() {
-        [] => None,
-        typed => Some(select::pairs_and_blocks(catalog, typed).await?),
-    };
-    let plain = from_config(config);
-    Ok(RunOptions {
+/// Returns the options of a run from the arguments and the settings.
+pub(crate) fn options(args: &RunArgs, config: &Config, part: RunPart) -> RunOptions {
+    let plain = run::options(config);
+    RunOptions {
         workers: args.jobs.map_or(plain.workers, usize::from),
         memory: args.memory.or(plain.memory),
         part,
         join: args.join,
         max_failures: args.max_failures,
-        only,
         rerun: match (args.rerun, args.stage) {
             (Some(RerunPolicy::All(_)), Some(stage)) => RerunPolicy::All(stage),
             (rerun, _) => rerun.unwrap_or(plain.rerun),
         },
         until: args.stage.unwrap_or(plain.until),
         ..plain
-    })
-}
-
-/// Returns the options of a run of all pairs, from the settings alone.
-pub(crate) fn from_config(config: &Config) -> RunOptions {
-    let plain = RunOptions::default();
-    RunOptions {
-        workers: match config.run.workers {
-            0 => plain.workers,
-            workers => workers,
-        },
-        memory: match config.run.memory_mib {
-            0 => runner::default_memory_limit(),
-            mib => Some(mib << 20),
-        },
-        stage_timeout: Duration::from_secs(config.run.stage_timeout_s),
-        mesh_limits: config.limits.mesh,
-        image_limits: config.limits.image,
-        ..plain
     }
 }
 
-/// Runs the pairs, shows the progress on stderr and handles signals. Finally closes the catalog.
-pub(crate) async fn drive(
-    project: &Project,
-    catalog: Catalog,
-    config: &Config,
-    options: &RunOptions,
-    context: &Context,
-) -> anyhow::Result<(RunSummary, Failures)> {
+/// Runs the pairs, shows the progress on stderr and handles signals.
+pub(crate) async fn drive(prepared: PreparedRun, context: &Context) -> ProjectResult<RunOutcome> {
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
-    let global = &context.global;
-    let (screen, palette) = (&context.screen, context.stderr);
-    let mut progress = ProgressReporter::new(global.progress, global.quiet, screen, palette);
-    let ended = runner::run(project, &catalog, &config.stages, options, &stop, |event| {
-        progress.event(&event);
-    })
-    .await;
-    progress.end();
-    // After an error, the catalog may not reply any more.
-    let ended = match ended {
-        Ok(summary) => {
-            let failures = Failures::read(&catalog, false).await;
-            failures.map(|failures| (summary, failures))
-        }
-        Err(error) => Err(error.into()),
-    };
-    close(catalog, &stop).await;
+    let outcome = prepared.run(&stop, &Terminal::of_run(context)).await;
     watch.abort();
-    ended
+    outcome
 }
 
 /// Returns the exit code of a run.
@@ -220,28 +158,17 @@ pub(crate) const fn code(summary: &RunSummary) -> ExitCode {
     }
 }
 
-fn as_json(summary: &RunSummary) -> Value {
-    json!({
-        "schema": 1,
-        "done": summary.done,
-        "failed": summary.failed,
-        "failed_in_all": summary.failed_in_all,
-        "left": summary.left,
-        "blocks": summary.blocks,
-        "stages": summary.stages,
-        "stopped": summary.stopped,
-        "too_many_failures": summary.too_many_failures,
-        "elapsed_ms": summary.elapsed_ms,
-        "status": summary.status,
-    })
-}
-
-fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
+fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> ProjectResult<ExitCode> {
     let (blocks, plan) = (&plan.blocks, &plan.pairs);
     let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan, "blocks": blocks});
     context.print(&json, || {
         plan_text(plan, running) + &block_plan_text(blocks)
     })?;
+    if plan.changes_method() {
+        context.info(
+            "the results of the other method would be replaced; to keep both, import the pairs into a second project, and compare the two with `report --compare`",
+        );
+    }
     if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
         context.next("run");
     }

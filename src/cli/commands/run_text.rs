@@ -1,25 +1,29 @@
 //! Text about a run: how it ended, what to do next, and what would run.
 
 use super::review::review_step;
+use crate::cli::output::block_status::failed_blocks_text;
 use crate::cli::output::context::Context;
-use crate::cli::output::failures::Failures;
+use crate::cli::output::failures::failures_text;
 use crate::cli::output::table::{columns, count, pairs_and_blocks};
 use mocban_catalog::{BlockPlanEntry, Plan};
 use mocban_core::domain::JobStatus;
+use mocban_project::run::RunOutcome;
 use mocban_project::shell::shell_quoted;
-use mocban_project::time_text::duration;
 use mocban_runner::{BlockSummary, RunSummary};
+use mocban_system::time_text::duration;
 
 /// Prints how a run ended and which pairs failed.
-pub(crate) fn print_outcome(summary: &RunSummary, failures: &Failures, context: &Context) {
+pub(crate) fn print_outcome(outcome: &RunOutcome, context: &Context) {
+    let (summary, failures) = (&outcome.summary, &outcome.failures);
     context.info(&headline(summary));
     if summary.failed_in_all > 0 {
         let number = count(summary.failed_in_all, "pair");
-        context.info(&format!("{number} failed:\n{}", failures.text().trim_end()));
+        let text = failures_text(failures, false);
+        context.info(&format!("{number} failed:\n{}", text.trim_end()));
     }
     if summary.blocks.failed_in_all > 0 {
         let number = count(summary.blocks.failed_in_all, "block");
-        let text = failures.blocks.failures_text();
+        let text = failed_blocks_text(&failures.blocks, false);
         context.info(&format!("{number} failed:\n{}", text.trim_end()));
     }
 }
@@ -64,25 +68,26 @@ fn pair_headline(summary: &RunSummary) -> String {
 }
 
 /// Returns the commands that make sense after a run.
-pub(crate) fn next_steps(
-    summary: &RunSummary,
-    failures: &Failures,
-    are_results_missing: bool,
-) -> Vec<String> {
+pub(crate) fn next_steps(outcome: &RunOutcome) -> Vec<String> {
+    let RunOutcome {
+        summary,
+        failures,
+        are_results_missing,
+    } = outcome;
     let mut steps = Vec::new();
     if summary.status.pairs == 0 && failures.blocks.is_empty() {
         steps.push("import pairs.csv".to_owned());
     }
     let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
     if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) + summary.blocks.left > 0
-        || are_results_missing
+        || *are_results_missing
     {
         steps.push("run".to_owned());
     }
     if let Some(first) = failures.blocks.first_failed() {
         steps.push(format!("show {}", shell_quoted(&first)));
     }
-    if let Some(first) = failures.first().filter(|_| summary.failed_in_all > 0) {
+    if let Some(first) = failures.pairs.first().filter(|_| summary.failed_in_all > 0) {
         steps.push(format!("show {}", shell_quoted(first.name.as_str())));
         if failures.may_succeed_unchanged() {
             steps.push("retry".to_owned());

@@ -1,73 +1,64 @@
 //! `show PAIR`: prints numbers, files, history, and why the pair will run again.
 
-use std::collections::BTreeSet;
-
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::show_block::show_block;
 use super::verdict;
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
-use crate::cli::output::failures::may_succeed_unchanged;
+use crate::cli::output::pair_table::pair_table as table_text;
 use crate::cli::output::screen::{Palette, Tone};
-use crate::cli::output::show_text::{Adjustment, ManualResult, PairPage, manual_text};
+use crate::cli::output::show_text::{PairPage, manual_text};
 use crate::cli::output::streams;
-use mocban_catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
-use mocban_core::domain::{
-    DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
-};
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_catalog::{Catalog, PairDetail, PlanEntry};
+use mocban_core::domain::{JobStatus, MetricOutcome, PairName, ThresholdMetric};
+use mocban_project::details::{self, Details, PairOverview};
+use mocban_project::failures::may_succeed_unchanged;
+use mocban_project::pair_table::{self, PairChoice};
 use mocban_project::shell::shell_quoted;
-use mocban_project::time_text::local;
-use mocban_report::ManualCorrection;
-use mocban_runner::{self as runner, NamedWork};
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_store::Project;
+use mocban_system::time_text::local;
 
 /// Arguments of `show`.
 #[derive(Debug, Args)]
 pub(crate) struct ShowArgs {
     /// The pair or block; without it, the names of all pairs and blocks are listed
     pub(crate) name: Option<String>,
+    /// A table of the pairs of low confidence, the least confident first
+    #[arg(long, conflicts_with = "name")]
+    pub(crate) low: bool,
 }
 
-pub(crate) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.open_read_only().await?;
-    let Some(typed) = args.name else {
+pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let (project, catalog) = context.location.open_read_only().await?;
+    if args.low {
+        return show_low(&catalog, context).await;
+    }
+    let Some(id) = args.name else {
         return list_names(&catalog, context).await;
     };
-    let typed = std::slice::from_ref(&typed);
-    let NamedWork { pairs, blocks } = select::pairs_and_blocks(&catalog, typed).await?;
-    let (pair, block) = (pairs.into_iter().next(), blocks.into_iter().next());
-    let name = match (pair, block) {
-        (_, Some(block)) => return show_block(&block, &project, catalog, context).await,
-        (Some(pair), None) => pair,
-        (None, None) => anyhow::bail!("{} was not looked up", typed[0]),
-    };
-    let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
-    let why = catalog.why(&name, &fingerprints).await?;
-    let Some(detail) = catalog.pair(&name).await? else {
-        if catalog.retired_pairs().await?.contains(&name) {
-            let text = format!(
-                "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
-            );
-            return Err(Refusal::NothingSelected(text).into());
-        }
-        anyhow::bail!("pair {name} was removed while it was read");
-    };
-    let manual = manual_results(&catalog, &detail.results).await?;
+    let details = details::read(&id, &catalog, &context.location).await?;
     catalog.close().await;
-    let (detail, palette) = (&detail, context.stdout);
+    let pair = match details {
+        Details::Pair(pair) => pair,
+        Details::Block(block, characters) => {
+            show_block(&block, &characters, &project, context)?;
+            return Ok(ExitCode::Done);
+        }
+    };
+    let (detail, palette) = (&pair.detail, context.stdout);
+    let next_run = pair.next_run.as_ref();
     let page = PairPage {
         detail,
         project: &project,
         palette,
     };
-    context.print(&as_json(detail, &manual, why.as_ref(), &project)?, || {
-        let tail = tail(detail, why.as_ref(), palette);
-        [page.text(), manual_text(&manual, palette), tail].concat()
+    context.print(&as_json(&pair, &project)?, || {
+        let tail = tail(detail, next_run, palette);
+        [page.text(), manual_text(&pair.manual, palette), tail].concat()
     })?;
-    for command in next_steps(detail, why.is_some()) {
+    for command in next_steps(detail, next_run.is_some()) {
         context.next(&command);
     }
     Ok(ExitCode::Done)
@@ -77,10 +68,8 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
 const NAMES_AT_ONCE: usize = 1000;
 
 /// Prints the names of all blocks and pairs, one per line. Retired pairs are left out.
-async fn list_names(catalog: &Catalog, context: &Context) -> anyhow::Result<ExitCode> {
-    let (blocks, mut pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
-    let retired: BTreeSet<PairName> = catalog.retired_pairs().await?.into_iter().collect();
-    pairs.retain(|pair| !retired.contains(pair));
+async fn list_names(catalog: &Catalog, context: &Context) -> ProjectResult<ExitCode> {
+    let (blocks, pairs) = details::names(catalog).await?;
     if context.global.json {
         streams::print_json(&json!({"schema": 1, "blocks": blocks, "pairs": pairs}))?;
         return Ok(ExitCode::Done);
@@ -91,6 +80,25 @@ async fn list_names(catalog: &Catalog, context: &Context) -> anyhow::Result<Exit
     for chunk in pairs.chunks(NAMES_AT_ONCE) {
         let names: Vec<&str> = chunk.iter().map(PairName::as_str).collect();
         streams::print(&names.join("\n"))?;
+    }
+    Ok(ExitCode::Done)
+}
+
+/// Prints a table of the pairs of low confidence.
+async fn show_low(catalog: &Catalog, context: &Context) -> ProjectResult<ExitCode> {
+    let rows = pair_table::read(catalog, PairChoice::LowConfidence).await?;
+    let (limit, metric) = (MetricOutcome::LOW_CONFIDENCE, ThresholdMetric::DEFAULT);
+    if context.global.json {
+        streams::print_json(
+            &json!({"schema": 1, "below": limit, "metric": metric, "pairs": rows}),
+        )?;
+    } else if rows.is_empty() {
+        context.info(&format!(
+            "no pair has a confidence below {limit} ({metric})"
+        ));
+    } else {
+        streams::print(&table_text(&rows, context.stdout))?;
+        context.next("contact-sheet --order confidence");
     }
     Ok(ExitCode::Done)
 }
@@ -142,14 +150,10 @@ fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
 }
 
 /// Returns the pair's record as JSON. Adds the artifact paths, manual alignments and what the next run would do.
-fn as_json(
-    detail: &PairDetail,
-    manual: &[ManualResult],
-    why: Option<&PlanEntry>,
-    project: &Project,
-) -> anyhow::Result<Value> {
-    let mut value = serde_json::to_value(detail)?;
-    let files = detail
+fn as_json(pair: &PairOverview, project: &Project) -> ProjectResult<Value> {
+    let mut value = serde_json::to_value(&pair.detail)?;
+    let files = pair
+        .detail
         .results
         .stages
         .iter()
@@ -159,42 +163,8 @@ fn as_json(
         (role.clone(), json!(path.to_string_lossy()))
     });
     value["files"] = paths.collect::<serde_json::Map<_, _>>().into();
-    value["manual_alignments"] = serde_json::to_value(manual)?;
-    value["next_run"] = serde_json::to_value(why)?;
+    value["manual_alignments"] = serde_json::to_value(&pair.manual)?;
+    value["next_run"] = serde_json::to_value(&pair.next_run)?;
     value["schema"] = json!(1);
     Ok(value)
-}
-
-/// Reads a pair's manual alignments, oldest first. Skips alignments that were undone.
-async fn manual_results(
-    catalog: &Catalog,
-    results: &PairResults,
-) -> Result<Vec<ManualResult>, CatalogError> {
-    let all = catalog.manual_alignments().await?.into_iter();
-    let name = &results.attributes.name;
-    let of_pair = all.filter(|stored| stored.made.pair == *name && stored.undone_at.is_none());
-    let with_adjustment = of_pair.map(|stored| ManualResult {
-        adjustment: adjustment(&stored, results),
-        stored,
-    });
-    Ok(with_adjustment.collect())
-}
-
-fn adjustment(manual: &StoredAlignment, results: &PairResults) -> Option<Adjustment> {
-    let automatic = automatic_result(results).filter(|_| manual.on_current_depth)?;
-    let depth: DepthOutcome = results.stage(Stage::Depth)?.parse().ok()?;
-    let (from, to) = (&automatic.print_from_depth, &manual.made.print_from_depth);
-    Some(Adjustment {
-        from: automatic.metric,
-        by: ManualCorrection::between(from, to, [depth.width, depth.height])?,
-        from_iou: automatic.scores.iou,
-    })
-}
-
-/// Returns the automatic result that manual alignments are compared with: the ensemble's, or else the first metric's.
-fn automatic_result(results: &PairResults) -> Option<&MetricOutcome> {
-    let ensemble = results.metric(ThresholdMetric::Ensemble);
-    ensemble
-        .or(results.metrics.first())
-        .map(|record| &record.outcome)
 }

@@ -5,37 +5,33 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use crate::cli::output::context::Context;
+use crate::cli::output::digits::significant;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::show_text::state_name;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
-use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
-use mocban_project::exit::ExitCode;
+use mocban_core::domain::{BlockCharacterState, BlockStage, JobStatus, one_line};
+use mocban_project::ProjectResult;
 use mocban_project::shell::shell_quoted;
-use mocban_project::time_text::{duration, local};
 use mocban_store::Project;
+use mocban_system::time_text::{duration, local};
 
 /// Number of characters that are listed of each kind.
 const MAX_CHARACTERS: usize = 20;
 
+/// Significant digits of numbers that are not whole.
+const DIGITS: i32 = 4;
+
 /// Shows a block.
-///
-/// # Errors
-/// Returns an error if a database operation fails or the block is gone.
-pub(crate) async fn show_block(
-    name: &BlockName,
+pub(crate) fn show_block(
+    detail: &BlockDetail,
+    characters: &[StoredCharacter],
     project: &Project,
-    catalog: Catalog,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
-    let Some(detail) = catalog.block(name).await? else {
-        anyhow::bail!("block {name} was removed while it was read");
-    };
-    let characters = catalog.block_characters(name).await?;
-    catalog.close().await;
-    let json = as_json(&detail, &characters, project)?;
-    context.print(&json, || text(&detail, &characters, context.stdout))?;
-    let quoted = shell_quoted(name.as_str());
+) -> ProjectResult<()> {
+    let json = as_json(detail, characters, project)?;
+    context.print(&json, || text(detail, characters, context.stdout))?;
+    let quoted = shell_quoted(detail.state.attributes.name.as_str());
     let failure = detail.state.failure.as_ref();
     match detail.state.status {
         // Control points may help.
@@ -47,14 +43,14 @@ pub(crate) async fn show_block(
         JobStatus::Ready | JobStatus::Backoff => context.next("run"),
         JobStatus::Done => {}
     }
-    Ok(ExitCode::Done)
+    Ok(())
 }
 
 fn as_json(
     detail: &BlockDetail,
     characters: &[StoredCharacter],
     project: &Project,
-) -> anyhow::Result<Value> {
+) -> ProjectResult<Value> {
     let mut value = serde_json::to_value(detail)?;
     value["schema"] = json!(1);
     value["character_list"] = serde_json::to_value(characters)?;
@@ -139,7 +135,9 @@ fn numbers(outcome: &Value) -> String {
         let name = name.replace('_', " ");
         match value {
             Value::Number(number) => Some(match number.as_f64() {
-                Some(real) if !number.is_u64() && !number.is_i64() => format!("{name} {real:.3}"),
+                Some(real) if !number.is_u64() && !number.is_i64() => {
+                    format!("{name} {}", significant(real, DIGITS))
+                }
                 _ => format!("{name} {number}"),
             }),
             Value::Bool(flag) => Some(format!("{name} {flag}")),
@@ -231,7 +229,7 @@ mod tests {
             json!({ "agreement": 0.93456, "windows": 120, "grid": [1, 2], "side": "front" });
         assert_eq!(
             numbers(&outcome),
-            "agreement 0.935, side front, windows 120"
+            "agreement 0.9346, side front, windows 120"
         );
     }
 }

@@ -7,25 +7,31 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use super::closing::{AFTER_SILENCE, close_within};
 use super::review::review_step;
-use super::status_hosts;
+use super::status_hosts::table_text;
+use crate::cli::output::block_status::{blocks_line, failed_blocks_text};
 use crate::cli::output::context::Context;
-use crate::cli::output::failures::Failures;
+use crate::cli::output::failures::failures_text;
 use crate::cli::output::missing_results;
+use crate::cli::output::pair_table::pair_table as pair_table_text;
 use crate::cli::output::screen::{Palette, Tone, clear_code};
 use crate::cli::output::streams;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{Catalog, StageCounts, StatusCounts};
 use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
-use mocban_project::exit::ExitCode;
+use mocban_project::closing::{AFTER_SILENCE, close_within};
+use mocban_project::hosts::WorkerTable;
 use mocban_project::location::now;
+use mocban_project::pair_table::{self, PairChoice, PairRow};
 use mocban_project::shell::shell_quoted;
-use mocban_runner::{self as runner, Stop};
+use mocban_project::status::ProjectStatus;
+use mocban_project::{ExitCode, ProjectResult};
+use mocban_runner::Stop;
 use mocban_store::Project;
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(crate) struct StatusArgs {
     /// Refresh every two seconds until Ctrl-C
     #[arg(short, long)]
@@ -33,15 +39,18 @@ pub(crate) struct StatusArgs {
     /// List every failed pair with its error, not only the first ones of each class
     #[arg(long)]
     pub(crate) failed: bool,
+    /// Add a table of all pairs: state, alignment, confidence and verdict
+    #[arg(long, conflicts_with = "watch")]
+    pub(crate) pairs: bool,
     /// Show the workers of each machine instead: what they have done, how long each stage takes, and what they wait for
-    #[arg(long, conflicts_with = "failed")]
+    #[arg(long, conflicts_with_all = ["failed", "pairs"])]
     pub(crate) hosts: bool,
 }
 
 const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 
-pub(crate) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.open_read_only().await?;
+pub(crate) async fn status(args: StatusArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let (project, catalog) = context.location.open_read_only().await?;
     if !args.watch {
         print_once(&project, &catalog, &args, context).await?;
         catalog.close().await;
@@ -54,7 +63,7 @@ pub(crate) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
         }
     };
     // Also ends a read to which the database server does not reply.
-    let ended: anyhow::Result<Infallible> = tokio::select! {
+    let ended: ProjectResult<Infallible> = tokio::select! {
         ended = watching => ended,
         _ = tokio::signal::ctrl_c() => {
             close_within(catalog, &Stop::new(), AFTER_SILENCE).await;
@@ -70,90 +79,38 @@ async fn print_once(
     catalog: &Catalog,
     args: &StatusArgs,
     context: &Context,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     if args.hosts {
-        let workers = status_hosts::read(catalog, now()).await?;
-        let (json, text) = (workers.json(), workers.text(context.stdout));
+        let workers = WorkerTable::read(catalog, now()).await?;
+        let (json, text) = (workers.json(), table_text(&workers, context.stdout));
         print_refreshed(args, context, &json, text)?;
     } else {
-        print_status(&read(project, catalog, args, context).await?, args, context)?;
+        let status = ProjectStatus::read(project, catalog, args.failed, &context.location).await?;
+        let pairs = if args.pairs {
+            Some(pair_table::read(catalog, PairChoice::All).await?)
+        } else {
+            None
+        };
+        print_status(&status, pairs.as_deref(), args, context)?;
     }
     Ok(())
 }
 
-async fn read(
-    project: &Project,
-    catalog: &Catalog,
-    args: &StatusArgs,
-    context: &Context,
-) -> anyhow::Result<ProjectStatus> {
-    let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
-    // Read before the counts: a run that ends in between leaves no leases.
-    let running = runner::is_running(project, catalog, now()).await?;
-    let failures = Failures::read(catalog, args.failed).await?;
-    let counts = catalog.status(&fingerprints).await?;
-    Ok(ProjectStatus {
-        are_results_missing: missing_results::are_missing(project, &counts.jobs),
-        counts,
-        running,
-        failures,
-    })
-}
-
-/// The state that the screen shows.
-struct ProjectStatus {
-    counts: StatusCounts,
-    /// Whether a process works on the project. If not, leased pairs count as interrupted, not as running.
-    running: bool,
-    failures: Failures,
-    /// Whether there are results, but none of their files.
-    are_results_missing: bool,
-}
-
-impl ProjectStatus {
-    fn jobs(&self, status: JobStatus) -> u64 {
-        self.counts.jobs.get(&status).copied().unwrap_or(0)
-    }
-
-    fn waiting(&self) -> u64 {
-        self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff)
-    }
-
-    /// Returns the number of pairs that a process is working on.
-    fn in_process(&self) -> u64 {
-        self.jobs(JobStatus::Leased) - self.interrupted()
-    }
-
-    /// Returns the number of leased pairs whose run died or ended with an error. The next run continues these pairs.
-    fn interrupted(&self) -> u64 {
-        u64::from(!self.running) * self.jobs(JobStatus::Leased)
-    }
-
-    fn json(&self, with_failures: bool) -> anyhow::Result<Value> {
-        let mut json = serde_json::to_value(&self.counts)?;
-        json["running"] = Value::from(self.running);
-        if !self.failures.blocks.is_empty() {
-            json["blocks"] = self.failures.blocks.json();
-        }
-        if with_failures {
-            json["failures"] = self.failures.json();
-        }
-        Ok(json)
-    }
-
-    fn failed(&self) -> u64 {
-        self.jobs(JobStatus::Quarantined)
-    }
-}
-
 fn print_status(
     status: &ProjectStatus,
+    pairs: Option<&[PairRow]>,
     args: &StatusArgs,
     context: &Context,
-) -> anyhow::Result<()> {
-    let dir = context.dir().display().to_string();
-    let text = screen(status, &dir, context.stdout);
-    print_refreshed(args, context, &status.json(args.failed)?, text)?;
+) -> ProjectResult<()> {
+    let dir = context.location.dir.display().to_string();
+    let mut text = screen(status, &dir, args.failed, context.stdout);
+    let mut json = status.json(args.failed)?;
+    if let Some(pairs) = pairs {
+        text.push('\n');
+        text.push_str(&pair_table_text(pairs, context.stdout));
+        json["pair_list"] = serde_json::to_value(pairs)?;
+    }
+    print_refreshed(args, context, &json, text)?;
     if !context.global.json {
         for command in next_steps(status) {
             context.next(&command);
@@ -168,7 +125,7 @@ fn print_refreshed(
     context: &Context,
     json: &Value,
     mut text: String,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     if context.global.json {
         if args.watch {
             streams::print_json_text(&json.to_string())?;
@@ -183,20 +140,20 @@ fn print_refreshed(
     Ok(streams::print(&text)?)
 }
 
-fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
+fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Palette) -> String {
     let line = |word: &str, text: &str| format!("{}  {text}\n", label(word, palette));
     let mut parts = vec![line("project", &headline(status, dir, palette))];
     if !status.failures.blocks.is_empty() {
         parts.push(line(
             "blocks",
-            &status.failures.blocks.line(status.running, palette),
+            &blocks_line(&status.failures.blocks, status.running, palette),
         ));
-        parts.push(status.failures.blocks.failures_text());
+        parts.push(failed_blocks_text(&status.failures.blocks, all));
     }
     parts.push(stage_table(&status.counts, palette));
     if status.failed() > 0 {
         parts.push(format!("{}\n", palette.paint(Tone::Strong, "failed")));
-        parts.push(status.failures.text());
+        parts.push(failures_text(&status.failures, all));
     }
     if status.interrupted() > 0 {
         let text = "their run ended before it finished them; the next run continues them";
@@ -206,6 +163,11 @@ fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
         let pairs = count(status.counts.stale, "pair");
         let text = format!("{pairs} computed with other settings or files than the current ones");
         parts.push(line("stale", &text));
+    }
+    if status.counts.retired > 0 {
+        let pairs = count(status.counts.retired, "pair");
+        let text = format!("{pairs} out of every count; results and verdicts are kept");
+        parts.push(line("retired", &text));
     }
     if status.are_results_missing {
         parts.push(line("files", missing_results::TEXT));
@@ -302,10 +264,11 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     if let Some(first) = status.failures.blocks.first_failed() {
         steps.push(format!("show {}", shell_quoted(&first)));
     }
-    if let Some(first) = status.failures.first() {
+    if let Some(first) = status.failures.pairs.first() {
         steps.push(format!("show {}", shell_quoted(first.name.as_str())));
     }
     if status.counts.low_confidence > 0 {
+        steps.push("show --low".to_owned());
         steps.push("contact-sheet --order confidence".to_owned());
     }
     if status.jobs(JobStatus::Done) > 0 && !running {
@@ -323,6 +286,7 @@ mod tests {
         JobStatus, Palette, ProjectStatus, Stage, StageCounts, StatusCounts, Verdict, next_steps,
         screen,
     };
+    use mocban_project::failures::Failures;
 
     fn status(done: u64, ready: u64) -> ProjectStatus {
         let stage = StageCounts {
@@ -334,6 +298,7 @@ mod tests {
             counts: StatusCounts {
                 schema: 1,
                 pairs: done + ready,
+                retired: 0,
                 jobs: [(JobStatus::Done, done), (JobStatus::Ready, ready)].into(),
                 stages: Stage::ALL.map(|name| (name, stage)).into(),
                 stale: 0,
@@ -341,7 +306,7 @@ mod tests {
                 verdicts: std::collections::BTreeMap::new(),
             },
             running: true,
-            failures: super::Failures::default(),
+            failures: Failures::default(),
             are_results_missing: false,
         }
     }
@@ -351,7 +316,7 @@ mod tests {
         let mut status = status(3, 0);
         status.counts.jobs.insert(JobStatus::Leased, 2);
         let headline = |status: &ProjectStatus| {
-            let text = screen(status, "demo", Palette::PLAIN);
+            let text = screen(status, "demo", false, Palette::PLAIN);
             text.lines().next().map(str::to_owned)
         };
         let expected = |word: &str| {
@@ -372,24 +337,28 @@ mod tests {
     fn screens_of_all_states() {
         let mut all = status(3, 1);
         all.counts.jobs.insert(JobStatus::Leased, 2);
-        insta::assert_snapshot!("running", screen(&all, "demo", Palette::PLAIN));
+        insta::assert_snapshot!("running", screen(&all, "demo", false, Palette::PLAIN));
         all.running = false;
         all.counts.stale = 1;
         all.counts.low_confidence = 2;
         all.counts.verdicts = [(Verdict::Pass, 4), (Verdict::Unsure, 1)].into();
-        insta::assert_snapshot!("interrupted", screen(&all, "demo", Palette::PLAIN));
+        insta::assert_snapshot!("interrupted", screen(&all, "demo", false, Palette::PLAIN));
         insta::assert_snapshot!("next_steps", next_steps(&all).join("\n"));
     }
 
     #[test]
     fn pairs_of_low_confidence_are_counted_with_the_command_that_draws_them() {
         let mut status = status(3, 0);
-        assert!(!screen(&status, "demo", Palette::PLAIN).contains("confidence"));
+        assert!(!screen(&status, "demo", false, Palette::PLAIN).contains("confidence"));
         status.counts.low_confidence = 1;
-        let text = screen(&status, "demo", Palette::PLAIN);
+        let text = screen(&status, "demo", false, Palette::PLAIN);
         let line = "confidence   1 done pair below 0.5 (ensemble)\n";
         assert!(text.ends_with(line), "{text}");
-        assert_eq!(next_steps(&status)[0], "contact-sheet --order confidence");
+        let steps = next_steps(&status);
+        assert_eq!(
+            steps[..2],
+            ["show --low", "contact-sheet --order confidence"]
+        );
     }
 
     #[test]
@@ -408,7 +377,7 @@ mod tests {
             next_steps(&done),
             [super::missing_results::NEXT, "run", "report"]
         );
-        let text = screen(&done, "demo", Palette::PLAIN);
+        let text = screen(&done, "demo", false, Palette::PLAIN);
         assert!(
             text.contains("files        the depth maps and masks"),
             "{text}"

@@ -1,143 +1,110 @@
 //! `status --hosts`: the workers of each machine, with what they have done and what they wait for.
 
-use std::collections::BTreeMap;
-
-use serde_json::{Value, json};
-
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::table::{columns, count};
-use crate::cli::output::worker_totals::{WorkerTotals, is_present};
-use mocban_catalog::{Catalog, WorkerRecord, WorkerState};
-use mocban_core::domain::UnixMillis;
-use mocban_project::time_text::rough_duration;
+use mocban_catalog::{WorkerRecord, WorkerState};
+use mocban_core::domain::{Stage, WaitReason};
+use mocban_project::hosts::WorkerTable;
+use mocban_project::worker_totals::{WorkerTotals, is_present};
+use mocban_system::time_text::rough_duration;
 
-/// Workers without a heartbeat for longer are not shown, in milliseconds.
-const SHOWN_MS: i64 = 24 * 3_600_000;
-
-/// The workers of one day.
-pub(crate) struct WorkerTable {
-    now: UnixMillis,
-    hosts: BTreeMap<String, Vec<WorkerRecord>>,
+/// Returns the hosts with their workers and sums as a table.
+pub(crate) fn table_text(table: &WorkerTable, palette: Palette) -> String {
+    if table.hosts.is_empty() {
+        return "no worker has been seen in the last 24 hours\n".to_owned();
+    }
+    let strong = |text: &str| palette.paint(Tone::Strong, text);
+    let head = [
+        "host, pid",
+        "version",
+        "state",
+        "running",
+        "heartbeat",
+        "done",
+        "failed",
+        "fit",
+        "depth",
+        "normalize",
+        "register",
+        "database",
+        "files",
+        "memory",
+    ];
+    let mut rows = vec![head.map(strong).to_vec()];
+    for (host, workers) in &table.hosts {
+        let present = workers
+            .iter()
+            .filter(|one| is_present(one.state(table.now)));
+        let state = format!("{} of {} alive", present.count(), workers.len());
+        let start = [strong(host), String::new(), state];
+        let blank = [const { String::new() }; 2];
+        let cells = cells(&WorkerTotals::of(workers, table.now));
+        rows.push([&start[..], &blank, &cells].concat());
+        rows.extend(
+            workers
+                .iter()
+                .map(|worker| worker_row(table, worker, palette)),
+        );
+    }
+    let number: usize = table.hosts.values().map(Vec::len).sum();
+    let (hosts, workers) = (table.hosts.len() as u64, number as u64);
+    format!(
+        "{}{} on {}; stages: mean ms of a pair; database, files: share of the time waited for them; memory: peak\n",
+        columns(rows, "<<<>>>>>>>>>>>"),
+        count(workers, "worker"),
+        count(hosts, "host"),
+    )
 }
 
-/// Reads the workers that had a heartbeat within a day.
-pub(crate) async fn read(catalog: &Catalog, now: UnixMillis) -> anyhow::Result<WorkerTable> {
-    let workers = catalog.workers(now - SHOWN_MS).await?;
-    Ok(WorkerTable::new(workers, now))
+fn worker_row(table: &WorkerTable, worker: &WorkerRecord, palette: Palette) -> Vec<String> {
+    let state = worker.state(table.now);
+    let tone = match state {
+        WorkerState::Alive => Tone::Good,
+        WorkerState::Stopping => Tone::Warn,
+        WorkerState::Gone => Tone::Bad,
+        WorkerState::Ended => Tone::Faint,
+    };
+    let version = worker.metrics.as_ref().map(|one| one.version.clone());
+    let last = match state {
+        WorkerState::Alive | WorkerState::Stopping => table.now,
+        WorkerState::Gone | WorkerState::Ended => worker.ended.unwrap_or(worker.heartbeat),
+    };
+    let running = (last - worker.started).max(0).unsigned_abs();
+    let start = [
+        format!("  {}", worker.pid),
+        version.unwrap_or_default(),
+        palette.paint(tone, state),
+        rough_duration(running),
+        format!("{} ago", rough_duration(table.age_ms(worker.heartbeat))),
+    ];
+    [&start[..], &cells(&WorkerTotals::of_one(worker))].concat()
 }
 
-impl WorkerTable {
-    fn new(workers: Vec<WorkerRecord>, now: UnixMillis) -> Self {
-        let mut hosts: BTreeMap<String, Vec<WorkerRecord>> = BTreeMap::new();
-        for worker in workers {
-            hosts.entry(worker.host.clone()).or_default().push(worker);
-        }
-        Self { now, hosts }
+/// Returns the cells of a row after the state.
+fn cells(totals: &WorkerTotals) -> Vec<String> {
+    let dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    let percent = |share: f64| format!("{:.1} %", share * 100.0);
+    let mut cells = vec![totals.done.to_string(), totals.failed.to_string()];
+    for stage in Stage::ALL {
+        let ms = totals.stage_ms(stage);
+        cells.push(dash(ms.map(|ms| format!("{ms:.1}"))));
     }
-
-    /// Returns the age of a time in milliseconds. A clock of another machine may be ahead.
-    fn age_ms(&self, time: UnixMillis) -> u64 {
-        (self.now - time).max(0).unsigned_abs()
+    for reasons in [
+        &[WaitReason::Database] as &[_],
+        &[WaitReason::Inputs, WaitReason::Artifacts],
+    ] {
+        cells.push(dash(totals.wait_share(reasons).map(percent)));
     }
-
-    /// Returns the hosts with their workers and sums as JSON.
-    pub(crate) fn json(&self) -> Value {
-        let hosts = self.hosts.iter().map(|(host, workers)| {
-            let rows: Vec<_> = workers.iter().map(|worker| self.worker(worker)).collect();
-            let total = WorkerTotals::of(workers, self.now).json();
-            json!({"host": host, "workers": rows, "total": total})
-        });
-        let all = WorkerTotals::of(self.hosts.values().flatten(), self.now).json();
-        json!({"schema": 1, "hosts": hosts.collect::<Vec<_>>(), "total": all})
-    }
-
-    fn worker(&self, worker: &WorkerRecord) -> Value {
-        let version = worker.metrics.as_ref().map(|metrics| &metrics.version);
-        let mut object = json!({
-            "id": worker.id.0,
-            "pid": worker.pid,
-            "version": version,
-            "state": worker.state(self.now).name(),
-            "since": worker.started,
-            "heartbeat_age_ms": self.age_ms(worker.heartbeat),
-        });
-        let totals = WorkerTotals::of_one(worker).json();
-        if let Value::Object(fields) = &mut object {
-            fields.extend(totals);
-        }
-        object
-    }
-
-    /// Returns the hosts with their workers and sums as a table.
-    pub(crate) fn text(&self, palette: Palette) -> String {
-        if self.hosts.is_empty() {
-            return "no worker has been seen in the last 24 hours\n".to_owned();
-        }
-        let strong = |text: &str| palette.paint(Tone::Strong, text);
-        let head = [
-            "host, pid",
-            "version",
-            "state",
-            "running",
-            "heartbeat",
-            "done",
-            "failed",
-            "fit",
-            "depth",
-            "normalize",
-            "register",
-            "database",
-            "files",
-            "memory",
-        ];
-        let mut rows = vec![head.map(strong).to_vec()];
-        for (host, workers) in &self.hosts {
-            let present = workers.iter().filter(|one| is_present(one.state(self.now)));
-            let state = format!("{} of {} alive", present.count(), workers.len());
-            let start = [strong(host), String::new(), state];
-            let blank = [const { String::new() }; 2];
-            let cells = WorkerTotals::of(workers, self.now).cells();
-            rows.push([&start[..], &blank, &cells].concat());
-            rows.extend(workers.iter().map(|worker| self.row(worker, palette)));
-        }
-        let number: usize = self.hosts.values().map(Vec::len).sum();
-        let (hosts, workers) = (self.hosts.len() as u64, number as u64);
-        format!(
-            "{}{} on {}; stages: mean ms of a pair; database, files: share of the time waited for them; memory: peak\n",
-            columns(rows, "<<<>>>>>>>>>>>"),
-            count(workers, "worker"),
-            count(hosts, "host"),
-        )
-    }
-
-    fn row(&self, worker: &WorkerRecord, palette: Palette) -> Vec<String> {
-        let state = worker.state(self.now);
-        let tone = match state {
-            WorkerState::Alive => Tone::Good,
-            WorkerState::Stopping => Tone::Warn,
-            WorkerState::Gone => Tone::Bad,
-            WorkerState::Ended => Tone::Faint,
-        };
-        let version = worker.metrics.as_ref().map(|one| one.version.clone());
-        let last = match state {
-            WorkerState::Alive | WorkerState::Stopping => self.now,
-            WorkerState::Gone | WorkerState::Ended => worker.ended.unwrap_or(worker.heartbeat),
-        };
-        let running = (last - worker.started).max(0).unsigned_abs();
-        let start = [
-            format!("  {}", worker.pid),
-            version.unwrap_or_default(),
-            palette.paint(tone, state),
-            rough_duration(running),
-            format!("{} ago", rough_duration(self.age_ms(worker.heartbeat))),
-        ];
-        [&start[..], &WorkerTotals::of_one(worker).cells()].concat()
-    }
+    let mib = totals
+        .peak_memory_bytes
+        .map(|bytes| format!("{} MiB", bytes >> 20));
+    cells.push(dash(mib));
+    cells
 }
 
 #[cfg(test)]
 mod tests {
-    use super::WorkerTable;
+    use super::{WorkerTable, table_text};
     use crate::cli::output::screen::Palette;
     use mocban_catalog::WorkerRecord;
     use mocban_core::domain::{ComputeTimes, Stage, WaitReason, WorkerId, WorkerMetrics};
@@ -209,7 +176,7 @@ mod tests {
 
     #[test]
     fn workers_are_grouped_by_host_with_sums() {
-        insta::assert_snapshot!(table().text(Palette::PLAIN));
+        insta::assert_snapshot!(table_text(&table(), Palette::PLAIN));
     }
 
     #[test]
@@ -248,7 +215,7 @@ mod tests {
     #[test]
     fn without_workers_the_table_says_so() {
         let table = WorkerTable::new(Vec::new(), NOW);
-        assert!(table.text(Palette::PLAIN).starts_with("no worker"));
+        assert!(table_text(&table, Palette::PLAIN).starts_with("no worker"));
         assert_eq!(table.json()["hosts"], serde_json::json!([]));
     }
 }

@@ -1,34 +1,30 @@
 //! `verdict`: people's verdicts on the results, in an append-only log.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::streams;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{
-    CatalogError, FaultyRow, ImportedVerdicts, InvalidVerdict, NewVerdict, ReviewContext, SetApart,
-    VerdictEvent, check_reviewer,
+    FaultyRow, ImportedVerdicts, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
+    check_reviewer,
 };
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
-use mocban_project::exit::{ExitCode, Refusal};
-use mocban_project::files::{self, RefusedLine};
-use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
-use mocban_project::time_text::{duration, local};
-use mocban_project::verdict_file::{self, VerdictList};
+use mocban_project::verdicts::{self, VerdictLog};
+use mocban_project::{ExitCode, ProjectResult};
+use mocban_system::time_text::{duration, local};
 
 /// Commands on verdicts.
 #[derive(Debug, Subcommand)]
 pub(crate) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(VerdictSetArgs),
-    /// Record the verdicts of a CSV file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
+    /// Record the verdicts of a CSV or XLSX file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
     /// of the verdicts.jsonl of an export
     Import(VerdictImportArgs),
     /// Print the log, oldest first
@@ -66,6 +62,9 @@ pub(crate) struct VerdictSetArgs {
 pub(crate) struct VerdictImportArgs {
     /// The file
     pub(crate) file: PathBuf,
+    /// Sheet of an XLSX file [default: the first one]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) sheet: Option<String>,
 }
 
 /// Arguments of `verdict log`.
@@ -98,10 +97,7 @@ fn angle(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(crate) async fn verdict(
-    command: VerdictCommand,
-    context: &Context,
-) -> anyhow::Result<ExitCode> {
+pub(crate) async fn verdict(command: VerdictCommand, context: &Context) -> ProjectResult<ExitCode> {
     match command {
         VerdictCommand::Set(args) => set(args, context).await,
         VerdictCommand::Import(args) => import(args, context).await,
@@ -110,29 +106,26 @@ pub(crate) async fn verdict(
     }
 }
 
-async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.open().await?;
-    let rights = catalog.review_rights().await?;
-    rights.require_verdicts(&args.reviewer)?;
-    let new = NewVerdict {
-        pair: select::pair(&catalog, &args.pair).await?,
+async fn set(args: VerdictSetArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let verdict = |pair| NewVerdict {
+        pair,
         metric: args.metric,
         verdict: args.verdict,
         reviewer: args.reviewer,
         reason: args.reason,
         note: args.note,
-        look: ReviewContext {
+        context: ReviewContext {
             angle_read_deg: args.angle,
             ..ReviewContext::default()
         },
         at: None,
     };
-    new.check(now())
-        .map_err(|error| Refusal::Usage(error.to_string()))?;
-    let (text, known) = (set_text(&new), known_text(&new));
-    let stored = catalog.verdict_set(vec![new], now()).await?;
-    catalog.close().await;
-    context.info(if stored == 0 { &known } else { &text });
+    let (new, is_new) = verdicts::record(&args.pair, verdict, &context.location).await?;
+    context.info(&if is_new {
+        set_text(&new)
+    } else {
+        format!("{} is already recorded", verdict_text(&new))
+    });
     Ok(ExitCode::Done)
 }
 
@@ -146,49 +139,23 @@ fn set_text(new: &NewVerdict) -> String {
     format!("{}; {undo} takes it back{one_only}", verdict_text(new))
 }
 
-/// Returns that a verdict was recorded before.
-fn known_text(new: &NewVerdict) -> String {
-    format!("{} is already recorded", verdict_text(new))
-}
-
 /// Returns `b01-0117, density: pass`.
 fn verdict_text(new: &NewVerdict) -> String {
     let metric = new.metric.map_or("all metrics", ThresholdMetric::name);
     format!("{}, {metric}: {}", new.pair, new.verdict)
 }
 
-async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let bytes = files::read(&args.file)?;
-    let (_project, catalog) = context.open().await?;
-    let refused = |error: RefusedLine| error.in_file(&args.file, "no verdict was recorded");
-    let is_jsonl = files::is_jsonl(&args.file, &bytes);
-    let list = VerdictList::new(bytes, is_jsonl).map_err(refused)?;
-    let (mut first_lines, mut reviewers) = (BTreeMap::new(), BTreeSet::new());
-    for row in list.rows() {
-        let row = row.map_err(refused)?;
-        verdict_file::check_values(&row, now()).map_err(refused)?;
-        let NewVerdict { pair, reviewer, .. } = row.listed.verdict;
-        first_lines.entry(pair).or_insert(row.line);
-        reviewers.insert(reviewer);
+async fn import(args: VerdictImportArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let sheet = args.sheet.as_deref();
+    let (imported, warning) = verdicts::import(&args.file, sheet, &context.location).await?;
+    if let Some(warning) = warning {
+        context.warn(&warning);
     }
-    let rights = catalog.review_rights().await?;
-    for reviewer in &reviewers {
-        rights.require_verdicts(reviewer)?;
-    }
-    let names: Vec<_> = first_lines.keys().cloned().collect();
-    let unknown = catalog.unknown_names(&names).await?;
-    verdict_file::refuse_unknown(&first_lines, &unknown).map_err(refused)?;
-    // All rows were valid in the first pass.
-    let rows = list.rows().map(|row| match row {
-        Ok(row) => Ok(row.listed),
-        Err(_) => Err(CatalogError::CutShort),
-    });
     let ImportedVerdicts {
         recorded: number,
         known,
         left_out,
-    } = catalog.import_verdicts(rows, now()).await?;
-    catalog.close().await;
+    } = imported;
     context.print_json(
         &json!({"schema": 1, "recorded": number, "left_out": left_out, "known": known}),
     )?;
@@ -206,19 +173,9 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.open_read_only().await?;
-    let pair = match &args.pair {
-        Some(typed) => Some(select::pair(&catalog, typed).await?),
-        None => None,
-    };
-    let (sound, mut damaged) = catalog.without_faulty_rows().await?;
-    let events = sound.verdict_log(pair.as_ref()).await?;
-    catalog.close().await;
-    if let Some(pair) = &pair {
-        damaged.retain(|row| row.pair.as_deref() == Some(pair.as_str()));
-    }
-    damaged.retain(|row| row.table.is_of_verdicts());
+async fn log(args: VerdictLogArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let log = verdicts::log(args.pair.as_deref(), &context.location).await?;
+    let VerdictLog { events, damaged } = log;
     context.warn_about_set_apart(&SetApart::of(&damaged));
     if context.global.json {
         for event in &events {
@@ -253,13 +210,8 @@ fn damaged_text(rows: &[FaultyRow], palette: Palette) -> String {
     rows.iter().map(line).collect()
 }
 
-async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.open().await?;
-    let rights = catalog.review_rights().await?;
-    let reviewer = args.reviewer.as_deref().or(rights.only_reviewer());
-    rights.require_review(reviewer)?;
-    let undone = catalog.verdict_undo(reviewer, now()).await?;
-    catalog.close().await;
+async fn undo(args: VerdictUndoArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let undone = verdicts::undo(args.reviewer.as_deref(), &context.location).await?;
     context.print_json(&json!({"schema": 1, "undone": undone}))?;
     for event in &undone {
         context.info(&format!(
@@ -294,16 +246,16 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         palette.paint(tone, event.verdict),
         event.reviewer.clone(),
         event.reason.map_or("", Reason::name).to_owned(),
-        view_text(&event.look),
+        view_text(&event.context),
         event.note.clone().unwrap_or_default(),
         state,
     ]
 }
 
 /// Formats how long the result was shown, and by how many degrees the reviewer would still rotate the relief.
-fn view_text(look: &ReviewContext) -> String {
-    let shown = look.shown_ms.map(duration);
-    let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
+fn view_text(context: &ReviewContext) -> String {
+    let shown = context.shown_ms.map(duration);
+    let angle = context.angle_read_deg.map(|angle| format!("{angle:+}°"));
     let parts: Vec<String> = shown.into_iter().chain(angle).collect();
     parts.join(" ")
 }

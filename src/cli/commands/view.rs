@@ -6,20 +6,22 @@ use clap::Args;
 use serde_json::json;
 
 use super::block_points::BlockPoints;
-use super::block_sheet;
 use crate::cli::input::browser::open;
-use crate::cli::input::select;
+use crate::cli::input::language::language_of_system;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
-use mocban_export::InputFileLimits;
 use mocban_export::scan_view::ScanView;
+use mocban_pages::review::Language;
 use mocban_pages::view::{self, ViewServer};
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::error::TaskStopped;
+use mocban_project::selection;
+use mocban_project::sheets::block_view;
 use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
 use mocban_store::Project;
 
@@ -34,30 +36,37 @@ pub(crate) struct ViewArgs {
     /// Port on this machine; 0 chooses the same port each time for a name, or any free port
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
+    /// Language of the page, en or vi [default: vi if LANG is Vietnamese, else that of the browser]
+    #[arg(long)]
+    lang: Option<Language>,
     /// Print the address without opening a browser
     #[arg(long)]
     no_open: bool,
 }
 
-pub(crate) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+impl ViewArgs {
+    /// Returns the language of the page. Without one, the browser decides.
+    fn language(&self) -> Option<Language> {
+        self.lang.or_else(language_of_system)
+    }
+}
+
+pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
-    let (project, catalog) = context.open_read_only().await?;
+    let (project, catalog) = context.location.open_read_only().await?;
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
-    if select::block(&catalog, &args.pair).await?.is_some() {
+    if selection::block(&catalog, &args.pair).await?.is_some() {
         let page = block_page(address, &args, &project, &catalog, context).await;
         catalog.close().await;
         return serve(page?, &args, context).await;
     }
-    let limits = context.settings()?.config.limits;
-    let limits = InputFileLimits {
-        mesh: limits.mesh,
-        image: limits.image,
-    };
-    let name = select::pair(&catalog, &args.pair).await?;
+    let limits = context.location.settings()?.config.limits;
+    let name = selection::pair(&catalog, &args.pair).await?;
     let detail = catalog.pair(&name).await?;
     catalog.close().await;
     let Some(pair) = detail.map(|detail| detail.results) else {
-        anyhow::bail!("pair {name} was removed while it was read");
+        let text = format!("pair {name} was removed while it was read");
+        return Err(ProjectError::unexpected(text));
     };
     let default = pair.metric(ThresholdMetric::DEFAULT);
     let default = default.or_else(|| pair.metrics.first());
@@ -65,7 +74,9 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<Ex
     let read = move |metric| ScanView::read(&project, &pair, metric, limits);
     let scan = match metric {
         None => None,
-        Some(metric) => tokio::task::spawn_blocking(move || read(metric)).await??,
+        Some(metric) => tokio::task::spawn_blocking(move || read(metric))
+            .await
+            .map_err(TaskStopped)??,
     };
     let Some(scan) = scan else {
         let of = args
@@ -75,7 +86,7 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<Ex
         let text = format!("pair {name} has no result{of} to show; see: {command}");
         return Err(Refusal::NothingSelected(text).into());
     };
-    let page = view::bind(address, name.as_str(), &scan).await?;
+    let page = view::bind(address, name.as_str(), &scan, args.language()).await?;
     serve(page, &args, context).await
 }
 
@@ -86,9 +97,10 @@ async fn block_page(
     project: &Project,
     catalog: &Catalog,
     context: &Context,
-) -> anyhow::Result<ViewServer> {
-    let name = select::existing_block(catalog, &args.pair).await?;
-    let view = match block_sheet::read(&args.pair, args.metric, project, catalog, context).await {
+) -> ProjectResult<ViewServer> {
+    let name = selection::existing_block(catalog, &args.pair).await?;
+    let view = match block_view(&args.pair, args.metric, project, catalog, &context.location).await
+    {
         Ok(view) => Some(view),
         Err(error) => {
             let Some(why) = refusal(catalog, &name).await? else {
@@ -100,11 +112,11 @@ async fn block_page(
         }
     };
     let store = BlockPoints::new(context, &name);
-    Ok(view::bind_block(address, &name, view, store).await?)
+    Ok(view::bind_block(address, &name, view, store, args.language()).await?)
 }
 
 /// Returns why the page of a block was refused, if it was.
-async fn refusal(catalog: &Catalog, name: &BlockName) -> anyhow::Result<Option<String>> {
+async fn refusal(catalog: &Catalog, name: &BlockName) -> ProjectResult<Option<String>> {
     let detail = catalog.block(name).await?;
     let failure = detail.and_then(|detail| detail.state.failure);
     let refused = failure.filter(|stored| {
@@ -114,7 +126,7 @@ async fn refusal(catalog: &Catalog, name: &BlockName) -> anyhow::Result<Option<S
 }
 
 /// Announces a page and serves it until the user ends it.
-async fn serve(page: ViewServer, args: &ViewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+async fn serve(page: ViewServer, args: &ViewArgs, context: &Context) -> ProjectResult<ExitCode> {
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
     let _file = announce(&page.url(), args, context)?;
@@ -132,7 +144,7 @@ fn announce(
     url: &str,
     args: &ViewArgs,
     context: &Context,
-) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
+) -> ProjectResult<Option<tempfile::NamedTempFile>> {
     if context.global.json {
         streams::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;
     } else {

@@ -3,16 +3,17 @@
 use clap::Args;
 use serde_json::json;
 
-use super::closing::close;
 use super::metrics::MetricsArgs;
 use super::run::{self, RunArgs};
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::pairs_and_blocks;
+use crate::cli::output::terminal::Terminal;
 use mocban_catalog::RerunPolicy;
 use mocban_core::domain::Stage;
-use mocban_project::exit::ExitCode;
-use mocban_runner::{self as runner, RunPart, Stop};
+use mocban_project::run::PreparedRun;
+use mocban_project::{ExitCode, ProjectResult};
+use mocban_runner::{RunPart, Stop};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -45,21 +46,21 @@ pub(crate) struct WorkerArgs {
     pub(crate) metrics: MetricsArgs,
 }
 
-pub(crate) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn plan(args: PlanArgs, context: &Context) -> ProjectResult<ExitCode> {
     let args = RunArgs {
         names: args.names,
         rerun: args.rerun,
         ..RunArgs::default()
     };
-    let config = context.settings()?.config;
-    let (project, catalog) = context.open_for_run().await?;
-    let options = run::options(&args, &config, &catalog, RunPart::Plan).await?;
+    let options = run::options(&args, &context.location.settings()?.config, RunPart::Plan);
+    let terminal = Terminal::new(context);
+    let (names, location) = (&args.names, &context.location);
+    let prepared = PreparedRun::new(names, options, false, location, &terminal).await?;
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
-    let planned = runner::run(&project, &catalog, &config.stages, &options, &stop, |_| {}).await;
-    close(catalog, &stop).await;
+    let planned = prepared.run(&stop, &()).await;
     watch.abort();
-    let planned = planned?;
+    let planned = planned?.summary;
     let blocks = planned.blocks.left;
     context.print_json(&json!({
         "schema": 1, "pairs": planned.left, "blocks": blocks, "status": planned.status,
@@ -72,7 +73,7 @@ pub(crate) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-pub(crate) async fn worker(args: WorkerArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn worker(args: WorkerArgs, context: &Context) -> ProjectResult<ExitCode> {
     let args = RunArgs {
         jobs: args.jobs,
         memory: args.memory,

@@ -3,10 +3,14 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 29] = [
+const EXAMPLES: [(&str, &str); 31] = [
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100\nmocban demo whole --block",
+    ),
+    (
+        "align",
+        "mocban align 0117.stl 0117.png\nmocban align 0117.stl 0117.png -o aligned",
     ),
     (
         "import",
@@ -26,10 +30,17 @@ const EXAMPLES: [(&str, &str); 29] = [
     ),
     (
         "status",
-        "mocban -C blocks status --watch\nmocban -C blocks status --hosts",
+        "mocban -C blocks status --watch\nmocban -C blocks status --pairs\nmocban -C blocks status --hosts",
     ),
-    ("show", "mocban -C blocks show b01-0117"),
+    (
+        "show",
+        "mocban -C blocks show b01-0117\nmocban -C blocks show --low",
+    ),
     ("retry", "mocban -C blocks retry --class io"),
+    (
+        "retire",
+        "mocban -C blocks retire b01-0117\nmocban -C blocks retire --undo b01-0117",
+    ),
     ("check", "mocban -C blocks check --repair"),
     ("backup", "mocban -C blocks backup blocks.sqlite"),
     (

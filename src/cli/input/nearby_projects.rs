@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mocban_core::domain::spelling::nearest;
-use mocban_project::input_paths::plain_letters;
+use mocban_core::domain::spelling::{nearest, plain_form};
 use mocban_store::CATALOG_FILE;
 
 /// Largest number of entries of a folder that are read.
@@ -25,9 +24,9 @@ pub(crate) fn nearby_projects(dir: &Path) -> Vec<PathBuf> {
         return Vec::new();
     };
     let beside = projects_in(dir.parent().unwrap_or(Path::new("")));
-    let name = |path: &Path| plain_letters(&path.file_name().unwrap_or_default().to_string_lossy());
+    let name = |path: &Path| plain_form(&path.file_name().unwrap_or_default().to_string_lossy());
     let names: Vec<String> = beside.iter().map(|path| name(path)).collect();
-    let typed = plain_letters(&typed.to_string_lossy());
+    let typed = plain_form(&typed.to_string_lossy());
     let similar = nearest(&typed, names.iter().map(String::as_str), MAX_SUGGESTED);
     // Two names may have the same plain letters.
     let found = similar.iter().flat_map(|similar| {

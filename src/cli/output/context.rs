@@ -3,28 +3,20 @@
 use std::ffi::OsString;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use serde::Serialize;
 use serde_json::json;
 
 use super::screen::{Palette, Screen, Tone};
 use super::streams;
-use super::table::count;
 use crate::cli::input::global::Global;
-use mocban_catalog::{Catalog, SetApart};
-use mocban_config::Loaded;
-use mocban_project::exit::ExitCode;
+use mocban_catalog::SetApart;
 use mocban_project::location::Location;
 use mocban_project::shell::shell_quoted;
-use mocban_runner as runner;
-use mocban_store::{Project, ProjectStorage};
+use mocban_project::{ExitCode, ProjectResult};
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).
 const MAX_LINE_CHARS: usize = 6000;
-
-/// Longest time for looking at the roots of inputs before a run.
-const ROOT_CHECK: Duration = Duration::from_secs(5);
 
 /// The global flags and the state derived from them.
 #[derive(Debug, Clone)]
@@ -70,41 +62,27 @@ impl Context {
         context
     }
 
-    /// Returns the project's directory, which need not exist.
-    pub(crate) fn dir(&self) -> PathBuf {
-        self.location.dir.clone()
-    }
-
-    /// Returns the settings in effect for this project.
-    pub(crate) fn settings(&self) -> anyhow::Result<Loaded> {
-        self.location.settings()
-    }
-
-    /// Opens the project and its catalog for reading; works during a run.
-    pub(crate) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
-        self.location.open_read_only().await
-    }
-
-    /// Opens the project and its catalog for reading and writing.
-    pub(crate) async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
-        self.location.open().await
-    }
-
     /// Writes a line to stderr, unless `-q` is given.
     pub(crate) fn info(&self, text: &str) {
         if !self.global.quiet {
+            self.screen.count_warnings();
             self.screen.line(&indented(text));
         }
     }
 
-    /// Writes a warning to stderr, also with `-q`.
+    /// Writes a warning to stderr, also with `-q`. Of equal ones, only the first few are written, unless `-v` is given.
     pub(crate) fn warn(&self, text: &str) {
-        let label = self.stderr.paint(Tone::Warn, "warning:");
-        self.screen.line(&format!("{label} {}", indented(text)));
+        let label = format!("{} ", self.stderr.paint(Tone::Warn, "warning:"));
+        if self.global.verbose > 0 {
+            self.screen.line(&format!("{label}{}", indented(text)));
+        } else {
+            self.screen.warning(&label, &indented(text));
+        }
     }
 
     /// Writes an error message to stderr, as text or, with `--json`, as a JSON object.
     pub(crate) fn error(&self, text: &str, code: ExitCode) {
+        self.screen.count_warnings();
         if self.global.json {
             let object = json!({"message_type": "exit_error", "code": code as u8, "message": text});
             self.screen.json_line(&object);
@@ -132,7 +110,7 @@ impl Context {
         &self,
         value: &impl Serialize,
         text: impl FnOnce() -> String,
-    ) -> anyhow::Result<()> {
+    ) -> ProjectResult<()> {
         if self.global.json {
             streams::print_json(value)
         } else {
@@ -141,54 +119,9 @@ impl Context {
     }
 
     /// Writes a JSON document to stdout with `--json`.
-    pub(crate) fn print_json(&self, value: &impl Serialize) -> anyhow::Result<()> {
+    pub(crate) fn print_json(&self, value: &impl Serialize) -> ProjectResult<()> {
         if self.global.json {
             streams::print_json(value)?;
-        }
-        Ok(())
-    }
-
-    /// Opens the project and its catalog for a run, and asks the object stores of the settings whether they answer. Warns
-    /// about roots of inputs that are not there.
-    pub(crate) async fn open_for_run(&self) -> anyhow::Result<(Project, Catalog)> {
-        let (project, catalog) = self.open().await?;
-        if project.storage().is_none() {
-            return Ok((project, catalog));
-        }
-        let checked = project.clone();
-        let check = move || checked.storage().map_or(Ok(()), ProjectStorage::check);
-        if let Err(error) = tokio::task::spawn_blocking(check).await? {
-            catalog.close().await;
-            return Err(error.into());
-        }
-        let checked = project.clone();
-        let find = move || {
-            checked
-                .storage()
-                .map_or_else(Vec::new, ProjectStorage::unusable_roots)
-        };
-        // The run needs a root only if one of its pairs does. A disk may hang.
-        let found = tokio::time::timeout(ROOT_CHECK, tokio::task::spawn_blocking(find)).await;
-        for root in found.into_iter().flatten().flatten() {
-            self.warn(&root.to_string());
-        }
-        Ok((project, catalog))
-    }
-
-    /// Warns about results that were computed with other settings or files than the current ones. Does nothing if the
-    /// settings are invalid.
-    pub(crate) async fn warn_about_stale(&self, catalog: &Catalog) -> anyhow::Result<()> {
-        let Ok(settings) = self.settings() else {
-            return Ok(());
-        };
-        let fingerprints = runner::fingerprints(&settings.config.stages);
-        let stale = catalog.count_stale(&fingerprints).await?;
-        if stale > 0 {
-            let pairs = count(stale, "pair");
-            let verb = if stale == 1 { "is" } else { "are" };
-            self.warn(&format!(
-                "{pairs} {verb} stale: computed with other settings or files than the current ones; `run` updates them"
-            ));
         }
         Ok(())
     }

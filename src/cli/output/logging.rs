@@ -4,18 +4,18 @@ use std::fs::OpenOptions;
 use std::io::IsTerminal as _;
 use std::sync::Mutex;
 
-use anyhow::Context as _;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
 use super::screen::{Palette, Screen};
 use crate::cli::input::global::{Global, LogFormat};
 use mocban_lists::manifest::is_named_like_input;
-use mocban_project::exit::Refusal;
-use mocban_project::files::refuse_project_file;
+use mocban_project::error::WithContext as _;
+use mocban_project::files::{create_parent, refuse_project_file};
+use mocban_project::{ProjectResult, Refusal};
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
-pub(crate) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
+pub(crate) fn start(global: &Global, screen: &Screen) -> ProjectResult<()> {
     let colours = Palette::choose(global.color, std::io::stderr().is_terminal());
     let (writer, to_file) = writer(global, screen, colours)?;
     let level = level(global.verbose, global.quiet, to_file);
@@ -36,12 +36,13 @@ fn writer(
     global: &Global,
     screen: &Screen,
     colours: Palette,
-) -> anyhow::Result<(BoxMakeWriter, bool)> {
+) -> ProjectResult<(BoxMakeWriter, bool)> {
     let Some(path) = &global.log_file else {
         let writer = LogWriter {
             screen: screen.clone(),
             format: global.log_format,
             colours,
+            counts_equal: global.verbose == 0,
         };
         return Ok((BoxMakeWriter::new(move || writer.clone()), false));
     };
@@ -54,6 +55,7 @@ fn writer(
         );
         return Err(Refusal::Usage(text).into());
     }
+    create_parent(path)?;
     let file = OpenOptions::new()
         .create(true)
         .append(true)
@@ -68,6 +70,8 @@ struct LogWriter {
     screen: Screen,
     format: LogFormat,
     colours: Palette,
+    /// Whether only the first of equal warnings is written.
+    counts_equal: bool,
 }
 
 impl std::io::Write for LogWriter {
@@ -76,6 +80,9 @@ impl std::io::Write for LogWriter {
         let text = String::from_utf8_lossy(bytes);
         let line = text.trim_end_matches('\n');
         match self.format {
+            LogFormat::Text if self.counts_equal && line.contains("WARN") => {
+                self.screen.log_warning(line);
+            }
             LogFormat::Text if self.colours.is_on() => self.screen.log_line(line),
             LogFormat::Text => self.screen.line(line),
             LogFormat::Json => self.screen.json_log_line(line),

@@ -3,7 +3,7 @@
 use std::backtrace::Backtrace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use mocban_project::exit::ExitCode;
+use mocban_project::ExitCode;
 
 /// Sends the message and backtrace of a panic to the log (`-v`, `--log-file`) instead of the terminal.
 pub(crate) fn log_only() {

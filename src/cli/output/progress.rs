@@ -11,8 +11,8 @@ use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
 use super::table::count;
 use crate::cli::input::global::ProgressMode;
 use mocban_core::domain::one_line;
-use mocban_project::time_text::duration;
 use mocban_runner::{RunEvent, StopLevel};
+use mocban_system::time_text::duration;
 
 /// Shows one run.
 #[derive(Debug)]
@@ -26,8 +26,15 @@ pub(crate) struct ProgressReporter {
 
 #[derive(Debug)]
 enum Display {
-    Bar(ProgressBar),
-    Plain { last: Instant, percent: u64 },
+    Bar {
+        bar: ProgressBar,
+        /// Whether the bar counts stages of blocks.
+        is_of_blocks: bool,
+    },
+    Plain {
+        last: Instant,
+        percent: u64,
+    },
     Json,
     None,
 }
@@ -54,16 +61,24 @@ impl ProgressReporter {
 
     /// Shows an event.
     pub(crate) fn event(&mut self, event: &RunEvent) {
+        let was_open = self.progress.blocks.is_open();
         self.progress.observe(event);
+        if was_open && !self.progress.blocks.is_open() {
+            // The time of blocks says nothing about that of pairs.
+            self.started = Instant::now();
+        }
         match &mut self.display {
             Display::None => return,
             Display::Json => {
                 self.screen.json_line(&json!(event));
                 return;
             }
-            Display::Bar(bar) => update_bar(bar, &self.progress),
+            Display::Bar { bar, is_of_blocks } => update_bar(bar, is_of_blocks, &self.progress),
             Display::Plain { last, percent } => {
-                let is_enough = self.progress.percent() >= *percent + PLAIN_PERCENT;
+                // Blocks and then pairs each begin at 0 %.
+                *percent = self.progress.percent().min(*percent);
+                let is_enough = self.progress.percent() >= *percent + PLAIN_PERCENT
+                    || matches!(event, RunEvent::BlockStageStarted { .. });
                 let since = last.elapsed();
                 if since >= PLAIN_INTERVAL || is_enough && since >= PLAIN_MIN_INTERVAL {
                     (*last, *percent) = (Instant::now(), self.progress.percent());
@@ -79,7 +94,7 @@ impl ProgressReporter {
 
     /// Removes the bar.
     pub(crate) fn end(self) {
-        if let Display::Bar(bar) = self.display {
+        if let Display::Bar { bar, .. } = self.display {
             bar.finish_and_clear();
         }
     }
@@ -99,31 +114,46 @@ fn display(mode: ProgressMode, quiet: bool, screen: &Screen, now: Instant) -> Di
     }
 }
 
-fn bar(screen: &Screen) -> Display {
-    // The bar is narrower than the terminal, so that the "^C" printed after it does not wrap.
-    let style = ProgressStyle::with_template(
-        "{msg}\n{bar:40} {percent:>3} %  {pos}/{len} stages  {per_sec}  {eta} left",
-    )
-    .unwrap_or_else(|_| ProgressStyle::default_bar())
-    .progress_chars("━╸─")
-    .with_key(
-        "per_sec",
-        |state: &ProgressState, to: &mut dyn std::fmt::Write| {
-            // Formatting into memory does not fail.
-            let _ = write!(to, "{:.1}/s", state.per_sec());
-        },
-    );
-    let bar = screen.add_bar(ProgressBar::new(0).with_style(style));
-    bar.enable_steady_tick(Duration::from_millis(250));
-    Display::Bar(bar)
+/// The second line of the bar. It is narrower than the terminal, so that the "^C" printed after it does not wrap.
+const PAIR_BAR: &str = "{msg}\n{bar:40} {percent:>3} %  {pos}/{len} stages  {per_sec}  {eta} left";
+/// The same while there are blocks to cut: without an estimate, because their pairs are not yet known.
+const BLOCK_BAR: &str = "{msg}\n{bar:40} {percent:>3} %  {pos}/{len} stages of blocks  {elapsed}";
+
+fn bar_style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template)
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+        .progress_chars("━╸─")
+        .with_key(
+            "per_sec",
+            |state: &ProgressState, to: &mut dyn std::fmt::Write| {
+                // Formatting into memory does not fail.
+                let _ = write!(to, "{:.1}/s", state.per_sec());
+            },
+        )
 }
 
-fn update_bar(bar: &ProgressBar, progress: &RunProgress) {
-    if bar.length() != Some(progress.stages) {
-        bar.set_length(progress.stages);
+fn bar(screen: &Screen) -> Display {
+    let bar = screen.add_bar(ProgressBar::new(0).with_style(bar_style(PAIR_BAR)));
+    bar.enable_steady_tick(Duration::from_millis(250));
+    Display::Bar {
+        bar,
+        is_of_blocks: false,
     }
-    bar.set_position(progress.finished);
-    bar.set_message(progress.by_stage_line());
+}
+
+fn update_bar(bar: &ProgressBar, is_of_blocks: &mut bool, progress: &RunProgress) {
+    let blocks = progress.blocks.line();
+    if blocks.is_some() != *is_of_blocks {
+        *is_of_blocks = blocks.is_some();
+        bar.set_style(bar_style(if *is_of_blocks { BLOCK_BAR } else { PAIR_BAR }));
+        bar.reset_eta();
+    }
+    let (finished, stages) = progress.position();
+    if bar.length() != Some(stages) {
+        bar.set_length(stages);
+    }
+    bar.set_position(finished);
+    bar.set_message(blocks.unwrap_or_else(|| progress.by_stage_line()));
 }
 
 /// Returns the line that is printed for an event, if any.

@@ -3,6 +3,8 @@
 use mocban_core::domain::Stage;
 use mocban_runner::RunEvent;
 
+use super::block_progress::BlockProgress;
+
 /// Counts of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct RunProgress {
@@ -12,6 +14,8 @@ pub(crate) struct RunProgress {
     pub(crate) finished: u64,
     /// Stages computed.
     pub(crate) computed: u64,
+    /// Stages that were computed before all blocks were cut. The rate is that of the others.
+    computed_before: u64,
     /// All pairs to align.
     pub(crate) pairs: u64,
     /// Pairs done.
@@ -19,17 +23,25 @@ pub(crate) struct RunProgress {
     /// Pairs failed.
     pub(crate) failed: u64,
     /// Done and total per stage.
-    pub(crate) by_stage: [(u64, u64); 4],
+    pub(crate) by_stage: [(u64, u64); Stage::COUNT],
+    /// The blocks, whose pairs are added to the counts when they are cut.
+    pub(crate) blocks: BlockProgress,
 }
 
 impl RunProgress {
     /// Counts one event.
     pub(crate) fn observe(&mut self, event: &RunEvent) {
+        let was_open = self.blocks.is_open();
+        self.blocks.observe(event);
+        if was_open && !self.blocks.is_open() {
+            self.computed_before = self.computed;
+        }
         match event {
             RunEvent::Started {
                 pairs,
                 stages,
                 by_stage,
+                blocks: _,
                 workers: _,
             } => {
                 self.pairs = *pairs;
@@ -90,8 +102,21 @@ impl RunProgress {
         parts.join("  ")
     }
 
-    /// Returns one line for a log: `42 % · 10 of 24 pairs done, 1 failed · 3.1 stages/s · about 17 s left`.
+    /// Returns one line for a log: `42 % · 10 of 24 pairs done, 1 failed · 3.1 stages/s · about 17 s left`. While there
+    /// are blocks to cut, the number of pairs is not known, so the line is about blocks and has no estimate.
+    /// `elapsed_ms` is the time since all blocks are cut.
     pub(crate) fn line(&self, elapsed_ms: u64) -> String {
+        if let Some(blocks) = self.blocks.line() {
+            return if self.pairs == 0 {
+                blocks
+            } else {
+                let (done, failed) = (self.done, self.failed);
+                format!(
+                    "{blocks} · {done} of {} pairs so far done, {failed} failed",
+                    self.pairs
+                )
+            };
+        }
         let counts = format!(
             "{} % · {} of {} pairs done, {} failed",
             self.percent(),
@@ -102,25 +127,30 @@ impl RunProgress {
         match self.rate(elapsed_ms) {
             Some(rate) => {
                 let left_ms = self.stages.saturating_sub(self.finished) as f64 / rate * 1000.0;
-                let left = mocban_project::time_text::rough_duration(left_ms as u64);
+                let left = mocban_system::time_text::rough_duration(left_ms as u64);
                 format!("{counts} · {rate:.1} stages/s · about {left} left")
             }
             None => counts,
         }
     }
 
-    /// Returns the percentage of finished stages, rounded down. At 100, all stages are finished.
-    pub(crate) const fn percent(&self) -> u64 {
-        match (self.finished * 100).checked_div(self.stages) {
-            Some(percent) => percent,
-            None => 100,
-        }
+    /// Returns the finished and all stages: those of blocks while there are blocks to cut, then those of pairs.
+    pub(crate) fn position(&self) -> (u64, u64) {
+        self.blocks
+            .position()
+            .unwrap_or((self.finished, self.stages))
     }
 
-    /// Returns stages per second; `None` before the first stage.
+    /// Returns the percentage of finished stages, rounded down. At 100, all stages are finished.
+    pub(crate) fn percent(&self) -> u64 {
+        let (finished, stages) = self.position();
+        (finished * 100).checked_div(stages).unwrap_or(100)
+    }
+
+    /// Returns stages of pairs per second since all blocks are cut; `None` before the first stage.
     fn rate(&self, elapsed_ms: u64) -> Option<f64> {
-        (self.computed > 0 && elapsed_ms > 0)
-            .then(|| self.computed as f64 * 1000.0 / elapsed_ms as f64)
+        let computed = self.computed - self.computed_before;
+        (computed > 0 && elapsed_ms > 0).then(|| computed as f64 * 1000.0 / elapsed_ms as f64)
     }
 }
 
@@ -141,6 +171,7 @@ mod tests {
             pairs: 2,
             stages: 8,
             by_stage: [2; 4],
+            blocks: 0,
             workers: 1,
         });
         for stage in Stage::ALL {

@@ -6,11 +6,13 @@
 
 use std::hash::{BuildHasher as _, RandomState};
 use std::io::Write as _;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use clap::ColorChoice;
 use indicatif::{MultiProgress, ProgressBar};
 
+use super::equal_warnings::EqualWarnings;
 use mocban_core::domain::{one_line, visible, visible_json};
 
 /// Beginning of the program's own terminal codes. It contains a random number.
@@ -39,12 +41,38 @@ pub(crate) fn terminal_line(text: &str) -> String {
 
 /// The stderr stream. Messages, log and progress bar share it, so that no line overwrites the bar.
 #[derive(Debug, Clone)]
-pub(crate) struct Screen(MultiProgress);
+pub(crate) struct Screen {
+    bars: MultiProgress,
+    warnings: Arc<Mutex<EqualWarnings>>,
+}
 
 impl Screen {
     /// Returns a screen without a bar.
     pub(crate) fn new() -> Self {
-        Self(MultiProgress::new())
+        Self {
+            bars: MultiProgress::new(),
+            warnings: Arc::default(),
+        }
+    }
+
+    /// Writes a warning, or counts it if equal ones were written before.
+    pub(crate) fn warning(&self, label: &str, text: &str) {
+        let lines = self.warnings().add(label, text, Instant::now());
+        for line in &lines {
+            self.line(line);
+        }
+    }
+
+    /// Writes the numbers of warnings that were only counted.
+    pub(crate) fn count_warnings(&self) {
+        let lines = self.warnings().take();
+        for line in &lines {
+            self.line(line);
+        }
+    }
+
+    fn warnings(&self) -> MutexGuard<'_, EqualWarnings> {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Writes a line, above the bar if there is one. Escapes hidden characters, as [`terminal_text`] does.
@@ -62,6 +90,11 @@ impl Screen {
         self.line(&text.replace("\u{1b}[", &OWN_CODE));
     }
 
+    /// Writes a warning of the log with colours, or counts it if an equal one was written before.
+    pub(crate) fn log_warning(&self, text: &str) {
+        self.warning("", &text.replace("\u{1b}[", &OWN_CODE));
+    }
+
     /// Writes a line of a log in JSON.
     pub(crate) fn json_log_line(&self, text: &str) {
         self.write(&visible_json(text));
@@ -71,12 +104,12 @@ impl Screen {
         let line = format!("{line}\n");
         let write = || std::io::stderr().lock().write_all(line.as_bytes());
         // A closed stderr cannot be reported anywhere.
-        let _ = self.0.suspend(write);
+        let _ = self.bars.suspend(write);
     }
 
     /// Shows a bar below all lines.
     pub(crate) fn add_bar(&self, bar: ProgressBar) -> ProgressBar {
-        self.0.add(bar)
+        self.bars.add(bar)
     }
 }
 

@@ -1,17 +1,18 @@
 //! The text that `show` prints about one pair.
 
-use serde::Serialize;
-
+use super::digits::significant;
 use super::screen::{Palette, Tone};
 use super::table::columns;
-use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
+use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
-    ThresholdMetric, Verdict, one_line,
+    Verdict, one_line,
 };
-use mocban_project::time_text::{duration, local};
-use mocban_report::ManualCorrection;
+use mocban_core::mesh::missing_sentence;
+use mocban_project::details::{Adjustment, ManualResult};
+use mocban_results::ManualCorrection;
 use mocban_store::Project;
+use mocban_system::time_text::{duration, local};
 
 /// One pair, its project and the colours.
 pub(crate) struct PairPage<'a> {
@@ -136,7 +137,11 @@ impl PairPage<'_> {
         if metrics.is_empty() {
             return String::new();
         }
-        let head = "  metric,angle °,scale,shift px,threshold,ssim,iou,iou box,dice,no ink,no wood,margin,confidence,verdicts";
+        let unit = self.detail.results.attributes.unit;
+        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let head = format!(
+            "  metric,angle °,scale,shift px,threshold{unit},ssim,iou,iou box,dice,no ink,no wood,margin,confidence,verdicts"
+        );
         let head = head.split(',').map(ToOwned::to_owned).collect();
         let rows = std::iter::once(head).chain(metrics.iter().map(metric_row));
         section("result", rows, "<>>>>>>>>>>>><", self.palette)
@@ -186,6 +191,9 @@ pub(crate) const fn state_name(status: JobStatus) -> &'static str {
     }
 }
 
+/// Significant digits of lengths, which have the unit of the mesh.
+const DIGITS: i32 = 3;
+
 /// Returns the few numbers of a stage that show whether it succeeded. Lengths are in `unit`.
 fn numbers(record: &StageRecord, unit: &str) -> String {
     let text = match record.stage {
@@ -198,20 +206,28 @@ fn numbers(record: &StageRecord, unit: &str) -> String {
 }
 
 fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
-    let bow = match fit.bow {
-        Some(_) => format!(", curvature {:.3} {unit}", fit.bow_height),
+    let curvature = match fit.curvature {
+        Some(_) => format!(
+            ", curvature {} {unit}",
+            significant(fit.curvature_height, DIGITS)
+        ),
         None => String::new(),
     };
+    let missing = fit.missing_vertices.map_or(String::new(), |missing| {
+        format!("; {}", missing_sentence(missing.get()))
+    });
+    let [relief, rms] = [fit.relief, fit.rms].map(|length| significant(length, DIGITS));
     format!(
-        "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{bow}; {} vertices, {} triangles",
-        fit.relief, fit.rms, fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
+        "relief {relief} {unit}, rms {rms} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{missing}",
+        fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }
 
 fn depth_numbers(depth: &DepthOutcome, unit: &str) -> String {
     let DepthOutcome { width, height, .. } = depth;
-    let (side, covered) = (depth.scale.mesh_unit_per_px, depth.coverage * 100.0);
-    format!("{width} x {height} px, {side:.4} {unit} a pixel, {covered:.0} % covered")
+    let side = significant(depth.scale.mesh_unit_per_px, DIGITS);
+    let covered = depth.coverage * 100.0;
+    format!("{width} x {height} px, {side} {unit} a pixel, {covered:.0} % covered")
 }
 
 fn ink_numbers(found: &NormalizeOutcome) -> String {
@@ -221,9 +237,11 @@ fn ink_numbers(found: &NormalizeOutcome) -> String {
         format!("print threshold {threshold:.0} of 65535, {polarity}")
     };
     let texts: Vec<String> = found.inks.iter().map(text).collect();
-    let turned = found.print_turned.map_or_else(String::new, |orientation| {
-        format!("; turned upright by its EXIF orientation {orientation}")
-    });
+    let turned = found
+        .print_orientation
+        .map_or_else(String::new, |orientation| {
+            format!("; turned upright by its EXIF orientation {orientation}")
+        });
     format!("{}{turned}", texts.join("; or "))
 }
 
@@ -240,7 +258,7 @@ fn metric_row(record: &MetricRecord) -> Vec<String> {
         format!("{:.2}", result.angle_deg),
         format!("{:.4}", result.scale),
         format!("{:.1}, {:.1}", result.shift_px[0], result.shift_px[1]),
-        format!("{:.4}", result.threshold_depth),
+        significant(result.threshold_depth, DIGITS),
         format!("{:.3}", result.scores.ssim),
         format!("{:.3}", result.scores.iou),
         format!("{:.3}", result.scores.iou_box),
@@ -272,25 +290,6 @@ fn verdicts(record: &MetricRecord) -> String {
         parts.push(format!("{} for an older result", record.older_verdicts));
     }
     parts.join(", ")
-}
-
-/// A manual alignment beside the automatic result.
-#[derive(Debug, Serialize)]
-pub(crate) struct ManualResult {
-    #[serde(flatten)]
-    pub(crate) stored: StoredAlignment,
-    /// Difference from the automatic result. `None` if there is no automatic result, or if the depth map has changed.
-    pub(crate) adjustment: Option<Adjustment>,
-}
-
-/// How a manual alignment differs from the result of a metric.
-#[derive(Debug, Serialize)]
-pub(crate) struct Adjustment {
-    pub(crate) from: ThresholdMetric,
-    #[serde(flatten)]
-    pub(crate) by: ManualCorrection,
-    /// Intersection over union of the automatic result.
-    pub(crate) from_iou: f64,
 }
 
 /// Formats manual alignments, one line each. Returns an empty text if there are none.

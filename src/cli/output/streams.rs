@@ -4,6 +4,7 @@ use std::io::Write as _;
 
 use super::screen::terminal_text;
 use mocban_core::domain::visible_json;
+use mocban_project::ProjectResult;
 
 /// Writes a result to stdout and ends it with a line feed. Escapes hidden characters, as `terminal_text` does.
 pub(crate) fn print(text: &str) -> std::io::Result<()> {
@@ -11,7 +12,7 @@ pub(crate) fn print(text: &str) -> std::io::Result<()> {
 }
 
 /// Writes a value to stdout as one JSON document.
-pub(crate) fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+pub(crate) fn print_json(value: &impl serde::Serialize) -> ProjectResult<()> {
     print_json_text(&serde_json::to_string_pretty(value)?)?;
     Ok(())
 }

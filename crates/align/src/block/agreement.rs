@@ -13,17 +13,17 @@ use super::windows::WindowMatch;
 const AGREEMENT_MM: f64 = 0.5;
 /// Windows with at least this correlation agree. Wrong ones reach 0.5 here and there.
 const AGREEMENT_NCC: f64 = 0.5;
-/// Least share of agreeing windows, and least median of the correlations. Of 30 generated blocks with the page of another
-/// one, the highest values were 0.44 and 0.53, where both pages have the same columns.
+/// Least fraction of agreeing windows, and least median of the correlations. Of 30 generated blocks with the page of
+/// another one, the highest values were 0.44 and 0.53, where both pages have the same columns.
 const MIN_AGREEMENT: f64 = 0.68;
 const MIN_MEDIAN_NCC: f64 = 0.6;
 /// Fewer windows prove nothing: about 22 cm2 of text.
 const MIN_WINDOWS: usize = 60;
-/// A part of the face is accepted alone if it has at least this share of the windows. In the same 30 blocks, the highest
-/// value was 0.25.
+/// A part of the face is accepted alone if it has at least this fraction of the windows. In the same 30 blocks, the
+/// highest value was 0.25.
 const MIN_PART: f64 = 0.4;
-/// The same where a person gave the position. Of 96 positions on four generated blocks that were wrong by 18 to 30 mm, the
-/// highest share was 0.24, and none reached the least part; of 64 right ones, the lowest share was 0.96.
+/// The same where a person gave the position. Of 96 positions on four generated blocks that were wrong by 18 to 30 mm,
+/// the highest fraction was 0.24, and none reached the least part; of 64 right ones, the lowest fraction was 0.96.
 const MIN_AGREEMENT_GIVEN: f64 = 0.5;
 const MIN_PART_GIVEN: f64 = 0.2;
 /// Spacing of [`Support`], and the distance over which windows are counted, mm.
@@ -37,28 +37,28 @@ const MIN_SUPPORT: f64 = 0.6;
 pub struct Agreement {
     /// Number of windows with relief on the face and on the page.
     pub windows: usize,
-    /// Share of the windows that lie within 0.5 mm of the field.
+    /// Fraction of the windows that lie within 0.5 mm of the field.
     pub share: f64,
     /// Median of the windows' correlations.
     pub median_ncc: f64,
-    /// Share of the windows that lie within 0.5 mm of the field and have a correlation of at least 0.5.
+    /// Fraction of the windows that lie within 0.5 mm of the field and have a correlation of at least 0.5.
     pub agreeing: f64,
-    /// Share of the windows in the part of the face that agrees.
+    /// Fraction of the windows in the part of the face that agrees.
     pub part: f64,
-    /// Share of that part's windows that lie within 0.5 mm of the field.
+    /// Fraction of that part's windows that lie within 0.5 mm of the field.
     pub part_share: f64,
     /// Median of the correlations in that part.
     pub part_ncc: f64,
 }
 
-/// The share of agreeing windows around the places of a face.
+/// The fraction of agreeing windows around the places of a face.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Support {
     /// Position of the first value, mm.
     pub origin_mm: [f64; 2],
     /// Number of columns, 10 mm apart.
     pub columns: usize,
-    /// Shares in percent, row by row.
+    /// Fractions in percent, row by row.
     pub percent: Vec<u8>,
 }
 
@@ -161,7 +161,7 @@ impl Support {
         }
     }
 
-    /// Returns the share of agreeing windows around a place of the face, 0..=1; 0 outside the windows.
+    /// Returns the fraction of agreeing windows around a place of the face, 0..=1; 0 outside the windows.
     pub fn at(&self, place: [f64; 2]) -> f64 {
         let rows = self.percent.len().checked_div(self.columns).unwrap_or(0);
         let cell = |k: usize, count: usize| {

@@ -105,8 +105,7 @@ impl CoarseSearch {
                 .map(|k| WIDE_SCALES[0] * WIDE_RATIO.powi(k))
                 .collect()
         } else {
-            let expected = expected_scale(relief, page);
-            expected
+            expected_scale(relief, page)
                 .map(|scale| SCALE_RATIOS.map(|ratio| ratio * scale).to_vec())
                 .unwrap_or_default()
         };

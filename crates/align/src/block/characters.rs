@@ -52,7 +52,7 @@ pub struct PlacedCharacter {
     pub ncc: f64,
     /// Shift of the character's own ink against the map, mm.
     pub shift_mm: [f64; 2],
-    /// Share of the places around the character that agree, 0..=1.
+    /// Fraction of the places around the character that agree, 0..=1.
     pub support: f64,
     /// How sure the position is, 0..=1: by its own correlation and by the places around it.
     pub confidence: f64,

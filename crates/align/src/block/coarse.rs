@@ -35,7 +35,7 @@ pub(super) struct CoarseRange {
     pub(super) angles: Vec<f64>,
     /// Scales, page pixels per mm.
     pub(super) scales: Vec<f64>,
-    /// Least share of the face's area that must lie on the page.
+    /// Least fraction of the face's area that must lie on the page.
     pub(super) min_overlap: f32,
     /// Number of positions to return.
     pub(super) count: usize,
@@ -266,7 +266,7 @@ impl PageTarget {
         }
     }
 
-    /// Returns the share of a face on the page along an axis, for each position of its middle.
+    /// Returns the fraction of a face on the page along an axis, for each position of its middle.
     fn overlaps(&self, axis: usize, half: f64) -> Vec<f32> {
         let [first, last] = self.bounds[axis];
         let share = |at: usize| {

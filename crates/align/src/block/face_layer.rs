@@ -13,12 +13,13 @@ pub(super) const FACE_CELL: usize = 4;
 const LAYER_MM: f64 = 1.0;
 /// A scan with more layers shows no block.
 const MAX_LAYERS: usize = 1 << 16;
-/// Layers with more than this share of the heights may be the face.
+/// Layers with more than this fraction of the heights may be the face.
 const MIN_LAYER_SHARE: f64 = 0.04;
 /// Heights that belong to the face, relative to the middle of its layer, mm: carved ground, bow and twist.
 const BELOW_MM: f32 = 9.0;
 const ABOVE_MM: f32 = 3.0;
-/// Pieces of the face with at least this share of its area belong to it if only a crack of this width, mm, separates them.
+/// Pieces of the face with at least this fraction of its area belong to it if only a crack of this width, mm, separates
+/// them.
 const MIN_PIECE_SHARE: f64 = 0.01;
 const MAX_CRACK_MM: f64 = 6.0;
 /// Cracks that may lie one behind the other.
@@ -26,8 +27,8 @@ const CRACKS: usize = 3;
 /// Parts narrower than this are removed, mm: clamps, rims of a turntable.
 const MIN_WIDTH_MM: f64 = 3.6;
 
-/// The face is the highest part with at least this share of the area of the largest one. Clamps of a holder may be higher
-/// than the face, and a turntable below it may be larger.
+/// The face is the highest part with at least this fraction of the area of the largest one. Clamps of a holder may be
+/// higher than the face, and a turntable below it may be larger.
 const MIN_PART_SHARE: f64 = 0.25;
 
 /// Finds the face: cells of 4 x 4 pixels of the height map that belong to it. Returns `None` if there is no layer or no

@@ -4,7 +4,7 @@ use super::align::CarvedFace;
 use super::height_map::{HEIGHT_STEP_MM, NO_HEIGHT};
 use super::relief::surface_height;
 
-/// The four pixels around a point, each with its share.
+/// The four pixels around a point, each with its weight.
 type Neighbours = [([i64; 2], f32); 4];
 
 impl CarvedFace {

@@ -8,15 +8,15 @@ use mocban_core::domain::cancel::ThreadToken;
 
 /// Windows below this correlation are left out.
 pub(super) const MIN_NCC: f64 = 0.35;
-/// Ridge on the slopes of the local fit, as a share of its weight.
+/// Ridge on the slopes of the local fit, as a fraction of its weight.
 const RIDGE: f64 = 0.05;
-/// Weight of "no shift" in the local fit, as a share of one sure window: far from all windows the field is 0.
+/// Weight of "no shift" in the local fit, as a fraction of one sure window: far from all windows the field is 0.
 const PRIOR: f64 = 1e-4;
 /// Rounds of reweighting.
 const ROUNDS: usize = 4;
 /// Least residual at which a window counts a quarter, mm.
 const MIN_SCALE_MM: f64 = 0.06;
-/// Least share of the sharper direction's certainty that the weaker direction counts with.
+/// Least fraction of the sharper direction's certainty that the weaker direction counts with.
 const MIN_CERTAINTY: f64 = 0.02;
 
 /// One window in the fit.

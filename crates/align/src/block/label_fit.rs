@@ -3,10 +3,10 @@
 use super::characters::CharacterBox;
 use super::page_ink::PageInk;
 
-/// Largest share of the outlines on ink of labels that fit. Right labels have 1 to 5 %, those of another page or of the
-/// mirrored page about 20 %.
+/// Largest fraction of the outlines on ink of labels that fit. Right labels have 1 to 5 %, those of another page or of
+/// the mirrored page about 20 %.
 const MAX_ON_INK: f64 = 0.1;
-/// Labels that fit a mirrored or turned page have at most this share of the one that they have on the page.
+/// Labels that fit a mirrored or turned page have at most this fraction of the one that they have on the page.
 const MIN_GAIN: f64 = 0.5;
 /// Points along each side of a box.
 const POINTS: usize = 24;
@@ -73,7 +73,7 @@ pub fn check_label_fit(page: &PageInk, boxes: &[CharacterBox]) -> Result<(), Lab
     })
 }
 
-/// Returns the share of the points of all outlines that lie on ink, after a change of the points.
+/// Returns the fraction of the points of all outlines that lie on ink, after a change of the points.
 fn share_on_ink(
     page: &PageInk,
     boxes: &[CharacterBox],

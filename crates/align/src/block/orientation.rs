@@ -22,7 +22,7 @@ const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 const REACH: f64 = 3.0;
 /// Margin of the extent, mm.
 const EXTENT_MARGIN_MM: f64 = 3.0;
-/// Thickness of the layer of a face, as a share of the long side: 12 mm of 320 mm.
+/// Thickness of the layer of a face, as a fraction of the long side: 12 mm of 320 mm.
 const LAYER_SHARE: f64 = 0.0375;
 /// Area looks along a direction if the cosine is at least this.
 const ALONG: f64 = 0.85;
@@ -88,12 +88,10 @@ impl Orientation {
         }
         let spread = SymmetricEigen::new(covariance);
         let long_side = SIDE_BY_DEVIATION * spread.eigenvalues.max().max(0.0).sqrt();
-        let normals = SymmetricEigen::new(sums.normals);
-        let candidates = normals
+        let n = SymmetricEigen::new(sums.normals)
             .eigenvectors
             .column_iter()
-            .chain(spread.eigenvectors.column_iter());
-        let n = candidates
+            .chain(spread.eigenvectors.column_iter())
             .map(|candidate| {
                 poll();
                 let n = refined(candidate.into_owned(), sample);

@@ -1,5 +1,7 @@
 //! What the stages of a block store as JSON.
 
+use std::num::NonZeroU64;
+
 use serde::{Deserialize, Serialize};
 
 use super::agreement::{Agreement, Support};
@@ -15,6 +17,9 @@ pub struct FaceOutcome {
     pub unit: LengthUnit,
     /// Triangles of the scan.
     pub triangles: u64,
+    /// Number of vertices of the scan that were left out because they have no position.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing_vertices: Option<NonZeroU64>,
     /// The faces that were found.
     pub faces: Vec<FoundFace>,
 }

@@ -18,11 +18,11 @@ const SHEET_QUANTILE: f64 = 0.9;
 const CLOSING: usize = 4;
 /// Blur of the sheet, cells.
 const SHEET_BLUR: f64 = 3.0;
-/// Cells darker than this share of the bright cells are bed, not sheet.
+/// Cells darker than this fraction of the bright cells are bed, not sheet.
 const BED_SHARE: f32 = 0.55;
 /// Cells this near to the bed hold no ink: the edge of the sheet.
 const BED_RIM: usize = 1;
-/// Width of the ramp of soft ink, as a share of the difference between ink and sheet.
+/// Width of the ramp of soft ink, as a fraction of the difference between ink and sheet.
 const RAMP: f64 = 0.5;
 /// Least darkness of ink in relation to the sheet.
 const MIN_CONTRAST: f64 = 0.12;
@@ -40,8 +40,7 @@ impl PageInk {
     /// Returns an error if the image has no ink.
     pub fn of(page: &PrintImage) -> Result<Self, BlockError> {
         let grey = grey(page);
-        let sheet = Sheet::of(&grey);
-        let darkness = sheet.darkness(&grey);
+        let darkness = Sheet::of(&grey).darkness(&grey);
         let (threshold, contrast) = threshold(&darkness)?;
         let ramp = (RAMP * contrast * 255.0).max(1.0);
         let low = threshold * 255.0 - ramp / 2.0;
@@ -172,7 +171,7 @@ impl Sheet {
         }
     }
 
-    /// Returns the share of light that the ink takes, in 255ths; 0 on the bed.
+    /// Returns the fraction of light that the ink takes, in 255ths; 0 on the bed.
     fn darkness(&self, grey: &Grid<u8>) -> Grid<u8> {
         let width = grey.width();
         let mut dark = vec![0_u8; width * grey.height()];
@@ -258,7 +257,7 @@ fn filtered(cells: &Grid<f32>, reach: usize, combine: fn(f32, f32) -> f32) -> Gr
     along_rows(&along_rows(cells).transposed()).transposed()
 }
 
-/// Returns the threshold between sheet and ink, and the difference between the two, as shares of the light.
+/// Returns the threshold between sheet and ink, and the difference between the two, as fractions of the light.
 fn threshold(darkness: &Grid<u8>) -> Result<(f64, f64), BlockError> {
     let step = (darkness.data().len() / 200_000).max(1);
     let samples = darkness.data().iter().step_by(step);

@@ -23,7 +23,7 @@ const MAX_LOCAL_MM: f64 = 0.6;
 /// Depth below the surface at which the soft relief is 0.5, and its softness, mm.
 const EDGE_MM: f32 = 0.30;
 const SOFTNESS_MM: f32 = 0.08;
-/// Cells need heights in at least this share of their pixels.
+/// Cells need heights in at least this fraction of their pixels.
 const MIN_CELL_SHARE: f64 = 0.3;
 
 /// One side of a block as an image of its strokes.
@@ -51,6 +51,20 @@ impl Relief {
             face,
             surface,
         })
+    }
+
+    /// Returns the fraction of the face that is carved ground, 0..=1: about 0 on a planed back, more than a half under text.
+    pub fn carved_fraction(&self) -> f64 {
+        let (mut ground, mut all) = (0_u64, 0_u64);
+        for y in 0..self.soft.height() {
+            for (x, soft) in self.soft.row(y).iter().enumerate() {
+                if is_face(&self.face, x, y) {
+                    all += 1;
+                    ground += u64::from(*soft < 128);
+                }
+            }
+        }
+        ground as f64 / all.max(1) as f64
     }
 }
 
@@ -200,7 +214,7 @@ fn soften(map: &HeightMap, face: &Mask, surface: &Grid<f32>) -> Grid<u8> {
     soft
 }
 
-/// Returns the cell whose middle lies before a pixel, and the pixel's share of the way to the next middle.
+/// Returns the cell whose middle lies before a pixel, and the pixel's fraction of the way to the next middle.
 fn cell_at(pixel: usize, cells: usize) -> (usize, f32) {
     let at = ((pixel as f32 + 0.5) / CELL as f32 - 0.5).clamp(0.0, cells as f32 - 1.0);
     (at as usize, at.fract())
@@ -241,6 +255,15 @@ mod tests {
             }
         }
         assert!(right as f64 > 0.98 * f64::from(all), "{right} of {all}");
+    }
+
+    #[test]
+    fn ground_is_carved_and_a_planed_face_is_not() {
+        let mut face = TestWorld::new(11).face();
+        let carved = face.relief.carved_fraction();
+        assert!((0.4..0.95).contains(&carved), "{carved}");
+        face.relief.soft.data_mut().fill(255);
+        assert!(face.relief.carved_fraction() < 1e-9);
     }
 
     #[test]

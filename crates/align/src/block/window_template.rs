@@ -3,7 +3,7 @@
 use super::window_images::{LANES, ShrunkRelief, WarpedInk, Window};
 use mocban_core::simd::dispatch;
 
-/// Windows need this share of their pixels on the face and on the page.
+/// Windows need this fraction of their pixels on the face and on the page.
 const MIN_SHARE: f32 = 0.35;
 /// Windows need this variance of the relief: about one stroke.
 const MIN_VARIANCE: f32 = 0.01;

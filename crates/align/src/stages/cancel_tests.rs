@@ -9,7 +9,7 @@ use super::{Print, Scan, Settings, pipeline};
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
 use mocban_core::mesh::{Mesh, MeshLimits, read};
 
-/// Moments at which each stage is cancelled, as shares of its polls in eighths.
+/// Moments at which each stage is cancelled, as fractions of its polls in eighths.
 const EIGHTHS: [u64; 4] = [0, 2, 5, 8];
 
 /// Runs a stage to its end, then cancels it at some of its polls. It must end at this poll and leave its inputs usable.

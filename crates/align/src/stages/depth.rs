@@ -132,14 +132,14 @@ pub fn depth(
     if indexed.overlaps_too_often() {
         return Err(DepthError::Overlap(scan.mesh().triangles.len()));
     }
-    if let Some(bow) = &fit.bow {
+    if let Some(curvature) = &fit.curvature {
         let rows = heights.data_mut().chunks_exact_mut(view.width);
         for (y, row) in rows.enumerate() {
             poll();
             // Conversions from 32-bit integers to floats are vectorized.
             for (x, height) in (0_i32..).zip(row) {
                 let [u, v] = plane_from_px.apply([f64::from(x), y as f64]);
-                *height -= bow.height(u, v) as f32;
+                *height -= curvature.height(u, v) as f32;
             }
         }
     }
@@ -152,7 +152,7 @@ pub fn depth(
             height_per_level,
             mesh_unit_per_px: view.unit_per_px,
             depth_from_plane: view.px_from_plane,
-            bow: fit.bow,
+            curvature: fit.curvature,
             unit,
         },
     })
@@ -215,7 +215,9 @@ mod tests {
 
     use super::{DepthError, DepthParams, NO_HIT, ResolutionBy, depth, quantize};
     use crate::stages::Scan;
-    use mocban_core::domain::{Bow, FitOutcome, LengthUnit, Rigid3, ScanRegion, SideEvidence};
+    use mocban_core::domain::{
+        Curvature, FitOutcome, LengthUnit, Rigid3, ScanRegion, SideEvidence,
+    };
     use mocban_core::mesh::Mesh;
     use mocban_core::raster::Grid;
 
@@ -244,14 +246,14 @@ mod tests {
         mesh.into()
     }
 
-    fn flat_fit(bow: Option<Bow>) -> FitOutcome {
+    fn flat_fit(curvature: Option<Curvature>) -> FitOutcome {
         FitOutcome {
             plane_from_mesh: Rigid3::to_frame(
                 [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
                 [0.0; 3],
             ),
-            bow,
-            bow_height: 0.0,
+            curvature,
+            curvature_height: 0.0,
             inlier_ratio: 1.0,
             rms: 0.0,
             relief: 1.0,
@@ -264,6 +266,7 @@ mod tests {
             print_outline: None,
             vertices: 0,
             triangles: 0,
+            missing_vertices: None,
         }
     }
 
@@ -307,8 +310,9 @@ mod tests {
 
     #[test]
     fn heights_are_measured_from_the_bow() {
-        let bow = Bow([0.0, 0.1, 0.0, 0.0, 0.0, 0.0]);
-        let map = depth(&ramp(), &flat_fit(Some(bow)), None, &params()).expect("the ramp is seen");
+        let curvature = Curvature([0.0, 0.1, 0.0, 0.0, 0.0, 0.0]);
+        let map =
+            depth(&ramp(), &flat_fit(Some(curvature)), None, &params()).expect("the ramp is seen");
         for y in 0..map.levels.height() {
             for x in 0..map.levels.width() {
                 assert!(map.height(x, y).is_none_or(|h| h.abs() < 1e-5));

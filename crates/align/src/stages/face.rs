@@ -10,10 +10,10 @@ use super::binarize;
 
 /// Cells along each side of the map. Points of the upper class count by cell, so single outliers do not.
 const CELLS: usize = 32;
-/// Least share of the upper class in a cell of the hull.
+/// Least fraction of the upper class in a cell of the hull.
 const LEAST_SHARE: f64 = 0.2;
-/// The upper class is the face, and not the tops, if it fills at least this share of the inner cells of its hull, and
-/// if these cells hold at least `FACE_AREA` of the map's heights. Dense strokes fill up to about 0.8.
+/// The upper class is the face, and not the tops, if it fills at least this fraction of the inner cells of its hull,
+/// and if these cells hold at least `FACE_AREA` of the map's heights. Dense strokes fill up to about 0.8.
 const FACE_DENSITY: f64 = 0.95;
 const FACE_AREA: f64 = 0.3;
 /// Number of cells by which the hull of tops is enlarged, so that it contains ground around a single stroke.
@@ -32,7 +32,7 @@ pub(super) struct PositionedHeight {
 }
 
 impl PositionedHeight {
-    /// Returns a height at a position, given as shares of the map's width and height, 0..=1.
+    /// Returns a height at a position, given as fractions of the map's width and height, 0..=1.
     pub(super) fn new(position: [f32; 2], height: f32) -> Self {
         let cell = position.map(|at| ((at * CELLS as f32) as u8).min(CELLS as u8 - 1));
         let [column, row] = cell;

@@ -10,7 +10,7 @@ use mocban_core::raster::{Grid, decode_grey8, png_grey8};
 
 /// Largest difference between matching pixels, on a scale of 0 to 255.
 const TOLERANCE: u8 = 12;
-/// Share of pixels that may differ by more than `TOLERANCE`.
+/// Fraction of pixels that may differ by more than `TOLERANCE`.
 const OTHERS: f64 = 0.01;
 
 fn hold(name: &str, got: &Grid<u8>) {

@@ -23,7 +23,7 @@ mod settings;
 mod testing;
 mod zbuffer;
 
-pub use pipeline::{AlignedPair, StageError};
+pub use pipeline::{AlignedPair, ScanHints, StageError};
 pub use print::Print;
 pub use scan::Scan;
 pub use settings::{AlignmentMethod, PipelineParams, Settings};

@@ -9,6 +9,8 @@
 //!
 //! The fit stage reads the print to decide the carved side. The page of the crate gives the reason.
 
+use std::num::NonZeroU64;
+
 use super::depth::{self, DepthError};
 use super::fit::{self, FitError};
 use super::normalize::{self, NormalizeError, Normalized};
@@ -18,7 +20,7 @@ use super::register::{self, RegisterError, Registered};
 use super::scan::Scan;
 use super::settings::{AlignmentMethod, Settings};
 use mocban_core::domain::{
-    Affine2, FailureClass, FitOutcome, MetricOutcome, PrintFromMesh, ThresholdMetric,
+    Affine2, FailureClass, FitOutcome, LengthUnit, MetricOutcome, PrintFromMesh, ThresholdMetric,
 };
 use mocban_core::raster::DepthMap;
 
@@ -49,6 +51,18 @@ impl StageError {
             Self::Register(error) => error.class(),
         }
     }
+
+    /// Returns whether the print is the likelier cause. It is if the characters do not match and nothing is unusual about
+    /// the scan.
+    pub const fn is_of_print(&self) -> bool {
+        match self {
+            Self::Normalize(NormalizeError::Print(_)) => true,
+            Self::Register(
+                RegisterError::NoMatch { seen, .. } | RegisterError::OtherCharacter { seen, .. },
+            ) => !seen.is_of_scan(),
+            _ => false,
+        }
+    }
 }
 
 impl Settings {
@@ -68,10 +82,12 @@ pub fn fit(
     scanned_face_down: Option<bool>,
     settings: &Settings,
 ) -> Result<FitOutcome, FitError> {
-    match settings.pipeline.method {
+    let mut outcome = match settings.pipeline.method {
         AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
         AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
-    }
+    }?;
+    outcome.missing_vertices = NonZeroU64::new(scan.missing());
+    Ok(outcome)
 }
 
 /// Prepares print and depth map for registration.
@@ -89,7 +105,7 @@ pub fn normalize(
             paper_method::normalize::normalize(depth, print, &settings.normalize)
         }
     }?;
-    normalized.outcome.print_turned = print.image().turned;
+    normalized.outcome.print_orientation = print.image().turned;
     Ok(normalized)
 }
 
@@ -112,6 +128,15 @@ pub fn register(
             paper_method::register::register(depth, normalized, &settings.register)
         }
     }
+}
+
+/// What is known of a scan apart from its mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ScanHints {
+    /// Unit of the mesh.
+    pub unit: Option<LengthUnit>,
+    /// Whether the carved face points towards -z of the mesh.
+    pub scanned_face_down: Option<bool>,
 }
 
 /// Results of the four stages for one mesh and print.
@@ -158,8 +183,21 @@ impl AlignedPair {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(scan: &Scan, print: &Print, settings: &Settings) -> Result<Self, StageError> {
-        let fit = fit(scan, Some(print), None, settings)?;
-        let depth = depth::depth(scan, &fit, None, &settings.depth)?;
+        Self::with_hints(scan, print, ScanHints::default(), settings)
+    }
+
+    /// Runs the four stages, as a project does for a pair of its list.
+    ///
+    /// # Errors
+    /// Returns the error of the first stage that finds no result.
+    pub fn with_hints(
+        scan: &Scan,
+        print: &Print,
+        hints: ScanHints,
+        settings: &Settings,
+    ) -> Result<Self, StageError> {
+        let fit = fit(scan, Some(print), hints.scanned_face_down, settings)?;
+        let depth = depth::depth(scan, &fit, hints.unit, &settings.depth)?;
         let normalized = match &fit.print_outline {
             Some(outline) => normalize(&depth, &print.clone().within(Some(outline)), settings),
             None => normalize(&depth, print, settings),
@@ -181,6 +219,14 @@ impl AlignedPair {
     /// Returns a metric's alignment, if the method gives the metric.
     pub fn metric(&self, metric: ThresholdMetric) -> Option<&MetricOutcome> {
         self.metrics().iter().find(|found| found.metric == metric)
+    }
+
+    /// Returns the alignment that is shown first: that of `relief`, or of the default metric under the paper's method.
+    pub fn first_metric(&self) -> &MetricOutcome {
+        let found = self.metric(ThresholdMetric::Relief);
+        found
+            .or_else(|| self.metric(ThresholdMetric::DEFAULT))
+            .unwrap_or(&self.metrics()[0])
     }
 
     /// Returns the map from mesh points to print pixels under a metric's alignment.

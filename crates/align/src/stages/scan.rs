@@ -5,12 +5,13 @@ use std::sync::OnceLock;
 use super::zbuffer::IndexedSurface;
 use mocban_core::domain::ScanRegion;
 use mocban_core::domain::cancel::polled;
-use mocban_core::mesh::Mesh;
+use mocban_core::mesh::{Mesh, MeshRead};
 
 /// A mesh as read, and its surface, which is indexed on first use.
 #[derive(Debug)]
 pub struct Scan {
     mesh: Mesh,
+    missing: u64,
     indexed: OnceLock<IndexedSurface>,
 }
 
@@ -18,6 +19,11 @@ impl Scan {
     /// Returns the mesh as read.
     pub const fn mesh(&self) -> &Mesh {
         &self.mesh
+    }
+
+    /// Returns the number of vertices of the file that were left out because they have no position.
+    pub const fn missing(&self) -> u64 {
+        self.missing
     }
 
     /// Returns the faces with all corners in a region. For a mesh without faces, returns the points in the region.
@@ -31,20 +37,26 @@ impl Scan {
     }
 }
 
-impl From<Mesh> for Scan {
-    fn from(mesh: Mesh) -> Self {
+impl From<MeshRead> for Scan {
+    fn from(MeshRead { mesh, missing }: MeshRead) -> Self {
         Self {
             mesh,
+            missing,
             indexed: OnceLock::new(),
         }
+    }
+}
+
+impl From<Mesh> for Scan {
+    fn from(mesh: Mesh) -> Self {
+        MeshRead { mesh, missing: 0 }.into()
     }
 }
 
 /// Returns the faces with only corners that `keeps` accepts. For a mesh without faces, returns the accepted points.
 pub(super) fn part_of(mesh: &Mesh, keeps: impl Fn([f64; 3]) -> bool) -> Mesh {
     let kept: Vec<bool> = polled(mesh.vertices.iter()).map(keeps).collect();
-    let faces = polled(mesh.triangles.iter().copied());
-    let faces: Vec<[u32; 3]> = faces
+    let faces: Vec<[u32; 3]> = polled(mesh.triangles.iter().copied())
         .filter(|face| face.iter().all(|corner| kept[*corner as usize]))
         .collect();
     if mesh.triangles.is_empty() {

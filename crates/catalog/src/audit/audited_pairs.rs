@@ -6,7 +6,7 @@ use crate::db::conn::Conn;
 use crate::db::query::query;
 use crate::db::row::{FromRow as _, Row, from_row};
 use crate::db::rows::json_array;
-use crate::records::pair_work::{self, KnownInputs};
+use crate::records::pair_work::KnownInputs;
 use crate::records::stage_results::METRIC_HASHES;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
@@ -67,9 +67,6 @@ FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = CAST(wante
 
 impl Catalog {
     /// Reads up to `limit` pairs with ids above `after`.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn audit_page(&self, after: Option<PairId>, limit: usize) -> Result<AuditPage> {
         let mut conn = self.snapshot().await?;
         let query = query(PAGE).bind(after.map_or(0, |pair| pair.0));
@@ -99,7 +96,7 @@ fn pair(row: &Row) -> Result<AuditedPair> {
     let status: Option<JobStatus> = row.get("status")?;
     Ok(AuditedPair {
         name: row.get("name")?,
-        inputs: pair_work::known_inputs(row)?,
+        inputs: KnownInputs::from_row(row)?,
         job: status.zip(row.get("stage")?),
         is_retired: row.get("is_retired")?,
         has_failure: row.get("has_failure")?,

@@ -5,6 +5,7 @@ use serde_json::Value;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::Row;
+use crate::db::transaction::in_transaction;
 use crate::queue::fingerprint::hash_of;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, Stage};
@@ -36,9 +37,6 @@ const MARK_ALL: &str = "UPDATE job SET dirty = 1 WHERE dirty = 0";
 
 impl Catalog {
     /// Returns the fingerprints of jobs whose hash does not follow from their settings.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn faulty_fingerprints(&self) -> Result<Vec<FaultyFingerprint>> {
         let mut conn = self.read_conn().await?;
         let used = query(USED).fetch_all(&mut conn).await?;
@@ -59,16 +57,13 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails. In that case nothing is changed.
     pub async fn retire_fingerprints(&self, faulty: Vec<FaultyFingerprint>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                for fingerprint in &faulty {
-                    retire(conn, fingerprint).await?;
-                }
-                query(MARK_ALL).execute(conn).await?;
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            for fingerprint in &faulty {
+                retire(conn, fingerprint).await?;
+            }
+            query(MARK_ALL).execute(conn).await?;
+            Ok(())
         })
-        .await
     }
 }
 

@@ -132,9 +132,6 @@ impl Catalog {
     }
 
     /// Describes at most 50 rows that reference a missing row.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn broken_references(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         let lines = query_scalar(REFERENCES).bind(LINES as i64);
@@ -143,9 +140,6 @@ impl Catalog {
 
     /// Compares the tables, indexes and triggers with the schema of this program, in PostgreSQL only the triggers and rules.
     /// Returns one line for each difference.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn schema_differences(&self) -> Result<Vec<String>> {
         let mut conn = match self.read_conn().await? {
             Conn::Sqlite(conn) => conn,
@@ -160,9 +154,6 @@ impl Catalog {
 
     /// Compares the counters, and the fingerprint and dirty mark of each job, with the rows they are derived from. With
     /// `quick`, checks only the counters, because the other checks read all results.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn drift(&self, quick: bool) -> Result<Drift> {
         // Read in one transaction, so that the writes of a concurrent run do not look like drift.
         let mut conn = self.snapshot().await?;

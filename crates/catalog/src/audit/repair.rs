@@ -6,37 +6,17 @@ use sqlx::AssertSqlSafe;
 use crate::audit::integrity::integrity;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
-use crate::db::query::{query, query_as};
+use crate::db::query::query;
 use crate::db::rows::json_array;
 use crate::db::schema::{self, SchemaDifference, wanted_objects};
-use crate::queue::counters::{CounterKey, Deltas};
+use crate::db::transaction::in_transaction;
+use crate::queue::counters::Deltas;
 use crate::queue::fragments::{fingerprint_before, inconsistent};
 use crate::queue::job_counts::count_jobs;
 use crate::queue::pair_job::PairJob;
-use crate::queue::requeue::CLEAR_FAILURES;
+use crate::queue::requeue::send_back;
 use crate::{Catalog, Result};
 use mocban_core::domain::{PairId, Stage};
-
-const POSITIONS: &str = "
-SELECT j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
-FROM json_each(?1) AS item CROSS JOIN job AS j ON j.pair = CAST(item.value ->> 0 AS bigint)";
-
-const NEW_JOBS: &str = "
-INSERT INTO job (pair, stage, status)
-SELECT CAST(value ->> 0 AS bigint), 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = CAST(value ->> 0 AS bigint))";
-
-/// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
-/// lease fail.
-pub(crate) const RESTORE: &str = concat!(
-    "
-UPDATE job SET stage = min(stage, CAST(item.value ->> 1 AS bigint)), status = 0, run_at = NULL, prio = 0,
-    attempt = 0, crashes = 0, exclusive = 0, worker = NULL, deadline = NULL, token = token + 1,
-    fingerprint = ",
-    fingerprint_before!("min(job.stage, CAST(item.value ->> 1 AS bigint))"),
-    "
-FROM json_each(?1) AS item WHERE job.pair = CAST(item.value ->> 0 AS bigint)
-RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
-);
 
 /// Removes the results of the stages that are to run again, because their values may be invalid.
 const REMOVE_RESULTS: &str = "
@@ -84,70 +64,51 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails. In that case nothing is changed.
     pub async fn restore(&self, pairs: Vec<(PairId, Stage)>) -> Result<()> {
-        self.in_transaction(move |conn| Box::pin(async move { restore(conn, &pairs).await }))
-            .await
+        in_transaction!(self, |conn| { restore(conn, &pairs).await })
     }
 
     /// Corrects the fingerprint of each job, marks jobs with inconsistent results dirty, and recounts all counters.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn rebuild_counters(&self) -> Result<()> {
-        self.in_transaction(|conn| {
-            Box::pin(async move {
-                // Before the jobs are changed, so that heartbeats wait.
-                lock_counters(conn).await?;
-                for sql in [FIX_FINGERPRINTS, MARK_DIRTY] {
-                    query(sql).execute(&mut *conn).await?;
-                }
-                recount(conn).await
-            })
+        in_transaction!(self, |conn| {
+            // Before the jobs are changed, so that heartbeats wait.
+            lock_counters(conn).await?;
+            for sql in [FIX_FINGERPRINTS, MARK_DIRTY] {
+                query(sql).execute(&mut *conn).await?;
+            }
+            recount(conn).await
         })
-        .await
     }
 
     /// Rebuilds every index from its table. Returns the faults that SQLite's integrity check finds afterwards.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
-        self.in_transaction(|conn| {
-            Box::pin(async move {
-                let Conn::Sqlite(conn) = conn else {
-                    return Ok(Vec::new());
-                };
-                sqlx::query("REINDEX").execute(&mut **conn).await?;
-                integrity(conn, false).await
-            })
+        in_transaction!(self, |conn| {
+            let Conn::Sqlite(conn) = conn else {
+                return Ok(Vec::new());
+            };
+            sqlx::query("REINDEX").execute(&mut **conn).await?;
+            integrity(conn, false).await
         })
-        .await
     }
 
     /// Recreates missing indexes and triggers. Does not change tables.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn restore_schema(&self) -> Result<()> {
         let wanted = wanted_objects().await?;
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let Conn::Sqlite(conn) = conn else {
-                    return Ok(());
+        in_transaction!(self, |conn| {
+            let Conn::Sqlite(conn) = conn else {
+                return Ok(());
+            };
+            for found in schema::differences(conn, wanted).await? {
+                let SchemaDifference::Missing(name) = found else {
+                    continue;
                 };
-                for found in schema::differences(conn, wanted).await? {
-                    let SchemaDifference::Missing(name) = found else {
-                        continue;
-                    };
-                    if let Some(sql) = wanted.get(&name).filter(|_| !name.starts_with("table ")) {
-                        // SQL of our own migrations.
-                        let sql = AssertSqlSafe(sql.as_str());
-                        sqlx::query(sql).execute(&mut **conn).await?;
-                    }
+                if let Some(sql) = wanted.get(&name).filter(|_| !name.starts_with("table ")) {
+                    // SQL of our own migrations.
+                    let sql = AssertSqlSafe(sql.as_str());
+                    sqlx::query(sql).execute(&mut **conn).await?;
                 }
-                Ok(())
-            })
+            }
+            Ok(())
         })
-        .await
     }
 }
 
@@ -172,30 +133,11 @@ pub(crate) async fn recount(conn: &mut Conn) -> Result<()> {
 }
 
 async fn restore(conn: &mut Conn, pairs: &[(PairId, Stage)]) -> Result<()> {
-    let items = json_array(
-        pairs
-            .iter()
-            .map(|(pair, stage)| json!([pair.0, stage.index()])),
-    );
+    let items = pairs.iter();
+    let items = items.map(|(pair, stage)| json!([pair.0, stage.index()]));
     let mut deltas = Deltas::default();
-    let before = query_as(POSITIONS).bind(&items);
-    let before: Vec<CounterKey> = before.fetch_all(&mut *conn).await?;
-    for key in before {
-        deltas.add(key, -1);
-    }
-    query(NEW_JOBS).bind(&items).execute(&mut *conn).await?;
-    let after = query_as(RESTORE).bind(&items);
-    let after: Vec<CounterKey> = after.fetch_all(&mut *conn).await?;
-    for key in after {
-        deltas.add(key, 1);
-    }
-    query(REMOVE_RESULTS)
-        .bind(&items)
-        .execute(&mut *conn)
-        .await?;
-    query(CLEAR_FAILURES.of::<PairJob>())
-        .bind(&items)
-        .execute(&mut *conn)
-        .await?;
+    send_back::<PairJob>(conn, pairs.iter().copied(), &mut deltas).await?;
+    let remove = query(REMOVE_RESULTS).bind(json_array(items));
+    remove.execute(&mut *conn).await?;
     deltas.apply(conn).await
 }

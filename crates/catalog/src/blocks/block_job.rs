@@ -6,8 +6,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::Result;
-use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
-use crate::blocks::records::{BLOCK, control_points, input_versions};
+use crate::blocks::model::{BlockAttributes, BlockInputVersions, BlockProvenance};
+use crate::blocks::records::{BLOCK, control_points};
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
 use crate::db::query::query;
@@ -33,8 +33,10 @@ impl JobKind for BlockJob {
     type Name = BlockName;
     type Selection = BlockSelection;
     type Stage = BlockStage;
-    type Provenance = MadeWith;
+    type Provenance = BlockProvenance;
     type Inputs = BlockInputVersions;
+
+    const STAGES: usize = BlockStage::COUNT;
 
     fn unit(id: i64) -> BlockId {
         BlockId(id)
@@ -60,7 +62,7 @@ impl JobKind for BlockJob {
         stage.index()
     }
 
-    fn fingerprint(_: &MadeWith) -> Option<FingerprintId> {
+    fn fingerprint(_: &BlockProvenance) -> Option<FingerprintId> {
         None
     }
 }
@@ -82,6 +84,8 @@ impl StoredKind for BlockJob {
         ("and_advance", ""),
         ("and_fail", ""),
         ("and_requeue", ""),
+        ("and_send_back", ""),
+        ("and_not_retired", ""),
         ("and_recover", ""),
         ("and_overdue", ""),
         ("and_count_claimed", ""),
@@ -89,8 +93,8 @@ impl StoredKind for BlockJob {
     const PROVENANCE: &'static [(&'static str, &'static str)] =
         &[("made_with", "item.value ->> 'made_with'")];
 
-    fn provenance(made_with: &MadeWith) -> Result<impl Serialize + use<'_>> {
-        Ok(json!({ "made_with": serde_json::to_string(made_with)? }))
+    fn provenance(provenance: &BlockProvenance) -> Result<impl Serialize + use<'_>> {
+        Ok(json!({ "made_with": serde_json::to_string(provenance)? }))
     }
 
     /// The settings of the worker are unknown, so only changed inputs make this failure outdated.
@@ -101,10 +105,14 @@ impl StoredKind for BlockJob {
         _: Option<WorkerId>,
     ) -> Result<Value> {
         let row = query(BLOCK).bind(block.0).fetch_one(conn).await?;
-        let (attributes, inputs) = (BlockAttributes::from_row(&row)?, input_versions(&row)?);
+        let (attributes, inputs) = (
+            BlockAttributes::from_row(&row)?,
+            BlockInputVersions::from_row(&row)?,
+        );
         let points = control_points(&row)?;
-        let made_with = MadeWith::new(stage, &Value::Null, &attributes, &inputs, points.as_ref());
-        Ok(serde_json::to_value(Self::provenance(&made_with)?)?)
+        let provenance =
+            BlockProvenance::new(stage, &Value::Null, &attributes, &inputs, points.as_ref());
+        Ok(serde_json::to_value(Self::provenance(&provenance)?)?)
     }
 
     fn are_known(_: &BlockInputVersions) -> bool {

@@ -11,9 +11,6 @@ const PAGE: usize = 256;
 
 impl Catalog {
     /// Returns the results of the pairs that were cut from a block and are not retired, sorted by name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn pairs_of_block(&self, block: &BlockName) -> Result<Vec<PairResults>> {
         let characters = self.block_characters(block).await?.into_iter();
         let cut: BTreeSet<String> = characters.filter_map(|one| one.pair).collect();

@@ -7,8 +7,7 @@ use serde_json::Value;
 use crate::blocks::model::{CutOrigin, NewCharacter, StoredCharacter};
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
-use crate::db::row::{FromRow, Row};
-use crate::db::value::Json;
+use crate::db::row::FromRow as _;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{BlockCharacterState, BlockId, BlockName, PairId, PairName};
 
@@ -40,40 +39,8 @@ SELECT p.name, c.label, c.box, c.maps
 FROM pair AS p JOIN block_character AS c ON c.pair = p.id AND c.state = 'cut'
 WHERE p.name BETWEEN ?1 AND ?2";
 
-impl FromRow for CutOrigin {
-    fn from_row(row: &Row) -> Result<Self> {
-        let Json(bounds) = row.get("box")?;
-        let maps: Option<Json<_>> = row.get("maps")?;
-        Ok(Self {
-            label: row.get("label")?,
-            bounds,
-            maps: maps.map(|Json(maps)| maps),
-        })
-    }
-}
-
-impl FromRow for StoredCharacter {
-    fn from_row(row: &Row) -> Result<Self> {
-        let Json(bounds) = row.get("box")?;
-        let maps: Option<Json<Value>> = row.get("maps")?;
-        Ok(Self {
-            label: row.get("label")?,
-            character: row.get("character")?,
-            bounds,
-            confidence: row.get("confidence")?,
-            state: row.get("state")?,
-            reason: row.get("reason")?,
-            maps: maps.map(|Json(maps)| maps),
-            pair: row.get("pair")?,
-        })
-    }
-}
-
 impl Catalog {
     /// Returns the characters of a block in reading order, retired ones last.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block_characters(&self, block: &BlockName) -> Result<Vec<StoredCharacter>> {
         let mut conn = self.read_conn().await?;
         let list = query_as(LIST).bind(block.as_str());
@@ -93,10 +60,9 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let query = query(ORIGINS).bind(first.as_str()).bind(last.as_str());
         let rows = query.fetch_all(&mut conn).await?;
-        let origins = rows
-            .iter()
-            .map(|row| Ok((row.get("name")?, CutOrigin::from_row(row)?)));
-        origins.collect()
+        rows.iter()
+            .map(|row| Ok((row.get("name")?, CutOrigin::from_row(row)?)))
+            .collect()
     }
 }
 
@@ -146,6 +112,5 @@ pub(crate) async fn store(
         let gone = query(sql).bind(block.0).bind(&labels);
         gone.execute(&mut *conn).await?;
     }
-    let uncut = query_scalar(UNCUT).bind(block.0);
-    uncut.fetch_all(conn).await
+    query_scalar(UNCUT).bind(block.0).fetch_all(conn).await
 }

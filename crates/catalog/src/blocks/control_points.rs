@@ -1,6 +1,7 @@
 //! Stores the control points of blocks.
 
 use crate::db::query::{query, query_scalar};
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
@@ -25,9 +26,6 @@ pub enum ControlPointsChange {
 impl Catalog {
     /// Stores the control points of a block, or removes them, if the stored ones still have the hash `read`; `None` stands
     /// for no points. So nobody replaces points that they have not seen. The next run finds out which stages are stale.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn set_control_points(
         &self,
         block: &BlockName,
@@ -36,26 +34,23 @@ impl Catalog {
     ) -> Result<ControlPointsChange> {
         let text = points.map(serde_json::to_string).transpose()?;
         let name = block.to_string();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let row = query(STORED).bind(&name).fetch_optional(&mut *conn);
-                let Some(row) = row.await? else {
-                    return Ok(ControlPointsChange::NoBlock);
-                };
-                let stored: Option<String> = row.get("control_points")?;
-                let points = stored.as_deref().map(serde_json::from_str::<ControlPoints>);
-                if points.transpose()?.map(|points| points.hash()) != read {
-                    return Ok(ControlPointsChange::Outdated);
-                }
-                let update = query_scalar(UPDATE).bind(&name).bind(&text).bind(&stored);
-                let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
-                let Some(id) = id else {
-                    return Ok(ControlPointsChange::Outdated);
-                };
-                checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
-                Ok(ControlPointsChange::Stored)
-            })
+        in_transaction!(self, |conn| {
+            let row = query(STORED).bind(&name).fetch_optional(&mut *conn);
+            let Some(row) = row.await? else {
+                return Ok(ControlPointsChange::NoBlock);
+            };
+            let stored: Option<String> = row.get("control_points")?;
+            let points = stored.as_deref().map(serde_json::from_str::<ControlPoints>);
+            if points.transpose()?.map(|points| points.hash()) != read {
+                return Ok(ControlPointsChange::Outdated);
+            }
+            let update = query_scalar(UPDATE).bind(&name).bind(&text).bind(&stored);
+            let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
+            let Some(id) = id else {
+                return Ok(ControlPointsChange::Outdated);
+            };
+            checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+            Ok(ControlPointsChange::Stored)
         })
-        .await
     }
 }

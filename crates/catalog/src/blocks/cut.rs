@@ -10,16 +10,18 @@ use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::names_json;
 use crate::db::script::Script;
+use crate::db::transaction::in_transaction;
 use crate::queue::checkpoint::{self, LeasedCheckpoints};
 use crate::queue::counters::Deltas;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::{Lease, StageCheckpoint};
 use crate::queue::pair_job::PairJob;
 use crate::queue::provenance::InputVersions;
+use crate::queue::requeue::send_back;
 use crate::queue::retired;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::{Catalog, Result};
-use mocban_core::domain::{BlockName, PairId, PairName};
+use mocban_core::domain::{BlockName, PairId, PairName, RetireCause, Stage};
 
 /// What the cut of a block changed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -75,10 +77,7 @@ impl Catalog {
         characters: Vec<NewCharacter>,
     ) -> Result<CutReply> {
         let done = (lease, vec![stage]);
-        self.in_transaction(move |conn| {
-            Box::pin(async move { finish(conn, &done, &characters).await })
-        })
-        .await
+        in_transaction!(self, |conn| { finish(conn, &done, &characters).await })
     }
 }
 
@@ -93,8 +92,8 @@ async fn finish(
     let name: BlockName = name.fetch_one(&mut *conn).await?;
     let rows = pair_rows(&name, found)?;
     let names: Vec<PairName> = rows.iter().map(|cut| cut.row.name.clone()).collect();
-    let taken = query_scalar(TAKEN).bind(lease.unit.0);
-    let taken: Option<PairName> = taken
+    let taken: Option<PairName> = query_scalar(TAKEN)
+        .bind(lease.unit.0)
         .bind(names_json(&names))
         .fetch_optional(&mut *conn)
         .await?;
@@ -112,7 +111,7 @@ async fn finish(
     let mut deltas = Deltas::default();
     let summary = store_pairs(conn, &rows, at, &mut deltas).await?;
     let gone = characters::store(conn, lease.unit, &name, found).await?;
-    let retired = retired::retire(conn, &gone, at, &mut deltas).await?;
+    let retired = retired::retire(conn, &gone, RetireCause::Labels, at, &mut deltas).await?;
     deltas.apply(conn).await?;
     Ok(CutReply::Stored(CutSummary { retired, ..summary }))
 }
@@ -181,10 +180,11 @@ async fn store_pairs(
         .map(|change| &change.name)
         .collect();
     let again = stored.iter().filter(|(_, name)| changed.contains(name));
-    let again: Vec<PairId> = again.map(|(id, _)| *id).collect();
-    retired::reset(conn, &again, deltas).await?;
+    // The workers that hold their leases read the old files.
+    let from_start = again.clone().map(|(id, _)| (*id, Stage::Fit));
+    send_back::<PairJob>(conn, from_start, deltas).await?;
     let all = names.len() as u64;
-    let changed = again.len() as u64;
+    let changed = again.count() as u64;
     Ok(CutSummary {
         added: summary.added,
         changed,

@@ -4,9 +4,11 @@ use crate::blocks::model::BlockAttributes;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
-use crate::{Catalog, Result};
+use crate::records::similar_names;
+use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
 
 /// Counts of an import of blocks.
@@ -36,7 +38,7 @@ ON CONFLICT (name) DO UPDATE SET
     labels_path = excluded.labels_path, unit = excluded.unit, side = excluded.side, attributes = excluded.attributes
 RETURNING id";
 
-pub(crate) const NEW_JOB: &str =
+const NEW_JOB: &str =
     "INSERT INTO block_job (block, stage, status) VALUES (?1, 0, 0) ON CONFLICT (block) DO NOTHING";
 
 const NAMES: &str = concat!(
@@ -47,25 +49,30 @@ const NAMES: &str = concat!(
 
 impl Catalog {
     /// Imports blocks in one transaction. Adds new blocks and updates existing ones. The next run finds out which
-    /// stages of a changed block are stale.
+    /// stages of a changed block are stale. With `changed_files`, most known blocks may get another scan and another page.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails. In that case nothing is imported.
+    /// Returns an error if the names of two blocks differ only in case, if most known blocks would get other files, or if
+    /// a database operation fails. In that case nothing is imported.
     pub async fn import_blocks(
         &self,
         rows: Vec<BlockAttributes>,
+        changed_files: bool,
         now: UnixMillis,
     ) -> Result<BlockImportSummary> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut summary = BlockImportSummary::default();
-                for row in &rows {
-                    import_block(conn, row, now, &mut summary).await?;
-                }
-                Ok(summary)
-            })
+        in_transaction!(self, |conn| {
+            let mut summary = BlockImportSummary::default();
+            for row in &rows {
+                import_block(conn, row, now, &mut summary).await?;
+            }
+            if summary.added > 0 {
+                similar_names::refuse_blocks(conn).await?;
+            }
+            if !changed_files {
+                refuse_changed_files(&summary)?;
+            }
+            Ok(summary)
         })
-        .await
     }
 
     /// Changes a block by a statement with its name as `?1` and a value as `?2`, which returns its id, and stores the
@@ -77,26 +84,41 @@ impl Catalog {
         value: Option<String>,
     ) -> Result<bool> {
         let name = block.to_string();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let update = query_scalar(statement).bind(&name).bind(&value);
-                let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
-                let Some(id) = id else { return Ok(false) };
-                checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
-                Ok(true)
-            })
+        in_transaction!(self, |conn| {
+            let update = query_scalar(statement).bind(&name).bind(&value);
+            let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
+            let Some(id) = id else { return Ok(false) };
+            checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+            Ok(true)
         })
-        .await
     }
 
     /// Returns the names of all blocks, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block_names(&self) -> Result<Vec<BlockName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar(NAMES).bind(self.left_out.of(ChecksummedTable::Block));
         names.fetch_all(&mut conn).await
+    }
+}
+
+/// Refuses an import that gives most of the known blocks another scan and another page. Unless the name of a block is
+/// given, it is that of the file of its scan, which other folders may have too.
+fn refuse_changed_files(summary: &BlockImportSummary) -> Result<()> {
+    let has_other_files = |(_, fields): &&(BlockName, Vec<&str>)| {
+        ["mesh", "page"].iter().all(|file| fields.contains(file))
+    };
+    let mut others = summary.changed.iter().filter(has_other_files);
+    let changed = others.clone().count() as u64;
+    let known = summary.unchanged + summary.changed.len() as u64;
+    match others.next() {
+        Some((example, _)) if 2 * changed > known => Err(CatalogError::ChangedFiles {
+            changed,
+            known,
+            kind: "blocks",
+            files: "scan and another page",
+            example: example.to_string(),
+        }),
+        _ => Ok(()),
     }
 }
 

@@ -3,11 +3,12 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::db::row::from_row;
-use mocban_core::domain::InputVersion;
+use crate::Result;
+use crate::db::row::{FromRow, Row, from_row};
+use crate::db::rows::input_version;
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
-    ControlPoints, LengthUnit, PrintFromMesh,
+    ControlPoints, InputVersion, LengthUnit, PrintFromMesh,
 };
 
 /// Attributes of a block as imported.
@@ -47,6 +48,17 @@ pub struct BlockInputVersions {
     pub labels: Option<InputVersion>,
 }
 
+/// Reads the input files of a block as last read.
+impl FromRow for BlockInputVersions {
+    fn from_row(row: &Row) -> Result<Self> {
+        Ok(Self {
+            mesh: input_version(row, "mesh")?,
+            page: input_version(row, "page")?,
+            labels: input_version(row, "labels")?,
+        })
+    }
+}
+
 impl BlockInputVersions {
     /// Returns whether control points were chosen on this mesh and this page.
     pub fn have(&self, points: &ControlPoints) -> bool {
@@ -59,7 +71,7 @@ impl BlockInputVersions {
 
 /// What a result or a failure of a stage was made with. Stored as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MadeWith {
+pub struct BlockProvenance {
     /// Revision and settings of the stage.
     pub settings: Value,
     /// The attributes that results depend on.
@@ -76,7 +88,7 @@ pub struct MadeWith {
     pub control_points: Option<ContentHash>,
 }
 
-impl MadeWith {
+impl BlockProvenance {
     /// Describes a stage that was computed from these inputs.
     pub fn new(
         stage: BlockStage,
@@ -168,6 +180,8 @@ pub struct CutOrigin {
     pub maps: Option<CharacterMaps>,
 }
 
+from_row! { CutOrigin { label, bounds: "box" as Json, maps as JsonOrNull } }
+
 /// A character of a block as stored.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StoredCharacter {
@@ -189,3 +203,5 @@ pub struct StoredCharacter {
     /// Id of its pair.
     pub pair: Option<String>,
 }
+
+from_row! { StoredCharacter { label, character, bounds: "box" as Json, confidence, state, reason, maps as JsonOrNull, pair } }

@@ -3,16 +3,17 @@
 
 use crate::blocks::block_job::BlockJob;
 use crate::blocks::model::{BlockAttributes, BlockInputVersions, BlockWork};
-use crate::blocks::records::{BLOCK, control_points, input_versions, stage_records};
+use crate::blocks::records::{BLOCK, control_points, stage_records};
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow as _, from_row};
 use crate::db::script::Script;
+use crate::db::transaction::in_transaction;
 use crate::queue::claim::{ClaimRequest, add_claim, add_release, in_order, leases, release_due};
 use crate::queue::counters::Deltas;
-use crate::queue::kind::StoredKind as _;
-use crate::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
+use crate::queue::kind::{StoredKind as _, Template};
+use crate::queue::lease::{CheckpointOutcome, FencedRow, Lease, StageCheckpoint, StageFailure};
 use crate::queue::requeue::{RetrySelection, retry, retry_pairs};
 use crate::queue::{checkpoint, fail, server_claim};
 use crate::{Catalog, CatalogError, Result};
@@ -23,6 +24,14 @@ SELECT count(*) FILTER (WHERE status = 0) AS ready, count(*) FILTER (WHERE statu
     count(*) FILTER (WHERE status = 2) AS backoff, count(*) FILTER (WHERE status = 4) AS quarantined,
     min(run_at) AS next_due FROM block_job
 WHERE ?1 IS NULL OR block IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
+
+/// Selects a job if its lease is valid, and locks it, so that the lease cannot be lost before the transaction ends.
+static LEASED: Template = Template::new(
+    "
+SELECT {unit} AS unit, token FROM {job}
+WHERE {unit} = ?1 AND worker = ?2 AND token = ?3 AND status = 1 AND EXISTS (
+        SELECT 1 FROM worker AS w WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= ?4) FOR UPDATE",
+);
 
 /// Numbers of blocks that have a stage to run, and of blocks that failed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -49,49 +58,40 @@ impl OutstandingBlocks {
 }
 
 impl Catalog {
-    /// Leases one ready block, with the data that its stages need. If `among` is given, considers only its blocks.
+    /// Leases one ready block, with the data that its stages need. If `selection` is given, considers only its blocks.
     /// Returns `None` if no block is ready, or if the worker has ended or its last heartbeat is before `alive_since`. A
     /// worker has at most one block: it gets the same lease again if the reply to the claim before was lost.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn claim_block(
         &self,
         worker: WorkerId,
         deadline: UnixMillis,
         alive_since: UnixMillis,
-        among: Option<&BlockSelection>,
+        selection: Option<&BlockSelection>,
     ) -> Result<Option<(Lease<BlockJob>, BlockWork)>> {
         let request = ClaimRequest {
             worker,
             slots: 1,
             until: BlockStage::Cut,
             exclusive: false,
-            among: among.cloned(),
+            selection: selection.cloned(),
             deadline,
             alive_since,
         };
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut held = leases(conn, worker).await?;
-                if held.is_empty() {
-                    held = claim(conn, &request).await?;
-                }
-                let Some(lease) = held.into_iter().next() else {
-                    return Ok(None);
-                };
-                let work = work(conn, &lease).await?;
-                Ok(Some((lease, work)))
-            })
+        in_transaction!(self, |conn| {
+            let mut held = leases(conn, worker).await?;
+            if held.is_empty() {
+                held = claim(conn, &request).await?;
+            }
+            let Some(lease) = held.into_iter().next() else {
+                return Ok(None);
+            };
+            let work = work(conn, &lease).await?;
+            Ok(Some((lease, work)))
         })
-        .await
     }
 
     /// Stores a finished stage and advances the job. Its artifacts must be on disk already. If the lease was lost, nothing
     /// is stored. The last stage is stored with [`Catalog::finish_cut`].
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn checkpoint_block(
         &self,
         lease: Lease<BlockJob>,
@@ -100,10 +100,10 @@ impl Catalog {
         // An earlier stage than that of the lease may have been computed again.
         let next = lease.after(&stage);
         let item = (lease, vec![stage]);
-        let stored = self.in_transaction(move |conn| {
-            Box::pin(async move { checkpoint::store(conn, &item, &mut uncounted()).await })
+        let stored = in_transaction!(self, |conn| {
+            checkpoint::store(conn, &item, &mut uncounted()).await
         });
-        Ok(match (stored.await?, next) {
+        Ok(match (stored?, next) {
             (false, _) => CheckpointOutcome::LeaseLost,
             (true, Some(lease)) => CheckpointOutcome::Lease(lease),
             (true, None) => CheckpointOutcome::Done,
@@ -111,79 +111,77 @@ impl Catalog {
     }
 
     /// Stores a failed stage of a block. Returns `false`, and stores nothing, if the lease was lost.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn fail_block(
         &self,
         lease: Lease<BlockJob>,
         failed: StageFailure<BlockJob>,
     ) -> Result<bool> {
         let item = (lease, failed);
-        self.in_transaction(move |conn| {
-            Box::pin(async move { fail::store(conn, &item, &mut uncounted()).await })
+        in_transaction!(self, |conn| {
+            fail::store(conn, &item, &mut uncounted()).await
         })
-        .await
     }
 
     /// Gives a lease back. Returns `false` if it was lost.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn release_block(&self, lease: Lease<BlockJob>) -> Result<bool> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut script = Script::default();
-                let statement = add_release(&mut script, [&lease].into_iter())?;
-                let rows = script.run(conn).await?;
-                Ok(lease.is_in(&rows.read_if_any(statement.as_ref())?))
-            })
+        in_transaction!(self, |conn| {
+            let mut script = Script::default();
+            let statement = add_release(&mut script, [&lease].into_iter())?;
+            let rows = script.run(conn).await?;
+            Ok(lease.is_in(&rows.read_if_any(statement.as_ref())?))
         })
-        .await
     }
 
-    /// Stores versions of the input files of blocks. Keeps the stored version of a file whose new version is `None`.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
+    /// Stores versions of the input files of a leased block, and keeps the stored version of a file whose new version is
+    /// `None`. Returns `false`, and stores nothing, if the lease was lost or the worker's last heartbeat is before
+    /// `alive_since`.
+    pub async fn store_leased_inputs(
+        &self,
+        lease: Lease<BlockJob>,
+        seen: BlockInputVersions,
+        alive_since: UnixMillis,
+    ) -> Result<bool> {
+        in_transaction!(self, |conn| {
+            let leased = query_as(LEASED.of::<BlockJob>()).bind(lease.unit.0);
+            let leased = leased.bind(lease.worker.0).bind(lease.token);
+            let rows: Vec<FencedRow> = leased.bind(alive_since).fetch_all(&mut *conn).await?;
+            if !lease.is_in(&rows) {
+                return Ok(false);
+            }
+            let mut script = Script::default();
+            BlockJob::add_inputs(&mut script, [(lease.unit, &seen)].into_iter())?;
+            script.run(conn).await?;
+            Ok(true)
+        })
+    }
+
+    /// Stores versions of the input files of blocks that no worker has leased. Keeps the stored version of a file whose new version is `None`.
     pub async fn store_block_inputs(&self, seen: Vec<(BlockId, BlockInputVersions)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut script = Script::default();
-                BlockJob::add_inputs(&mut script, seen.iter().map(|(id, seen)| (*id, seen)))?;
-                script.run(conn).await?;
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            let mut script = Script::default();
+            BlockJob::add_inputs(&mut script, seen.iter().map(|(id, seen)| (*id, seen)))?;
+            script.run(conn).await?;
+            Ok(())
         })
-        .await
     }
 
-    /// Counts the blocks that are ready, leased or backing off, and the failed ones. If `among` is given, counts only
+    /// Counts the blocks that are ready, leased or backing off, and the failed ones. If `selection` is given, counts only
     /// its blocks.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn outstanding_blocks(
         &self,
-        among: Option<&BlockSelection>,
+        selection: Option<&BlockSelection>,
     ) -> Result<OutstandingBlocks> {
         let mut conn = self.read_conn().await?;
-        let counts = query_as(OUTSTANDING).bind(among.map(BlockSelection::json));
+        let counts = query_as(OUTSTANDING).bind(selection.map(BlockSelection::json));
         counts.fetch_one(&mut conn).await
     }
 
     /// Ends the back-offs of blocks that are due, and returns the number of blocks made ready. Also ends back-offs with
     /// more than `longest` milliseconds left, which only a clock jump can cause.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn release_due_blocks(&self, now: UnixMillis, longest: i64) -> Result<u64> {
-        self.in_transaction(move |conn| {
-            Box::pin(
-                async move { release_due::<BlockJob>(conn, now, longest, &mut uncounted()).await },
-            )
+        in_transaction!(self, |conn| {
+            release_due::<BlockJob>(conn, now, longest, &mut uncounted()).await
         })
-        .await
     }
 
     /// Makes failed pairs and blocks ready in one transaction, and returns the number of each. Unknown names of blocks
@@ -197,13 +195,10 @@ impl Catalog {
         blocks: &RetrySelection<BlockJob>,
     ) -> Result<[u64; 2]> {
         let (pairs, blocks) = (pairs.clone(), blocks.clone());
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let retried = retry_pairs(conn, &pairs).await?;
-                Ok([retried, retry(conn, &blocks, &mut uncounted()).await?])
-            })
+        in_transaction!(self, |conn| {
+            let retried = retry_pairs(conn, &pairs).await?;
+            Ok([retried, retry(conn, &blocks, &mut uncounted()).await?])
         })
-        .await
     }
 }
 
@@ -230,7 +225,7 @@ async fn work(conn: &mut Conn, lease: &Lease<BlockJob>) -> Result<BlockWork> {
         return Err(CatalogError::Corrupt(text));
     };
     let attributes = BlockAttributes::from_row(&row)?;
-    let inputs: BlockInputVersions = input_versions(&row)?;
+    let inputs: BlockInputVersions = BlockInputVersions::from_row(&row)?;
     let control_points = control_points(&row)?;
     let mut results = stage_records(conn, lease.unit).await?;
     results.retain(|record| record.stage < lease.cursor);

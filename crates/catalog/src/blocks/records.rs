@@ -10,11 +10,11 @@ use crate::db::row::{FromRow, Row, from_row};
 use crate::db::value::Json;
 use crate::records::checksums::ChecksummedTable;
 use crate::records::left_out::is_counted;
+use crate::records::model::{AttemptRecord, StoredFailure, stored_failure};
 use crate::{Catalog, Result};
-use mocban_core::domain::InputVersion;
 use mocban_core::domain::{
-    BlockId, BlockName, BlockStage, BlockStageRecord, ContentHash, ControlPoints, Failure,
-    JobStatus, UnixMillis,
+    BlockId, BlockName, BlockStage, BlockStageRecord, ContentHash, ControlPoints, JobStatus,
+    UnixMillis,
 };
 
 /// Selects a block with its input files as last read.
@@ -35,11 +35,13 @@ const STATES: &str = concat!(
 SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.control_points,
     j.stage, j.status, j.attempt, j.crashes,
     f.stage AS failed_stage, f.class, f.message, f.at AS failed_at,
-    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut') AS characters,
+    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND NOT EXISTS (
+        SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair)) AS characters,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'left') AS left_out,
-    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'retired') AS retired,
-    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND c.confidence < ?2)
-        AS low_confidence
+    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND (c.state = 'retired' OR c.state = 'cut' AND EXISTS (
+        SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair))) AS retired,
+    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND c.confidence < ?2 AND NOT EXISTS (
+        SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair)) AS low_confidence
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id WHERE (?1 IS NULL OR b.name = ?1) AND ",
     is_counted!("b.id", "?3"),
     " ORDER BY b.name"
@@ -54,18 +56,6 @@ SELECT a.stage, a.class, a.message, a.ms, a.at
 FROM block_attempt AS a JOIN block AS b ON b.id = a.block WHERE b.name = ?1 ORDER BY a.id";
 
 const AUDITED: &str = "SELECT b.id, b.name, j.stage FROM block AS b LEFT JOIN block_job AS j ON j.block = b.id ORDER BY b.id";
-
-/// A stored failure of a block with its stage.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct StoredBlockFailure {
-    /// The stage that failed.
-    pub stage: BlockStage,
-    /// Class and message.
-    #[serde(flatten)]
-    pub failure: Failure,
-    /// When.
-    pub at: UnixMillis,
-}
 
 /// A block with the state of its job.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -82,7 +72,7 @@ pub struct BlockState {
     /// Workers that died or hung over it.
     pub crashes: u32,
     /// The failure, if the block failed or backs off.
-    pub failure: Option<StoredBlockFailure>,
+    pub failure: Option<StoredFailure<BlockStage>>,
     /// Places that a person chose on scan and page.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub control_points: Option<ControlPoints>,
@@ -108,27 +98,15 @@ pub struct BlockStageDetail {
     /// Hash over outcome and artifacts.
     pub result_hash: ContentHash,
     /// Settings, inputs and attributes that it was computed from.
-    pub made_with: Value,
+    #[serde(rename = "made_with")]
+    pub provenance: Value,
     /// Computing time in milliseconds.
     pub ms: u64,
     /// When it was stored.
     pub at: UnixMillis,
 }
 
-from_row! { BlockStageDetail { stage, outcome as Json, files as Json, result_hash, made_with as Json, ms, at } }
-
-/// An attempt of a stage of a block.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct BlockAttemptRecord {
-    /// The stage.
-    pub stage: BlockStage,
-    /// Class and message, if it failed.
-    pub failure: Option<Failure>,
-    /// Computing time in milliseconds.
-    pub ms: Option<u64>,
-    /// When it ended.
-    pub at: UnixMillis,
-}
+from_row! { BlockStageDetail { stage, outcome as Json, files as Json, result_hash, provenance: "made_with" as Json, ms, at } }
 
 /// Everything about one block.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -139,7 +117,7 @@ pub struct BlockDetail {
     /// Current results of its stages.
     pub stages: Vec<BlockStageDetail>,
     /// Attempts, oldest first.
-    pub attempts: Vec<BlockAttemptRecord>,
+    pub attempts: Vec<AttemptRecord<BlockStage>>,
 }
 
 /// A block with its results, for a check.
@@ -168,52 +146,12 @@ pub struct KnownBlock {
     pub inputs: BlockInputVersions,
 }
 
-impl FromRow for KnownBlock {
-    fn from_row(row: &Row) -> Result<Self> {
-        Ok(Self {
-            block: row.get("id")?,
-            attributes: BlockAttributes::from_row(row)?,
-            inputs: input_versions(row)?,
-        })
-    }
-}
-
-impl FromRow for BlockStageRecord {
-    fn from_row(row: &Row) -> Result<Self> {
-        let Json(files) = row.get("files")?;
-        Ok(Self {
-            stage: row.get("stage")?,
-            outcome: row.get("outcome")?,
-            files,
-            result_hash: row.get("result_hash")?,
-        })
-    }
-}
-
-impl FromRow for BlockAttemptRecord {
-    fn from_row(row: &Row) -> Result<Self> {
-        Ok(Self {
-            stage: row.get("stage")?,
-            failure: failure(row)?,
-            ms: row.get("ms")?,
-            at: row.get("at")?,
-        })
-    }
-}
+from_row! { KnownBlock { block: "id", attributes in row, inputs in row } }
+from_row! { BlockStageRecord { stage, outcome, files as Json, result_hash } }
 
 impl FromRow for BlockState {
     fn from_row(row: &Row) -> Result<Self> {
         let cursor: i64 = row.get("stage")?;
-        let failure = match (
-            failure(row)?,
-            row.get("failed_stage")?,
-            row.get("failed_at")?,
-        ) {
-            (Some(failure), Some(stage), Some(at)) => {
-                Some(StoredBlockFailure { stage, failure, at })
-            }
-            _ => None,
-        };
         Ok(Self {
             attributes: BlockAttributes::from_row(row)?,
             status: row.get("status")?,
@@ -222,7 +160,7 @@ impl FromRow for BlockState {
                 .and_then(BlockStage::from_index),
             attempts: row.get("attempt")?,
             crashes: row.get("crashes")?,
-            failure,
+            failure: stored_failure(row)?,
             control_points: control_points(row)?,
             characters: row.get("characters")?,
             left_out: row.get("left_out")?,
@@ -232,24 +170,11 @@ impl FromRow for BlockState {
     }
 }
 
-/// Reads class and message of a failure, if there is one.
-fn failure(row: &Row) -> Result<Option<Failure>> {
-    let class = row.get("class")?;
-    let message: Option<String> = row.get("message")?;
-    Ok(match (class, message) {
-        (Some(class), Some(message)) => Some(Failure { class, message }),
-        _ => None,
-    })
-}
-
 impl Catalog {
     /// Confidence of a character's position below which it is counted as uncertain.
     pub const LOW_CHARACTER_CONFIDENCE: f64 = 0.5;
 
     /// Returns all blocks with the states of their jobs, sorted by name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block_states(&self) -> Result<Vec<BlockState>> {
         let mut conn = self.read_conn().await?;
         let states = query_as(STATES).bind(None::<&str>);
@@ -259,9 +184,6 @@ impl Catalog {
     }
 
     /// Returns everything about a block, or `None` if it does not exist.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block(&self, name: &BlockName) -> Result<Option<BlockDetail>> {
         let mut conn = self.snapshot().await?;
         let state = query_as(STATES).bind(name.as_str());
@@ -280,9 +202,6 @@ impl Catalog {
     }
 
     /// Returns all blocks with their input files as last read, sorted by id.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn known_blocks(&self) -> Result<Vec<KnownBlock>> {
         let mut conn = self.read_conn().await?;
         query_as(BLOCKS).fetch_all(&mut conn).await
@@ -314,18 +233,4 @@ pub(crate) async fn stage_records(
 pub(crate) fn control_points(row: &Row) -> Result<Option<ControlPoints>> {
     let stored: Option<Json<ControlPoints>> = row.get("control_points")?;
     Ok(stored.map(|Json(points)| points))
-}
-
-/// Reads the input files from a row with the columns of [`BLOCK`].
-pub(crate) fn input_versions(row: &Row) -> Result<BlockInputVersions> {
-    let version = |hash: &str, stat: &str| -> Result<Option<InputVersion>> {
-        let (hash, stat): (Option<_>, Option<_>) = (row.get(hash)?, row.get(stat)?);
-        let both = hash.zip(stat);
-        Ok(both.map(|(hash, stat)| InputVersion { hash, stat }))
-    };
-    Ok(BlockInputVersions {
-        mesh: version("mesh_hash", "mesh_stat")?,
-        page: version("page_hash", "page_stat")?,
-        labels: version("labels_hash", "labels_stat")?,
-    })
 }

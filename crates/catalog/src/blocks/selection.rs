@@ -40,9 +40,6 @@ impl BlockSelection {
 
 impl Catalog {
     /// Returns the blocks with the given names. Unknown names are left out.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn select_blocks(&self, names: &[BlockName]) -> Result<BlockSelection> {
         let names: Vec<&str> = names.iter().map(BlockName::as_str).collect();
         let mut conn = self.read_conn().await?;
@@ -52,9 +49,6 @@ impl Catalog {
     }
 
     /// Returns the given pairs together with the pairs that have been cut from the blocks so far, without retired ones.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn with_cut_pairs(
         &self,
         pairs: &PairSelection,

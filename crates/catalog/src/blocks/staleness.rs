@@ -6,19 +6,19 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::blocks::block_job::BlockJob;
-use crate::blocks::import::NEW_JOB;
-use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
+use crate::blocks::model::{BlockAttributes, BlockInputVersions, BlockProvenance};
 use crate::blocks::queue::uncounted;
-use crate::blocks::records::{control_points, input_versions};
+use crate::blocks::records::control_points;
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow, Row};
+use crate::db::transaction::in_transaction;
 use crate::db::value::Json;
 use crate::queue::block_settings::BlockSettings;
 use crate::queue::counters::{CounterKey, KeyedJob};
 use crate::queue::lease::position;
-use crate::queue::requeue::requeue;
+use crate::queue::requeue::{requeue, send_back};
 use crate::queue::staleness::RerunPolicy;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
@@ -30,13 +30,6 @@ SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id ORDER BY b.id";
 
 const RESULTS: &str = "SELECT block, stage, made_with FROM block_result ORDER BY block, stage";
-
-/// Sends a block back to a stage and ends its lease.
-const RESET: &str = "
-UPDATE block_job SET stage = min(stage, ?2), status = 0, run_at = NULL, attempt = 0, crashes = 0, worker = NULL,
-    deadline = NULL, token = token + 1 WHERE block = ?1";
-
-const CLEAR_FAILURE: &str = "DELETE FROM block_failure WHERE block = ?1";
 
 /// Why a block runs, or runs again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -100,17 +93,17 @@ struct PlannedBlock {
     control_points: Option<ControlPoints>,
     cursor: i64,
     status: JobStatus,
-    failure: Option<(BlockStage, MadeWith)>,
+    failure: Option<(BlockStage, BlockProvenance)>,
 }
 
 impl FromRow for PlannedBlock {
     fn from_row(row: &Row) -> Result<Self> {
-        let failed_with: Option<Json<MadeWith>> = row.get("failed_with")?;
+        let failed_with: Option<Json<BlockProvenance>> = row.get("failed_with")?;
         let failed_stage: Option<BlockStage> = row.get("failed_stage")?;
         Ok(Self {
             block: row.get("id")?,
             attributes: BlockAttributes::from_row(row)?,
-            inputs: input_versions(row)?,
+            inputs: BlockInputVersions::from_row(row)?,
             control_points: control_points(row)?,
             cursor: row.get("stage")?,
             status: row.get("status")?,
@@ -138,12 +131,12 @@ impl PlannedBlock {
     fn change(
         &self,
         stage: BlockStage,
-        made: &MadeWith,
+        made: &BlockProvenance,
         settings: &BlockSettings,
     ) -> Option<BlockReason> {
         let points = self.control_points.as_ref();
         let (attributes, inputs) = (&self.attributes, &self.inputs);
-        let now = MadeWith::new(stage, settings.of(stage), attributes, inputs, points);
+        let now = BlockProvenance::new(stage, settings.of(stage), attributes, inputs, points);
         [
             (made.mesh != now.mesh, BlockReason::Mesh),
             (made.page != now.page, BlockReason::Page),
@@ -166,7 +159,7 @@ impl PlannedBlock {
     /// Returns the first stage to run and why, or `None` if the block need not run or is leased.
     fn decide(
         &self,
-        results: &BTreeMap<BlockStage, MadeWith>,
+        results: &BTreeMap<BlockStage, BlockProvenance>,
         settings: &BlockSettings,
         policy: RerunPolicy,
     ) -> Option<(BlockStage, BlockReason)> {
@@ -207,19 +200,16 @@ impl PlannedBlock {
 }
 
 impl Catalog {
-    /// Returns the blocks that a run with these settings would work on, and why. If `among` is given, considers only
+    /// Returns the blocks that a run with these settings would work on, and why. If `selection` is given, considers only
     /// its blocks.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn plan_blocks(
         &self,
         settings: &BlockSettings,
         policy: RerunPolicy,
-        among: Option<&BlockSelection>,
+        selection: Option<&BlockSelection>,
     ) -> Result<Vec<BlockPlanEntry>> {
         let mut conn = self.snapshot().await?;
-        let planned = decisions(&mut conn, settings, policy, among).await?;
+        let planned = decisions(&mut conn, settings, policy, selection).await?;
         let entries = planned.into_iter().map(|(job, from, why)| BlockPlanEntry {
             block: job.attributes.name,
             from,
@@ -228,53 +218,33 @@ impl Catalog {
         Ok(entries.collect())
     }
 
-    /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `among` is given,
+    /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `selection` is given,
     /// considers only its blocks. Returns their number.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn requeue_stale_blocks(
         &self,
         settings: &BlockSettings,
         policy: RerunPolicy,
-        among: Option<&BlockSelection>,
+        selection: Option<&BlockSelection>,
     ) -> Result<u64> {
-        let (settings, among) = (settings.clone(), among.cloned());
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let decided = decisions(conn, &settings, policy, among.as_ref()).await?;
-                let stale = decided.iter().filter(|(job, from, why)| {
-                    let waits = matches!(why, BlockReason::New | BlockReason::Unfinished);
-                    !waits || job.next() != Some(*from)
-                });
-                let stale = stale.map(|(job, from, _)| (job.keyed(), position::<BlockJob>(*from)));
-                let stale: Vec<_> = stale.collect();
-                requeue::<BlockJob>(conn, &stale, &mut uncounted()).await
-            })
+        let (settings, selection) = (settings.clone(), selection.cloned());
+        in_transaction!(self, |conn| {
+            let decided = decisions(conn, &settings, policy, selection.as_ref()).await?;
+            let stale = decided.iter().filter(|(job, from, why)| {
+                let waits = matches!(why, BlockReason::New | BlockReason::Unfinished);
+                !waits || job.next() != Some(*from)
+            });
+            let stale = stale.map(|(job, from, _)| (job.keyed(), position::<BlockJob>(*from)));
+            let stale: Vec<_> = stale.collect();
+            requeue::<BlockJob>(conn, &stale, &mut uncounted()).await
         })
-        .await
     }
 
     /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files
     /// of their results are missing or damaged.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn reset_blocks(&self, blocks: Vec<(BlockId, BlockStage)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                for (block, stage) in &blocks {
-                    let new = query(NEW_JOB).bind(block.0);
-                    new.execute(&mut *conn).await?;
-                    let reset = query(RESET).bind(block.0).bind(stage.index() as i64);
-                    reset.execute(&mut *conn).await?;
-                    let clear = query(CLEAR_FAILURE).bind(block.0);
-                    clear.execute(&mut *conn).await?;
-                }
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            send_back::<BlockJob>(conn, blocks.into_iter(), &mut uncounted()).await
         })
-        .await
     }
 }
 
@@ -283,10 +253,10 @@ async fn decisions(
     conn: &mut Conn,
     settings: &BlockSettings,
     policy: RerunPolicy,
-    among: Option<&BlockSelection>,
+    selection: Option<&BlockSelection>,
 ) -> Result<Vec<(PlannedBlock, BlockStage, BlockReason)>> {
     let jobs: Vec<PlannedBlock> = query_as(JOBS).fetch_all(&mut *conn).await?;
-    let mut results: BTreeMap<BlockId, BTreeMap<BlockStage, MadeWith>> = BTreeMap::new();
+    let mut results: BTreeMap<BlockId, BTreeMap<BlockStage, BlockProvenance>> = BTreeMap::new();
     for row in &query(RESULTS).fetch_all(conn).await? {
         let Json(made) = row.get("made_with")?;
         let of_block = results.entry(row.get("block")?).or_default();
@@ -294,7 +264,8 @@ async fn decisions(
     }
     let none = BTreeMap::new();
     let wanted = jobs.into_iter();
-    let wanted = wanted.filter(|job| among.is_none_or(|among| among.contains(job.block)));
+    let wanted =
+        wanted.filter(|job| selection.is_none_or(|selection| selection.contains(job.block)));
     let decided = wanted.filter_map(|job| {
         let results = results.get(&job.block).unwrap_or(&none);
         let (from, why) = job.decide(results, settings, policy)?;

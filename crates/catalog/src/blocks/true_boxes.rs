@@ -17,18 +17,12 @@ const ALL: &str = concat!(
 
 impl Catalog {
     /// Stores the true boxes of a block, replacing earlier ones. Returns `false` if there is no such block.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn set_true_boxes(&self, block: &BlockName, boxes: &[TrueBox]) -> Result<bool> {
         let text = serde_json::to_string(boxes)?;
         self.update_block(SET, block, Some(text)).await
     }
 
     /// Returns the blocks that have true boxes, sorted by name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn true_boxes(&self) -> Result<Vec<(BlockName, Vec<TrueBox>)>> {
         let mut conn = self.read_conn().await?;
         let rows = query(ALL).bind(self.left_out.of(ChecksummedTable::Block));

@@ -16,8 +16,8 @@ const LONGEST_WAIT: Duration = Duration::from_mins(1);
 const QUIET_WAIT: Duration = Duration::from_secs(5);
 /// Time between two looks at the process that holds the lock.
 const LOOK_EVERY: Duration = Duration::from_secs(5);
-/// Least share of a processor that a working process uses: it writes a long list, for example. A program with an open
-/// transaction that waits for a person uses less.
+/// Least fraction of a processor that a working process uses: it writes a long list, for example. A program with an
+/// open transaction that waits for a person uses less.
 const WORKING_PERCENT: u64 = 1;
 /// Time between two attempts: SQLite refuses some locks at once.
 const RETRY_EVERY: Duration = Duration::from_millis(5);

@@ -8,18 +8,18 @@ use sqlx::{Database, Postgres, Sqlite, Transaction};
 
 /// A connection to a catalog.
 pub(crate) enum Conn {
-    Sqlite(Held<Sqlite>),
-    Postgres(Held<Postgres>),
+    Sqlite(ConnectionKind<Sqlite>),
+    Postgres(ConnectionKind<Postgres>),
 }
 
 /// A connection that is owned or belongs to a pool. A snapshot ends when it is dropped.
-pub(crate) enum Held<D: Database> {
+pub(crate) enum ConnectionKind<D: Database> {
     Owned(D::Connection),
     Pooled(PoolConnection<D>),
     Snapshot(Transaction<'static, D>),
 }
 
-impl<D: Database> Deref for Held<D> {
+impl<D: Database> Deref for ConnectionKind<D> {
     type Target = D::Connection;
 
     fn deref(&self) -> &Self::Target {
@@ -31,7 +31,7 @@ impl<D: Database> Deref for Held<D> {
     }
 }
 
-impl<D: Database> DerefMut for Held<D> {
+impl<D: Database> DerefMut for ConnectionKind<D> {
     fn deref_mut(&mut self) -> &mut Self::Target {
         match self {
             Self::Owned(conn) => conn,
@@ -50,6 +50,6 @@ impl Conn {
     pub(crate) async fn in_memory() -> Self {
         let options = sqlx::sqlite::SqliteConnectOptions::new().in_memory(true);
         let conn = sqlx::ConnectOptions::connect(&options).await;
-        Self::Sqlite(Held::Owned(conn.expect("a database")))
+        Self::Sqlite(ConnectionKind::Owned(conn.expect("a database")))
     }
 }

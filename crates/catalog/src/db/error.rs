@@ -175,6 +175,44 @@ pub enum CatalogError {
     /// The rows of an import ended early.
     #[error("the list was not read to its end, so nothing was imported")]
     CutShort,
+    /// A new pair or block whose name differs from a known one only in upper and lower case.
+    #[error(
+        "{kind} {new} differs from {kind} {known} only in upper and lower case, so their files would be one on Windows and macOS; nothing was imported, rename one of them"
+    )]
+    SimilarName {
+        /// `pair` or `block`.
+        kind: &'static str,
+        /// The new name.
+        new: String,
+        /// The known name.
+        known: String,
+    },
+    /// Most known pairs or blocks of an import would get other files.
+    #[error(
+        "{changed} of the {known} {kind} in it that the project has would get another {files}, such as {example}: their ids may be those of others; nothing was imported, give other ids (of folders, import the one above, so that ids begin with the name of the folder), or add --allow-changed-files if the files have moved"
+    )]
+    ChangedFiles {
+        /// Number of pairs or blocks that would get other files.
+        changed: u64,
+        /// Number of pairs or blocks in the list that are known.
+        known: u64,
+        /// `pairs` or `blocks`.
+        kind: &'static str,
+        /// Which files.
+        files: &'static str,
+        /// Name of one of them.
+        example: String,
+    },
+    /// A new pair with the files of a known one, whose name differs only in leading zeros.
+    #[error(
+        "pair {new} has the mesh and the print of pair {known}, so a spreadsheet may have dropped the zeros of its id; nothing was imported, write the id as {known}"
+    )]
+    SameFiles {
+        /// The new name.
+        new: PairName,
+        /// The known name.
+        known: PairName,
+    },
     /// A pragma did not take effect.
     #[error("the database set {name} to {found}, not {wanted}")]
     Pragma {

@@ -107,8 +107,7 @@ impl PostgresAddress {
         let mut conn = self.connect_unconfigured().await?;
         let mut other = self.connect_unconfigured().await?;
         // A pooler without a free connection to the server answers late.
-        let checking = timeout_active(CONNECT_TIMEOUT, keep_processes(&mut conn, &mut other));
-        let is_kept = checking
+        let is_kept = timeout_active(CONNECT_TIMEOUT, keep_processes(&mut conn, &mut other))
             .await
             .unwrap_or_else(|| Err(timed_out()))
             .map_err(|error| self.not_connected(&error))?;

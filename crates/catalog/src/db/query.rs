@@ -131,12 +131,11 @@ impl<R: Rows> Query<R> {
                 let rows = self.sqlite()?.fetch_all(&mut **conn).await?.into_iter();
                 rows.map(|row| R::value(Row::Sqlite(row))).collect()
             }
-            Conn::Postgres(conn) => {
-                let rows = limited(self.postgres()?.fetch_all(&mut **conn))
-                    .await?
-                    .into_iter();
-                rows.map(|row| R::value(Row::Postgres(row))).collect()
-            }
+            Conn::Postgres(conn) => limited(self.postgres()?.fetch_all(&mut **conn))
+                .await?
+                .into_iter()
+                .map(|row| R::value(Row::Postgres(row)))
+                .collect(),
         }
     }
 
@@ -155,9 +154,6 @@ impl<R: Rows> Query<R> {
     }
 
     /// Returns the first row.
-    ///
-    /// # Errors
-    /// Returns an error if there is none.
     pub(crate) async fn fetch_one(self, conn: &mut Conn) -> Result<R::Value> {
         let row = self.fetch_optional(conn).await?;
         row.ok_or(CatalogError::Database(sqlx::Error::RowNotFound))

@@ -120,13 +120,14 @@ pub(crate) trait FromRow: Sized {
 }
 
 /// Implements [`FromRow`] for a struct. Lists every field, with the name of its column if that is not the field's name.
-/// `field in row` reads the field from the same row, `field as Json` parses JSON text, and `field = value` sets it.
+/// `field in row` reads the field from the same row, `field by function` calls a function with the row, `field as Json`
+/// parses JSON text, `field as JsonOrNull` parses it if there is any, and `field = value` sets the field.
 macro_rules! from_row {
-    ($type:ident { $($field:ident $(: $column:literal)? $(in $row:ident)? $(as $json:ident)? $(= $value:expr)?),+ $(,)? }) => {
+    ($type:ty { $($field:ident $(: $column:literal)? $(in $row:ident)? $(by $read:path)? $(as $json:ident)? $(= $value:expr)?),+ $(,)? }) => {
         impl $crate::db::row::FromRow for $type {
             fn from_row(row: &$crate::db::row::Row) -> $crate::Result<Self> {
                 Ok(Self {
-                    $($field: $crate::db::row::field!(row, $field $(: $column)? $(in $row)? $(as $json)? $(= $value)?)),+
+                    $($field: $crate::db::row::field!(row, $field $(: $column)? $(in $row)? $(by $read)? $(as $json)? $(= $value)?)),+
                 })
             }
         }
@@ -145,15 +146,33 @@ macro_rules! field {
     ($row:ident, $field:ident in row) => {
         $crate::db::row::FromRow::from_row($row)?
     };
-    ($row:ident, $field:ident as Json) => {{
-        let $crate::db::value::Json(value) = $row.get(stringify!($field))?;
-        value
-    }};
+    ($row:ident, $field:ident by $read:path) => {
+        $read($row)?
+    };
+    ($row:ident, $field:ident as $json:ident) => {
+        $crate::db::row::json!($row, stringify!($field), $json)
+    };
+    ($row:ident, $field:ident: $column:literal as $json:ident) => {
+        $crate::db::row::json!($row, $column, $json)
+    };
     ($row:ident, $field:ident = $value:expr) => {
         $value
     };
 }
 pub(crate) use field;
+
+/// Parses a column as JSON: see [`from_row`].
+macro_rules! json {
+    ($row:ident, $column:expr, Json) => {{
+        let $crate::db::value::Json(value) = $row.get($column)?;
+        value
+    }};
+    ($row:ident, $column:expr, JsonOrNull) => {{
+        let value: Option<$crate::db::value::Json<_>> = $row.get($column)?;
+        value.map(|$crate::db::value::Json(value)| value)
+    }};
+}
+pub(crate) use json;
 
 /// Implements [`FromRow`] for tuples, in the order of the columns.
 macro_rules! tuples {

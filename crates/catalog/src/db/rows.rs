@@ -3,11 +3,13 @@
 use serde_json::Value;
 use sqlx::error::BoxDynError;
 
+use crate::db::error::CatalogError;
+use crate::db::row::Row;
 use crate::db::value::{FromValue, Value as ColumnValue, read_blob, read_text};
 use mocban_core::domain::{
     Affine2, AttentionCheck, BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage,
-    ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName, PrintFromMesh, Reason,
-    ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
+    ContentHash, Failure, FailureClass, InputVersion, JobStatus, LengthUnit, PairId, PairName,
+    PrintFromMesh, Reason, RetireCause, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
 };
 
 /// Implements [`FromValue`] for domain types. Each line has a type, the type of its column, and a conversion function.
@@ -42,6 +44,7 @@ decode! {
     ReviewOrder: text = str::parse;
     ThresholdMetric: text = str::parse;
     Verdict: text = str::parse;
+    RetireCause: text = str::parse;
     Affine2: text = serde_json::from_str;
     AttentionCheck: text = serde_json::from_str;
     PrintFromMesh: text = serde_json::from_str;
@@ -66,6 +69,21 @@ fn hash(bytes: &[u8]) -> Result<ContentHash, String> {
         Ok(bytes) => Ok(ContentHash::from_bytes(bytes)),
         Err(_) => Err(format!("a hash of {} bytes", bytes.len())),
     }
+}
+
+/// Reads the version of an input file, such as `mesh`, from the columns with its hash and its `stat`.
+pub(crate) fn input_version(row: &Row, file: &str) -> Result<Option<InputVersion>, CatalogError> {
+    let hash: Option<_> = row.get(&*format!("{file}_hash"))?;
+    let stat: Option<_> = row.get(&*format!("{file}_stat"))?;
+    let both = hash.zip(stat);
+    Ok(both.map(|(hash, stat)| InputVersion { hash, stat }))
+}
+
+/// Reads class and message of a failure, if there is one.
+pub(crate) fn failure(row: &Row) -> Result<Option<Failure>, CatalogError> {
+    let (class, message): (Option<_>, Option<String>) = (row.get("class")?, row.get("message")?);
+    let both = class.zip(message);
+    Ok(both.map(|(class, message)| Failure { class, message }))
 }
 
 /// Builds a JSON array of names for `json_each`.

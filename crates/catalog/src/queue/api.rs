@@ -21,18 +21,12 @@ impl Catalog {
     }
 
     /// Gives a lease back. The attempt does not count. Returns `false` if the lease was already lost.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn release(&self, lease: Lease) -> Result<bool> {
         self.grouped(|reply| Request::Release(lease, reply)).await
     }
 
     /// Keeps the lock of this process's worker on a server, also over a new connection if the old one is broken. Must be
     /// called every few seconds. Does nothing if the catalog is a file.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn keep_worker_lock(&self, worker: WorkerId) -> Result<()> {
         if !self.is_shared() {
             return Ok(());
@@ -50,9 +44,6 @@ impl Catalog {
     /// Stores a worker's heartbeat, and its metrics if given. Returns `false`, and stores nothing, if the worker has ended
     /// or its previous heartbeat is older than `alive_since`. In that case the worker's leases are void, and it must
     /// register again.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn heartbeat(
         &self,
         worker: WorkerId,
@@ -104,27 +95,18 @@ impl Catalog {
     }
 
     /// Stores a failed stage. Returns `false`, and stores nothing, if the lease was lost.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn fail(&self, lease: Lease, failure: StageFailure) -> Result<bool> {
         self.grouped(|reply| Request::Fail(Box::new((lease, failure)), reply))
             .await
     }
 
     /// Reads the counters of jobs.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn counters(&self) -> Result<JobCounts> {
         let mut conn = self.read_conn().await?;
         Ok(by_status(counters(&mut conn).await?))
     }
 
     /// Counts all jobs from their rows. In an undamaged catalog, [`Catalog::counters`] gives the same result.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn recount(&self) -> Result<JobCounts> {
         let mut conn = self.snapshot().await?;
         Ok(by_status(count_jobs(&mut conn).await?))

@@ -6,9 +6,9 @@ use crate::queue::fingerprint::differences;
 use crate::queue::plan::FieldChange;
 use mocban_core::domain::BlockStage;
 
-/// The settings of the four stages of a block, by stage: each stage's revision and settings.
+/// The settings of the stages of a block, by stage: each stage's revision and settings.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BlockSettings([Value; 4]);
+pub struct BlockSettings([Value; BlockStage::COUNT]);
 
 impl BlockSettings {
     /// Collects the settings of each stage.

@@ -8,7 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::error::Result;
 use crate::db::script::{Script, Statement};
-use crate::queue::counters::{CounterKey, Cursor, DONE, Deltas};
+use crate::queue::counters::{CounterKey, Cursor, Deltas};
 use crate::queue::kind::{JobKind, StoredKind, Template};
 use crate::queue::lease::{FencedRow, Lease, StageCheckpoint, position, was_written_long_ago};
 use crate::queue::pair_job::PairJob;
@@ -27,7 +27,7 @@ pub(crate) type LeasedCheckpoints<K = PairJob> = (Lease<K>, Vec<StageCheckpoint<
 /// a pair dirty if the new results do not build on the stored ones: see [`AdvancedJob`].
 pub(crate) static ADVANCE: Template = Template::new(
     "
-UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [next] = 4 THEN NULL ELSE worker END,
+UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [status] = 1 THEN worker END,
     deadline = [deadline], attempt = 1, crashes = 0{and_advance}
 FROM jsonb_each(?) AS item
 WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status = 1 AND EXISTS (
@@ -39,11 +39,11 @@ RETURNING {unit} AS unit, token",
 /// Items: [`ResultItem`].
 static RESULT: Template = Template::new(
     "
-INSERT INTO {result} ({unit}, stage, worker, {made_with}, outcome, files, result_hash, ms, at)
-SELECT [unit], [stage], [worker], {made_with_values}, item.value ->> 'outcome', CAST(item.value -> 'files' AS text),
+INSERT INTO {result} ({unit}, stage, worker, {provenance}, outcome, files, result_hash, ms, at)
+SELECT [unit], [stage], [worker], {provenance_values}, item.value ->> 'outcome', CAST(item.value -> 'files' AS text),
     unhex(item.value ->> 'result_hash'), [ms], [at]
 FROM jsonb_each(?) AS item WHERE true
-ON CONFLICT ({unit}, stage) DO UPDATE SET {made_with_updates}, outcome = excluded.outcome, files = excluded.files,
+ON CONFLICT ({unit}, stage) DO UPDATE SET {provenance_updates}, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at",
 );
 
@@ -91,8 +91,7 @@ pub(crate) async fn store<K: StoredKind>(
     }
     let mut script = Script::default();
     let statement = add_advance(&mut script, [checkpoint].into_iter())?;
-    let rows = script.run(conn).await?;
-    let advanced = rows.read_if_any(statement.as_ref())?;
+    let advanced = script.run(conn).await?.read_if_any(statement.as_ref())?;
     if !checkpoint.0.is_in(&advanced) {
         return Ok(false);
     }
@@ -162,7 +161,7 @@ struct ResultItem<'i, P> {
     stage: usize,
     worker: WorkerId,
     #[serde(flatten)]
-    made_with: P,
+    provenance: P,
     outcome: &'i str,
     files: &'i ArtifactSet,
     result_hash: ContentHash,
@@ -179,7 +178,7 @@ impl<'i> ResultItem<'i, ()> {
             unit: lease.id(),
             stage: K::index(result.stage),
             worker: lease.worker,
-            made_with: K::provenance(&result.made_with)?,
+            provenance: K::provenance(&result.provenance)?,
             outcome: &result.outcome,
             files: &result.files,
             result_hash: result.result_hash,
@@ -193,9 +192,9 @@ impl<'i> ResultItem<'i, ()> {
 fn key_after<K: JobKind>(stage: &StageCheckpoint<K>) -> CounterKey {
     let (cursor, status) = match K::next(stage.stage) {
         Some(next) => (position::<K>(next), JobStatus::Leased),
-        None => (DONE, JobStatus::Done),
+        None => (K::STAGES as Cursor, JobStatus::Done),
     };
-    let fingerprint = K::fingerprint(&stage.made_with);
+    let fingerprint = K::fingerprint(&stage.provenance);
     CounterKey::new(cursor, status, fingerprint.map(|FingerprintId(id)| id))
 }
 
@@ -261,7 +260,7 @@ fn chain<K: JobKind>(stages: &[StageCheckpoint<K>]) -> (Option<FingerprintId>, b
     let follow = |two: &[StageCheckpoint<K>]| K::next(two[0].stage) == Some(two[1].stage);
     let first = restart.is_none().then(|| chain.first()).flatten();
     (
-        first.and_then(|one| K::fingerprint(&one.made_with)),
+        first.and_then(|one| K::fingerprint(&one.provenance)),
         chain.windows(2).all(follow),
     )
 }

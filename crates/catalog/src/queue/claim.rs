@@ -27,7 +27,7 @@ pub struct ClaimRequest<K: JobKind = PairJob> {
     /// If set, leases one pair that must run exclusively; otherwise, leases only pairs that need not.
     pub exclusive: bool,
     /// Lease only these. `None` for all.
-    pub among: Option<K::Selection>,
+    pub selection: Option<K::Selection>,
     /// Deadline of the first stage.
     pub deadline: UnixMillis,
     /// If the worker's last heartbeat is before this time, nothing is leased. The time is by the worker's own clock.
@@ -43,7 +43,7 @@ impl ClaimRequest {
             slots,
             until: Stage::Register,
             exclusive: false,
-            among: None,
+            selection: None,
             deadline,
             alive_since: UnixMillis::MIN,
         }
@@ -144,15 +144,15 @@ pub(crate) fn add_claim<K: StoredKind>(
     script: &mut Script,
     request: &ClaimRequest<K>,
 ) -> Statement<Lease<K>> {
-    let claim = match &request.among {
+    let claim = match &request.selection {
         Some(_) => &CLAIM_AMONG,
         None => &CLAIM,
     };
     let statement = script.add(claim.of::<K>());
     script.bind(request.worker.0);
     script.bind(request.deadline);
-    if let Some(among) = &request.among {
-        script.bind(K::ids(among).into_owned());
+    if let Some(selection) = &request.selection {
+        script.bind(K::ids(selection).into_owned());
     }
     script.bind(position::<K>(request.until));
     script.bind(i64::from(request.exclusive));

@@ -44,11 +44,8 @@ const ALL_INTERVALS: i64 = 1 << 32;
 /// Counters that are not 0.
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter WHERE n <> 0";
 
-/// Position of a job: the index of its next stage, or 4 if the job is done.
+/// Position of a job: the index of its next stage, or the number of stages of its kind if the job is done.
 pub(crate) type Cursor = i64;
-
-/// Position of a job that is done.
-pub(crate) const DONE: Cursor = Stage::ALL.len() as Cursor;
 
 /// Returns the position of a job with this next stage.
 pub(crate) const fn cursor(stage: Stage) -> Cursor {

@@ -31,11 +31,11 @@ RETURNING {unit} AS unit, token, stage, status, coalesce({fingerprint}, 0) AS fi
 /// Stores why a job backs off or is quarantined. Items: see [`item`].
 static FAILURE: Template = Template::new(
     "
-INSERT INTO {failure} ({unit}, stage, class, message, {made_with}, at)
-SELECT [unit], [stage], item.value ->> 'class', item.value ->> 'message', {made_with_values}, [at]
+INSERT INTO {failure} ({unit}, stage, class, message, {provenance}, at)
+SELECT [unit], [stage], item.value ->> 'class', item.value ->> 'message', {provenance_values}, [at]
 FROM jsonb_each(?) AS item WHERE [status] <> 0
 ON CONFLICT ({unit}) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
-    {made_with_updates}, at = excluded.at",
+    {provenance_updates}, at = excluded.at",
 );
 
 static ATTEMPT: Template = Template::new(
@@ -120,8 +120,7 @@ pub(crate) async fn store<K: StoredKind>(
 ) -> Result<bool> {
     let mut script = Script::default();
     let statement = add_failures(&mut script, [failed].into_iter())?;
-    let rows = script.run(conn).await?;
-    let rows = rows.read_if_any(statement.as_ref())?;
+    let rows = script.run(conn).await?.read_if_any(statement.as_ref())?;
     let Some(row) = row_of(&failed.0, &rows) else {
         return Ok(false);
     };
@@ -152,8 +151,8 @@ fn item<K: StoredKind>((lease, failed): &LeasedFailure<K>) -> Result<Value> {
         "class": failed.failure.class, "message": failed.failure.message, "ms": failed.ms, "at": failed.at,
         "alive_since": failed.alive_since,
     });
-    let made_with = serde_json::to_value(K::provenance(&failed.made_with)?)?;
-    Ok(merged(fields, made_with))
+    let provenance = serde_json::to_value(K::provenance(&failed.provenance)?)?;
+    Ok(merged(fields, provenance))
 }
 
 /// Returns an object with the fields of two.

@@ -8,8 +8,9 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::db::value::Json;
-use crate::queue::plan::FieldChange;
+use crate::queue::plan::{FieldChange, METHOD};
 use crate::queue::provenance::FingerprintId;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, Stage};
@@ -23,9 +24,9 @@ pub struct Fingerprint {
     pub fields: Value,
 }
 
-/// The current fingerprints of the four stages.
+/// The current fingerprints of the stages.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fingerprints([Fingerprint; 4]);
+pub struct Fingerprints([Fingerprint; Stage::COUNT]);
 
 impl Fingerprints {
     /// Computes the fingerprint of each stage from its fields. Each hash includes the previous stage's hash, so a
@@ -45,7 +46,7 @@ impl Fingerprints {
         &self.0[stage.index()]
     }
 
-    /// Returns the four hashes on one line. Another process can pass the line to [`Catalog::changes_from`].
+    /// Returns the hashes on one line. Another process can pass the line to [`Catalog::changes_from`].
     pub fn hash_line(&self) -> String {
         let hashes = self.0.each_ref().map(|fingerprint| fingerprint.hash);
         hashes.map(ContentHash::to_hex).join(" ")
@@ -60,7 +61,7 @@ pub(crate) fn hash_of(stage: Stage, fields: &Value, upstream: Option<ContentHash
 
 /// Row ids of the current fingerprints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FingerprintIds([FingerprintId; 4]);
+pub struct FingerprintIds([FingerprintId; Stage::COUNT]);
 
 impl FingerprintIds {
     /// Returns the fingerprint of a stage.
@@ -89,44 +90,35 @@ ON CONFLICT DO NOTHING",
 );
 
 impl Catalog {
-    /// Stores the fingerprints that are not stored yet. Returns the ids of all four.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
+    /// Stores the fingerprints that are not stored yet. Returns the ids of all.
     pub async fn register_fingerprints(
         &self,
         fingerprints: &Fingerprints,
     ) -> Result<FingerprintIds> {
         let fingerprints = fingerprints.clone();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut upstream: Option<FingerprintId> = None;
-                let mut ids = [FingerprintId(0); 4];
-                for stage in Stage::ALL {
-                    let fingerprint = fingerprints.of(stage);
-                    let id = query_scalar(INSERT)
-                        .bind(stage.index() as i64)
-                        .bind(&fingerprint.hash.as_bytes()[..])
-                        .bind(fingerprint.fields.to_string())
-                        .bind(upstream)
-                        .fetch_one(&mut *conn)
-                        .await?;
-                    let counters = query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
-                    counters.bind(id).execute(&mut *conn).await?;
-                    ids[stage.index()] = id;
-                    upstream = Some(id);
-                }
-                Ok(FingerprintIds(ids))
-            })
+        in_transaction!(self, |conn| {
+            let mut upstream: Option<FingerprintId> = None;
+            let mut ids = [FingerprintId(0); Stage::COUNT];
+            for stage in Stage::ALL {
+                let fingerprint = fingerprints.of(stage);
+                let id = query_scalar(INSERT)
+                    .bind(stage.index() as i64)
+                    .bind(&fingerprint.hash.as_bytes()[..])
+                    .bind(fingerprint.fields.to_string())
+                    .bind(upstream)
+                    .fetch_one(&mut *conn)
+                    .await?;
+                let counters = query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
+                counters.bind(id).execute(&mut *conn).await?;
+                ids[stage.index()] = id;
+                upstream = Some(id);
+            }
+            Ok(FingerprintIds(ids))
         })
-        .await
     }
 
     /// Returns the settings in which `fingerprints` differ from those of another process, which is described by its
     /// [`Fingerprints::hash_line`]. Skips a stage if the catalog does not know the other process's hash.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn changes_from(
         &self,
         hash_line: &str,
@@ -153,17 +145,17 @@ impl Catalog {
 pub(crate) async fn known(
     conn: &mut Conn,
     fingerprints: &Fingerprints,
-) -> Result<[Option<FingerprintId>; 4]> {
-    let mut ids = [None; 4];
+) -> Result<[Option<FingerprintId>; Stage::COUNT]> {
+    let mut ids = [None; Stage::COUNT];
     for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
-        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1");
-        let query = query.bind(&fingerprints.of(stage).hash.as_bytes()[..]);
+        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1")
+            .bind(&fingerprints.of(stage).hash.as_bytes()[..]);
         *id = query.fetch_optional(&mut *conn).await?;
     }
     Ok(ids)
 }
 
-/// Returns the ids of the four fingerprints as a JSON array. A fingerprint that is not stored has the id -1, which
+/// Returns the ids of the fingerprints as a JSON array. A fingerprint that is not stored has the id -1, which
 /// matches no result.
 pub(crate) async fn current_json(conn: &mut Conn, fingerprints: &Fingerprints) -> Result<String> {
     let ids = known(conn, fingerprints).await?;
@@ -182,11 +174,11 @@ pub(crate) async fn fields_of(conn: &mut Conn, id: FingerprintId) -> Result<Valu
 pub(crate) struct FingerprintChains {
     /// Stage and upstream by id.
     stored: BTreeMap<FingerprintId, (Stage, Option<FingerprintId>)>,
-    current: [Option<FingerprintId>; 4],
+    current: [Option<FingerprintId>; Stage::COUNT],
 }
 
 impl FingerprintChains {
-    /// Reads all fingerprints. Each combination of settings has added at most four.
+    /// Reads all fingerprints. Each combination of settings has added at most one for each stage.
     pub(crate) async fn load(conn: &mut Conn, fingerprints: &Fingerprints) -> Result<Self> {
         let current = known(conn, fingerprints).await?;
         let query = query_as("SELECT id, stage, upstream FROM fingerprint");
@@ -231,7 +223,8 @@ pub(crate) fn differences(stage: &str, old: &Value, new: &Value) -> Vec<FieldCha
     changes.collect()
 }
 
-/// Flattens nested objects. The key `settings` is left out of the names.
+/// Flattens nested objects, with the names of the settings: the key `settings` is left out. The method, which every stage has,
+/// is returned for the first stage only.
 fn leaves(stage: &str, fields: &Value) -> Map<String, Value> {
     let mut found = Map::new();
     let mut open = vec![(stage.to_owned(), fields)];
@@ -243,6 +236,8 @@ fn leaves(stage: &str, fields: &Value) -> Map<String, Value> {
         for (key, value) in inner {
             let path = match key.as_str() {
                 "settings" => path.clone(),
+                "method" if path == Stage::Fit.name() => METHOD.to_owned(),
+                "method" if path == stage => continue,
                 key => format!("{path}.{key}"),
             };
             open.push((path, value));
@@ -257,6 +252,19 @@ mod tests {
 
     use super::{Fingerprints, differences};
     use mocban_core::domain::Stage;
+
+    #[test]
+    fn the_method_is_a_setting_of_the_pipeline_and_named_once() {
+        let fields = |method| json!({ "method": method, "settings": { "seed": 1 } });
+        let of = |stage| differences(stage, &fields("default"), &fields("paper"));
+        let found = of("fit");
+        assert_eq!(found.len(), 1);
+        assert_eq!(
+            found[0].to_string(),
+            "pipeline.method: \"default\" -> \"paper\""
+        );
+        assert_eq!(of("register"), []);
+    }
 
     #[test]
     fn a_changed_setting_changes_its_stage_and_those_after_it() {

@@ -30,6 +30,9 @@ pub trait JobKind: Debug + Clone + Copy + PartialEq + Eq + Send + Sync + 'static
     /// Versions of the input files.
     type Inputs: Debug + Clone + PartialEq + Send + Sync;
 
+    /// Number of stages. Also the position of a job that is done.
+    const STAGES: usize;
+
     /// Returns what has a row id.
     fn unit(id: i64) -> Self::Unit;
     /// Returns a row id.
@@ -43,7 +46,7 @@ pub trait JobKind: Debug + Clone + Copy + PartialEq + Eq + Send + Sync + 'static
     /// Returns the index of a stage.
     fn index(stage: Self::Stage) -> usize;
     /// Returns the fingerprint of the settings, for a pair.
-    fn fingerprint(made_with: &Self::Provenance) -> Option<FingerprintId>;
+    fn fingerprint(provenance: &Self::Provenance) -> Option<FingerprintId>;
 
     /// Returns the stage after another one.
     fn next(stage: Self::Stage) -> Option<Self::Stage> {
@@ -63,7 +66,7 @@ pub(crate) trait StoredKind: JobKind {
     const PROVENANCE: &'static [(&'static str, &'static str)];
 
     /// Returns the fields of an item that [`Self::PROVENANCE`] reads.
-    fn provenance(made_with: &Self::Provenance) -> Result<impl Serialize + use<'_, Self>>;
+    fn provenance(provenance: &Self::Provenance) -> Result<impl Serialize + use<'_, Self>>;
 
     /// Returns these fields for a stage whose worker died, from what is known of inputs and settings.
     fn crashed(
@@ -103,6 +106,8 @@ impl Template {
         *self.filled[K::NUMBER].get_or_init(|| {
             let named = with_names::<K>(self.text);
             let sqlite = with_fields(&named, |field| format!("item.value ->> {field}"));
+            // SQLite locks the whole database.
+            let sqlite = sqlite.replace(" FOR UPDATE", "");
             let postgres = with_fields(&named, |field| {
                 format!("CAST(item.value ->> {field} AS bigint)")
             });
@@ -118,10 +123,13 @@ fn with_names<K: StoredKind>(template: &str) -> String {
     let updates = columns.clone();
     let updates = updates.map(|column| format!("{column} = excluded.{column}"));
     let mut text = template
-        .replace("{made_with}", &columns.collect::<Vec<_>>().join(", "))
-        .replace("{made_with_values}", &values.collect::<Vec<_>>().join(", "))
+        .replace("{provenance}", &columns.collect::<Vec<_>>().join(", "))
         .replace(
-            "{made_with_updates}",
+            "{provenance_values}",
+            &values.collect::<Vec<_>>().join(", "),
+        )
+        .replace(
+            "{provenance_updates}",
             &updates.collect::<Vec<_>>().join(", "),
         );
     for (name, value) in K::NAMES {

@@ -16,8 +16,8 @@ use mocban_system::failpoint;
 /// The right to run stages of one pair or block. A claim creates the lease, and a checkpoint continues it. Results and
 /// failures of stages are stored only under a valid lease.
 ///
-/// `token` is the fencing token. Each claim, recovery and repair increases the job's token, so a write under
-/// an older lease changes nothing.
+/// `token` is the fencing token: the number of the job's owner. A claim, a recovery, a repair and a new cut increase the
+/// token in the row of the job. A write names the token of its lease, and is refused if the row has another.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Lease<K: JobKind = PairJob> {
     pub(crate) unit: K::Unit,
@@ -63,6 +63,11 @@ impl<K: JobKind> Lease<K> {
         K::id(self.unit)
     }
 
+    /// Returns the worker that holds the lease.
+    pub const fn worker(&self) -> WorkerId {
+        self.worker
+    }
+
     /// Returns the next stage to run.
     pub const fn cursor(&self) -> K::Stage {
         self.cursor
@@ -73,8 +78,8 @@ impl<K: JobKind> Lease<K> {
         self.attempt
     }
 
-    /// Returns whether the pair must run exclusively, because it exceeded a resource limit or its worker died or hung.
-    /// Never true for a block.
+    /// Returns whether no other pair may run at the same time, because the pair exceeded a resource limit or its worker died
+    /// or hung. Blocks have no such mark, because a process starts nothing beside a block.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }
@@ -96,7 +101,7 @@ impl<K: JobKind> Lease<K> {
     pub(crate) fn after(&self, last: &StageCheckpoint<K>) -> Option<Self> {
         Some(Self {
             cursor: K::next(last.stage)?,
-            fingerprint: K::fingerprint(&last.made_with),
+            fingerprint: K::fingerprint(&last.provenance),
             attempt: 1,
             cleared: true,
             ..*self
@@ -125,7 +130,8 @@ pub enum CheckpointOutcome<K: JobKind = PairJob> {
     Lease(Lease<K>),
     /// Stored; the pair or block is done.
     Done,
-    /// The lease was lost and nothing was stored.
+    /// Nothing was stored, because the lease was lost, or because the files were written so long ago that they may have been
+    /// removed.
     LeaseLost,
 }
 
@@ -172,7 +178,7 @@ pub struct StageCheckpoint<K: JobKind = PairJob> {
     /// Which stage.
     pub stage: K::Stage,
     /// Settings, inputs and attributes that it was computed from.
-    pub made_with: K::Provenance,
+    pub provenance: K::Provenance,
     /// The outcome as JSON.
     pub outcome: String,
     /// Artifacts by role.
@@ -238,7 +244,7 @@ pub struct StageFailure<K: JobKind = PairJob> {
     /// What happens to the job.
     pub action: FailureAction,
     /// Settings, inputs and attributes of the attempt.
-    pub made_with: K::Provenance,
+    pub provenance: K::Provenance,
     /// Versions of the input files that were read.
     pub inputs: K::Inputs,
     /// Computing time in milliseconds, if anything was computed.

@@ -4,7 +4,7 @@ mod api;
 pub(crate) mod block_settings;
 pub(crate) mod checkpoint;
 pub(crate) mod claim;
-pub(crate) mod claim_start;
+pub(crate) mod claim_tracker;
 pub(crate) mod commit;
 pub(crate) mod counters;
 pub(crate) mod fail;

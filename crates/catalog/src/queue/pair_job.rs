@@ -65,6 +65,8 @@ impl JobKind for PairJob {
     type Provenance = PairProvenance;
     type Inputs = InputVersions;
 
+    const STAGES: usize = Stage::COUNT;
+
     fn unit(id: i64) -> PairId {
         PairId(id)
     }
@@ -89,8 +91,8 @@ impl JobKind for PairJob {
         stage.index()
     }
 
-    fn fingerprint(made_with: &PairProvenance) -> Option<FingerprintId> {
-        Some(made_with.fingerprint)
+    fn fingerprint(provenance: &PairProvenance) -> Option<FingerprintId> {
+        Some(provenance.fingerprint)
     }
 }
 
@@ -133,6 +135,17 @@ impl StoredKind for PairJob {
             "and_requeue",
             concat!(", prio = 0, exclusive = 0", go_back_to!("([1])")),
         ),
+        (
+            "and_send_back",
+            concat!(
+                ", prio = 0, exclusive = 0",
+                go_back_to!("min(job.stage, [1])")
+            ),
+        ),
+        (
+            "and_not_retired",
+            " AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = [0])",
+        ),
         ("and_recover", ", exclusive = max(exclusive, [1])"),
         ("and_overdue", ", exclusive = 1"),
         ("and_count_claimed", COUNT_CLAIMED),
@@ -144,8 +157,8 @@ impl StoredKind for PairJob {
         ("attributes", "item.value ->> 'attributes'"),
     ];
 
-    fn provenance(made_with: &PairProvenance) -> Result<impl Serialize + use<'_>> {
-        Ok(made_with)
+    fn provenance(provenance: &PairProvenance) -> Result<impl Serialize + use<'_>> {
+        Ok(provenance)
     }
 
     /// Returns the settings of the worker and the inputs as last read.

@@ -8,6 +8,9 @@ use serde_json::Value;
 use crate::queue::provenance::FingerprintId;
 use mocban_core::domain::{JobStatus, Stage};
 
+/// Name of the setting that is part of every stage's fingerprint.
+pub(crate) const METHOD: &str = "pipeline.method";
+
 /// Why a pair has work to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case", tag = "reason")]
@@ -81,6 +84,15 @@ impl Plan {
     /// Returns the number of pairs that would run.
     pub fn pairs(&self) -> u64 {
         self.entries.iter().map(|entry| entry.pairs).sum()
+    }
+
+    /// Returns whether pairs would run with another method than before.
+    pub fn changes_method(&self) -> bool {
+        let mut changes = self
+            .entries
+            .iter()
+            .filter_map(|entry| entry.changes.as_ref());
+        changes.any(|found| found.iter().any(|change| change.field == METHOD))
     }
 
     /// Counts pairs that would not run.

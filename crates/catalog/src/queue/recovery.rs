@@ -10,6 +10,7 @@ use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::script::Script;
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::queue::fail::{add_records, merged};
 use crate::queue::kind::{JobKind, StoredKind, Template};
@@ -72,7 +73,7 @@ SELECT w.id FROM json_each(?1) AS seen CROSS JOIN worker AS w ON w.id = CAST(see
 WHERE w.heartbeat = CAST(seen.value ->> 1 AS bigint)";
 
 /// Selects the given workers that hold leases, of pairs or blocks. `died` is 1 if the worker did not end properly.
-pub(crate) const LEFT_BY: &str = "
+pub(crate) const ORPHANED: &str = "
 SELECT w.id, w.ended IS NULL AS died, count(*) AS leases FROM (
         SELECT worker FROM job WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
         UNION ALL
@@ -146,9 +147,6 @@ pub(crate) struct RecoveredJobs<K: JobKind> {
 
 impl Catalog {
     /// Returns the workers that hold leases.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
         let mut holders: Vec<LeaseHolder> = query_as(HOLDERS).fetch_all(&mut conn).await?;
@@ -164,28 +162,22 @@ impl Catalog {
 
     /// Stores the current versions of input files that no stage of a quarantined pair has read. A later run compares
     /// the stored hashes to detect replaced files.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn record_poisoned_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut script = Script::default();
-                let items = || {
-                    seen.iter()
-                        .map(|(pair, inputs)| input_item((*pair, inputs)))
-                };
-                script.execute_over(UPDATE_INPUTS, items())?;
-                script.execute_over(FATAL_INPUTS, items())?;
-                script.run(conn).await?;
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            let mut script = Script::default();
+            let items = || {
+                seen.iter()
+                    .map(|(pair, inputs)| input_item((*pair, inputs)))
+            };
+            script.execute_over(UPDATE_INPUTS, items())?;
+            script.execute_over(FATAL_INPUTS, items())?;
+            script.run(conn).await?;
+            Ok(())
         })
-        .await
     }
 }
 
-/// Recovers the jobs of dead workers, given as a JSON array and as the items of [`left_by`].
+/// Recovers the jobs of dead workers, given as a JSON array and as the items of [`orphaned`].
 pub(crate) async fn recover<K: StoredKind>(
     conn: &mut Conn,
     [workers, items]: [&str; 2],
@@ -217,9 +209,8 @@ pub(crate) async fn deaths(conn: &mut Conn) -> Result<i64> {
 }
 
 /// Builds the items of [`RECOVER`] for some workers.
-pub(crate) async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
-    let query = query_as(LEFT_BY).bind(workers);
-    let found: Vec<(i64, bool, i64)> = query.fetch_all(conn).await?;
+pub(crate) async fn orphaned(conn: &mut Conn, workers: &str) -> Result<String> {
+    let found: Vec<(i64, bool, i64)> = query_as(ORPHANED).bind(workers).fetch_all(conn).await?;
     let items = found.into_iter().map(|(worker, died, leases)| {
         let blamed = died && leases == 1;
         json!([worker, i64::from(died), i64::from(blamed)])
@@ -323,8 +314,8 @@ async fn store_recovered<K: StoredKind>(
                     "message": format!("{crashes} workers died or hung over it at {stage}"), "at": now,
                     "status": key.status.code(),
                 });
-                let made_with = K::crashed(conn, unit, stage, worker).await?;
-                crashed.push(merged(fields, made_with));
+                let provenance = K::crashed(conn, unit, stage, worker).await?;
+                crashed.push(merged(fields, provenance));
             }
             _ => recovered.ready += 1,
         }

@@ -38,7 +38,24 @@ FROM json_each(?1) AS item WHERE {job}.{unit} = [0] AND {job}.status <> 1
 RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
 );
 
-/// Locks jobs in PostgreSQL, always in the order of ids.
+/// Adds the jobs that are missing. Retired pairs get none.
+static NEW_JOBS: Template = Template::new(
+    "
+INSERT INTO {job} ({unit}, stage, status)
+SELECT [0], 0, 0 FROM json_each(?1) AS item WHERE NOT EXISTS (SELECT 1 FROM {job} WHERE {unit} = [0]){and_not_retired}",
+);
+
+/// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
+/// lease fail.
+pub(crate) static SEND_BACK: Template = Template::new(
+    "
+UPDATE {job} SET stage = min({job}.stage, [1]), status = 0, run_at = NULL, attempt = 0, crashes = 0, worker = NULL,
+    deadline = NULL, token = token + 1{and_send_back}
+FROM json_each(?1) AS item WHERE {job}.{unit} = [0]
+RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
+);
+
+/// Selects jobs, and locks them in PostgreSQL, always in the order of ids.
 static LOCK_JOBS: Template = Template::new(
     "
 SELECT {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint FROM {job}
@@ -50,7 +67,7 @@ pub(crate) const MEMBERS: &str = "
 SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS NOT DISTINCT FROM ?4 AND dirty = 0
 ORDER BY pair LIMIT ?5";
 
-pub(crate) static CLEAR_FAILURES: Template =
+static CLEAR_FAILURES: Template =
     Template::new("DELETE FROM {failure} WHERE {unit} IN (SELECT [0] FROM json_each(?1) AS item)");
 
 /// Selects the jobs that failed or back off, of one failure class or of all.
@@ -69,7 +86,7 @@ WHERE named.name IN (SELECT atom FROM json_each(?1)) AND j.status IN (2, 4) ORDE
 );
 
 impl Catalog {
-    /// Requeues pairs whose settings or inputs changed, and pairs that `policy` selects. If `among` is given, considers
+    /// Requeues pairs whose settings or inputs changed, and pairs that `policy` selects. If `selection` is given, considers
     /// only its pairs. Returns the number of requeued pairs.
     ///
     /// # Errors
@@ -77,13 +94,13 @@ impl Catalog {
     pub async fn requeue_stale(
         &self,
         fingerprints: &Fingerprints,
-        among: Option<&PairSelection>,
+        selection: Option<&PairSelection>,
         policy: RerunPolicy,
     ) -> Result<u64> {
         let mut conn = self.snapshot().await?;
         let current = current_json(&mut conn, fingerprints).await?;
         let mut moves = Vec::new();
-        if among.is_none() {
+        if selection.is_none() {
             // Jobs without the dirty mark are requeued in groups. Dirty and quarantined jobs are inspected below.
             let chains = FingerprintChains::load(&mut conn, fingerprints).await?;
             let groups = groups(&mut conn, &chains).await?;
@@ -99,11 +116,11 @@ impl Catalog {
                 .requeue_pages(move |conn, after| Box::pin(requeue_group(conn, key, to, after)))
                 .await?;
         }
-        let among = among.cloned();
+        let selection = selection.cloned();
         requeued += self
             .requeue_pages(move |conn, after| {
-                let (current, among) = (current.clone(), among.clone());
-                Box::pin(requeue_inspected(conn, current, among, policy, after))
+                let (current, selection) = (current.clone(), selection.clone());
+                Box::pin(requeue_inspected(conn, current, selection, policy, after))
             })
             .await?;
         Ok(requeued)
@@ -212,19 +229,19 @@ async fn requeue_group(
 }
 
 /// Inspects one page of jobs whose pairs follow `after`, and requeues the stale ones. Returns their number, and the
-/// last pair of the page. If `among` is `None`, inspects dirty and quarantined jobs, and unmarks jobs that are
+/// last pair of the page. If `selection` is `None`, inspects dirty and quarantined jobs, and unmarks jobs that are
 /// consistent again.
 async fn requeue_inspected(
     conn: &mut Conn,
     current: String,
-    among: Option<PairSelection>,
+    selection: Option<PairSelection>,
     policy: RerunPolicy,
     after: i64,
 ) -> Result<(u64, Option<i64>)> {
-    let (jobs, last) = match &among {
+    let (jobs, last) = match &selection {
         None => inspect_marked(conn, &current, after).await?,
-        Some(among) => {
-            let jobs = inspect(conn, &current, after, among).await?;
+        Some(selection) => {
+            let jobs = inspect(conn, &current, after, selection).await?;
             let last = jobs.last().map(|(pair, _)| *pair);
             (jobs, last)
         }
@@ -235,7 +252,7 @@ async fn requeue_inspected(
         Some((KeyedJob { unit: pair, key }, cursor(to)))
     });
     let moved = requeue_counted(conn, &stale.collect::<Vec<_>>()).await?;
-    if let (None, Some(last)) = (among, last) {
+    if let (None, Some(last)) = (selection, last) {
         clear_dirty(conn, after, last).await?;
     }
     Ok((moved, last))
@@ -289,4 +306,29 @@ pub(crate) async fn requeue<K: StoredKind>(
         }
     }
     Ok(moved.len() as u64)
+}
+
+/// Sends jobs back to a stage, never forward, and ends their leases. Adds missing jobs, except for retired pairs, and removes
+/// the failures.
+pub(crate) async fn send_back<K: StoredKind>(
+    conn: &mut Conn,
+    jobs: impl Iterator<Item = (K::Unit, K::Stage)> + Clone,
+    deltas: &mut Deltas,
+) -> Result<()> {
+    let units = json_array(jobs.clone().map(|(unit, _)| K::id(unit)));
+    let items = json_array(jobs.map(|(unit, to)| json!([K::id(unit), K::index(to)])));
+    let before = query_as(LOCK_JOBS.of::<K>()).bind(units);
+    let before: Vec<KeyedJob> = before.fetch_all(&mut *conn).await?;
+    query(NEW_JOBS.of::<K>()).bind(&items).execute(conn).await?;
+    let after = query_as(SEND_BACK.of::<K>()).bind(&items);
+    let after: Vec<KeyedJob> = after.fetch_all(&mut *conn).await?;
+    let clear = query(CLEAR_FAILURES.of::<K>()).bind(&items);
+    clear.execute(conn).await?;
+    for job in before {
+        deltas.add(job.key, -1);
+    }
+    for job in after {
+        deltas.add(job.key, 1);
+    }
+    Ok(())
 }

@@ -1,16 +1,20 @@
-//! Retired pairs: pairs whose boxes are gone from the labels of their block. A retired pair has no job, so that runs,
-//! status and reports leave it out. Its results and verdicts stay, and it comes back with its box.
+//! Retired pairs: a person, a shorter list, or labels without their boxes took them out. A retired pair has no job, so that
+//! runs, status, reports and exports leave it out. Its results and verdicts stay, and it may come back.
 
+use std::collections::HashSet;
+
+use serde::Serialize;
 use serde_json::json;
 
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
-use crate::db::rows::json_array;
+use crate::db::rows::{json_array, names_json};
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::{Catalog, Result};
-use mocban_core::domain::{JobStatus, PairId, PairName, UnixMillis};
+use mocban_core::domain::{JobStatus, PairId, PairName, RetireCause, Stage, UnixMillis};
 
 /// Removes jobs. Their leases end, because no fenced statement finds them any more.
 const REMOVE: &str = "
@@ -18,14 +22,17 @@ DELETE FROM job WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
 RETURNING pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint, token, low_confidence";
 
 const INSERT: &str = "
-INSERT INTO retired_pair (pair, stage, is_quarantined, token, fingerprint, low_confidence, at)
+INSERT INTO retired_pair (pair, stage, is_quarantined, token, fingerprint, low_confidence, cause, at)
 SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint), CAST(value ->> 3 AS bigint),
-    CAST(value ->> 4 AS bigint), CAST(value ->> 5 AS bigint), ?2 FROM json_each(?1) WHERE true
+    CAST(value ->> 4 AS bigint), CAST(value ->> 5 AS bigint), ?2, ?3 FROM json_each(?1) WHERE true
 ON CONFLICT (pair) DO NOTHING";
 
-/// Builds the statement that gives retired pairs of some names their jobs back, from the condition on the name. A job
-/// whose pair changed meanwhile is stale, so it is dirty. A pair stays quarantined if its failure is stored. The first
-/// condition saves looking up all names.
+// The statement names the position of a pair that is done.
+const _: () = assert!(Stage::COUNT == 4);
+
+/// Builds the statement that gives retired pairs of some names their jobs back, from the condition on the name. If `?2` is
+/// 0, pairs that a person retired stay retired; so does a pair whose box is gone. A job whose pair changed meanwhile is
+/// stale, so it is dirty. A pair stays quarantined if its failure is stored. The first condition saves looking up all names.
 macro_rules! restore {
     ($has_name:literal) => {
         concat!(
@@ -34,7 +41,8 @@ INSERT INTO job (pair, stage, status, token, fingerprint, dirty, low_confidence)
 SELECT r.pair, r.stage, CASE WHEN r.stage = 4 THEN 3 WHEN r.is_quarantined = 1 AND f.pair IS NOT NULL THEN 4 ELSE 0 END,
     r.token + 1, r.fingerprint, 1, r.low_confidence
 FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair LEFT JOIN failure AS f ON f.pair = r.pair
-WHERE EXISTS (SELECT 1 FROM retired_pair) AND ",
+WHERE EXISTS (SELECT 1 FROM retired_pair) AND (?2 = 1 OR r.cause <> 'person') AND (?2 = 0 OR NOT EXISTS (
+    SELECT 1 FROM block_character AS c WHERE c.pair = r.pair AND c.state <> 'cut')) AND ",
             $has_name,
             "
 RETURNING pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint"
@@ -48,29 +56,33 @@ const RESTORE: Sql = Sql::pair(
     restore!("p.name = ANY (ARRAY(SELECT atom FROM json_each(?1)))"),
 );
 
+const IDS: &str = "SELECT id FROM pair WHERE name IN (SELECT atom FROM json_each(?1)) ORDER BY id";
+
 const CLEAR: &str = "
 DELETE FROM retired_pair WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
 
-/// Selects jobs with their keys. In PostgreSQL, locks them in the order of pairs.
-const LOCK: Sql = Sql::pair(
-    "SELECT pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
-    WHERE pair IN (SELECT atom FROM json_each(?1)) ORDER BY pair",
-    "SELECT pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
-    WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) ORDER BY pair FOR UPDATE",
-);
+const RETIRED: &str = "
+SELECT p.name, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair ORDER BY p.name";
 
-/// Sends jobs back to the first stage and ends their leases.
-const RESET: &str = "
-UPDATE job SET stage = 0, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0, exclusive = 0, worker = NULL,
-    deadline = NULL, token = token + 1, fingerprint = NULL
-WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
-RETURNING pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint";
+/// Jobs of pairs that were not cut from a block.
+const LISTED_JOBS: &str = "
+SELECT j.pair FROM job AS j WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = j.pair) ORDER BY j.pair";
 
-const CLEAR_FAILURES: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
+/// Number of pairs in one statement.
+const CHUNK: usize = 2_000;
 
-const NAMES: &str =
-    "SELECT p.name FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair ORDER BY p.name";
+/// A pair that is out of all counts.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RetiredPair {
+    /// The pair.
+    pub name: PairName,
+    /// Who retired it.
+    pub cause: RetireCause,
+    /// When.
+    pub at: UnixMillis,
+}
+
+from_row! { RetiredPair { name, cause, at } }
 
 /// A removed job.
 struct RemovedJob {
@@ -82,14 +94,41 @@ struct RemovedJob {
 from_row! { RemovedJob { job in row, token, low_confidence } }
 
 impl Catalog {
-    /// Returns the names of the retired pairs, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn retired_pairs(&self) -> Result<Vec<PairName>> {
+    /// Returns the retired pairs, sorted by name.
+    pub async fn retired_pairs(&self) -> Result<Vec<RetiredPair>> {
         let mut conn = self.read_conn().await?;
-        let names = query_scalar(NAMES);
-        names.fetch_all(&mut conn).await
+        query_as(RETIRED).fetch_all(&mut conn).await
+    }
+
+    /// Retires pairs for a person. Their leases end. Returns how many were not retired before.
+    pub async fn retire_pairs(&self, names: &[PairName], now: UnixMillis) -> Result<u64> {
+        let names = names.to_vec();
+        in_transaction!(self, |conn| {
+            let mut deltas = Deltas::default();
+            let mut retired = 0;
+            for chunk in names.chunks(CHUNK) {
+                let pairs = query_scalar(IDS).bind(names_json(chunk));
+                let pairs: Vec<PairId> = pairs.fetch_all(&mut *conn).await?;
+                retired += retire(conn, &pairs, RetireCause::Person, now, &mut deltas).await?;
+            }
+            deltas.apply(conn).await?;
+            Ok(retired)
+        })
+    }
+
+    /// Gives retired pairs their jobs back, except for pairs whose boxes are gone from the labels of their blocks. Returns
+    /// how many came back.
+    pub async fn restore_pairs(&self, names: &[PairName]) -> Result<u64> {
+        let names = names.to_vec();
+        in_transaction!(self, |conn| {
+            let mut deltas = Deltas::default();
+            let mut restored = 0;
+            for chunk in names.chunks(CHUNK) {
+                restored += restore(conn, &names_json(chunk), true, &mut deltas).await?;
+            }
+            deltas.apply(conn).await?;
+            Ok(restored)
+        })
     }
 }
 
@@ -98,12 +137,12 @@ impl Catalog {
 pub(crate) async fn retire(
     conn: &mut Conn,
     pairs: &[PairId],
+    cause: RetireCause,
     now: UnixMillis,
     deltas: &mut Deltas,
 ) -> Result<u64> {
     let ids = json_array(pairs.iter().map(|pair| pair.0));
-    let removed = query_as(REMOVE).bind(ids);
-    let removed: Vec<RemovedJob> = removed.fetch_all(&mut *conn).await?;
+    let removed: Vec<RemovedJob> = query_as(REMOVE).bind(ids).fetch_all(&mut *conn).await?;
     let mut items = Vec::new();
     for one in &removed {
         let KeyedJob { unit: pair, key } = one.job;
@@ -122,15 +161,41 @@ pub(crate) async fn retire(
     }
     query(INSERT)
         .bind(json_array(items))
+        .bind(cause.name())
         .bind(now)
         .execute(conn)
         .await?;
     Ok(removed.len() as u64)
 }
 
-/// Gives the retired pairs among these names, a JSON array, their jobs back. Returns how many there were.
-pub(crate) async fn restore(conn: &mut Conn, names: &str, deltas: &mut Deltas) -> Result<u64> {
-    let restored = query_as(RESTORE).bind(names);
+/// Retires the pairs that a list does not have, except for pairs of blocks. Returns how many.
+pub(crate) async fn retire_unlisted(
+    conn: &mut Conn,
+    listed: &HashSet<i64>,
+    now: UnixMillis,
+    deltas: &mut Deltas,
+) -> Result<u64> {
+    let jobs: Vec<PairId> = query_scalar(LISTED_JOBS).fetch_all(&mut *conn).await?;
+    let gone: Vec<PairId> = jobs
+        .into_iter()
+        .filter(|pair| !listed.contains(&pair.0))
+        .collect();
+    let mut retired = 0;
+    for chunk in gone.chunks(CHUNK) {
+        retired += retire(conn, chunk, RetireCause::List, now, deltas).await?;
+    }
+    Ok(retired)
+}
+
+/// Gives the retired pairs among these names, a JSON array, their jobs back: for a person, those with a box if they were
+/// cut from a block; otherwise those without a person as cause. Returns how many there were.
+pub(crate) async fn restore(
+    conn: &mut Conn,
+    names: &str,
+    is_person: bool,
+    deltas: &mut Deltas,
+) -> Result<u64> {
+    let restored = query_as(RESTORE).bind(names).bind(i64::from(is_person));
     let restored: Vec<KeyedJob> = restored.fetch_all(&mut *conn).await?;
     for job in &restored {
         deltas.add(job.key, 1);
@@ -140,19 +205,4 @@ pub(crate) async fn restore(conn: &mut Conn, names: &str, deltas: &mut Deltas) -
         query(CLEAR).bind(ids).execute(conn).await?;
     }
     Ok(restored.len() as u64)
-}
-
-/// Sends pairs whose files or attributes changed back to the first stage. Ends their leases, because the workers that
-/// hold them read the old files.
-pub(crate) async fn reset(conn: &mut Conn, pairs: &[PairId], deltas: &mut Deltas) -> Result<()> {
-    let ids = json_array(pairs.iter().map(|pair| pair.0));
-    let before: Vec<KeyedJob> = query_as(LOCK).bind(&ids).fetch_all(&mut *conn).await?;
-    let after: Vec<KeyedJob> = query_as(RESET).bind(&ids).fetch_all(&mut *conn).await?;
-    for job in before {
-        deltas.add(job.key, -1);
-    }
-    for job in after {
-        deltas.add(job.key, 1);
-    }
-    query(CLEAR_FAILURES).bind(&ids).execute(conn).await
 }

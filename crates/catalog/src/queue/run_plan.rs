@@ -14,23 +14,17 @@ use mocban_core::domain::{PairName, Stage};
 
 impl Catalog {
     /// Plans a run with these settings for the selected pairs, or for all.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn plan(
         &self,
         fingerprints: &Fingerprints,
-        among: Option<&PairSelection>,
+        selection: Option<&PairSelection>,
         policy: RerunPolicy,
     ) -> Result<Plan> {
         let mut conn = self.snapshot().await?;
-        plan(&mut conn, fingerprints, among, policy).await
+        plan(&mut conn, fingerprints, selection, policy).await
     }
 
     /// Counts the pairs that have a result with outdated settings or inputs.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn count_stale(&self, fingerprints: &Fingerprints) -> Result<u64> {
         let mut conn = self.snapshot().await?;
         let current = current_json(&mut conn, fingerprints).await?;
@@ -47,11 +41,17 @@ impl Catalog {
         fingerprints: &Fingerprints,
     ) -> Result<Option<PlanEntry>> {
         let mut conn = self.snapshot().await?;
-        let among = select(&mut conn, std::slice::from_ref(pair)).await?;
-        if among.is_empty() {
+        let selection = select(&mut conn, std::slice::from_ref(pair)).await?;
+        if selection.is_empty() {
             return Err(CatalogError::UnknownPair(pair.clone()));
         }
-        let plan = plan(&mut conn, fingerprints, Some(&among), RerunPolicy::Changed).await?;
+        let plan = plan(
+            &mut conn,
+            fingerprints,
+            Some(&selection),
+            RerunPolicy::Changed,
+        )
+        .await?;
         Ok(plan.entries.into_iter().next())
     }
 }
@@ -59,7 +59,7 @@ impl Catalog {
 async fn plan(
     conn: &mut Conn,
     fingerprints: &Fingerprints,
-    among: Option<&PairSelection>,
+    selection: Option<&PairSelection>,
     policy: RerunPolicy,
 ) -> Result<Plan> {
     let current = current_json(conn, fingerprints).await?;
@@ -69,10 +69,10 @@ async fn plan(
         Some(key) => *entries.entry(key).or_default() += pairs,
         None => plan.add_unchanged(job.key.status, pairs),
     };
-    if let Some(among) = among {
+    if let Some(selection) = selection {
         let mut after = Some(0);
         while let Some(from) = after {
-            let page = inspect(conn, &current, from, among).await?;
+            let page = inspect(conn, &current, from, selection).await?;
             after = page.last().map(|(pair, _)| *pair);
             for (_, job) in &page {
                 add(job, 1);

@@ -121,7 +121,7 @@ fn statement(is_first: bool) -> String {
 WITH item AS {jobs},
 advanced AS (
     UPDATE job SET stage = item.next, status = item.status,
-        worker = CASE WHEN item.next = 4 THEN NULL ELSE job.worker END, deadline = item.deadline,
+        worker = CASE WHEN item.status = 1 THEN job.worker END, deadline = item.deadline,
         attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.low_confidence, fingerprint = item.fingerprint,
         dirty = CASE WHEN job.dirty = 1 OR item.mixed = 1 OR (item.first IS NOT NULL AND job.fingerprint IS DISTINCT FROM (
             SELECT upstream FROM fingerprint WHERE id = item.first)) THEN 1 ELSE 0 END
@@ -316,10 +316,10 @@ fn result_row(
         pair: job.unit,
         stage: one.stage.index() as i64,
         worker: job.worker,
-        fingerprint: one.made_with.fingerprint.0,
-        mesh_hash: bytes(one.made_with.mesh_hash.as_ref()),
-        print_hash: bytes(one.made_with.print_hash.as_ref()),
-        attributes: &one.made_with.attributes,
+        fingerprint: one.provenance.fingerprint.0,
+        mesh_hash: bytes(one.provenance.mesh_hash.as_ref()),
+        print_hash: bytes(one.provenance.print_hash.as_ref()),
+        attributes: &one.provenance.attributes,
         outcome: &one.outcome,
         files: serde_json::to_string(&one.files)?,
         result_hash: one.result_hash.as_bytes(),

@@ -29,7 +29,7 @@ macro_rules! ready {
 }
 
 /// The tables of a claim that leases only the pairs `?6`.
-macro_rules! among {
+macro_rules! selected {
     () => {
         "json_each(?6) AS wanted JOIN {job} AS j ON j.{unit} = CAST(wanted.atom AS bigint)"
     };
@@ -74,11 +74,12 @@ static CLAIM_EXCLUSIVE: Template = claim!("", ready!("{job} AS j", " AND {exclus
 /// Like [`CLAIM`], but leases only the pairs `?6`.
 static CLAIM_AMONG: Template = claim!(
     " AND other.exclusive = 1",
-    ready!(among!(), " AND {exclusive} = 0", "?5")
+    ready!(selected!(), " AND {exclusive} = 0", "?5")
 );
 
 /// Like [`CLAIM_EXCLUSIVE`], but leases only one of the pairs `?6`.
-static CLAIM_AMONG_EXCLUSIVE: Template = claim!("", ready!(among!(), " AND {exclusive} = 1", "?5"));
+static CLAIM_AMONG_EXCLUSIVE: Template =
+    claim!("", ready!(selected!(), " AND {exclusive} = 1", "?5"));
 
 /// Like [`CLAIM`], but leases jobs with the turn `?6` behind the pair `?7` first, and others only if there are too few
 /// and the limit `?8` permits it. The two conditions on `turn` are an equality that the planner does not recognize. With
@@ -124,7 +125,7 @@ pub(crate) fn exclusive_texts() -> [String; 2] {
 
 /// Where a claim on a server begins: behind this pair among those with the same next stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Behind {
+pub(crate) struct ClaimCursor {
     /// The next stage.
     pub(crate) turn: Cursor,
     pub(crate) pair: i64,
@@ -132,7 +133,7 @@ pub(crate) struct Behind {
     pub(crate) or_anywhere: bool,
 }
 
-impl Behind {
+impl ClaimCursor {
     /// Begins behind the pair of a lease.
     pub(crate) const fn pair_of(lease: &Lease) -> Self {
         Self {
@@ -161,9 +162,9 @@ impl Behind {
 pub(crate) async fn claim<K: StoredKind>(
     conn: &mut Conn,
     request: &ClaimRequest<K>,
-    behind: Option<Behind>,
+    behind: Option<ClaimCursor>,
 ) -> Result<Vec<Lease<K>>> {
-    let text = match (&request.among, request.exclusive, behind) {
+    let text = match (&request.selection, request.exclusive, behind) {
         (Some(_), false, _) => &CLAIM_AMONG,
         (Some(_), true, _) => &CLAIM_AMONG_EXCLUSIVE,
         (None, true, _) => &CLAIM_EXCLUSIVE,
@@ -176,8 +177,8 @@ pub(crate) async fn claim<K: StoredKind>(
         .bind(request.alive_since)
         .bind(position::<K>(request.until))
         .bind(request.limit());
-    if let Some(among) = &request.among {
-        claim = claim.bind(K::ids(among).into_owned());
+    if let Some(selection) = &request.selection {
+        claim = claim.bind(K::ids(selection).into_owned());
     } else if let Some(behind) = behind.filter(|_| !request.exclusive) {
         let anywhere = if behind.or_anywhere {
             request.limit()

@@ -6,6 +6,7 @@ use serde_json::Value;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
+use crate::db::transaction::in_transaction;
 use crate::queue::fingerprint::{differences, fields_of};
 use crate::queue::plan::FieldChange;
 use crate::queue::provenance::FingerprintId;
@@ -49,28 +50,19 @@ pub enum SharedSettings {
 impl Catalog {
     /// Makes these the settings of all workers, unless pairs or blocks are leased by workers with other settings. Workers
     /// with other settings get no more pairs and blocks.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn set_run_settings(&self, settings: WorkerSettings) -> Result<SharedSettings> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let (pairs, blocks) = (settings.fingerprints.json(), settings.blocks.json());
-                let others = query_as(OTHERS).bind(&pairs).bind(&blocks);
-                if let Some(others) = others.fetch_optional(&mut *conn).await? {
-                    return other(conn, others, &settings).await;
-                }
-                query(SET).bind(&pairs).bind(&blocks).execute(conn).await?;
-                Ok(SharedSettings::Same)
-            })
+        in_transaction!(self, |conn| {
+            let (pairs, blocks) = (settings.fingerprints.json(), settings.blocks.json());
+            let others = query_as(OTHERS).bind(&pairs).bind(&blocks);
+            if let Some(others) = others.fetch_optional(&mut *conn).await? {
+                return other(conn, others, &settings).await;
+            }
+            query(SET).bind(&pairs).bind(&blocks).execute(conn).await?;
+            Ok(SharedSettings::Same)
         })
-        .await
     }
 
     /// Compares the settings of a new worker with those of the last plan. Without a plan, any settings are accepted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn compare_run_settings(&self, settings: &WorkerSettings) -> Result<SharedSettings> {
         let mut conn = self.snapshot().await?;
         let planned = query_as("SELECT fingerprints, block_settings FROM run_settings");
@@ -87,9 +79,6 @@ impl Catalog {
     }
 
     /// Counts the workers whose last heartbeat is recent.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn active_workers(&self, now: UnixMillis) -> Result<u64> {
         let mut conn = self.read_conn().await?;
         let active = query_scalar(ACTIVE).bind(now - SHOWN_ACTIVE_MS);
@@ -97,18 +86,12 @@ impl Catalog {
     }
 
     /// Takes the lock of planning. Returns `false` if another process plans.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn try_lock_planning(&self) -> Result<bool> {
         self.in_transaction(|conn| Box::pin(query_scalar(TRY_LOCK).fetch_one(conn)))
             .await
     }
 
     /// Releases the lock of planning.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn unlock_planning(&self) -> Result<()> {
         self.in_transaction(|conn| Box::pin(query(UNLOCK).execute(conn)))
             .await
@@ -131,7 +114,7 @@ async fn other(
     others: StoredSettings,
     settings: &WorkerSettings,
 ) -> Result<SharedSettings> {
-    let ids: [i64; 4] = serde_json::from_str(&others.fingerprints)?;
+    let ids: [i64; Stage::COUNT] = serde_json::from_str(&others.fingerprints)?;
     let mut changes = Vec::new();
     for (stage, id) in Stage::ALL.into_iter().zip(ids) {
         let mine: Value = fields_of(conn, settings.fingerprints.of(stage)).await?;

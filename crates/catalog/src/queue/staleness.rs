@@ -124,10 +124,10 @@ pub(crate) async fn inspect(
     conn: &mut Conn,
     current: &str,
     after: i64,
-    among: &PairSelection,
+    selection: &PairSelection,
 ) -> Result<Vec<(i64, StaleJob)>> {
     let query = query(INSPECT).bind(current).bind(after);
-    let query = query.bind(PAGE as i64).bind(&among.json);
+    let query = query.bind(PAGE as i64).bind(&selection.json);
     query.fetch_all(conn).await?.iter().map(stale_job).collect()
 }
 
@@ -182,8 +182,7 @@ pub(crate) async fn groups(
     conn: &mut Conn,
     chains: &FingerprintChains,
 ) -> Result<Vec<(StaleJob, u64)>> {
-    let counted = counters(conn).await?;
-    let groups = counted.into_iter().map(|(key, jobs)| {
+    let groups = counters(conn).await?.into_iter().map(|(key, jobs)| {
         let job = StaleJob {
             key,
             change: changed_settings(key, chains),

@@ -1,8 +1,7 @@
 //! Lists the workers with their metrics, for people who watch them.
 
 use crate::db::query::query_as;
-use crate::db::row::{FromRow, Row};
-use crate::db::value::Json;
+use crate::db::row::from_row;
 use crate::queue::shared_runs::SHOWN_ACTIVE_MS;
 use crate::{Catalog, Result};
 use mocban_core::domain::{UnixMillis, WorkerId, WorkerMetrics, enum_names};
@@ -37,22 +36,7 @@ pub struct WorkerRecord {
     pub metrics: Option<WorkerMetrics>,
 }
 
-impl FromRow for WorkerRecord {
-    fn from_row(row: &Row) -> Result<Self> {
-        let metrics: Option<Json<WorkerMetrics>> = row.get("metrics")?;
-        Ok(Self {
-            id: row.get("id")?,
-            host: row.get("host")?,
-            pid: row.get("pid")?,
-            started: row.get("started")?,
-            heartbeat: row.get("heartbeat")?,
-            ended: row.get("ended")?,
-            died: row.get("died")?,
-            leased: row.get("leased")?,
-            metrics: metrics.map(|Json(metrics)| metrics),
-        })
-    }
-}
+from_row! { WorkerRecord { id, host, pid, started, heartbeat, ended, died, leased, metrics as JsonOrNull } }
 
 /// What a worker does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -88,9 +72,6 @@ impl WorkerRecord {
 
 impl Catalog {
     /// Returns the workers whose last heartbeat is later than `since`, in the order in which they registered.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn workers(&self, since: UnixMillis) -> Result<Vec<WorkerRecord>> {
         let mut conn = self.read_conn().await?;
         query_as(LIST).bind(since).fetch_all(&mut conn).await

@@ -45,9 +45,6 @@ impl WorkerLock {
     }
 
     /// Takes the lock if it is not held. Otherwise, only finds out whether the connection works.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub(crate) async fn take(&mut self, conn: &mut Conn) -> Result<()> {
         let Some(worker) = self.worker else {
             return Ok(());

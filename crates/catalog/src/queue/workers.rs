@@ -3,6 +3,7 @@
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
+use crate::db::transaction::in_transaction;
 use crate::queue::block_settings::BlockSettings;
 use crate::queue::claim::release_due;
 use crate::queue::counters::{Cursor, Deltas, cursor};
@@ -53,7 +54,7 @@ pub struct WorkLeft {
     /// Pairs with stages to run, without quarantined pairs.
     pub pairs: u64,
     /// Number of pairs that have yet to run each stage.
-    pub by_stage: [u64; 4],
+    pub by_stage: [u64; Stage::COUNT],
     /// Quarantined pairs.
     pub quarantined: u64,
 }
@@ -79,9 +80,6 @@ GROUP BY j.stage, j.status";
 
 impl Catalog {
     /// Registers a worker process with its settings. Returns an id that no worker had before.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn register_worker(
         &self,
         info: WorkerInfo,
@@ -93,9 +91,6 @@ impl Catalog {
     }
 
     /// Records that a worker ended properly, and with which metrics. Without metrics, the worker is not listed any more.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn end_worker(
         &self,
         worker: WorkerId,
@@ -103,64 +98,55 @@ impl Catalog {
         metrics: Option<&WorkerMetrics>,
     ) -> Result<()> {
         let metrics = metrics.map(serde_json::to_string).transpose()?;
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                query("UPDATE worker SET ended = ?2, metrics = ?3 WHERE id = ?1")
-                    .bind(worker.0)
-                    .bind(now)
-                    .bind(metrics)
-                    .execute(conn)
-                    .await?;
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            query("UPDATE worker SET ended = ?2, metrics = ?3 WHERE id = ?1")
+                .bind(worker.0)
+                .bind(now)
+                .bind(metrics)
+                .execute(conn)
+                .await?;
+            Ok(())
         })
-        .await
     }
 
     /// Ends the back-offs that are due, and returns the number of pairs made ready. Also ends back-offs with more than
     /// `longest` milliseconds left, which only a clock jump can cause.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut deltas = Deltas::default();
-                let due = release_due::<PairJob>(conn, now, longest, &mut deltas).await?;
-                deltas.apply(conn).await?;
-                Ok(due)
-            })
+        in_transaction!(self, |conn| {
+            let mut deltas = Deltas::default();
+            let due = release_due::<PairJob>(conn, now, longest, &mut deltas).await?;
+            deltas.apply(conn).await?;
+            Ok(due)
         })
-        .await
     }
 
-    /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. Without `among`, counts
+    /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. Without `selection`, counts
     /// all pairs, but at most 1000 ready ones.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn outstanding(
         &self,
         until: Stage,
-        among: Option<&PairSelection>,
+        selection: Option<&PairSelection>,
     ) -> Result<Outstanding> {
         let mut conn = self.read_conn().await?;
-        let query = match among {
+        let query = match selection {
             None => query_as(LEFT_ALL).bind(cursor(until)),
-            Some(among) => query_as(LEFT_AMONG).bind(cursor(until)).bind(&among.json),
+            Some(selection) => query_as(LEFT_AMONG)
+                .bind(cursor(until))
+                .bind(&selection.json),
         };
         query.fetch_one(&mut conn).await
     }
 
-    /// Counts the stages up to `until` that pairs have yet to run. Without `among`, reads the counters, not the jobs.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
+    /// Counts the stages up to `until` that pairs have yet to run. Without `selection`, reads the counters, not the jobs.
+    pub async fn work_left(
+        &self,
+        until: Stage,
+        selection: Option<&PairSelection>,
+    ) -> Result<WorkLeft> {
         let mut conn = self.read_conn().await?;
-        let query = match among {
+        let query = match selection {
             None => query_as(COUNT_ALL),
-            Some(among) => query_as(COUNT_AMONG).bind(&among.json),
+            Some(selection) => query_as(COUNT_AMONG).bind(&selection.json),
         };
         let counted: Vec<(Cursor, JobStatus, u64)> = query.fetch_all(&mut conn).await?;
         let mut left = WorkLeft::default();

@@ -8,6 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::review_context::ReviewContext;
 use crate::records::verdicts::NewVerdict;
@@ -39,15 +40,15 @@ pub struct ImportedVerdicts {
     pub left_out: u64,
 }
 
-/// Selects the current results of pairs. A pair that is not done has one row whose metric is NULL.
+/// Selects the current results of pairs. A pair that is not done, or is retired, has one row whose metric is NULL.
 const JUDGED: Sql = Sql::pair(
     "
 SELECT p.name, p.id AS pair, m.metric, m.result_hash FROM pair AS p
-    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
+    LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
 WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id, m.metric",
     "
 SELECT p.name, p.id AS pair, m.metric, m.result_hash FROM pair AS p
-    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
+    LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
 WHERE p.name = ANY (ARRAY(SELECT atom FROM json_each(?1))) ORDER BY p.id, m.metric",
 );
 
@@ -132,13 +133,13 @@ impl VerdictRowDraft<'_> {
     /// Returns whether the verdict counts as stored if it equals the reviewer's newest one. Without a time, a verdict with
     /// a context, such as an angle, is always new.
     fn is_compared_with_newest(&self) -> bool {
-        self.new.at.is_none() && self.new.look == ReviewContext::default()
+        self.new.at.is_none() && self.new.context == ReviewContext::default()
     }
 
     /// Returns the item for a statement. `first` is its number, or the number of its action.
     fn item(&self, first: i64, now: UnixMillis) -> Value {
         let Self { new, result, .. } = self;
-        let look = &new.look;
+        let context = &new.context;
         json!([
             first,
             result.pair,
@@ -149,11 +150,11 @@ impl VerdictRowDraft<'_> {
             new.reason.map(Reason::name),
             new.note,
             new.at.unwrap_or(now),
-            look.event,
-            look.seen,
-            look.shown_ms,
-            look.angle_read_deg,
-            look.review_order.map(ReviewOrder::name),
+            context.event,
+            context.seen,
+            context.shown_ms,
+            context.angle_read_deg,
+            context.review_order.map(ReviewOrder::name),
         ])
     }
 }
@@ -186,24 +187,21 @@ impl Catalog {
     where
         I: Iterator<Item = Result<ListedVerdict>> + Send + 'static,
     {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let newest = "SELECT coalesce(max(id), 0) FROM verdict";
-                let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
-                let mut counts = ImportedVerdicts::default();
-                loop {
-                    let part: Vec<_> = list.by_ref().take(CHUNK).collect::<Result<_>>()?;
-                    if part.is_empty() {
-                        return Ok(counts);
-                    }
-                    let of_part = append(conn, &part, newest, now).await?;
-                    counts.recorded += of_part.recorded;
-                    counts.known += of_part.known;
-                    counts.left_out += of_part.left_out;
+        in_transaction!(self, |conn| {
+            let newest = "SELECT coalesce(max(id), 0) FROM verdict";
+            let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
+            let mut counts = ImportedVerdicts::default();
+            loop {
+                let part: Vec<_> = list.by_ref().take(CHUNK).collect::<Result<_>>()?;
+                if part.is_empty() {
+                    return Ok(counts);
                 }
-            })
+                let of_part = append(conn, &part, newest, now).await?;
+                counts.recorded += of_part.recorded;
+                counts.known += of_part.known;
+                counts.left_out += of_part.left_out;
+            }
         })
-        .await
     }
 }
 
@@ -225,8 +223,7 @@ async fn append(
         let of_pair = results.get(&listed.verdict.pair);
         let results = judged(listed, of_pair.map(Vec::as_slice))?;
         counts.left_out += u64::from(results.is_none());
-        let results = results.into_iter().flatten();
-        candidates.extend(results.map(|result| VerdictRowDraft {
+        candidates.extend(results.into_iter().flatten().map(|result| VerdictRowDraft {
             row,
             new: &listed.verdict,
             result,
@@ -248,7 +245,7 @@ async fn append(
     Ok(counts)
 }
 
-/// Returns the current results of the pairs, by name. A pair that is not done has none.
+/// Returns the current results of the pairs, by name. A pair that is not done, or is retired, has none.
 async fn current_results(
     conn: &mut Conn,
     rows: &[ListedVerdict],
@@ -261,8 +258,7 @@ async fn current_results(
             .await?;
     let mut results: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for (name, pair, metric, hash) in found {
-        let of_pair = results.entry(name).or_default();
-        of_pair.extend(
+        results.entry(name).or_default().extend(
             metric
                 .zip(hash)
                 .map(|(metric, hash)| JudgedResult { pair, metric, hash }),
@@ -318,7 +314,7 @@ async fn without_stored<'v>(
         let content = candidate.content();
         let is_known = stored.contains(&number)
             || candidate.is_compared_with_newest() && last.get(&of_result) == Some(&content);
-        let event = candidate.new.look.event.clone();
+        let event = candidate.new.context.event.clone();
         if !is_known && event.is_none_or(|event| events.insert((event, candidate.result.metric))) {
             last.insert(of_result, content);
             new.push(candidate);
@@ -332,9 +328,9 @@ async fn stored_events(
     conn: &mut Conn,
     candidates: &[VerdictRowDraft<'_>],
 ) -> Result<BTreeSet<(String, ThresholdMetric)>> {
-    let events = candidates.iter();
-    let events: BTreeSet<_> = events
-        .filter_map(|new| new.new.look.event.as_deref())
+    let events: BTreeSet<_> = candidates
+        .iter()
+        .filter_map(|new| new.new.context.event.as_deref())
         .collect();
     if events.is_empty() {
         return Ok(BTreeSet::new());
@@ -349,8 +345,8 @@ async fn newest_contents(
     candidates: &[VerdictRowDraft<'_>],
     now: UnixMillis,
 ) -> Result<BTreeMap<(JudgedResult, String), Content>> {
-    let compared = candidates.iter();
-    let compared: BTreeMap<_, _> = compared
+    let compared: BTreeMap<_, _> = candidates
+        .iter()
         .filter(|new| new.is_compared_with_newest())
         .map(|new| (new.key(), new))
         .collect();
@@ -374,18 +370,15 @@ async fn begin_acts(conn: &mut Conn, new: &[VerdictRowDraft<'_>]) -> Result<BTre
         .map(|new| (new.row, new.new.reviewer.as_str()))
         .collect();
     let begun = query_as(ACTS).bind(json_array(reviewers.values().copied()));
-    let mut begun: Vec<(i64, String)> = begun.fetch_all(conn).await?;
-    begun.sort_unstable();
+    let begun: Vec<(i64, String)> = begun.fetch_all(conn).await?;
     // The database may return the actions in any order.
-    let mut of_reviewer: BTreeMap<String, std::vec::IntoIter<i64>> = BTreeMap::new();
-    let mut ids: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+    let mut of_reviewer: BTreeMap<String, BTreeSet<i64>> = BTreeMap::new();
     for (id, reviewer) in begun {
-        ids.entry(reviewer).or_default().push(id);
+        of_reviewer.entry(reviewer).or_default().insert(id);
     }
-    of_reviewer.extend(ids.into_iter().map(|(name, ids)| (name, ids.into_iter())));
     let acts = reviewers.into_iter().filter_map(|(row, reviewer)| {
-        let act = of_reviewer.get_mut(reviewer)?.next()?;
-        Some((row, act))
+        let first = of_reviewer.get_mut(reviewer)?.pop_first()?;
+        Some((row, first))
     });
     Ok(acts.collect())
 }

@@ -89,9 +89,6 @@ const MARKS: &str = "SELECT record, row, value FROM set_apart";
 impl Catalog {
     /// Compares the rows of all tables in [`ChecksummedTable`] with their checksums. Returns the rows that do not
     /// agree.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn faulty_rows(&self) -> Result<Vec<FaultyRow>> {
         self.faulty_rows_of(&ChecksummedTable::ALL).await
     }

@@ -22,9 +22,6 @@ WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.name = item.value ->> 'name') 
 
 impl Catalog {
     /// Returns whether any pair has a true alignment.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn has_truth(&self) -> Result<bool> {
         let mut conn = self.read_conn().await?;
         let exists = query_scalar("SELECT EXISTS (SELECT 1 FROM truth)");
@@ -43,8 +40,7 @@ pub(crate) async fn set(conn: &mut Conn, truths: &[(PairName, Value)]) -> Result
         if let Some(name) = unknown.fetch_optional(&mut *conn).await? {
             return Err(CatalogError::UnknownPair(name));
         }
-        let set = query_scalar(SET).bind(items);
-        let pairs: Vec<i64> = set.fetch_all(&mut *conn).await?;
+        let pairs: Vec<i64> = query_scalar(SET).bind(items).fetch_all(&mut *conn).await?;
         checksums::store(conn, ChecksummedTable::Truth, &pairs).await?;
         stored += pairs.len() as u64;
     }

@@ -32,9 +32,6 @@ const FIRST_FILES: [&str; 2] = [
 
 impl Catalog {
     /// Returns which catalog this is, and where.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails, or the path of the file cannot be read.
     pub async fn identity(&self) -> Result<CatalogIdentity> {
         let mut conn = self.read_conn().await?;
         let id: Vec<u8> = query_scalar(ID).fetch_one(&mut conn).await?;
@@ -70,9 +67,6 @@ impl Catalog {
     }
 
     /// Returns artifacts of at most `limit` results of pairs, and of as many of blocks.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn first_artifacts(&self, limit: usize) -> Result<Vec<ArtifactRef>> {
         let mut conn = self.read_conn().await?;
         let mut artifacts = Vec::new();

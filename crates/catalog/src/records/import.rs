@@ -1,6 +1,6 @@
 //! Import of pairs: names, paths and attributes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
@@ -10,12 +10,14 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::retired;
 use crate::queue::selection::{PairSelection, select, unknown_names};
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::ground_truth;
 use crate::records::model::PairAttributes;
+use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{PairName, UnixMillis};
 
@@ -34,6 +36,17 @@ pub enum ImportChunk {
     End,
 }
 
+/// What an import may do besides adding pairs and changing their columns.
+#[derive(Debug, Clone, Default)]
+pub struct ImportTerms {
+    /// True alignments to store.
+    pub truths: Vec<(PairName, Value)>,
+    /// Whether most of the known pairs may get another mesh and another print.
+    pub changed_files: bool,
+    /// Whether pairs that the list does not have are retired, except for pairs of blocks.
+    pub replace: bool,
+}
+
 /// Counts of an import.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ImportSummary {
@@ -43,6 +56,10 @@ pub struct ImportSummary {
     pub changed: Vec<PairChange>,
     /// Number of existing pairs with the same values.
     pub unchanged: u64,
+    /// Number of pairs that the list does not have and that were retired.
+    pub retired: u64,
+    /// Number of retired pairs that came back. They are also counted as changed or unchanged.
+    pub restored: u64,
 }
 
 /// A pair whose values an import changed.
@@ -103,91 +120,138 @@ FROM json_to_recordset(CAST(?1 AS json)) AS item (name text, mesh text, print te
 /// Updates the statistics of PostgreSQL's planner.
 const ANALYZE: &str = "ANALYZE pair, job";
 
-/// Adds jobs for those of some pairs that have none.
+/// Adds jobs for those of some pairs that have none and are not retired.
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
-SELECT CAST(atom AS bigint), 0, 0 FROM json_each(?1) WHERE true
+SELECT CAST(atom AS bigint), 0, 0 FROM json_each(?1)
+WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = CAST(atom AS bigint))
 ON CONFLICT (pair) DO NOTHING";
+
+/// Pairs with a job whose names are between two texts, so that an index finds them.
+const WITH_PREFIX: &str = "
+SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id
+WHERE p.name >= ?1 AND p.name < ?2 ORDER BY p.name LIMIT ?3";
 
 impl Catalog {
     /// Imports streamed rows, and true alignments, in one transaction. Adds new pairs and updates existing ones. If a
     /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
     ///
     /// # Errors
-    /// Returns an error if the channel closes before `ImportChunk::End`, if a true alignment names an unknown pair, or
-    /// if a database operation fails. In that case nothing is imported.
+    /// Returns an error if the channel closes before `ImportChunk::End`, if a new pair is similar to a known one, if most
+    /// known pairs would get other files, if a true alignment names an unknown pair, or if a database operation fails. In
+    /// that case nothing is imported.
     pub async fn import_all(
         &self,
         mut chunks: mpsc::Receiver<ImportChunk>,
-        truths: Vec<(PairName, Value)>,
+        terms: ImportTerms,
         now: UnixMillis,
     ) -> Result<(ImportSummary, u64)> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut summary = ImportSummary::default();
-                let mut deltas = Deltas::default();
-                loop {
-                    match chunks.recv().await {
-                        Some(ImportChunk::Rows(rows)) => {
-                            for chunk in rows.chunks(CHUNK) {
-                                import_chunk(conn, chunk, now, &mut summary, &mut deltas).await?;
+        in_transaction!(self, |conn| {
+            let mut summary = ImportSummary::default();
+            let mut deltas = Deltas::default();
+            let last = similar_names::last_pair(conn).await?;
+            let mut listed = HashSet::new();
+            loop {
+                match chunks.recv().await {
+                    Some(ImportChunk::Rows(rows)) => {
+                        for chunk in rows.chunks(CHUNK) {
+                            let ids = import_chunk(conn, chunk, now, &mut summary, &mut deltas);
+                            let ids = ids.await?;
+                            if terms.replace {
+                                listed.extend(ids);
                             }
                         }
-                        Some(ImportChunk::End) => break,
-                        None => return Err(CatalogError::CutShort),
                     }
+                    Some(ImportChunk::End) => break,
+                    None => return Err(CatalogError::CutShort),
                 }
-                deltas.apply(conn).await?;
-                summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
-                let stored = ground_truth::set(conn, &truths).await?;
-                if let Conn::Postgres(_) = conn {
-                    query(ANALYZE).execute(conn).await?;
-                }
-                Ok((summary, stored))
-            })
+            }
+            similar_names::refuse_pairs(conn, last).await?;
+            if !terms.changed_files {
+                refuse_changed_files(&summary)?;
+            }
+            if terms.replace {
+                let retired = retired::retire_unlisted(conn, &listed, now, &mut deltas);
+                summary.retired = retired.await?;
+            }
+            deltas.apply(conn).await?;
+            summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
+            let stored = ground_truth::set(conn, &terms.truths).await?;
+            if let Conn::Postgres(_) = conn {
+                query(ANALYZE).execute(conn).await?;
+            }
+            Ok((summary, stored))
         })
-        .await
     }
 
     /// Returns the names of all pairs, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar("SELECT name FROM pair ORDER BY name");
         names.fetch_all(&mut conn).await
     }
 
+    /// Returns the first names that begin with a text, sorted, without those of retired pairs.
+    pub async fn pair_names_with_prefix(
+        &self,
+        prefix: &str,
+        limit: usize,
+    ) -> Result<Vec<PairName>> {
+        let mut conn = self.read_conn().await?;
+        let names = query_scalar(WITH_PREFIX).bind(prefix);
+        let names = names.bind(format!("{prefix}{}", char::MAX));
+        names.bind(limit as i64).fetch_all(&mut conn).await
+    }
+
     /// Returns the unknown names among `names`, in the given order.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         unknown_names(&mut conn, names).await
     }
 
     /// Returns the pairs with the given names. Unknown names are left out.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await
     }
 }
 
-/// Adds and updates pairs. Retired pairs get their jobs back.
+/// Refuses an import that gives most of the known pairs another mesh and another print. Their ids are then likely those of
+/// other characters, such as the numbers of another block.
+fn refuse_changed_files(summary: &ImportSummary) -> Result<()> {
+    const FEWEST: u64 = 2;
+    let has_other_files = |change: &&PairChange| {
+        ["mesh", "print"]
+            .iter()
+            .all(|file| change.fields.contains(file))
+    };
+    let mut others = summary.changed.iter().filter(has_other_files);
+    let changed = others.clone().count() as u64;
+    let known = summary.unchanged + summary.changed.len() as u64;
+    match others.next() {
+        Some(example) if changed >= FEWEST && 2 * changed > known => {
+            Err(CatalogError::ChangedFiles {
+                changed,
+                known,
+                files: "mesh and another print",
+                kind: "pairs",
+                example: example.name.to_string(),
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Adds and updates pairs. Pairs that no person retired get their jobs back. Returns the ids of the rows.
 pub(crate) async fn import_chunk(
     conn: &mut Conn,
     chunk: &[ImportRow],
     now: UnixMillis,
     summary: &mut ImportSummary,
     deltas: &mut Deltas,
-) -> Result<()> {
+) -> Result<Vec<i64>> {
     let names = json_array(chunk.iter().map(|row| row.name.as_str()));
-    retired::restore(conn, &names, deltas).await?;
+    summary.restored += retired::restore(conn, &names, false, deltas).await?;
     let known = query(SELECT).bind(&names);
     let mut stored: BTreeMap<PairName, Option<PairAttributes>> = BTreeMap::new();
     for row in &known.fetch_all(&mut *conn).await? {
@@ -227,9 +291,12 @@ pub(crate) async fn import_chunk(
     let upsert = query(UPSERT).bind(items).bind(now);
     let rows = upsert.fetch_all(&mut *conn).await?;
     checksums::store_of_rows(conn, ChecksummedTable::Pair, &rows).await?;
-    let ids: Result<Vec<i64>> = rows.iter().map(|row| row.get(0)).collect();
-    let ids = json_array(ids?);
-    query(NEW_JOBS).bind(ids).execute(conn).await
+    let ids: Vec<i64> = rows.iter().map(|row| row.get(0)).collect::<Result<_>>()?;
+    query(NEW_JOBS)
+        .bind(json_array(ids.iter().copied()))
+        .execute(conn)
+        .await?;
+    Ok(ids)
 }
 
 fn item(row: &ImportRow) -> Value {

@@ -34,21 +34,24 @@ SELECT name, path FROM (
     SELECT id, name, mesh_path AS path FROM pair
     UNION ALL SELECT id, name, print_path FROM pair
     UNION ALL SELECT id, name, body ->> 'tops_mask' FROM pair JOIN truth ON truth.pair = pair.id
+    UNION ALL SELECT id, name, mesh_path FROM block
+    UNION ALL SELECT id, name, page_path FROM block
+    UNION ALL SELECT id, name, labels_path FROM block
 ) WHERE substr(path, -length(?1)) = ?1 OR substr(path, -length(?2)) = ?2 ORDER BY id",
     "
 SELECT name, path FROM (
     SELECT id, name, mesh_path AS path FROM pair
     UNION ALL SELECT id, name, print_path FROM pair
     UNION ALL SELECT id, name, body ->> 'tops_mask' FROM pair JOIN truth ON truth.pair = pair.id
+    UNION ALL SELECT id, name, mesh_path FROM block
+    UNION ALL SELECT id, name, page_path FROM block
+    UNION ALL SELECT id, name, labels_path FROM block
 ) AS inputs WHERE right(path, length(?1)) = ?1 OR right(path, length(?2)) = ?2 ORDER BY id",
 );
 
 impl Catalog {
-    /// Returns the meshes, prints and true masks whose stored paths end with one of two file names, each with the name
-    /// of its pair.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
+    /// Returns the meshes, prints, true masks, pages and labels whose stored paths end with one of two file names, each with
+    /// the name of its pair or block.
     pub async fn inputs_named(&self, file_names: [String; 2]) -> Result<Vec<(String, String)>> {
         let [one, other] = file_names;
         let query = query_as(NAMED).bind(one).bind(other);

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::db::query::{query_as, query_scalar};
 use crate::db::row::from_row;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::review_answers::pair_id;
@@ -117,79 +118,61 @@ impl Catalog {
         made: ManualAlignment,
         now: UnixMillis,
     ) -> Result<bool> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let pair = pair_id(conn, &made.pair).await?;
-                let stored: Option<i64> = query_scalar(INSERT)
-                    .bind(&made.event)
-                    .bind(pair)
-                    .bind(&made.mesh_hash.as_bytes()[..])
-                    .bind(&made.print_hash.as_bytes()[..])
-                    .bind(&made.depth_hash.as_bytes()[..])
-                    .bind(&made.seen.as_bytes()[..])
-                    .bind(serde_json::to_string(&made.print_from_depth)?)
-                    .bind(serde_json::to_string(&made.print_from_mesh)?)
-                    .bind(made.iou)
-                    .bind(made.dice)
-                    .bind(&made.reviewer)
-                    .bind(&made.note)
-                    .bind(now)
-                    .fetch_optional(&mut *conn)
-                    .await?;
-                checksums::store(conn, ChecksummedTable::ManualAlignment, stored.as_slice())
-                    .await?;
-                Ok(stored.is_some())
-            })
+        in_transaction!(self, |conn| {
+            let pair = pair_id(conn, &made.pair).await?;
+            let stored: Option<i64> = query_scalar(INSERT)
+                .bind(&made.event)
+                .bind(pair)
+                .bind(&made.mesh_hash.as_bytes()[..])
+                .bind(&made.print_hash.as_bytes()[..])
+                .bind(&made.depth_hash.as_bytes()[..])
+                .bind(&made.seen.as_bytes()[..])
+                .bind(serde_json::to_string(&made.print_from_depth)?)
+                .bind(serde_json::to_string(&made.print_from_mesh)?)
+                .bind(made.iou)
+                .bind(made.dice)
+                .bind(&made.reviewer)
+                .bind(&made.note)
+                .bind(now)
+                .fetch_optional(&mut *conn)
+                .await?;
+            checksums::store(conn, ChecksummedTable::ManualAlignment, stored.as_slice()).await?;
+            Ok(stored.is_some())
         })
-        .await
     }
 
     /// Returns all manual alignments, including undone ones, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
         self.manual_alignment_page(0, i64::MAX as usize).await
     }
 
     /// Returns up to `limit` manual alignments with ids above `after`, including undone ones, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn manual_alignment_page(
         &self,
         after: i64,
         limit: usize,
     ) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
-        let query = query_as(LOG).bind(after);
-        let query = query.bind(limit as i64);
+        let query = query_as(LOG).bind(after).bind(limit as i64);
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignment));
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignmentUndo));
         query.fetch_all(&mut conn).await
     }
 
     /// Returns the newest manual alignment of each pair. Ignores alignments that are undone or whose `holds` is false.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn newest_manual_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
         Ok(newest(self.manual_alignments().await?))
     }
 
     /// Returns the newest manual alignment of each pair with a name from `first` to `last`, like
     /// [`Self::newest_manual_alignments`].
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn newest_manual_alignments_between(
         &self,
         first: &PairName,
         last: &PairName,
     ) -> Result<BTreeMap<PairName, StoredAlignment>> {
         let mut conn = self.read_conn().await?;
-        let query = query_as(OF_NAMES);
-        let query = query.bind(first.as_str()).bind(last.as_str());
+        let query = query_as(OF_NAMES).bind(first.as_str()).bind(last.as_str());
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignment));
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignmentUndo));
         Ok(newest(query.fetch_all(&mut conn).await?))

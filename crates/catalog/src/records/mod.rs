@@ -17,6 +17,7 @@ pub(crate) mod review_answers;
 pub(crate) mod review_context;
 pub(crate) mod review_rights;
 pub(crate) mod set_apart;
+pub(crate) mod similar_names;
 pub(crate) mod stage_results;
 pub(crate) mod status;
 pub(crate) mod verdict_rules;

@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::db::row::from_row;
+use crate::Result;
+use crate::db::row::{FromRow, Row, from_row};
+use crate::db::rows::failure;
+use crate::db::value::FromValue;
 use crate::records::verdicts::{ReviewerVerdict, VerdictEvent};
 use mocban_core::domain::{
     ArtifactSet, ContentHash, Failure, JobStatus, LengthUnit, MetricOutcome, PairName, Stage,
@@ -20,6 +23,8 @@ pub struct StatusCounts {
     pub schema: u32,
     /// Number of pairs.
     pub pairs: u64,
+    /// Number of pairs that a person or a shorter list retired. They are in no other count.
+    pub retired: u64,
     /// Number of pairs by job status, all statuses included.
     pub jobs: BTreeMap<JobStatus, u64>,
     /// Number of pairs by stage, all stages included.
@@ -44,16 +49,23 @@ pub struct StageCounts {
     pub failed: u64,
 }
 
-/// A stored failure with its stage.
+/// A stored failure with its stage, of a pair or a block.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct StoredFailure {
+pub struct StoredFailure<S = Stage> {
     /// The stage that failed.
-    pub stage: Stage,
+    pub stage: S,
     /// Class and message.
     #[serde(flatten)]
     pub failure: Failure,
     /// When.
     pub at: UnixMillis,
+}
+
+/// Reads the stored failure of a job, if there is one.
+pub(crate) fn stored_failure<S: FromValue>(row: &Row) -> Result<Option<StoredFailure<S>>> {
+    let (stage, at): (Option<S>, Option<_>) = (row.get("failed_stage")?, row.get("failed_at")?);
+    let whole = stage.zip(failure(row)?).zip(at);
+    Ok(whole.map(|((stage, failure), at)| StoredFailure { stage, failure, at }))
 }
 
 /// A quarantined pair in a list of failures.
@@ -122,7 +134,7 @@ pub struct MetricRecord {
 }
 
 /// Attributes of a pair as imported.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PairAttributes {
     /// The user's id.
     pub name: PairName,
@@ -141,7 +153,7 @@ pub struct PairAttributes {
     /// All other columns of the manifest.
     pub meta: Map<String, Value>,
     /// The alignment that is expected of a pair cut from a block, as JSON text.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<String>,
 }
 
@@ -186,17 +198,28 @@ impl PairResults {
     }
 }
 
-/// One attempt at one stage.
+/// One attempt at one stage, of a pair or a block.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct AttemptRecord {
+pub struct AttemptRecord<S = Stage> {
     /// The stage.
-    pub stage: Stage,
+    pub stage: S,
     /// The failure. `None` if the attempt succeeded.
     pub failure: Option<Failure>,
     /// Computing time in milliseconds, if known.
     pub ms: Option<u64>,
     /// When it ended.
     pub at: UnixMillis,
+}
+
+impl<S: FromValue> FromRow for AttemptRecord<S> {
+    fn from_row(row: &Row) -> Result<Self> {
+        Ok(Self {
+            stage: row.get("stage")?,
+            failure: failure(row)?,
+            ms: row.get("ms")?,
+            at: row.get("at")?,
+        })
+    }
 }
 
 /// Everything about one pair, for `show`.

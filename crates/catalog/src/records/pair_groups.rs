@@ -42,9 +42,6 @@ WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = p.id) AND ",
 
 impl Catalog {
     /// Returns the names of the user's columns of all pairs, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn meta_columns(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         let query = query_scalar(META_COLUMNS).bind(self.left_out.of(ChecksummedTable::Pair));
@@ -53,9 +50,6 @@ impl Catalog {
 
     /// Counts the pairs with equal values of an attribute, which is `block`, `character` or another text for none. A
     /// pair without a value is counted alone. A key is whether the pair is alone, then the value or the pair's name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn pair_groups(&self, attribute: &str) -> Result<BTreeMap<(bool, String), u64>> {
         let mut conn = self.read_conn().await?;
         let query = query(GROUPS).bind(attribute);
@@ -73,9 +67,6 @@ impl Catalog {
     }
 
     /// Returns the paths of prints that several pairs share, such as pages, each with the first of its pairs by name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn shared_prints(&self) -> Result<BTreeMap<String, PairName>> {
         let mut conn = self.read_conn().await?;
         let query = query(SHARED_PRINTS).bind(self.left_out.of(ChecksummedTable::Pair));

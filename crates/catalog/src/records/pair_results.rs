@@ -10,14 +10,12 @@ use crate::queue::counters::Cursor;
 use crate::records::checksums::ChecksummedTable;
 use crate::records::left_out::{LeftOut, is_counted};
 use crate::records::model::{
-    AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord,
-    StoredFailure,
+    FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord, stored_failure,
 };
 use crate::records::{stage_results, verdicts};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{
-    ContentHash, Failure, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
-    UnixMillis,
+    ContentHash, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
 };
 
 /// Selects pairs with their attributes, job, failure and true alignment, without the pairs of `?2` and the true alignments
@@ -59,9 +57,6 @@ const ATTEMPTS: &str =
 
 impl Catalog {
     /// Returns up to `limit` pairs with names above `after`, sorted by name. Returns an empty list at the end.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub(crate) async fn results_page(
         &self,
         after: Option<&PairName>,
@@ -75,9 +70,6 @@ impl Catalog {
     }
 
     /// Returns the details of a pair, or `None` if the pair does not exist.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
         let mut conn = self.snapshot().await?;
         let found = self.bind_left_out(query(ONE).bind(name.as_str()));
@@ -86,6 +78,7 @@ impl Catalog {
             return Ok(None);
         };
         let row = &found[0];
+        let attempts = query_as(ATTEMPTS).bind(row.get::<i64>("id")?);
         Ok(Some(PairDetail {
             results,
             mesh_hash: row.get("mesh_hash")?,
@@ -93,7 +86,7 @@ impl Catalog {
             attempt: row.get("attempt")?,
             crashes: row.get("crashes")?,
             run_at: row.get("run_at")?,
-            attempts: attempts(&mut conn, row.get("id")?).await?,
+            attempts: attempts.fetch_all(&mut conn).await?,
             verdict_log: verdicts::log(&mut conn, Some(name), &self.left_out).await?,
         }))
     }
@@ -105,9 +98,6 @@ impl Catalog {
     }
 
     /// Returns up to `limit` quarantined pairs, sorted by name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
         let mut conn = self.read_conn().await?;
         let query = query(FAILED).bind(limit as i64);
@@ -124,9 +114,6 @@ impl Catalog {
     }
 
     /// Counts the quarantined pairs by failure class. Leaves out classes without pairs.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
         let mut conn = self.read_conn().await?;
         let query = query_as(FAILED_BY_CLASS);
@@ -162,18 +149,6 @@ async fn assemble(conn: &mut Conn, found: &[Row], left_out: &LeftOut) -> Result<
     let pairs = pairs
         .map(|(row, id)| assemble_pair(row, id).map_err(|error: CatalogError| error.in_pair(id)));
     pairs.collect()
-}
-
-fn stored_failure(row: &Row) -> Result<Option<StoredFailure>> {
-    let Some(stage) = row.get("failed_stage")? else {
-        return Ok(None);
-    };
-    let message: String = row.get("message")?;
-    Ok(Some(StoredFailure {
-        stage,
-        failure: Failure::new(row.get("class")?, message),
-        at: row.get("failed_at")?,
-    }))
 }
 
 /// Returns the metrics of a pair, with the verdicts on their current results. Returns none if the pair is not done.
@@ -217,28 +192,6 @@ fn metrics(
     Ok(found)
 }
 
-async fn attempts(conn: &mut Conn, pair: i64) -> Result<Vec<AttemptRecord>> {
-    type Attempt = (
-        Stage,
-        Option<FailureClass>,
-        Option<String>,
-        Option<u64>,
-        UnixMillis,
-    );
-    let query = query_as(ATTEMPTS).bind(pair);
-    let found: Vec<Attempt> = query.fetch_all(conn).await?;
-    let records = found.into_iter().map(|(stage, class, message, ms, at)| {
-        let failure = class.zip(message);
-        AttemptRecord {
-            stage,
-            failure: failure.map(|(class, message)| Failure::new(class, message)),
-            ms,
-            at,
-        }
-    });
-    Ok(records.collect())
-}
-
 /// Reads the results of all pairs page by page, sorted by name. Only one page is read into memory at a time.
 #[derive(Debug)]
 pub struct ResultPages<'a> {
@@ -260,9 +213,6 @@ impl Catalog {
 
 impl ResultPages<'_> {
     /// Returns the next page, which is never empty, or `None` after the last page.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn next(&mut self) -> Result<Option<Vec<PairResults>>> {
         let page = self.catalog.results_page(self.after.as_ref(), self.size);
         let page = page.await?;

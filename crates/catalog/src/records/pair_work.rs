@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::db::query::query;
+use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow, Row, from_row};
-use crate::db::rows::json_array;
+use crate::db::rows::{input_version, json_array};
 use crate::db::script::Script;
+use crate::db::transaction::in_transaction;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::Lease;
 use crate::queue::pair_job::PairJob;
@@ -14,8 +15,7 @@ use crate::queue::selection::PairSelection;
 use crate::records::model::{PairAttributes, StageRecord};
 use crate::records::stage_results;
 use crate::{Catalog, CatalogError, Result};
-use mocban_core::domain::InputVersion;
-use mocban_core::domain::{PairId, Stage};
+use mocban_core::domain::{InputVersion, PairId, Stage};
 
 /// A leased pair with its attributes and results.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,9 +61,6 @@ FROM pair WHERE id > ?1 AND id IN (SELECT CAST(atom AS bigint) FROM json_each(?3
 
 impl Catalog {
     /// Returns the leased pairs with their results, in the same order as the leases.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails, or if a stored value is invalid.
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.read_conn().await?;
         let wanted = json_array(leases.iter().map(|lease| lease.unit.0));
@@ -92,60 +89,47 @@ impl Catalog {
         each.collect()
     }
 
-    /// Returns the input files of up to `limit` pairs with ids above `after`, sorted by id. If `among` is given,
+    /// Returns the input files of up to `limit` pairs with ids above `after`, sorted by id. If `selection` is given,
     /// returns only its pairs. Returns an empty list at the end.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn known_inputs(
         &self,
         after: Option<PairId>,
         limit: usize,
-        among: Option<&PairSelection>,
+        selection: Option<&PairSelection>,
     ) -> Result<Vec<KnownInputs>> {
         let mut conn = self.read_conn().await?;
         let after = after.map_or(0, |pair| pair.0);
-        let query = match among {
-            None => query(INPUTS).bind(after).bind(limit as i64),
-            Some(among) => query(INPUTS_AMONG)
+        let query = match selection {
+            None => query_as(INPUTS).bind(after).bind(limit as i64),
+            Some(selection) => query_as(INPUTS_AMONG)
                 .bind(after)
                 .bind(limit as i64)
-                .bind(&among.json),
+                .bind(&selection.json),
         };
-        let found = query.fetch_all(&mut conn).await?;
-        found.iter().map(known_inputs).collect()
+        query.fetch_all(&mut conn).await
     }
 
     /// Stores versions of input files. Keeps the stored version of a file whose new version is `None`.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn store_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut script = Script::default();
-                let inputs = seen.iter().map(|(pair, inputs)| (*pair, inputs));
-                PairJob::add_inputs(&mut script, inputs)?;
-                script.run(conn).await?;
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            let mut script = Script::default();
+            let inputs = seen.iter().map(|(pair, inputs)| (*pair, inputs));
+            PairJob::add_inputs(&mut script, inputs)?;
+            script.run(conn).await?;
+            Ok(())
         })
-        .await
     }
 }
 
 /// Reads the input files from a row with the columns of [`INPUTS`].
-pub(crate) fn known_inputs(row: &Row) -> Result<KnownInputs> {
-    let version = |hash: &str, stat: &str| -> Result<Option<InputVersion>> {
-        let (hash, stat): (Option<_>, Option<_>) = (row.get(hash)?, row.get(stat)?);
-        let both = hash.zip(stat);
-        Ok(both.map(|(hash, stat)| InputVersion { hash, stat }))
-    };
-    Ok(KnownInputs {
-        pair: row.get("id")?,
-        mesh_path: row.get("mesh_path")?,
-        mesh: version("mesh_hash", "mesh_stat")?,
-        print_path: row.get("print_path")?,
-        print: version("print_hash", "print_stat")?,
-    })
+impl FromRow for KnownInputs {
+    fn from_row(row: &Row) -> Result<Self> {
+        Ok(Self {
+            pair: row.get("id")?,
+            mesh_path: row.get("mesh_path")?,
+            mesh: input_version(row, "mesh")?,
+            print_path: row.get("print_path")?,
+            print: input_version(row, "print")?,
+        })
+    }
 }

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::row::{FromRow, Row, from_row};
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::review_context::ReviewContext;
@@ -96,14 +97,14 @@ pub struct AttentionCheckAnswer {
     pub note: Option<String>,
     /// Context in which it was given.
     #[serde(flatten)]
-    pub look: ReviewContext,
+    pub context: ReviewContext,
     /// When.
     pub at: UnixMillis,
     /// When it was undone, if it was.
     pub undone_at: Option<UnixMillis>,
 }
 
-from_row! { AttentionCheckAnswer { id, pair, metric, result_hash, check, verdict, reviewer, reason, note, look in row, at, undone_at } }
+from_row! { AttentionCheckAnswer { id, pair, metric, result_hash, check, verdict, reviewer, reason, note, context in row, at, undone_at } }
 
 const INSERT_CHECK: &str = "
 INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, shown_ms, angle_read_deg,
@@ -177,45 +178,42 @@ SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 A
 
 impl Catalog {
     /// Appends an answer to a shown item durably, even if the shown result is outdated. Returns `false`, and stores
-    /// nothing, if an answer with the same `look.event` exists.
+    /// nothing, if an answer with the same `context.event` exists.
     ///
     /// # Errors
     /// Returns an error if there is no such pair, if `shown` lists no result, or if a database operation fails.
     pub async fn answer(&self, given: NewVerdict, shown: Shown, now: UnixMillis) -> Result<bool> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let known = query_scalar(KNOWN).bind(&given.look.event);
-                if known.fetch_one(&mut *conn).await? {
-                    return Ok(false);
-                }
-                let pair = pair_id(conn, &given.pair).await?;
-                match &shown {
-                    Shown::Results(results) => {
-                        let mut act = None;
-                        for (metric, hash) in results {
-                            let judged = (pair, *metric, *hash);
-                            act = verdicts::insert(conn, &given, judged, act, now)
-                                .await?
-                                .or(act);
-                        }
-                        match act {
-                            Some(_) => Ok(true),
-                            None => Err(CatalogError::NoResult(given.pair)),
-                        }
+        in_transaction!(self, |conn| {
+            let known = query_scalar(KNOWN).bind(&given.context.event);
+            if known.fetch_one(&mut *conn).await? {
+                return Ok(false);
+            }
+            let pair = pair_id(conn, &given.pair).await?;
+            match &shown {
+                Shown::Results(results) => {
+                    let mut act = None;
+                    for (metric, hash) in results {
+                        let judged = (pair, *metric, *hash);
+                        act = verdicts::insert(conn, &given, judged, act, now)
+                            .await?
+                            .or(act);
                     }
-                    Shown::Check {
-                        check,
-                        metric,
-                        result_hash,
-                    } => {
-                        let from = (pair, *metric, *result_hash);
-                        insert_check(conn, &given, from, check, now).await?;
-                        Ok(true)
+                    match act {
+                        Some(_) => Ok(true),
+                        None => Err(CatalogError::NoResult(given.pair)),
                     }
                 }
-            })
+                Shown::Check {
+                    check,
+                    metric,
+                    result_hash,
+                } => {
+                    let from = (pair, *metric, *result_hash);
+                    insert_check(conn, &given, from, check, now).await?;
+                    Ok(true)
+                }
+            }
         })
-        .await
     }
 
     /// Undoes what a reviewer stored under an event id: a verdict, an answer to an attention check, or a manual
@@ -225,32 +223,26 @@ impl Catalog {
     /// Returns an error if the reviewer stored nothing under this event id, or if a database operation fails.
     pub async fn undo_event(&self, event: &str, reviewer: &str, now: UnixMillis) -> Result<()> {
         let (event, reviewer) = (event.to_owned(), reviewer.to_owned());
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let exists: bool = query_scalar(EXISTS)
-                    .bind(&event)
-                    .bind(&reviewer)
-                    .fetch_one(&mut *conn)
-                    .await?;
-                if !exists {
-                    return Err(CatalogError::NothingToUndo(Some(reviewer)));
-                }
-                for (table, undo) in UNDO {
-                    let undo = query_scalar(undo).bind(&event).bind(&reviewer);
-                    let undone: Vec<i64> = undo.bind(now).fetch_all(&mut *conn).await?;
-                    checksums::store(conn, table, &undone).await?;
-                }
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            let exists: bool = query_scalar(EXISTS)
+                .bind(&event)
+                .bind(&reviewer)
+                .fetch_one(&mut *conn)
+                .await?;
+            if !exists {
+                return Err(CatalogError::NothingToUndo(Some(reviewer)));
+            }
+            for (table, undo) in UNDO {
+                let undo = query_scalar(undo).bind(&event).bind(&reviewer);
+                let undone: Vec<i64> = undo.bind(now).fetch_all(&mut *conn).await?;
+                checksums::store(conn, table, &undone).await?;
+            }
+            Ok(())
         })
-        .await
     }
 
     /// Returns the answers of a reviewer that are not undone, oldest first. An answer on several results appears once
     /// for each of these results.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
         let left_out = &self.left_out;
@@ -264,17 +256,11 @@ impl Catalog {
     }
 
     /// Returns all answers to attention checks, including undone ones, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
         self.attention_check_page(0, i64::MAX as usize).await
     }
 
     /// Returns up to `limit` answers to attention checks with ids above `after`, including undone ones, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn attention_check_page(
         &self,
         after: i64,
@@ -291,9 +277,6 @@ impl Catalog {
     }
 
     /// Returns the key from which the review page derives the ids of its items. A catalog's key never changes.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn review_key(&self) -> Result<ContentHash> {
         let mut conn = self.read_conn().await?;
         let query = query_scalar("SELECT key FROM review_key");
@@ -317,17 +300,17 @@ async fn insert_check(
     check: &AttentionCheck,
     now: UnixMillis,
 ) -> Result<()> {
-    let look = &given.look;
+    let context = &given.context;
     let row: i64 = query_scalar(INSERT_CHECK)
-        .bind(&look.event)
+        .bind(&context.event)
         .bind(pair)
         .bind(metric.name())
         .bind(&result_hash.as_bytes()[..])
         .bind(check.name())
         .bind(serde_json::to_string(check)?)
-        .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
-        .bind(look.shown_ms.map(u64::cast_signed))
-        .bind(look.angle_read_deg)
+        .bind(context.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
+        .bind(context.shown_ms.map(u64::cast_signed))
+        .bind(context.angle_read_deg)
         .bind(given.verdict.name())
         .bind(&given.reviewer)
         .bind(given.reason.map(Reason::name))

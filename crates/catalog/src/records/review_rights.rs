@@ -32,9 +32,6 @@ SELECT CAST(session_user AS text) AS user_name, quote_ident(session_user) AS quo
 
 impl Catalog {
     /// Returns what the user of the database may store as a reviewer. In a file, everybody may store everything.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn review_rights(&self) -> Result<ReviewRights> {
         if !self.is_shared() {
             return Ok(ReviewRights::ALL);
@@ -59,18 +56,12 @@ impl ReviewRights {
     }
 
     /// Checks that the user may append verdicts of a reviewer.
-    ///
-    /// # Errors
-    /// Returns an error if the user may not.
     pub fn require_verdicts(&self, reviewer: &str) -> Result<()> {
         self.require(self.adds_verdicts, Some(reviewer))
     }
 
     /// Checks that the user may store all that the review page stores for a reviewer, and undo it. Without `reviewer`,
     /// the user's own name is assumed.
-    ///
-    /// # Errors
-    /// Returns an error if the user may not.
     pub fn require_review(&self, reviewer: Option<&str>) -> Result<()> {
         self.require(self.reviews, reviewer)
     }

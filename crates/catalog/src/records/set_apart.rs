@@ -10,6 +10,7 @@ use serde_json::json;
 
 use crate::db::query::{query, query_scalar};
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::records::faulty_rows::FaultyRow;
 use crate::records::left_out::LeftOut;
 use crate::{Catalog, Result};
@@ -66,9 +67,6 @@ ON CONFLICT (record, row) DO UPDATE SET value = excluded.value, fault = excluded
 
 impl Catalog {
     /// Compares all rows with their checksums. Returns the catalog without the rows that do not agree, and these rows.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn without_faulty_rows(&self) -> Result<(Self, Vec<FaultyRow>)> {
         let faulty = self.faulty_rows().await?;
         let mut by_table: BTreeMap<_, Vec<i64>> = BTreeMap::new();
@@ -82,9 +80,6 @@ impl Catalog {
     }
 
     /// Returns whether the user of the database may set rows apart: the owner, or anybody if the catalog is a file.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn may_set_apart(&self) -> Result<bool> {
         if !self.is_shared() {
             return Ok(true);
@@ -95,16 +90,12 @@ impl Catalog {
     }
 
     /// Records that the owner knows of damaged rows of append-only tables. The rows stay as they are.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn set_apart(&self, rows: Vec<FaultyRow>, now: UnixMillis) -> Result<()> {
         let rows = rows.iter();
         let rows = rows.map(|row| json!([row.table.code(), row.row, row.value, row.fault.name()]));
         let rows = json_array(rows);
-        self.in_transaction(move |conn| {
-            Box::pin(async move { query(SET_APART).bind(rows).bind(now).execute(conn).await })
+        in_transaction!(self, |conn| {
+            query(SET_APART).bind(rows).bind(now).execute(conn).await
         })
-        .await
     }
 }

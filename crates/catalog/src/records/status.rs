@@ -28,12 +28,12 @@ GROUP BY v.verdict";
 pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 
+/// Pairs that were retired, except for those whose boxes are gone, which their blocks count.
+const RETIRED: &str = "SELECT count(*) FROM retired_pair WHERE cause <> 'labels'";
+
 impl Catalog {
     /// Returns the counts of the `status` command. Results count as stale if their fingerprint is not among
     /// `fingerprints`, or if their inputs have changed.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn status(&self, fingerprints: &Fingerprints) -> Result<StatusCounts> {
         let mut conn = self.snapshot().await?;
         let counted = by_status(counters(&mut conn).await?);
@@ -41,6 +41,7 @@ impl Catalog {
         Ok(StatusCounts {
             schema: 1,
             pairs: counted.values().sum(),
+            retired: query_scalar(RETIRED).fetch_one(&mut conn).await?,
             jobs: jobs_by_status(&counted),
             stages: by_stage(&counted),
             stale: count_stale(&mut conn, &current).await?,

@@ -53,12 +53,18 @@ impl NewVerdict {
         if note.contains('\0') || note.chars().nth(NOTE_CHARS).is_some() {
             return Err(InvalidVerdict::Note);
         }
-        let look = &self.look;
-        look.event.as_deref().map_or(Ok(()), check_event)?;
-        if !look.angle_read_deg.is_none_or(|angle| angle.abs() <= 180.0) {
+        let context = &self.context;
+        context.event.as_deref().map_or(Ok(()), check_event)?;
+        if !context
+            .angle_read_deg
+            .is_none_or(|angle| angle.abs() <= 180.0)
+        {
             return Err(InvalidVerdict::Angle);
         }
-        if look.shown_ms.is_some_and(|ms| i64::try_from(ms).is_err()) {
+        if context
+            .shown_ms
+            .is_some_and(|ms| i64::try_from(ms).is_err())
+        {
             return Err(InvalidVerdict::ShownMs);
         }
         if !self.at.is_none_or(|at| (0..=now + DAY_MS).contains(&at)) {
@@ -111,7 +117,7 @@ mod tests {
             reviewer: "Lê Thị Lan".to_owned(),
             reason: Some(Reason::Angle),
             note: Some("ữ".repeat(NOTE_CHARS)),
-            look: ReviewContext {
+            context: ReviewContext {
                 event: Some("3f2a-77".to_owned()),
                 angle_read_deg: Some(-180.0),
                 shown_ms: Some(i64::MAX as u64),
@@ -140,19 +146,19 @@ mod tests {
                 InvalidVerdict::Note,
             ),
             (
-                |one| one.look.event = Some("a b".to_owned()),
+                |one| one.context.event = Some("a b".to_owned()),
                 InvalidVerdict::Event,
             ),
             (
-                |one| one.look.angle_read_deg = Some(180.1),
+                |one| one.context.angle_read_deg = Some(180.1),
                 InvalidVerdict::Angle,
             ),
             (
-                |one| one.look.angle_read_deg = Some(f64::NAN),
+                |one| one.context.angle_read_deg = Some(f64::NAN),
                 InvalidVerdict::Angle,
             ),
             (
-                |one| one.look.shown_ms = Some(u64::MAX),
+                |one| one.context.shown_ms = Some(u64::MAX),
                 InvalidVerdict::ShownMs,
             ),
             (|one| one.at = Some(-1), InvalidVerdict::At),

@@ -8,6 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{As, Query, query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::{LeftOut, is_counted};
 use crate::records::review_context::ReviewContext;
@@ -33,7 +34,7 @@ pub struct NewVerdict {
     pub note: Option<String>,
     /// Context in which it was given, if known.
     #[serde(flatten)]
-    pub look: ReviewContext,
+    pub context: ReviewContext,
     /// When the verdict was given, if not at the time of storing.
     pub at: Option<UnixMillis>,
 }
@@ -61,7 +62,7 @@ pub struct VerdictEvent {
     pub note: Option<String>,
     /// Context in which it was given, if known.
     #[serde(flatten)]
-    pub look: ReviewContext,
+    pub context: ReviewContext,
     /// When.
     pub at: UnixMillis,
     /// When it was undone, if it was.
@@ -70,7 +71,7 @@ pub struct VerdictEvent {
     pub current: bool,
 }
 
-from_row! { VerdictEvent { id, act, pair, metric, result_hash, verdict, reviewer, reason, note, look in row, at, undone_at, current } }
+from_row! { VerdictEvent { id, act, pair, metric, result_hash, verdict, reviewer, reason, note, context in row, at, undone_at, current } }
 
 /// A reviewer's newest verdict on a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -155,42 +156,33 @@ impl Catalog {
         now: UnixMillis,
     ) -> Result<Vec<VerdictEvent>> {
         let reviewer = reviewer.map(str::to_owned);
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let act: Option<i64> = query_scalar(
-                    "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer = ?1)
+        in_transaction!(self, |conn| {
+            let act: Option<i64> = query_scalar(
+                "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer = ?1)
                         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)",
-                )
-                .bind(&reviewer)
-                .fetch_one(&mut *conn)
-                .await?;
-                let Some(act) = act else {
-                    return Err(CatalogError::NothingToUndo(reviewer));
-                };
-                query(UNDO).bind(act).bind(now).execute(&mut *conn).await?;
-                checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
-                let nothing = LeftOut::default();
-                select_log((Some(act), None), (None, None), &nothing)
-                    .fetch_all(conn)
-                    .await
-            })
+            )
+            .bind(&reviewer)
+            .fetch_one(&mut *conn)
+            .await?;
+            let Some(act) = act else {
+                return Err(CatalogError::NothingToUndo(reviewer));
+            };
+            query(UNDO).bind(act).bind(now).execute(&mut *conn).await?;
+            checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
+            let nothing = LeftOut::default();
+            select_log((Some(act), None), (None, None), &nothing)
+                .fetch_all(conn)
+                .await
         })
-        .await
     }
 
     /// Returns the verdict log of one pair, or of all pairs, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         log(&mut conn, pair, &self.left_out).await
     }
 
     /// Returns up to `limit` lines of the verdict log with ids above `after`, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn verdict_log_page(&self, after: i64, limit: usize) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         let (after, limit) = (Some(after), Some(limit as i64));
@@ -209,12 +201,12 @@ pub(crate) async fn insert(
     act: Option<i64>,
     now: UnixMillis,
 ) -> Result<Option<i64>> {
-    let look = &new.look;
+    let context = &new.context;
     let act = if let Some(act) = act {
         act
     } else {
         let begun = query_scalar(NEW_ACT).bind(&new.reviewer);
-        let begun = begun.bind(&look.event).bind(metric.name());
+        let begun = begun.bind(&context.event).bind(metric.name());
         let Some(act) = begun.fetch_optional(&mut *conn).await? else {
             return Ok(None);
         };
@@ -230,11 +222,11 @@ pub(crate) async fn insert(
         .bind(new.reason.map(Reason::name))
         .bind(&new.note)
         .bind(new.at.unwrap_or(now))
-        .bind(&look.event)
-        .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
-        .bind(look.shown_ms.map(u64::cast_signed))
-        .bind(look.angle_read_deg)
-        .bind(look.review_order.map(ReviewOrder::name))
+        .bind(&context.event)
+        .bind(context.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
+        .bind(context.shown_ms.map(u64::cast_signed))
+        .bind(context.angle_read_deg)
+        .bind(context.review_order.map(ReviewOrder::name))
         .fetch_optional(&mut *conn)
         .await?;
     let Some(row) = inserted else {

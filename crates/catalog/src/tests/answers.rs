@@ -16,7 +16,7 @@ fn given(event: &str, verdict: Verdict) -> NewVerdict {
         reviewer: "ana".to_owned(),
         reason: (verdict == Verdict::Fail).then_some(Reason::WrongPair),
         note: Some("torn".to_owned()),
-        look: ReviewContext {
+        context: ReviewContext {
             event: Some(event.to_owned()),
             seen: Some(ContentHash::of(b"seen")),
             shown_ms: Some(1_900),
@@ -67,7 +67,7 @@ async fn an_answer_sent_again_is_stored_once() {
     let log = world.catalog.verdict_log(None).await.expect("a log");
     assert_eq!(log.len(), 2);
     assert!(log.iter().all(|event| event.act == log[0].id));
-    assert_eq!(log[0].look, given("e1", Verdict::Fail).look);
+    assert_eq!(log[0].context, given("e1", Verdict::Fail).context);
     assert_eq!(log[0].reason, Some(Reason::WrongPair));
     let fail = vec![Verdict::Fail];
     assert_eq!(
@@ -104,7 +104,7 @@ async fn answers_to_attention_checks_are_not_verdicts() {
     assert_eq!(checks.len(), 1);
     assert_eq!(checks[0].check, AttentionCheck::Turned { angle_deg: 9.5 });
     assert!(checks[0].check.is_fault());
-    assert_eq!(checks[0].look.shown_ms, Some(1_900));
+    assert_eq!(checks[0].context.shown_ms, Some(1_900));
 }
 
 #[tokio::test]
@@ -152,7 +152,7 @@ async fn a_verdict_from_the_command_line_is_among_the_answers() {
     let world = World::new(1).await;
     world.finish_one().await;
     let typed = NewVerdict {
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: Some(3),
         ..given("", Verdict::Pass)
     };

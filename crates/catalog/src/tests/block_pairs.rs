@@ -6,11 +6,11 @@ use super::blocks::{attributes, block, character, stored, version, world};
 use super::{World, name};
 use crate::{
     BlockAttributes, BlockInputVersions, BlockReason, CharacterMaps, CheckpointOutcome, CutOrigin,
-    CutReply, NewCharacter, NewVerdict, ReviewContext,
+    CutReply, NewCharacter, NewVerdict, RetiredPair, ReviewContext,
 };
 use mocban_core::domain::{
-    BlockCharacterState, BlockName, BlockStage, JobStatus, PrintFromMesh, Stage, ThresholdMetric,
-    TrueBox, Verdict,
+    BlockCharacterState, BlockName, BlockStage, JobStatus, PairName, PrintFromMesh, RetireCause,
+    Stage, ThresholdMetric, TrueBox, Verdict,
 };
 
 #[tokio::test]
@@ -138,7 +138,8 @@ async fn only_changed_characters_run_again_and_verdicts_stay() {
     assert_eq!(status_of(&world, "b_b").await, Some(JobStatus::Ready));
     assert_eq!(status_of(&world, "b_c").await, None);
     let retired = world.catalog.retired_pairs().await.expect("a read");
-    assert_eq!(retired, [name("b_c")]);
+    assert_eq!(names_of(&retired), [name("b_c")]);
+    assert_eq!(retired[0].cause, RetireCause::Labels);
     let log = world.catalog.verdict_log(None).await.expect("a read");
     assert_eq!(log.len(), 1);
     let states = world.character_states().await;
@@ -243,21 +244,26 @@ async fn a_copy_holds_blocks_and_retired_pairs() {
     };
     let found = states(copy.clone()).await;
     assert_eq!(found, states(world.catalog.clone()).await);
-    assert_eq!(found.2, [name("b_b")]);
+    assert_eq!(names_of(&found.2), [name("b_b")]);
     let counters = copy.counters().await.expect("counters");
     assert_eq!(counters, copy.recount().await.expect("a recount"));
     // New rows of the copy get new numbers.
-    let imported = copy.import_blocks(vec![attributes("c")], 3).await;
+    let imported = copy.import_blocks(vec![attributes("c")], false, 3).await;
     assert_eq!(imported.expect("imported").added, 1);
     assert_eq!(copy.faulty_rows().await.expect("a read"), []);
 }
 
-async fn status_of(world: &World, pair: &str) -> Option<JobStatus> {
+/// Returns the names of retired pairs.
+pub(super) fn names_of(retired: &[RetiredPair]) -> Vec<PairName> {
+    retired.iter().map(|pair| pair.name.clone()).collect()
+}
+
+pub(super) async fn status_of(world: &World, pair: &str) -> Option<JobStatus> {
     let detail = world.catalog.pair(&name(pair)).await.expect("a read");
     detail.map(|detail| detail.results.status)
 }
 
-async fn judge(world: &World, pair: &str) {
+pub(super) async fn judge(world: &World, pair: &str) {
     let detail = world.catalog.pair(&name(pair)).await.expect("a read");
     let results = detail.expect("the pair").results;
     assert_eq!(results.status, JobStatus::Done);
@@ -268,7 +274,7 @@ async fn judge(world: &World, pair: &str) {
         reviewer: "lan".to_owned(),
         reason: None,
         note: None,
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: None,
     };
     let stored = world.catalog.verdict_set(vec![verdict], 5).await;

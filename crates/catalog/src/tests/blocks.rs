@@ -2,12 +2,11 @@
 
 use serde_json::json;
 
-use super::{World, register};
+use super::World;
 use crate::{
-    BlockAttributes, BlockInputVersions, BlockJob, BlockReason, BlockSettings, BlockWork,
-    CatalogError, CheckpointOutcome, CutPair, CutReply, CutSummary, DeadWorker, FailureAction,
-    InputVersion, Lease, MadeWith, NewCharacter, RerunPolicy, RetrySelection, StageCheckpoint,
-    StageFailure,
+    BlockAttributes, BlockInputVersions, BlockJob, BlockProvenance, BlockReason, BlockSettings,
+    BlockWork, CatalogError, CheckpointOutcome, CutPair, CutReply, CutSummary, FailureAction,
+    InputVersion, Lease, NewCharacter, RerunPolicy, RetrySelection, StageCheckpoint, StageFailure,
 };
 use mocban_core::domain::{
     ArtifactSet, BlockCharacterState, BlockName, BlockStage, ContentHash, Failure, FailureClass,
@@ -40,7 +39,7 @@ pub(super) fn version(text: &str) -> InputVersion {
     }
 }
 
-fn inputs(texts: [&str; 3]) -> BlockInputVersions {
+pub(super) fn inputs(texts: [&str; 3]) -> BlockInputVersions {
     BlockInputVersions {
         mesh: Some(version(texts[0])),
         page: Some(version(texts[1])),
@@ -57,7 +56,7 @@ pub(super) fn done(work: &BlockWork, stage: BlockStage) -> StageCheckpoint<Block
         files: ArtifactSet::new(),
         result_hash: ContentHash::of(stage.name().as_bytes()),
         metrics: Vec::new(),
-        made_with: MadeWith::new(
+        provenance: BlockProvenance::new(
             stage,
             settings.of(stage),
             &work.attributes,
@@ -94,7 +93,7 @@ pub(super) fn character(label: &str, content: &str) -> NewCharacter {
 }
 
 /// Returns the lease after a checkpoint.
-fn continued(outcome: CheckpointOutcome<BlockJob>) -> Lease<BlockJob> {
+pub(super) fn continued(outcome: CheckpointOutcome<BlockJob>) -> Lease<BlockJob> {
     match outcome {
         CheckpointOutcome::Lease(lease) => lease,
         other => panic!("the lease ended: {other:?}"),
@@ -145,7 +144,7 @@ impl World {
     }
 
     pub(super) async fn import_block(&self, row: BlockAttributes) {
-        let imported = self.catalog.import_blocks(vec![row], 1).await;
+        let imported = self.catalog.import_blocks(vec![row], false, 1).await;
         imported.expect("imported");
     }
 
@@ -178,7 +177,10 @@ pub(super) fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> 
 #[tokio::test]
 async fn an_import_is_idempotent_and_names_what_changed() {
     let world = world().await;
-    let again = world.catalog.import_blocks(vec![attributes("b")], 2).await;
+    let again = world
+        .catalog
+        .import_blocks(vec![attributes("b")], false, 2)
+        .await;
     let again = again.expect("imported");
     assert_eq!((again.added, again.unchanged), (0, 1));
     let other = BlockAttributes {
@@ -186,7 +188,7 @@ async fn an_import_is_idempotent_and_names_what_changed() {
         labels_path: None,
         ..attributes("b")
     };
-    let changed = world.catalog.import_blocks(vec![other], 2).await;
+    let changed = world.catalog.import_blocks(vec![other], true, 2).await;
     let changed = changed.expect("imported").changed;
     assert_eq!(changed, [(block("b"), vec!["page", "labels"])]);
     assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
@@ -267,7 +269,7 @@ fn failed(work: &BlockWork, stage: BlockStage, action: FailureAction) -> StageFa
             "b.png: the page is of another block",
         ),
         action,
-        made_with: done.made_with,
+        provenance: done.provenance,
         inputs: done.inputs,
         ms: Some(3),
         at: 100,
@@ -393,53 +395,4 @@ async fn a_block_backs_off_and_becomes_due() {
         1
     );
     assert_eq!(world.leased_block().await.0.attempt(), 2);
-}
-
-#[tokio::test]
-async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
-    let world = world().await;
-    let (lease, work) = world.leased_block().await;
-    // A second claim of the same worker returns the same lease: the reply to the first may have been lost.
-    assert_eq!(world.leased_block().await.0, lease);
-    let other = register(&world.catalog).await;
-    assert!(world.claim_block(other).await.is_none());
-    let recovered = world
-        .catalog
-        .recover(DeadWorker::AllExcept(other), 60)
-        .await;
-    assert_eq!(recovered.expect("a recovery").blocks, 1);
-    let stage = done(&work, BlockStage::Face);
-    let late = world.catalog.checkpoint_block(lease, stage.clone()).await;
-    assert_eq!(late.expect("a reply"), CheckpointOutcome::LeaseLost);
-    let (lease, _) = world.claim_block(other).await.expect("a ready block");
-    let advanced = world
-        .catalog
-        .checkpoint_block(lease.clone(), stage.clone())
-        .await;
-    let advanced = continued(advanced.expect("a reply"));
-    assert_eq!(advanced.cursor(), BlockStage::Align);
-    // The reply was lost, and the worker sends the same checkpoint again.
-    let again = world.catalog.checkpoint_block(lease, stage).await;
-    assert_eq!(again.expect("a reply"), CheckpointOutcome::Lease(advanced));
-}
-
-#[tokio::test]
-async fn a_block_that_kills_its_workers_is_quarantined() {
-    let world = world().await;
-    let mut worker = world.worker;
-    for crashes in 1..=3 {
-        assert!(world.claim_block(worker).await.is_some(), "{crashes}");
-        worker = register(&world.catalog).await;
-        let recovered = world
-            .catalog
-            .recover(DeadWorker::AllExcept(worker), 60)
-            .await;
-        let ready = u64::from(crashes < 3);
-        assert_eq!(recovered.expect("a recovery").blocks, ready, "{crashes}");
-    }
-    let states = world.catalog.block_states().await.expect("a read");
-    let failure = states[0].failure.clone().expect("a failure");
-    let message = "3 workers died or hung over it at face";
-    assert_eq!(failure.failure.message, message);
-    assert_eq!(world.requeue_blocks([9; 4]).await, []);
 }

@@ -18,7 +18,7 @@ fn failed(fingerprints: FingerprintIds, action: FailureAction) -> StageFailure {
         stage: Stage::Fit,
         failure: Failure::new(FailureClass::Io, "the disk is slow"),
         action,
-        made_with: done(fingerprints, Stage::Fit).made_with,
+        provenance: done(fingerprints, Stage::Fit).provenance,
         inputs: inputs(Stage::Fit),
         ms: None,
         at: 50,

@@ -293,7 +293,7 @@ impl Game {
             stage,
             failure: Failure::new(FailureClass::Bug, "made up"),
             action,
-            made_with: done(process.fingerprints, stage).made_with,
+            provenance: done(process.fingerprints, stage).provenance,
             inputs: inputs(stage),
             ms: None,
             at: process.clock,

@@ -1,7 +1,8 @@
 //! Imports that are streamed in chunks.
 
+use super::blocks::{attributes, block};
 use super::{World, name, row};
-use crate::{CatalogError, ImportChunk};
+use crate::{CatalogError, ImportChunk, ImportRow, ImportTerms};
 
 #[tokio::test]
 async fn an_import_without_an_end_stores_nothing() {
@@ -10,7 +11,10 @@ async fn an_import_without_an_end_stores_nothing() {
     let rows = ImportChunk::Rows(vec![row("q0"), row("q1")]);
     sender.try_send(rows).expect("room for one");
     drop(sender);
-    let outcome = world.catalog.import_all(chunks, Vec::new(), 1).await;
+    let outcome = world
+        .catalog
+        .import_all(chunks, ImportTerms::default(), 1)
+        .await;
     assert!(
         matches!(outcome, Err(CatalogError::CutShort)),
         "{outcome:?}"
@@ -30,10 +34,189 @@ async fn chunks_of_an_import_are_counted_together() {
         sender.try_send(ImportChunk::Rows(chunk)).expect("room");
     }
     sender.try_send(ImportChunk::End).expect("room");
-    let imported = world.catalog.import_all(chunks, Vec::new(), 1).await;
+    let imported = world
+        .catalog
+        .import_all(chunks, ImportTerms::default(), 1)
+        .await;
     let (summary, truths) = imported.expect("imported");
     assert_eq!((summary.added, summary.unchanged, truths), (2, 0, 0));
     assert_eq!(summary.changed[0].name, name("p0"));
     assert_eq!(summary.changed[0].fields, ["mesh"]);
     world.assert_counters().await;
+}
+
+/// Returns a row with files of its own.
+fn row_with(id: &str, files: &str) -> ImportRow {
+    ImportRow {
+        mesh_path: format!("{files}.stl"),
+        print_path: format!("{files}.png"),
+        ..row(id)
+    }
+}
+
+#[tokio::test]
+async fn a_new_pair_whose_name_differs_from_a_known_one_only_in_case_is_refused() {
+    let world = World::new(0).await;
+    let known = ["A1", "đĩa 7", "a01"].map(|id| row_with(id, id)).to_vec();
+    world
+        .catalog
+        .import(known.clone(), 1)
+        .await
+        .expect("new names");
+    for (id, expected) in [
+        (
+            "a1",
+            "pair a1 differs from pair A1 only in upper and lower case",
+        ),
+        (
+            "Đĩa 7",
+            "pair Đĩa 7 differs from pair đĩa 7 only in upper and lower case",
+        ),
+        (
+            "A01",
+            "pair A01 differs from pair a01 only in upper and lower case",
+        ),
+    ] {
+        let rows = vec![row_with("b", "b"), row_with(id, "c")];
+        let refused = world.catalog.import(rows, 2).await.expect_err(id);
+        assert!(refused.to_string().starts_with(expected), "{refused}");
+    }
+    let again = world
+        .catalog
+        .import(known, 3)
+        .await
+        .expect("the same names");
+    assert_eq!((again.added, again.unchanged), (0, 3));
+    assert_eq!(world.catalog.pair_names().await.expect("names").len(), 3);
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_pair_that_lost_the_zeros_of_its_name_is_refused_with_its_name() {
+    let world = World::new(0).await;
+    let known = vec![row_with("0117", "stl/117"), row_with("0118", "stl/118")];
+    world.catalog.import(known, 1).await.expect("new names");
+    let refused = world
+        .catalog
+        .import(vec![row_with("117", "stl/117")], 2)
+        .await;
+    let text = refused.expect_err("the same files").to_string();
+    assert!(
+        text.starts_with("pair 117 has the mesh and the print of pair 0117,"),
+        "{text}"
+    );
+    assert!(text.ends_with("write the id as 0117"), "{text}");
+    // Other files make another pair.
+    let added = world
+        .catalog
+        .import(vec![row_with("118", "b2/118")], 3)
+        .await;
+    assert_eq!(added.expect("another pair").added, 1);
+}
+
+#[tokio::test]
+async fn a_block_whose_name_differs_only_in_case_is_refused() {
+    let world = World::new(0).await;
+    let catalog = &world.catalog;
+    catalog
+        .import_blocks(vec![attributes("B1")], false, 1)
+        .await
+        .expect("a new name");
+    let refused = catalog
+        .import_blocks(vec![attributes("b1")], false, 2)
+        .await;
+    let text = refused.expect_err("the same name").to_string();
+    assert!(
+        text.starts_with("block b1 differs from block B1 only in"),
+        "{text}"
+    );
+    assert_eq!(catalog.block_names().await.expect("names"), [block("B1")]);
+}
+
+#[tokio::test]
+async fn an_import_that_gives_most_known_pairs_other_files_is_refused_unless_asked_for() {
+    let world = World::new(0).await;
+    let catalog = &world.catalog;
+    let rows = |folder: &str, ids: std::ops::Range<usize>| {
+        let row = |k: usize| row_with(&k.to_string(), &format!("{folder}/{k}"));
+        ids.map(row).collect::<Vec<_>>()
+    };
+    catalog
+        .import(rows("b1", 1..9), 1)
+        .await
+        .expect("new pairs");
+    let refused = catalog
+        .import(rows("b2", 3..12), 2)
+        .await
+        .expect_err("other files");
+    let text = refused.to_string();
+    assert!(
+        text.starts_with("6 of the 6 pairs in it that the project has would get another mesh and another print, such as 3:"),
+        "{text}"
+    );
+    // A few corrections among many, and one other file each, are changes.
+    let mut few = rows("b1", 1..9);
+    few.splice(0..4, rows("b2", 1..5));
+    assert_eq!(
+        catalog
+            .import(few, 3)
+            .await
+            .expect("four of eight")
+            .changed
+            .len(),
+        4
+    );
+    let mut prints = rows("b1", 1..9);
+    for row in &mut prints {
+        row.print_path += ".tif";
+    }
+    assert_eq!(
+        catalog
+            .import(prints, 4)
+            .await
+            .expect("other prints")
+            .changed
+            .len(),
+        8
+    );
+    let (sender, chunks) = tokio::sync::mpsc::channel(2);
+    for chunk in [ImportChunk::Rows(rows("moved", 1..9)), ImportChunk::End] {
+        sender.try_send(chunk).expect("room");
+    }
+    let terms = ImportTerms {
+        changed_files: true,
+        ..ImportTerms::default()
+    };
+    let (summary, _) = catalog
+        .import_all(chunks, terms, 5)
+        .await
+        .expect("asked for");
+    assert_eq!(summary.changed.len(), 8);
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_block_with_another_scan_and_another_page_is_refused_unless_asked_for() {
+    let world = World::new(0).await;
+    let catalog = &world.catalog;
+    catalog
+        .import_blocks(vec![attributes("scan")], false, 1)
+        .await
+        .expect("new");
+    let mut other = attributes("scan");
+    other.mesh_path = "b2/scan.stl".to_owned();
+    catalog
+        .import_blocks(vec![other.clone()], false, 2)
+        .await
+        .expect("another scan");
+    other.mesh_path = "b3/scan.stl".to_owned();
+    other.page_path = "b3/scan.png".to_owned();
+    let refused = catalog.import_blocks(vec![other.clone()], false, 3).await;
+    let text = refused.expect_err("other files").to_string();
+    assert!(
+        text.starts_with("1 of the 1 blocks in it that the project has would get another scan and another page, such as scan:"),
+        "{text}"
+    );
+    let changed = catalog.import_blocks(vec![other], true, 4).await;
+    assert_eq!(changed.expect("asked for").changed.len(), 1);
 }

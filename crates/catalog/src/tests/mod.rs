@@ -1,6 +1,7 @@
 //! Tests of the catalog on real databases: files in the module `tests`, PostgreSQL in `tests_on_postgres`.
 
 mod answers;
+mod block_leases;
 mod block_pairs;
 mod block_settings;
 mod blocks;
@@ -14,6 +15,7 @@ mod model;
 mod place;
 mod protocol;
 mod recovery;
+mod retired;
 mod schema;
 mod server_plans;
 mod set_apart;
@@ -164,9 +166,9 @@ impl World {
         for revision in [[1; 4], [1, 1, 2, 1]] {
             let fingerprints = fingerprints(revision);
             let selected = self.catalog.select(&names).await.expect("a read");
-            let plan = |among| {
+            let plan = |selection| {
                 self.catalog
-                    .plan(&fingerprints, among, RerunPolicy::Changed)
+                    .plan(&fingerprints, selection, RerunPolicy::Changed)
             };
             let all = plan(None).await.expect("a plan");
             let each = plan(Some(&selected)).await.expect("a plan");
@@ -233,7 +235,7 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
     });
     StageCheckpoint {
         stage,
-        made_with: PairProvenance::new(
+        provenance: PairProvenance::new(
             fingerprints.of(stage),
             &inputs(stage),
             json!({ "scanned_face_down": null, "unit": null }).to_string(),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::db::conn::{Conn, Held};
+use crate::db::conn::{Conn, ConnectionKind};
 use crate::db::open;
 use crate::db::postgres_address::PostgresAddress;
 use crate::postgres_server;
@@ -73,12 +73,12 @@ impl Place {
         match self {
             Self::File { path, .. } => {
                 let conn = open::write_conn(path, false).await;
-                Conn::Sqlite(Held::Owned(conn.expect("a connection")))
+                Conn::Sqlite(ConnectionKind::Owned(conn.expect("a connection")))
             }
             Self::Url(url) => {
                 let place = PostgresAddress::parse(url).expect("a place");
                 let conn = place.connect(false).await;
-                Conn::Postgres(Held::Owned(conn.expect("a connection")))
+                Conn::Postgres(ConnectionKind::Owned(conn.expect("a connection")))
             }
         }
     }

@@ -17,7 +17,7 @@ fn failed(world: &World, stage: Stage, action: FailureAction) -> StageFailure {
         stage,
         failure: Failure::new(FailureClass::Io, "the disk is slow"),
         action,
-        made_with: done(world.fingerprints, stage).made_with,
+        provenance: done(world.fingerprints, stage).provenance,
         inputs: super::inputs(stage),
         ms: Some(3),
         at: 50,
@@ -238,9 +238,9 @@ async fn an_exclusive_pair_is_claimed_only_exclusively() {
 async fn a_claim_among_selected_pairs_leases_no_other() {
     let world = World::new(4).await;
     let wanted = [name("p3"), name("p1")];
-    let among = world.catalog.select(&wanted).await.expect("a read");
+    let selection = world.catalog.select(&wanted).await.expect("a read");
     let request = ClaimRequest {
-        among: Some(among.clone()),
+        selection: Some(selection.clone()),
         ..ClaimRequest::new(world.worker, 9, 1_000)
     };
     assert_eq!(
@@ -249,7 +249,10 @@ async fn a_claim_among_selected_pairs_leases_no_other() {
     );
     assert_eq!(status(&world, "p0").await, JobStatus::Ready);
     assert_eq!(status(&world, "p3").await, JobStatus::Leased);
-    let left = world.catalog.work_left(Stage::Depth, Some(&among)).await;
+    let left = world
+        .catalog
+        .work_left(Stage::Depth, Some(&selection))
+        .await;
     assert_eq!(left.expect("a read").by_stage, [2, 2, 0, 0]);
 }
 

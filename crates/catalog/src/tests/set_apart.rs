@@ -19,7 +19,7 @@ async fn judge(catalog: &Catalog, reviewer: &str, verdict: Verdict) -> bool {
         reviewer: reviewer.to_owned(),
         reason: None,
         note: None,
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: None,
     };
     let stored = catalog.verdict_set(vec![given], 5).await;

@@ -143,7 +143,7 @@ async fn a_failed_pair_is_requeued_when_its_settings_change() {
         stage: Stage::Fit,
         failure: Failure::new(FailureClass::NoSolution, "no relief"),
         action: FailureAction::Quarantine,
-        made_with: super::done(world.fingerprints, Stage::Fit).made_with,
+        provenance: super::done(world.fingerprints, Stage::Fit).provenance,
         inputs: super::inputs(Stage::Fit),
         ms: None,
         at: 5,

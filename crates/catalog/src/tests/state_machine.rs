@@ -26,7 +26,7 @@ pub(super) enum JobState {
         /// When it may be claimed again.
         run_at: UnixMillis,
     },
-    /// All four stages are complete.
+    /// All stages are complete.
     Done,
     /// Failed at `stage`.
     Quarantined {

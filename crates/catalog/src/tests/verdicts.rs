@@ -19,7 +19,7 @@ fn verdict(reviewer: &str, verdict: Verdict) -> NewVerdict {
         reviewer: reviewer.to_owned(),
         reason: (verdict == Verdict::Fail).then_some(Reason::Angle),
         note: None,
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: None,
     }
 }
@@ -238,8 +238,8 @@ fn mixed_list() -> Vec<ListedVerdict> {
         new.pair = name(if number % 2 == 0 { "p0" } else { "p1" });
         new.metric = (number % 5 == 0).then_some(ThresholdMetric::Density);
         new.note = (number % 7 == 0).then(|| format!("note {}", number % 14));
-        new.look.event = (number % 11 == 0).then(|| format!("event {}", number % 33));
-        new.look.angle_read_deg = (number % 13 == 0).then_some(number as f64 / 8.0);
+        new.context.event = (number % 11 == 0).then(|| format!("event {}", number % 33));
+        new.context.angle_read_deg = (number % 13 == 0).then_some(number as f64 / 8.0);
         ListedVerdict {
             verdict: new,
             judged: None,

@@ -6,7 +6,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode};
 use sqlx::{ConnectOptions as _, Connection as _, SqliteConnection};
 
 use crate::audit::integrity;
-use crate::db::conn::{Conn, Held};
+use crate::db::conn::{Conn, ConnectionKind};
 use crate::db::error_kind::CatalogErrorKind;
 use crate::db::open::{Identity, identity, wrong_identity};
 use crate::db::schema;
@@ -32,7 +32,7 @@ impl Catalog {
     pub async fn back_up(&self, file: &Path, settings: Option<&[u8]>) -> Result<()> {
         // `VACUUM INTO` fails under `query_only`. The connection is taken out of the pool before this setting is turned
         // off, so that the pool keeps only read connections.
-        let Conn::Sqlite(Held::Pooled(conn)) = self.read_conn().await? else {
+        let Conn::Sqlite(ConnectionKind::Pooled(conn)) = self.read_conn().await? else {
             return self.back_up_from_server(file, settings).await;
         };
         let mut conn = conn.detach();

@@ -13,7 +13,7 @@ use std::path::Path;
 use self::rows::{TableReader, content, insert};
 use self::tables::TABLES;
 use crate::audit::repair::recount;
-use crate::db::conn::{Conn, Held};
+use crate::db::conn::{Conn, ConnectionKind};
 use crate::db::postgres_address::PostgresAddress;
 use crate::db::query::{query, query_scalar};
 use crate::{Catalog, CatalogError, NewCatalog, Result};
@@ -118,7 +118,7 @@ impl Catalog {
             sqlx::query("BEGIN").execute(&mut conn).await?;
             address.create_schema_in(&mut conn).await?;
             address.require_current(&mut conn).await?;
-            let mut target = Conn::Postgres(Held::Owned(conn));
+            let mut target = Conn::Postgres(ConnectionKind::Owned(conn));
             if let Some(tables) = copy_rows(&mut source, &mut target, progress).await? {
                 query("COMMIT").execute(&mut target).await?;
                 return Ok(CatalogCopy {

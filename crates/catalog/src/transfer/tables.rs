@@ -149,13 +149,14 @@ pub(super) const TABLES: [CopyTable; 26] = [
     table!("manual_alignment_undo", 3, "alignment", "reviewer", "at"),
     table!(
         "retired_pair",
-        7,
+        8,
         "pair",
         "stage",
         "is_quarantined",
         "token",
         "fingerprint",
         "low_confidence",
+        "cause",
         "at"
     ),
     table!("block", 17, "id", "name", "mesh_path", "page_path", "labels_path", "unit", "side", "attributes", "mesh_hash",

@@ -37,6 +37,11 @@ impl BlockName {
         self.0.file_name()
     }
 
+    /// Returns the id in the form of the id of a pair.
+    pub const fn as_pair(&self) -> &PairName {
+        &self.0
+    }
+
     /// Returns the id of the pair that is cut from this block for a label: `BLOCK_LABEL`.
     ///
     /// # Errors

@@ -8,6 +8,9 @@ use std::io::{self, BufRead, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
 
 /// Items of a loop between two polls. Loops that use it spend at most about a microsecond on an item.
 const ITEMS_PER_POLL: u32 = 1 << 12;
@@ -108,6 +111,28 @@ pub fn poll() {
     if is_cancelled {
         resume_unwind(Box::new(Cancelled));
     }
+}
+
+/// Time between two polls of a thread that waits for another one.
+const WAITING_POLL: Duration = Duration::from_millis(5);
+
+/// Runs work that polls too rarely on a thread of its own, and polls while it waits for the result. After a
+/// cancellation, that thread ends at its next poll or at the end of the work.
+///
+/// Returns `None`, and does not run the work, if nobody can cancel this computation or if no thread can be started.
+pub(crate) fn run_aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Option<T> {
+    let token = ThreadToken::current();
+    token.0.as_ref()?;
+    let (running, ended) = mpsc::channel::<()>();
+    let work = move || {
+        let _running = running;
+        token.scope(work)
+    };
+    let thread = thread::Builder::new().spawn(work).ok()?;
+    while ended.recv_timeout(WAITING_POLL) == Err(RecvTimeoutError::Timeout) {
+        poll();
+    }
+    Some(thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
 }
 
 /// Polls at every 4,096th item of a loop.
@@ -215,7 +240,7 @@ mod tests {
     use std::io::Read as _;
     use std::sync::mpsc;
 
-    use super::{CancelToken, Cancelled, PolledReader, ThreadToken, poll, polled};
+    use super::{CancelToken, Cancelled, PolledReader, ThreadToken, poll, polled, run_aside};
 
     #[test]
     fn a_computation_ends_at_its_next_poll_and_not_without_a_token() {
@@ -281,5 +306,37 @@ mod tests {
         });
         assert_eq!(read, Err(Cancelled));
         assert_eq!(token.polls(), 3);
+    }
+
+    #[test]
+    fn a_cancellation_ends_the_wait_for_work_that_does_not_poll() {
+        let token = CancelToken::default();
+        let (inner, (started, start)) = (token.clone(), mpsc::channel());
+        let (release, released) = mpsc::channel::<()>();
+        let thread = std::thread::spawn(move || {
+            inner.run(|| {
+                run_aside(move || {
+                    started.send(()).expect("a receiver");
+                    released.recv().is_err()
+                })
+            })
+        });
+        start.recv().expect("it starts");
+        token.cancel();
+        assert_eq!(thread.join().expect("no panic"), Err(Cancelled));
+        drop(release);
+    }
+
+    #[test]
+    fn work_aside_gives_its_result_its_panic_or_its_cancellation() {
+        let token = CancelToken::default();
+        assert_eq!(token.run(|| run_aside(|| 7)), Ok(Some(7)));
+        assert_eq!(run_aside(|| 7), None, "nobody can cancel it");
+        let failing = || run_aside(|| std::panic::resume_unwind(Box::new(7_i32)));
+        let caught = std::panic::catch_unwind(|| token.run::<Option<()>>(failing));
+        assert_eq!(caught.expect_err("a panic").downcast_ref(), Some(&7_i32));
+        let token = CancelToken::cancelled_at(100);
+        let endless = || run_aside(|| polled(std::iter::repeat(())).for_each(drop));
+        assert_eq!(token.run(endless), Err(Cancelled));
     }
 }

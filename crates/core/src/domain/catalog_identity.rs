@@ -4,6 +4,9 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+/// Name of the catalog file in a project.
+pub const CATALOG_FILE: &str = "catalog.sqlite";
+
 /// Identifies a catalog and the file or schema that holds it. A copy of the file has the same `id`, and another
 /// `instance`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -43,6 +43,9 @@ macro_rules! enum_names {
 macro_rules! stage_order {
     ($type:ident) => {
         impl $type {
+            /// Number of stages.
+            pub const COUNT: usize = Self::ALL.len();
+
             /// Returns the position of the stage in the processing order, from 0. A job's cursor is the index of its
             /// next stage.
             pub const fn index(self) -> usize {

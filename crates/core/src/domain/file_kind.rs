@@ -24,13 +24,15 @@ pub enum FileKind {
     OtherMesh(&'static str),
     /// Another format with a known signature.
     Other(&'static str),
+    /// The text that Git LFS stores in place of a large file that was not fetched.
+    LfsPointer,
     /// Printable text without a signature.
     Text,
     /// Bytes without a known signature.
     Binary,
 }
 
-const SIGNATURES: [(&[u8], FileKind); 28] = [
+const SIGNATURES: &[(&[u8], FileKind)] = &[
     (b"\x89PNG\r\n\x1a\n", FileKind::Png),
     (b"\xff\xd8\xff", FileKind::Jpeg),
     (b"II*\0", FileKind::Tiff),
@@ -41,15 +43,30 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
     (b"BM", FileKind::OtherImage("a BMP image")),
     (b"8BPS", FileKind::OtherImage("a Photoshop image")),
     (b"\0\0\0\x0cjP  ", FileKind::OtherImage("a JPEG 2000 image")),
+    (
+        b"\xff\x4f\xff\x51",
+        FileKind::OtherImage("a JPEG 2000 image"),
+    ),
+    (b"\0\0\0\x0cJXL ", FileKind::OtherImage("a JPEG XL image")),
     (b"ply\n", FileKind::Ply),
     (b"ply\r", FileKind::Ply),
-    (b"glTF", FileKind::OtherMesh("a binary glTF scene")),
-    (b"OFF\n", FileKind::OtherMesh("an OFF mesh")),
-    (b"OFF\r", FileKind::OtherMesh("an OFF mesh")),
+    (b"glTF", GLTF),
     (b"Kaydara FBX", FileKind::OtherMesh("an FBX scene")),
+    (b"; FBX", FileKind::OtherMesh("an FBX scene")),
+    (b"BLENDER", FileKind::OtherMesh("a Blender scene")),
+    (b"PXR-USDC", FileKind::OtherMesh("a USD scene")),
+    (b"#usda", FileKind::OtherMesh("a USD scene")),
+    (b"ISO-10303-21", FileKind::OtherMesh("a STEP model")),
     (b"#VRML", FileKind::OtherMesh("a VRML scene")),
     (b"# .PCD", FileKind::OtherMesh("a PCD point cloud")),
     (b"LASF", FileKind::OtherMesh("a LAS point cloud")),
+    (b"ASTM-E57", FileKind::OtherMesh("an E57 point cloud")),
+    (b"version https://git-lfs", FileKind::LfsPointer),
+    (b"version https://hawser", FileKind::LfsPointer),
+    (
+        b"/annex/objects/",
+        FileKind::Other("a pointer of git-annex, whose content `git annex get` fetches"),
+    ),
     (b"%PDF", FileKind::Other("a PDF document")),
     (b"PK\x03\x04", FileKind::Other("a ZIP archive")),
     (b"\x1f\x8b", FileKind::Other("a gzip archive")),
@@ -61,25 +78,86 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
     (b"<", FileKind::Other("XML or HTML text")),
 ];
 
+/// Extensions of unsupported 3D formats.
+const UNREAD_MESHES: [(&[&str], FileKind); 13] = [
+    (&["glb", "gltf"], GLTF),
+    (&["off"], FileKind::OtherMesh("an OFF mesh")),
+    (&["3mf"], FileKind::OtherMesh("a 3MF model")),
+    (&["fbx"], FileKind::OtherMesh("an FBX scene")),
+    (&["dae"], FileKind::OtherMesh("a COLLADA scene")),
+    (&["x3d"], FileKind::OtherMesh("an X3D scene")),
+    (&["wrl"], FileKind::OtherMesh("a VRML scene")),
+    (&["blend"], FileKind::OtherMesh("a Blender scene")),
+    (
+        &["usd", "usda", "usdc", "usdz"],
+        FileKind::OtherMesh("a USD scene"),
+    ),
+    (&["step", "stp"], FileKind::OtherMesh("a STEP model")),
+    (&["pcd"], FileKind::OtherMesh("a PCD point cloud")),
+    (&["las", "laz"], FileKind::OtherMesh("a LAS point cloud")),
+    (&["e57"], FileKind::OtherMesh("an E57 point cloud")),
+];
+
+/// Extensions of unsupported images and documents.
+const UNREAD_IMAGES: [(&[&str], FileKind); 9] = [
+    (&["bmp", "dib"], FileKind::OtherImage("a BMP image")),
+    (&["webp"], FileKind::OtherImage("a WebP image")),
+    (&["gif"], FileKind::OtherImage("a GIF image")),
+    (
+        &["jp2", "j2k", "jpf", "jpx"],
+        FileKind::OtherImage("a JPEG 2000 image"),
+    ),
+    (&["jxl"], FileKind::OtherImage("a JPEG XL image")),
+    (&["heic", "heif"], FileKind::OtherImage("a HEIC image")),
+    (&["avif"], FileKind::OtherImage("an AVIF image")),
+    (&["psd"], FileKind::OtherImage("a Photoshop image")),
+    (&["pdf"], FileKind::Other("a PDF document")),
+];
+
+const GLTF: FileKind = FileKind::OtherMesh("a glTF scene");
+/// Bytes at the beginning and the end of a container that are searched for the name of its content.
+const SEARCHED_BYTES: usize = 1 << 16;
+
 impl FileKind {
     /// Returns the type of a file that begins with these bytes.
     pub fn of(bytes: &[u8]) -> Self {
         if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
             return Self::OtherImage("a WebP image");
         }
-        if let Some(brand @ (b"avif" | b"heic" | b"mif1" | b"heix")) =
-            bytes.get(8..12).filter(|_| &bytes[4..8] == b"ftyp")
-        {
-            return Self::OtherImage(if brand == b"avif" {
-                "an AVIF image"
-            } else {
-                "a HEIC image"
-            });
+        let brand = bytes.get(8..12).filter(|_| &bytes[4..8] == b"ftyp");
+        match brand {
+            Some(b"avif" | b"avis") => return Self::OtherImage("an AVIF image"),
+            Some(b"heic" | b"heim" | b"heis" | b"heix" | b"hevc" | b"mif1" | b"msf1") => {
+                return Self::OtherImage("a HEIC image");
+            }
+            _ => {}
         }
-        SIGNATURES
+        let found = SIGNATURES
             .iter()
             .find(|(signature, _)| bytes.starts_with(signature))
-            .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind)
+            .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind);
+        Self::scene_within(found, bytes).unwrap_or(found)
+    }
+
+    /// Returns the 3D format whose files are archives, XML or text.
+    fn scene_within(outer: Self, bytes: &[u8]) -> Option<Self> {
+        let part = bytes.len().min(SEARCHED_BYTES);
+        let (head, tail) = (&bytes[..part], &bytes[bytes.len() - part..]);
+        let has = |word: &str| {
+            let mut places = head.windows(word.len()).chain(tail.windows(word.len()));
+            places.any(|place| place == word.as_bytes())
+        };
+        let name = match outer {
+            Self::Other("a ZIP archive") if has("3D/3dmodel.model") => "a 3MF model",
+            Self::Other("XML or HTML text") if has("<COLLADA") => "a COLLADA scene",
+            Self::Other("XML or HTML text") if has("<X3D") => "an X3D scene",
+            Self::Text if is_off(head) => "an OFF mesh",
+            Self::Text if head.trim_ascii_start().starts_with(b"{") => {
+                return (has("\"asset\"") && has("\"version\"")).then_some(GLTF);
+            }
+            _ => return None,
+        };
+        Some(Self::OtherMesh(name))
     }
 
     fn without_signature(bytes: &[u8]) -> Self {
@@ -100,9 +178,54 @@ impl FileKind {
             Self::Tiff => "a TIFF image",
             Self::Ply => "a PLY mesh",
             Self::OtherImage(name) | Self::OtherMesh(name) | Self::Other(name) => name,
+            Self::LfsPointer => "a pointer of Git LFS",
             Self::Text => "text",
             Self::Binary => "binary data of unknown kind",
         }
+    }
+
+    /// Returns the type that files with an extension usually are, if it is not read.
+    pub fn of_unread_extension(extension: &str) -> Option<Self> {
+        let extension = extension.to_ascii_lowercase();
+        let mut types = UNREAD_MESHES.into_iter().chain(UNREAD_IMAGES);
+        let found = types.find(|(extensions, _)| extensions.contains(&extension.as_str()));
+        found.map(|(_, kind)| kind)
+    }
+
+    /// Returns what to do with files of this type where images are needed, if that does not depend on the file.
+    pub fn image_advice(self) -> Option<String> {
+        let mut images = UNREAD_IMAGES.into_iter();
+        let (extensions, _) = images.find(|(_, kind)| *kind == self)?;
+        let extension = extensions[0];
+        Some(if extension == "pdf" {
+            "save their pages as images, such as with `pdftoppm -r 600 -png FILE.pdf page`"
+                .to_owned()
+        } else {
+            format!(
+                "convert them, such as with ImageMagick: `magick mogrify -format png *.{extension}`"
+            )
+        })
+    }
+
+    /// Returns what to do with files of this type where meshes are needed, if that does not depend on the file.
+    pub fn mesh_advice(self) -> Option<String> {
+        let programs = match self {
+            Self::OtherMesh("a STEP model") => "FreeCAD",
+            Self::OtherMesh(_) => "MeshLab, Blender or CloudCompare",
+            _ => return None,
+        };
+        Some(format!("open them in {programs} and export them as PLY"))
+    }
+
+    /// Says that a file of this type is not what is `needed`, which files of the `formats` that are read hold.
+    pub(crate) fn refusal(self, needed: &str, formats: &str, advice: Option<String>) -> String {
+        if self == Self::LfsPointer {
+            return format!(
+                "the file is {self} and does not hold the {needed}; fetch the {needed} with `git lfs pull`"
+            );
+        }
+        let advice = advice.map_or(String::new(), |advice| format!(": {advice}"));
+        format!("the file is {self}; {formats} are read{advice}")
     }
 
     /// Returns the description without the article.
@@ -113,6 +236,21 @@ impl FileKind {
     }
 }
 
+/// Returns whether the first word of a text, which comments may precede, is `OFF` or names one of its variants.
+fn is_off(text: &[u8]) -> bool {
+    let mut lines = text.split(|byte| matches!(byte, b'\n' | b'\r'));
+    let is_content = |line: &&[u8]| !line.trim_ascii().is_empty() && !line.starts_with(b"#");
+    let first = lines.find(is_content).unwrap_or_default();
+    let mut words = first.split(u8::is_ascii_whitespace);
+    let Some(mut variant) = words.next().and_then(|word| word.strip_suffix(b"OFF")) else {
+        return false;
+    };
+    for prefix in [&b"ST"[..], b"C", b"N", b"4", b"n"] {
+        variant = variant.strip_prefix(prefix).unwrap_or(variant);
+    }
+    variant.is_empty()
+}
+
 impl std::fmt::Display for FileKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.description())
@@ -121,7 +259,30 @@ impl std::fmt::Display for FileKind {
 
 #[cfg(test)]
 mod tests {
-    use super::FileKind;
+    use super::{FileKind, UNREAD_IMAGES, UNREAD_MESHES};
+
+    #[test]
+    fn unread_types_are_known_by_extension_and_have_advice() {
+        for (extensions, kind) in UNREAD_IMAGES {
+            for extension in extensions {
+                assert_eq!(FileKind::of_unread_extension(extension), Some(kind));
+            }
+            let advice = kind.image_advice().expect("advice");
+            assert!(advice.contains(extensions[0]), "{advice}");
+        }
+        assert_eq!(
+            FileKind::of_unread_extension("PDF"),
+            Some(FileKind::Other("a PDF document"))
+        );
+        for (extensions, kind) in UNREAD_MESHES {
+            for extension in extensions {
+                assert_eq!(FileKind::of_unread_extension(extension), Some(kind));
+            }
+            assert!(kind.mesh_advice().is_some() && kind.image_advice().is_none());
+        }
+        assert_eq!(FileKind::of_unread_extension("png"), None);
+        assert_eq!(FileKind::Text.image_advice(), None);
+    }
 
     #[test]
     fn types_are_detected_by_content() {
@@ -136,7 +297,76 @@ mod tests {
             FileKind::of(b"\0\0\0\x1cftypheic"),
             FileKind::OtherImage("a HEIC image")
         );
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n";
+        assert_eq!(FileKind::of(pointer), FileKind::LfsPointer);
         assert_eq!(FileKind::of(b"hello there"), FileKind::Text);
         assert_eq!(FileKind::of(&[0, 1, 2]), FileKind::Binary);
+    }
+
+    #[test]
+    fn all_files_of_a_scene_format_have_one_description() {
+        let zip = |name: &str| {
+            [
+                b"PK\x03\x04".as_slice(),
+                &vec![b'x'; 99_999],
+                name.as_bytes(),
+            ]
+            .concat()
+        };
+        let embedded = format!(
+            "{{\"buffers\":[{{\"uri\":\"data:{}\"}}],\"asset\":{{\"version\":\"2.0\"}}}}",
+            "A".repeat(9999)
+        );
+        for (wanted, files) in [
+            (
+                "a glTF scene",
+                vec![
+                    b"glTF\x02\0\0\0".to_vec(),
+                    b" {\n \"asset\": {\"version\": \"2.0\"}, \"meshes\": []}".to_vec(),
+                    embedded.into_bytes(),
+                ],
+            ),
+            (
+                "an OFF mesh",
+                [
+                    "OFF\n3 1 0\n",
+                    "OFF\r\n3 1 0",
+                    "OFF 3 1 0\n",
+                    "# a scan\n\nOFF\n",
+                    "COFF\n3 1 0\n",
+                    "STCNOFF\n",
+                    "OFF BINARY\n",
+                ]
+                .map(|text| text.as_bytes().to_vec())
+                .to_vec(),
+            ),
+            ("a 3MF model", vec![zip("3D/3dmodel.model")]),
+            ("a ZIP archive", vec![zip("xl/workbook.xml")]),
+            (
+                "a COLLADA scene",
+                vec![b"<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">".to_vec()],
+            ),
+            (
+                "text",
+                [
+                    "OFFICE\n",
+                    "off we go",
+                    "{\"images\": []}",
+                    "# OFF\n1 2 3\n",
+                ]
+                .map(|text| text.as_bytes().to_vec())
+                .to_vec(),
+            ),
+        ] {
+            for file in files {
+                let said = FileKind::of(&file).to_string();
+                assert_eq!(
+                    said,
+                    wanted,
+                    "{}",
+                    String::from_utf8_lossy(&file[..20.min(file.len())])
+                );
+            }
+        }
     }
 }

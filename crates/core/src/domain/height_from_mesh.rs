@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Bow, Rigid3};
+use super::{Curvature, Rigid3};
 
 /// The map from mesh points to heights over the fitted surface, which may be curved.
 ///
@@ -12,13 +12,13 @@ use super::{Bow, Rigid3};
 /// map and `threshold_depth` refer to. The third row of `print_from_mesh` gives `z` instead, the height over the plane.
 ///
 /// ```
-/// use mocban_core::domain::{Bow, HeightFromMesh, Rigid3};
+/// use mocban_core::domain::{Curvature, HeightFromMesh, Rigid3};
 ///
 /// let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// let plane_from_mesh = Rigid3::to_frame(axes, [0.0; 3]);
 /// // A block that is bent along x: the stroke tops lie at z = 0.01 x^2.
-/// let bow = Bow([0.0, 0.0, 0.0, 0.01, 0.0, 0.0]);
-/// let height_from_mesh = HeightFromMesh::new(&plane_from_mesh, Some(&bow));
+/// let curvature = Curvature([0.0, 0.0, 0.0, 0.01, 0.0, 0.0]);
+/// let height_from_mesh = HeightFromMesh::new(&plane_from_mesh, Some(&curvature));
 ///
 /// // A vertex is stroke where its height is at least `threshold_depth`, which is 0.1 mm below the tops here.
 /// let threshold_depth = -0.1;
@@ -40,11 +40,11 @@ pub struct HeightFromMesh {
 
 impl HeightFromMesh {
     /// Returns the map for a plane and the curved surface over it.
-    pub fn new(plane_from_mesh: &Rigid3, bow: Option<&Bow>) -> Self {
+    pub fn new(plane_from_mesh: &Rigid3, curvature: Option<&Curvature>) -> Self {
         let [x, y, z, _] = plane_from_mesh.0;
         Self {
             plane_from_mesh: [x, y, z],
-            curvature: bow.map_or([0.0; 6], |bow| bow.0),
+            curvature: curvature.map_or([0.0; 6], |curvature| curvature.0),
         }
     }
 
@@ -52,6 +52,6 @@ impl HeightFromMesh {
     pub fn apply(&self, [x, y, z]: [f64; 3]) -> f64 {
         let dot = |row: [f64; 4]| row[0] * x + row[1] * y + row[2] * z + row[3];
         let [u, v, height] = self.plane_from_mesh.map(dot);
-        height - Bow(self.curvature).height(u, v)
+        height - Curvature(self.curvature).height(u, v)
     }
 }

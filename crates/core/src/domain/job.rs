@@ -14,7 +14,7 @@ pub enum JobStatus {
     Leased,
     /// Waits for its next attempt after a transient failure.
     Backoff,
-    /// All four stages are done.
+    /// All stages are done.
     Done,
     /// Failed permanently; only `retry` or a changed input runs it again.
     Quarantined,

@@ -18,7 +18,7 @@ use super::enum_names;
 /// the rim of the strokes bare. `P'` is `P` with its edge moved inward by `r`. `s` is the signed distance from the edge
 /// of `P'`, in pixels of a canvas of half the size (positive on ink).
 ///
-/// The paper's three metrics match the print. [`Self::Relief`] follows the relief, and uses the print only where the
+/// The paper's three metrics match the print. `relief` follows the relief, and uses the print only where the
 /// relief leaves the depth uncertain.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
@@ -34,8 +34,8 @@ pub enum ThresholdMetric {
     /// of the canvas. The score is minus the minimum.
     Density,
     /// Maximizes `sum over D(t) of w / sum of max(w, 0) - 0.05 ln(d / d_r)^2`. `w` is `s` clamped to -1..=1, and `d_r`
-    /// is the depth of [`Self::Relief`]. The score is the maximum. The first term is 1 if the strokes cover all ink and
-    /// no paper. The paper's method uses the better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of the
+    /// is the depth of `relief`. The score is the maximum. The first term is 1 if the strokes cover all ink and
+    /// no paper. The paper's method uses the better of `nl_ssim` and `density`, by the IoU of the
     /// registered masks.
     Ensemble,
     /// Selects the depth at which the stroke tops end and the walls begin. The relief gives an estimate and its
@@ -50,6 +50,12 @@ pub enum ThresholdMetric {
 
 enum_names! { pub ThresholdMetric, "a metric":
     NlSsim = "nl_ssim", Density = "density", Ensemble = "ensemble", Relief = "relief",
+}
+
+impl Default for ThresholdMetric {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
 }
 
 impl ThresholdMetric {

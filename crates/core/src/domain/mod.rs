@@ -12,6 +12,7 @@ pub mod cancel;
 mod catalog_identity;
 mod control_points;
 mod enum_names;
+mod explained;
 mod failure;
 mod file_kind;
 mod hash;
@@ -24,6 +25,7 @@ mod metric;
 mod outcome;
 mod pair_name;
 mod print_outline;
+mod retire_cause;
 mod review_order;
 mod sanitize;
 mod seeded_random;
@@ -46,10 +48,11 @@ pub use block::{
 };
 pub use box_iou::box_iou;
 pub use box_name::{BoxName, NotePart};
-pub use catalog_identity::{CatalogIdentity, UNKNOWN_SERVER};
+pub use catalog_identity::{CATALOG_FILE, CatalogIdentity, UNKNOWN_SERVER};
 pub use control_points::{ControlPoint, ControlPoints};
 pub use enum_names::enum_names;
 use enum_names::stage_order;
+pub use explained::{ErrorCode, Explained, FREE_SPACE, explained_by_cause};
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
@@ -60,12 +63,13 @@ pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use levelling::Levelling;
 pub use metric::ThresholdMetric;
 pub use outcome::{
-    Bow, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,
+    Curvature, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,
     NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
     SideEvidence, ThresholdChoice,
 };
-pub use pair_name::{PairName, PairNameError};
+pub use pair_name::{NO_BREAK_SPACES, PairName, PairNameError};
 pub use print_outline::PrintOutline;
+pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;
 pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;

@@ -2,6 +2,8 @@
 //!
 //! Outcomes are stored as JSON with exact numbers, so that a resumed run computes the same results.
 
+use std::num::NonZeroU64;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Affine2, LengthUnit, Levelling, PrintOutline, Rigid3, ThresholdMetric};
@@ -10,17 +12,17 @@ use super::{Affine2, LengthUnit, Levelling, PrintOutline, Rigid3, ThresholdMetri
 ///
 /// The height over the plane is `z = c[0] + c[1] x + c[2] y + c[3] x^2 + c[4] x y + c[5] y^2`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Bow(pub [f64; 6]);
+pub struct Curvature(pub [f64; 6]);
 
-impl Bow {
+impl Curvature {
     /// Returns the height of the surface at a point of the plane, in mesh units.
     ///
     /// # Examples
     /// ```
-    /// use mocban_core::domain::Bow;
+    /// use mocban_core::domain::Curvature;
     ///
-    /// let bow = Bow([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]);
-    /// assert_eq!(bow.height(2.0, 9.0), 2.0);
+    /// let curvature = Curvature([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]);
+    /// assert_eq!(curvature.height(2.0, 9.0), 2.0);
     /// ```
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let c = &self.0;
@@ -31,10 +33,10 @@ impl Bow {
 /// Evidence for the side of the plane that was chosen as the carved one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SideEvidence {
-    /// Share of the faces that are wound outward on the chosen side, weighted by projected area, 0..=1. `None` if there
-    /// are no faces, and under the paper's method.
+    /// Fraction of the faces that are wound outward on the chosen side, weighted by projected area, 0..=1. `None` if
+    /// there are no faces, and under the paper's method.
     pub winding: Option<f64>,
-    /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
+    /// Fraction of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
     /// stores `|a - b| / (a + b)` instead, where `a` and `b` measure the two sides: the mean distance of a side's
     /// points from their centroid.
     pub flatness: f64,
@@ -66,10 +68,12 @@ pub struct FitOutcome {
     /// Maps mesh coordinates to the right-handed plane frame, in mesh units. The z axis points out of the block.
     pub plane_from_mesh: Rigid3,
     /// Curved surface of the stroke tops. `None` if the block is flat.
-    pub bow: Option<Bow>,
+    #[serde(rename = "bow")]
+    pub curvature: Option<Curvature>,
     /// Largest minus smallest height of the curved surface within the scan's bounds, in mesh units; 0 for a flat block.
-    pub bow_height: f64,
-    /// Share of the sampled points that are inliers of the fitted surface, 0..=1.
+    #[serde(rename = "bow_height")]
+    pub curvature_height: f64,
+    /// Fraction of the sampled points that are inliers of the fitted surface, 0..=1.
     pub inlier_ratio: f64,
     /// Root mean square distance of the inliers to the surface, in mesh units.
     pub rms: f64,
@@ -87,6 +91,9 @@ pub struct FitOutcome {
     pub vertices: u64,
     /// Number of triangles in the file; 0 for a point set.
     pub triangles: u64,
+    /// Number of vertices of the file that were left out because they have no position.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing_vertices: Option<NonZeroU64>,
 }
 
 /// Conversion of levels and pixels of a depth map to mesh units.
@@ -101,7 +108,8 @@ pub struct DepthScale {
     /// Maps plane x, y to depth-map pixels. Includes a reflection, so that the depth map reads like the print.
     pub depth_from_plane: Affine2,
     /// Curved surface from which heights are measured; `None` for the plane.
-    pub bow: Option<Bow>,
+    #[serde(rename = "bow")]
+    pub curvature: Option<Curvature>,
     /// Unit of the mesh, if known.
     pub unit: Option<LengthUnit>,
 }
@@ -122,7 +130,7 @@ pub struct DepthOutcome {
     pub height: u32,
     /// Conversion of levels and pixels to mesh units.
     pub scale: DepthScale,
-    /// Share of pixels with data, 0..=1.
+    /// Fraction of pixels with data, 0..=1.
     pub coverage: f64,
 }
 
@@ -159,7 +167,7 @@ pub struct ReliefHeights {
     pub top: f64,
     /// Median height of the carved background, in mesh units.
     pub ground: f64,
-    /// Depth below `top` at which the stroke tops end and the walls begin, as a share of [`Self::depth`].
+    /// Depth below `top` at which the stroke tops end and the walls begin, as a fraction of [`Self::depth`].
     pub tops_end: f64,
     /// Standard deviation of the logarithm of [`Self::tops_end`]: about 0.1 on new blocks, and above 0.5 where wear has
     /// rounded the strokes.
@@ -190,7 +198,7 @@ impl ReliefHeights {
     ///     height_per_level: 0.001,
     ///     mesh_unit_per_px: 0.02,
     ///     depth_from_plane: Affine2::IDENTITY,
-    ///     bow: None,
+    ///     curvature: None,
     ///     unit: None,
     /// };
     /// let level = relief.level_at(&scale, relief.tops_end);
@@ -216,8 +224,12 @@ pub struct NormalizeOutcome {
     /// ensemble. The default method selects none.
     pub thresholds: Vec<ThresholdChoice>,
     /// EXIF orientation of the print (2 to 8), if its pixels were turned to make it upright.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub print_turned: Option<u8>,
+    #[serde(
+        default,
+        rename = "print_turned",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub print_orientation: Option<u8>,
 }
 
 /// Similarity of the print mask and the depth mask of a metric on the canvas. See `stages::score` for the formulas.
@@ -233,9 +245,9 @@ pub struct Scores {
     pub iou_box: f64,
     /// Dice coefficient of the masks by pixel.
     pub dice: f64,
-    /// Share of the canvas that is ink.
+    /// Fraction of the canvas that is ink.
     pub density_print: f64,
-    /// Share of the canvas that is stroke top.
+    /// Fraction of the canvas that is stroke top.
     pub density_depth: f64,
 }
 
@@ -245,9 +257,9 @@ pub struct Scores {
 pub struct Disagreement {
     /// Number of connected pieces of stroke tops without ink and of ink without wood.
     pub pieces: u32,
-    /// Area of the stroke tops without ink, as a share of the mask's area.
+    /// Area of the stroke tops without ink, as a fraction of the mask's area.
     pub missing_ink: f64,
-    /// Area of the ink without wood, as a share of the ink's area.
+    /// Area of the ink without wood, as a fraction of the ink's area.
     pub missing_wood: f64,
 }
 
@@ -256,9 +268,9 @@ pub struct Disagreement {
 pub struct PoseFeatures {
     /// Normalized correlation of relief and ink where both images have data, at most 1.
     pub correlation: f64,
-    /// Share of the stroke tops that are covered by ink, 0..=1.
+    /// Fraction of the stroke tops that are covered by ink, 0..=1.
     pub tops_covered: f64,
-    /// Share of the ink that is covered by stroke tops, 0..=1.
+    /// Fraction of the ink that is covered by stroke tops, 0..=1.
     pub ink_covered: f64,
     /// Score of the best pose at a different angle, divided by the score of the best pose.
     pub other_angle: f64,
@@ -266,17 +278,17 @@ pub struct PoseFeatures {
     pub mirrored: f64,
     /// Sensitivity of the pose to its start. The pose is refined from three starts with slightly different sizes. Two
     /// results differ by the mean distance between their depth-map corners. This is the largest difference from the
-    /// best result, as a share of the map's longest side.
+    /// best result, as a fraction of the map's longest side.
     #[serde(default)]
     pub spread: f64,
     /// Area of the largest connected piece of stroke tops without ink, in squares of the stroke width.
-    #[serde(default)]
-    pub tops_alone: f64,
+    #[serde(default, rename = "tops_alone")]
+    pub unmatched_tops: f64,
     /// Area of the largest connected piece of ink without wood, in squares of the stroke width.
-    #[serde(default)]
-    pub ink_alone: f64,
-    /// Mean deviation between the edges of ink and stroke tops, after the spread of the ink, as a share of the stroke
-    /// width.
+    #[serde(default, rename = "ink_alone")]
+    pub unmatched_ink: f64,
+    /// Mean deviation between the edges of ink and stroke tops, after the spread of the ink, as a fraction of the
+    /// stroke width.
     #[serde(default)]
     pub edge_scatter: f64,
     /// Area of the ink, in squares of the stroke width: how many strokes the print shows.

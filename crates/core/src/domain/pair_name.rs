@@ -8,7 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use unicode_normalization::UnicodeNormalization as _;
 
-use super::{is_hidden, sanitize};
+use super::spelling::fold_case;
+use super::{ErrorCode, Explained, is_hidden, sanitize};
 
 /// Characters of an id that a file name on Windows may not have, and the escape character itself. All are ASCII.
 const ESCAPED: &str = "%\"*:<>?|";
@@ -17,9 +18,12 @@ const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 /// Devices with a number from 0 to 9.
 const NUMBERED_DEVICES: [&str; 2] = ["com", "lpt"];
 
+/// Spaces that text programs write and nobody sees.
+pub const NO_BREAK_SPACES: [char; 3] = ['\u{a0}', '\u{2007}', '\u{202f}'];
+
 /// The user's id of a pair: any text of 1 to 200 bytes without control characters, invisible characters, slashes, a
-/// leading dot, and spaces at its ends. It is stored in Unicode's composed form (NFC), so the same id typed on macOS
-/// and on Windows is equal.
+/// leading dot, and spaces at its ends. It is stored in Unicode's composed form (NFC) and with plain spaces, so the same
+/// id typed on macOS and on Windows is equal.
 ///
 /// ```
 /// use mocban_core::domain::PairName;
@@ -53,6 +57,12 @@ pub enum PairNameError {
     TooLong(usize),
 }
 
+impl Explained for PairNameError {
+    fn code(&self) -> ErrorCode {
+        ErrorCode::Usage
+    }
+}
+
 impl PairName {
     /// Maximum length of an id, and of the file name derived from it, in bytes.
     pub const MAX_BYTES: usize = 200;
@@ -75,7 +85,10 @@ impl PairName {
         if text.trim() != text {
             return Err(PairNameError::OuterSpace(text.to_owned()));
         }
-        let name = Self(text.nfc().collect());
+        let plain = text
+            .nfc()
+            .map(|c| if NO_BREAK_SPACES.contains(&c) { ' ' } else { c });
+        let name = Self(plain.collect());
         let longest = name.0.len().max(name.file_name().len());
         if longest > Self::MAX_BYTES {
             return Err(PairNameError::TooLong(longest));
@@ -117,6 +130,20 @@ impl PairName {
             }
         }
         Cow::Owned(name)
+    }
+
+    /// Returns the id as file systems compare names that ignore case, such as those of Windows and macOS. Files of two
+    /// pairs fall together there if these forms are equal.
+    ///
+    /// ```
+    /// use mocban_core::domain::PairName;
+    ///
+    /// let folded = |id| PairName::new(id).map(|name| name.folded());
+    /// assert_eq!(folded("Đĩa A1"), folded("đĩa a1"));
+    /// assert_ne!(folded("đĩa"), folded("dia"));
+    /// ```
+    pub fn folded(&self) -> String {
+        fold_case(&self.0)
     }
 
     /// Returns the id with this file name. `None` if no id has it.
@@ -203,6 +230,7 @@ mod tests {
         let [composed, decomposed] = ["chữ", "chu\u{31b}\u{303}"];
         assert_ne!(composed, decomposed);
         assert_eq!(PairName::new(composed), PairName::new(decomposed));
+        assert_eq!(PairName::new("tờ\u{a0}3"), PairName::new("tờ 3"));
     }
 
     #[test]

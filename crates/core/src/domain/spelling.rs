@@ -1,17 +1,64 @@
 //! Finds the names that a mistyped name may stand for.
 
+use unicode_normalization::UnicodeNormalization as _;
+use unicode_normalization::char::is_combining_mark;
+
+/// Returns a name as file systems compare it that ignore case, such as those of Windows and macOS.
+pub fn fold_case(name: &str) -> String {
+    // Upper case first: some letters, such as the final sigma, have one upper and several lower forms.
+    name.to_uppercase().to_lowercase().nfc().collect()
+}
+
+/// Returns a name in lower case, without accents and without zeros before numbers, so that `Khoi-4` is similar to
+/// `khối-04`. Spreadsheets drop such zeros.
+pub fn plain_form(name: &str) -> String {
+    let letters = name.nfd().filter(|c| !is_combining_mark(*c));
+    let letters = letters.map(|c| match c {
+        'đ' | 'Đ' => 'd',
+        c => c,
+    });
+    without_leading_zeros(&letters.collect::<String>().to_lowercase())
+}
+
+/// Returns a text without the zeros before its whole numbers.
+pub fn without_leading_zeros(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
+        let (before, number) = rest.split_at(at);
+        let is_end = |c: char| !c.is_ascii_digit();
+        let (digits, after) = number.split_at(number.find(is_end).unwrap_or(number.len()));
+        let significant = digits.trim_start_matches('0');
+        plain += before;
+        plain += if significant.is_empty() {
+            "0"
+        } else {
+            significant
+        };
+        rest = after;
+    }
+    plain + rest
+}
+
 /// Returns up to `limit` of the known names that are similar to a mistyped name, most similar first.
 ///
-/// Two names are similar if one starts with the other, or if their edit distance is 1 or at most a third of the longer
-/// name's length.
+/// Two names are similar if they have the same [`plain_form`], if one starts with the other, or if their edit distance is 1
+/// or at most a third of the longer name's length. Different names of one character are not.
 pub fn nearest<'a>(
     typed: &str,
     known: impl IntoIterator<Item = &'a str>,
     limit: usize,
 ) -> Vec<&'a str> {
+    let plain = plain_form(typed);
+    let distance = |name| {
+        let is_same = plain_form(name) == plain;
+        is_same
+            .then_some(0)
+            .or_else(|| distance_if_similar(typed, name))
+    };
     let mut ranked: Vec<(usize, &str)> = known
         .into_iter()
-        .filter_map(|name| distance_if_similar(typed, name).map(|edits| (edits, name)))
+        .filter_map(|name| distance(name).map(|edits| (edits, name)))
         .collect();
     ranked.sort_unstable();
     ranked.dedup();
@@ -32,12 +79,32 @@ fn distance_if_similar(typed: &str, name: &str) -> Option<usize> {
     let allowed = (longer / 3).max(1);
     let edits = strsim::osa_distance(typed, name);
     let is_prefix = !typed.is_empty() && (name.starts_with(typed) || typed.starts_with(name));
-    (edits <= allowed || is_prefix).then_some(edits)
+    (edits <= allowed && edits < longer || is_prefix).then_some(edits)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{hint, nearest};
+    use super::{hint, nearest, plain_form};
+
+    #[test]
+    fn another_letter_alone_is_not_suggested() {
+        assert_eq!(hint("z", ["a", "b"]), "");
+        assert_eq!(nearest("ab", ["az", "zz"], 2), ["az"]);
+    }
+
+    #[test]
+    fn accents_case_and_leading_zeros_make_no_difference() {
+        for (a, b) in [
+            ("Khoi-4", "khối-04"),
+            ("117", "0117"),
+            ("b4_0", "b04_000"),
+            ("Dia 7a", "đĩa 007a"),
+        ] {
+            assert_eq!(plain_form(a), plain_form(b), "{a}");
+        }
+        assert_ne!(plain_form("100"), plain_form("10"));
+        assert_eq!(nearest("17", ["18", "0017"], 2), ["0017", "18"]);
+    }
 
     #[test]
     fn similar_names_come_in_order_and_others_not_at_all() {

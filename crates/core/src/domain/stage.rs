@@ -1,4 +1,4 @@
-//! The four stages of the pipeline, in order.
+//! The stages of the pipeline, in order.
 
 use serde::{Deserialize, Serialize};
 

@@ -6,14 +6,6 @@ use serde::{Deserialize, Serialize};
 use super::enum_names;
 
 /// Unit of a mesh's coordinates. If the unit is unknown, no lengths in mm are reported.
-///
-/// ```
-/// use mocban_core::domain::LengthUnit;
-///
-/// let unit: LengthUnit = "in".parse()?;
-/// assert_eq!(unit.mm(), 25.4);
-/// # Ok::<(), String>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LengthUnit {
@@ -33,6 +25,14 @@ enum_names! { pub LengthUnit, "a unit":
 
 impl LengthUnit {
     /// Returns the length of one unit in millimetres.
+    ///
+    /// ```
+    /// use mocban_core::domain::LengthUnit;
+    ///
+    /// let unit: LengthUnit = "in".parse()?;
+    /// assert_eq!(unit.mm(), 25.4);
+    /// # Ok::<(), String>(())
+    /// ```
     pub const fn mm(self) -> f64 {
         match self {
             Self::Mm => 1.0,

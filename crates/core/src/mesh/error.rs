@@ -22,7 +22,7 @@ pub enum MeshError {
     #[error("the file is empty (0 bytes)")]
     Empty,
     /// The content is of an unsupported format.
-    #[error("the file is {0}; OBJ, PLY and STL meshes and XYZ points are read")]
+    #[error("{}", not_a_mesh(*.0))]
     NotAMesh(FileKind),
     /// More than the settings allow.
     #[error("the file has {count} {what}; limits.mesh.max_{what} is {limit}")]
@@ -60,6 +60,14 @@ pub enum MeshError {
         /// Count in the header.
         want: u64,
     },
+    /// The records of a binary STL have another length.
+    #[error(
+        "the binary STL has {bytes} bytes a triangle instead of 50; save it again without attributes, or as PLY"
+    )]
+    FacetBytes {
+        /// Bytes of each triangle.
+        bytes: u64,
+    },
     /// The file goes on after the rows that its header counts.
     #[error(
         "the {format} has {bytes} bytes after the rows that its header counts; save it again with the right counts"
@@ -80,13 +88,15 @@ pub enum MeshError {
         /// The missing keyword.
         missing: &'static str,
     },
-    /// A coordinate that is NaN or infinite.
-    #[error("vertex {vertex} has the coordinate {value}, which is not a finite number")]
-    NotFinite {
-        /// Position in the file, counted from 1.
-        vertex: u64,
-        /// The coordinate.
-        value: f64,
+    /// Nothing is left without the vertices that have no position.
+    #[error(
+        "{missing} of {vertices} vertices have no position (NaN, infinite or repeated 0 0 0), and without them nothing is left"
+    )]
+    NothingLeft {
+        /// Vertices without a position.
+        missing: u64,
+        /// All vertices of the file.
+        vertices: u64,
     },
     /// The file has no vertices.
     #[error("the mesh has no vertices")]
@@ -104,6 +114,9 @@ pub enum MeshError {
         /// Number of vertices.
         vertices: u64,
     },
+    /// A face refers to a missing vertex, and neither is known.
+    #[error("a face refers to a vertex that the file does not have")]
+    NoSuchVertex,
     /// A line of a text format cannot be parsed.
     #[error("line {line}: {reason}")]
     Line {
@@ -135,27 +148,9 @@ impl MeshError {
     }
 }
 
-/// Checks that a vertex is finite and returns it; `vertex` counts from 1.
-pub(super) fn check_finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], MeshError> {
-    match position.into_iter().find(|value| !value.is_finite()) {
-        Some(value) => Err(MeshError::NotFinite { vertex, value }),
-        None => Ok(position),
-    }
-}
-
-/// Checks that a block of vertices is finite. `before` is the number of vertices before the block in the file.
-pub(super) fn check_all_finite<T: Copy + Into<f64>>(
-    positions: &[[T; 3]],
-    before: usize,
-) -> Result<(), MeshError> {
-    let values = positions.as_flattened().iter();
-    if values.fold(true, |finite, value| finite & (*value).into().is_finite()) {
-        return Ok(());
-    }
-    for (vertex, position) in (before as u64 + 1..).zip(positions) {
-        check_finite(position.map(Into::into), vertex)?;
-    }
-    Ok(())
+fn not_a_mesh(kind: FileKind) -> String {
+    let formats = "OBJ, PLY and STL meshes and XYZ points";
+    kind.refusal("mesh", formats, kind.mesh_advice())
 }
 
 /// Limits on meshes, checked before memory is reserved.

@@ -1,6 +1,6 @@
 //! Format detection by content.
 
-use super::{MeshError, stl, text};
+use super::{MeshError, stl, text, xyz};
 use crate::domain::FileKind;
 
 /// The supported formats.
@@ -18,7 +18,10 @@ pub(super) enum DetectedFormat {
     Xyz,
 }
 
-/// Lines of a text that are examined.
+/// Extensions of point sets.
+const POINT_EXTENSIONS: [&str; 6] = ["xyz", "asc", "txt", "csv", "pts", "xyzrgb"];
+
+/// Lines of a text that are examined, without comments.
 const LINES_TRIED: usize = 1000;
 
 impl DetectedFormat {
@@ -37,6 +40,7 @@ impl DetectedFormat {
             _ if stl::whole_binary_count(bytes, bytes.len() as u64).is_some() => {
                 Ok(Self::StlBinary)
             }
+            _ if is_ascii_stl(bytes) => Ok(Self::StlAscii),
             FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
             // A text file with a control character may be classed as binary.
             FileKind::Text | FileKind::Binary => match first_words(bytes) {
@@ -44,6 +48,14 @@ impl DetectedFormat {
                 // A truncated binary STL with a text header cannot be recognised by its size, so the file name decides.
                 None if has_extension(name, "stl") && text::contains(bytes, 0) => {
                     Ok(Self::StlBinary)
+                }
+                // The reader says which line is wrong.
+                None if POINT_EXTENSIONS
+                    .iter()
+                    .any(|wanted| has_extension(name, wanted))
+                    && kind == FileKind::Text =>
+                {
+                    Ok(Self::Xyz)
                 }
                 None => Err(MeshError::NotAMesh(kind)),
             },
@@ -60,27 +72,39 @@ pub(super) fn has_extension(name: &str, wanted: &str) -> bool {
 
 fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
     let bytes = &bytes[..bytes.len().min(text::MAX_LINE_BYTES)];
-    for (number, line) in text::lines(bytes).take(LINES_TRIED) {
+    let mut is_first = true;
+    let content = text::lines(bytes).filter(|(_, line)| !xyz::is_comment(line));
+    for (number, line) in content.take(LINES_TRIED) {
         let mut words = text::words(line);
-        let Some(first) = words.next() else { continue };
-        match first {
-            _ if line.starts_with(b"#") || line.starts_with(b"//") => {}
+        match words.next().unwrap_or_default() {
             b"ply" if number == 1 => return Some(DetectedFormat::Ply),
-            // A binary STL may have a header that begins with `solid`.
-            _ if first.eq_ignore_ascii_case(b"solid") => {
-                let is_binary = bytes.iter().take(4096).any(|byte| *byte == 0);
-                return Some(if is_binary {
-                    DetectedFormat::StlBinary
-                } else {
-                    DetectedFormat::StlAscii
-                });
+            first if is_first && first.eq_ignore_ascii_case(b"solid") => {
+                return Some(DetectedFormat::StlBinary);
             }
-            b"v" | b"vn" | b"vt" | b"vp" | b"f" | b"o" | b"g" | b"s" | b"mtllib" | b"usemtl" => {
+            b"v" if is_first || text::position(words).is_ok() => return Some(DetectedFormat::Obj),
+            b"vn" | b"vt" | b"vp" | b"f" | b"o" | b"g" | b"s" | b"mtllib" | b"usemtl"
+                if is_first =>
+            {
                 return Some(DetectedFormat::Obj);
             }
-            _ if super::xyz::is_data_or_title(line) => return Some(DetectedFormat::Xyz),
-            _ => return None,
+            _ if is_first && xyz::is_data_or_title(line) => return Some(DetectedFormat::Xyz),
+            // Keywords that are rare or of one program may precede the vertices of an OBJ.
+            _ => is_first = false,
         }
     }
     None
+}
+
+/// Returns whether a file is an ASCII STL. The header of a binary STL may begin with `solid`, too, and a name in text may
+/// have NUL.
+fn is_ascii_stl(bytes: &[u8]) -> bool {
+    let head = bytes[..bytes.len().min(4096)].trim_ascii_start();
+    let has = |word: &[u8]| {
+        head.windows(word.len())
+            .any(|at| at.eq_ignore_ascii_case(word))
+    };
+    let is_solid = text::words(head)
+        .next()
+        .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    is_solid && (!head.contains(&0) || (has(b"facet") && has(b"vertex")))
 }

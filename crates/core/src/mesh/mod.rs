@@ -1,8 +1,10 @@
 //! Triangle meshes and point sets in their own frame and unit, and their readers and writers.
 
 mod clustering;
+mod decimal;
 mod error;
 mod format;
+mod missing;
 mod obj;
 mod ply;
 pub mod robust_bounds;
@@ -10,12 +12,15 @@ mod stl;
 mod text;
 mod triangle_mesh;
 mod triangle_stream;
+#[cfg(test)]
+mod unusual_tests;
 mod weld;
 
 pub mod write;
 mod xyz;
 
 pub use error::{MeshError, MeshLimits, MeshReadError};
+pub use missing::{MeshRead, missing_sentence};
 pub use triangle_mesh::{Mesh, Vertices};
 pub use triangle_stream::{
     STL_HEAD, Triangle, TriangleStream, binary_stl_triangles, pass_over_binary_stl,
@@ -27,8 +32,9 @@ use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
 use crate::page_vec::PageVec;
 use format::DetectedFormat;
+use missing::PositionCheck;
 
-/// Reads a mesh or point set from the bytes of a file.
+/// Reads a mesh or point set from the bytes of a file, like [`read_from`].
 ///
 /// The format is detected from the content; `name` is used only if the content is truncated or ambiguous. Polygons are
 /// triangulated as fans; faces of fewer than three corners are ignored. Each triangle of an STL gets three vertices of
@@ -48,22 +54,30 @@ use format::DetectedFormat;
 /// ```
 ///
 /// # Errors
-/// Returns an error if the bytes are not a complete mesh of a supported format, contain a number that is not finite or
-/// an index out of range, or exceed the limits.
+/// Returns an error if the bytes are not a complete mesh of a supported format, contain an index out of range, have no
+/// vertex with a position, or exceed the limits.
 pub fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshError> {
+    read_bytes(bytes, name, limits).map(|read| read.mesh)
+}
+
+fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead, MeshError> {
     limits.check_bytes(bytes.len() as u64)?;
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-    let mesh = match DetectedFormat::of(bytes, name)? {
-        DetectedFormat::Obj => obj::read(bytes, limits),
+    let checked = |mesh: Mesh| {
+        let check = PositionCheck::of(&mesh.vertices);
+        (mesh, check)
+    };
+    let (mesh, check) = match DetectedFormat::of(bytes, name)? {
+        DetectedFormat::Obj => obj::read(bytes, limits).map(checked),
         DetectedFormat::Ply => ply::read(bytes, limits),
         DetectedFormat::StlBinary => stl::read_binary(bytes, limits),
-        DetectedFormat::StlAscii => stl::read_ascii(bytes, limits),
-        DetectedFormat::Xyz => xyz::read(bytes, limits),
+        DetectedFormat::StlAscii => stl::read_ascii(bytes, limits).map(checked),
+        DetectedFormat::Xyz => xyz::read(bytes, limits).map(checked),
     }?;
     if mesh.vertices.is_empty() {
         return Err(MeshError::NoVertices);
     }
-    Ok(mesh)
+    check.without_missing(mesh)
 }
 
 /// Some programs write this mark before text.
@@ -80,7 +94,8 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 ///     0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 /// let limits = MeshLimits::SUGGESTED;
 /// let mesh = read_from(&mut ply.as_slice(), ply.len() as u64, "a.ply", &limits)?;
-/// assert_eq!(mesh, read(ply, "a.ply", &limits)?);
+/// assert_eq!(mesh.mesh, read(ply, "a.ply", &limits)?);
+/// assert_eq!(mesh.missing, 0);
 /// # Ok::<(), mocban_core::mesh::MeshReadError>(())
 /// ```
 ///
@@ -91,7 +106,7 @@ pub fn read_from(
     about: u64,
     name: &str,
     limits: &MeshLimits,
-) -> Result<Mesh, MeshReadError> {
+) -> Result<MeshRead, MeshReadError> {
     limits.check_bytes(about)?;
     let mut source = PolledReader(source);
     let mut head = Vec::with_capacity(stl::HEADER);
@@ -101,10 +116,11 @@ pub fn read_from(
         .read_to_end(&mut head)?;
     let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
-        return stl::read_facets(&mut source, count, limits);
+        let (mesh, check) = stl::read_facets(&mut source, count, limits)?;
+        return Ok(check.without_missing(mesh)?);
     }
     let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
-    Ok(read(&bytes, name, limits)?)
+    Ok(read_bytes(&bytes, name, limits)?)
 }
 
 #[cfg(test)]
@@ -165,7 +181,9 @@ mod tests {
 
     /// Reads from a file that had `about` bytes when it was opened.
     fn from_file(bytes: &[u8], about: usize, name: &str) -> Result<Mesh, String> {
-        read_from(&mut Slow(bytes), about as u64, name, &LIMITS).map_err(|error| error.to_string())
+        read_from(&mut Slow(bytes), about as u64, name, &LIMITS)
+            .map(|read| read.mesh)
+            .map_err(|error| error.to_string())
     }
 
     #[test]
@@ -188,7 +206,9 @@ mod tests {
                     "a.stl",
                     &MeshLimits::SUGGESTED,
                 );
-                let read = read.map_err(|error| error.to_string());
+                let read = read
+                    .map(|read| read.mesh)
+                    .map_err(|error| error.to_string());
                 assert_eq!(read, held.map_err(|error| error.to_string()), "{len}");
             }
         }

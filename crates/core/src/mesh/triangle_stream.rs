@@ -2,8 +2,9 @@
 
 use std::io::Read;
 
-use super::error::{self, MeshError, MeshLimits, MeshReadError};
+use super::error::{MeshError, MeshLimits, MeshReadError};
 use super::format::has_extension;
+use super::missing::is_finite;
 use super::stl;
 use super::triangle_mesh::Mesh;
 use crate::domain::FileKind;
@@ -76,17 +77,19 @@ pub const STL_HEAD: usize = stl::HEADER;
 
 /// Passes over the facets of a binary STL, which is read a part at a time.
 ///
-/// `source` starts after the header.
+/// `source` starts after the header. Leaves out facets with a corner that has no position, and returns the number of such
+/// corners.
 ///
 /// # Errors
-/// Returns an error if the file ends early, a number is not finite, or `visit` returns one.
+/// Returns an error if the file ends early or `visit` returns one.
 pub fn pass_over_binary_stl(
     source: &mut impl Read,
     count: u32,
     limits: &MeshLimits,
     visit: &mut dyn FnMut(&[Triangle]) -> Result<(), MeshReadError>,
-) -> Result<(), MeshReadError> {
+) -> Result<u64, MeshReadError> {
     limits.check_triangles(u64::from(count))?;
+    let mut missing = 0;
     let mut bytes = vec![0; stl::FACET * BATCH.min(count as usize)];
     let mut batch = Vec::with_capacity(BATCH.min(count as usize));
     let mut left = count as usize;
@@ -101,19 +104,24 @@ pub fn pass_over_binary_stl(
         let (facets, _) = bytes.as_chunks::<{ stl::FACET }>();
         batch.clear();
         for facet in facets {
-            batch.push(stl::corners(facet).map(|corner| corner.map(f64::from)));
+            let corners = stl::corners(facet).map(|corner| corner.map(f64::from));
+            let absent = corners.iter().filter(|corner| !is_finite(**corner)).count();
+            missing += absent as u64;
+            if absent == 0 {
+                batch.push(corners);
+            }
         }
-        error::check_all_finite(batch.as_flattened(), 3 * (count as usize - left))?;
         visit(&batch)?;
         left -= facets.len();
     }
-    Ok(())
+    Ok(missing)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{STL_HEAD, binary_stl_triangles};
-    use crate::mesh::MeshError;
+    use super::{STL_HEAD, binary_stl_triangles, pass_over_binary_stl};
+    use crate::mesh::write::MeshFormat;
+    use crate::mesh::{Mesh, MeshError, MeshLimits};
 
     /// The first bytes of a binary STL with 300,000 triangles, whose header is a text.
     fn head() -> Vec<u8> {
@@ -152,5 +160,29 @@ mod tests {
             let head = &text.as_bytes()[..STL_HEAD];
             assert_eq!(binary_stl_triangles(head, 5_000, "b.stl"), Ok(None));
         }
+    }
+
+    #[test]
+    fn facets_with_a_corner_without_position_are_left_out() {
+        let corners = vec![
+            [0.0; 3],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.5],
+            [f64::NAN, f64::INFINITY, 0.0],
+        ];
+        let mesh = Mesh {
+            vertices: corners.into(),
+            triangles: vec![[0, 1, 3], [0, 1, 2], [3, 3, 2]].into(),
+        };
+        let bytes = MeshFormat::StlBinary.encode(&mesh);
+        let mut visited = Vec::new();
+        let mut visit = |batch: &[_]| {
+            visited.extend_from_slice(batch);
+            Ok(())
+        };
+        let mut facets = &bytes[STL_HEAD..];
+        let missing = pass_over_binary_stl(&mut facets, 3, &MeshLimits::SUGGESTED, &mut visit);
+        assert_eq!(missing.expect("reads"), 3);
+        assert_eq!(visited, [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]]]);
     }
 }

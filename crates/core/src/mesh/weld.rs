@@ -68,7 +68,7 @@ impl Mesh {
 
 impl Vertices {
     /// Returns the vertices at the given places, in the same precision.
-    fn select(&self, places: &[u32]) -> Self {
+    pub(super) fn select(&self, places: &[u32]) -> Self {
         let places = polled(places).map(|place| *place as usize);
         match self {
             Self::Single(all) => Self::Single(places.map(|place| all[place]).collect()),

@@ -90,7 +90,7 @@ mod testing {
                     height_per_level: 2e-5,
                     mesh_unit_per_px: 0.1,
                     depth_from_plane: Affine2::IDENTITY,
-                    bow: None,
+                    curvature: None,
                     unit: None,
                 },
             }

@@ -38,16 +38,6 @@ fn transpose_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width
     }
 }
 
-impl Grid<u16> {
-    /// Counts the values that are at least `level`.
-    pub fn count_at_least(&self, level: u16) -> usize {
-        // Runs are short enough for a 16-bit sum, which has more SIMD lanes.
-        let runs = self.data.chunks(usize::from(u16::MAX));
-        let set = |run: &[u16]| run.iter().map(|l| u16::from(*l >= level)).sum::<u16>();
-        runs.map(|run| usize::from(set(run))).sum()
-    }
-}
-
 impl<T: Copy> Grid<T> {
     const fn of(width: usize, height: usize, data: Vec<T>) -> Self {
         Self {
@@ -175,14 +165,6 @@ impl<T: Copy> Grid<T> {
 #[cfg(test)]
 mod tests {
     use super::Grid;
-
-    #[test]
-    fn more_values_than_fit_16_bits_are_counted() {
-        let grid = Grid::from_fn(400, 300, |x, _| x as u16);
-        assert_eq!(grid.count_at_least(0), 120_000);
-        assert_eq!(grid.count_at_least(100), 300 * 300);
-        assert_eq!(grid.count_at_least(400), 0);
-    }
 
     #[test]
     fn rows_become_columns() {

@@ -12,6 +12,8 @@ mod minmax_pyramid;
 pub mod otsu;
 mod resample;
 mod supersample;
+#[cfg(any(test, feature = "test-helpers"))]
+pub mod test_profiles;
 mod warp_depth;
 mod warp_mask;
 mod warp_rgb;

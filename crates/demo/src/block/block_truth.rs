@@ -18,7 +18,7 @@ const LANDMARKS: usize = 12;
 const CANDIDATE_MM: f64 = 0.12;
 /// Least distance of landmarks from the edge of the stroke, mm, in the order in which they are tried.
 const INSIDE_MM: [f64; 4] = [0.18, 0.12, 0.06, 0.02];
-/// Share of a character's stroke area that must be lost before it counts as damaged.
+/// Fraction of a character's stroke area that must be lost before it counts as damaged.
 const DAMAGED_SHARE: f64 = 0.25;
 /// Spacing of the points at which the map is recorded, mm.
 const MAP_STEP_MM: f64 = 20.0;
@@ -92,7 +92,7 @@ pub struct BlockCharacterTruth {
     /// To which part of the text it belongs.
     #[serde(flatten)]
     pub part: BlockTextPart,
-    /// Share of its stroke area that the block lost.
+    /// Fraction of its stroke area that the block lost.
     pub lost: f64,
     /// Whether more than a quarter of its stroke area is lost.
     pub damaged: bool,
@@ -180,7 +180,9 @@ impl TruthSide<'_> {
         let Some(map) = self.map else {
             return Vec::new();
         };
-        let steps = [0, 1].map(|i| ((area.max[i] - area.min[i]) / MAP_STEP_MM).ceil() as usize);
+        let steps = area
+            .size()
+            .map(|length| (length / MAP_STEP_MM).ceil() as usize);
         let points = (0..=steps[1]).flat_map(|j| (0..=steps[0]).map(move |i| [i, j]));
         let record = |index: [usize; 2]| {
             let [u, v] = [0, 1].map(|i| area.min[i] + index[i] as f64 * MAP_STEP_MM);
@@ -208,15 +210,6 @@ impl TruthSide<'_> {
         let Some(map) = self.map else {
             return false;
         };
-        let corners = [0, 1, 2, 3].map(|k| {
-            let u = if k % 2 == 0 {
-                bounds.min[0]
-            } else {
-                bounds.max[0]
-            };
-            let v = if k < 2 { bounds.min[1] } else { bounds.max[1] };
-            [u, v]
-        });
         let last = self.page_size.map(|side| side as f64 - 1.0);
         let is_in_image = |corner: &[f64; 2]| {
             let pixel = map.page_from_face(*corner);
@@ -224,14 +217,16 @@ impl TruthSide<'_> {
         };
         bounds.min[0] >= self.clip_u[0]
             && bounds.max[0] <= self.clip_u[1]
-            && corners.iter().all(is_in_image)
+            && bounds.corners().iter().all(is_in_image)
     }
 
     /// Returns the points of a regular grid that lie in the strokes of a character as they were carved, with their
     /// distance from the edge of the stroke, mm.
     fn stroke_points(&self, index: usize, bounds: BoundsMm) -> Vec<([f64; 2], f64)> {
         let field = &self.relief.field;
-        let count = [0, 1].map(|i| ((bounds.max[i] - bounds.min[i]) / CANDIDATE_MM) as usize + 1);
+        let count = bounds
+            .size()
+            .map(|length| (length / CANDIDATE_MM) as usize + 1);
         (0..count[1])
             .flat_map(|j| (0..count[0]).map(move |i| [i, j]))
             .map(|at| [0, 1].map(|i| bounds.min[i] + at[i] as f64 * CANDIDATE_MM))

@@ -5,11 +5,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::face_field::FAR_MM;
 use super::text_cell::TextCell;
-use crate::artwork::{chip_edges, knife_outline};
+use crate::artwork::carved_strokes;
 use crate::glyph::Glyphs;
 use crate::polygon::BoundsMm;
 use crate::scalar_field::{SampleFrame, ScalarField};
-use mocban_core::raster::Grid;
 
 /// Margin of a character's own samples around its strokes, mm.
 const MARGIN_MM: f64 = 1.0;
@@ -19,7 +18,7 @@ const MIN_WEIGHT_MM: f64 = 0.1;
 /// The hand of the carver of one side.
 pub(super) struct TextCarver<'a> {
     glyphs: &'a Glyphs,
-    /// Distance by which outlines are moved outwards, as a share of the em.
+    /// Distance by which outlines are moved outwards, as a fraction of the em.
     weight: f64,
 }
 
@@ -56,27 +55,16 @@ impl<'a> TextCarver<'a> {
         let size_mm = (cell.em_mm * share).max(4.0 * weight_mm);
         let step_mm = (0.006 * size_mm).clamp(0.03, 0.07);
         let frame = SampleFrame::covering(size_mm / 2.0 + MARGIN_MM, step_mm);
-        let mut coverage = Grid::new(frame.side, frame.side, 0.0);
-        let outline_mm = size_mm - 2.0 * weight_mm;
-        let glyphs = self.glyphs;
-        glyphs.ink(cell.character, frame, [0.0; 2], outline_mm, &mut coverage);
-        let distance = ScalarField::signed_distance(frame, &coverage);
-        let mut strokes = knife_outline(&distance, weight_mm, rng);
-        chip_edges(&mut strokes, rng);
+        let sizes_mm = [size_mm, weight_mm];
+        let strokes = carved_strokes(self.glyphs, cell.character, frame, sizes_mm, rng);
         let (sin, cos) = cell.angle_rad.sin_cos();
         let mut carved = CarvedCell {
             strokes,
             centre: [0, 1].map(|i| cell.centre[i] + cell.em_mm * middle[i]),
             turn: [sin, cos],
             stretch: rng.random_range(0.95..1.04),
-            bounds: BoundsMm {
-                min: cell.centre,
-                max: cell.centre,
-            },
-            reach: BoundsMm {
-                min: cell.centre,
-                max: cell.centre,
-            },
+            bounds: BoundsMm::around([cell.centre]),
+            reach: BoundsMm::around([cell.centre]),
         };
         carved.measure();
         carved
@@ -103,30 +91,20 @@ impl CarvedCell {
     fn measure(&mut self) {
         let frame = self.strokes.frame;
         let [sin, cos] = self.turn;
-        let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for y in 0..frame.side {
-            for x in 0..frame.side {
-                if self.strokes.at(x, y) > 0.0 {
-                    let [u, v] = frame.position(x, y);
-                    let u = u * self.stretch;
-                    let point = [
-                        self.centre[0] + cos * u - sin * v,
-                        self.centre[1] + cos * v + sin * u,
-                    ];
-                    for i in 0..2 {
-                        min[i] = min[i].min(point[i]);
-                        max[i] = max[i].max(point[i]);
-                    }
-                }
-            }
+        let carved = frame
+            .samples()
+            .filter(|(x, y)| self.strokes.at(*x, *y) > 0.0);
+        let found = BoundsMm::around(carved.map(|(x, y)| {
+            let [u, v] = frame.position(x, y);
+            let u = u * self.stretch;
+            [
+                self.centre[0] + cos * u - sin * v,
+                self.centre[1] + cos * v + sin * u,
+            ]
+        }));
+        if found.min[0] <= found.max[0] {
+            self.bounds = found;
         }
-        if min[0] <= max[0] {
-            self.bounds = BoundsMm { min, max };
-        }
-        let margin = -FAR_MM;
-        self.reach = BoundsMm {
-            min: self.bounds.min.map(|c| c - margin),
-            max: self.bounds.max.map(|c| c + margin),
-        };
+        self.reach = self.bounds.with_margin(-FAR_MM);
     }
 }

@@ -30,7 +30,7 @@ pub(super) struct ColumnText {
     note_pitch: f64,
     /// Distance of the two columns of notes from the middle.
     note_offset: f64,
-    /// Share of the columns that contain notes.
+    /// Fraction of the columns that contain notes.
     notes: f64,
 }
 
@@ -43,7 +43,7 @@ enum Segment {
 }
 
 impl ColumnText {
-    /// Draws sizes for columns with the given pitches in mm. `notes` is the share of columns that contain notes.
+    /// Draws sizes for columns with the given pitches in mm. `notes` is the fraction of columns that contain notes.
     pub(super) fn draw(
         row_pitch: f64,
         column_pitch: f64,

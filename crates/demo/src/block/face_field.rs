@@ -26,10 +26,8 @@ impl FaceField {
     /// Creates a field without strokes for a page with the given outer edges.
     pub(super) fn empty(outer: BoundsMm) -> Self {
         let margin = FAR_MM.abs() + 0.5;
-        let size = [0, 1].map(|i| {
-            let length = outer.max[i] - outer.min[i] + 2.0 * margin;
-            (length / STEP_MM).ceil() as usize + 1
-        });
+        let length = outer.size().map(|length| length + 2.0 * margin);
+        let size = length.map(|length| (length / STEP_MM).ceil() as usize + 1);
         Self {
             origin: outer.min.map(|c| c - margin),
             values: Grid::new(size[0], size[1], FAR_MM as f32),

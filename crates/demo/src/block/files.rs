@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::kind::BlockKind;
-use super::mesh_file::BlockMeshFormat;
+use super::kind::BlockOptions;
 use super::world::BlockWorld;
 use crate::dataset::{DatasetError, at};
 
@@ -17,17 +16,6 @@ const REVISION: u32 = 1;
 const STAMP_FILE: &str = "block.json";
 /// Bytes of the mesh that are collected before they are written.
 const BUFFER: usize = 1 << 20;
-
-/// Which world is written.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BlockOptions {
-    /// What is special about the block or its page.
-    pub kind: BlockKind,
-    /// Random seed; the same seed gives the same bytes.
-    pub seed: u64,
-    /// Spacing of the mesh's vertices, mm.
-    pub spacing_mm: f64,
-}
 
 /// Paths and size of a written world.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -119,7 +107,7 @@ pub fn write_block(
         return Ok(files);
     }
     fs::create_dir_all(dir).map_err(at(dir))?;
-    let world = BlockWorld::new(options.seed, options.kind, options.spacing_mm);
+    let world = BlockWorld::new(*options);
     let truth = world.truth();
     let stamp = BlockStamp {
         schema: 1,
@@ -151,8 +139,7 @@ fn write_mesh(
         inner: BufWriter::with_capacity(BUFFER, file),
         is_stopped,
     };
-    let written = world.write_mesh(BlockMeshFormat::Ply, &mut out);
-    let written = written.and_then(|()| out.flush());
+    let written = world.write_mesh(&mut out).and_then(|()| out.flush());
     if is_stopped() {
         return Err(DatasetError::Stopped);
     }

@@ -52,7 +52,7 @@ impl Impression {
         self.colour
     }
 
-    /// Returns the share of a pixel that lies in a printed stroke, 0..=1. `inside_mm` is the signed distance to the
+    /// Returns the fraction of a pixel that lies in a printed stroke, 0..=1. `inside_mm` is the signed distance to the
     /// outline of the carved strokes.
     pub(super) fn cover(&self, [u, v]: [f64; 2], inside_mm: f64, px_mm: f64) -> f64 {
         let spread = self.spread_mm

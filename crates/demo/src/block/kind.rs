@@ -1,7 +1,9 @@
 //! Kinds of blocks: each is a set of ranges of the same physical quantities.
 
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use super::seeding::{hash, part_rng};
 use crate::kind::NumberRange;
 use mocban_core::domain::enum_names;
 
@@ -70,9 +72,9 @@ pub(super) enum BlockSupport {
 /// Ranges from which the conditions of a block and its page are drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockRanges {
-    /// Size of the characters as a share of the usual size.
+    /// Size of the characters as a fraction of the usual size.
     pub scale: NumberRange,
-    /// Share of the columns that contain notes.
+    /// Fraction of the columns that contain notes.
     pub notes: NumberRange,
     /// Probability that the page is folded in the middle.
     pub folded: f64,
@@ -238,6 +240,29 @@ const MIXED: BlockRanges = BlockRanges {
     cracks: [1.0, 2.0],
     ..PLAIN
 };
+
+/// Which block is made. The same options give the same bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BlockOptions {
+    /// What is special about the block or its page.
+    pub kind: BlockKind,
+    /// Random seed.
+    pub seed: u64,
+    /// Approximate spacing of the mesh's vertices, mm.
+    pub spacing_mm: f64,
+}
+
+impl BlockOptions {
+    /// Returns the seed of the parts, which differs between kinds.
+    pub(super) fn part_seed(self) -> u64 {
+        hash(self.seed, self.kind as u64, 0)
+    }
+
+    /// Returns the random numbers of a part.
+    pub(super) fn rng(self, part: u64) -> ChaCha8Rng {
+        part_rng(self.part_seed(), part)
+    }
+}
 
 impl BlockKind {
     /// Returns the ranges of the conditions.

@@ -72,10 +72,7 @@ impl PageLayout {
             cells: Vec::new(),
             rules: Vec::new(),
             fish_tails: Vec::new(),
-            outer: BoundsMm {
-                min: inner.min.map(|c| c - margin),
-                max: inner.max.map(|c| c + margin),
-            },
+            outer: inner.with_margin(margin),
             fold_u: is_folded.then_some(0.0),
         };
         page.add_frame(inner, &measures);
@@ -89,9 +86,7 @@ impl PageLayout {
             (0.0, measures.inner_half_width),
             (outer_line, measures.outer_half_width),
         ] {
-            let [u0, v0] = inner.min.map(|c| c - offset);
-            let [u1, v1] = inner.max.map(|c| c + offset);
-            let corners = [[u0, v0], [u1, v0], [u1, v1], [u0, v1]];
+            let corners = inner.with_margin(offset).corners();
             for i in 0..4 {
                 self.rules.push(PageRule {
                     ends: [corners[i], corners[(i + 1) % 4]],
@@ -253,7 +248,7 @@ mod tests {
                     "{}",
                     page.cells.len()
                 );
-                let size = [0, 1].map(|i| page.outer.max[i] - page.outer.min[i]);
+                let size = page.outer.size();
                 assert!((180.0..310.0).contains(&size[0]), "{size:?}");
                 assert!((130.0..235.0).contains(&size[1]), "{size:?}");
             }

@@ -4,7 +4,7 @@
 //! `kind` names the kinds and has their ranges. `layout`, `page_measures`, `column`, `text_cell` and `text_source` draw a
 //! page of text. `carved_page` carves it with `carved_text` and `carved_line`, as outlines that `face_field` holds on a
 //! large grid. `relief` and `block_damage` compute the carved surface, and `solid`, `support` and `pose` the scan, which
-//! `mesh_file` writes row by row with `facets`, `stl_file` and `ply_file`. `leaf`, `true_map`, `page_sheet`, `impression` and
+//! `ply_file` writes row by row with `facets`. `leaf`, `true_map`, `page_sheet`, `impression` and
 //! `page_image` make the image of the page, and `page_file` encodes it. `block_truth` records the true alignment, and
 //! `via_labels` draws boxes around the characters. `world` makes all of it from a seed, and `files` writes it to disk.
 //! `pair_truth` gives the true alignment of the pairs that are cut from the block.
@@ -22,10 +22,8 @@ mod impression;
 mod kind;
 mod layout;
 mod leaf;
-mod mesh_file;
 mod page_file;
 mod page_image;
-
 mod page_measures;
 mod page_sheet;
 mod pair_truth;
@@ -34,7 +32,6 @@ mod pose;
 mod relief;
 mod seeding;
 mod solid;
-mod stl_file;
 mod support;
 mod text_cell;
 mod text_source;
@@ -46,10 +43,8 @@ mod world;
 mod tests;
 
 pub use block_truth::{BlockCharacterTruth, BlockLandmark, BlockTextPart, BlockTruth};
-pub use files::{BlockFiles, BlockOptions, block_options, find_block, write_block};
-pub use kind::BlockKind;
-pub use mesh_file::BlockMeshFormat;
+pub use files::{BlockFiles, block_options, find_block, write_block};
+pub use kind::{BlockKind, BlockOptions};
 pub use page_file::PageFileBytes;
-pub use pair_truth::CutPairTruth;
 pub use pose::FaceSide;
 pub use world::BlockWorld;

@@ -64,8 +64,8 @@ impl PageSheet {
         }
     }
 
-    /// Returns the colour of the sheet or the bed at a point, 0..=255 per channel, and the share of the point that the
-    /// sheet covers.
+    /// Returns the colour of the sheet or the bed at a point, 0..=255 per channel, and the fraction of the point that
+    /// the sheet covers.
     pub(super) fn at(&self, point: [f64; 2], px_mm: f64) -> ([f64; 3], f64) {
         let cover = self.cover(point, px_mm);
         let [u, v] = point;
@@ -90,7 +90,7 @@ impl PageSheet {
         (sheet.map(|c| lerp(bed, c, cover)), cover)
     }
 
-    /// Returns the share of a pixel that the sheet covers. The edges are slightly ragged.
+    /// Returns the fraction of a pixel that the sheet covers. The edges are slightly ragged.
     fn cover(&self, [u, v]: [f64; 2], px_mm: f64) -> f64 {
         let from_edge = (u - self.area.min[0])
             .min(self.area.max[0] - u)
@@ -115,7 +115,7 @@ impl WaterStain {
         }
     }
 
-    /// Returns the share of reflected light, 0..=1.
+    /// Returns the fraction of reflected light, 0..=1.
     fn at(&self, [u, v]: [f64; 2]) -> f64 {
         let [du, dv] = [u - self.centre[0], v - self.centre[1]];
         let reach = 1.6 * self.radius_mm + 4.0;

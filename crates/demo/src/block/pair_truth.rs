@@ -1,30 +1,14 @@
 //! The true alignment of the pairs that are cut from a block: one line of `truth.jsonl` each.
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
 
 use super::block_truth::{BlockCharacterTruth, BlockTruth};
 use crate::scan_pose::TopsPlane;
-use mocban_core::domain::{Affine2, PrintFromMesh, box_iou};
+use crate::truth_line::TruthLine;
+use mocban_core::domain::{Affine2, PrintFromMesh, Rigid3, box_iou};
 
 /// Least intersection over union of a box with the ink of a character that it belongs to.
 const MIN_OVERLAP: f64 = 0.3;
-
-/// The true alignment of a pair that was cut from a block. Has no mask of the stroke tops.
-#[derive(Debug, Clone, Serialize)]
-pub struct CutPairTruth {
-    /// Id of the pair.
-    pub id: String,
-    /// Maps mesh coordinates to pixels of the print, and to the height over the plane of the stroke tops in mesh units.
-    pub print_from_mesh: PrintFromMesh,
-    /// The plane of the character's stroke tops, in mesh coordinates.
-    pub plane: TopsPlane,
-    /// Points on stroke tops, in mesh coordinates.
-    pub landmarks: Vec<[f64; 3]>,
-    /// Height of the character's ink, in pixels of the print; for flat characters, half its width. Errors are measured as
-    /// shares of it.
-    pub char_height_px: f64,
-}
 
 impl BlockTruth {
     /// Returns the character whose ink best overlaps a box on the page (left, top, right, bottom, in pixels), or `None`
@@ -39,19 +23,20 @@ impl BlockTruth {
     }
 
     /// Returns the true alignment of the pair `id` of a character. `page_from_print` maps the pixels of its print to the
-    /// page. Returns `None` if the page does not belong to the block or the landmarks lie on a line.
+    /// page. It has no mask of the stroke tops, and the height of a flat character is half its width. Returns `None` if the
+    /// page does not belong to the block or the landmarks lie on a line.
     pub fn pair(
         &self,
         id: &str,
         character: &BlockCharacterTruth,
         page_from_print: &Affine2,
-    ) -> Option<CutPairTruth> {
+    ) -> Option<TruthLine> {
         let print_from_page = page_from_print.inverse()?;
         let [left, top, right, bottom] = character.box_px?;
         let mut points = Vec::new();
         let mut values = [const { Vec::new() }; 3];
         for landmark in &character.landmarks {
-            let [u, v, height, _] = self.face_from_mesh.map(|row| weighted(row, landmark.mesh));
+            let [u, v, height] = Rigid3(self.face_from_mesh).apply(landmark.mesh);
             let [x, y] = print_from_page.apply(landmark.page?);
             points.push([u, v]);
             for (values, value) in values.iter_mut().zip([x, y, height]) {
@@ -71,7 +56,7 @@ impl BlockTruth {
         let slope = row(top_height);
         let steepness = (1.0 + top_height[0].powi(2) + top_height[1].powi(2)).sqrt();
         let over = [0, 1, 2, 3].map(|i| (height[i] - slope[i]) / steepness / unit_mm);
-        Some(CutPairTruth {
+        Some(TruthLine {
             id: id.to_owned(),
             print_from_mesh: PrintFromMesh([row(x), row(y), over]),
             plane: TopsPlane {
@@ -84,13 +69,9 @@ impl BlockTruth {
                 .map(|landmark| landmark.mesh)
                 .collect(),
             char_height_px: (bottom - top).max((right - left) / 2.0) * print_from_page.scale(),
+            tops_mask: None,
         })
     }
-}
-
-/// Returns the value of an affine function at a point.
-fn weighted(row: [f64; 4], [x, y, z]: [f64; 3]) -> f64 {
-    row[0] * x + row[1] * y + row[2] * z + row[3]
 }
 
 /// Fits a + b u + c v to values at points by least squares; returns the factors of u and v and the constant.
@@ -110,12 +91,17 @@ fn fitted(points: &[[f64; 2]], values: &[f64]) -> Option<[f64; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use crate::block::{BlockKind, BlockWorld};
+    use crate::block::{BlockKind, BlockOptions, BlockWorld};
     use mocban_core::domain::Affine2;
 
     #[test]
     fn map_of_a_pair_leads_from_its_landmarks_to_the_print() {
-        let truth = BlockWorld::new(11, BlockKind::Warp, 3.0).truth();
+        let truth = BlockWorld::new(BlockOptions {
+            seed: 11,
+            kind: BlockKind::Warp,
+            spacing_mm: 3.0,
+        })
+        .truth();
         let page_from_print = Affine2([[1.0, 0.0, 700.0], [0.0, 1.0, 300.0]]);
         let shown = truth
             .characters

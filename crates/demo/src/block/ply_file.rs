@@ -61,9 +61,6 @@ impl VertexNumbers {
 }
 
 /// Writes the mesh of a block: vertices row by row, then faces row by row.
-///
-/// # Errors
-/// Returns an error if `out` does.
 pub(super) fn write_ply(solid: &BlockSolid, out: &mut impl Write) -> io::Result<()> {
     let numbers = VertexNumbers::of(solid);
     write!(
@@ -129,8 +126,8 @@ fn write_faces(
         for k in 0..count {
             let next = (k + 1) % count;
             let [low, high] = [ring + 1, ring];
-            let quad = [(low, k), (low, next), (high, next), (high, k)];
-            let quad = quad.map(|(ring, k)| numbers.on_ring(ring, k));
+            let quad = [(low, k), (low, next), (high, next), (high, k)]
+                .map(|(ring, k)| numbers.on_ring(ring, k));
             push_faces(&mut bytes, &split(quad, false));
         }
         out.write_all(&bytes)?;

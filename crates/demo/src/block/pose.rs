@@ -8,7 +8,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::scan_pose::any_rotation;
+use crate::scan_pose::{any_rotation, dot};
 use mocban_core::domain::LengthUnit;
 
 /// A side of a block.
@@ -111,8 +111,4 @@ impl BlockPose {
     pub(super) fn normal(&self, side: SideFrame) -> [f64; 3] {
         self.rotation.map(|row| row[2] * side.signs[2])
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -133,7 +133,7 @@ impl BlockBow {
         }
     }
 
-    /// Returns the height at a point in mm, which is also given as a share of half the block's size.
+    /// Returns the height at a point in mm, which is also given as a fraction of half the block's size.
     fn at(&self, [u, v]: [f64; 2], [x, y]: [f64; 2]) -> f64 {
         self.along * x * x
             + self.across * y * y

@@ -50,7 +50,7 @@ pub(super) struct ScanNoise {
     seed: u64,
     outline: [Noise; 2],
     bottom: Noise,
-    /// Share of the walls that the scan shows if it does not show the back.
+    /// Fraction of the walls that the scan shows if it does not show the back.
     wall_share: f64,
 }
 
@@ -146,7 +146,7 @@ impl BlockSolid {
             .collect()
     }
 
-    /// Returns a point of a wall at a share `t` of the way from front to back, in the block frame.
+    /// Returns a point of a wall at a fraction `t` of the way from front to back, in the block frame.
     fn wall_point(&self, [top, bottom]: [[f64; 3]; 2], t: f64, row: usize, k: usize) -> [f64; 3] {
         if t == 0.0 {
             return top;

@@ -4,6 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::kind::BlockSupport;
+use crate::debris::ring_quads;
 
 /// Distance of the vertices of a support, mm.
 const STEP_MM: f64 = 2.5;
@@ -53,24 +54,10 @@ impl SupportMesh {
             let [x, y, _] = self.vertices[*corner as usize];
             x.abs() < half_mm[0] - 3.0 && y.abs() < half_mm[1] - 3.0
         };
-        let mut triangles = Vec::new();
-        for ring in 0..rings + 2 {
-            for spoke in 0..spokes {
-                let at =
-                    |ring: usize, spoke: usize| first + (ring * spokes + spoke % spokes) as u32;
-                let quad = [
-                    at(ring, spoke),
-                    at(ring + 1, spoke),
-                    at(ring + 1, spoke + 1),
-                    at(ring, spoke + 1),
-                ];
-                if !quad.iter().all(is_hidden) {
-                    triangles.push([quad[0], quad[1], quad[2]]);
-                    triangles.push([quad[0], quad[2], quad[3]]);
-                }
-            }
+        let quads = ring_quads(first, rings as u32 + 2, spokes as u32);
+        for [a, b, c, d] in quads.filter(|quad| !quad.iter().all(is_hidden)) {
+            self.triangles.extend([[a, b, c], [a, c, d]]);
         }
-        self.triangles.extend(triangles);
     }
 
     /// Adds a plate below the block and a jaw at each short side, which is higher than the face.

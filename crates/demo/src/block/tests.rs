@@ -3,26 +3,33 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-use super::{BlockKind, BlockMeshFormat, BlockTruth, BlockWorld, FaceSide};
+use super::{BlockKind, BlockOptions, BlockTruth, BlockWorld, FaceSide};
 use mocban_core::mesh::{Mesh, MeshLimits, read};
 use mocban_core::raster::{Grid, ImageLimits, decode};
 
 const SPACING_MM: f64 = 0.6;
 
-/// A block with text on both sides, whose page is of the back.
-static BACK: LazyLock<BlockWorld> =
-    LazyLock::new(|| BlockWorld::new(5, BlockKind::Back, SPACING_MM));
+fn world(seed: u64, kind: BlockKind, spacing_mm: f64) -> BlockWorld {
+    BlockWorld::new(BlockOptions {
+        kind,
+        seed,
+        spacing_mm,
+    })
+}
 
-fn mesh_bytes(world: &BlockWorld, format: BlockMeshFormat) -> Vec<u8> {
+/// A block with text on both sides, whose page is of the back.
+static BACK: LazyLock<BlockWorld> = LazyLock::new(|| world(5, BlockKind::Back, SPACING_MM));
+
+fn mesh_bytes(world: &BlockWorld) -> Vec<u8> {
     let mut bytes = Vec::new();
     world
-        .write_mesh(format, &mut bytes)
+        .write_mesh(&mut bytes)
         .expect("memory takes every byte");
     bytes
 }
 
-fn mesh_of(world: &BlockWorld, format: BlockMeshFormat) -> Mesh {
-    let bytes = mesh_bytes(world, format);
+fn mesh_of(world: &BlockWorld) -> Mesh {
+    let bytes = mesh_bytes(world);
     read(&bytes, "block", &MeshLimits::SUGGESTED).expect("a complete mesh")
 }
 
@@ -52,8 +59,8 @@ fn grey_page(world: &BlockWorld) -> Grid<f64> {
         .map(|pixel| pixel.iter().map(|c| f64::from(*c)).sum::<f64>() / 3.0 / 257.0)
 }
 
-/// Returns the share of the pixels of a box that are darker than `limit`. The box includes its last column and row and
-/// must lie in the image.
+/// Returns the fraction of the pixels of a box that are darker than `limit`. The box includes its last column and row
+/// and must lie in the image.
 fn dark_share(page: &Grid<f64>, [x0, y0, x1, y1]: [i64; 4], limit: f64) -> f64 {
     let pixels = (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| (x, y)));
     let found: Vec<f64> = pixels.filter_map(|(x, y)| page.get(x, y)).collect();
@@ -63,7 +70,7 @@ fn dark_share(page: &Grid<f64>, [x0, y0, x1, y1]: [i64; 4], limit: f64) -> f64 {
 #[test]
 fn landmarks_lie_on_stroke_tops_of_the_written_mesh() {
     let truth = BACK.truth();
-    let mesh = mesh_of(&BACK, BlockMeshFormat::Stl);
+    let mesh = mesh_of(&BACK);
     assert_eq!(mesh.triangles.len(), truth.triangles);
     let heights = heights(&mesh, &truth);
     let (mut near, mut all) = (0, 0);
@@ -160,7 +167,7 @@ fn page_landmarks_lie_in_their_boxes() {
 
 #[test]
 fn text_is_carved_in_mirror_writing_on_both_sides() {
-    for world in [&*BACK, &BlockWorld::new(3, BlockKind::QuarterTurn, 2.0)] {
+    for world in [&*BACK, &world(3, BlockKind::QuarterTurn, 2.0)] {
         let truth = world.truth();
         let characters = truth
             .characters
@@ -192,27 +199,20 @@ fn text_is_carved_in_mirror_writing_on_both_sides() {
 }
 
 #[test]
-fn closed_mesh_is_watertight_and_both_formats_agree() {
-    let ply = mesh_of(&BACK, BlockMeshFormat::Ply);
+fn closed_mesh_is_watertight_and_encloses_a_block() {
+    let mesh = mesh_of(&BACK);
     let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
-    for triangle in &*ply.triangles {
+    for triangle in &*mesh.triangles {
         for k in 0..3 {
             let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
             *edges.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };
         }
     }
     assert!(edges.values().all(|balance| *balance == 0));
-    assert_eq!(edges.len() * 2, ply.triangles.len() * 3);
-    let stl = mesh_of(&BACK, BlockMeshFormat::Stl);
-    assert_eq!(stl.triangles.len(), ply.triangles.len());
-    let corner =
-        |mesh: &Mesh, triangle: &[u32; 3], k: usize| mesh.vertices.at(triangle[k] as usize);
+    assert_eq!(edges.len() * 2, mesh.triangles.len() * 3);
     let mut volume = 0.0;
-    for (one, other) in stl.triangles.iter().zip(ply.triangles.iter()) {
-        let [a, b, c] = [0, 1, 2].map(|k| {
-            assert_eq!(corner(&stl, one, k), corner(&ply, other, k));
-            corner(&stl, one, k)
-        });
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|corner| mesh.vertices.at(corner as usize));
         let cross = [0, 1, 2].map(|i| {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
             b[j] * c[k] - b[k] * c[j]
@@ -230,19 +230,18 @@ fn same_seed_gives_the_same_bytes_on_any_number_of_threads() {
         .num_threads(1)
         .build()
         .expect("a thread");
-    let again = pool.install(|| BlockWorld::new(5, BlockKind::Back, SPACING_MM));
+    let again = pool.install(|| world(5, BlockKind::Back, SPACING_MM));
     assert!(again.page().bytes == BACK.page().bytes);
     assert!(again.labels_via() == BACK.labels_via());
     let truth = |world: &BlockWorld| serde_json::to_string(&world.truth()).expect("plain values");
     assert_eq!(truth(&again), truth(&BACK));
-    let stl = |world: &BlockWorld| mesh_bytes(world, BlockMeshFormat::Stl);
-    assert!(pool.install(|| stl(&again)) == stl(&BACK));
+    assert!(pool.install(|| mesh_bytes(&again)) == mesh_bytes(&BACK));
 }
 
 #[test]
 fn half_pages_show_about_half_of_the_characters() {
     for kind in [BlockKind::HalfPage, BlockKind::OpenedBook] {
-        let truth = BlockWorld::new(2, kind, 3.0).truth();
+        let truth = world(2, kind, 3.0).truth();
         let shown = truth
             .characters
             .iter()
@@ -263,7 +262,7 @@ fn half_pages_show_about_half_of_the_characters() {
 
 #[test]
 fn page_of_another_block_has_labels_but_no_truth() {
-    let world = BlockWorld::new(2, BlockKind::WrongPage, 3.0);
+    let world = world(2, BlockKind::WrongPage, 3.0);
     let truth = world.truth();
     assert!(!truth.belongs && truth.map.is_empty());
     assert!(

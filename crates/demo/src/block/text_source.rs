@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::glyph::Glyphs;
 
-/// Offset of the ranks in the Zipf-Mandelbrot law. With it, the most frequent character has a share of about 3 %.
+/// Offset of the ranks in the Zipf-Mandelbrot law. With it, the most frequent character makes up about 3 % of a text.
 const RANK_OFFSET: f64 = 6.0;
 
 /// The characters of the font with their cumulated frequencies.

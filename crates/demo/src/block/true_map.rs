@@ -5,14 +5,15 @@ use rand_chacha::ChaCha8Rng;
 
 use super::kind::BlockRanges;
 use crate::draw::{number_within, within};
+use crate::paper_geometry::unwarped;
 use crate::polygon::BoundsMm;
+use mocban_core::domain::Affine2;
 
 /// Wavelengths of the warp, mm.
 const WAVELENGTH_MM: [f64; 2] = [80.0, 320.0];
-/// Shares of the warp's amplitude that its waves have.
+/// Fractions of the warp's amplitude that its waves have.
 const WAVE_SHARES: [f64; 3] = [0.5, 0.3, 0.2];
-/// Largest number of steps of the fixed-point iteration that inverts the warp. It converges by a factor of ten per
-/// step, because the warp is much smaller than its wavelength.
+/// Largest number of steps of the iteration that inverts the warp. It converges by a factor of ten per step.
 const INVERSION_STEPS: usize = 20;
 /// Distance from the middle for which the change of scale by perspective is given, mm.
 const PERSPECTIVE_MM: f64 = 150.0;
@@ -30,9 +31,9 @@ struct SheetWave {
 #[derive(Debug, Clone)]
 pub(super) struct TruePageMap {
     waves: [[SheetWave; 3]; 2],
-    linear: [[f64; 2]; 2],
+    linear: Affine2,
     /// Inverse of `linear`.
-    unlinear: [[f64; 2]; 2],
+    unlinear: Affine2,
     /// Change of the scale per mm along both axes of the image plane.
     horizon: [f64; 2],
     /// Quarter turns, clockwise.
@@ -55,15 +56,14 @@ impl TruePageMap {
         let shrink = [0; 2].map(|_: i32| 1.0 - within(ranges.shrink, rng));
         let shear = rng.random_range(-1.0..1.0) * ranges.shear;
         let angle = (rng.random_range(-1.0..1.0) * ranges.rotation_deg).to_radians();
-        let (sin, cos) = angle.sin_cos();
-        let scaled = [[shrink[0], shear], [0.0, shrink[1]]];
-        let linear = multiply([[cos, -sin], [sin, cos]], scaled);
+        let scaled = Affine2([[shrink[0], shear, 0.0], [0.0, shrink[1], 0.0]]);
+        let linear = Affine2::similarity(1.0, angle, [0.0; 2]).after(&scaled);
         let perspective = within(ranges.perspective, rng) / PERSPECTIVE_MM;
         let direction = rng.random_range(0.0..std::f64::consts::TAU);
         let mut map = Self {
             waves,
             linear,
-            unlinear: inverse(linear),
+            unlinear: linear.inverse().expect("the sheet has an area"),
             horizon: [perspective * direction.cos(), perspective * direction.sin()],
             turns: number_within(ranges.turns, rng),
             px_per_mm: within(ranges.px_per_mm, rng),
@@ -76,31 +76,25 @@ impl TruePageMap {
     /// Moves the image so that it shows a box of the face frame. Returns its width and height in pixels.
     fn fit(&mut self, view: BoundsMm) -> [usize; 2] {
         const STEPS: usize = 32;
-        let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for step in 0..=STEPS {
+        let edges = (0..=STEPS).flat_map(|step| {
             let t = step as f64 / STEPS as f64;
             let [u, v] = [0, 1].map(|i| view.min[i] + (view.max[i] - view.min[i]) * t);
-            let around = [
+            [
                 [u, view.min[1]],
                 [u, view.max[1]],
                 [view.min[0], v],
                 [view.max[0], v],
-            ];
-            for pixel in around.map(|point| self.page_from_face(point)) {
-                for i in 0..2 {
-                    min[i] = min[i].min(pixel[i]);
-                    max[i] = max[i].max(pixel[i]);
-                }
-            }
-        }
-        self.shift_px = [0, 1].map(|i| self.shift_px[i] - min[i]);
-        [0, 1].map(|i| (max[i] - min[i]).ceil() as usize + 1)
+            ]
+        });
+        let pixels = BoundsMm::around(edges.map(|point| self.page_from_face(point)));
+        self.shift_px = [0, 1].map(|i| self.shift_px[i] - pixels.min[i]);
+        pixels.size().map(|length| length.ceil() as usize + 1)
     }
 
     /// Converts a point of the face frame to pixels. (0, 0) is the middle of the first pixel.
     pub(super) fn page_from_face(&self, uv: [f64; 2]) -> [f64; 2] {
         let shift = self.warp_at(uv);
-        let flat = apply(self.linear, [uv[0] + shift[0], uv[1] + shift[1]]);
+        let flat = self.linear.apply([uv[0] + shift[0], uv[1] + shift[1]]);
         let depth = 1.0 + self.horizon[0] * flat[0] + self.horizon[1] * flat[1];
         let turned = turn(flat.map(|c| c / depth), self.turns);
         [0, 1].map(|i| self.px_per_mm * turned[i] + self.shift_px[i])
@@ -111,18 +105,8 @@ impl TruePageMap {
         let turned = [0, 1].map(|i| (pixel[i] - self.shift_px[i]) / self.px_per_mm);
         let seen = turn(turned, 4 - self.turns % 4);
         let depth = 1.0 - self.horizon[0] * seen[0] - self.horizon[1] * seen[1];
-        let warped = apply(self.unlinear, seen.map(|c| c / depth));
-        let mut uv = warped;
-        for _ in 0..INVERSION_STEPS {
-            let shift = self.warp_at(uv);
-            let next = [warped[0] - shift[0], warped[1] - shift[1]];
-            let moved = (next[0] - uv[0]).abs() + (next[1] - uv[1]).abs();
-            uv = next;
-            if moved < 1e-9 {
-                break;
-            }
-        }
-        uv
+        let warped = self.unlinear.apply(seen.map(|c| c / depth));
+        unwarped(warped, INVERSION_STEPS, 1e-9, |uv| self.warp_at(uv))
     }
 
     /// Returns the displacement by the warp, mm.
@@ -156,22 +140,6 @@ const fn turn([x, y]: [f64; 2], turns: u32) -> [f64; 2] {
         2 => [-x, -y],
         _ => [y, -x],
     }
-}
-
-fn apply(matrix: [[f64; 2]; 2], [x, y]: [f64; 2]) -> [f64; 2] {
-    matrix.map(|[a, b]| a * x + b * y)
-}
-
-fn multiply(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-    a.map(|row| [0, 1].map(|j| row[0] * b[0][j] + row[1] * b[1][j]))
-}
-
-fn inverse([[a, b], [c, d]]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-    let determinant = a * d - b * c;
-    [
-        [d / determinant, -b / determinant],
-        [-c / determinant, a / determinant],
-    ]
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::block_truth::box_edges;
 use super::text_cell::TextCell;
 
-/// Largest error of an edge of a drawn box, as a share of the box's width or height.
+/// Largest error of an edge of a drawn box, as a fraction of the box's width or height.
 const SLACK: f64 = 0.03;
 
 /// A character on the page and the box of its ink.

@@ -10,16 +10,15 @@ use super::carved_page::carve_page;
 use super::face_field::FaceField;
 use super::facets::triangle_count;
 use super::impression::Impression;
-use super::kind::{BlockKind, BlockSupport, PageExtent};
+use super::kind::{BlockOptions, BlockSupport, PageExtent};
 use super::layout::PageLayout;
 use super::leaf::{PageScene, PrintedLeaf};
-use super::mesh_file::{BlockMeshFormat, write_solid};
 use super::page_file::{PageFileBytes, encode_page};
 use super::page_image::{InkBox, PageRendering};
 use super::page_sheet::PageSheet;
+use super::ply_file::write_ply;
 use super::pose::{BlockPose, FaceSide, SideFrame};
 use super::relief::BlockRelief;
-use super::seeding::{hash, part_rng};
 use super::solid::{BlockSolid, ScanNoise, ScannedPart};
 use super::support::SupportMesh;
 use super::text_source::TextSource;
@@ -42,29 +41,9 @@ mod part {
     pub(super) const FIELDS: [u64; 3] = [1 << 20, 2 << 20, 3 << 20];
 }
 
-/// Which world is made.
-#[derive(Debug, Clone, Copy)]
-struct WorldChoice {
-    seed: u64,
-    kind: BlockKind,
-    spacing_mm: f64,
-}
-
-impl WorldChoice {
-    /// Returns the seed of the parts, which differs between kinds.
-    fn part_seed(self) -> u64 {
-        hash(self.seed, self.kind as u64, 0)
-    }
-
-    /// Returns the random numbers of a part.
-    fn rng(self, part: u64) -> ChaCha8Rng {
-        part_rng(self.part_seed(), part)
-    }
-}
-
 /// A generated block, its page and their true alignment.
 pub struct BlockWorld {
-    choice: WorldChoice,
+    choice: BlockOptions,
     solid: BlockSolid,
     /// The layout of the printed side.
     layout: PageLayout,
@@ -81,15 +60,9 @@ pub struct BlockWorld {
 type Text = (PageLayout, FaceField);
 
 impl BlockWorld {
-    /// Makes the world of a seed and kind, with a mesh of about `spacing_mm` between vertices. The same arguments give
-    /// the same bytes.
-    pub fn new(seed: u64, kind: BlockKind, spacing_mm: f64) -> Self {
-        let ranges = kind.ranges();
-        let choice = WorldChoice {
-            seed,
-            kind,
-            spacing_mm,
-        };
+    /// Makes a world.
+    pub fn new(choice: BlockOptions) -> Self {
+        let ranges = choice.kind.ranges();
         let glyphs = Glyphs::embedded();
         let mut rng = choice.rng(part::CONDITIONS);
         let is_folded = rng.random_bool(ranges.folded);
@@ -119,7 +92,7 @@ impl BlockWorld {
 
     /// Prints a side of a block, or the other text if the page is not of the block.
     fn print(
-        choice: WorldChoice,
+        choice: BlockOptions,
         solid: BlockSolid,
         layout: PageLayout,
         side: FaceSide,
@@ -184,12 +157,9 @@ impl BlockWorld {
         triangle_count(&self.solid)
     }
 
-    /// Writes the mesh row by row.
-    ///
-    /// # Errors
-    /// Returns an error if `out` does.
-    pub fn write_mesh(&self, format: BlockMeshFormat, out: &mut impl Write) -> io::Result<()> {
-        write_solid(&self.solid, format, out)
+    /// Writes the mesh as binary PLY, row by row, so that the memory does not grow with the file.
+    pub fn write_mesh(&self, out: &mut impl Write) -> io::Result<()> {
+        write_ply(&self.solid, out)
     }
 
     /// Returns the true alignment.
@@ -255,7 +225,7 @@ impl BlockWorld {
 
 /// Carves the texts into a block and scans it.
 fn scan_block(
-    choice: WorldChoice,
+    choice: BlockOptions,
     front: Text,
     back: Option<Text>,
     rng: &mut ChaCha8Rng,

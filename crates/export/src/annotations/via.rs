@@ -23,8 +23,7 @@ impl ViaRegions {
     pub(crate) fn add(&mut self, strokes: &StrokeAnnotation, bytes: u64) {
         // VIA names an image by its file name without folders.
         let name = strokes.file_name.rsplit('/').next().unwrap_or_default();
-        let image = self.0.entry(name.to_owned());
-        let image = image.or_insert_with(|| ViaImage {
+        let image = self.0.entry(name.to_owned()).or_insert_with(|| ViaImage {
             bytes,
             regions: Vec::new(),
         });
@@ -41,9 +40,6 @@ impl ViaRegions {
     }
 
     /// Writes the file, image by image. The key of an image is its name followed by its size in bytes, as in VIA.
-    ///
-    /// # Errors
-    /// Returns the first error of `append`.
     pub(crate) fn write<E>(self, mut append: impl FnMut(&str) -> Result<(), E>) -> Result<(), E> {
         append("{")?;
         for (k, (name, image)) in self.0.into_iter().enumerate() {

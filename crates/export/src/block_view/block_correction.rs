@@ -33,6 +33,8 @@ pub struct BlockCorrection {
     saved: Option<ControlPoints>,
     /// The side that is aligned with the page.
     aligned: Option<BlockSide>,
+    /// The side that the list names.
+    listed: Option<BlockSide>,
     failure: Option<String>,
 }
 
@@ -59,7 +61,7 @@ pub struct PicturePoint {
 pub struct TriedAlignment {
     /// The points as they are stored.
     pub points: ControlPoints,
-    /// Share of the places of the face that agree with the page, 0..=1.
+    /// Fraction of the places of the face that agree with the page, 0..=1.
     pub agreement: f64,
     /// Relief and ink over each other, as JPEG.
     pub overlay: Vec<u8>,
@@ -125,7 +127,7 @@ impl BlockCorrection {
         let invalid = |why: serde_json::Error| unusable(BlockStage::Face, &why.to_string());
         let files = serde_json::from_value::<ArtifactSet>(stored.files.clone());
         let files = files.map_err(invalid)?;
-        let mesh = serde_json::from_value(stored.made_with["mesh"].clone());
+        let mesh = serde_json::from_value(stored.provenance["mesh"].clone());
         let aligned = match stage(BlockStage::Align) {
             Some(align) => Some(outcome::<AlignOutcome>(align)?.side),
             None => None,
@@ -142,6 +144,7 @@ impl BlockCorrection {
             mesh_hash: mesh.map_err(invalid)?,
             saved: detail.state.control_points.clone(),
             aligned,
+            listed: detail.state.attributes.side,
             failure: (detail.state.failure.as_ref()).map(|stored| stored.failure.message.clone()),
             name,
         })
@@ -159,11 +162,10 @@ impl BlockCorrection {
             .filter(|points| self.is_for_files(points));
         let shown = saved.and_then(|points| Some((self.face(points.side)?, points)));
         let points = shown.map(|(face, points)| face.picture_points(&points.points));
-        let first = self.faces.first().map(|one| one.side);
         json!({
             "block": self.name,
             "sides": sides.collect::<Vec<_>>(),
-            "side": shown.map(|(face, _)| face.side).or(self.aligned).or(first),
+            "side": shown.map(|(face, _)| face.side).or_else(|| self.likely_side()),
             "page_size": [page.width(), page.height()],
             "points": points.unwrap_or_default(),
             "min_points": ControlPoints::MIN,
@@ -172,6 +174,18 @@ impl BlockCorrection {
             "is_aligned": self.aligned.is_some(),
             "failure": self.failure,
         })
+    }
+
+    /// Returns the side that the page probably shows: the aligned one, the one that the list names, or the most carved one.
+    fn likely_side(&self) -> Option<BlockSide> {
+        let listed = self.listed.filter(|side| self.face(*side).is_some());
+        let carved = |one: &FacePicture| one.face.relief.carved_fraction();
+        let most = || {
+            let faces = self.faces.iter().map(|one| (carved(one), one.side));
+            faces.max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let known = self.aligned.or(listed);
+        known.or_else(|| most().map(|(_, side)| side))
     }
 
     /// Draws the relief of a face as it would be printed, after a number of quarter turns (clockwise), as JPEG. Returns

@@ -3,7 +3,7 @@
 use crate::source_print::SourcePrintError;
 use mocban_align::block::BlockError;
 use mocban_catalog::CatalogError;
-use mocban_core::domain::{BlockName, BlockStage, ThresholdMetric};
+use mocban_core::domain::{BlockName, BlockStage, ErrorCode, Explained, ThresholdMetric};
 use mocban_core::raster::PngError;
 
 /// Why a block cannot be shown.
@@ -56,4 +56,21 @@ pub enum BlockViewError {
     /// A worker task panicked or was cancelled.
     #[error("drawing stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
+}
+
+impl Explained for BlockViewError {
+    fn wrapped(&self) -> Option<&dyn Explained> {
+        match self {
+            Self::Catalog(error) => Some(error),
+            _ => None,
+        }
+    }
+
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::NotAligned { .. } | Self::NoResult { .. } => ErrorCode::NothingSelected,
+            Self::Catalog(error) => error.code(),
+            _ => ErrorCode::Unexpected,
+        }
+    }
 }

@@ -6,8 +6,8 @@ use super::page_view::BlockView;
 use crate::pictures::{
     BLUE, LegendEntry, MarkedBox, PictureLegend, Rgb, VERMILLION, mark, with_legend,
 };
-use mocban_report::number_format::NumberStyle::Percent;
-use mocban_report::number_format::{counted, format_number};
+use mocban_results::number_format::NumberStyle::Percent;
+use mocban_results::number_format::{counted, format_number};
 
 /// Pixels per mm of the page with boxes. Names are then readable in boxes of 5 mm.
 const BOXES_PX_PER_MM: f64 = 12.0;
@@ -113,7 +113,7 @@ mod tests {
     use crate::block_view::page_layers::tests::ridges;
     use crate::block_view::{CharacterStatus, CharacterView};
     use mocban_core::domain::BlockCharacterState;
-    use mocban_report::test_fixtures;
+    use mocban_results::test_fixtures;
 
     fn characters() -> Vec<CharacterView> {
         let done = test_fixtures::with_confidence("b_c1", 0.9);

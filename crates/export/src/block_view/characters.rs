@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::pictures::{BLUE, ORANGE, VERMILLION};
 use mocban_catalog::{MetricRecord, PairResults, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, JobStatus, ThresholdMetric, enum_names};
-use mocban_report::Consensus;
+use mocban_results::Consensus;
 
 /// Colour of characters whose pairs have no result yet.
 const GREY: [u8; 3] = [120, 120, 120];
@@ -174,7 +174,7 @@ pub(super) mod tests {
     use super::{CharacterStatus, CharacterView, PositionConfidence};
     use mocban_catalog::{PairResults, StoredCharacter};
     use mocban_core::domain::{BlockCharacterState, FailureClass, ThresholdMetric, Verdict};
-    use mocban_report::test_fixtures;
+    use mocban_results::test_fixtures;
 
     /// A character at a box of the page.
     pub(in crate::block_view) fn stored(

@@ -10,9 +10,6 @@ use mocban_store::{Project, hash_input};
 
 /// Returns the file of a block that is another one than the file on which points were chosen, if there is one. A file that
 /// cannot be read here counts as the same, because the scan may be on another computer.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read.
 pub async fn replaced_file(
     catalog: &Catalog,
     project: &Project,
@@ -33,8 +30,8 @@ fn compare(
     let attributes = &detail.state.attributes;
     let mut faces = detail.stages.iter();
     let faces = faces.find(|one| one.stage == BlockStage::Face);
-    let scanned = faces.map(|stored| serde_json::from_value(stored.made_with["mesh"].clone()));
-    let scanned: Option<ContentHash> = scanned
+    let scanned: Option<ContentHash> = faces
+        .map(|stored| serde_json::from_value(stored.provenance["mesh"].clone()))
         .transpose()
         .map_err(|why| unusable(BlockStage::Face, &why.to_string()))?;
     // A run may have found the faces of another scan meanwhile.

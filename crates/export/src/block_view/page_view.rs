@@ -9,9 +9,10 @@ use super::characters::{CharacterView, shown_record};
 use super::page_layers::PageLayers;
 use super::page_picture::PagePicture;
 use super::registered_face::RegisteredFace;
-use crate::pair_pictures::{InputFileLimits, PictureError};
+use crate::pair_pictures::PictureError;
 use crate::scan_view::ScanView;
 use mocban_catalog::{BlockDetail, Catalog, PairResults, StoredCharacter};
+use mocban_core::InputLimits;
 use mocban_core::domain::{BlockCharacterState, BlockName, PairName, ThresholdMetric};
 use mocban_core::raster::ImageLimits;
 use mocban_store::Project;
@@ -25,11 +26,11 @@ pub struct BlockView {
     pub layers: PageLayers,
     /// The characters that have a box.
     pub characters: Vec<CharacterView>,
-    /// Share of the places of the face that agree with the page, 0..=1.
+    /// Fraction of the places of the face that agree with the page, 0..=1.
     pub agreement: f64,
     pairs: Vec<Option<PairResults>>,
     metric: Option<ThresholdMetric>,
-    limits: InputFileLimits,
+    limits: InputLimits,
     project: Project,
 }
 
@@ -44,7 +45,7 @@ impl BlockView {
         project: &Project,
         name: &BlockName,
         metric: Option<ThresholdMetric>,
-        limits: InputFileLimits,
+        limits: InputLimits,
     ) -> Result<Self, BlockViewError> {
         let detail = catalog.block(name).await?;
         let detail = detail.ok_or_else(|| BlockViewError::Gone(name.clone()))?;
@@ -120,8 +121,7 @@ async fn pairs_of(
     let mut by_name: BTreeMap<PairName, PairResults> = found
         .map(|pair| (pair.attributes.name.clone(), pair))
         .collect();
-    let pairs = names.map(|name| by_name.remove(&name?));
-    Ok(pairs.collect())
+    Ok(names.map(|name| by_name.remove(&name?)).collect())
 }
 
 /// Reads the page and the heights of a block.

@@ -19,7 +19,7 @@ pub(crate) struct RegisteredFace {
     pub(crate) side: BlockSide,
     /// Unit of the scan.
     pub(crate) unit: LengthUnit,
-    /// Share of the places of the face that agree with the page, 0..=1.
+    /// Fraction of the places of the face that agree with the page, 0..=1.
     pub(crate) agreement: f64,
     /// Where they agree.
     pub(crate) support: Support,
@@ -35,9 +35,6 @@ pub(crate) struct RegisteredFace {
 impl RegisteredFace {
     /// Collects the current outcomes of a block. Returns `None` if its page is not aligned: it has not run, was refused, or
     /// runs again.
-    ///
-    /// # Errors
-    /// Returns an error if a stored outcome has another form.
     pub(crate) fn of(detail: &BlockDetail) -> Result<Option<Self>, BlockViewError> {
         let next = detail.state.next_stage;
         let is_current = |stage| next.is_none_or(|next| stage < next);
@@ -59,13 +56,13 @@ impl RegisteredFace {
             }
             None => (aligned.page_from_face, BlockStage::Align),
         };
-        let made_with = align.made_with["page"].clone();
+        let provenance = align.provenance["page"].clone();
         Ok(Some(Self {
             side: aligned.side,
             unit: scan.unit,
             agreement: aligned.agreement.agreeing,
             support: aligned.support,
-            page_hash: serde_json::from_value(made_with).unwrap_or_default(),
+            page_hash: serde_json::from_value(provenance).unwrap_or_default(),
             face: shown
                 .ok_or_else(|| unusable(BlockStage::Face, "it has no face on the aligned side"))?,
             files: serde_json::from_value(face.files.clone())
@@ -80,8 +77,7 @@ impl RegisteredFace {
     /// # Errors
     /// Returns an error if the stored map has no grid.
     pub(crate) fn map(&self) -> Result<PageMap, BlockViewError> {
-        let map = PageMap::try_from(self.map.clone());
-        map.map_err(|why| unusable(self.map_stage, &why))
+        PageMap::try_from(self.map.clone()).map_err(|why| unusable(self.map_stage, &why))
     }
 
     /// Returns the number of columns of the nodes of the map, and the pixels of the page of the nodes, row by row.
@@ -123,6 +119,5 @@ pub(super) fn unusable(stage: BlockStage, why: &str) -> BlockViewError {
 }
 
 pub(super) fn outcome<T: DeserializeOwned>(stage: &BlockStageDetail) -> Result<T, BlockViewError> {
-    let read = T::deserialize(&stage.outcome);
-    read.map_err(|error| unusable(stage.stage, &error.to_string()))
+    T::deserialize(&stage.outcome).map_err(|error| unusable(stage.stage, &error.to_string()))
 }

@@ -1,4 +1,4 @@
-//! The format `csv`: a table with one row per pair and metric, for spreadsheets and R.
+//! The format `csv`: a table with one row per pair and metric, for spreadsheets and R, and a second one with the matrices.
 
 use ::csv::{Terminator, WriterBuilder};
 use serde_json::{Map, Value};
@@ -7,10 +7,36 @@ use crate::export_folder::{FolderError, SharedFile};
 use crate::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
 use crate::pair_pictures::PictureError;
 use crate::record::{MetricFields, PairFields, PairRecord, ReviewerFields};
-use crate::record_fields::{METRIC_FIELDS, PAIR_FIELDS, RecordField, markdown_table, schema_of};
+use crate::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
 
-/// The table.
+/// The table of numbers and texts.
 const TABLE: &str = "pairs.csv";
+/// The table of matrices, with the same rows.
+const MATRICES: &str = "matrices.csv";
+/// Fields that `pairs.csv` begins with: what people look for. The others follow in the order of the fields.
+const FIRST_FIELDS: [&str; 19] = [
+    "id",
+    "character",
+    "block",
+    "metric",
+    "verdict",
+    "confidence",
+    "ssim",
+    "nl_ssim",
+    "iou",
+    "iou_box",
+    "dice",
+    "angle_deg",
+    "scale",
+    "shift_px",
+    "threshold_depth",
+    "status",
+    "error_class",
+    "error",
+    "verdicts",
+];
+/// Columns by which the rows of `matrices.csv` are joined with those of `pairs.csv`.
+const KEYS: [&str; 2] = ["id", "metric"];
 /// Mark by which Excel recognizes UTF-8.
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
@@ -36,42 +62,61 @@ struct ResultColumn {
     pointer: String,
 }
 
-/// Writes `pairs.csv`.
+/// A table of an export.
+struct CsvTable {
+    columns: Vec<ResultColumn>,
+    file: SharedFile,
+}
+
+impl CsvTable {
+    /// Creates the file of a table, with its header.
+    fn begin(folder: &FormatFolder, name: &str, fields: &[&str]) -> Result<Self, FolderError> {
+        let mut file = SharedFile::create(&folder.root, name)?;
+        if folder.context.options.csv_bom {
+            file.append(BYTE_ORDER_MARK)?;
+        }
+        let columns = columns(fields, &folder.context.meta_columns);
+        let header = columns.iter().map(|column| text_cell(&column.name));
+        file.append(&rows([header.collect()]))?;
+        Ok(Self { columns, file })
+    }
+
+    /// Returns rows of the table from the fields of results.
+    fn encode(&self, results: &[Value]) -> Vec<u8> {
+        let cells = |result: &Value| {
+            let cell = |column: &ResultColumn| {
+                let value = result.pointer(&column.pointer);
+                value.map_or_else(String::new, cell)
+            };
+            self.columns.iter().map(cell).collect()
+        };
+        rows(results.iter().map(cells))
+    }
+}
+
+/// Writes `pairs.csv` and `matrices.csv`.
 pub(super) struct CsvWriter {
     folder: FormatFolder,
-    columns: Vec<ResultColumn>,
-    table: SharedFile,
+    tables: [CsvTable; 2],
 }
 
 impl CsvWriter {
     pub(super) fn begin(folder: FormatFolder) -> Result<Self, FolderError> {
-        let mut table = SharedFile::create(&folder.root, TABLE)?;
-        if folder.context.options.csv_bom {
-            table.append(BYTE_ORDER_MARK)?;
-        }
-        let columns = columns(&folder.context.meta_columns);
-        table.append(&rows([columns
-            .iter()
-            .map(|column| text_cell(&column.name))
-            .collect()]))?;
-        Ok(Self {
-            folder,
-            columns,
-            table,
-        })
+        let tables = [
+            CsvTable::begin(&folder, TABLE, &table_fields())?,
+            CsvTable::begin(&folder, MATRICES, &matrix_fields())?,
+        ];
+        Ok(Self { folder, tables })
     }
 
-    /// Returns the cells of a pair and metric.
-    fn cells(&self, pair: &Map<String, Value>, metric: &MetricFields) -> Vec<String> {
-        let mut row = pair.clone();
-        row["verdicts_text"] = judgements(&metric.verdicts).into();
-        if let Ok(Value::Object(fields)) = serde_json::to_value(metric) {
-            row.extend(fields);
+    /// Returns the fields of a pair and metric.
+    fn fields(pair: &Map<String, Value>, metric: &MetricFields) -> Value {
+        let mut fields = pair.clone();
+        fields["verdicts_text"] = judgements(&metric.verdicts).into();
+        if let Ok(Value::Object(of_metric)) = serde_json::to_value(metric) {
+            fields.extend(of_metric);
         }
-        let row = Value::Object(row);
-        let cell =
-            |column: &ResultColumn| row.pointer(&column.pointer).map_or_else(String::new, cell);
-        self.columns.iter().map(cell).collect()
+        Value::Object(fields)
     }
 }
 
@@ -85,27 +130,37 @@ impl FormatWriter for CsvWriter {
             Vec::new()
         };
         let metrics = view.record.metrics.iter().chain(&missing);
-        let text = rows(metrics.map(|metric| self.cells(&pair, metric)));
+        let results: Vec<Value> = metrics.map(|metric| Self::fields(&pair, metric)).collect();
         Ok(EncodedPair {
             files: Vec::new(),
-            shared: vec![text],
+            shared: self
+                .tables
+                .iter()
+                .map(|table| table.encode(&results))
+                .collect(),
         })
     }
 
     fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
-        shared.iter().try_for_each(|rows| self.table.append(rows))
+        let mut tables = self.tables.iter_mut().zip(shared);
+        tables.try_for_each(|(table, rows)| table.file.append(&rows))
     }
 
     fn finish(&mut self) -> Result<Vec<String>, FolderError> {
-        self.table.flush()?;
-        Ok(vec![TABLE.to_owned()])
+        for table in &mut self.tables {
+            table.file.flush()?;
+        }
+        Ok([TABLE, MATRICES].map(str::to_owned).to_vec())
     }
 
     fn guide(&self) -> FormatGuide {
         let tables = [("Columns", &PAIR_FIELDS[..]), ("", &METRIC_FIELDS[..])];
         FormatGuide {
             purpose: "Results of block scans aligned with prints, as a table with one row per pair and metric.".to_owned(),
-            files: vec![[TABLE, "the table: UTF-8, comma-separated, lines end with CR LF"].map(str::to_owned)],
+            files: vec![
+                [TABLE, "numbers and texts: UTF-8, comma-separated, lines end with CR LF"].map(str::to_owned),
+                [MATRICES, "matrices of the same rows, by `id` and `metric`"].map(str::to_owned),
+            ],
             usage: "\
 Elements of lists and matrices are columns with their indices from 1: `print_from_mesh_2_4` is row 2, column 4. The
 user's columns begin with `meta_`. `curvature_1` to `curvature_6` are `height_from_mesh.curvature`. `verdicts` lists
@@ -114,6 +169,8 @@ begins with `'`.
 
 ```r
 pairs <- read.csv(\"pairs.csv\", fileEncoding = \"UTF-8-BOM\")
+matrices <- read.csv(\"matrices.csv\", fileEncoding = \"UTF-8-BOM\")
+pairs <- merge(pairs, matrices, by = c(\"id\", \"metric\"))
 ```"
             .to_owned(),
             fields: markdown_table(&schema_of::<RowSchema>(), &tables),
@@ -131,10 +188,37 @@ struct RowSchema {
     _metric: MetricFields,
 }
 
-/// Returns the columns in the order of the fields.
-fn columns(meta: &[String]) -> Vec<ResultColumn> {
+/// Returns whether a field is in `matrices.csv`: maps and surfaces, which few people read by eye.
+fn is_matrix(field: &str) -> bool {
+    let is_two_dimensional =
+        |(list, lengths): &(&str, &[usize])| *list == field && lengths.len() == 2;
+    field == "height_from_mesh" || LISTS.iter().any(is_two_dimensional)
+}
+
+/// Returns all fields, in their order.
+fn all_fields() -> impl Iterator<Item = &'static str> {
+    PAIR_FIELDS
+        .iter()
+        .chain(&METRIC_FIELDS)
+        .map(|field| field.name)
+}
+
+/// Returns the fields of `pairs.csv`.
+fn table_fields() -> Vec<&'static str> {
+    let others = all_fields().filter(|name| !FIRST_FIELDS.contains(name) && !is_matrix(name));
+    FIRST_FIELDS.into_iter().chain(others).collect()
+}
+
+/// Returns the fields of `matrices.csv`.
+fn matrix_fields() -> Vec<&'static str> {
+    let matrices = all_fields().filter(|name| is_matrix(name));
+    KEYS.into_iter().chain(matrices).collect()
+}
+
+/// Returns the columns of fields.
+fn columns(fields: &[&str], meta: &[String]) -> Vec<ResultColumn> {
     let mut columns = Vec::new();
-    for RecordField { name, .. } in PAIR_FIELDS.iter().chain(&METRIC_FIELDS) {
+    for name in fields {
         match *name {
             "meta" => columns.extend(meta.iter().map(|key| ResultColumn {
                 name: format!("meta_{key}"),
@@ -242,7 +326,63 @@ fn rows(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
 mod tests {
     use serde_json::json;
 
-    use super::cell;
+    use super::{FIRST_FIELDS, all_fields, cell, columns, matrix_fields, table_fields};
+
+    fn names(fields: &[&str]) -> Vec<String> {
+        let columns = columns(fields, &["tờ".to_owned()]);
+        columns.into_iter().map(|column| column.name).collect()
+    }
+
+    #[test]
+    fn the_table_begins_with_what_people_look_for_and_has_no_matrices() {
+        let names = names(&table_fields());
+        assert_eq!(
+            names[..6],
+            [
+                "id",
+                "character",
+                "block",
+                "metric",
+                "verdict",
+                "confidence"
+            ]
+        );
+        assert_eq!(names[11..14], ["angle_deg", "scale", "shift_px_1"]);
+        assert!(names.contains(&"meta_tờ".to_owned()), "{names:?}");
+        assert!(
+            names.iter().all(|name| !name.contains("_from_")),
+            "{names:?}"
+        );
+    }
+
+    #[test]
+    fn every_field_is_in_one_of_the_tables() {
+        let (table, matrices) = (table_fields(), matrix_fields());
+        for field in all_fields() {
+            let is_key = ["id", "metric"].contains(&field);
+            assert_eq!(
+                table.contains(&field) && matrices.contains(&field),
+                is_key,
+                "{field}"
+            );
+            assert!(
+                table.contains(&field) || matrices.contains(&field),
+                "{field}"
+            );
+        }
+        assert!(
+            FIRST_FIELDS
+                .iter()
+                .all(|name| all_fields().any(|field| field == *name))
+        );
+        let names = names(&matrices);
+        assert_eq!(names[..3], ["id", "metric", "plane_from_mesh_1_1"]);
+        assert!(names.contains(&"curvature_6".to_owned()), "{names:?}");
+        assert_eq!(
+            names.last().map(String::as_str),
+            Some("print_from_depth_3_3")
+        );
+    }
 
     #[test]
     fn no_text_is_a_formula_and_numbers_stay_numbers() {

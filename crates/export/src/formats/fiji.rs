@@ -1,18 +1,10 @@
 //! The format `fiji`: calibrated TIFF images.
 
-use super::single_results::{FileOfPair, SingleResults};
-use crate::export_folder::FolderError;
+use super::single_results::{FileOfPair, ShownResult, SingleResultFormat};
 use crate::fiji::{AlignedPictures, FijiImages};
-use crate::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
+use crate::format_writer::PairView;
 use crate::pair_pictures::PictureError;
-use crate::record::PairRecord;
 
-/// Files of a pair.
-const FILES: [FileOfPair; 3] = [
-    ["heights", "pairs/*/heights.tif", HEIGHTS],
-    ["stack", "pairs/*/stack.tif", STACK],
-    ["strokes", "pairs/*/strokes.tif", STROKES],
-];
 const HEIGHTS: &str =
     "32-bit heights over the fitted surface in mm, in the frame of the depth map; NaN is no data";
 const STACK: &str = "three 32-bit channels in the frame of the pictures: print (0-255), heights in mm, stroke mask \
@@ -39,24 +31,24 @@ with tifffile.TiffFile(\"pairs/ID/heights.tif\") as file:
 ```
 ";
 
-/// Writes the images.
-pub(super) struct FijiWriter {
-    results: SingleResults,
-}
+/// The calibrated images.
+#[derive(Default)]
+pub(super) struct FijiFormat;
 
-impl FijiWriter {
-    pub(super) fn begin(folder: &FormatFolder) -> Result<Self, FolderError> {
-        Ok(Self {
-            results: SingleResults::begin(folder)?,
-        })
-    }
-}
+impl SingleResultFormat for FijiFormat {
+    const PURPOSE: &'static str = "Prints and heights of carved blocks as calibrated TIFF images.";
+    const FILES: &'static [FileOfPair] = &[
+        ["heights", "pairs/*/heights.tif", HEIGHTS],
+        ["stack", "pairs/*/stack.tif", STACK],
+        ["strokes", "pairs/*/strokes.tif", STROKES],
+    ];
+    const USAGE: &'static str = USAGE;
 
-impl FormatWriter for FijiWriter {
-    fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
-        let Some(shown) = SingleResults::of_pair(view) else {
-            return Ok(self.results.without_result(view));
-        };
+    fn contents(
+        &self,
+        _: &PairView<'_>,
+        shown: ShownResult<'_>,
+    ) -> Result<Vec<Vec<u8>>, PictureError> {
         let (pictures, outcome) = (shown.pictures, &shown.record.outcome);
         let aligned = AlignedPictures {
             print: pictures.print_rgb()?,
@@ -68,22 +60,6 @@ impl FormatWriter for FijiWriter {
                 .after(&outcome.print_from_depth),
         };
         let images = FijiImages::new(&pictures.depth()?.levels, &shown.scale, &aligned);
-        let contents = [images.heights, images.stack, images.strokes];
-        Ok(self
-            .results
-            .with_files(view, shown.fields, &FILES, contents))
-    }
-
-    fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
-        shared.iter().try_for_each(|line| self.results.append(line))
-    }
-
-    fn finish(&mut self) -> Result<Vec<String>, FolderError> {
-        Ok(vec![self.results.finish()?])
-    }
-
-    fn guide(&self) -> FormatGuide {
-        let purpose = "Prints and heights of carved blocks as calibrated TIFF images.";
-        self.results.guide_of_files(purpose, &FILES, USAGE)
+        Ok(vec![images.heights, images.stack, images.strokes])
     }
 }

@@ -2,31 +2,19 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::single_results::{FileOfPair, SingleResults};
-use crate::export_folder::FolderError;
-use crate::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
+use super::single_results::{FileOfPair, ShownResult, SingleResultFormat};
+use crate::format_writer::PairView;
 use crate::mesh::{MeshPlacement, ScanFiles, ScanTitle};
 use crate::pair_pictures::PictureError;
 use crate::pictures::eight_bits;
-use crate::record::PairRecord;
 
-/// Files of a pair.
-const FILES: [FileOfPair; 4] = [
-    ["ply", "pairs/*/scan.ply", SCAN],
-    ["glb", "pairs/*/scan.glb", GLB],
-    ["matrix", "pairs/*/matrix.txt", MATRIX],
-    [
-        "project",
-        "pairs/*/scan.mlp",
-        "MeshLab project with `scan.ply`",
-    ],
-];
 const SCAN: &str = "the scan, binary PLY in millimetres: per vertex the colour of the print, `stroke` (1 on strokes) and \
     `height` over the fitted surface";
 const GLB: &str =
     "the scan, glTF 2.0 in metres with the print as texture; `asset.extras` states units and maps";
 const MATRIX: &str =
     "4 x 4 matrix from the original mesh file to `scan.ply`, a similarity without reflection";
+const PROJECT: &str = "MeshLab project with `scan.ply`";
 
 /// The frame, and how to open the files.
 const USAGE: &str = "\
@@ -65,27 +53,28 @@ tops = scan.vertices[vertices[\"stroke\"] == 1]                # mm
 ```
 ";
 
-/// Writes the scans.
-pub(super) struct MeshWriter {
-    results: SingleResults,
+/// The placed scans.
+#[derive(Default)]
+pub(super) struct PlacedScanFormat {
     /// Held while a scan is read. Until its repeated vertices are merged, a scan takes several times its memory.
     reading: Mutex<()>,
 }
 
-impl MeshWriter {
-    pub(super) fn begin(folder: &FormatFolder) -> Result<Self, FolderError> {
-        Ok(Self {
-            results: SingleResults::begin(folder)?,
-            reading: Mutex::default(),
-        })
-    }
-}
+impl SingleResultFormat for PlacedScanFormat {
+    const PURPOSE: &'static str = "Scans of carved blocks, moved onto their prints.";
+    const FILES: &'static [FileOfPair] = &[
+        ["ply", "pairs/*/scan.ply", SCAN],
+        ["glb", "pairs/*/scan.glb", GLB],
+        ["matrix", "pairs/*/matrix.txt", MATRIX],
+        ["project", "pairs/*/scan.mlp", PROJECT],
+    ];
+    const USAGE: &'static str = USAGE;
 
-impl FormatWriter for MeshWriter {
-    fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
-        let Some(shown) = SingleResults::of_pair(view) else {
-            return Ok(self.results.without_result(view));
-        };
+    fn contents(
+        &self,
+        view: &PairView<'_>,
+        shown: ShownResult<'_>,
+    ) -> Result<Vec<Vec<u8>>, PictureError> {
         let pictures = shown.pictures;
         let print = eight_bits(&pictures.source_print()?.picture);
         let placement = MeshPlacement::new(
@@ -111,27 +100,7 @@ impl FormatWriter for MeshWriter {
         };
         let files = ScanFiles::new(mesh, &placement, &print, &title)
             .map_err(|error| PictureError::Unencodable(error.to_string()))?;
-        let contents = [
-            files.ply,
-            files.glb,
-            files.matrix.into_bytes(),
-            files.project.into_bytes(),
-        ];
-        Ok(self
-            .results
-            .with_files(view, shown.fields, &FILES, contents))
-    }
-
-    fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
-        shared.iter().try_for_each(|line| self.results.append(line))
-    }
-
-    fn finish(&mut self) -> Result<Vec<String>, FolderError> {
-        Ok(vec![self.results.finish()?])
-    }
-
-    fn guide(&self) -> FormatGuide {
-        let purpose = "Scans of carved blocks, moved onto their prints.";
-        self.results.guide_of_files(purpose, &FILES, USAGE)
+        let [matrix, project] = [files.matrix, files.project].map(String::into_bytes);
+        Ok(vec![files.ply, files.glb, matrix, project])
     }
 }

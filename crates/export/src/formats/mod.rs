@@ -14,14 +14,12 @@ mod webdataset;
 #[cfg(test)]
 pub(super) use jsonl::ExportLine;
 
+use self::single_results::{SingleResultFormat, SingleResultWriter};
 use super::export_folder::FolderError;
 use super::format::ExportFormat;
 use super::format_writer::{FormatFolder, FormatWriter};
 
 /// Creates the writer of a format for an empty folder.
-///
-/// # Errors
-/// Returns an error if a file cannot be created.
 pub(super) fn begin(
     format: ExportFormat,
     folder: FormatFolder,
@@ -32,9 +30,15 @@ pub(super) fn begin(
         ExportFormat::Parquet => Box::new(parquet::ParquetWriter::begin(folder)?),
         ExportFormat::HuggingFace => Box::new(huggingface::HuggingFaceWriter::begin(folder)?),
         ExportFormat::WebDataset => Box::new(webdataset::WebDatasetWriter::begin(folder)?),
-        ExportFormat::Mesh => Box::new(mesh::MeshWriter::begin(&folder)?),
-        ExportFormat::Fiji => Box::new(fiji::FijiWriter::begin(&folder)?),
-        ExportFormat::Viewer => Box::new(viewer::ViewerWriter::begin(&folder)?),
+        ExportFormat::Mesh => single_result::<mesh::PlacedScanFormat>(&folder)?,
+        ExportFormat::Fiji => single_result::<fiji::FijiFormat>(&folder)?,
+        ExportFormat::Viewer => single_result::<viewer::ViewerFormat>(&folder)?,
         ExportFormat::Annotations => Box::new(annotations::AnnotationWriter::begin(folder)?),
     })
+}
+
+fn single_result<F: SingleResultFormat + 'static>(
+    folder: &FormatFolder,
+) -> Result<Box<dyn FormatWriter>, FolderError> {
+    Ok(Box::new(SingleResultWriter::<F>::begin(folder)?))
 }

@@ -1,4 +1,4 @@
-//! The file `pairs.jsonl` of formats that hold one result per pair.
+//! Formats that hold one result per pair, and their file `pairs.jsonl`.
 
 use std::collections::BTreeMap;
 
@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use crate::export_folder::{FolderError, SharedFile};
 use crate::export_logs::json_lines;
-use crate::format_writer::{EncodedPair, FormatFolder, FormatGuide, PairView};
-use crate::pair_pictures::PairPictures;
-use crate::record::{MetricFields, PairFields};
+use crate::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
+use crate::pair_pictures::{PairPictures, PictureError};
+use crate::record::{MetricFields, PairFields, PairRecord};
 use crate::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
 use crate::sample::chosen;
 use mocban_catalog::MetricRecord;
@@ -44,6 +44,74 @@ struct SingleResult<'a> {
     metric: &'a MetricFields,
     /// Files of the pair, paths below the folder of `pairs.jsonl`; null if the pair has no result.
     files: Option<NamedFiles>,
+}
+
+/// A format whose files show one result of each pair.
+pub(super) trait SingleResultFormat: Default + Send + Sync {
+    /// What the folder is.
+    const PURPOSE: &'static str;
+    /// Files of a pair.
+    const FILES: &'static [FileOfPair];
+    /// How to open the files, as Markdown.
+    const USAGE: &'static str;
+
+    /// Encodes the files of a pair, in the order of [`Self::FILES`].
+    fn contents(
+        &self,
+        view: &PairView<'_>,
+        shown: ShownResult<'_>,
+    ) -> Result<Vec<Vec<u8>>, PictureError>;
+}
+
+/// Writes the files of a format, with a line about each pair.
+pub(super) struct SingleResultWriter<F> {
+    format: F,
+    results: SingleResults,
+}
+
+impl<F: SingleResultFormat> SingleResultWriter<F> {
+    pub(super) fn begin(folder: &FormatFolder) -> Result<Self, FolderError> {
+        Ok(Self {
+            format: F::default(),
+            results: SingleResults::begin(folder)?,
+        })
+    }
+}
+
+impl<F: SingleResultFormat> FormatWriter for SingleResultWriter<F> {
+    fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
+        let Some(shown) = SingleResults::of_pair(view) else {
+            return Ok(self.results.without_result(view));
+        };
+        let mut encoded = EncodedPair::default();
+        let mut names = NamedFiles::new();
+        let fields = shown.fields;
+        let contents = self.format.contents(view, shown)?;
+        for ([name, path, _], content) in F::FILES.iter().zip(contents) {
+            names.insert(name, (*path).to_owned());
+            encoded.add_file(*path, content);
+        }
+        let line = self.results.line(view, Some((fields, names)));
+        encoded.shared.push(line);
+        Ok(encoded)
+    }
+
+    fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
+        shared.iter().try_for_each(|line| self.results.append(line))
+    }
+
+    fn finish(&mut self) -> Result<Vec<String>, FolderError> {
+        Ok(vec![self.results.finish()?])
+    }
+
+    fn guide(&self) -> FormatGuide {
+        let paths = F::FILES.iter().map(|[_, path, _]| path.replace('*', "ID"));
+        let paths: Vec<String> = paths.collect();
+        let rows = F::FILES.iter().zip(&paths);
+        let rows = rows.map(|([_, _, meaning], path)| [path.as_str(), *meaning]);
+        let rows: Vec<[&str; 2]> = rows.collect();
+        self.results.guide(F::PURPOSE, &rows, F::USAGE)
+    }
 }
 
 /// Selects one result per pair, and writes a line about each.
@@ -92,25 +160,6 @@ impl SingleResults {
         }
     }
 
-    /// Returns a pair with its line and its files. `contents` are in the order of `files`.
-    pub(super) fn with_files(
-        &self,
-        view: &PairView<'_>,
-        fields: &MetricFields,
-        files: &[FileOfPair],
-        contents: impl IntoIterator<Item = Vec<u8>>,
-    ) -> EncodedPair {
-        let mut encoded = EncodedPair::default();
-        let mut names = NamedFiles::new();
-        for ([name, path, _], content) in files.iter().zip(contents) {
-            names.insert(name, (*path).to_owned());
-            encoded.add_file(*path, content);
-        }
-        let line = self.line(view, Some((fields, names)));
-        encoded.shared.push(line);
-        encoded
-    }
-
     /// Returns the line of a pair. `shown` is its result with its files.
     pub(super) fn line(
         &self,
@@ -141,24 +190,6 @@ impl SingleResults {
     pub(super) fn finish(&mut self) -> Result<String, FolderError> {
         self.lines.flush()?;
         Ok(LINES.to_owned())
-    }
-
-    /// Returns what the README says about the lines and the files of each pair, for a format with this purpose.
-    pub(super) fn guide_of_files(
-        &self,
-        purpose: &str,
-        files: &[FileOfPair],
-        usage: &str,
-    ) -> FormatGuide {
-        let paths: Vec<String> = files
-            .iter()
-            .map(|[_, path, _]| path.replace('*', "ID"))
-            .collect();
-        let rows = files.iter().zip(&paths);
-        let rows: Vec<[&str; 2]> = rows
-            .map(|([_, _, meaning], path)| [path.as_str(), *meaning])
-            .collect();
-        self.guide(purpose, &rows, usage)
     }
 
     /// Returns what the README says about the lines, for a format with this purpose and these files.

@@ -61,7 +61,7 @@ impl MeshPlacement {
                 &scale.depth_from_plane,
                 &fit.plane_from_mesh,
             ),
-            height_from_mesh: HeightFromMesh::new(&fit.plane_from_mesh, scale.bow.as_ref()),
+            height_from_mesh: HeightFromMesh::new(&fit.plane_from_mesh, scale.curvature.as_ref()),
             threshold: outcome.threshold_depth,
             frame_from_plane: Rigid3::to_frame(axes, [origin[0], origin[1], 0.0]),
             writing_is_mirrored: print_from_plane.determinant() >= 0.0,
@@ -149,8 +149,8 @@ fn upright_axes(print_from_plane: &Affine2) -> [[f64; 2]; 2] {
 pub(super) mod tests {
     use super::{Levelling, MeshPlacement};
     use mocban_core::domain::{
-        Affine2, Bow, DepthScale, Disagreement, FitOutcome, LengthUnit, MetricOutcome, Rigid3,
-        ScanRegion, Scores, SideEvidence, ThresholdMetric,
+        Affine2, Curvature, DepthScale, Disagreement, FitOutcome, LengthUnit, MetricOutcome,
+        Rigid3, ScanRegion, Scores, SideEvidence, ThresholdMetric,
     };
 
     const SIZE: [usize; 2] = [200, 100];
@@ -164,8 +164,8 @@ pub(super) mod tests {
     fn fit() -> FitOutcome {
         FitOutcome {
             plane_from_mesh: plane_from_mesh(),
-            bow: None,
-            bow_height: 0.0,
+            curvature: None,
+            curvature_height: 0.0,
             inlier_ratio: 1.0,
             rms: 0.0,
             relief: 1.0,
@@ -178,6 +178,7 @@ pub(super) mod tests {
             print_outline: None,
             vertices: 0,
             triangles: 0,
+            missing_vertices: None,
         }
     }
 
@@ -187,7 +188,7 @@ pub(super) mod tests {
             height_per_level: 2e-5,
             mesh_unit_per_px: 0.025,
             depth_from_plane: Affine2([[-40.0, 0.0, 100.0], [0.0, -40.0, 90.0]]),
-            bow: Some(Bow([0.01, 0.0, 0.02, 0.0, 0.0, 0.003])),
+            curvature: Some(Curvature([0.01, 0.0, 0.02, 0.0, 0.0, 0.003])),
             unit,
         }
     }
@@ -295,10 +296,10 @@ pub(super) mod tests {
     #[test]
     fn strokes_are_measured_from_the_curved_surface_within_the_region() {
         let [x, y] = [1.5, -2.0];
-        let bow = scale(None).bow.expect("a curved block").height(x, y);
+        let curvature = scale(None).curvature.expect("a curved block").height(x, y);
         let placed = placement(Some(LengthUnit::Mm));
         for (height, is_stroke) in [(-0.399, true), (-0.401, false)] {
-            let found = placed.place(mesh_point([x, y, bow + height]));
+            let found = placed.place(mesh_point([x, y, curvature + height]));
             assert!((found.height - height).abs() < 1e-9);
             assert_eq!(found.is_stroke, is_stroke, "{height}");
         }

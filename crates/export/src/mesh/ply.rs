@@ -10,9 +10,6 @@ const WHITE: [u8; 3] = [255; 3];
 
 /// Writes a scan as binary little-endian PLY: per vertex its position, print colour, stroke label (0 or 1) and height
 /// over the fitted surface; per face its corners. `unit` is the unit of the scan, if known.
-///
-/// # Errors
-/// Returns an error if the output cannot be written.
 pub(super) fn write_ply(
     mesh: &PlacedMesh,
     unit: Option<LengthUnit>,

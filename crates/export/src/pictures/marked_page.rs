@@ -12,7 +12,7 @@ const LEGEND_FONTS: [f32; 2] = [14.0, 34.0];
 const NAME_FONTS: [f32; 5] = [17.0, 15.0, 13.0, 12.0, 11.0];
 /// Width of the outline of a box, pixels.
 const OUTLINE: usize = 3;
-/// Share of the page that is left under a name, of 4.
+/// Fraction of the page that is left under a name, of 4.
 const UNDER_NAME: u16 = 1;
 
 /// A box on a picture of a page.
@@ -112,10 +112,9 @@ fn name(picture: &mut Rgb, one: &MarkedBox, others: &[[f64; 4]]) {
 /// Returns the first name that fits into a width in pixels at any size, and the size; the last one is shortened. Returns
 /// `None` if there are no names.
 fn fitting_name(names: &[String], space: usize) -> Option<(String, f32)> {
-    let sizes = names
+    let fitting = names
         .iter()
-        .flat_map(|text| NAME_FONTS.map(|size| (text, size)));
-    let fitting = sizes
+        .flat_map(|text| NAME_FONTS.map(|size| (text, size)))
         .into_iter()
         .find(|(text, size)| text_width(text, *size) <= space);
     if let Some((text, size)) = fitting {

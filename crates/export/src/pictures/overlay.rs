@@ -156,7 +156,7 @@ mod tests {
     use super::{EDGE, PrintView, TRUE_EDGE, edges};
     use mocban_core::domain::{Affine2, ThresholdMetric};
     use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage};
-    use mocban_report::test_fixtures;
+    use mocban_results::test_fixtures;
 
     /// A bar of 4 x 20 px at (8, 5) on a lower level in a map of 30 x 30 px.
     fn depth() -> DepthMap {
@@ -173,6 +173,7 @@ mod tests {
         PrintImage {
             rgb: Grid::new(30, 30, [60_000; 3]),
             turned: None,
+            ignored_profile: None,
         }
     }
 

@@ -5,7 +5,8 @@ use mocban_core::raster::Grid;
 
 /// Altitude of the light above the horizon, in radians. A low light shows shallow relief.
 const LIGHT_ALTITUDE_RAD: f64 = 35.0 * std::f64::consts::PI / 180.0;
-/// Share of the grey value that depends on height. Without this share, flat tops and flat background would look alike.
+/// Fraction of the grey value that depends on height. Without this fraction, flat tops and flat background would look
+/// alike.
 const HEIGHT_SHARE: f64 = 0.3;
 /// Red, green and blue in full light, 0..=1: the colour of wood.
 const WOOD: [f64; 3] = [1.0, 0.95, 0.86];

@@ -19,7 +19,7 @@ const LEGEND_FONT: f32 = 20.0;
 const NOTE_FONT: f32 = 0.8;
 /// Most columns that leave the images large enough.
 const MAX_COLUMNS: usize = 12;
-/// Share of the width of a cell that a long id has at least, percent.
+/// Fraction of the width of a cell that a long id has at least, percent.
 const ID_PERCENT: usize = 60;
 /// Space between the numbers of a note.
 pub const NOTE_SPACE: &str = "   ";

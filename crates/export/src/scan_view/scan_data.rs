@@ -7,14 +7,15 @@ use serde_json::{Value, json};
 
 use super::view_inputs::ViewInputs;
 use crate::mesh::texture_coordinates;
-use crate::pair_pictures::{InputFileLimits, PairPictures, PictureError};
+use crate::pair_pictures::{PairPictures, PictureError};
 use crate::stage_outcomes::StageOutcomes;
 use mocban_catalog::PairResults;
+use mocban_core::InputLimits;
 use mocban_core::domain::{Affine2, DepthScale, LengthUnit, MetricOutcome, ThresholdMetric};
-use mocban_report::pair_artifacts::PairArtifacts;
+use mocban_results::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
-/// Share of the heights below and above the range of the threshold slider.
+/// Fraction of the heights below and above the range of the threshold slider.
 const OUTSIDE_RANGE: f64 = 0.002;
 
 /// The data of the 3D view of a result: a scan in the frame of its print, and textures.
@@ -37,7 +38,7 @@ impl ScanView {
         project: &Project,
         pair: &PairResults,
         metric: ThresholdMetric,
-        limits: InputFileLimits,
+        limits: InputLimits,
     ) -> Result<Option<Self>, PictureError> {
         let Some(record) = pair.metric(metric) else {
             return Ok(None);
@@ -61,7 +62,7 @@ impl ScanView {
         metric: ThresholdMetric,
         print_from_depth: &Affine2,
         level: u16,
-        limits: InputFileLimits,
+        limits: InputLimits,
     ) -> Result<Option<Self>, PictureError> {
         let Some(record) = pair.metric(metric) else {
             return Ok(None);

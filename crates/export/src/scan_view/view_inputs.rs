@@ -68,8 +68,7 @@ impl ViewInputs {
         let print = eight_bits(picture);
         let size = [print.width(), print.height()];
         let fit = pictures.outcomes.fit.clone();
-        let placement = MeshPlacement::new(fit, scale, outcome, size);
-        let placement = placement
+        let placement = MeshPlacement::new(fit, scale, outcome, size)
             .ok_or_else(|| PictureError::Unencodable("the alignment has no inverse".to_owned()))?;
         let (levelling, map) = (
             pictures.outcomes.register.levelling,

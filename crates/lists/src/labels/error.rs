@@ -136,7 +136,7 @@ pub enum LabelsProblem {
         page: [u32; 2],
     },
     /// Two boxes have the same name.
-    #[error("box {first} and box {second} are both named {}; rename one of them", quoted(.name))]
+    #[error("box {first} and box {second} are both named {} (upper and lower case are equal); rename one of them", quoted(.name))]
     SameName {
         /// The name.
         name: String,

@@ -1,10 +1,10 @@
 //! Labels of a page: boxes of characters that a person or a program drew on the image of a page.
 //!
-//! Eight formats are read, recognized by their content ([`LabelFormat`]); VIA 2 and COCO are written. The functions
+//! The formats of [`LabelFormat`] are read, recognized by their content; VIA 2 and COCO are written. The functions
 //! take and return bytes and touch no files.
 //!
 //! # Frame
-//! In all eight formats, coordinates are edges: x from 0 to the width of the page, (0, 0) is the **outer corner** of the
+//! In all formats, coordinates are edges: x from 0 to the width of the page, (0, 0) is the **outer corner** of the
 //! top-left pixel, and a box around exactly this pixel is x = 0, y = 0, width = 1, height = 1. The outlines of
 //! [`LabelBox`] have the pixel convention of this crate instead, in which (0, 0) is the **centre** of the top-left
 //! pixel: reading subtracts 0.5 from both coordinates, and writing adds it. The box around the top-left pixel is

@@ -42,6 +42,7 @@ pub(super) fn fit_to_page(
     }
     check_count(file.regions.len())?;
     let mut warnings = page_warnings(&file, page);
+    warnings.extend(file.warnings);
     let scale = scale(file.size, page, &mut warnings)?;
     let placed = with_area(file.regions, scale, &mut warnings);
     if placed.is_empty() {
@@ -49,21 +50,18 @@ pub(super) fn fit_to_page(
     }
     let inside = on_page(placed, page, &mut warnings)?;
     let unique = without_repeats(inside, &mut warnings);
-    check_names(&unique)?;
+    let names = names(&unique)?;
     check_overlap(&unique, page)?;
     let pixel_centres = |corners: Corners| corners.into_iter().map(|[x, y]| [x - 0.5, y - 0.5]);
-    let finished = unique.into_iter().map(|placed| {
-        let name = placed.region.name.as_deref().map(PairName::new).transpose();
-        let place = || format!("the name of box {}", placed.region.number);
-        Ok(LabelBox {
-            name: name
-                .map_err(|error| LabelsProblem::at(place(), error.to_string()))?
-                .map(String::from),
+    let finished = unique
+        .into_iter()
+        .zip(names)
+        .map(|(placed, name)| LabelBox {
+            name: name.map(String::from),
             text: placed.region.text,
             outline: pixel_centres(placed.corners).collect(),
-        })
-    });
-    Ok((finished.collect::<Result<_, _>>()?, warnings))
+        });
+    Ok((finished.collect(), warnings))
 }
 
 /// Checks a number of boxes of a page, while they are read.
@@ -235,20 +233,25 @@ fn without_repeats(placed: Vec<PlacedRegion>, warnings: &mut Vec<String>) -> Vec
     unique
 }
 
-/// Refuses names that two boxes have.
-fn check_names(placed: &[PlacedRegion]) -> Result<(), LabelsProblem> {
-    let mut known: HashMap<&str, usize> = HashMap::new();
-    for region in placed.iter().map(|placed| &placed.region) {
-        let Some(name) = region.name.as_deref() else {
-            continue;
+/// Returns the names of the boxes. Refuses names that two boxes have, also if they differ in upper and lower case.
+fn names(placed: &[PlacedRegion]) -> Result<Vec<Option<PairName>>, LabelsProblem> {
+    let mut known: HashMap<String, usize> = HashMap::new();
+    let name = |placed: &PlacedRegion| {
+        let region = &placed.region;
+        let Some(text) = region.name.as_deref() else {
+            return Ok(None);
         };
-        if let Some(first) = known.insert(name, region.number) {
-            return Err(LabelsProblem::SameName {
-                name: name.to_owned(),
+        let place = || format!("the name of box {}", region.number);
+        let name =
+            PairName::new(text).map_err(|error| LabelsProblem::at(place(), error.to_string()))?;
+        match known.insert(name.folded(), region.number) {
+            None => Ok(Some(name)),
+            Some(first) => Err(LabelsProblem::SameName {
+                name: text.to_owned(),
                 first,
                 second: region.number,
-            });
+            }),
         }
-    }
-    Ok(())
+    };
+    placed.iter().map(name).collect()
 }

@@ -9,6 +9,7 @@ use super::message::{list, quoted};
 use super::model::{LabelFormat, Labels, PageFile};
 use super::page_fit::fit_to_page;
 use super::region::{PageRegions, shown};
+use crate::json_numbers::unknown_number;
 use mocban_core::domain::{FileKind, UniqueKeys, sanitize};
 
 /// Largest file that is read, in bytes.
@@ -135,13 +136,8 @@ fn broken_json(text: &str, error: &serde_json::Error) -> LabelsProblem {
         .lines()
         .nth(error.line().saturating_sub(1))
         .unwrap_or_default();
-    let at = error.column().saturating_sub(1);
     // Python writes numbers that JSON does not know.
-    let unknown = ["NaN", "-Infinity", "Infinity"].into_iter().find(|number| {
-        let rest = |at: usize| line.as_bytes().get(at..).unwrap_or_default();
-        rest(at).starts_with(number.as_bytes())
-            || rest(at.saturating_sub(1)).starts_with(number.as_bytes())
-    });
+    let unknown = unknown_number(line, error.column());
     LabelsProblem::Damaged {
         format: "JSON",
         reason: match unknown {

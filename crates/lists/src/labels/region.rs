@@ -25,16 +25,21 @@ const KINDS: &[&str] = &[
     "char",
     "character",
     "class",
+    "column",
     "default",
     "glyph",
     "item",
     "label",
+    "line",
     "object",
     "none",
+    "page",
     "region",
     "stroke",
     "symbol",
     "text",
+    "textline",
+    "textregion",
     "undefined",
     "unknown",
     "word",
@@ -77,6 +82,8 @@ pub(super) struct PageRegions {
     /// Width and height of the image in pixels.
     pub(super) size: Option<[f64; 2]>,
     pub(super) regions: Vec<LabelRegion>,
+    /// What was assumed or left out.
+    pub(super) warnings: Vec<String>,
 }
 
 /// Returns the first attribute in the order of `keys` that is a text, or also a whole number if `numbers`.

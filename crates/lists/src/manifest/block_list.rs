@@ -4,14 +4,37 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::column_names::{missing_column, similar_column};
+use super::csv::column_names;
 use super::draft::MAX_PATH_BYTES;
 use super::error::{ManifestError, at_line, of_list};
-use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
+use super::row::RowIds;
+use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
+use crate::columns::KnownColumns;
 use crate::quotes::check_quotes;
+use mocban_core::domain::spelling::plain_form;
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
 
-/// The columns of a list of blocks. The first three are required.
-const COLUMNS: [&str; 6] = ["block", "mesh", "page", "labels", "unit", "side"];
+/// The columns of a list of blocks, and their Vietnamese names. The first three are required.
+const COLUMNS: KnownColumns = KnownColumns {
+    names: &["block", "mesh", "page", "labels", "unit", "side"],
+    other_names: &[
+        ("so_hieu_van", "block"),
+        ("ma_van", "block"),
+        ("van", "block"),
+        ("van_khac", "block"),
+        ("khoi", "block"),
+        ("moc_ban", "block"),
+        ("ban_quet", "mesh"),
+        ("ban_quet_3d", "mesh"),
+        ("tep_quet", "mesh"),
+        ("luoi", "mesh"),
+        ("anh_trang", "page"),
+        ("trang", "page"),
+        ("nhan", "labels"),
+        ("don_vi", "unit"),
+        ("mat", "side"),
+    ],
+};
 const REQUIRED: usize = 3;
 
 /// A block of a list.
@@ -34,27 +57,34 @@ pub struct BlockRow {
 }
 
 /// Returns whether a list is one of blocks, by its header: it has the column `page`, or the column `block` with `labels`
-/// or `side` and without the columns of a list of pairs.
+/// or `side`, and not the columns of a list of pairs.
 pub fn is_block_list(bytes: &[u8]) -> bool {
-    let Ok(bytes) = as_utf8(bytes) else {
+    let Ok(text) = CsvText::new(bytes) else {
         return false;
     };
-    let mut record = ::csv::StringRecord::new();
-    if !matches!(reader(&bytes).read_record(&mut record), Ok(true)) {
+    let mut record = ::csv::ByteRecord::new();
+    if !matches!(reader(&text).read_byte_record(&mut record), Ok(true)) {
         return false;
     }
-    let names: Vec<String> = record.iter().map(str::to_lowercase).collect();
-    let has = |name: &str| names.iter().any(|found| found == name);
-    has("page") || has("block") && (has("labels") || has("side")) && !has("id") && !has("print")
+    let Ok(names) = column_names(1, &record, "") else {
+        return false;
+    };
+    let of = |known: &KnownColumns| known.assign(&names).unwrap_or_default().columns;
+    let (blocks, pairs) = (of(&COLUMNS), of(&super::row::COLUMNS));
+    let has = |columns: &[Option<&str>], name: &str| columns.contains(&Some(name));
+    let [id, print] = ["id", "print"].map(|name| has(&pairs, name));
+    let [block, page, labels, side] =
+        ["block", "page", "labels", "side"].map(|name| has(&blocks, name));
+    page && !(id && print) || block && (labels || side) && !id && !print
 }
 
-fn reader(bytes: &[u8]) -> ::csv::Reader<&[u8]> {
+fn reader<'t>(text: &'t CsvText<'_>) -> ::csv::Reader<&'t [u8]> {
     ::csv::ReaderBuilder::new()
-        .delimiter(delimiter(bytes))
+        .delimiter(text.delimiter)
         .trim(::csv::Trim::All)
         .flexible(true)
         .has_headers(false)
-        .from_reader(bytes)
+        .from_reader(&text.bytes)
 }
 
 /// Parses a list of blocks. Columns may be in any order, and their names in any case. Blank lines are ignored.
@@ -63,19 +93,20 @@ fn reader(bytes: &[u8]) -> ::csv::Reader<&[u8]> {
 /// Returns an error if the list cannot be decoded, contains no blocks, or has an invalid header or row. The error names
 /// the lines of invalid rows.
 pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
-    let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
-    check_quotes(bytes, delimiter(bytes))
-        .map_err(|error| at_line(error.line, &error.to_string()))?;
-    let mut reader = reader(bytes);
+    let text = CsvText::new(bytes).map_err(|error| of_list(&error.to_string()))?;
+    let bytes = &*text.bytes;
+    check_quotes(bytes, text.delimiter).map_err(|error| at_line(error.line, &error.to_string()))?;
+    let mut reader = reader(&text);
     let mut lines = LineCounter::new(bytes);
     let mut record = ::csv::ByteRecord::new();
     let mut problems = ManifestError::default();
+    let mut hint = String::new();
     if std::str::from_utf8(bytes).is_err() {
-        let hint = encoding_hint(bytes);
+        hint = encoding_hint(bytes);
         problems.add(of_list(&format!("the list is not UTF-8{hint}")));
     }
     let mut header: Option<Vec<&'static str>> = None;
-    let (mut rows, mut seen) = (Vec::new(), BTreeMap::new());
+    let (mut rows, mut ids) = (Vec::new(), RowIds::default());
     loop {
         let start = reader.position().clone();
         let is_read = match reader.read_byte_record(&mut record) {
@@ -91,7 +122,7 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
         }
         let line = lines.at(Some(record.position().unwrap_or(&start)));
         let Some(columns) = &header else {
-            header = Some(columns_of(line, &record)?);
+            header = Some(columns_of(line, &record, &hint)?);
             continue;
         };
         if record.iter().all(<[u8]>::is_empty) {
@@ -99,8 +130,9 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
         }
         let mut reasons = Vec::new();
         if let Some(row) = row(line, columns, &record, &mut reasons) {
-            if let Some(first) = seen.insert(row.name.clone(), line) {
-                reasons.push(format!("block \"{}\" is already on line {first}", row.name));
+            let name = row.name.as_pair();
+            if let Some(first) = ids.insert(name, line) {
+                reasons.push(first.reason("block", name.as_str()));
             }
             rows.push(row);
         }
@@ -114,45 +146,38 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
 }
 
 /// Returns the columns of a header.
-fn columns_of(line: usize, record: &::csv::ByteRecord) -> Result<Vec<&'static str>, ManifestError> {
+fn columns_of(
+    line: usize,
+    record: &::csv::ByteRecord,
+    encoding_hint: &str,
+) -> Result<Vec<&'static str>, ManifestError> {
+    let names = column_names(line, record, encoding_hint)?;
+    let columns = COLUMNS
+        .assign(&names)
+        .map_err(|same| at_line(line, &same.reason(&names)))?
+        .columns;
     let mut problems = ManifestError::default();
-    let is_known = |name: &str| COLUMNS.contains(&name);
-    let mut columns = Vec::new();
-    for field in record {
-        let name = String::from_utf8_lossy(field).to_lowercase();
-        let found = COLUMNS.into_iter().find(|column| *column == name);
-        match found {
-            Some(column) if columns.contains(&column) => {
-                problems.add(at_line(line, &format!("two columns are named {column:?}")));
-            }
-            Some(column) => columns.push(column),
-            None => {
-                let optional = COLUMNS[REQUIRED..].iter();
-                let similar = optional
-                    .copied()
-                    .find(|column| similar_column(&name, column));
-                let hint =
-                    similar.map(|column| format!("; rename it to {column:?} if it is meant"));
-                let hint = hint.unwrap_or_default();
-                let known = COLUMNS.join(", ");
-                let reason =
-                    format!("column {name:?} is unknown{hint}; a list of blocks has: {known}");
-                problems.add(at_line(line, &reason));
-            }
-        }
-    }
-    let missing = COLUMNS[..REQUIRED].iter();
-    let missing = missing.filter(|name| !columns.contains(*name));
-    let missing: Vec<_> = missing
-        .map(|name| at_line(line, &missing_column(name, record, is_known)))
-        .collect();
-    if !missing.is_empty() {
-        // A misspelt name is also unknown; say it once.
-        problems = ManifestError::default();
-        problems.extend(missing);
+    let required = COLUMNS.names[..REQUIRED].iter();
+    let missing = required.filter(|name| !columns.contains(&Some(**name)));
+    problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
+    // A misspelt name is also unknown; say it once.
+    problems.check(false)?;
+    let mut problems = ManifestError::default();
+    for (name, _) in names
+        .iter()
+        .zip(&columns)
+        .filter(|(_, known)| known.is_none())
+    {
+        let found = name.to_lowercase();
+        let mut optional = COLUMNS.names[REQUIRED..].iter();
+        let similar = optional.find(|column| similar_column(&found, column));
+        let hint = similar.map(|column| format!("; rename it to {column:?} if it is meant"));
+        let (hint, known) = (hint.unwrap_or_default(), COLUMNS.names.join(", "));
+        let reason = format!("column {name:?} is unknown{hint}; a list of blocks has: {known}");
+        problems.add(at_line(line, &reason));
     }
     problems.check(false)?;
-    Ok(columns)
+    Ok(columns.into_iter().flatten().collect())
 }
 
 /// Returns a row, or records why it is not valid.
@@ -180,11 +205,12 @@ fn row(
             ));
             return None;
         }
+        let cell = trimmed(cell);
         if !cell.is_empty() {
             cells.insert(*column, cell);
         }
     }
-    for column in &COLUMNS[1..REQUIRED] {
+    for column in &COLUMNS.names[1..REQUIRED] {
         if !cells.contains_key(column) {
             reasons.push(format!("{column} is empty"));
         }
@@ -193,8 +219,7 @@ fn row(
     let name = BlockName::new(name).map_err(|error| error.to_string());
     let unit = cells.get("unit").map(|cell| cell.to_ascii_lowercase());
     let unit = unit.map(|cell| cell.parse::<LengthUnit>()).transpose();
-    let side = cells.get("side").map(|cell| cell.to_ascii_lowercase());
-    let side = side.map(|cell| cell.parse::<BlockSide>()).transpose();
+    let side = cells.get("side").map(|cell| side(cell)).transpose();
     let mut record = |reason: Option<&String>| reasons.extend(reason.cloned());
     record(name.as_ref().err());
     record(unit.as_ref().err());
@@ -208,6 +233,15 @@ fn row(
         unit: unit.ok()?,
         side: side.ok()?,
     })
+}
+
+/// Parses a side, in English or Vietnamese.
+fn side(cell: &str) -> Result<BlockSide, String> {
+    match plain_form(cell).as_str() {
+        "truoc" | "mat truoc" => Ok(BlockSide::Front),
+        "sau" | "mat sau" => Ok(BlockSide::Back),
+        plain => plain.parse(),
+    }
 }
 
 #[cfg(test)]
@@ -225,6 +259,7 @@ mod tests {
             "block,mesh,page\n",
             "Block;Mesh;Page;labels\n",
             "block,mesh,pages,labels\n",
+            "sep=;\nSố hiệu ván;Bản quét;Ảnh trang;Mặt\n",
         ] {
             assert!(is_block_list(text.as_bytes()), "{text}");
         }
@@ -233,6 +268,8 @@ mod tests {
             "id,mesh,print\n",
             "",
             "block,mesh\n",
+            "id,mesh,print,page\n",
+            "mã,bản quét,bản in,trang\n",
         ] {
             assert!(!is_block_list(text.as_bytes()), "{text}");
         }
@@ -247,6 +284,18 @@ mod tests {
         assert_eq!(rows[0].side, Some(BlockSide::Back));
         assert_eq!(rows[0].labels.as_deref(), Some("l/1.json".as_ref()));
         assert_eq!((&rows[1].labels, rows[1].side), (&None, None));
+    }
+
+    #[test]
+    fn a_list_may_be_vietnamese() {
+        let text =
+            "sep=;\nSố hiệu ván;Bản quét; \"Ảnh trang\";nhãn;Mặt\nb1;m.stl;\u{a0}p.jpg;;Mặt sau\n";
+        let rows = parse_blocks(text.as_bytes()).expect("valid");
+        assert_eq!((rows[0].name.as_str(), rows[0].line), ("b1", 3));
+        assert_eq!(
+            (rows[0].page.to_str(), rows[0].side),
+            (Some("p.jpg"), Some(BlockSide::Back))
+        );
     }
 
     #[test]
@@ -269,6 +318,10 @@ mod tests {
             (
                 "block,mesh,page\nb,m,p\nb,m,p\n",
                 "line 3: block \"b\" is already on line 2",
+            ),
+            (
+                "block,mesh,page\nB1,m,p\nb1,m,p\n",
+                "line 3: block \"b1\" differs from that on line 2 only in upper and lower case",
             ),
             (
                 "block,mesh,page,side\nb,m,p,top\n",

@@ -41,26 +41,25 @@ const OTHER_NAMES: [(&str, &str); 22] = [
     ("đơn vị", "unit"),
 ];
 
-/// Describes a missing column. Suggests an unknown column with a similar name.
+/// Largest number of columns that are shown and compared.
+const MAX_SHOWN: usize = 12;
+
+/// Describes a missing column of a header. Suggests a column that is not known and has a similar name.
 pub(super) fn missing_column(
     name: &str,
-    record: &::csv::ByteRecord,
-    is_known: impl Fn(&str) -> bool,
+    header: &[&str],
+    columns: &[Option<&'static str>],
 ) -> String {
-    let found: Vec<_> = record
-        .iter()
-        .take(12)
-        .map(|field| String::from_utf8_lossy(field))
-        .collect();
+    let found = &header[..header.len().min(MAX_SHOWN)];
     let shown = found.join(", ");
-    let is_similar = |field: &&std::borrow::Cow<'_, str>| {
-        let field = field.trim().to_lowercase();
-        !is_known(&field) && similar_column(&field, name)
-    };
-    let hint = found.iter().find(is_similar).map(|field| {
-        let field = field.trim();
-        format!("; rename {field:?} to {name:?} if it is meant")
-    });
+    let unknown = found
+        .iter()
+        .zip(columns)
+        .filter(|(_, known)| known.is_none());
+    let mut similar = unknown.filter(|(field, _)| similar_column(&field.to_lowercase(), name));
+    let hint = similar
+        .next()
+        .map(|(field, _)| format!("; rename {field:?} to {name:?} if it is meant"));
     format!(
         "column {name:?} is missing{}; the header has: {shown}",
         hint.unwrap_or_default()

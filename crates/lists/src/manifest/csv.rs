@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use super::column_names::missing_column;
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, at_line, of_list};
-use super::row::{ManifestRow, REQUIRED, RowIds, known_column};
-use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
+use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
+use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
+use crate::columns::{HeaderColumns, SameColumn};
 use crate::quotes::check_quotes;
 
 /// Parses a CSV list with a header line. Columns may be in any order, and their names in any case. Blank lines are
@@ -22,14 +23,17 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
 }
 
 /// Parses a CSV list like [`parse_csv`], but passes each row to `each` instead of keeping all rows in memory. Valid
-/// rows are passed even if other rows are invalid. Returns the ids of the rows.
+/// rows are passed even if other rows are invalid. Returns the ids of the rows, and which columns have other names.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid header or row. The error names
 /// the lines of invalid rows.
-pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError> {
-    let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
-    let delimiter = delimiter(bytes);
+pub fn read_csv(
+    bytes: &[u8],
+    each: &mut dyn FnMut(ManifestRow),
+) -> Result<ReadRows, ManifestError> {
+    let text = CsvText::new(bytes).map_err(|error| of_list(&error.to_string()))?;
+    let (bytes, delimiter) = (&*text.bytes, text.delimiter);
     check_quotes(bytes, delimiter).map_err(|error| at_line(error.line, &error.to_string()))?;
     let mut reader = ::csv::ReaderBuilder::new()
         .delimiter(delimiter)
@@ -51,7 +55,11 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowId
             (Ok(false), Some(_)) => break,
             (Ok(false), None) => return Err(of_list("the list is empty").into()),
             (Ok(true), Some(header)) => rows.push(line, header.draft(line, &record)),
-            (Ok(true), None) => header = Some(CsvHeader::parse(line, &record, bytes)?),
+            (Ok(true), None) => {
+                let mut parsed = CsvHeader::parse(line, &record, bytes)?;
+                rows.add_renamed(std::mem::take(&mut parsed.renamed));
+                header = Some(parsed);
+            }
             (Err(error), _) => {
                 rows.push(line, Err(error.to_string()));
                 break;
@@ -94,10 +102,38 @@ impl std::io::Read for BoundedRows<'_> {
 /// Longest name of a column in bytes. Every row stores the names of its user-defined columns.
 const MAX_NAME_BYTES: usize = 1000;
 
+/// Returns the names of the columns of a header, without blanks at their ends.
+pub(super) fn column_names<'r>(
+    line: usize,
+    record: &'r ::csv::ByteRecord,
+    encoding_hint: &str,
+) -> Result<Vec<&'r str>, ManifestError> {
+    let mut problems = ManifestError::default();
+    let mut names = Vec::new();
+    for (number, field) in (1..).zip(record) {
+        let Ok(name) = std::str::from_utf8(field) else {
+            let reason = format!("the name of column {number} is not UTF-8{encoding_hint}");
+            problems.add(at_line(line, &reason));
+            continue;
+        };
+        if name.len() > MAX_NAME_BYTES {
+            let (len, limit) = (name.len(), MAX_NAME_BYTES);
+            let reason =
+                format!("the name of column {number} has {len} bytes, over the limit of {limit}");
+            problems.add(at_line(line, &reason));
+        }
+        names.push(trimmed(name));
+    }
+    problems.check(false)?;
+    Ok(names)
+}
+
 /// The header of a list.
 struct CsvHeader {
     /// The columns in order. Each has its standard name, if the column is known, and its name as written.
     columns: Vec<(Option<&'static str>, String)>,
+    /// Columns with other names, as written, each with its name.
+    renamed: Vec<(String, &'static str)>,
     /// What to do about cells that are not UTF-8.
     encoding_hint: String,
 }
@@ -108,39 +144,29 @@ impl CsvHeader {
             Ok(_) => String::new(),
             Err(_) => encoding_hint(list),
         };
-        let mut problems = ManifestError::default();
-        let mut seen = BTreeMap::new();
-        let mut columns = Vec::new();
-        for (number, field) in (1..).zip(record) {
-            let Ok(name) = std::str::from_utf8(field) else {
-                let reason = format!("the name of column {number} is not UTF-8{encoding_hint}");
-                problems.add(at_line(line, &reason));
-                continue;
-            };
-            if name.len() > MAX_NAME_BYTES {
-                let (len, limit) = (name.len(), MAX_NAME_BYTES);
-                let reason = format!(
-                    "the name of column {number} has {len} bytes, over the limit of {limit}"
-                );
-                problems.add(at_line(line, &reason));
-            }
-            let known = known_column(name);
-            if !name.is_empty()
-                && let Some(first) = seen.insert(known.unwrap_or(name), number)
+        let names = column_names(line, record, &encoding_hint)?;
+        let refuse = |same: SameColumn| at_line(line, &same.reason(&names));
+        let HeaderColumns { columns, renamed } = COLUMNS.assign(&names).map_err(refuse)?;
+        let mut others = BTreeMap::new();
+        for (k, name) in names.iter().enumerate() {
+            if columns[k].is_none()
+                && !name.is_empty()
+                && let Some(first) = others.insert(*name, k + 1)
             {
-                let reason = format!("columns {first} and {number} are both named {name:?}");
-                problems.add(at_line(line, &reason));
+                let second = k + 1;
+                return Err(refuse(SameColumn { first, second }).into());
             }
-            columns.push((known, name.to_owned()));
         }
-        let missing = REQUIRED.iter().filter(|name| !seen.contains_key(**name));
-        problems.extend(missing.map(|name| {
-            let is_known = |name: &str| known_column(name).is_some();
-            at_line(line, &missing_column(name, record, is_known))
-        }));
+        let mut problems = ManifestError::default();
+        let missing = REQUIRED
+            .iter()
+            .filter(|name| !columns.contains(&Some(**name)));
+        problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
         problems.check(false)?;
+        let names = names.into_iter().map(str::to_owned);
         Ok(Self {
-            columns,
+            columns: columns.into_iter().zip(names).collect(),
+            renamed,
             encoding_hint,
         })
     }
@@ -165,6 +191,7 @@ impl CsvHeader {
                 let hint = &self.encoding_hint;
                 return Err(format!("the cell of column {name:?} is not UTF-8{hint}"));
             };
+            let cell = trimmed(cell);
             if let Some(known) = known {
                 draft.cells.insert(known, cell.to_owned());
             } else if !cell.is_empty() && !name.is_empty() {
@@ -176,203 +203,4 @@ impl CsvHeader {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{ManifestError, ManifestRow};
-    use mocban_core::domain::LengthUnit;
-
-    fn parse(text: &str) -> Result<Vec<ManifestRow>, ManifestError> {
-        super::parse_csv(text.as_bytes())
-    }
-
-    fn refusal(text: &str) -> String {
-        parse(text).expect_err(text).to_string()
-    }
-
-    #[test]
-    fn known_columns_are_parsed_and_others_stored() {
-        let rows = parse(
-            "id,mesh,print,character,block,unit,scanned_face_down,folio\n\
-             b1_0001,m/1.stl,p/1.png,天,b1,mm,yes,12r\nb1_0002,m/2.stl,p/2.png,,,,,\n",
-        )
-        .expect("parses");
-        assert_eq!(rows[0].name.as_str(), "b1_0001");
-        assert_eq!(rows[0].mesh.to_str(), Some("m/1.stl"));
-        assert_eq!(rows[0].character.as_deref(), Some("天"));
-        assert_eq!(rows[0].unit, Some(LengthUnit::Mm));
-        assert_eq!(rows[0].scanned_face_down, Some(true));
-        assert_eq!(rows[0].meta["folio"], "12r");
-        assert_eq!(
-            (rows[1].line, rows[1].unit, &rows[1].block),
-            (3, None, &None)
-        );
-        assert!(rows[1].meta.is_empty());
-    }
-
-    #[test]
-    fn order_case_spaces_bom_and_separators_do_not_matter() {
-        let plain = parse("id,mesh,print\na,b,c\n").expect("parses");
-        for text in [
-            "\u{feff}id,mesh,print\r\na,b,c\r\n",
-            " Mesh ; ID ; PRINT\nb;a;c",
-            "print\tid\tmesh\nc\ta\tb\n",
-            "id,mesh,print\na,\"b\",c\n,,\n",
-        ] {
-            assert_eq!(parse(text).expect(text), plain, "{text:?}");
-        }
-    }
-
-    #[test]
-    fn lines_are_counted_through_blank_lines_and_long_cells() {
-        let rows =
-            parse("\n\nid,mesh,print,note\n\na,b,c,\"two\nlines\"\r\n\r\n\nd,e,f,\ng,h,i,\n")
-                .expect("parses");
-        let lines: Vec<_> = rows.iter().map(|row| row.line).collect();
-        assert_eq!(lines, [5, 9, 10]);
-    }
-
-    #[test]
-    fn every_problem_is_reported_with_its_line() {
-        let text = "id,mesh,print,unit,scanned_face_down\n\
-            a,m,p,,\n\
-            a/b,m,p,,\n\
-            ,m,p,,\n\
-            a,m,p,,\n\
-            c,,,furlong,maybe\n\
-            d,m\n";
-        assert_eq!(
-            refusal(text).lines().collect::<Vec<_>>(),
-            [
-                "line 3: id \"a/b\" holds '/'; an id has no slashes, control or invisible characters",
-                "line 4: the id is empty",
-                "line 5: id \"a\" is already on line 2",
-                "line 6: mesh is empty",
-                "line 6: print is empty",
-                "line 6: \"furlong\" is not a unit (mm, cm, m, in)",
-                "line 6: scanned_face_down is \"maybe\", not true, false, yes, no, 1 or 0",
-                "line 7: the row has 2 cells, the header has 5",
-            ]
-        );
-    }
-
-    #[test]
-    fn missing_and_repeated_columns_are_reported() {
-        assert_eq!(
-            refusal("id,model,print\na,b,c\n"),
-            "line 1: column \"mesh\" is missing; rename \"model\" to \"mesh\" if it is meant; the header has: id, \
-             model, print"
-        );
-        assert_eq!(
-            refusal("id,mesh,print,Mesh\na,b,c,d\n"),
-            "line 1: columns 2 and 4 are both named \"Mesh\""
-        );
-        assert_eq!(refusal(""), "the list is empty");
-        assert_eq!(refusal("id,mesh,print\n"), "the list contains no pairs");
-    }
-
-    #[test]
-    fn a_row_without_closing_quotation_mark_is_refused_with_its_line() {
-        let rest = "b,m,p,\n".repeat(1 << 18);
-        let text = format!("id,mesh,print,note\n\n\na/b,m,p,\n\nc,m,p,\"open\n{rest}");
-        assert_eq!(
-            refusal(&text),
-            "line 6: a quote is opened here and never closed"
-        );
-        let long = "x".repeat(1 << 21);
-        let text = format!("id,mesh,print,note\na/b,m,p,\nc,m,p,\"{long}\"\n");
-        assert_eq!(
-            refusal(&text).lines().collect::<Vec<_>>(),
-            [
-                "line 2: id \"a/b\" holds '/'; an id has no slashes, control or invisible characters",
-                "line 3: the row has more than 1048576 bytes; a closing quotation mark may be missing",
-            ]
-        );
-        // The limit applies to each row, not to the list.
-        let rows: Vec<_> = (0..300_000).map(|n| format!("{n},m,p")).collect();
-        let rows = parse(&format!("id,mesh,print\n{}", rows.join("\n"))).expect("parses");
-        assert_eq!(rows.last().map(|row| row.line), Some(300_001));
-    }
-
-    #[test]
-    fn a_long_column_name_is_refused() {
-        let name = "n".repeat(1001);
-        assert_eq!(
-            refusal(&format!("id,mesh,print,{name}\na,b,c,d\n")),
-            "line 1: the name of column 4 has 1001 bytes, over the limit of 1000"
-        );
-        let text = format!("id,mesh,print,{}\na,b,c,d\n", &name[1..]);
-        assert_eq!(parse(&text).expect("parses")[0].meta.len(), 1);
-    }
-
-    #[test]
-    fn bytes_that_are_not_utf8_are_reported_with_line_and_column() {
-        let error =
-            super::parse_csv(b"id,mesh,print\na,b,c\nd,\x01\xff\xfe,f\n").expect_err("bytes");
-        assert_eq!(
-            error.to_string(),
-            "line 3: the cell of column \"mesh\" is not UTF-8"
-        );
-        // "chữ" in Windows-1258: "ch", "ư" and a combining tilde.
-        let error = super::parse_csv(b"id,mesh,print\na,ch\xfd\xde.stl,c\n").expect_err("bytes");
-        assert_eq!(
-            error.to_string(),
-            "line 2: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
-             list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")"
-        );
-    }
-
-    #[test]
-    fn the_encoding_is_that_of_all_lines_and_given_once() {
-        // Without the second row, the first could be Windows-1252.
-        let error = super::parse_csv(b"id,mesh,print\na,\xe0.stl,c\nb,ch\xfd\xde.stl,c\n")
-            .expect_err("bytes");
-        assert_eq!(
-            error.to_string(),
-            "lines 2, 3: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
-             list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")"
-        );
-        // Only lines that are not UTF-8 decide, and this one is not text.
-        let list = ["id,mesh,print\nđá,a,b\ny,".as_bytes(), b"\x01\xff.stl,c\n"].concat();
-        let error = super::parse_csv(&list).expect_err("bytes");
-        assert_eq!(
-            error.to_string(),
-            "line 3: the cell of column \"mesh\" is not UTF-8"
-        );
-    }
-
-    #[test]
-    fn swapped_columns_are_named_once() {
-        let swapped = "id,mesh,print\n1,p/1.JPG,m/1.ply\n2,p/2.jpg,m/2.ply\n";
-        assert_eq!(
-            refusal(swapped),
-            "lines 2, 3: mesh names an image and print names a mesh; swap the two"
-        );
-        assert_eq!(
-            refusal("id,mesh,print\nm/1.stl,1,p/1.png\nm/2.stl,2,p/2.png\n"),
-            "lines 2, 3: id names a file; give each pair an id, or swap the columns if they are mixed up"
-        );
-        // The content decides, so an unusual extension is no reason to refuse a row.
-        assert!(parse("id,mesh,print\n1,scan.tif,print.dat\n").is_ok());
-    }
-
-    #[test]
-    fn a_misspelt_column_is_named() {
-        assert_eq!(
-            refusal("id,mech,print\na,b,c\n"),
-            "line 1: column \"mesh\" is missing; rename \"mech\" to \"mesh\" if it is meant; the header has: id, \
-             mech, print"
-        );
-        // `in` and `tên` are Vietnamese names of the columns.
-        let vietnamese = refusal("in,mesh,tên\na,b,c\n");
-        let renamed: Vec<_> = vietnamese
-            .lines()
-            .map(|line| line.split("; ").nth(1))
-            .collect();
-        assert_eq!(
-            renamed,
-            [
-                Some("rename \"tên\" to \"id\" if it is meant"),
-                Some("rename \"in\" to \"print\" if it is meant")
-            ]
-        );
-    }
-}
+mod tests;

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::error::{ManifestError, at_line};
+use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
-use super::row::{ManifestRow, REQUIRED, RowIds};
+use super::row::{ManifestRow, REQUIRED, ReadRows};
+use mocban_core::domain::spelling::plain_form;
 use mocban_core::domain::{PairName, PairNameError};
 
 /// The cells of one row by lower-case column name, and its other columns.
@@ -33,7 +34,7 @@ const ID_IS_FILE: &str =
 /// Passes valid rows on; collects problems and ids.
 pub(super) struct RowCollector<'e> {
     problems: ManifestError,
-    ids: RowIds,
+    read: ReadRows,
     each: &'e mut dyn FnMut(ManifestRow),
 }
 
@@ -42,15 +43,28 @@ impl<'e> RowCollector<'e> {
     pub(super) fn new(each: &'e mut dyn FnMut(ManifestRow)) -> Self {
         Self {
             problems: ManifestError::default(),
-            ids: RowIds::default(),
+            read: ReadRows::default(),
             each,
         }
     }
 
-    /// Returns the ids of the list, or all its problems.
-    pub(super) fn finish(self) -> Result<RowIds, ManifestError> {
-        self.problems.check(self.ids.is_empty())?;
-        Ok(self.ids)
+    /// Returns what was read, or all problems of the list.
+    pub(super) fn finish(self) -> Result<ReadRows, ManifestError> {
+        self.problems.check(self.read.ids.is_empty())?;
+        Ok(self.read)
+    }
+
+    /// Adds columns that were read under other names.
+    pub(super) fn add_renamed(
+        &mut self,
+        renamed: impl IntoIterator<Item = (String, &'static str)>,
+    ) {
+        self.read.renamed.extend(renamed);
+    }
+
+    /// Adds a problem of the list or of a line.
+    pub(super) fn add_problem(&mut self, problem: Problem) {
+        self.problems.add(problem);
     }
 
     /// Checks a row and passes it on if it is valid. Records the problems of an invalid row. Ignores a blank row.
@@ -86,8 +100,8 @@ impl<'e> RowCollector<'e> {
             }
         };
         let name = record(PairName::new(text).map_err(reason), reasons)?;
-        if let Some(first) = self.ids.insert(&name, draft.line) {
-            reasons.push(format!("id {text:?} is already on line {first}"));
+        if let Some(first) = self.read.ids.insert(&name, draft.line) {
+            reasons.push(first.reason("id", text));
             return None;
         }
         Some(name)
@@ -174,9 +188,9 @@ fn record<T>(value: Result<T, String>, reasons: &mut Vec<String>) -> Option<T> {
 }
 
 fn parse_flag(cell: &str) -> Result<bool, String> {
-    match cell.to_ascii_lowercase().as_str() {
-        "true" | "yes" | "1" => Ok(true),
-        "false" | "no" | "0" => Ok(false),
+    match plain_form(cell).as_str() {
+        "true" | "yes" | "1" | "co" | "dung" => Ok(true),
+        "false" | "no" | "0" | "khong" | "sai" => Ok(false),
         _ => Err(format!(
             "scanned_face_down is {cell:?}, not true, false, yes, no, 1 or 0"
         )),

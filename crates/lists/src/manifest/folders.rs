@@ -1,25 +1,36 @@
-//! Pairs from two directories. Files with the same stem form a pair, such as `stl/12.stl` and `print/12.png`.
+//! Pairs from two directories. Files with the same stem form a pair, such as `stl/12.stl` and `print/12.png`, also in
+//! folders of the same name, such as `stl/block-4/12.stl` and `print/block-4/12.png`.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use unicode_normalization::UnicodeNormalization as _;
 
 use super::error::{ManifestError, at_file, of_list};
 use super::row::ManifestRow;
 use mocban_core::domain::PairName;
+use mocban_core::domain::spelling::{fold_case, plain_form};
 
 const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
 const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
+/// Folders that name a kind of file, such as `stl` in `block-4/stl/12.stl`. They are no part of ids.
+const KIND_FOLDERS: [&str; 17] = [
+    "image", "images", "img", "jpeg", "jpg", "mesh", "meshes", "obj", "ply", "png", "print",
+    "prints", "scan", "scans", "stl", "tif", "tiff",
+];
+
+/// Longest list of similar files in a message.
+const MAX_SIMILAR: usize = 5;
+
 /// Returns whether the extension of a path is that of a mesh.
-pub(super) fn is_named_like_mesh(path: &Path) -> bool {
+pub fn is_named_like_mesh(path: &Path) -> bool {
     has_extension(path, &MESH_EXTENSIONS)
 }
 
 /// Returns whether the extension of a path is that of a print.
-pub(super) fn is_named_like_print(path: &Path) -> bool {
+pub fn is_named_like_print(path: &Path) -> bool {
     has_extension(path, &PRINT_EXTENSIONS)
 }
 
@@ -28,10 +39,19 @@ pub fn is_named_like_input(path: &Path) -> bool {
     is_named_like_mesh(path) || is_named_like_print(path)
 }
 
+/// A directory with the files in it and in its folders.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ListedFolder {
+    /// The directory.
+    pub root: PathBuf,
+    /// Its files.
+    pub files: Vec<PathBuf>,
+}
+
 /// The content of two directories.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FolderPairs {
-    /// Pairs in the order of their stems; numbers are ordered by value.
+    /// Pairs in the order of their folders and stems; numbers are ordered by value.
     pub rows: Vec<ManifestRow>,
     /// Meshes without a print.
     pub meshes_alone: Vec<PathBuf>,
@@ -39,114 +59,196 @@ pub struct FolderPairs {
     pub prints_alone: Vec<PathBuf>,
     /// Files with other extensions.
     pub ignored: Vec<PathBuf>,
+    /// Meshes and prints whose names differ only in accents or in zeros before a number: the first ones, as text.
+    pub similar: Vec<String>,
 }
 
-/// Pairs mesh files with print files of the same stem.
+/// Pairs mesh files with print files of the same folder and stem; upper and lower case are equal. The id of a pair in
+/// folders is `FOLDER_STEM`, and the folder is its block.
 ///
 /// Hidden files are skipped. The format of a file is detected later, from its content. The result does not depend on
 /// the order of `meshes` and `prints`.
 ///
 /// # Errors
-/// Returns an error if two meshes or two prints have the same stem, the stem of a pair is not a valid id, or there is
-/// no pair.
-pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPairs, ManifestError> {
+/// Returns an error if two meshes or two prints have the same id, the id of a pair is not valid, or there is no pair.
+pub fn pair_folders(
+    meshes: &ListedFolder,
+    prints: &ListedFolder,
+) -> Result<FolderPairs, ManifestError> {
     let mut problems = ManifestError::default();
-    let (meshes, mut ignored) = by_stem(meshes, &MESH_EXTENSIONS, "meshes", &mut problems);
-    let (mut prints, more) = by_stem(prints, &PRINT_EXTENSIONS, "prints", &mut problems);
-    ignored.extend(more);
+    let is_same = meshes.root == prints.root;
+    let (meshes, other_meshes) = by_id(meshes, is_named_like_mesh, "meshes", &mut problems);
+    let (mut prints, other_prints) = by_id(prints, is_named_like_print, "prints", &mut problems);
+    let (mut pairs, mut meshes_alone) = (Vec::new(), Vec::new());
+    for (id, mesh) in meshes {
+        match prints.remove(&id) {
+            Some(print) => pairs.push((mesh, print)),
+            None => meshes_alone.push(mesh),
+        }
+    }
+    let mut prints_alone: Vec<FolderFile> = prints.into_values().collect();
+    pairs.sort_by_key(|(mesh, _)| mesh.place());
     let mut rows = Vec::new();
-    let mut meshes_alone = Vec::new();
-    for (stem, mesh) in meshes {
-        let Some(print) = prints.remove(&stem) else {
-            meshes_alone.push(mesh);
-            continue;
-        };
-        match PairName::new(&stem.text) {
+    for (mesh, print) in pairs {
+        match PairName::new(&mesh.id()) {
             Ok(name) => rows.push(row(rows.len() + 1, name, mesh, print)),
-            Err(error) => problems.add(at_file(&mesh, &error.to_string())),
+            Err(error) => problems.add(at_file(&mesh.path, &error.to_string())),
         }
     }
     problems.check(false)?;
+    let is_swapped = other_meshes.iter().any(|path| is_named_like_print(path))
+        && other_prints.iter().any(|path| is_named_like_mesh(path));
+    let similar = similar(&meshes_alone, &prints_alone);
     if rows.is_empty() {
-        let is_swapped = ignored.iter().any(|path| is_named_like_print(path))
-            && ignored.iter().any(|path| is_named_like_mesh(path));
-        let reason = if is_swapped {
-            "--meshes holds images and --prints holds meshes; swap the two"
-        } else {
-            "no mesh has the same file name as a print"
-        };
-        return Err(of_list(reason).into());
+        return Err(of_list(&no_pair(is_swapped && meshes_alone.is_empty(), &similar)).into());
     }
+    for alone in [&mut meshes_alone, &mut prints_alone] {
+        alone.sort_by_key(FolderFile::place);
+    }
+    let paths = |files: Vec<FolderFile>| files.into_iter().map(|file| file.path).collect();
     Ok(FolderPairs {
         rows,
-        meshes_alone,
-        prints_alone: prints.into_values().collect(),
-        ignored,
+        meshes_alone: paths(meshes_alone),
+        prints_alone: paths(prints_alone),
+        ignored: if is_same {
+            let is_other = |path: &PathBuf| !is_named_like_input(path);
+            other_meshes.into_iter().filter(is_other).collect()
+        } else {
+            [other_meshes, other_prints].concat()
+        },
+        similar,
     })
 }
 
-fn row(line: usize, name: PairName, mesh: PathBuf, print: PathBuf) -> ManifestRow {
+/// Returns why a list of folders has no pairs.
+fn no_pair(is_swapped: bool, similar: &[String]) -> String {
+    if is_swapped {
+        return "--meshes holds images and --prints holds meshes; swap the two".to_owned();
+    }
+    let reason = "no mesh has the same file name as a print";
+    match similar.first() {
+        Some(first) => format!("{reason}; {first}"),
+        None => reason.to_owned(),
+    }
+}
+
+/// Describes meshes and prints without each other whose ids differ only in accents or in zeros before a number.
+fn similar(meshes: &[FolderFile], prints: &[FolderFile]) -> Vec<String> {
+    let prints: BTreeMap<String, &FolderFile> = prints
+        .iter()
+        .map(|print| (plain_form(&print.id()), print))
+        .collect();
+    let similar = meshes.iter().filter_map(|mesh| {
+        let print = prints.get(&plain_form(&mesh.id()))?;
+        let (mesh, print) = (mesh.path.display(), print.path.display());
+        Some(format!(
+            "{mesh} and {print} have similar names; rename one if they are a pair"
+        ))
+    });
+    similar.take(MAX_SIMILAR).collect()
+}
+
+fn row(line: usize, name: PairName, mesh: FolderFile, print: FolderFile) -> ManifestRow {
     ManifestRow {
         line,
         name,
-        mesh,
-        print,
+        block: mesh.block().or_else(|| print.block()),
+        mesh: mesh.path,
+        print: print.path,
         character: None,
-        block: None,
         unit: None,
         scanned_face_down: None,
         meta: BTreeMap::new(),
     }
 }
 
-/// A file stem; numbers are ordered by value, before all other stems.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct Stem {
-    rank: (bool, u64),
-    text: String,
+/// A file with the folders between it and the root.
+#[derive(Debug, Clone)]
+struct FolderFile {
+    path: PathBuf,
+    /// Names of the folders, without those of kinds of files.
+    folders: Vec<String>,
+    stem: String,
 }
 
-impl Stem {
-    fn of(path: &Path) -> Option<Self> {
-        // A mesh named on macOS and a print named on Windows may have different forms of the same letters.
-        let text: String = path.file_stem()?.to_string_lossy().nfc().collect();
-        let number = text.parse().ok();
+/// Part of a path for sorting: numbers are ordered by value, before all others.
+type SortedPart = (bool, u64, String);
+
+impl FolderFile {
+    /// Splits a path below a root into its parts, in composed letters: a mesh named on macOS and a print named on Windows
+    /// may have different forms of the same letters.
+    fn new(path: &Path, root: &Path) -> Option<Self> {
+        let text = |name: &std::ffi::OsStr| -> String { name.to_string_lossy().nfc().collect() };
+        let below = path.strip_prefix(root).unwrap_or(path);
+        let folders = below.parent().into_iter().flat_map(Path::components);
+        let folders = folders.filter_map(|part| match part {
+            Component::Normal(name) => Some(text(name)),
+            _ => None,
+        });
+        let is_kind = |name: &String| KIND_FOLDERS.contains(&name.to_lowercase().as_str());
         Some(Self {
-            rank: (number.is_none(), number.unwrap_or(0)),
-            text,
+            folders: folders.filter(|name| !is_kind(name)).collect(),
+            stem: text(path.file_stem()?),
+            path: path.to_owned(),
         })
+    }
+
+    fn block(&self) -> Option<String> {
+        (!self.folders.is_empty()).then(|| self.folders.join("_"))
+    }
+
+    fn id(&self) -> String {
+        let block = self.block().map_or_else(String::new, |block| block + "_");
+        block + &self.stem
+    }
+
+    fn place(&self) -> Vec<SortedPart> {
+        let parts = self.folders.iter().chain([&self.stem]);
+        let sorted = parts.map(|part| {
+            let number = part.parse().ok();
+            (number.is_none(), number.unwrap_or(0), part.clone())
+        });
+        sorted.collect()
     }
 }
 
-/// Splits the files into a map of those with one of the extensions, keyed by stem, and a list of the others. Skips
-/// hidden files. Adds a problem for each file with the same stem as an earlier file.
-fn by_stem(
-    listing: &[PathBuf],
-    extensions: &[&str],
+/// Splits the files into a map of those of a kind, keyed by id as Windows and macOS compare it, and a list of the others.
+/// Skips hidden files. Adds a problem for each file with the same id as an earlier file.
+fn by_id(
+    listed: &ListedFolder,
+    is_of_kind: impl Fn(&Path) -> bool,
     kind: &str,
     problems: &mut ManifestError,
-) -> (BTreeMap<Stem, PathBuf>, Vec<PathBuf>) {
-    let mut sorted = listing.to_vec();
+) -> (BTreeMap<String, FolderFile>, Vec<PathBuf>) {
+    let mut sorted = listed.files.clone();
     sorted.sort();
-    let mut found: BTreeMap<Stem, PathBuf> = BTreeMap::new();
-    let mut ignored = Vec::new();
+    let mut found: BTreeMap<String, FolderFile> = BTreeMap::new();
+    let mut others = Vec::new();
     for path in sorted.into_iter().filter(|path| !is_hidden(path)) {
-        let Some(stem) = Stem::of(&path).filter(|_| has_extension(&path, extensions)) else {
-            ignored.push(path);
+        let file = FolderFile::new(&path, &listed.root);
+        let Some(file) = file.filter(|_| is_of_kind(&path)) else {
+            others.push(path);
             continue;
         };
-        match found.entry(stem) {
+        match found.entry(fold_case(&file.id())) {
             Entry::Vacant(free) => {
-                free.insert(path);
+                free.insert(file);
             }
             Entry::Occupied(first) => {
-                let first = first.get().display();
-                let reason = format!("{first} has the same stem; {kind} are paired by stem");
+                let shown = first.get().path.display();
+                let reason = if first.get().id() == file.stem {
+                    format!("{shown} has the same stem; {kind} are paired by stem")
+                } else {
+                    let id = first.get().id();
+                    format!(
+                        "{shown} has the same id {id:?} (upper and lower case are equal); rename one of the {kind}"
+                    )
+                };
                 problems.add(at_file(&path, &reason));
             }
         }
     }
-    (found, ignored)
+    (found, others)
 }
 
 fn is_hidden(path: &Path) -> bool {
@@ -164,10 +266,114 @@ fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 mod tests {
     use std::path::PathBuf;
 
-    use super::pair_folders;
+    use super::{FolderPairs, ListedFolder, ManifestError};
 
     fn files(names: &[&str]) -> Vec<PathBuf> {
         names.iter().map(PathBuf::from).collect()
+    }
+
+    fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPairs, ManifestError> {
+        let listed = |root: &str, files: &[PathBuf]| ListedFolder {
+            root: root.into(),
+            files: files.to_vec(),
+        };
+        super::pair_folders(&listed("m", meshes), &listed("p", prints))
+    }
+
+    /// Returns ids and blocks.
+    fn ids(found: &FolderPairs) -> Vec<(&str, &str)> {
+        let rows = found.rows.iter();
+        rows.map(|row| (row.name.as_str(), row.block.as_deref().unwrap_or_default()))
+            .collect()
+    }
+
+    #[test]
+    fn folders_are_blocks_and_parts_of_ids() {
+        let meshes = files(&[
+            "m/b10/1.stl",
+            "m/b2/10.stl",
+            "m/b2/2.stl",
+            "m/3.stl",
+            "m/v1/b1/x.stl",
+        ]);
+        let prints = files(&[
+            "p/b2/2.png",
+            "p/b2/10.png",
+            "p/b10/1.png",
+            "p/3.png",
+            "p/v1/b1/x.png",
+            "p/b2/1.png",
+        ]);
+        let found = pair_folders(&meshes, &prints).expect("pairs");
+        let expected = [
+            ("3", ""),
+            ("b10_1", "b10"),
+            ("b2_2", "b2"),
+            ("b2_10", "b2"),
+            ("v1_b1_x", "v1_b1"),
+        ];
+        assert_eq!(ids(&found), expected);
+        assert_eq!(found.prints_alone, files(&["p/b2/1.png"]));
+    }
+
+    #[test]
+    fn meshes_and_prints_may_be_in_one_folder_per_block() {
+        let root = |names: &[&str]| ListedFolder {
+            root: "d".into(),
+            files: files(names),
+        };
+        for [mesh, print] in [
+            ["d/b1/1.stl", "d/b1/1.png"],
+            ["d/b1/stl/1.stl", "d/b1/print/1.png"],
+            ["d/Meshes/b1/1.stl", "d/Prints/B1/1.png"],
+        ] {
+            let both = root(&[mesh, print, "d/notes.txt"]);
+            let found = super::pair_folders(&both, &both).expect("a pair");
+            assert_eq!(ids(&found), [("b1_1", "b1")], "{mesh}");
+            assert_eq!(found.ignored, files(&["d/notes.txt"]));
+            assert!(found.meshes_alone.is_empty() && found.prints_alone.is_empty());
+        }
+        // The folder may be in the names already.
+        let found = pair_folders(&files(&["m/b1_1.stl"]), &files(&["p/b1/1.png"]));
+        assert_eq!(ids(&found.expect("a pair")), [("b1_1", "b1")]);
+    }
+
+    #[test]
+    fn files_with_equal_ids_are_both_named() {
+        let refusal = |meshes: &[&str]| {
+            let refused = pair_folders(&files(meshes), &files(&["p/a1.png"]));
+            refused.expect_err("twice").to_string()
+        };
+        assert_eq!(
+            refusal(&["m/A1.stl", "m/a1.stl"]),
+            "m/a1.stl: m/A1.stl has the same id \"A1\" (upper and lower case are equal); rename one of the meshes"
+        );
+        assert_eq!(
+            refusal(&["m/a/b_1.stl", "m/a_b/1.stl"]),
+            "m/a_b/1.stl: m/a/b_1.stl has the same id \"a_b_1\" (upper and lower case are equal); rename one of the meshes"
+        );
+        let found = pair_folders(&files(&["m/A1.STL"]), &files(&["p/a1.png"]));
+        assert_eq!(ids(&found.expect("a pair")), [("A1", "")]);
+    }
+
+    #[test]
+    fn names_that_differ_in_zeros_or_accents_are_offered() {
+        let meshes = files(&["m/117.stl", "m/chữ.stl", "m/5.stl"]);
+        let prints = files(&["p/0117.png", "p/chu.png", "p/5.png"]);
+        let found = pair_folders(&meshes, &prints).expect("a pair");
+        assert_eq!(
+            found.similar,
+            [
+                "m/117.stl and p/0117.png have similar names; rename one if they are a pair",
+                "m/chữ.stl and p/chu.png have similar names; rename one if they are a pair"
+            ]
+        );
+        let refused = pair_folders(&meshes[..1], &prints[..1]).expect_err("no pair");
+        assert_eq!(
+            refused.to_string(),
+            "no mesh has the same file name as a print; m/117.stl and p/0117.png have similar names; rename one if they \
+             are a pair"
+        );
     }
 
     #[test]

@@ -8,8 +8,11 @@ use serde_json::Value;
 
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, of_list};
-use super::row::{ManifestRow, RowIds, known_column};
-use super::text::as_utf8;
+use super::json_array::each_value;
+use super::row::{COLUMNS, ManifestRow, ReadRows};
+use super::text::{as_utf8, trimmed};
+use crate::columns::HeaderColumns;
+use crate::json_numbers::{nan_as_null, unknown_number};
 use mocban_core::domain::{KEY_TWICE, UniqueKeys};
 
 /// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` counts as no value. Blank lines are ignored.
@@ -24,7 +27,8 @@ pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
 }
 
 /// Parses a list like [`parse_jsonl`], but passes each row to `each` instead of keeping all rows in memory. Valid rows
-/// are passed even if other rows are invalid. Returns the ids of the rows.
+/// are passed even if other rows are invalid. Returns the ids of the rows, and which keys have other names. The list may
+/// also be a JSON array of objects, and `NaN`, which Python writes for missing values, counts as no value.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid row. The error names the lines
@@ -32,39 +36,75 @@ pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
 pub fn read_jsonl(
     bytes: &[u8],
     each: &mut dyn FnMut(ManifestRow),
-) -> Result<RowIds, ManifestError> {
+) -> Result<ReadRows, ManifestError> {
     let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
     let mut rows = RowCollector::new(each);
-    for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
-        let content = content.trim_ascii();
-        if content.is_empty() {
-            continue;
-        }
+    let mut keys = RowKeys::default();
+    let mut push = |line, content: &[u8]| {
         let draft = if content.len() > MAX_ROW_BYTES {
             let len = content.len();
             Err(format!(
                 "the row has {len} bytes, over the limit of {MAX_ROW_BYTES}"
             ))
         } else {
-            draft(line, content).map(Some)
+            draft(line, content, &mut keys).map(Some)
         };
+        rows.add_renamed(std::mem::take(&mut keys.columns.renamed));
         rows.push(line, draft);
+    };
+    if bytes.trim_ascii_start().starts_with(b"[") {
+        if let Err(problem) = each_value(bytes, &mut push) {
+            rows.add_problem(problem);
+        }
+        return rows.finish();
+    }
+    for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
+        let content = content.trim_ascii();
+        if !content.is_empty() {
+            push(line, content);
+        }
     }
     rows.finish()
 }
 
-fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
+/// The keys of the row before, and what they are: most rows of a list have the same keys.
+#[derive(Default)]
+struct RowKeys {
+    keys: Vec<String>,
+    columns: HeaderColumns,
+}
+
+impl RowKeys {
+    /// Finds out what the keys of a row are.
+    fn update(&mut self, object: &[(String, Value)]) -> Result<(), String> {
+        let keys = object.iter().map(|(key, _)| key);
+        if keys.clone().eq(&self.keys) {
+            return Ok(());
+        }
+        let twice = |k: usize| format!("the key {:?} {KEY_TWICE}", object[k].0);
+        let names: Vec<&str> = keys.clone().map(|key| key.trim()).collect();
+        let found = COLUMNS
+            .assign(&names)
+            .map_err(|same| twice(same.second - 1))?;
+        let mut others = BTreeSet::new();
+        let is_twice = |k: &usize| found.columns[*k].is_none() && !others.insert(&object[*k].0);
+        if let Some(k) = (0..object.len()).find(is_twice) {
+            return Err(twice(k));
+        }
+        self.keys = keys.cloned().collect();
+        self.columns = found;
+        Ok(())
+    }
+}
+
+fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, String> {
     let text = std::str::from_utf8(content)
         .map_err(|error| format!("byte {} is not UTF-8", error.valid_up_to() + 1))?;
-    let JsonEntries(object) = serde_json::from_str(text).map_err(|error| wrong_json(&error))?;
+    let JsonEntries(object) = parsed(text).map_err(|error| wrong_json(&error, line, text))?;
+    keys.update(&object)?;
     let mut draft = DraftRow::new(line);
-    let mut keys = BTreeSet::new();
-    for (key, value) in object {
-        let known = known_column(key.trim());
-        if !keys.insert(known.map_or_else(|| key.clone(), ToOwned::to_owned)) {
-            return Err(format!("the key {key:?} {KEY_TWICE}"));
-        }
-        match (known, value) {
+    for ((key, value), known) in object.into_iter().zip(&keys.columns.columns) {
+        match (*known, value) {
             (_, Value::Null) => {}
             (Some(name), value) => {
                 draft.cells.insert(name, cell(name, value)?);
@@ -75,6 +115,14 @@ fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
         }
     }
     Ok(draft)
+}
+
+/// Parses an object. If it is not JSON, tries again with `NaN` as no value.
+fn parsed(text: &str) -> serde_json::Result<JsonEntries> {
+    serde_json::from_str(text).or_else(|error| match nan_as_null(text) {
+        Some(text) => serde_json::from_str(&text),
+        None => Err(error),
+    })
 }
 
 /// The keys and values of a JSON object in their order. Unlike a map, it keeps keys that are given twice.
@@ -108,7 +156,7 @@ impl<'de> Visitor<'de> for EntriesVisitor {
 /// Returns a cell's value as text. Numbers are accepted, because ids are often numbers.
 fn cell(name: &str, value: Value) -> Result<String, String> {
     match value {
-        Value::String(text) => Ok(text.trim().to_owned()),
+        Value::String(text) => Ok(trimmed(&text).to_owned()),
         Value::Number(number) => Ok(number.to_string()),
         Value::Bool(flag) => Ok(flag.to_string()),
         Value::Null | Value::Array(_) | Value::Object(_) => {
@@ -117,15 +165,22 @@ fn cell(name: &str, value: Value) -> Result<String, String> {
     }
 }
 
-/// Formats a parser error without its line number. The number is always 1, because each line is parsed separately.
-fn wrong_json(error: &serde_json::Error) -> String {
+/// Formats a parser error of a row that begins on a line. Its place is a column, or a line if the row has several.
+fn wrong_json(error: &serde_json::Error, first: usize, text: &str) -> String {
     let message = error.to_string();
     let reason = message.rsplit_once(" at line ");
     let reason = reason.map_or(&*message, |(reason, _)| reason);
     if reason.ends_with(KEY_TWICE) {
         return reason.to_owned();
     }
-    format!("not a JSON object, column {}: {reason}", error.column())
+    if text.contains('\n') {
+        let line = first + error.line().max(1) - 1;
+        return format!("not a JSON object, line {line}: {reason}");
+    }
+    match unknown_number(text, error.column()) {
+        Some(number) => format!("{number} is not a number of JSON; write null or leave it out"),
+        None => format!("not a JSON object, column {}: {reason}", error.column()),
+    }
 }
 
 #[cfg(test)]
@@ -153,6 +208,67 @@ mod tests {
             (&csv[0].unit, &csv[0].scanned_face_down, &csv[1].name)
         );
         assert_eq!(json[1].line, 3);
+    }
+
+    #[test]
+    fn an_array_gives_the_same_rows_as_lines() {
+        let rows = [
+            r#"{"id":"a","mesh":"m.stl","print":"p.png","note":"x, [y] {z}"}"#,
+            r#"{"id":17,"mesh":"n","print":"q","block":null}"#,
+        ];
+        let lines = parse(&rows.join("\n")).expect("parses");
+        for list in [
+            format!("[{}]", rows.join(",\n")),
+            format!(
+                "\u{feff}\n[\n  {}\n]\n",
+                rows.join(",\n  ").replace("\",\"", "\",\n    \"")
+            ),
+        ] {
+            let array = parse(&list).expect("parses");
+            for (a, b) in array.iter().zip(&lines) {
+                assert_eq!((&a.name, &a.mesh, &a.meta), (&b.name, &b.mesh, &b.meta));
+            }
+            assert_eq!(array.len(), 2);
+        }
+        let refused = parse(
+            "[\n{\"id\":\"a\",\"mesh\":\"m\",\"print\":\"p\"},\n{\"id\":\"b\",\n\"mesh\":}\n, 3]",
+        );
+        assert_eq!(
+            refused.expect_err("refused").to_string(),
+            "line 3: not a JSON object, line 4: expected value\nline 5: not a JSON object, column 1: invalid type: \
+             integer `3`, expected a map"
+        );
+        let short = parse("[{\"id\":\"a\",\"mesh\":\"m\",\"print\":\"p\"}").expect_err("refused");
+        assert_eq!(
+            short.to_string(),
+            "line 1: the list ends early; save or copy it again"
+        );
+    }
+
+    #[test]
+    fn missing_values_of_python_are_no_values() {
+        let list = r#"{"id":"a NaN","mesh":"m","print":"p","block":NaN,"note":"NaN","year": NaN ,"ids":[NaN]}"#;
+        let rows = parse(list).expect("parses");
+        assert_eq!((rows[0].name.as_str(), &rows[0].block), ("a NaN", &None));
+        assert_eq!(rows[0].meta.len(), 2);
+        assert_eq!(rows[0].meta["note"], "NaN");
+        let refused = parse(r#"{"id":"a","mesh":"m","print":"p","year":-Infinity}"#);
+        assert_eq!(
+            refused.expect_err("refused").to_string(),
+            "line 1: -Infinity is not a number of JSON; write null or leave it out"
+        );
+    }
+
+    #[test]
+    fn keys_may_be_vietnamese() {
+        let rows =
+            parse(r#"{"Mã số":"a","bản quét":"m","Bản in":"p","khối":"b"}"#).expect("parses");
+        assert_eq!(rows[0].block.as_deref(), Some("b"));
+        let twice = parse(r#"{"id":"a","mesh":"m","print":"p","khối":"b","Khoi":"c"}"#);
+        assert_eq!(
+            twice.expect_err("refused").to_string(),
+            "line 1: the key \"Khoi\" is given twice"
+        );
     }
 
     #[test]

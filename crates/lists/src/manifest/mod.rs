@@ -7,6 +7,7 @@ mod csv;
 mod draft;
 mod error;
 mod folders;
+mod json_array;
 mod jsonl;
 mod misspelt_columns;
 mod row;
@@ -15,8 +16,12 @@ mod text;
 pub use self::csv::{parse_csv, read_csv};
 pub use block_list::{BlockRow, is_block_list, parse_blocks};
 pub use error::ManifestError;
-pub use folders::{FolderPairs, is_named_like_input, pair_folders};
+pub use folders::{
+    FolderPairs, ListedFolder, is_named_like_input, is_named_like_mesh, is_named_like_print,
+    pair_folders,
+};
 pub use jsonl::{parse_jsonl, read_jsonl};
 pub use misspelt_columns::MisspeltColumns;
-pub use row::{ManifestRow, RowIds};
-pub use text::{LineCounter, NotText, as_utf8, delimiter};
+pub(crate) use row::is_text_column;
+pub use row::{ManifestRow, ReadRows, RowIds};
+pub use text::{CsvText, LineCounter, NotText, as_utf8, trimmed};

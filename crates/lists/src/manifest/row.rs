@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 
+use crate::columns::{KnownColumns, plain_name};
 use mocban_core::domain::{ContentHash, LengthUnit, PairName};
 
 /// One pair of a list. Paths are stored as written; a relative path is relative to the list.
@@ -35,26 +36,129 @@ pub(super) const REQUIRED: [&str; 3] = ["id", "mesh", "print"];
 /// The other columns with a meaning.
 pub(super) const OPTIONAL: [&str; 4] = ["character", "block", "unit", "scanned_face_down"];
 
-/// Returns the column with a meaning of this name, ignoring case.
-pub(super) fn known_column(name: &str) -> Option<&'static str> {
-    let mut columns = REQUIRED.into_iter().chain(OPTIONAL);
-    columns.find(|known| known.eq_ignore_ascii_case(name))
+/// All columns with a meaning, and their Vietnamese names.
+pub(super) const COLUMNS: KnownColumns = KnownColumns {
+    names: &[
+        "id",
+        "mesh",
+        "print",
+        "character",
+        "block",
+        "unit",
+        "scanned_face_down",
+    ],
+    other_names: &[
+        ("ma_so", "id"),
+        ("so_hieu", "id"),
+        ("ky_hieu", "id"),
+        ("ma_chu", "id"),
+        ("so_hieu_chu", "id"),
+        ("ma", "id"),
+        ("ban_quet", "mesh"),
+        ("ban_quet_3d", "mesh"),
+        ("tep_quet", "mesh"),
+        ("mo_hinh_3d", "mesh"),
+        ("luoi", "mesh"),
+        ("ban_in", "print"),
+        ("anh_ban_in", "print"),
+        ("anh_in", "print"),
+        ("tep_anh", "print"),
+        ("chu", "character"),
+        ("mat_chu", "character"),
+        ("chu_nom", "character"),
+        ("chu_han", "character"),
+        ("ky_tu", "character"),
+        ("ki_tu", "character"),
+        ("ten_chu", "character"),
+        ("so_hieu_van", "block"),
+        ("ma_van", "block"),
+        ("so_hieu_khoi", "block"),
+        ("van", "block"),
+        ("van_khac", "block"),
+        ("khoi", "block"),
+        ("moc_ban", "block"),
+        ("don_vi", "unit"),
+        ("don_vi_do", "unit"),
+        ("quet_up", "scanned_face_down"),
+        ("quet_up_mat", "scanned_face_down"),
+    ],
+};
+
+/// Returns whether the values of a column in a list of pairs, of blocks or of verdicts are names of things or of files, so
+/// that none is a date.
+pub(crate) fn is_text_column(header: &str) -> bool {
+    const OTHERS: [&str; 6] = ["pair", "cap", "ma_cap", "page", "trang", "labels"];
+    let plain = plain_name(header);
+    let others = COLUMNS.other_names.iter();
+    let names = COLUMNS.names.iter().copied();
+    names
+        .chain(OTHERS)
+        .chain(others.map(|(name, _)| *name))
+        .any(|name| name == plain)
 }
+
+/// What was read of a list whose rows were passed on.
+#[derive(Debug, Default)]
+pub struct ReadRows {
+    /// The ids of the rows.
+    pub ids: RowIds,
+    /// Columns that were read under other names, as written, each with its name.
+    pub renamed: BTreeMap<String, &'static str>,
+}
+
+/// Why ids that differ only in case are refused.
+const ONE_FILE: &str = "so their files would be one on Windows and macOS; rename one of them";
 
 /// Number of hash bytes stored for each id. Among ten million ids, the probability of any collision is below 10^-24.
 const HASH_BYTES: usize = 16;
 
-/// The ids of a list, each with its line. Ids are stored as hashes, because a list may have millions of rows.
+/// The ids of a list, each with its line. Ids are stored as hashes, because a list may have millions of rows. No two ids
+/// differ only in upper and lower case: the files of both pairs would fall together on Windows and macOS.
 #[derive(Debug, Default)]
-pub struct RowIds(BTreeMap<[u8; HASH_BYTES], u32>);
+pub struct RowIds(BTreeMap<[u8; HASH_BYTES], FirstRow>);
+
+/// The first row with an id in upper or lower case.
+#[derive(Debug, Clone, Copy)]
+struct FirstRow {
+    line: u32,
+    /// Hash of the id as written.
+    exact: [u8; HASH_BYTES],
+}
+
+/// An earlier id that is equal to a new one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct EqualId {
+    pub(super) line: u32,
+    /// Whether they differ in upper and lower case.
+    pub(super) differs_in_case: bool,
+}
+
+impl EqualId {
+    /// Returns why a row with this id is refused. `kind` is the name of the column.
+    pub(super) fn reason(self, kind: &str, text: &str) -> String {
+        let line = self.line;
+        if self.differs_in_case {
+            format!(
+                "{kind} {text:?} differs from that on line {line} only in upper and lower case, {ONE_FILE}"
+            )
+        } else {
+            format!("{kind} {text:?} is already on line {line}")
+        }
+    }
+}
 
 impl RowIds {
-    /// Adds an id; returns its first line if it was added before.
-    pub(super) fn insert(&mut self, name: &PairName, line: usize) -> Option<u32> {
-        match self.0.entry(key(name)) {
-            Entry::Occupied(first) => Some(*first.get()),
+    /// Adds an id; returns the earlier one if an equal id was added before.
+    pub(super) fn insert(&mut self, name: &PairName, line: usize) -> Option<EqualId> {
+        let exact = key(name.as_str());
+        match self.0.entry(key(&name.folded())) {
+            Entry::Occupied(first) => Some(EqualId {
+                line: first.get().line,
+                differs_in_case: first.get().exact != exact,
+            }),
             Entry::Vacant(free) => {
-                free.insert(u32::try_from(line).unwrap_or(u32::MAX));
+                let line = u32::try_from(line).unwrap_or(u32::MAX);
+                free.insert(FirstRow { line, exact });
                 None
             }
         }
@@ -62,7 +166,8 @@ impl RowIds {
 
     /// Returns whether the list contains the id.
     pub fn contains(&self, name: &PairName) -> bool {
-        self.0.contains_key(&key(name))
+        let first = self.0.get(&key(&name.folded()));
+        first.is_some_and(|first| first.exact == key(name.as_str()))
     }
 
     /// Returns whether the list has no rows.
@@ -81,7 +186,7 @@ impl<'n> FromIterator<&'n PairName> for RowIds {
     }
 }
 
-fn key(name: &PairName) -> [u8; HASH_BYTES] {
-    let hash = ContentHash::of(name.as_str().as_bytes());
+fn key(text: &str) -> [u8; HASH_BYTES] {
+    let hash = ContentHash::of(text.as_bytes());
     std::array::from_fn(|at| hash.as_bytes()[at])
 }

@@ -12,7 +12,7 @@ pub enum NotText {
     DamagedUtf16,
     /// A workbook, such as a file of Excel.
     #[error(
-        "this is a workbook or an archive, not a text file; save the table as \"CSV UTF-8\" in the spreadsheet program"
+        "this is a workbook of an old format or with a password, or an archive; save the table as XLSX or as \"CSV UTF-8\" in the spreadsheet program"
     )]
     Workbook,
 }
@@ -37,6 +37,104 @@ pub fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotText> {
         [0, second, ..] if second != 0 => from_utf16(bytes, u16::from_be_bytes),
         _ => Ok(bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes).into()),
     }
+}
+
+/// A list in CSV, as its parser takes it.
+#[derive(Debug)]
+pub struct CsvText<'t> {
+    /// The text. If it is not UTF-8, the parser reports the line.
+    pub bytes: Cow<'t, [u8]>,
+    /// The separator of columns.
+    pub delimiter: u8,
+}
+
+impl<'t> CsvText<'t> {
+    /// Decodes a list and finds its separator: the one that a first line such as `sep=;` names for Excel, or
+    /// [`delimiter`]. The content of that line, and blanks before quoted cells, are left out; no line moves.
+    ///
+    /// # Errors
+    /// Returns an error if the bytes are not text.
+    pub fn new(bytes: &'t [u8]) -> Result<Self, NotText> {
+        let mut bytes = as_utf8(bytes)?;
+        let named = separator_line(&bytes);
+        let delimiter = named.unwrap_or_else(|| delimiter(&bytes));
+        if named.is_some() {
+            bytes = match bytes {
+                Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[SEPARATOR.len() + 1..]),
+                Cow::Owned(bytes) => Cow::Owned(bytes[SEPARATOR.len() + 1..].to_vec()),
+            };
+        }
+        if let Some(changed) = without_blanks_before_quotes(&bytes, delimiter) {
+            bytes = Cow::Owned(changed);
+        }
+        Ok(Self { bytes, delimiter })
+    }
+}
+
+/// Begins a first line that names the separator for Excel.
+const SEPARATOR: &[u8] = b"sep=";
+
+/// Returns the separator that the first line names.
+fn separator_line(list: &[u8]) -> Option<u8> {
+    let (start, rest) = list.split_at_checked(SEPARATOR.len())?;
+    match *rest {
+        [separator, b'\r' | b'\n', ..] if start.eq_ignore_ascii_case(SEPARATOR) => Some(separator),
+        _ => None,
+    }
+}
+
+/// Removes the blanks before quoted cells, as in `1, "a, b"`: the parser takes a quote for one only at the start of a cell.
+/// Returns `None` if there are none. A quote that is not closed before the end of the cell and the line stays as it is.
+fn without_blanks_before_quotes(list: &[u8], delimiter: u8) -> Option<Vec<u8>> {
+    let ends_cell = |byte: &u8| *byte == delimiter || matches!(byte, b'\n' | b'\r');
+    let is_blank = |byte: &&u8| matches!(byte, b' ' | b'\t') && **byte != delimiter;
+    // Almost no list has any.
+    if !list
+        .windows(2)
+        .any(|two| two[1] == b'"' && matches!(two[0], b' ' | b'\t'))
+    {
+        return None;
+    }
+    let (mut kept, mut copied, mut at) = (Vec::new(), 0, 0);
+    while at < list.len() {
+        let start = at + list[at..].iter().take_while(is_blank).count();
+        if list.get(start) == Some(&b'"') {
+            let end = end_of_quotes(list, start);
+            let after = end + list[end..].iter().take_while(is_blank).count();
+            let is_closed =
+                list.get(after).is_none_or(ends_cell) && !list[start..end].contains(&b'\n');
+            if start > at && is_closed && list[..end].last() == Some(&b'"') && end > start + 1 {
+                kept.extend_from_slice(&list[copied..at]);
+                copied = start;
+            }
+            at = if start == at || is_closed { end } else { start };
+        }
+        let rest = list[at..].iter().position(ends_cell);
+        at = rest.map_or(list.len(), |rest| at + rest + 1);
+    }
+    if copied == 0 {
+        return None;
+    }
+    kept.extend_from_slice(&list[copied..]);
+    Some(kept)
+}
+
+/// Returns the position behind the quote that closes the one at `start`, or the end of the list. Two quotes are a character.
+fn end_of_quotes(list: &[u8], start: usize) -> usize {
+    let mut at = start + 1;
+    while let Some(quote) = list[at..].iter().position(|byte| *byte == b'"') {
+        at += quote + 1;
+        if list.get(at) != Some(&b'"') {
+            return at;
+        }
+        at += 1;
+    }
+    list.len()
+}
+
+/// Returns a cell without blanks, no-break spaces and invisible marks at its ends.
+pub fn trimmed(cell: &str) -> &str {
+    cell.trim_matches(|c: char| c.is_whitespace() || matches!(c, '\u{feff}' | '\u{200b}'))
 }
 
 /// Bytes of the combining tone marks of Windows-1258.
@@ -86,7 +184,7 @@ fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, N
 
 /// Returns the column separator: the most frequent of tab, semicolon and comma in the first line that is not blank.
 /// Returns a comma if the line has none of them.
-pub fn delimiter(bytes: &[u8]) -> u8 {
+fn delimiter(bytes: &[u8]) -> u8 {
     let start = bytes.trim_ascii_start();
     let header = start.split(|byte| *byte == b'\n').next().unwrap_or(start);
     let count = |delimiter: u8| header.split(|byte| *byte == delimiter).count();
@@ -132,7 +230,46 @@ impl<B: AsRef<[u8]>> LineCounter<B> {
 
 #[cfg(test)]
 mod tests {
-    use super::{NotText, as_utf8, delimiter};
+    use super::{CsvText, NotText, as_utf8, delimiter};
+
+    fn text(list: &str) -> (String, char) {
+        let found = CsvText::new(list.as_bytes()).expect("text");
+        let text = String::from_utf8(found.bytes.into_owned()).expect("UTF-8");
+        (text, char::from(found.delimiter))
+    }
+
+    #[test]
+    fn a_first_line_may_name_the_separator() {
+        for list in ["sep=;\r\na;b,c,d\r\n", "\u{feff}SEP=;\na;b,c,d\n"] {
+            let (text, separator) = text(list);
+            assert_eq!((text.trim(), separator), ("a;b,c,d", ';'), "{list}");
+            assert_eq!(text.lines().count(), 2, "lines are counted as in the file");
+        }
+        assert_eq!(text("sep=;x\na,b\n").1, ';');
+        assert_eq!(text("sep,a\n").1, ',');
+    }
+
+    #[test]
+    fn blanks_before_quoted_cells_are_left_out() {
+        for (list, expected) in [
+            ("1, \"a, b\",c\n", "1,\"a, b\",c\n"),
+            (
+                "1,\t \"a\" , \"b\"\"c\"\n \"d\"",
+                "1,\"a\" ,\"b\"\"c\"\n\"d\"",
+            ),
+            // A quote inside a cell, inside quotes, and one that is not closed in its cell.
+            ("1, \"a\" b,c\n", "1, \"a\" b,c\n"),
+            ("1,\"x, \"\"y\"\" \",c\n", "1,\"x, \"\"y\"\" \",c\n"),
+            ("1, \"a\nb\",c\n", "1, \"a\nb\",c\n"),
+            ("1, \"", "1, \""),
+            ("1, \"\",c", "1,\"\",c"),
+            ("1,a\"b, c\"\n", "1,a\"b, c\"\n"),
+        ] {
+            assert_eq!(text(list).0, expected, "{list}");
+        }
+        // A tab separates cells.
+        assert_eq!(text("a\tb\n1\t\"x\"\n").0, "a\tb\n1\t\"x\"\n");
+    }
 
     #[test]
     fn utf16_and_marks_become_plain_utf8() {

@@ -16,9 +16,6 @@ pub struct AccessControl {
 
 impl AccessControl {
     /// Draws the secrets of a server that is bound to `address`. Cookies are named after `page`.
-    ///
-    /// # Errors
-    /// Returns an error if the operating system provides no randomness.
     pub fn new(page: &str, address: SocketAddr) -> std::io::Result<Self> {
         Ok(Self {
             address,

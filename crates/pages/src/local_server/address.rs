@@ -11,9 +11,6 @@ const DYNAMIC_PORTS: [u16; 2] = [49_152, 16_384];
 
 /// Binds the address. Port 0 tries a port that depends only on `name`, so that a restarted server has the same origin,
 /// and then any free port.
-///
-/// # Errors
-/// Returns an error if the address cannot be bound.
 pub async fn listen(address: SocketAddr, name: &str) -> std::io::Result<TcpListener> {
     if address.port() == 0
         && let Ok(listener) =

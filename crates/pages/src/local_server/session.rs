@@ -35,9 +35,6 @@ pub(super) struct Session {
 
 impl Session {
     /// Draws new secrets from the operating system. Cookies are named after the page and its port.
-    ///
-    /// # Errors
-    /// Returns an error if the operating system provides no randomness.
     pub(super) fn new(page: &str, port: u16) -> std::io::Result<Self> {
         Ok(Self {
             token: secret()?,

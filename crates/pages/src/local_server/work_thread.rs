@@ -42,9 +42,6 @@ impl Default for WorkThread {
 impl WorkThread {
     /// Calls `work` on the thread and returns its result. If the caller no longer waits, for example because a browser has
     /// closed the connection, work that has not begun is left out, and work that has begun is cancelled.
-    ///
-    /// # Errors
-    /// Returns an error if the work panicked.
     pub async fn call<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,

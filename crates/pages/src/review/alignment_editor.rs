@@ -8,7 +8,7 @@ use super::item_images::{IMAGE_SIDE, ItemImages};
 use mocban_catalog::ManualAlignment;
 use mocban_catalog::check_event;
 use mocban_core::domain::Affine2;
-use mocban_report::ManualCorrection;
+use mocban_results::ManualCorrection;
 
 /// Accepted scale of the relief relative to the image.
 const SCALES: std::ops::RangeInclusive<f64> = 0.01..=100.0;

@@ -5,7 +5,7 @@ use super::item::ReviewItem;
 use mocban_core::domain::{Affine2, ContentHash, PrintFromMesh, Stage};
 use mocban_core::raster::{DepthMap, Mask, MaskOverlap, png_rgb8, warp_mask};
 use mocban_export::pictures::shaded;
-use mocban_report::pair_artifacts::PairArtifacts;
+use mocban_results::pair_artifacts::PairArtifacts;
 
 /// The depth map of an item, and the canvas on which its scores are computed.
 #[derive(Debug)]

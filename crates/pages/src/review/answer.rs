@@ -56,7 +56,7 @@ impl AnswerBody {
             reviewer: state.options.queue.reviewer.clone(),
             reason: self.reason,
             note: check_note(self.note.as_deref())?,
-            look: ReviewContext {
+            context: ReviewContext {
                 event: Some(self.event.clone()),
                 seen: Some(item.view.hash()),
                 shown_ms: self.shown_ms,

@@ -15,7 +15,7 @@ use super::planted_faults::QueueError;
 use super::state::ServerState;
 use super::unstored::Unconfirmed;
 use mocban_catalog::{CatalogError, CatalogErrorKind};
-use mocban_report::pair_artifacts::PairArtifactsError;
+use mocban_results::pair_artifacts::PairArtifactsError;
 
 /// Why a request fails.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use mocban_core::raster::{DepthMap, Mask};
 pub struct CheckRates {
     /// Planted faults per result, 0 to 1.
     pub faults: f64,
-    /// Share of the results that are shown a second time, 0 to 1.
+    /// Fraction of the results that are shown a second time, 0 to 1.
     pub duplicates: f64,
 }
 

@@ -18,9 +18,6 @@ pub(super) struct ReviewerHistory {
 
 impl ReviewerHistory {
     /// Reads the reviewer's current answers and alignments, without undone ones.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog cannot be read.
     pub(super) async fn read(
         catalog: &Catalog,
         options: &QueueOptions,

@@ -3,7 +3,7 @@
 use crate::local_server::WorkFailed;
 use mocban_catalog::CatalogError;
 use mocban_export::{PictureError, SourcePrintError};
-use mocban_report::pair_artifacts::PairArtifactsError;
+use mocban_results::pair_artifacts::PairArtifactsError;
 
 /// Why the images of an item cannot be rendered.
 #[derive(Debug, thiserror::Error)]

@@ -17,12 +17,13 @@ use crate::local_server::WorkThread;
 use mocban_align::stages::normalize::PrintMasks;
 use mocban_align::stages::register::StrokeMap;
 use mocban_catalog::{Catalog, PairResults};
+use mocban_core::InputLimits;
 use mocban_core::domain::{Affine2, Stage};
 use mocban_core::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
+use mocban_export::SourcePrint;
 use mocban_export::pictures::PrintView;
 use mocban_export::scan_view::ScanView;
-use mocban_export::{InputFileLimits, SourcePrint};
-use mocban_report::pair_artifacts::PairArtifacts;
+use mocban_results::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
 /// Longer side of an image in pixels.
@@ -136,7 +137,7 @@ fn stroke_map(
 pub(super) struct ImageCache {
     catalog: Catalog,
     project: Project,
-    limits: InputFileLimits,
+    limits: InputLimits,
     slots: Mutex<CacheSlots<ItemImages>>,
     pictures: WorkLane,
     alignments: WorkLane,
@@ -165,7 +166,7 @@ impl ImageCache {
     pub(super) fn new(
         catalog: Catalog,
         project: Project,
-        limits: InputFileLimits,
+        limits: InputLimits,
         quick: Arc<WorkThread>,
     ) -> Self {
         Self {
@@ -318,9 +319,9 @@ mod tests {
     use crate::review::image_error::ImageError;
     use crate::review::item::test_fixtures::item;
     use mocban_catalog::Catalog;
+    use mocban_core::InputLimits;
     use mocban_core::mesh::MeshLimits;
     use mocban_core::raster::ImageLimits;
-    use mocban_export::InputFileLimits;
     use mocban_store::Project;
 
     #[tokio::test]
@@ -328,7 +329,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::at(dir.path());
         let catalog = Catalog::create(&project.catalog_path()).await;
-        let limits = InputFileLimits {
+        let limits = InputLimits {
             mesh: MeshLimits::SUGGESTED,
             image: ImageLimits::SUGGESTED,
         };

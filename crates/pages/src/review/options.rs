@@ -7,8 +7,8 @@ use std::path::Path;
 use super::check_items::CheckRates;
 use super::i18n::Language;
 use mocban_catalog::CatalogError;
+use mocban_core::InputLimits;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric, UnixMillis};
-use mocban_export::InputFileLimits;
 
 /// Options of a review queue.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +29,28 @@ pub struct QueueOptions {
 }
 
 impl QueueOptions {
+    /// Seed if none is given.
+    pub const DEFAULT_SEED: u64 = 1;
+
+    /// Returns the arguments with which `review` shows the same results to another person, such as `review --reviewer NAME
+    /// --metric relief --sample 50`. What has its default value is left out.
+    pub fn for_another_reviewer(&self) -> String {
+        let metrics = self.metrics.iter();
+        let mut words: Vec<String> = metrics.map(|metric| format!("--metric {metric}")).collect();
+        if let Some(sample) = self.sample {
+            words.push(format!("--sample {sample}"));
+            // The order and the seed decide which results are in the sample.
+            if self.order == ReviewOrder::LeastConfident {
+                words.push("--order least-confident".to_owned());
+            }
+            if self.seed != Self::DEFAULT_SEED {
+                words.push(format!("--seed {}", self.seed));
+            }
+        }
+        words.insert(0, "review --reviewer NAME".to_owned());
+        words.join(" ")
+    }
+
     /// Returns whether the queue can have attention checks. If so, the page shows the pair of an item only after the
     /// answer, because the reviewer would recognise a pair that appears twice.
     pub(super) fn has_attention_checks(&self) -> bool {
@@ -56,9 +78,42 @@ pub struct ReviewOptions {
     /// free port is used.
     pub listen: SocketAddr,
     /// Limits on the input files.
-    pub limits: InputFileLimits,
+    pub limits: InputLimits,
     /// Returns the sentence that explains an error of the catalog of the project in a folder.
     pub explain: fn(&CatalogError, &Path) -> String,
     /// Clock.
     pub now: fn() -> UnixMillis,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CheckRates, QueueOptions};
+    use mocban_core::domain::{ReviewOrder, ThresholdMetric};
+
+    #[test]
+    fn another_reviewer_gets_the_same_results() {
+        let all = QueueOptions {
+            reviewer: "lan".to_owned(),
+            metrics: Vec::new(),
+            order: ReviewOrder::Random,
+            seed: QueueOptions::DEFAULT_SEED,
+            sample: None,
+            rates: CheckRates {
+                faults: 0.0,
+                duplicates: 0.0,
+            },
+        };
+        assert_eq!(all.for_another_reviewer(), "review --reviewer NAME");
+        let some = QueueOptions {
+            metrics: vec![ThresholdMetric::Relief, ThresholdMetric::Ensemble],
+            order: ReviewOrder::LeastConfident,
+            seed: 7,
+            sample: Some(50),
+            ..all
+        };
+        assert_eq!(
+            some.for_another_reviewer(),
+            "review --reviewer NAME --metric relief --metric ensemble --sample 50 --order least-confident --seed 7"
+        );
+    }
 }

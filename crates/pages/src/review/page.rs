@@ -154,6 +154,7 @@ fn verdict_bar(language: Language) -> Markup {
                 (button("undo", language))
             }
             p #hint .hint hidden {}
+            (alignment_bar(language))
             div #reasons .reasons role="group" aria-label=(language.translate("reasons")) {
                 span { (language.translate("reasons")) }
                 @for reason in Reason::ALL { (button(reason.name(), language)) }
@@ -170,6 +171,37 @@ fn verdict_bar(language: Language) -> Markup {
                 (button("jump", language))
                 (button("details", language))
             }
+        }
+    }
+}
+
+/// Steps of the alignment editor with their signs.
+const ALIGNMENT_STEPS: [(&str, &str); 10] = [
+    ("move_left", "←"),
+    ("move_right", "→"),
+    ("move_up", "↑"),
+    ("move_down", "↓"),
+    ("rotate_left", "↺"),
+    ("rotate_right", "↻"),
+    ("smaller", "−"),
+    ("larger", "+"),
+    ("mirror", "⇋"),
+    ("reset", "⟲"),
+];
+
+/// Returns the buttons of the alignment editor, for people who use no keyboard.
+fn alignment_bar(language: Language) -> Markup {
+    html! {
+        div #alignment .alignment role="group" aria-label=(language.translate("manual_alignment")) hidden {
+            @for (step, sign) in ALIGNMENT_STEPS {
+                button type="button" data-align=(step) {
+                    span aria-hidden="true" { (sign) } " " (language.translate(step))
+                }
+            }
+            label { input #alignment-fine type="checkbox"; " " (language.translate("small_steps")) }
+            span.spacer {}
+            (button("save", language))
+            (button("cancel", language))
         }
     }
 }

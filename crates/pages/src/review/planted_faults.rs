@@ -8,7 +8,7 @@ use super::item::{ItemView, ReviewItem};
 use crate::local_server::{WorkFailed, WorkThread};
 use mocban_catalog::{Catalog, CatalogError};
 use mocban_core::domain::{AttentionCheck, ContentHash, SeededRandom, Stage};
-use mocban_report::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use mocban_results::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_store::Project;
 
 /// Maximum number of results that are tried besides those in which faults are wanted.
@@ -72,9 +72,6 @@ impl FaultPlanter {
     }
 
     /// Plants the wanted number of faults, or fewer if not enough candidates can be read.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog cannot be read, or planting a fault panics.
     pub(super) async fn plant(
         &self,
         candidates: FaultCandidates<'_>,

@@ -10,8 +10,8 @@ use super::order;
 use super::planted_faults::{FaultPlanter, FaultShortage, QueueError};
 use mocban_catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use mocban_core::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
-use mocban_report::consensus::{is_disputed, partition_verdicts};
-use mocban_report::pair_artifacts::group_identical;
+use mocban_results::consensus::{is_disputed, partition_verdicts};
+use mocban_results::pair_artifacts::group_identical;
 
 /// Number of pairs read from the catalog at a time.
 const PAGE_PAIRS: usize = 256;
@@ -29,9 +29,6 @@ pub(super) struct ReviewQueue {
 
 impl ReviewQueue {
     /// Reads the queue of a reviewer from the current state of the catalog.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog cannot be read, or planting a fault panics.
     pub(super) async fn read(
         catalog: &Catalog,
         planter: &FaultPlanter,
@@ -158,7 +155,7 @@ mod tests {
     use crate::review::{CheckRates, QueueOptions};
     use mocban_catalog::ReviewerVerdict;
     use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict};
-    use mocban_report::test_fixtures;
+    use mocban_results::test_fixtures;
 
     fn options(order: ReviewOrder, faults: f64, duplicates: f64) -> QueueOptions {
         QueueOptions {

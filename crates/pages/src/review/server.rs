@@ -14,6 +14,7 @@ use super::state::ServerState;
 use super::unstored::UnstoredEvents;
 use crate::local_server::{AccessControl, ConnectionLimits, WorkFailed, WorkThread, listen, serve};
 use mocban_catalog::{Catalog, CatalogError};
+use mocban_core::domain::explained_by_cause;
 use mocban_store::Project;
 
 /// Why the server cannot start or run.
@@ -37,6 +38,8 @@ pub enum ReviewError {
     #[error("cannot plant an attention check: {0}")]
     Fault(WorkFailed),
 }
+
+explained_by_cause! { ReviewError: Catalog }
 
 /// A server that is bound and ready to serve.
 #[derive(Debug)]
@@ -86,8 +89,7 @@ pub async fn bind(
         served_items: std::sync::Mutex::default(),
     };
     // Loads the items now: after a restart, a page may resend an answer before it requests the queue.
-    let queue = state.load_queue().await;
-    let queue = queue.map_err(|error| match error {
+    let queue = state.load_queue().await.map_err(|error| match error {
         QueueError::Catalog(error) => ReviewError::Catalog(error),
         QueueError::Stopped(error) => ReviewError::Fault(error),
     })?;

@@ -30,9 +30,6 @@ pub(super) struct ServerState {
 
 impl ServerState {
     /// Reads the queue from the current state of the catalog and remembers its items.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog cannot be read, or if a blocking task fails.
     pub(super) async fn load_queue(&self) -> Result<ReviewQueue, QueueError> {
         let queue = ReviewQueue::read(&self.catalog, &self.planter, &self.options.queue).await?;
         let mut served = self.lock_served();

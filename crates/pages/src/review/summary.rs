@@ -6,7 +6,7 @@ use super::review_queue::ReviewQueue;
 use super::state::ServerState;
 use mocban_catalog::CatalogError;
 use mocban_core::domain::Verdict;
-use mocban_report::{ReviewerPair, ReviewerRecord, agreement, is_inattentive};
+use mocban_results::{ReviewerPair, ReviewerRecord, agreement, is_inattentive};
 
 /// The summary of a review.
 #[derive(Debug, Serialize)]
@@ -21,6 +21,8 @@ pub(super) struct ReviewSummary {
     others: Vec<ReviewerPair>,
     /// The command line that names this project, for the next commands.
     command: String,
+    /// The rest of the command with which another person judges the same results.
+    next_reviewer: String,
 }
 
 /// Number of results by verdict.
@@ -48,9 +50,6 @@ impl VerdictCounts {
 impl ReviewSummary {
     /// Reads the summary of a queue. Returns `None` while an item has no answer, because the counts would reveal which
     /// items are attention checks.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog cannot be read.
     pub(super) async fn read(
         state: &ServerState,
         queue: &ReviewQueue,
@@ -76,6 +75,7 @@ impl ReviewSummary {
             reviewer,
             others,
             command: state.options.command.clone(),
+            next_reviewer: state.options.queue.for_another_reviewer(),
         }))
     }
 }

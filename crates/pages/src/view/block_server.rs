@@ -14,6 +14,7 @@ use super::correction_server::{self, CorrectionStore};
 use super::page;
 use super::server::{ViewError, ViewServer, jpeg};
 use crate::local_server::WorkThread;
+use crate::review::Language;
 use mocban_core::domain::BlockName;
 use mocban_export::block_view::{BlockView, PageLayer, PageRegion};
 use mocban_export::scan_view::assets;
@@ -56,11 +57,13 @@ const LONGEST_SIDE: usize = 3000;
 #[derive(Debug)]
 struct ShownBlock {
     view: BlockView,
+    language: Option<Language>,
     work: Arc<WorkThread>,
     overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
 }
 
-/// Binds the address for the page of a block, and for its correction. Without `view`, only the correction is shown. Port 0 chooses the same port for equal names of blocks, if it is free.
+/// Binds the address for the page of a block, and for its correction. Without `view`, only the correction is shown. Port
+/// 0 chooses the same port for equal names of blocks, if it is free. Without a language, the browser decides.
 ///
 /// # Errors
 /// Returns an error if the address cannot be bound or the system provides no randomness.
@@ -69,22 +72,29 @@ pub async fn bind_block(
     block: &BlockName,
     view: Option<BlockView>,
     store: impl CorrectionStore,
+    language: Option<Language>,
 ) -> Result<ViewServer, ViewError> {
     let work = Arc::new(WorkThread::default());
     let pages = match view {
-        Some(view) => page_routes(view, Arc::clone(&work)),
+        Some(view) => page_routes(view, language, Arc::clone(&work)),
         None => Router::new().route("/", get(async || Redirect::to("correct"))),
     };
     let pages = pages
         .route("/assets/{name}", get(asset))
-        .merge(correction_server::routes(block.clone(), store, work));
+        .merge(correction_server::routes(
+            block.clone(),
+            store,
+            work,
+            language,
+        ));
     ViewServer::open(address, block.as_str(), pages).await
 }
 
 /// Returns the routes of the page of a block that is aligned.
-fn page_routes(view: BlockView, work: Arc<WorkThread>) -> Router {
+fn page_routes(view: BlockView, language: Option<Language>, work: Arc<WorkThread>) -> Router {
     let shown = ShownBlock {
         view,
+        language,
         work,
         overviews: PageLayer::ALL.map(|_| OnceLock::new()),
     };
@@ -116,7 +126,7 @@ impl ShownBlock {
 }
 
 async fn index(State(shown): State<Arc<ShownBlock>>) -> Html<String> {
-    Html(page::block(shown.view.name.as_str()))
+    Html(page::block(shown.view.name.as_str(), shown.language))
 }
 
 async fn asset(Path(name): Path<String>) -> Response {

@@ -16,6 +16,7 @@ use serde_json::json;
 use super::page;
 use super::server::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
+use crate::review::Language;
 use mocban_core::domain::{BlockName, BlockSide, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
 
@@ -50,6 +51,7 @@ pub enum PointsSaved {
 /// The state of the page.
 struct CorrectionState<S> {
     block: BlockName,
+    language: Option<Language>,
     store: S,
     work: Arc<WorkThread>,
     /// The block, which is read when the page is opened.
@@ -88,9 +90,11 @@ pub(super) fn routes<S: CorrectionStore>(
     block: BlockName,
     store: S,
     work: Arc<WorkThread>,
+    language: Option<Language>,
 ) -> Router {
     let state = CorrectionState {
         block,
+        language,
         store,
         work,
         shown: tokio::sync::Mutex::default(),
@@ -164,7 +168,7 @@ impl<S: CorrectionStore> CorrectionState<S> {
 }
 
 async fn index<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Html<String> {
-    Html(page::correction(state.block.as_str()))
+    Html(page::correction(state.block.as_str(), state.language))
 }
 
 async fn block_json<S: CorrectionStore>(

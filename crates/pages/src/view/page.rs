@@ -1,15 +1,22 @@
 //! HTML of the page.
 
-use maud::html;
+use maud::{Markup, html};
 
 use crate::local_server::document;
+use crate::review::Language;
 
-/// Language of the page before its script translates it.
-const LANGUAGE: &str = "en";
+/// Language of the page before its script translates it, unless one is given.
+const DEFAULT_LANGUAGE: Language = Language::English;
+
+/// Returns the language for the script. Without one, it chooses the language of the browser.
+fn chosen(language: Option<Language>) -> Markup {
+    html! { @if let Some(language) = language { meta name="page-language" content=(language.name()); } }
+}
 
 /// Returns the page of a pair. Its script loads the data and creates the controls.
-pub(super) fn view(pair: &str) -> String {
+pub(super) fn view(pair: &str, language: Option<Language>) -> String {
     let head = html! {
+        (chosen(language))
         link rel="stylesheet" href="assets/scan-viewer.css";
         script type="module" src="assets/view.js" {}
     };
@@ -19,21 +26,23 @@ pub(super) fn view(pair: &str) -> String {
             noscript { p { "This page needs JavaScript. All of it is served by your own computer." } }
         }
     };
-    document(LANGUAGE, pair, &head, &body).into_string()
+    let language = language.unwrap_or(DEFAULT_LANGUAGE);
+    document(language.name(), pair, &head, &body).into_string()
 }
 
 /// Returns the page of a block. Its script loads the data and creates the controls.
-pub(super) fn block(name: &str) -> String {
-    block_page(name, "assets/block-view.js")
+pub(super) fn block(name: &str, language: Option<Language>) -> String {
+    block_page(name, language, "assets/block-view.js")
 }
 
 /// Returns the page on which the alignment of a block is corrected.
-pub(super) fn correction(name: &str) -> String {
-    block_page(name, "assets/block-correct.js")
+pub(super) fn correction(name: &str, language: Option<Language>) -> String {
+    block_page(name, language, "assets/block-correct.js")
 }
 
-fn block_page(name: &str, script: &str) -> String {
+fn block_page(name: &str, language: Option<Language>, script: &str) -> String {
     let head = html! {
+        (chosen(language))
         link rel="stylesheet" href="assets/scan-viewer.css";
         link rel="stylesheet" href="assets/block-view.css";
         script type="module" src=(script) {}
@@ -45,18 +54,36 @@ fn block_page(name: &str, script: &str) -> String {
             noscript { p { "This page needs JavaScript. All of it is served by your own computer." } }
         }
     };
-    document(LANGUAGE, name, &head, &body).into_string()
+    let language = language.unwrap_or(DEFAULT_LANGUAGE);
+    document(language.name(), name, &head, &body).into_string()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{block, correction, view};
+    use super::{Language, block, correction, view};
 
     #[test]
     fn pages_load_only_from_this_server() {
-        for page in [view("a<b"), block("a<b"), correction("a<b")] {
+        for page in pages(None) {
             assert!(!page.contains("//"), "{page}");
         }
-        assert!(view("a<b").contains("<title>a&lt;b</title>"));
+        assert!(view("a<b", None).contains("<title>a&lt;b</title>"));
+    }
+
+    fn pages(language: Option<Language>) -> [String; 3] {
+        let pages = [view, block, correction];
+        pages.map(|page| page("a<b", language))
+    }
+
+    #[test]
+    fn a_given_language_is_named_to_the_script() {
+        for page in pages(Some(Language::Vietnamese)) {
+            assert!(page.contains(r#"<html lang="vi">"#), "{page}");
+            let given = r#"<meta name="page-language" content="vi">"#;
+            assert!(page.contains(given), "{page}");
+        }
+        for page in pages(None) {
+            assert!(!page.contains("page-language"), "{page}");
+        }
     }
 }

@@ -13,6 +13,8 @@ use tokio::net::TcpListener;
 
 use super::page;
 use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
+use crate::review::Language;
+use mocban_core::domain::Explained;
 use mocban_export::scan_view::{ScanView, assets};
 
 /// The script of the page.
@@ -34,6 +36,8 @@ pub enum ViewError {
     Token(std::io::Error),
 }
 
+impl Explained for ViewError {}
+
 /// A server that is bound and ready to serve.
 #[derive(Debug)]
 pub struct ViewServer {
@@ -46,10 +50,12 @@ pub struct ViewServer {
 #[derive(Debug)]
 struct ShownScan {
     pair: String,
+    language: Option<Language>,
     data: Bytes,
 }
 
-/// Binds the address for the view of a pair. Port 0 chooses the same port for equal names of pairs, if it is free.
+/// Binds the address for the view of a pair. Port 0 chooses the same port for equal names of pairs, if it is free. Without a
+/// language, the browser decides.
 ///
 /// # Errors
 /// Returns an error if the address cannot be bound or the system provides no randomness.
@@ -57,9 +63,11 @@ pub async fn bind(
     address: SocketAddr,
     pair: &str,
     view: &ScanView,
+    language: Option<Language>,
 ) -> Result<ViewServer, ViewError> {
     let shown = ShownScan {
         pair: pair.to_owned(),
+        language,
         data: view.to_bytes().into(),
     };
     let pages = Router::new()
@@ -105,7 +113,7 @@ impl ViewServer {
 }
 
 async fn index(State(shown): State<Arc<ShownScan>>) -> Html<String> {
-    Html(page::view(&shown.pair))
+    Html(page::view(&shown.pair, shown.language))
 }
 
 async fn asset(Path(name): Path<String>) -> Response {

@@ -34,6 +34,43 @@ fn columns_may_be_in_any_order_and_optional_ones_missing() {
 }
 
 #[test]
+fn headers_and_words_may_be_capitals_or_vietnamese() {
+    let plain = "pair,verdict,reviewer,metric,reason,note\n1,pass,lan,nl_ssim,,x\n2,fail,lan,density,strokes_lost,\n\
+                 3,unsure,lan,,,\n";
+    let plain = parse_csv(plain.as_bytes()).expect("valid");
+    for text in [
+        "Pair,Verdict,Reviewer,Metric,Reason,Note\n1,Pass,lan,NL_SSIM,,x\n2,FAIL,lan,Density,Strokes lost,\n3,Unsure,lan,,,\n",
+        "Mã số,Đánh giá,Người đánh giá,Thước đo,Lý do,Ghi chú\n1,Đạt,lan,nl_ssim,,x\n2,không đạt,lan,density,Mất nét,\n\
+         3,Chưa chắc,lan,,,\n",
+        "MA SO,KET QUA,NGUOI CHAM,METRIC,LY DO,GHI CHU\n1,DAT,lan,nl ssim,,x\n2,Khong Dat,lan,density,mat net,\n\
+         3,không chắc,lan,,,\n",
+        "sep=;\n id ; \"verdict\" ;reviewer;metric;reason;note\n1;\u{a0}Pass;lan;nl_ssim;;x\n2;fail;lan;density;strokes_lost;\n\
+         3;unsure;lan;;;\n",
+    ] {
+        let rows = parse_csv(text.as_bytes()).expect(text);
+        let verdicts =
+            |rows: &[VerdictRow]| -> Vec<_> { rows.iter().map(|row| row.listed.clone()).collect() };
+        assert_eq!(verdicts(&rows), verdicts(&plain), "{text}");
+    }
+    assert_eq!(
+        error("Pair,Verdict,Reviewer\n1,Maybe,lan\n"),
+        "line 2: \"Maybe\" is not a verdict (pass, fail, unsure)"
+    );
+}
+
+#[test]
+fn json_of_python_has_no_values_for_missing_ones() {
+    let rows =
+        parse_jsonl(br#"{"pair":"1","verdict":"pass","reviewer":"lan","note":NaN,"metric":NaN}"#);
+    assert_eq!(rows.expect("valid")[0].listed.verdict.note, None);
+    let array = parse_jsonl(b"[{}]").expect_err("an array").to_string();
+    assert_eq!(
+        array,
+        "line 1: the file is a JSON array; write one object on each line"
+    );
+}
+
+#[test]
 fn times_are_parsed_and_other_texts_refused() {
     let rows =
         parse_csv(b"pair,verdict,reviewer,at\n1,pass,lan,2026-11-21 04:10:03\n1,pass,lan,\n");
@@ -134,7 +171,7 @@ fn values_that_no_verdict_has_are_refused_by_line() {
     }
     let twice = error("pair,verdict,reviewer,pair\n1,pass,lan,2\n");
     assert!(
-        twice.starts_with("line 1: column pair is there twice"),
+        twice.starts_with("line 1: columns 1 and 4 are both named \"pair\""),
         "{twice}"
     );
 }
@@ -144,10 +181,11 @@ fn unknown_pair_is_reported_by_line() {
     let id = |text: &str| text.parse::<PairName>().expect("valid id");
     let lines = [("1", 2), ("2", 3), ("0", 4)].map(|(pair, line)| (id(pair), line));
     let unknown = ["0", "2"].map(id);
-    let error = refuse_unknown(&lines.into(), &unknown).expect_err("refused");
-    assert!(
-        error.to_string().starts_with("line 3: there is no pair 2"),
-        "{error}"
+    let known = ["1", "0002", "7"].map(id);
+    let error = refuse_unknown(&lines.into(), &unknown, &known).expect_err("refused");
+    assert_eq!(
+        error.to_string(),
+        "line 3: there is no pair 2; did you mean \"0002\"?"
     );
 }
 

@@ -2,10 +2,10 @@
 
 use super::table::Table;
 use super::text::{with_caption, wrapped};
-use crate::number_format::NumberStyle::Share;
-use crate::number_format::format_count;
-use crate::reviewer_agreement::{MIN_RESULTS, ReviewerAgreement, ReviewerPair, ReviewerRecord};
-use crate::stats::{IntervalMethod, Rate};
+use mocban_results::number_format::NumberStyle::Share;
+use mocban_results::number_format::format_count;
+use mocban_results::stats::{IntervalMethod, Rate};
+use mocban_results::{MIN_RESULTS, ReviewerAgreement, ReviewerPair, ReviewerRecord};
 
 /// Returns the agreement as aligned tables, with a newline at the end.
 pub fn agreement_text(found: &ReviewerAgreement) -> String {

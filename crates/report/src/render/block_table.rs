@@ -3,8 +3,8 @@
 use super::table::Table;
 use crate::block_accuracy::{BlockAccuracy, BoxAccuracy};
 use crate::model::Report;
-use crate::stats::ratio;
 use mocban_core::domain::{ThresholdMetric, one_line};
+use mocban_results::stats::ratio;
 
 /// Maximum length of the name of a block in a table, characters. The table then fits a terminal.
 const MAX_NAME_CHARS: usize = 20;

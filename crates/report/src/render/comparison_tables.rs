@@ -3,9 +3,9 @@
 use super::table::Table;
 use crate::comparison::{Basis, Comparison, versus};
 use crate::model::Report;
-use crate::number_format::NumberStyle::{self, Score, Share};
-use crate::number_format::{format_count, format_number};
 use crate::score_bootstrap::{BootstrapSettings, MeanIntervals};
+use mocban_results::number_format::NumberStyle::{self, Score, Share};
+use mocban_results::number_format::{format_count, format_number};
 
 /// Reads one interval of a metric's means.
 type MeanIntervalField = fn(&MeanIntervals) -> Option<[f64; 2]>;
@@ -130,8 +130,9 @@ pub(super) fn score_comparisons(report: &Report) -> Option<Table> {
 mod tests {
     use super::{mean_intervals, score_comparisons};
     use crate::render::text::aligned;
-    use crate::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{Report, ReportAccumulator, test_fixtures};
     use mocban_core::domain::ThresholdMetric;
+    use mocban_results::TruthEvaluation;
 
     /// Twenty pairs on which one metric has the best IoU.
     fn with_best(best: ThresholdMetric) -> Report {

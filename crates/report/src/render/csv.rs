@@ -177,9 +177,10 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::{HEADER, quantities, render};
-    use crate::stats::wilson_95;
-    use crate::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{Report, ReportAccumulator, test_fixtures};
     use mocban_core::domain::{Reason, Verdict};
+    use mocban_results::TruthEvaluation;
+    use mocban_results::stats::wilson_95;
 
     /// Returns n, value, low and high of each quantity of a metric.
     fn quantities_of(report: &Report, metric: &str) -> BTreeMap<String, [String; 4]> {

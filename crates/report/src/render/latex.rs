@@ -141,8 +141,9 @@ mod tests {
     use std::process::Command;
 
     use super::render;
-    use crate::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{Report, ReportAccumulator, test_fixtures};
     use mocban_core::domain::FailureClass;
+    use mocban_results::TruthEvaluation;
 
     /// Compiles a report in a document of the class `article` with its default margins and font size. Returns the log, or
     /// `None` if the engine is not installed.

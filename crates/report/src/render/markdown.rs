@@ -7,9 +7,9 @@ use super::report_tables::tables;
 use super::risk_coverage_tables::full_tables;
 use super::table::{ColumnFormat, Table};
 use crate::model::{FailureGroup, Report};
-use crate::number_format::format_count;
 use crate::score_comparison::conclusions;
 use mocban_core::domain::one_line;
+use mocban_results::number_format::format_count;
 
 /// Returns the report as Markdown.
 pub(super) fn render(report: &Report) -> String {
@@ -99,8 +99,9 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{escape, render};
-    use crate::{ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{ReportAccumulator, test_fixtures};
     use mocban_core::domain::FailureClass;
+    use mocban_results::TruthEvaluation;
 
     #[test]
     fn messages_cannot_add_markup() {

@@ -17,9 +17,9 @@ mod snapshot_tests;
 mod table;
 mod text;
 
-use super::gallery::Gallery;
 use super::model::Report;
 use mocban_core::domain::{enum_names, visible, visible_json};
+use mocban_results::gallery::Gallery;
 
 pub use agreement_text::agreement_text;
 pub use html::{Cover, MAX_PAGE_BYTES, page};
@@ -72,8 +72,9 @@ fn json(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::{ReportFormat, render};
-    use crate::{IntervalMethod, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{ReportAccumulator, test_fixtures};
     use mocban_core::domain::Verdict;
+    use mocban_results::{IntervalMethod, TruthEvaluation};
     use serde_json::{Value, json};
 
     #[test]
@@ -166,7 +167,7 @@ mod tests {
             let answers = [
                 "36 of 38 pairs",
                 "Acc of Ensemble",
-                "By verdicts, all metrics",
+                "By verdicts, no two metrics",
             ];
             let [first, second, third] = answers.map(at);
             assert!(

@@ -2,8 +2,8 @@
 
 use super::comparison_tables::mean_intervals;
 use crate::model::Report;
-use crate::number_format::{counted, format_count};
 use crate::provenance::UsedSettings;
+use mocban_results::number_format::{counted, format_count};
 
 /// A line: what it is about, and its text.
 pub(super) type ProvenanceLine = (&'static str, String);

@@ -3,13 +3,12 @@
 use super::block_table::blocks;
 use super::comparison_tables::mean_intervals;
 use super::table::Table;
-use crate::manual_alignment::ManualAlignmentErrors;
 use crate::model::{MetricRow, Report};
-use crate::number_format::NumberStyle::{Degrees, Milliseconds, Percent, Seconds, Share};
-use crate::number_format::format_count;
-use crate::stats::Rate;
 use crate::truth_summary::TruthSummary;
 use mocban_core::domain::Reason;
+use mocban_results::manual_alignment::ManualAlignmentErrors;
+use mocban_results::number_format::NumberStyle::{Degrees, Milliseconds, Percent, Seconds, Share};
+use mocban_results::stats::Rate;
 
 /// Returns the tables of a report. A table without content is left out, except the table of scores.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
@@ -31,35 +30,23 @@ pub(super) fn tables(report: &Report) -> Vec<Table> {
 
 /// Returns the paper's table.
 pub(super) fn scores(report: &Report) -> Table {
-    Table::of(&report.rows)
+    let mut table = Table::of(&report.rows)
         .text("Method", |row| row.metric.title())
-        .count("n", |row| row.n)
+        .count("n", |row| row.n);
+    if report.has_verdicts() {
+        table = table.count("decided", |row| row.passed + row.failed);
+    }
+    table
         .share("Acc %", |row| row.acc)
         .interval(report.interval.title(), Share, |row| row.acc_ci95)
         .score("SSIM", |row| row.ssim)
         .score("IoU", |row| row.iou)
         .score("IoU box", |row| row.iou_box)
         .score("Dice", |row| row.dice)
-        .caption("scores", format!(
-            "Acc is the share of passed results among those that reviewers passed or failed{}. SSIM, IoU and Dice are \
-             means over n pairs, computed by pixel; IoU box is that of the bounding boxes.",
-            passed_counts(report)
-        ))
-}
-
-/// Returns the counts behind Acc, such as ` (Ensemble 586 of 587)`.
-fn passed_counts(report: &Report) -> String {
-    let decided = |row: &MetricRow| row.passed + row.failed;
-    let rows = report.rows.iter().filter(|row| decided(row) > 0);
-    let count = |row: &MetricRow| {
-        let [passed, decided] = [row.passed, decided(row)].map(format_count);
-        format!("{} {passed} of {decided}", row.metric.title())
-    };
-    let counts: Vec<String> = rows.map(count).collect();
-    if counts.is_empty() {
-        return String::new();
-    }
-    format!(" ({})", counts.join(", "))
+        .caption("scores",
+            "Acc is the share of passed results among the decided ones, which reviewers passed or failed. SSIM, IoU and \
+             Dice are means over n pairs, computed by pixel; IoU box is that of the bounding boxes.",
+        )
 }
 
 /// Returns the counts of verdicts.
@@ -229,8 +216,9 @@ pub(super) fn times(report: &Report) -> Option<Table> {
 mod tests {
     use super::{attention_checks, fail_reasons, thresholds, times};
     use crate::render::table::Table;
-    use crate::{AttentionCheckRates, Rate, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{ReportAccumulator, test_fixtures};
     use mocban_core::domain::{Reason, Stage, Verdict};
+    use mocban_results::{AttentionCheckRates, Rate, TruthEvaluation};
 
     fn cells(table: &Table, row: usize) -> Vec<&str> {
         table.rows[row]

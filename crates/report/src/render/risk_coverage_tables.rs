@@ -3,9 +3,9 @@
 use super::table::Table;
 use crate::comparison::Basis;
 use crate::model::Report;
-use crate::number_format::NumberStyle::{Percent, Share};
-use crate::number_format::{counted, format_count, format_number};
 use crate::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT, RiskCoverageCurve};
+use mocban_results::number_format::NumberStyle::{Percent, Share};
+use mocban_results::number_format::{counted, format_count, format_number};
 
 /// Column headers of [`short_tables`], one for each coverage in [`COVERAGE_PERCENT`].
 const HEADERS: [&str; COVERAGE_PERCENT.len()] =
@@ -99,7 +99,8 @@ fn failures(curve: &RiskCoverageCurve) -> Option<String> {
 mod tests {
     use super::{HEADERS, full_tables, short_tables};
     use crate::risk_coverage::COVERAGE_PERCENT;
-    use crate::{ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{ReportAccumulator, test_fixtures};
+    use mocban_results::TruthEvaluation;
 
     #[test]
     fn headers_name_the_coverages() {

@@ -3,8 +3,9 @@
 use insta::assert_snapshot;
 
 use super::{ReportFormat, agreement_text, render};
-use crate::{IntervalMethod, Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+use crate::{Report, ReportAccumulator, test_fixtures};
 use mocban_core::domain::{FailureClass, Verdict};
+use mocban_results::{IntervalMethod, TruthEvaluation};
 
 /// Two results without verdicts or ground truth.
 fn unjudged() -> Report {

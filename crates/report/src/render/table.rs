@@ -1,8 +1,8 @@
 //! A table of text cells, which the text, Markdown, LaTeX and HTML renderers share.
 
-use crate::number_format::NumberStyle::{self, Count, Score, Share};
-use crate::number_format::{format_count, format_interval, format_number, format_share};
 use mocban_core::domain::one_line;
+use mocban_results::number_format::NumberStyle::{self, Count, Score, Share};
+use mocban_results::number_format::{format_count, format_interval, format_number, format_share};
 
 /// A table of text cells.
 #[derive(Debug, Clone, PartialEq, Eq)]

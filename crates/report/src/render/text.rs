@@ -6,9 +6,9 @@ use super::report_tables::{scores, tables, truth};
 use super::risk_coverage_tables::short_tables;
 use super::table::{ColumnFormat, Table, TableColumn};
 use crate::model::{FailureGroup, Report};
-use crate::number_format::format_count;
 use crate::score_comparison::conclusions;
 use mocban_core::domain::{one_line, visible};
+use mocban_results::number_format::format_count;
 
 /// Columns of the terminal.
 const WIDTH: usize = 80;

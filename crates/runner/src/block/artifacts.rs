@@ -33,9 +33,6 @@ impl<'a> StageArtifacts<'a> {
     }
 
     /// Returns the artifacts that were written, by role. Stores the pack.
-    ///
-    /// # Errors
-    /// Returns an error if the pack cannot be stored.
     pub(crate) fn finish(self) -> Result<ArtifactSet, BlockStageError> {
         let written = self.written.into_inner();
         let mut written = written.unwrap_or_else(PoisonError::into_inner);

@@ -6,11 +6,12 @@ use std::time::Instant;
 use super::inputs::as_failure;
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
-use crate::compute_thread::run_blocking;
+use crate::blocking::run_blocking;
 use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::folder_check::check_folders;
 use crate::policy::{self, FailedAttempt};
+use crate::retry::stored;
 use crate::run_context::RunContext;
 use crate::stage_output::result_hash;
 use mocban_catalog::{
@@ -20,20 +21,6 @@ use mocban_catalog::{
 use mocban_core::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
 use mocban_store::{Project, stat_input};
 use mocban_system::failpoint::{self, Point};
-
-/// Calls an idempotent operation again while the database server is unavailable.
-macro_rules! while_unavailable {
-    ($catalog:expr, $call:expr) => {{
-        let mut attempt = 0;
-        loop {
-            match $call.await {
-                Err(error) if $catalog.may_retry(attempt, &error).await => attempt += 1,
-                outcome => break outcome,
-            }
-        }
-    }};
-}
-pub(crate) use while_unavailable;
 
 /// Stores a computed stage. Fails the block instead if the output is not valid.
 pub(crate) async fn store_stage(
@@ -62,7 +49,7 @@ pub(crate) async fn store_stage(
     let settings = context.blocks.settings(stage);
     let checkpoint = StageCheckpoint {
         stage,
-        made_with: block.made_with(stage, &settings),
+        provenance: block.provenance(stage, &settings),
         result_hash: result_hash(&outcome, &files),
         outcome,
         files,
@@ -97,11 +84,8 @@ async fn advance(
     next: BlockStage,
 ) -> Result<AfterStage, RunError> {
     let (catalog, lease) = (&context.catalog, &block.lease);
-    let stored = while_unavailable!(
-        catalog,
-        catalog.checkpoint_block(lease.clone(), checkpoint.clone())
-    );
-    let CheckpointOutcome::Lease(lease) = stored? else {
+    let stored = stored!(catalog.checkpoint_block(lease.clone(), checkpoint.clone()))?;
+    let CheckpointOutcome::Lease(lease) = stored else {
         return Ok(AfterStage::End(BlockEnd::LeaseLost));
     };
     let stage = checkpoint.stage;
@@ -124,11 +108,11 @@ async fn finish_cut(
     characters: Vec<NewCharacter>,
 ) -> Result<AfterStage, RunError> {
     let (catalog, lease) = (&context.catalog, &block.lease);
-    let stored = while_unavailable!(
-        catalog,
-        catalog.finish_cut(lease.clone(), checkpoint.clone(), characters.clone())
-    );
-    let summary = match stored? {
+    let summary = match stored!(catalog.finish_cut(
+        lease.clone(),
+        checkpoint.clone(),
+        characters.clone()
+    ))? {
         CutReply::Stored(summary) => summary,
         CutReply::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost)),
         CutReply::NameTaken(taken) => {
@@ -182,7 +166,7 @@ pub(crate) async fn store_failure(
         class: failure.class,
         is_transient,
         attempt: block.lease.attempt(),
-        exclusive: true,
+        ran_alone: true,
     };
     let action = policy::failure_action(attempt, now);
     let settings = context.blocks.settings(stage);
@@ -190,7 +174,7 @@ pub(crate) async fn store_failure(
         stage,
         failure: failure.clone(),
         action,
-        made_with: block.made_with(stage, &settings),
+        provenance: block.provenance(stage, &settings),
         inputs: block.inputs,
         ms,
         at: now,

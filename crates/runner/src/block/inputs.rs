@@ -5,24 +5,25 @@ use std::path::PathBuf;
 use crate::block_stages::{BlockFile, BlockInputs, BlockStageError};
 use crate::error::RunError;
 use crate::input_reads::{ReadItem, ReadLimits, read_each};
+use crate::retry::retried;
 use mocban_catalog::{
     BlockAttributes, BlockInputVersions, BlockSelection, Catalog, InputVersion, KnownBlock,
 };
 use mocban_core::domain::{BlockId, BlockStage, ContentHash, ControlPoints, Failure, FailureClass};
 use mocban_store::{Input, InputError, Project, hash_input, stat_input};
 
-/// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `among`. Skips scans
+/// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `selection`. Skips scans
 /// and pages that no stage has read; labels may have been added to a block that was finished without them. A file
 /// counts as unchanged if reading it fails or is ended by `limits`.
 pub(crate) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
-    among: Option<&BlockSelection>,
+    selection: Option<&BlockSelection>,
     limits: &ReadLimits,
 ) -> Result<(), RunError> {
-    let known = catalog.retry_while_unavailable(async || catalog.known_blocks().await);
-    let known = known.await?.into_iter();
-    let known = known.filter(|known| among.is_none_or(|among| among.contains(known.block)));
+    let known = retried!(catalog.known_blocks())?.into_iter();
+    let known =
+        known.filter(|known| selection.is_none_or(|selection| selection.contains(known.block)));
     let compared = known.map(|known| ComparedBlock {
         project: project.clone(),
         known,
@@ -30,9 +31,7 @@ pub(crate) async fn store_changes(
     let changed = read_each(compared.collect(), limits).await;
     let changed: Vec<_> = changed.into_iter().flatten().flatten().collect();
     if !changed.is_empty() {
-        let stored = catalog
-            .retry_while_unavailable(async || catalog.store_block_inputs(changed.clone()).await);
-        stored.await?;
+        retried!(catalog.store_block_inputs(changed.clone()))?;
     }
     Ok(())
 }

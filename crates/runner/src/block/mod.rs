@@ -5,7 +5,6 @@ pub(crate) mod checkpoint;
 pub(crate) mod inputs;
 pub(crate) mod memory;
 pub(crate) mod pipeline;
-pub(crate) mod plan;
 pub(crate) mod progress;
 pub(crate) mod slot;
 pub(crate) mod task;

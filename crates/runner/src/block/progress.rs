@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::inputs::BlockSources;
 use crate::block_stages::BlockStageOutput;
-use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease, MadeWith};
+use mocban_catalog::{BlockInputVersions, BlockJob, BlockProvenance, BlockWork, Lease};
 use mocban_core::domain::{ArtifactSet, BlockStage};
 
 /// How a block's task ended.
@@ -33,13 +33,13 @@ pub(crate) struct BlockInProgress {
 
 impl BlockInProgress {
     /// Describes what a stage is computed from.
-    pub(crate) fn made_with(&self, stage: BlockStage, settings: &Value) -> MadeWith {
+    pub(crate) fn provenance(&self, stage: BlockStage, settings: &Value) -> BlockProvenance {
         let BlockWork {
             attributes,
             control_points,
             ..
         } = &self.work;
-        MadeWith::new(
+        BlockProvenance::new(
             stage,
             settings,
             attributes,

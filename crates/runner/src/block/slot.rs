@@ -7,12 +7,13 @@ use tokio::task::JoinSet;
 use super::memory::{BLOCK_BYTES, EstimatedBlock, map_bytes};
 use super::progress::BlockEnd;
 use super::task::{BlockReport, process_block};
-use crate::compute_thread::task_result;
+use crate::blocking::task_result;
 use crate::error::RunError;
 use crate::input_reads::{ReadLimits, read_each};
 use crate::options::RunOptions;
 use crate::policy;
 use crate::prefetch::Prefetch;
+use crate::retry::retried;
 use crate::run_context::RunContext;
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
@@ -30,7 +31,7 @@ pub(crate) struct BlockRunCounts {
 pub(crate) struct BlockSlot {
     context: Arc<RunContext>,
     /// The blocks of this run; `None` for all.
-    among: Option<BlockSelection>,
+    selection: Option<BlockSelection>,
     image_limits: raster::ImageLimits,
     /// Memory for the height maps of a block.
     map_bytes: u64,
@@ -45,14 +46,16 @@ pub(crate) struct BlockSlot {
 impl BlockSlot {
     pub(crate) fn new(
         context: Arc<RunContext>,
-        among: Option<BlockSelection>,
+        selection: Option<BlockSelection>,
         options: &RunOptions,
     ) -> Self {
         Self {
             context,
-            may_find_one: among.as_ref().is_none_or(|among| !among.is_empty()),
-            among,
-            image_limits: options.image_limits,
+            may_find_one: selection
+                .as_ref()
+                .is_none_or(|selection| !selection.is_empty()),
+            selection,
+            image_limits: options.limits.image,
             map_bytes: map_bytes(options.memory),
             waits_for_memory: false,
             task: JoinSet::new(),
@@ -85,12 +88,9 @@ impl BlockSlot {
         }
         let context = &self.context;
         let (deadline, alive_since) = (context.block_deadline(), context.alive_since());
-        let (catalog, among) = (&context.catalog, self.among.as_ref());
-        let claimed = catalog.retry_while_unavailable(async || {
-            let claim = catalog.claim_block(worker, deadline, alive_since, among);
-            claim.await
-        });
-        let Some((lease, work)) = claimed.await? else {
+        let (catalog, selection) = (&context.catalog, self.selection.as_ref());
+        let claimed = retried!(catalog.claim_block(worker, deadline, alive_since, selection))?;
+        let Some((lease, work)) = claimed else {
             self.may_find_one = false;
             return Ok(false);
         };
@@ -137,9 +137,6 @@ impl BlockSlot {
     }
 
     /// Counts a block that ended.
-    ///
-    /// # Errors
-    /// Returns the error that ends the run.
     pub(crate) fn count(&mut self, ended: BlockReport) -> Result<(), RunError> {
         self.may_find_one = true;
         match ended? {
@@ -153,10 +150,8 @@ impl BlockSlot {
 
     /// Returns how many blocks any process has yet to finish.
     pub(crate) async fn outstanding(&self) -> Result<OutstandingBlocks, RunError> {
-        let (catalog, among) = (&self.context.catalog, self.among.as_ref());
-        let left =
-            catalog.retry_while_unavailable(async || catalog.outstanding_blocks(among).await);
-        Ok(left.await?)
+        let (catalog, selection) = (&self.context.catalog, self.selection.as_ref());
+        Ok(retried!(catalog.outstanding_blocks(selection))?)
     }
 
     /// Ends back-offs that are due, and finds out whether a claim may find a block.
@@ -166,9 +161,7 @@ impl BlockSlot {
         let is_due = left.next_due.is_some_and(|due| due <= now);
         if is_due {
             let catalog = &self.context.catalog;
-            catalog
-                .retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await)
-                .await?;
+            retried!(catalog.release_due_blocks(now, longest))?;
         }
         self.may_find_one = is_due || left.ready > 0;
         Ok(())

@@ -9,18 +9,19 @@ use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 
 use super::artifacts::StageArtifacts;
-use super::checkpoint::{store_failure, store_stage, while_unavailable};
+use super::checkpoint::{store_failure, store_stage};
 use super::inputs::{BlockSources, outdated};
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::BlockStageError;
-use crate::compute_thread::panic_text;
+use crate::blocking::panic_text;
 use crate::error::RunError;
 use crate::events::RunEvent;
+use crate::retry::stored;
 use crate::run_context::RunContext;
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease};
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
-use mocban_core::domain::{BlockStage, BlockStageRecord, FailureClass};
+use mocban_core::domain::{BlockStage, BlockStageRecord, FailureClass, WorkerId};
 use mocban_store::ArtifactError;
 use mocban_system::failpoint::{self, Point};
 use mocban_system::platform::sleep_active;
@@ -69,6 +70,7 @@ pub(crate) async fn process_block(
             Err(Interruption::Stopped) => {
                 return release(&context, block.lease).await;
             }
+            Err(Interruption::LeaseLost) => return Ok(BlockEnd::LeaseLost),
             Err(Interruption::Store(error)) => {
                 return end_without_store(&context, block.lease, error).await;
             }
@@ -111,6 +113,8 @@ enum Interruption {
     Store(ArtifactError),
     /// The run stops at once.
     Stopped,
+    /// The lease is lost.
+    LeaseLost,
     /// The run cannot go on.
     Run(RunError),
 }
@@ -137,7 +141,8 @@ async fn run_stage(
         stage,
     });
     let (sources, known) = (block.sources.clone(), block.inputs.clone());
-    let versions = on_thread(context, move |_| sources.versions(stage, &known)).await?;
+    let worker = block.lease.worker();
+    let versions = on_thread(context, worker, move |_| sources.versions(stage, &known)).await?;
     let versions = versions.map_err(|error| Interruption::of(error, None))?;
     let earlier = outdated(stage, &block.inputs, &versions);
     let BlockInputVersions { mesh, page, labels } = versions;
@@ -152,10 +157,15 @@ async fn run_stage(
     }
     if seen != block.work.inputs {
         // Before the computation, so that a later run knows which files it failed on if the process dies.
-        let item = vec![(block.lease.block(), seen.clone())];
-        let catalog = &context.catalog;
-        let stored = while_unavailable!(catalog, catalog.store_block_inputs(item.clone()));
-        stored.map_err(|error| Interruption::Run(error.into()))?;
+        let (catalog, lease) = (&context.catalog, &block.lease);
+        let stored = stored!(catalog.store_leased_inputs(
+            lease.clone(),
+            seen.clone(),
+            context.alive_since()
+        ));
+        if !stored.map_err(|error| Interruption::Run(error.into()))? {
+            return Err(Interruption::LeaseLost);
+        }
         block.work.inputs = seen.clone();
     }
     block.inputs = seen;
@@ -179,7 +189,7 @@ async fn compute(
     let points = block.work.control_points.clone();
     let points = points.filter(|points| read.have(points));
     let inner = Arc::clone(context);
-    let outcome = on_thread(context, move |stop| {
+    let outcome = on_thread(context, block.lease.worker(), move |stop| {
         let inputs = sources.inputs(points);
         let artifacts = StageArtifacts::new(&inner.project, &inputs.name, stage);
         let output = inner
@@ -188,8 +198,8 @@ async fn compute(
         sources.check_unchanged(&read)?;
         failpoint::hit(stage, Point::Computed, Some(&inputs.name));
         Ok((output, artifacts.finish()?))
-    });
-    let outcome = outcome.await?;
+    })
+    .await?;
     let ms = begun.elapsed().as_millis() as u64;
     match outcome {
         Ok((output, files)) => Ok(ComputedBlockStage { output, files, ms }),
@@ -201,9 +211,11 @@ async fn compute(
 const LONGEST_END: Duration = Duration::from_millis(500);
 
 /// Runs blocking work on a thread of its own, with a flag that requests a stop. Waits for at most as long as one stage
-/// may take; then, and after an immediate stop of the run, cancels the work and waits until its memory is free.
+/// may take; then, after an immediate stop of the run, and when the leases of `worker` have expired, cancels the work and
+/// waits until its memory is free.
 async fn on_thread<T: Send + 'static>(
     context: &RunContext,
+    worker: WorkerId,
     work: impl FnOnce(&AtomicBool) -> Result<T, BlockStageError> + Send + 'static,
 ) -> Result<Result<T, BlockStageError>, Interruption> {
     let failed =
@@ -233,6 +245,7 @@ async fn on_thread<T: Send + 'static>(
             Err(_) => Err(failed(FailureClass::Bug, "the block's thread ended without a result".to_owned())),
         },
         () = context.stop.reached(StopLevel::Now) => Interruption::Stopped,
+        () = context.expired(worker) => Interruption::LeaseLost,
         () = sleep_active(context.stage_timeout) => {
             let seconds = context.stage_timeout.as_secs_f64();
             failed(FailureClass::Resource, format!("the stage took longer than {seconds} s (run.stage_timeout_s)"))

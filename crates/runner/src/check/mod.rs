@@ -23,7 +23,7 @@ use mocban_catalog::{
     AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
     SetApart,
 };
-use mocban_core::domain::{BlockId, BlockStage, UnixMillis};
+use mocban_core::domain::{BlockId, BlockStage, UnixMillis, explained_by_cause};
 use mocban_store::{ArtifactError, PlaceError, Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;
 
@@ -31,7 +31,7 @@ use pairs::PairCheck;
 const PAGE: usize = 500;
 
 /// Options of a check.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is a choice of its own, with a name"
@@ -75,12 +75,11 @@ pub enum CheckError {
     Stopped(#[from] tokio::task::JoinError),
 }
 
+explained_by_cause! { CheckError: Catalog, Claim }
+
 /// Checks a project and, with `repair`, repairs it.
 ///
 /// A damaged database is not written to, with one exception: if only indexes are damaged, a repair rebuilds them.
-///
-/// # Errors
-/// Returns an error if the catalog or the place of the artifacts cannot be read or written, or a worker thread panics.
 pub async fn check(
     project: &Project,
     catalog: &Catalog,

@@ -69,8 +69,7 @@ pub(super) fn check_pair(
         inputs_unreadable: Vec::new(),
     };
     // The files of a pair that was cut from a block are artifacts of the block.
-    let cut = [&pair.inputs.mesh_path, &pair.inputs.print_path];
-    let cut = cut
+    let cut = [&pair.inputs.mesh_path, &pair.inputs.print_path]
         .into_iter()
         .filter_map(|path| ArtifactRef::at_path(path));
     check.named.extend(cut);

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::{Arc, Mutex};
 
-use super::fake_executor::FakeExecutor;
+use super::fake_pairs::FakePairs;
 use super::{RunFixture, options};
 use crate::Stop;
 use mocban_catalog::Catalog;
@@ -20,12 +20,12 @@ impl RunFixture {
     async fn existing(dir: &Path) -> Self {
         let project = Project::open(dir).expect("a project");
         let catalog = Catalog::open(&project.catalog_path()).await;
-        let executor = FakeExecutor::default();
-        let _ = executor.project.set(project.clone());
+        let pairs = FakePairs::default();
+        let _ = pairs.project.set(project.clone());
         Self {
             project,
             catalog: catalog.expect("a catalog"),
-            executor: Arc::new(executor),
+            pairs: Arc::new(pairs),
             blocks: Arc::default(),
             stop: Stop::new(),
             events: Mutex::default(),

@@ -40,7 +40,7 @@ async fn a_block_waits_until_a_running_pair_returns_its_memory() {
         ..options(2)
     };
     let hold = async {
-        while fixture.executor.count("wait_1", Stage::Fit) == 0 {
+        while fixture.pairs.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
         let claimed = fixture.catalog.block_tokens().await.expect("a read");
@@ -51,7 +51,7 @@ async fn a_block_waits_until_a_running_pair_returns_its_memory() {
             tokio::task::yield_now().await;
         }
         assert_eq!(fixture.blocks.count("flaky_1", BlockStage::Align), 1);
-        fixture.executor.open();
+        fixture.pairs.open();
     };
     let (summary, ()) = tokio::join!(fixture.run(&limited), hold);
     assert_eq!((summary.blocks.done, summary.done), (1, 2));

@@ -27,9 +27,9 @@ impl RunFixture {
             unit: None,
             side: None,
         });
-        let imported = fixture.catalog.import_blocks(rows.collect(), 1).await;
+        let imported = fixture.catalog.import_blocks(rows.collect(), true, 1).await;
         imported.expect("imported");
-        let _ = fixture.executor.project.set(fixture.project.clone());
+        let _ = fixture.pairs.project.set(fixture.project.clone());
         fixture
     }
 
@@ -100,17 +100,15 @@ async fn changed_labels_run_only_the_changed_characters_again() {
     let changed = fixture.run(&options(2)).await;
     assert_eq!((changed.blocks.done, changed.done), (1, 1));
     assert_eq!(fixture.counts("b_1"), [1, 1, 2, 2]);
-    assert_eq!(fixture.executor.count("b_1_r1", Stage::Fit), 1);
-    assert_eq!(fixture.executor.count("b_1_r2", Stage::Fit), 2);
-    assert_eq!(
-        fixture.catalog.retired_pairs().await.expect("a read"),
-        [name("b_1_r3")]
-    );
+    assert_eq!(fixture.pairs.count("b_1_r1", Stage::Fit), 1);
+    assert_eq!(fixture.pairs.count("b_1_r2", Stage::Fit), 2);
+    let retired = fixture.catalog.retired_pairs().await.expect("a read");
+    assert_eq!((retired.len(), &retired[0].name), (1, &name("b_1_r3")));
     assert_eq!(changed.status.pairs, 2);
     fixture.write("b_1", "txt", "r1 a\nr2 new b\nr3 c");
     let back = fixture.run(&options(2)).await;
     assert_eq!((back.done, back.status.pairs), (0, 3));
-    assert_eq!(fixture.executor.count("b_1_r3", Stage::Fit), 1);
+    assert_eq!(fixture.pairs.count("b_1_r3", Stage::Fit), 1);
 }
 
 #[tokio::test]
@@ -122,7 +120,10 @@ async fn labels_that_are_added_to_a_finished_block_are_used() {
         ..with_labels.clone()
     };
     let import = async |attributes: BlockAttributes| {
-        let imported = fixture.catalog.import_blocks(vec![attributes], 1).await;
+        let imported = fixture
+            .catalog
+            .import_blocks(vec![attributes], true, 1)
+            .await;
         imported.expect("imported");
     };
     import(without.clone()).await;
@@ -154,7 +155,7 @@ async fn a_changed_page_or_mesh_or_setting_runs_the_stages_that_depend_on_it() {
     fixture.run(&options(1)).await;
     assert_eq!(fixture.counts("b_1"), [2, 3, 4, 4]);
     // Nothing of the characters changed.
-    assert_eq!(fixture.executor.count("b_1_r1", Stage::Fit), 1);
+    assert_eq!(fixture.pairs.count("b_1_r1", Stage::Fit), 1);
 }
 
 #[tokio::test]
@@ -267,7 +268,7 @@ async fn a_named_block_runs_with_the_pairs_that_are_cut_from_it_and_no_others() 
     assert_eq!((first.blocks.done, first.blocks.left), (1, 0));
     assert_eq!((first.done, first.left, first.status.pairs), (2, 0, 3));
     assert_eq!(fixture.counts("b_2"), [0; 4]);
-    assert_eq!(fixture.executor.count("other", Stage::Fit), 0);
+    assert_eq!(fixture.pairs.count("other", Stage::Fit), 0);
     fixture.write("b_1", "txt", "r1 a\nr2 new b");
     let second = fixture.run(&named(&["b_2"], &["other"])).await;
     assert_eq!((second.blocks.done, second.done), (1, 2));
@@ -371,7 +372,7 @@ async fn two_runs_work_on_different_blocks_and_share_the_pairs() {
         for label in ["r1", "r2"] {
             let pair = format!("{block}_{label}");
             assert_eq!(fixture.status(&pair).await, JobStatus::Done);
-            assert_eq!(fixture.executor.count(&pair, Stage::Fit), 1, "{pair}");
+            assert_eq!(fixture.pairs.count(&pair, Stage::Fit), 1, "{pair}");
         }
     }
 }

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
 
-use super::fake_executor::compute_without_end;
+use super::fake_pairs::compute_without_end;
 use super::gate::Gate;
 use crate::{
     BlockArtifacts, BlockFile, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use tokio::time::timeout;
 
 use super::{RunFixture, name, options};
-use crate::policy::Clock;
+use crate::timing::Clock;
 use crate::{RunEvent, RunOptions, StopLevel};
 use mocban_catalog::{Catalog, DeadWorker, Lease};
 use mocban_core::domain::{JobStatus, PairId, PairName, Stage, WorkerId};
@@ -19,7 +19,7 @@ impl RunFixture {
 
     /// Waits until a stage of a pair has started.
     async fn started(&self, pair: &str, stage: Stage) {
-        while self.executor.count(pair, stage) == 0 {
+        while self.pairs.count(pair, stage) == 0 {
             tokio::task::yield_now().await;
         }
     }
@@ -45,7 +45,7 @@ async fn stages_are_computed_while_earlier_ones_are_stored_and_reported_when_sto
     let hold = async {
         fixture.started("wait_1", Stage::Fit).await;
         let release = fixture.catalog.hold().await;
-        fixture.executor.open();
+        fixture.pairs.open();
         fixture.started("wait_1", Stage::Register).await;
         assert_eq!(fixture.position(|event| finished(event, Stage::Fit)), None);
         release.send(()).expect("the writer waits");
@@ -78,7 +78,7 @@ async fn finished_stages_are_stored_while_a_long_stage_is_computed() {
         };
         let stored = timeout(Duration::from_mins(1), stored).await;
         let detail = fixture.catalog.pair(&name("lasts_1")).await;
-        fixture.executor.open();
+        fixture.pairs.open();
         assert!(stored.is_ok(), "it is stored only at the end");
         assert_eq!(detail.expect("a read").expect("the pair").attempts.len(), 3);
     };
@@ -96,7 +96,7 @@ async fn stages_are_stored_at_once_when_the_lease_is_needed_to_store_a_failure()
     let options = options(1);
     let ended = timeout(SOON, fixture.run(&options)).await;
     assert_eq!(ended.expect("no timeout").done, 1);
-    assert_eq!(fixture.executor.count("breaks_1", Stage::Depth), 2);
+    assert_eq!(fixture.pairs.count("breaks_1", Stage::Depth), 2);
 }
 
 #[tokio::test]
@@ -107,12 +107,12 @@ async fn a_stage_computed_after_the_lease_was_lost_is_not_stored() {
         let all = DeadWorker::AllExcept(WorkerId(99));
         let recovered = fixture.catalog.recover(all, 1).await.expect("recovered");
         assert_eq!(recovered.ready, 1);
-        fixture.executor.open();
+        fixture.pairs.open();
     };
     let options = options(1);
     let (summary, ()) = tokio::join!(fixture.run(&options), take_lease);
     assert_eq!((summary.done, summary.stages), (1, 4));
-    assert_eq!(fixture.executor.count("wait_1", Stage::Fit), 2);
+    assert_eq!(fixture.pairs.count("wait_1", Stage::Fit), 2);
     let detail = fixture.catalog.pair(&name("wait_1")).await.expect("a read");
     let attempts = detail.expect("the pair").attempts;
     let stored = attempts.iter().filter(|attempt| attempt.failure.is_none());
@@ -131,12 +131,12 @@ async fn the_next_pair_is_claimed_ahead_and_released_by_a_drain() {
         while fixture.status("next").await != JobStatus::Ready {
             tokio::task::yield_now().await;
         }
-        fixture.executor.open();
+        fixture.pairs.open();
     };
     let options = options(1);
     let (summary, ()) = tokio::join!(fixture.run(&options), drain);
     assert_eq!((summary.done, summary.left), (1, 2));
-    assert_eq!(fixture.executor.count("next", Stage::Fit), 0);
+    assert_eq!(fixture.pairs.count("next", Stage::Fit), 0);
     let attempt = async |pair: PairName| {
         fixture
             .catalog
@@ -175,7 +175,7 @@ async fn no_more_pairs_are_claimed_ahead_than_slots_become_free() {
             tokio::task::yield_now().await;
         }
         assert_eq!(fixture.status("other").await, JobStatus::Ready);
-        fixture.executor.open();
+        fixture.pairs.open();
     };
     let options = options(2);
     let (summary, ()) = tokio::join!(fixture.run(&options), look);
@@ -204,7 +204,7 @@ async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
         let overdue = fixture.catalog.recover_overdue(other, 0, 0).await;
         assert_eq!(overdue.expect("recovered").ready, 1);
         assert_eq!(fixture.status("next").await, JobStatus::Leased);
-        fixture.executor.open();
+        fixture.pairs.open();
     };
     let (summary, ()) = tokio::join!(fixture.run(&options), look);
     assert_eq!(summary.done, 2);
@@ -229,7 +229,7 @@ async fn pairs_that_exceed_the_memory_together_run_one_after_the_other() {
                 let pairs = ["wait_1", "wait_2", "wait_3"];
                 let started = pairs
                     .iter()
-                    .filter(|pair| fixture.executor.count(pair, Stage::Fit) > 0);
+                    .filter(|pair| fixture.pairs.count(pair, Stage::Fit) > 0);
                 let started = started.count();
                 let mut ready = 0;
                 for pair in pairs {
@@ -240,11 +240,11 @@ async fn pairs_that_exceed_the_memory_together_run_one_after_the_other() {
             while !settled().await {
                 tokio::task::yield_now().await;
             }
-            fixture.executor.open();
+            fixture.pairs.open();
         };
         let (summary, ()) = tokio::join!(fixture.run(&options), open);
         assert_eq!(summary.done, 3);
-        let most = fixture.executor.most.load(Ordering::SeqCst);
+        let most = fixture.pairs.most.load(Ordering::SeqCst);
         assert_eq!(most, together, "{limit:?}");
     }
 }
@@ -255,7 +255,7 @@ async fn a_pair_leased_again_takes_another_slot_than_its_earlier_task() {
     let fixture = RunFixture::new(&["wait_1", "wait_2"]).await;
     let started = || {
         let pairs = ["wait_1", "wait_2"];
-        let counts = pairs.map(|pair| fixture.executor.count(pair, Stage::Fit));
+        let counts = pairs.map(|pair| fixture.pairs.count(pair, Stage::Fit));
         counts.into_iter().sum::<usize>()
     };
     let tasks = async |count: usize| {
@@ -273,7 +273,7 @@ async fn a_pair_leased_again_takes_another_slot_than_its_earlier_task() {
         tasks(3).await;
         // A fourth task must not start. No event shows this, so let the scheduler poll for a second.
         let fourth = timeout(Duration::from_secs(1), tasks(4)).await;
-        fixture.executor.open();
+        fixture.pairs.open();
         fourth
     };
     let options = options(3);

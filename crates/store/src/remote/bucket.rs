@@ -157,9 +157,6 @@ impl Bucket {
     }
 
     /// Stores an object, in place of an earlier one of this name.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn write(&self, key: &str, bytes: Vec<u8>) -> Result<(), BucketError> {
         self.request(key, |store, path| async move {
             store.put(&path, PutPayload::from(bytes)).await.map(drop)
@@ -168,9 +165,6 @@ impl Bucket {
 
     /// Stores an object unless there is one of this name. Returns whether it was stored. Of several processes that call this at
     /// the same time, one stores its object; a store without conditional requests keeps the last one.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn create(&self, key: &str, bytes: Vec<u8>) -> Result<bool, BucketError> {
         self.request(key, |store, path| async move {
             let payload = PutPayload::from(bytes);
@@ -188,9 +182,6 @@ impl Bucket {
     }
 
     /// Returns whether there is no object below `folder`.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn is_empty(&self, folder: &str) -> Result<bool, BucketError> {
         self.request(folder, |store, path| async move {
             let first = store.list(Some(&path)).try_next().await;
@@ -199,9 +190,6 @@ impl Bucket {
     }
 
     /// Removes an object. Does nothing if there is none.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn remove(&self, key: &str) -> Result<(), BucketError> {
         self.request(key, |store, path| async move {
             match store.delete(&path).await {
@@ -212,9 +200,6 @@ impl Bucket {
     }
 
     /// Calls `each` with the key and stat of every object below `folder`, in any order.
-    ///
-    /// # Errors
-    /// Returns an error if a request fails.
     pub(crate) fn list(
         &self,
         folder: &str,
@@ -248,9 +233,6 @@ impl Bucket {
     }
 
     /// Calls `each` with the key and stat of every object in `folder`, without those of its subfolders.
-    ///
-    /// # Errors
-    /// Returns an error if a request fails.
     pub(super) fn list_folder(
         &self,
         folder: &str,
@@ -268,9 +250,6 @@ impl Bucket {
     }
 
     /// Sends a request that shows whether the bucket exists and may be read.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn check(&self) -> Result<(), BucketError> {
         let store = self.client.for_first_request();
         let store = store.map_err(|reason| self.unusable(&reason))?;
@@ -315,10 +294,7 @@ impl Bucket {
     {
         let (address, reply) = (self.address_of(key), send(self.store()?, self.path(key)?));
         let place = address.clone();
-        let outcome = async move {
-            let outcome = reply.await;
-            outcome.map_err(|error| BucketError::of(&place, &error))
-        };
+        let outcome = async move { reply.await.map_err(|error| BucketError::of(&place, &error)) };
         start(address, outcome)?.wait()
     }
 }

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::bucket::Bucket;
 use super::bucket_error::BucketError;
 use super::cache_files;
+use crate::create_folders::create_folders;
 use mocban_core::domain::ContentHash;
 use mocban_system::platform::rename;
 
@@ -144,9 +145,9 @@ impl ObjectCache {
             let text = "no folder for local copies is known; set storage.cache";
             return Err(local(io::Error::new(ErrorKind::NotFound, text)));
         }
-        std::fs::create_dir_all(&self.folder).map_err(local)?;
-        let temporary = tempfile::NamedTempFile::with_prefix_in("tmp-", &self.folder);
-        let temporary = temporary.map_err(local)?;
+        create_folders(&self.folder).map_err(local)?;
+        let temporary =
+            tempfile::NamedTempFile::with_prefix_in("tmp-", &self.folder).map_err(local)?;
         let target = HashingFile {
             file: temporary.reopen().map_err(local)?,
             hasher: blake3::Hasher::new(),
@@ -227,7 +228,7 @@ impl ObjectCache {
 
     /// Creates the folder of a file.
     fn make_folder(&self, file: &Path) -> io::Result<()> {
-        std::fs::create_dir_all(file.parent().unwrap_or(&self.folder))
+        create_folders(file.parent().unwrap_or(&self.folder))
     }
 
     fn is_confirmed(&self, address: &str) -> bool {

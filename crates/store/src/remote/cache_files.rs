@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Copies are removed until this share of the space is free again.
+/// Copies are removed until this fraction of the space is free again.
 const FREE_SHARE: f64 = 0.1;
 
 /// A file of the cache.

@@ -8,8 +8,8 @@ mod client;
 mod listing;
 mod object_stat;
 mod pack;
-mod recent;
 mod request;
+mod small_cache;
 mod storage;
 
 pub use bucket_error::BucketError;

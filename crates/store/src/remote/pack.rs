@@ -64,9 +64,6 @@ impl Pack {
     }
 
     /// Stores the pack.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn store(self, bucket: &Bucket) -> Result<(), BucketError> {
         bucket.write(&key(&self.name), self.bytes)
     }
@@ -82,16 +79,12 @@ pub(crate) fn key(name: &str) -> String {
 /// surround the name.
 pub(crate) fn number_of(name: &str) -> Option<u64> {
     let name = name.rsplit_once('/').map_or(name, |(_, name)| name);
-    let name = name.strip_suffix(".tar").unwrap_or(name);
-    let (hash, number) = name.split_once('-')?;
+    let (hash, number) = name.strip_suffix(".tar").unwrap_or(name).split_once('-')?;
     let is_hash = hash.len() == 64 && hash.bytes().all(|byte| byte.is_ascii_hexdigit());
     (is_hash && number.len() == 16).then(|| u64::from_str_radix(number, 16).ok())?
 }
 
 /// Reads a whole pack.
-///
-/// # Errors
-/// Returns an error if the request fails.
 pub(super) fn read_pack(bucket: &Bucket, name: &str) -> Result<Vec<u8>, BucketError> {
     bucket.read(&key(name), MAX_BYTES)
 }

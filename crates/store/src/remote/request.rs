@@ -33,9 +33,6 @@ pub(super) struct PendingReply<T> {
 }
 
 /// Starts a request for an object or folder.
-///
-/// # Errors
-/// Returns an error if the threads cannot be started.
 pub(super) fn start<T: Send + 'static>(
     address: String,
     request: impl Future<Output = Result<T, BucketError>> + Send + 'static,
@@ -54,9 +51,6 @@ pub(super) fn start<T: Send + 'static>(
 
 impl<T> PendingReply<T> {
     /// Waits for the outcome of the request. Warns while it lasts.
-    ///
-    /// # Errors
-    /// Returns the error of the request.
     pub(super) fn wait(self) -> Result<T, BucketError> {
         let begun = Instant::now();
         loop {

@@ -10,8 +10,8 @@ use super::bucket_error::BucketError;
 use super::cache::{CachedObject, ObjectCache};
 use super::listing::FolderLists;
 use super::pack::{key, read_pack};
-use super::recent::Recent;
-use mocban_core::domain::is_address;
+use super::small_cache::SmallCache;
+use mocban_core::domain::{ErrorCode, Explained, is_address};
 
 /// The settings of a storage.
 #[derive(Debug, Clone, Default)]
@@ -43,9 +43,9 @@ pub struct ProjectStorage {
     cache: ObjectCache,
     lists: FolderLists,
     /// Packs read last.
-    packs: Recent<Arc<Vec<u8>>>,
+    packs: SmallCache<Arc<Vec<u8>>>,
     /// Lengths in bytes of the packs asked for last.
-    lengths: Recent<u64>,
+    lengths: SmallCache<u64>,
 }
 
 /// Why a storage cannot be used.
@@ -89,6 +89,16 @@ pub enum StorageError {
         /// Why.
         source: BucketError,
     },
+}
+
+impl Explained for StorageError {
+    fn code(&self) -> ErrorCode {
+        if self.is_unavailable() {
+            ErrorCode::Unavailable
+        } else {
+            ErrorCode::Settings
+        }
+    }
 }
 
 impl StorageError {
@@ -152,8 +162,8 @@ impl ProjectStorage {
             roots,
             cache: ObjectCache::new(cache, options.cache_bytes),
             lists: FolderLists::default(),
-            packs: Recent::default(),
-            lengths: Recent::default(),
+            packs: SmallCache::default(),
+            lengths: SmallCache::default(),
         }))
     }
 
@@ -166,8 +176,8 @@ impl ProjectStorage {
             roots: BTreeMap::from([("scans".to_owned(), Root::Bucket(bucket.clone()))]),
             cache: ObjectCache::new(cache, 1 << 20),
             lists: FolderLists::default(),
-            packs: Recent::default(),
-            lengths: Recent::default(),
+            packs: SmallCache::default(),
+            lengths: SmallCache::default(),
         };
         (storage, bucket)
     }
@@ -274,9 +284,6 @@ impl ProjectStorage {
     }
 
     /// Returns a pack, from memory if it was read lately.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn pack(&self, bucket: &Bucket, name: &str) -> Result<Arc<Vec<u8>>, BucketError> {
         self.packs
             .get_or_insert(name, || read_pack(bucket, name).map(Arc::new))
@@ -290,9 +297,6 @@ impl ProjectStorage {
     }
 
     /// Returns the length of a pack in bytes.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn pack_bytes(&self, bucket: &Bucket, name: &str) -> Result<u64, BucketError> {
         self.lengths
             .get_or_insert(name, || Ok(bucket.stat(&key(name))?.bytes))

@@ -44,9 +44,6 @@ pub fn stat_link(path: &Path) -> io::Result<FileStat> {
 }
 
 /// Returns identity and length of an open file.
-///
-/// # Errors
-/// Returns an error if the system does not give them.
 pub fn stat_open(file: &File) -> io::Result<FileStat> {
     file.metadata().map(|meta| stat_of(&meta))
 }
@@ -106,9 +103,6 @@ pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
 }
 
 /// Opens a file for reading. Does not wait for the writer of a pipe.
-///
-/// # Errors
-/// Returns an error if the file cannot be opened.
 pub fn open_without_waiting(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true);
@@ -118,9 +112,6 @@ pub fn open_without_waiting(path: &Path) -> io::Result<File> {
 }
 
 /// Lets reads of a file wait that [`open_without_waiting`] opened.
-///
-/// # Errors
-/// Returns an error if the system refuses it.
 pub fn let_reads_wait(file: &File) -> io::Result<()> {
     Ok(fcntl_setfl(file, OFlags::empty())?)
 }
@@ -136,33 +127,21 @@ pub fn is_socket(file_type: FileType) -> bool {
 }
 
 /// Opens a folder, to lock it or to make the names in it durable.
-///
-/// # Errors
-/// Returns an error if the folder cannot be opened.
 pub fn open_folder(folder: &Path) -> io::Result<File> {
     File::open(folder)
 }
 
 /// Makes the names in an open folder durable.
-///
-/// # Errors
-/// Returns an error if the disk fails.
 pub fn sync_names(folder: &File) -> io::Result<()> {
     folder.sync_all()
 }
 
 /// Makes the content of a file durable.
-///
-/// # Errors
-/// Returns an error if the file cannot be opened or the disk fails.
 pub fn sync_file(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
 }
 
 /// Makes a folder with all its files durable: syncs its file system.
-///
-/// # Errors
-/// Returns an error if the folder cannot be opened or the disk fails.
 #[cfg(target_os = "linux")]
 pub fn sync_tree(folder: &Path) -> io::Result<()> {
     Ok(rustix::fs::syncfs(File::open(folder)?)?)
@@ -174,9 +153,6 @@ pub fn sync_tree(folder: &Path) -> io::Result<()> {
 }
 
 /// Renames a file or folder; replaces an existing file atomically.
-///
-/// # Errors
-/// Returns an error if the system refuses it.
 pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
     std::fs::rename(from, to)
 }
@@ -209,9 +185,6 @@ pub fn with_slashes(path: String) -> String {
 }
 
 /// Ends the lock of an open file.
-///
-/// # Errors
-/// Returns an error if the system refuses it.
 pub fn unlock(file: &File) -> io::Result<()> {
     file.unlock()
 }
@@ -272,9 +245,6 @@ fn parse_memory(status: &str) -> Option<ProcessMemory> {
 
 /// Calls a function at each Ctrl-C, SIGTERM and SIGHUP until the handle is aborted. SIGHUP stays ignored if it was
 /// ignored when this process started, as under `nohup`.
-///
-/// # Errors
-/// Returns an error if the system refuses to watch a signal.
 pub fn watch_signals(on_signal: impl Fn() + Send + 'static) -> io::Result<JoinHandle<()>> {
     let is_ignored = IgnoredSignals::of_this_process().contains(SignalKind::hangup());
     let hang_up = (!is_ignored).then(|| signal(SignalKind::hangup()));

@@ -50,9 +50,6 @@ pub fn stat_link(path: &Path) -> io::Result<FileStat> {
 }
 
 /// Returns identity and length of an open file.
-///
-/// # Errors
-/// Returns an error if the system does not give them.
 pub fn stat_open(file: &File) -> io::Result<FileStat> {
     let found = winapi_util::file::information(file)?;
     Ok(FileStat {
@@ -101,17 +98,11 @@ pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
 }
 
 /// Opens a file for reading. Files on a disk never wait for a writer.
-///
-/// # Errors
-/// Returns an error if the file cannot be opened.
 pub fn open_without_waiting(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
 /// Does nothing: see [`open_without_waiting`].
-///
-/// # Errors
-/// Returns no error.
 pub const fn let_reads_wait(_file: &File) -> io::Result<()> {
     Ok(())
 }
@@ -127,9 +118,6 @@ pub const fn is_socket(_file_type: FileType) -> bool {
 }
 
 /// Opens a folder. Windows cannot lock it.
-///
-/// # Errors
-/// Returns an error if the folder cannot be opened.
 pub fn open_folder(folder: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true).custom_flags(FOLDERS_TOO);
@@ -138,25 +126,16 @@ pub fn open_folder(folder: &Path) -> io::Result<File> {
 
 /// Does nothing: Windows cannot sync a folder, and NTFS keeps its names consistent in a journal. A name may be lost in a
 /// power cut, as if the program had ended a few seconds earlier.
-///
-/// # Errors
-/// Returns no error.
 pub const fn sync_names(_folder: &File) -> io::Result<()> {
     Ok(())
 }
 
 /// Makes the content of a file durable. Windows only syncs files that are open for writing.
-///
-/// # Errors
-/// Returns an error if the file cannot be opened or the disk fails.
 pub fn sync_file(path: &Path) -> io::Result<()> {
     OpenOptions::new().write(true).open(path)?.sync_all()
 }
 
 /// Makes a folder with all its files durable: syncs each file.
-///
-/// # Errors
-/// Returns an error if a file cannot be opened or the disk fails.
 pub fn sync_tree(folder: &Path) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
@@ -171,9 +150,6 @@ pub fn sync_tree(folder: &Path) -> io::Result<()> {
 
 /// Renames a file or folder; replaces an existing file atomically. Tries again for a second while another program has
 /// the file or a file in the folder open, such as a virus scanner.
-///
-/// # Errors
-/// Returns an error if the system refuses it.
 pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
     for _ in 0..RENAME_ATTEMPTS {
         match std::fs::rename(from, to) {
@@ -211,9 +187,6 @@ pub fn with_slashes(path: String) -> String {
 
 /// Ends the lock of an open file. The standard library unlocks twice, in case there are two locks, and Wine reports the
 /// second time as a lock violation.
-///
-/// # Errors
-/// Returns an error if the system refuses it.
 pub fn unlock(file: &File) -> io::Result<()> {
     match file.unlock() {
         Err(error) if error.raw_os_error() == Some(ERROR_LOCK_VIOLATION) => Ok(()),
@@ -266,9 +239,6 @@ pub const fn process_memory() -> Option<ProcessMemory> {
 
 /// Calls a function at each Ctrl-C and Ctrl-Break, when the console is closed, and at a shutdown of the system, until
 /// the handle is aborted. Windows ends the process about five seconds after the console is closed.
-///
-/// # Errors
-/// Returns an error if the system refuses to watch them.
 pub fn watch_signals(on_signal: impl Fn() + Send + 'static) -> io::Result<JoinHandle<()>> {
     let (mut interrupt, mut end) = (ctrl_c()?, ctrl_break()?);
     let (mut close, mut shutdown) = (ctrl_close()?, ctrl_shutdown()?);

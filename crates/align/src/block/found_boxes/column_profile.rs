@@ -64,7 +64,7 @@ impl ColumnProfile {
         (1.0 - least / (MIDDLE_LINE * usual)).max(0.0)
     }
 
-    /// Returns the position across with the least ink near the middle of a row, and the share of it that is inked.
+    /// Returns the position across with the least ink near the middle of a row, and the fraction of it that is inked.
     pub(super) fn middle(&self, from: usize, to: usize) -> (usize, f64) {
         let rows = (to - from) as f64;
         let mut best = (0, f64::INFINITY);

@@ -15,7 +15,7 @@ const WIDTH_COST: f64 = 6.0;
 const STRIP_WIDTH: f64 = 0.93;
 /// Cost of a strip.
 const STRIP_COST: f64 = 0.5;
-/// The ink around a boundary counts at least as this share of that of the page.
+/// The ink around a boundary counts at least as this fraction of that of the page.
 const LEAST_AROUND: f64 = 0.3;
 /// Largest cost of ink on a boundary, in relation to the ink around it.
 const MAX_INK_COST: f64 = 1.5;
@@ -26,7 +26,7 @@ const RULE_GAIN: f64 = 1.0;
 const CROSSED_RULE_COST: f64 = 1.5;
 /// Distance of a boundary from its rule, mm.
 const RULE_REACH_MM: f64 = 0.7;
-/// Share of the gain that is lost at this distance.
+/// Fraction of the gain that is lost at this distance.
 const RULE_SLOPE: f64 = 0.3;
 
 /// A column of text.

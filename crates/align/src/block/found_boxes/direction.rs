@@ -20,9 +20,9 @@ use mocban_core::raster::Mask;
 
 /// Total length of inner rules that decides alone, mm.
 const SURE_RULES_MM: f64 = 150.0;
-/// A profile below this share of its mean is a gap.
+/// A profile below this fraction of its mean is a gap.
 const GAP_INK: f64 = 0.25;
-/// The share of gaps along the image must be larger by this to turn the text.
+/// The fraction of gaps along the image must be larger by this to turn the text.
 const SURE_GAPS: f64 = 0.05;
 /// Side of the corners of a character, in its size.
 const CORNER: f64 = 0.22;
@@ -117,7 +117,7 @@ fn standing(text: &Mask, bounds: &[[f64; 4]]) -> f64 {
     mean / error.max(1e-9)
 }
 
-/// Returns the share of the lower corners of a box that is inked minus that of the upper ones.
+/// Returns the fraction of the lower corners of a box that is inked minus that of the upper ones.
 fn corners(text: &Mask, bounds: &[f64; 4]) -> f64 {
     let [left, top, right, bottom] = bounds.map(|edge| (edge + 0.5) as usize);
     let size = |from: usize, to: usize| (((to - from) as f64 * CORNER) as usize).max(1);

@@ -10,7 +10,7 @@ pub(super) const CELL: usize = 2;
 pub(super) const CELL_MM: f64 = CELL as f64 * PIXEL_MM;
 /// Rules within this distance of the outermost one belong to the frame, mm.
 const FRAME_MM: f64 = 5.0;
-/// Share of the strokes beyond a frame, at most.
+/// Fraction of the strokes beyond a frame, at most.
 const BEYOND_FRAME: f64 = 0.02;
 /// Marks in the strip that contain a square of this side are ornaments, in widths of the strip.
 const SOLID: f64 = 0.18;
@@ -20,7 +20,7 @@ const STROKE: u8 = 128;
 /// Strokes of a page, by which columns and rows are found.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
-    /// Share of each cell that is covered by strokes of text, 0..=1.
+    /// Fraction of each cell that is covered by strokes of text, 0..=1.
     pub(super) cells: Grid<f32>,
     /// Strokes of text in the pixels of the image.
     pub(super) text: Mask,

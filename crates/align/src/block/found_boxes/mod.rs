@@ -27,12 +27,12 @@ const MIN_AREA_MM2: f64 = 0.8;
 const MIN_SIDE: f64 = 0.25;
 /// Least mean relief below the ink of a character.
 const MIN_SUPPORT: f64 = 0.08;
-/// Least share of the relief of a character that is printed.
+/// Least fraction of the relief of a character that is printed.
 const MIN_PRINTED: f64 = 0.5;
-/// Largest share of a character's strokes where the page does not show the block.
+/// Largest fraction of a character's strokes where the page does not show the block.
 const MAX_UNSEEN: f64 = 0.5;
-/// A page that lacks more than this share of the characters shows only a part of the text. With a smaller share, what it
-/// lacks is wood beside the text.
+/// A page that lacks more than this fraction of the characters shows only a part of the text. With a smaller fraction,
+/// what it lacks is wood beside the text.
 const PART_UNSEEN: f64 = 0.3;
 
 /// A character that was found on a page.

@@ -8,7 +8,7 @@ use crate::block::page_map::PageMap;
 use mocban_core::raster::Grid;
 use mocban_core::raster::components::ConnectedComponents;
 
-/// Parts of which at least this share lies in a second place are divided between the places.
+/// Parts of which at least this fraction lies in a second place are divided between the places.
 const SHARED: f64 = 0.2;
 /// Parts below this area are specks, mm^2; parts below the second one if the block does not show them.
 const SPECK_MM2: f64 = 0.1;
@@ -47,7 +47,7 @@ pub(super) struct Strokes {
     pub(super) relief: u64,
     /// Number of pixels where only the relief shows the text.
     pub(super) only_relief: usize,
-    /// Share of the relief in the place that is printed.
+    /// Fraction of the relief in the place that is printed.
     pub(super) printed: f64,
 }
 
@@ -76,7 +76,7 @@ impl Strokes {
         self.area as f64 * PIXEL_MM * PIXEL_MM
     }
 
-    /// Returns the share of the text that only the relief shows, because the page does not show the place.
+    /// Returns the fraction of the text that only the relief shows, because the page does not show the place.
     pub(super) fn unseen(&self) -> f64 {
         self.only_relief as f64 / self.area.max(1) as f64
     }
@@ -221,7 +221,7 @@ pub(super) fn measure(
     strokes
 }
 
-/// Returns the share of the relief in a place that is printed; 1 if there is none.
+/// Returns the fraction of the relief in a place that is printed; 1 if there is none.
 fn printed(image: &TextImage, layout: &Layout, place: &CharacterPlace) -> f64 {
     let [left, top, right, bottom] = place.room;
     let (mut all, mut printed) = (1.0, 1.0);

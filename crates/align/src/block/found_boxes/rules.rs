@@ -4,7 +4,7 @@ use super::text_image::PIXEL_MM;
 use mocban_core::raster::components::ConnectedComponents;
 use mocban_core::raster::{Grid, Mask};
 
-/// Length over which a rule is straight and nearly without gaps, mm, and the share of it that is covered.
+/// Length over which a rule is straight and nearly without gaps, mm, and the fraction of it that is covered.
 const RULE_MM: f64 = 25.0;
 const RULE_COVER: f64 = 0.9;
 /// Least length of all parts of a rule, mm.

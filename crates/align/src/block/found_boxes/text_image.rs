@@ -20,7 +20,7 @@ const TRUST_CELL: usize = 16;
 const TRUST_REACH: usize = 3;
 /// Least correlation of relief and ink where the page is believed to show the relief.
 const TRUST_NCC: f64 = 0.45;
-/// Share of strokes below which a surrounding has no relief.
+/// Fraction of strokes below which a surrounding has no relief.
 const NO_RELIEF: f64 = 0.02;
 
 /// A frame on the face in which text is upright: x to the right and y down, in pixels of 0.15 mm.

@@ -6,18 +6,18 @@ use mocban_core::raster::{Grid, Mask, resample};
 
 /// Number of cells along the longest side: the background changes slowly.
 const CELLS: f64 = 96.0;
-/// Usual half width of the closing, as a share of the longest side.
+/// Usual half width of the closing, as a fraction of the longest side.
 pub(super) const NARROW: f64 = 0.12;
-/// Half width of the closing if the print may be stained, as a share of the longest side. Dark areas wider than twice
-/// this are then stains.
+/// Half width of the closing if the print may be stained, as a fraction of the longest side. Dark areas wider than
+/// twice this are then stains.
 pub(super) const STROKE: f64 = 0.05;
-/// Least share of a cell that must be known for it to count.
+/// Least fraction of a cell that must be known for it to count.
 const LEAST_KNOWN: f32 = 0.3;
 /// Value of a cell without data: `f32::max` and `f32::min` ignore it.
 const EMPTY: f32 = f32::NAN;
 
 /// Returns the brightness of the background at each pixel, 0..=1: the grey, closed by a square and then smoothed.
-/// `narrow` is half the side of the square, as a share of the longest side of the known area.
+/// `narrow` is half the side of the square, as a fraction of the longest side of the known area.
 pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let Some(bounds) = known.bounding_box() else {
         return grey.clone();

@@ -8,26 +8,27 @@ use mocban_core::raster::components::{ConnectedComponents, remove_specks};
 use mocban_core::raster::otsu::{self, Split};
 use mocban_core::raster::{Grid, Mask, PrintImage};
 
-/// A pixel is white if its darkest channel is above this share of full white.
+/// A pixel is white if its darkest channel is above this fraction of full white.
 const WHITE: f32 = 0.965;
-/// A background darker than this share of full white can be distinguished from the white around the print.
+/// A background darker than this fraction of full white can be distinguished from the white around the print.
 const DISTINCT_BACKGROUND: f64 = 0.945;
-/// Light pixels inside the white border are a coloured background if they cover at least this share of the image. A
+/// Light pixels inside the white border are a coloured background if they cover at least this fraction of the image. A
 /// smaller area is only the soft edges of ink on white.
 const LEAST_BACKGROUND: f64 = 0.2;
-/// Least share of the image covered by the white around the print.
+/// Least fraction of the image covered by the white around the print.
 const LEAST_WHITE: f64 = 0.004;
-/// A dark pixel is pale if its grey lies beyond this share of the way from the 10th percentile of the dark pixels to
+/// A dark pixel is pale if its grey lies beyond this fraction of the way from the 10th percentile of the dark pixels to
 /// the median of the background.
 const PALE: f64 = 0.35;
-/// A print may have stains if more than this share of its dark pixels are pale (see [`PALE`]).
+/// A print may have stains if more than this fraction of its dark pixels are pale (see [`PALE`]).
 const LEAST_PALE: f64 = 0.15;
-/// Least difference between the greys of ink and background, as a share of the lighter grey. It is relative, because a
-/// scan that uses only part of the 16-bit range is dark.
+/// Least difference between the greys of ink and background, as a fraction of the lighter grey. It is relative, because
+/// a scan that uses only part of the 16-bit range is dark.
 const LEAST_CONTRAST: f64 = 0.08;
-/// Least difference between the greys of ink and background, as a share of full white. A smaller difference is noise.
+/// Least difference between the greys of ink and background, as a fraction of full white. A smaller difference is
+/// noise.
 const NOISE: f64 = 0.012;
-/// Least share of ink in a print.
+/// Least fraction of ink in a print.
 const LEAST_INK: f64 = 0.002;
 
 /// Least width and height of a print in pixels.
@@ -50,7 +51,7 @@ pub enum BinarizeError {
     /// Too few pixels are darker than the threshold.
     #[error("print has no ink: {share:.4} of it is beyond the grey threshold {threshold:.3}")]
     NoInk {
-        /// Share of ink, 0..=1.
+        /// Fraction of ink, 0..=1.
         share: f64,
         /// Threshold, 0..=1.
         threshold: f64,
@@ -165,7 +166,7 @@ fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
 }
 
 /// Binarizes `dark_ink`, which is the grey, or its inverse if ink is light. `narrow` is half the largest width of ink,
-/// as a share of the longest side.
+/// as a fraction of the longest side.
 fn binarize_narrow(
     grey: &Grid<f32>,
     dark_ink: &Grid<f32>,
@@ -287,6 +288,7 @@ mod tests {
         PrintImage {
             rgb: Grid::from_fn(60, 50, |x, y| [grey(x, y) * 257; 3]),
             turned: None,
+            ignored_profile: None,
         }
     }
 
@@ -341,6 +343,7 @@ mod tests {
                 [grey as u16 * 257; 3]
             }),
             turned: None,
+            ignored_profile: None,
         };
         let wrong = |ink: &InkMask| {
             let pixels = ink.mask.data().iter().enumerate();
@@ -385,6 +388,7 @@ mod tests {
         let one = PrintImage {
             rgb: Grid::new(1, 1, [0; 3]),
             turned: None,
+            ignored_profile: None,
         };
         assert!(matches!(
             read(&one),

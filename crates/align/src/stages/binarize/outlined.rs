@@ -20,12 +20,11 @@ pub(crate) fn hypotheses_within(
     let part = PrintImage {
         rgb: picture.rgb.part(bounds),
         turned: picture.turned,
+        ignored_profile: None,
     };
     let whole = |ink: InkMask| {
-        let from_part = |x: usize, y: usize| {
-            let is_inside = inside.at(x, y);
-            is_inside.then(|| [x - bounds.x0, y - bounds.y0])
-        };
+        let from_part =
+            |x: usize, y: usize| inside.at(x, y).then(|| [x - bounds.x0, y - bounds.y0]);
         let mask = |of: &Mask| {
             Mask::from_fn(size[0], size[1], |x, y| {
                 from_part(x, y).is_some_and(|[x, y]| of.at(x, y))
@@ -84,6 +83,7 @@ mod tests {
         let picture = PrintImage {
             rgb: Grid::from_fn(120, 90, |x, y| [grey(x, y) as u16 * 257; 3]),
             turned: None,
+            ignored_profile: None,
         };
         let inks = hypotheses_within(&picture, &outline()).expect("ink");
         let inside = inside(&outline(), [120, 90]);

@@ -8,7 +8,7 @@ const CLEAR: f64 = 0.8;
 /// If the sum of the evidence is above this value, ink is clearly lighter than the background, as in rubbings. A print
 /// with heavy dark ink and a frame can have a positive sum, but a smaller one.
 const CLEAR_LIGHT: f64 = 1.6;
-/// Width of the rim that counts as evidence for the background, as a share of the image's shorter side.
+/// Width of the rim that counts as evidence for the background, as a fraction of the image's shorter side.
 const RIM: f64 = 0.06;
 
 /// Returns whether ink is probably lighter than the background, and whether the polarity is clear. The polarity is
@@ -38,7 +38,7 @@ fn background_darkness(dark: &Mask, known: &Mask) -> f64 {
     2.0 * (share - 0.5) + (rim_share(dark, known) - 0.5)
 }
 
-/// Returns the share of pixels of a mask in the rim of the known area, 0..=1.
+/// Returns the fraction of pixels of a mask in the rim of the known area, 0..=1.
 pub(crate) fn rim_share(dark: &Mask, known: &Mask) -> f64 {
     let (width, height) = (known.width(), known.height());
     let reach = ((width.min(height) as f64 * RIM).round() as usize).max(1);

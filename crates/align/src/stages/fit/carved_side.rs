@@ -13,7 +13,7 @@ use super::side_surface::FittedSide;
 use crate::stages::zbuffer::IndexedSurface;
 use mocban_core::domain::SideEvidence;
 
-/// If the relief of a side is below this share of the other side's relief, the side is the back of the block.
+/// If the relief of a side is below this fraction of the other side's relief, the side is the back of the block.
 const BACK: f64 = 0.35;
 /// Log-odds against the back. Spikes and debris can hide the relief of the carved side, so the print may outweigh them.
 const BACK_ODDS: f64 = 4.0;
@@ -132,8 +132,8 @@ fn log_odds(
     SideOdds { odds, agreements }
 }
 
-/// Returns the interquartile range of the heights near the stroke tops, as a share of the relief, 0.005 or more. Uses
-/// the heights that are less than 0.4 times the relief below the surface. Returns 1 if these are fewer than 8.
+/// Returns the interquartile range of the heights near the stroke tops, as a fraction of the relief, 0.005 or more.
+/// Uses the heights that are less than 0.4 times the relief below the surface. Returns 1 if these are fewer than 8.
 fn layer_width(side: &FittedSide) -> f64 {
     let mut upper = side.samples.residuals(&side.surface);
     upper.retain(|r| *r > -0.4 * side.relief);

@@ -11,8 +11,8 @@ const SAMPLES: usize = 30_000;
 pub(super) const SAME: f64 = 0.26;
 /// Directions closer than this angle, in radians, count as one, because the fit of a side corrects smaller tilts.
 const DISTINCT: f64 = 0.2;
-/// A plane is large if the faces with normals within [`SAME`] of its normal have at least this share of the area of all
-/// sampled faces.
+/// A plane is large if the faces with normals within [`SAME`] of its normal have at least this fraction of the area of
+/// all sampled faces.
 const LEAST_AREA: f64 = 0.04;
 /// Largest number of large planes.
 const PLANES: usize = 6;

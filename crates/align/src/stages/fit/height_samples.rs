@@ -12,9 +12,9 @@ const LEAST_POINTS: usize = 16;
 /// A carving is at most about this many times as deep as the median of its ground. Lower points are side walls of the
 /// block, its foot, or a table.
 pub(super) const DEEPEST: f64 = 1.8;
-/// A carving is not deeper than this share of the extent of its side.
+/// A carving is not deeper than this fraction of the extent of its side.
 pub(super) const DEEPEST_CARVING: f64 = 0.2;
-/// Least share of the points below the carving at which they are left out.
+/// Least fraction of the points below the carving at which they are left out.
 const DEEP_SHARE: f64 = 0.01;
 
 /// Heights of a view as points. Coordinates are divided by the view's longest side: u and v are about -0.5..=0.5.

@@ -11,14 +11,14 @@ use crate::stages::scan::part_of;
 use mocban_core::domain::Rigid3;
 use mocban_core::mesh::Mesh;
 
-/// Heights of the cut part above and below the middle of the plane, as a share of the plane's longer side.
+/// Heights of the cut part above and below the middle of the plane, as a fraction of the plane's longer side.
 const REACH: f64 = 0.2;
-/// Share of the area whose faces may lie outside of the cut part at either end of x and y.
+/// Fraction of the area whose faces may lie outside of the cut part at either end of x and y.
 const OUTSIDE: f64 = 0.01;
-/// The cut part is widened by this share of its sides.
+/// The cut part is widened by this fraction of its sides.
 const WIDENED: f64 = 0.03;
-/// This share of the area of all faces with about the given normal lies below the middle of the uppermost plane: half of
-/// the area is on the back of a block, and half of the rest below the middle.
+/// This fraction of the area of all faces with about the given normal lies below the middle of the uppermost plane:
+/// half of the area is on the back of a block, and half of the rest below the middle.
 const MIDDLE: f64 = 0.75;
 /// A smaller part is not a side.
 const LEAST_VERTICES: usize = 64;
@@ -31,10 +31,9 @@ pub(super) fn near_plane(
     normal: Vector3<f64>,
 ) -> Option<(Mesh, Rigid3)> {
     let level = frame(normal, Vector3::zeros());
-    let parallel = facets
+    let mut places: Vec<([f64; 3], f64)> = facets
         .iter()
-        .filter(|facet| angle(&facet.normal, &normal) < SAME);
-    let mut places: Vec<([f64; 3], f64)> = parallel
+        .filter(|facet| angle(&facet.normal, &normal) < SAME)
         .map(|facet| (level.apply(facet.middle.into()), facet.area))
         .collect();
     let middle = quantile(&mut places, 2, MIDDLE)?;
@@ -62,7 +61,7 @@ pub(super) fn near_plane(
     (part.vertices.len() >= LEAST_VERTICES).then(|| (part, frame(normal, centre.into())))
 }
 
-/// Returns the coordinate `k` below which lies the share `share` of the weight. `None` without points.
+/// Returns the coordinate `k` below which lies the fraction `share` of the weight. `None` without points.
 fn quantile(places: &mut [([f64; 3], f64)], k: usize, share: f64) -> Option<f64> {
     places.sort_unstable_by(|a, b| a.0[k].total_cmp(&b.0[k]));
     let total: f64 = places.iter().map(|(_, weight)| weight).sum();

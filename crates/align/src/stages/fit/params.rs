@@ -15,13 +15,13 @@ pub struct FitParams {
     pub seed: u64,
     /// Paper's method: number of points of the spaced selection, 3 or more.
     pub spaced_points: u32,
-    /// Paper's method: least distance between selected points, as a share of the mesh's extent, above 0.
+    /// Paper's method: least distance between selected points, as a fraction of the mesh's extent, above 0.
     pub spacing: f64,
     /// Paper's method: RANSAC draws, 1 or more.
     pub ransac_draws: u32,
-    /// Paper's method: largest distance of a RANSAC inlier from the plane, as a share of the mesh's extent, above 0.
+    /// Paper's method: largest distance of a RANSAC inlier from the plane, as a fraction of the mesh's extent, above 0.
     pub ransac_distance: f64,
-    /// Smallest depth of the carving, as a share of the mesh's extent. The fit fails below this.
+    /// Smallest depth of the carving, as a fraction of the mesh's extent. The fit fails below this.
     pub min_relief: f64,
 }
 

@@ -26,8 +26,8 @@ pub(super) fn search(
         return None;
     }
     let is_carved = |side: &FittedSide| side.relief >= params.min_relief * side.extent;
-    let sides = coarse_sides(indexed, start, params.curved_blocks);
-    let sides = sides.map(|side| side.filter(is_carved));
+    let sides =
+        coarse_sides(indexed, start, params.curved_blocks).map(|side| side.filter(is_carved));
     // Highest agreement of each side, and the part that reaches it.
     let mut best = [(0.0, 0); 2];
     for (k, part) in parts.iter().enumerate() {

@@ -92,7 +92,8 @@ impl InkPyramids {
     }
 }
 
-/// Returns the best agreement of a side with the ink: the correlation times the share of the stroke tops that printed.
+/// Returns the best agreement of a side with the ink: the correlation times the fraction of the stroke tops that
+/// printed.
 fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
     let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
         return 0.0;

@@ -16,16 +16,16 @@ const CELLS: usize = 160;
 /// Number of gap widths over which ink is joined. At step `k`, counted from 0, ink is grown by `k` cells on all sides,
 /// which closes gaps of up to `2 k` cells.
 const STEPS: usize = 24;
-/// Smallest and largest size of a group, as shares of the longest side of the ink. A character with a neighbour takes
-/// up about half at most.
+/// Smallest and largest size of a group, as fractions of the longest side of the ink. A character with a neighbour
+/// takes up about half at most.
 const SIZES: [f64; 2] = [0.1, 0.58];
 /// Smallest width and height of a part in pixels.
 const LEAST_PX: f64 = 24.0;
 /// Largest number of groups that are tried.
 const MOST: usize = 16;
-/// Margin around the ink of a group, as a share of the longest side of the group.
+/// Margin around the ink of a group, as a fraction of the longest side of the group.
 const MARGIN: f64 = 0.07;
-/// Sizes of the windows around the middle of the ink, as shares of the ink's width and height.
+/// Sizes of the windows around the middle of the ink, as fractions of the ink's width and height.
 const MIDDLE: [f64; 2] = [0.4, 0.5];
 
 /// A group of ink. `bounds` is its box in cells. `steps` is the number of gap widths at which a group has the same box
@@ -144,7 +144,7 @@ fn groups(cells: &Mask, joined: &[ConnectedComponents]) -> Vec<Group> {
     groups
 }
 
-/// Returns the window around the middle of a box. `share` is the window's share of the box's width and height.
+/// Returns the window around the middle of a box. `share` is the window's fraction of the box's width and height.
 fn window(bounds: PixelBox, share: f64) -> Option<PrintOutline> {
     let inner = |from: usize, to: usize| {
         let (middle, half) = ((from + to) as f64 / 2.0, (to - from) as f64 * share / 2.0);
@@ -175,8 +175,8 @@ mod tests {
         })
     }
 
-    /// Returns the share of the middle character's ink inside a part, and the share of the part's ink that belongs to
-    /// other characters.
+    /// Returns the fraction of the middle character's ink inside a part, and the fraction of the part's ink that
+    /// belongs to other characters.
     fn shares(part: &PrintOutline, ink: &Mask) -> [f64; 2] {
         let inside = inside(part, [SIDE; 2]).zip_map(ink, |inside, ink| inside && ink);
         let middle = Mask::from_fn(SIDE, SIDE, |x, y| {

@@ -14,19 +14,19 @@ use mocban_core::mesh::robust_bounds::is_in_box;
 const CELLS: f64 = 64.0;
 /// Approximate limit of the number of points at which cells are marked.
 const MARKS: f64 = 2e7;
-/// A component is debris if its area is below this share of the largest component's area.
+/// A component is debris if its area is below this fraction of the largest component's area.
 const DEBRIS: f64 = 0.05;
 /// A face is narrow at a corner if both edges there are more than this many times as long as the third edge.
 const NARROW: f64 = 2.5;
-/// Least share of the area that lies in a support, the plane on which a block stands.
+/// Least fraction of the area that lies in a support, the plane on which a block stands.
 const LEAST_SUPPORT: f64 = 0.2;
-/// Largest share of the remaining area that may lie below a support.
+/// Largest fraction of the remaining area that may lie below a support.
 const WRONG_SIDE: f64 = 0.03;
 /// Number of layers into which a scan is cut to find the height of a support.
 const LAYERS: usize = 96;
 /// Faces within this many layers of a support belong to it.
 const THICKNESS: f64 = 1.6;
-/// A part with a smaller share of the scan's faces is not a block.
+/// A part with a smaller fraction of the scan's faces is not a block.
 const LEAST_PART: f64 = 0.02;
 
 /// Returns the parts that may be the block: first the scan without spikes and debris, then the part above each large

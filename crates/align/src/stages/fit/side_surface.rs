@@ -7,28 +7,28 @@ use super::pca::frame_along;
 use super::surface::Surface;
 use crate::stages::binarize;
 use crate::stages::zbuffer::{IndexedSurface, Viewport};
-use mocban_core::domain::{Bow, Rigid3};
+use mocban_core::domain::{Curvature, Rigid3};
 use mocban_core::raster::Grid;
 
 /// Maximum number of rotations of one rendering.
 const MAX_ROTATIONS: usize = 3;
-/// If more than this share of the visible area lies on the fitted surface, the side counts as uncarved.
+/// If more than this fraction of the visible area lies on the fitted surface, the side counts as uncarved.
 const MAX_TOPS: f64 = 0.85;
-/// If less than this share of the visible area lies on the fitted surface, the side counts as uncarved. The surface
+/// If less than this fraction of the visible area lies on the fitted surface, the side counts as uncarved. The surface
 /// then rests on walls or specks, not on strokes.
 const MIN_TOPS: f64 = 0.02;
 /// When the depth of the carving is measured, one height in this many is ignored at either end.
 const TRIMMED_ONE_IN: usize = 100;
 
-/// Largest share of the visible area that is debris.
+/// Largest fraction of the visible area that is debris.
 const DEBRIS: f64 = 0.04;
 
 /// Surface and measurements of one side.
 #[derive(Debug)]
 pub(super) struct FittedSide {
     pub(super) plane_from_mesh: Rigid3,
-    pub(super) bow: Option<Bow>,
-    pub(super) bow_height: f64,
+    pub(super) curvature: Option<Curvature>,
+    pub(super) curvature_height: f64,
     pub(super) relief: f64,
     pub(super) extent: f64,
     pub(super) surface: Surface,
@@ -67,12 +67,12 @@ pub(super) const FINE: FitEffort = FitEffort {
 pub(super) fn coarse_sides(
     indexed: &IndexedSurface,
     front: &Rigid3,
-    bow: bool,
+    may_curve: bool,
 ) -> [Option<FittedSide>; 2] {
     let view = Viewport::around(indexed.bounds(front), COARSE.px, false);
     let [seen, seen_from_back] = indexed.render_both_sides(front, &view);
     [(seen, *front), (seen_from_back, opposite_side(front))]
-        .map(|(heights, frame)| fit_heights(indexed, &frame, &heights, view, bow, COARSE))
+        .map(|(heights, frame)| fit_heights(indexed, &frame, &heights, view, may_curve, COARSE))
 }
 
 /// Returns the frame of the other side: x stays, y and z are reversed.
@@ -86,7 +86,7 @@ fn opposite_side(frame: &Rigid3) -> Rigid3 {
 pub(super) fn fit_view(
     indexed: &IndexedSurface,
     frame: &Rigid3,
-    bow: bool,
+    may_curve: bool,
     effort: FitEffort,
 ) -> Option<FittedSide> {
     if indexed.is_empty() {
@@ -97,7 +97,7 @@ pub(super) fn fit_view(
     if indexed.overlaps_too_often() {
         return None;
     }
-    fit_heights(indexed, frame, &heights, view, bow, effort)
+    fit_heights(indexed, frame, &heights, view, may_curve, effort)
 }
 
 /// Fits the stroke tops of a rendering. Rotates the view and fits again until the view is perpendicular to the tops, or
@@ -107,11 +107,11 @@ fn fit_heights(
     frame: &Rigid3,
     heights: &Grid<f32>,
     view: Viewport,
-    bow: bool,
+    may_curve: bool,
     effort: FitEffort,
 ) -> Option<FittedSide> {
     let samples = HeightSamples::new(heights, &view)?;
-    let seen = FittedView::of(*frame, samples, view, bow).leveled(bow, effort);
+    let seen = FittedView::of(*frame, samples, view, may_curve).leveled(may_curve, effort);
     if seen.slope() < effort.slope || effort.max_renderings <= 1 {
         return Some(seen.into_side());
     }
@@ -119,7 +119,7 @@ fn fit_heights(
         max_renderings: effort.max_renderings - 1,
         ..effort
     };
-    fit_view(indexed, &seen.plane_from_mesh(), bow, fewer)
+    fit_view(indexed, &seen.plane_from_mesh(), may_curve, fewer)
 }
 
 /// A rendering with the surface fitted to it.
@@ -133,8 +133,8 @@ struct FittedView {
 }
 
 impl FittedView {
-    fn of(frame: Rigid3, samples: HeightSamples, view: Viewport, bow: bool) -> Self {
-        let surface = samples.fit(bow);
+    fn of(frame: Rigid3, samples: HeightSamples, view: Viewport, may_curve: bool) -> Self {
+        let surface = samples.fit(may_curve);
         Self {
             frame,
             view,
@@ -145,7 +145,7 @@ impl FittedView {
     }
 
     /// Rotates the heights until the view is perpendicular to the stroke tops, or until a limit is reached.
-    fn leveled(mut self, bow: bool, effort: FitEffort) -> Self {
+    fn leveled(mut self, may_curve: bool, effort: FitEffort) -> Self {
         let seen_from = self.frame.inverse();
         for _ in 0..MAX_ROTATIONS {
             let frame = self.plane_from_mesh();
@@ -155,7 +155,7 @@ impl FittedView {
             }
             let other_from_this = frame.after(&self.frame.inverse());
             let samples = self.samples.turned(&other_from_this);
-            self = Self::of(frame, samples, self.view, bow);
+            self = Self::of(frame, samples, self.view, may_curve);
         }
         self
     }
@@ -185,7 +185,7 @@ impl FittedView {
             *coefficient -= flat;
         }
         let is_bent = over_plane[3..].iter().any(|c| *c != 0.0);
-        let bow = is_bent.then_some(Bow(over_plane));
+        let curvature = is_bent.then_some(Curvature(over_plane));
         let relief = if (MIN_TOPS..=MAX_TOPS).contains(&surface.tops) {
             relief(&mut samples.face_residuals(&surface))
         } else {
@@ -193,8 +193,9 @@ impl FittedView {
         };
         FittedSide {
             plane_from_mesh,
-            bow,
-            bow_height: bow.map_or(0.0, |bow| bow_height(&bow, &view)),
+            curvature,
+            curvature_height: curvature
+                .map_or(0.0, |curvature| curvature_height(&curvature, &view)),
             relief,
             extent: view.unit_per_px * view.width.max(view.height) as f64,
             surface,
@@ -204,7 +205,7 @@ impl FittedView {
 }
 
 /// Returns a frame in which the plane `z = a + b x + c y` of the old frame is `z = 0`. The new x axis is as close as
-/// possible to the old one. To first order in the slope, a bow therefore has the same coefficients in both frames.
+/// possible to the old one. To first order in the slope, a curved surface therefore has the same coefficients in both frames.
 fn frame_on_plane(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
     let mesh_from_plane = plane_from_mesh.inverse();
     let at = |p: [f64; 3]| Vector3::from(mesh_from_plane.apply(p));
@@ -214,15 +215,15 @@ fn frame_on_plane(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
     frame_along(normal, along, origin)
 }
 
-/// Returns the height difference between the highest and the lowest point of the bow in the view, in mesh units.
-fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
+/// Returns the height difference between the highest and the lowest point of the curved surface in the view, in mesh units.
+fn curvature_height(curvature: &Curvature, view: &Viewport) -> f64 {
     let Some(back) = view.px_from_plane.inverse() else {
         return 0.0;
     };
     let along = |side: usize, step: i32| (side - 1) as f64 * f64::from(step) / 8.0;
     let heights = (0..81).map(|k| {
         let [x, y] = back.apply([along(view.width, k % 9), along(view.height, k / 9)]);
-        bow.height(x, y)
+        curvature.height(x, y)
     });
     let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| {
         [low.min(z), high.max(z)]

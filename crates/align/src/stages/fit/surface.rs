@@ -14,8 +14,8 @@ use mocban_core::raster::{Grid, Mask};
 const ENVELOPE: f64 = 0.97;
 /// Weight of a point above the surface in the passes that follow.
 const ABOVE: f64 = 3.0;
-/// Distances below the surface at which the weight of a point falls to 0, as shares of the height range. Each distance
-/// is used for `NARROW_PASSES` passes.
+/// Distances below the surface at which the weight of a point falls to 0, as fractions of the height range. Each
+/// distance is used for `NARROW_PASSES` passes.
 const WINDOWS: [f64; 5] = [0.35, 0.22, 0.14, 0.10, 0.08];
 /// Number of convex passes.
 const ENVELOPE_PASSES: usize = 8;
@@ -27,11 +27,11 @@ const WIDE_WINDOWS: usize = 3;
 const CUT_PX: i64 = 2;
 /// Weight of a point that is not on a top of the character.
 const OFF_TOP_WEIGHT: f64 = 1e-6;
-/// Least share of the tops that must remain without the tops at the edge.
+/// Least fraction of the tops that must remain without the tops at the edge.
 const LEAST_OWN: f64 = 0.4;
 /// Errors of neighbouring pixels are correlated: this many pixels count as one independent observation.
 const CORRELATED_PX: f64 = 40.0;
-/// Standard deviation of the heights on rough stroke tops, as a share of the height range.
+/// Standard deviation of the heights on rough stroke tops, as a fraction of the height range.
 const TOP_SIGMA: f64 = 0.05;
 /// Prior standard deviation of the slope between the tops' plane and the mean plane of all heights.
 const TILT_SIGMA: f64 = 0.05;
@@ -42,24 +42,24 @@ const BOW_SIGMA: f64 = 0.15;
 const GROUND_BOW_SIGMA: f64 = 0.03;
 /// The fit of the ground starts with the mean plane, shifted to this quantile of the heights.
 const GROUND_START: f64 = 0.25;
-/// Distances from the ground at which the weight of a point falls to 0, as shares of the height range.
+/// Distances from the ground at which the weight of a point falls to 0, as fractions of the height range.
 const GROUND_WINDOWS: [f64; 4] = [0.35, 0.22, 0.14, 0.1];
-/// Least share of the visible area that must be within the last window.
+/// Least fraction of the visible area that must be within the last window.
 const LEAST_GROUND: f64 = 0.3;
 /// A surface with less support rests on few strokes.
 const SPARSE: f64 = 0.2;
-/// Soft tops fall to zero at this share of the relief below the surface.
+/// Soft tops fall to zero at this fraction of the relief below the surface.
 const SOFT_SPAN: f64 = 0.5;
-/// Ratio of supports by which a bow must beat the plane.
+/// Ratio of supports by which a curved surface must beat the plane.
 const BOW_GAIN: f64 = 1.04;
 
 /// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in units of the extent, and how well it fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
     pub(super) coefficients: Coefficients,
-    /// Share of the points that lie near the surface, weighted by nearness. Points far above it count negatively.
+    /// Fraction of the points that lie near the surface, weighted by nearness. Points far above it count negatively.
     pub(super) support: f64,
-    /// Share of the visible area within the last window.
+    /// Fraction of the visible area within the last window.
     pub(super) tops: f64,
     /// Root mean square residual of that area, in mesh units.
     pub(super) rms: f64,

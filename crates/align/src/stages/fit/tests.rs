@@ -51,9 +51,9 @@ fn bow_is_found_only_where_there_is_one() {
     )
     .expect("a plane");
     assert!(
-        found.bow.is_some() && (0.3..1.2).contains(&found.bow_height),
+        found.curvature.is_some() && (0.3..1.2).contains(&found.curvature_height),
         "{}",
-        found.bow_height
+        found.curvature_height
     );
     let flat = SyntheticSheet {
         turn: some_turn(4),
@@ -66,7 +66,7 @@ fn bow_is_found_only_where_there_is_one() {
         &settings().fit,
     )
     .expect("a plane");
-    assert!(found.bow_height < 0.05, "{}", found.bow_height);
+    assert!(found.curvature_height < 0.05, "{}", found.curvature_height);
 }
 
 #[test]

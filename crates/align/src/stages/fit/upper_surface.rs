@@ -68,8 +68,8 @@ pub fn fit(
     if let (Some(print), Some(inks)) = (print, &inks)
         && agreement < LEAST
     {
-        let parts = part_search::search(indexed, &start, print, params);
-        let parts = parts.filter(|found| found.agreement > agreement * BETTER);
+        let parts = part_search::search(indexed, &start, print, params)
+            .filter(|found| found.agreement > agreement * BETTER);
         let wider = wider_search::search(mesh, indexed, inks, agreement, params);
         let found = [parts, wider].into_iter().flatten();
         if let Some(found) = found.max_by(|a, b| a.agreement.total_cmp(&b.agreement)) {
@@ -104,8 +104,8 @@ pub fn fit(
 fn outcome(fine: &FittedSide, side: SideEvidence, mesh: &Mesh) -> FitOutcome {
     FitOutcome {
         plane_from_mesh: fine.plane_from_mesh,
-        bow: fine.bow,
-        bow_height: fine.bow_height,
+        curvature: fine.curvature,
+        curvature_height: fine.curvature_height,
         inlier_ratio: fine.surface.tops,
         rms: fine.surface.rms,
         relief: fine.relief,
@@ -114,5 +114,6 @@ fn outcome(fine: &FittedSide, side: SideEvidence, mesh: &Mesh) -> FitOutcome {
         print_outline: None,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
+        missing_vertices: None,
     }
 }

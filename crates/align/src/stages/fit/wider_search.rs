@@ -38,9 +38,9 @@ const RIVAL: f64 = 0.5;
 const LEAST_RIVAL: f64 = 0.1;
 /// A region extends above the surface by this many times the relief. Anything higher floats or is a spike.
 const HIGHEST: f64 = 1.0;
-/// If at least this share of the visible area lies deeper than any carving, that area is cut off.
+/// If at least this fraction of the visible area lies deeper than any carving, that area is cut off.
 const DEEP_AREA: f64 = 0.02;
-/// Shares of the width and height of a grid of characters that are tried for the middle character.
+/// Fractions of the width and height of a grid of characters that are tried for the middle character.
 const MIDDLE: [f64; 2] = [0.38, 0.5];
 /// Number of angles, from 0 to a right angle, that are tried to find the edges of a grid.
 const ANGLES: i32 = 30;
@@ -223,9 +223,9 @@ impl SideSearch<'_> {
 }
 
 /// Cuts off the area that lies deeper than any carving, such as the foot of a block or a table below it. Returns `None`
-/// if that area is a small share of the visible area, or if almost nothing would remain.
+/// if that area is a small fraction of the visible area, or if almost nothing would remain.
 fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
-    let deepest = -DEEPEST_CARVING * side.extent - side.bow_height;
+    let deepest = -DEEPEST_CARVING * side.extent - side.curvature_height;
     let heights = side.samples.residuals(&side.surface);
     let deep = heights.iter().filter(|height| **height < deepest).count();
     if (deep as f64) < DEEP_AREA * heights.len() as f64 {
@@ -270,7 +270,7 @@ fn bounds(mesh: &Mesh, frame: &Rigid3) -> [[f64; 3]; 2] {
 
 /// Returns the height over the plane, in mesh units, above which nothing belongs to the carving.
 fn top(side: &FittedSide) -> f64 {
-    HIGHEST * side.relief + side.bow_height
+    HIGHEST * side.relief + side.curvature_height
 }
 
 /// Returns whether a side shows floating debris or spikes above the carving.
@@ -299,7 +299,7 @@ pub(super) fn region(
         .iter()
         .map(|vertex| box_from_mesh.apply(vertex)[2]);
     let lowest = heights.fold(f64::INFINITY, f64::min) - slack;
-    let down = lowest.max(-DEEPEST * side.relief - side.bow_height);
+    let down = lowest.max(-DEEPEST * side.relief - side.curvature_height);
     ScanRegion {
         box_from_mesh,
         bounds: [

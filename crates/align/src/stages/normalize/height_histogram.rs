@@ -2,7 +2,7 @@
 
 use mocban_core::domain::ReliefHeights;
 
-/// Width of a bin and depth of the first, as shares of the relief.
+/// Width of a bin and depth of the first, as fractions of the relief.
 const BIN: f64 = 0.005;
 const FROM: f64 = -0.3;
 /// Number of bins. The last one ends at a depth of 1.2.
@@ -31,7 +31,7 @@ impl HeightHistogram {
         Self { counts }
     }
 
-    /// Returns the depth of the peak near the tops, as a share of the relief.
+    /// Returns the depth of the peak near the tops, as a fraction of the relief.
     pub(super) fn peak(&self) -> f64 {
         middle(peak_bin(&smoothed(&self.counts, FINE)))
     }
@@ -56,7 +56,7 @@ pub(super) fn bin_of(share: f64) -> usize {
     ((share - FROM) / BIN).round() as usize
 }
 
-/// Returns the depth in the middle of a bin, as a share of the relief.
+/// Returns the depth in the middle of a bin, as a fraction of the relief.
 pub(super) fn middle(bin: usize) -> f64 {
     FROM + (bin as f64 + 0.5) * BIN
 }

@@ -19,7 +19,7 @@ use super::print::Print;
 use mocban_core::raster::DepthMap;
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 15;
+pub const REVISION: u32 = 16;
 
 /// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///

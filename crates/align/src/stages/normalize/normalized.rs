@@ -84,7 +84,8 @@ impl Normalized {
                 specks: ink.specks.clone(),
                 known: ink.soft.known.clone(),
             };
-            Some((hypothesis, masks))
+            // As a resumed run reads them: ink is known, and specks are neither ink nor unknown.
+            Some((hypothesis, PrintMasks::from_grey(&masks.to_grey())))
         };
         let (hypotheses, prints): (Vec<_>, Vec<_>) = inks.iter().filter_map(interpretation).unzip();
         if prints.is_empty() {
@@ -96,7 +97,7 @@ impl Normalized {
                 inks: hypotheses,
                 relief,
                 thresholds: Vec::new(),
-                print_turned: None,
+                print_orientation: None,
             },
             prints,
         })

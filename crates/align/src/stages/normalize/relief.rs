@@ -10,12 +10,13 @@ use mocban_core::domain::ReliefHeights;
 use mocban_core::raster::{DepthMap, PixelBox};
 use mocban_core::simd::dispatch;
 
-/// If the tops are closer to the fitted surface than this share of the relief, they are first assumed to lie on it.
+/// If the tops are closer to the fitted surface than this fraction of the relief, they are first assumed to lie on it.
 const ANCHORED: f64 = 0.5;
 
-/// Largest depth of a carving, as a share of the longest side of the map's data. Real characters reach about 0.1.
+/// Largest depth of a carving, as a fraction of the longest side of the map's data. Real characters reach about 0.1.
 const DEEPEST: f64 = 0.25;
-/// Largest share of the sampled heights that may lie below the ground, such as heights of a table seen through holes.
+/// Largest fraction of the sampled heights that may lie below the ground, such as heights of a table seen through
+/// holes.
 const MOST_BELOW: f64 = 0.3;
 
 /// Measures the heights of tops and ground over the fitted surface. Returns `None` if no two sampled heights differ.
@@ -71,7 +72,7 @@ fn split_face(mut heights: Vec<f32>, deepest: f64) -> Option<Split> {
     Some(split)
 }
 
-/// Returns the depth of every pixel below the tops as a share of the relief, clamped to -1..=2.
+/// Returns the depth of every pixel below the tops as a fraction of the relief, clamped to -1..=2.
 pub(crate) fn relative_depths(depth: &DepthMap, relief: &ReliefHeights) -> SoftMask {
     let scale = &depth.scale;
     let per_level = (scale.height_per_level / relief.depth()) as f32;
@@ -84,7 +85,7 @@ pub(crate) fn relative_depths(depth: &DepthMap, relief: &ReliefHeights) -> SoftM
 }
 
 /// Returns how surely a point belongs to a stroke, given its depth below the tops: 1 well above the threshold `cut`, 0
-/// well below, linear over `softness` in between. All arguments are shares of the relief.
+/// well below, linear over `softness` in between. All arguments are fractions of the relief.
 #[inline(always)]
 pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
     (0.5 + (cut as f32 - depth) / softness as f32).clamp(0.0, 1.0)

@@ -10,7 +10,7 @@ use super::sampling::sampled;
 use mocban_core::domain::ReliefHeights;
 use mocban_core::raster::{DepthMap, PixelBox};
 
-/// A slope is measured between two points, each this share of the map's longest side away from the sample.
+/// A slope is measured between two points, each this fraction of the map's longest side away from the sample.
 const REACH: f64 = 1.0 / 256.0;
 /// Number of bins averaged.
 const WIDTH: usize = 7;
@@ -22,7 +22,7 @@ const WALL_QUANTILE: f64 = 0.8;
 /// The tops end where the steepness reaches `walls^(1 - SHARE) * tops^SHARE`. Values from 0.2 to 0.25 are about equally
 /// accurate on generated reliefs of twelve kinds.
 const SHARE: f64 = 0.22;
-/// Smallest steepness of tops, as a share of the walls' steepness. Without it, flat tops would end at any slope.
+/// Smallest steepness of tops, as a fraction of the walls' steepness. Without it, flat tops would end at any slope.
 const FLATTEST: f64 = 0.05;
 /// Range of depths at which tops can end.
 const RANGE: [f64; 2] = [0.02, 0.4];
@@ -31,15 +31,16 @@ const USUAL: f64 = 0.13;
 
 /// Deviation of the logarithm of the depth on a new block.
 const LEAST_DEVIATION: f64 = 0.1;
-/// Tops are rounded if their steepness, as a share of the walls' steepness, is above this. The excess makes the depth
-/// uncertain and too large.
+/// Tops are rounded if their steepness, as a fraction of the walls' steepness, is above this. The excess makes the
+/// depth uncertain and too large.
 const FLAT_TOPS: f64 = 0.04;
 /// Growth of the deviation with the excess.
 const ROUNDED_DEVIATION: f64 = 2.5;
 /// Decrease of the logarithm of the depth with the excess.
 const ROUNDED_SHIFT: f64 = 2.0;
-/// Growth of the deviation if the surface below the found depth is flatter than `EVEN_WALLS`, as a share of the walls'
-/// steepness. Then the found depth may be the edge of the last unworn tops, and the strokes end at a lower depth.
+/// Growth of the deviation if the surface below the found depth is flatter than `EVEN_WALLS`, as a fraction of the
+/// walls' steepness. Then the found depth may be the edge of the last unworn tops, and the strokes end at a lower
+/// depth.
 const DIP_DEVIATION: f64 = 4.0;
 const EVEN_WALLS: f64 = 0.8;
 /// The surface below the found depth begins this much deeper, and is measured at every `BELOW_STEP`-th bin.
@@ -51,7 +52,7 @@ const UNKNOWN_DEVIATION: f64 = 1.0;
 /// Depth at which the tops end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TopsEnd {
-    /// Depth below the tops, as a share of the relief.
+    /// Depth below the tops, as a fraction of the relief.
     pub(super) depth: f64,
     /// Standard deviation of the logarithm of `depth`.
     pub(super) log_deviation: f64,
@@ -151,7 +152,7 @@ mod tests {
     const SIDE: usize = 256;
 
     /// Returns the depth at which the tops of bars end. The tops are rounded, and their edges are worn by up to `worn`,
-    /// a share of the relief. The walls are `wall_px` wide.
+    /// a fraction of the relief. The walls are `wall_px` wide.
     fn tops_end(worn: f64, wall_px: f64) -> TopsEnd {
         let depth = |x: usize, y: usize| {
             let from_axis = (x % 64).abs_diff(32) as f64;

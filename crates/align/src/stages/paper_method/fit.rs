@@ -50,8 +50,8 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
     let middle = all.centre + normal * (plane.centre - all.centre).dot(&normal);
     Ok(FitOutcome {
         plane_from_mesh: frame(normal, middle),
-        bow: None,
-        bow_height: 0.0,
+        curvature: None,
+        curvature_height: 0.0,
         inlier_ratio: inliers.len() as f64 / taken.len() as f64,
         rms: (squares / inliers.len() as f64).sqrt(),
         relief,
@@ -64,6 +64,7 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
         print_outline: None,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
+        missing_vertices: None,
     })
 }
 

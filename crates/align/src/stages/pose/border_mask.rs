@@ -16,13 +16,13 @@ const MIN_STROKE: f32 = 0.3;
 const BORDER_PX: i64 = 2;
 /// Border strokes are masked with a margin of this many working pixels, because the edges of strokes are soft.
 const SOFT_EDGE_PX: usize = 3;
-/// If more than this share of the stroke pixels is connected to the border, the character is assumed to be connected
+/// If more than this fraction of the stroke pixels is connected to the border, the character is assumed to be connected
 /// too. Only a band along the border is masked then.
 const MAX_BORDER_SHARE: f64 = 0.5;
-/// Width of the band that is masked along the border, as a share of the level's longest side.
+/// Width of the band that is masked along the border, as a fraction of the level's longest side.
 const BORDER_BAND: f64 = 0.1;
-/// The border strokes of two levels agree if their overlap is at least this share of the overlap of all other pixels.
-/// An overlap is the sum of each pixel's smaller amount, divided by the sum of each pixel's larger amount.
+/// The border strokes of two levels agree if their overlap is at least this fraction of the overlap of all other
+/// pixels. An overlap is the sum of each pixel's smaller amount, divided by the sum of each pixel's larger amount.
 const MIN_RELATIVE_OVERLAP: f64 = 0.75;
 
 /// Returns the valid mask of a level: 1 where it is known and not masked near the border, 0 elsewhere.
@@ -105,10 +105,9 @@ impl StrokeMasks {
 
     /// Returns 1 for strokes that are not connected to the border, 0 elsewhere.
     fn interior(&self) -> Grid<f32> {
-        let inner = self
-            .all
-            .zip_map(&self.border, |stroke, border| stroke && !border);
-        inner.to_weights()
+        self.all
+            .zip_map(&self.border, |stroke, border| stroke && !border)
+            .to_weights()
     }
 
     /// Removes the border pixels that lie on `others`, the inner strokes of the other level.

@@ -8,8 +8,8 @@ use mocban_core::simd::dispatch;
 
 /// Threshold of Huber's loss, as a multiple of the median absolute residual (Huber 1964, doi:10.1214/aoms/1177703732).
 const HUBER_MEDIANS: f32 = 2.5;
-/// Cutoff of Tukey's biweight, as a share of full ink. Larger residuals have no weight, because they come from strokes
-/// that one of the images lacks.
+/// Cutoff of Tukey's biweight, as a fraction of full ink. Larger residuals have no weight, because they come from
+/// strokes that one of the images lacks.
 const TUKEY_CUTOFF: f32 = 0.5;
 /// Number of lanes in the sums: one SIMD vector.
 const LANES: usize = 8;

@@ -27,8 +27,7 @@ impl PlacedLevel<'_> {
         fixed_valid: &Grid<f32>,
     ) -> impl Iterator<Item = (usize, usize, BilinearCell)> {
         let rows = 0..fixed_valid.height();
-        let pixels = rows.flat_map(|y| (0..fixed_valid.width()).map(move |x| (x, y)));
-        pixels
+        rows.flat_map(|y| (0..fixed_valid.width()).map(move |x| (x, y)))
             .filter(|(x, y)| fixed_valid.at(*x, *y) != 0.0)
             .filter_map(|(x, y)| Some((x, y, self.cell(x, y)?)))
     }
@@ -37,14 +36,15 @@ impl PlacedLevel<'_> {
 /// How much of each level's strokes the other level covers, 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PoseOverlap {
-    /// Share of the stroke tops (the amount of the moving level) that the ink covers.
+    /// Fraction of the stroke tops (the amount of the moving level) that the ink covers.
     pub(crate) moving_covered: f64,
-    /// Share of the ink (the amount of the fixed level) that lies on stroke tops.
+    /// Fraction of the ink (the amount of the fixed level) that lies on stroke tops.
     pub(crate) fixed_covered: f64,
 }
 
 impl PoseOverlap {
-    /// Computes both shares over the pixels that are valid in both levels. The share of a level without strokes is 0.
+    /// Computes both fractions over the pixels that are valid in both levels. The fraction of a level without strokes
+    /// is 0.
     pub(super) fn new(
         fixed: &PyramidLevel,
         fixed_valid: &Grid<f32>,

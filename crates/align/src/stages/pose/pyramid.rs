@@ -8,7 +8,8 @@ use mocban_core::simd::dispatch;
 /// An amount for each pixel of an image, and a mask of the pixels where the amount is known.
 #[derive(Debug, Clone)]
 pub(crate) struct SoftMask {
-    /// Ink of a print or strokes of a relief, 0..=1, or depth below the stroke tops, as a share of the relief's depth.
+    /// Ink of a print or strokes of a relief, 0..=1, or depth below the stroke tops, as a fraction of the relief's
+    /// depth.
     pub(crate) amount: Grid<f32>,
     /// Where the image has data.
     pub(crate) known: Mask,
@@ -37,11 +38,11 @@ pub(crate) struct PyramidLevel {
     pub(super) work_from_image: Affine2,
 }
 
-/// Sigma of the low-pass filter, as a share of the level's longest side.
+/// Sigma of the low-pass filter, as a fraction of the level's longest side.
 const LOW_PASS_SHARE: f64 = 0.14;
 /// Longest side of the grids on which the low-pass filter runs, in pixels. Larger levels are shrunk first.
 const LOW_PASS_PX: usize = 48;
-/// A working pixel is known if at least this share of its area is known.
+/// A working pixel is known if at least this fraction of its area is known.
 const MIN_KNOWN: f32 = 0.5;
 
 impl ImagePyramid {
@@ -120,7 +121,7 @@ pub(crate) struct LevelBuilder<'a> {
     scale: f64,
     shift: [f64; 2],
     sides: [usize; 2],
-    /// Known share of each working pixel.
+    /// Known fraction of each working pixel.
     weight: Grid<f32>,
     /// Low-pass part of `weight`.
     low_pass_weight: Grid<f32>,

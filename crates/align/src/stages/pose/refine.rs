@@ -276,7 +276,7 @@ struct FixedSamples {
     /// colour of a chessboard, because neighbouring pixels of a smooth level are nearly equal.
     places: Vec<[f32; 2]>,
     values: Vec<f32>,
-    /// Share of the known pixels that is sampled.
+    /// Fraction of the known pixels that is sampled.
     known_share: f64,
     /// Sum of squared values of the whole level.
     energy: f64,

@@ -14,7 +14,7 @@ const LANES: usize = 8;
 /// Size of the searched levels in working pixels. At the largest scale of the default scale band, only the corners of a
 /// rotated level lie outside the square of the FFT.
 pub(super) const SEARCH_PX: usize = 20;
-/// Largest shift between the centres, as a share of the level size.
+/// Largest shift between the centres, as a fraction of the level size.
 const MAX_SHIFT: f64 = 0.35;
 /// Number of rotations per 90 degrees. Rotations that differ by a multiple of 90 degrees share one warp.
 const ANGLES_PER_QUARTER: usize = 9;

@@ -7,7 +7,7 @@ use super::overlap::PlacedLevel;
 use mocban_core::raster::Grid;
 
 /// Scores two poses on the pixels that are valid for both. A score, 0..=1, is the correlation (0 if negative) times the
-/// share of the moving level's amount that the fixed level covers.
+/// fraction of the moving level's amount that the fixed level covers.
 pub(super) fn tiebreak_scores(
     fixed: &PyramidLevel,
     fixed_valid: &Grid<f32>,

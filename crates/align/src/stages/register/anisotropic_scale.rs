@@ -8,15 +8,15 @@ use mocban_core::domain::Affine2;
 const MAX_ROUNDS: usize = 6;
 /// Number of steps of the refinement in each round.
 const STEPS: usize = 6;
-/// The score is computed at the current scale, and at scales larger and smaller by this share.
+/// The score is computed at the current scale, and at scales larger and smaller by this fraction.
 const TRIED: f64 = 0.008;
 /// Largest relative change of scale in one round, along the axes and along the diagonals.
 const MOST: f64 = 0.016;
 /// If the first round finds a smaller change, the pose keeps one scale, which saves time. Such a change moves no landmark
 /// by more than 0.3 % of the character's height.
 const EVIDENT: f64 = 0.004;
-/// Least share by which the anisotropic scale must bring the correlation closer to 1. On generated pairs, 2 of 48 damaged
-/// ones exceeded it, and most sheets that shrank and photographs exceeded 0.06.
+/// Least fraction by which the anisotropic scale must bring the correlation closer to 1. On generated pairs, 2 of 48
+/// damaged ones exceeded it, and most sheets that shrank and photographs exceeded 0.06.
 const LEAST_GAIN: f64 = 0.03;
 /// The search ends after a round with a smaller change.
 const CONVERGED: f64 = 0.001;

@@ -6,7 +6,7 @@
 //! mirrored meshes and uncarved plates. It prints the weights, and a reliability table for pairs of other seeds.
 //! `POSE` was fitted on 1,010 pairs of two independent generators, and `CHARACTER` on the pairs that its comment
 //! describes. `MASK` was set manually, because few masks are wrong. It lowers the confidence if the pose is a few
-//! percent off. On generated pairs, the mean confidence is slightly below the share that is right.
+//! percent off. On generated pairs, the mean confidence is slightly below the fraction that is right.
 
 use mocban_core::domain::{MetricOutcome, PoseFeatures};
 
@@ -37,13 +37,13 @@ const ROUGHEST: f64 = 0.12;
 /// Lower bound of the ink's area before its logarithm is taken. In squares of the stroke width. A character of a single
 /// stroke has a larger area.
 const LEAST_INK: f64 = 2.0;
-/// `spread_input` divides the spread by this share of the depth map's longest side. Smaller spreads are invisible.
+/// `spread_input` divides the spread by this fraction of the depth map's longest side. Smaller spreads are invisible.
 const UNSEEN_SPREAD: f64 = 0.002;
 /// Range to which the probability that a mask is right is clamped.
 const PROBABILITY: [f64; 2] = [0.02, 0.995];
-/// Lower bound of shares before their logarithm is taken.
+/// Lower bound of fractions before their logarithm is taken.
 const FLOOR: f64 = 0.02;
-/// Range to which the competitors' scores are clamped, as shares of the best score.
+/// Range to which the competitors' scores are clamped, as fractions of the best score.
 const RATIO: [f64; 2] = [0.2, 1.5];
 
 /// Inputs of the three logistic models. The confidence of an alignment is the product of their probabilities.
@@ -98,7 +98,7 @@ pub(super) fn of_character(features: &PoseFeatures) -> f64 {
 /// often have tops without ink together with ink without tops, or tops without ink together with sharp edges. A stroke
 /// without a partner says less if the character has many strokes.
 fn character_inputs(features: &PoseFeatures) -> [f64; CHARACTER_INPUTS] {
-    let (tops, ink) = (features.tops_alone, features.ink_alone);
+    let (tops, ink) = (features.unmatched_tops, features.unmatched_ink);
     let size = |area: f64| (area / SMALL_AREA).ln_1p();
     let scatter = features.edge_scatter.min(ROUGHEST);
     let [one, correlation, tops_covered, ink_covered, other, mirrored] = pose_inputs(features);
@@ -180,8 +180,8 @@ mod tests {
         other_angle: 0.3,
         mirrored: 0.4,
         spread: 0.0,
-        tops_alone: 0.0,
-        ink_alone: 0.0,
+        unmatched_tops: 0.0,
+        unmatched_ink: 0.0,
         edge_scatter: 0.03,
         ink_area: 40.0,
     };
@@ -234,10 +234,10 @@ mod tests {
 
     #[test]
     fn strokes_without_a_partner_are_evidence_against_the_character() {
-        let probability = |tops_alone, ink_alone, edge_scatter, ink_area| {
+        let probability = |unmatched_tops, unmatched_ink, edge_scatter, ink_area| {
             of_character(&PoseFeatures {
-                tops_alone,
-                ink_alone,
+                unmatched_tops,
+                unmatched_ink,
                 edge_scatter,
                 ink_area,
                 other_angle: 0.7,
@@ -258,8 +258,8 @@ mod tests {
     #[test]
     fn a_close_competitor_is_evidence_against_the_character() {
         let strokes = PoseFeatures {
-            tops_alone: 0.8,
-            ink_alone: 0.8,
+            unmatched_tops: 0.8,
+            unmatched_ink: 0.8,
             edge_scatter: 0.08,
             ..PLAIN
         };

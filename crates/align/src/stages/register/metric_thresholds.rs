@@ -26,7 +26,7 @@ const PRIOR: f64 = 0.05;
 /// A candidate threshold, and how its mask fits the corrected ink.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
-    /// Depth below the tops, as a share of the relief.
+    /// Depth below the tops, as a fraction of the relief.
     share: f64,
     level: u16,
     /// Number of stroke pixels whose ink is not missing.
@@ -116,8 +116,8 @@ fn lowest(candidates: &[Candidate], value: impl Fn(&Candidate) -> f64) -> usize 
         .unwrap_or(0)
 }
 
-/// Returns the depths to try, as shares of the relief, with their levels, the shallowest first. The square roots of the
-/// depths are evenly spaced, because the best depth of most blocks is small.
+/// Returns the depths to try, as fractions of the relief, with their levels, the shallowest first. The square roots of
+/// the depths are evenly spaced, because the best depth of most blocks is small.
 fn candidate_levels(
     depth: &DepthMap,
     relief: &ReliefHeights,
@@ -244,7 +244,7 @@ mod tests {
     };
 
     /// Returns a relief of bars with sloping walls. The tops have a half width of 4 px. The top of the third bar is
-    /// worn by `worn`, a share of the relief.
+    /// worn by `worn`, a fraction of the relief.
     fn bars(worn: f64) -> DepthMap {
         let level = |x: usize, y: usize| {
             let from_axis = (x % 32).abs_diff(16) as f64;
@@ -267,7 +267,7 @@ mod tests {
         settings().register
     }
 
-    /// Returns the depth that a metric chooses, as a share of the relief.
+    /// Returns the depth that a metric chooses, as a fraction of the relief.
     fn chosen(depth: &DepthMap, canvas: &HalfCanvas, metric: ThresholdMetric) -> f64 {
         let (all, _) = choose(depth, &RELIEF, canvas, &params()).expect("strokes and ink");
         let choice = all

@@ -11,6 +11,7 @@ mod half_canvas;
 mod ink_edge;
 mod levelling;
 mod metric_thresholds;
+mod observation;
 mod params;
 mod pose_search;
 mod posed;
@@ -22,6 +23,7 @@ mod tops_edge;
 mod unmatched;
 
 pub use confidence::ConfidenceInputs;
+pub use observation::Observation;
 pub use params::{RegisterError, RegisterParams};
 pub use scoring::Registered;
 pub(super) use scoring::{Alignment, canvas_print, score_alignments};
@@ -42,12 +44,12 @@ pub const REVISION: u32 = 21;
 const MIRROR_LIKELY: f64 = 1.04;
 
 /// A pair is refused if the probability of the pose, multiplied by the probability of the same character, is below this
-/// share of `min_confidence`. The share is small because damaged blocks and dry prints of the right character have
-/// strokes without a partner too.
+/// fraction of `min_confidence`. The fraction is small because damaged blocks and dry prints of the right character
+/// have strokes without a partner too.
 const UNLIKELY: f64 = 0.05;
 
-/// A light print is refused if the tops cover more than this share of the rim of the depth map. Strokes do not surround
-/// a character, so these tops are the carved ground, seen from the back of the scanned surface.
+/// A light print is refused if the tops cover more than this fraction of the rim of the depth map. Strokes do not
+/// surround a character, so these tops are the carved ground, seen from the back of the scanned surface.
 const TOPS_AT_RIM: f64 = 0.6;
 
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
@@ -112,7 +114,7 @@ pub fn register(
         thresholds,
         params,
     )?;
-    require_character(features, params)?;
+    require_character(features, params).map_err(|error| error.with(|| posed.observe(depth)))?;
     let alignments: Vec<Alignment> = thresholds
         .iter()
         .map(|ChosenThreshold { choice, .. }| Alignment {
@@ -160,7 +162,11 @@ fn require_character(
         });
     }
     if pose * character < UNLIKELY * params.min_confidence {
-        return Err(RegisterError::OtherCharacter { pose, character });
+        return Err(RegisterError::OtherCharacter {
+            pose,
+            character,
+            seen: Observation::Nothing,
+        });
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::observation::Observation;
 use crate::stages::score::SsimWindow;
 use mocban_core::domain::{FailureClass, ThresholdMetric};
 
@@ -19,9 +20,9 @@ pub struct RegisterParams {
     /// Whether the pose may have different scales along two perpendicular axes, because a sheet shrinks across its
     /// grain.
     pub anisotropic_scale: bool,
-    /// Smallest depth below the tops that is tried as a threshold, as a share of the relief's depth.
+    /// Smallest depth below the tops that is tried as a threshold, as a fraction of the relief's depth.
     pub threshold_min: f64,
-    /// Largest depth below the tops that is tried as a threshold, as a share of the relief's depth.
+    /// Largest depth below the tops that is tried as a threshold, as a fraction of the relief's depth.
     pub threshold_max: f64,
     /// Smallest confidence in the pose, 0..=1, with which a pair is accepted.
     pub min_confidence: f64,
@@ -76,23 +77,27 @@ pub enum RegisterError {
     Inverted,
     /// Strokes of the relief or of the print have no partner in the other one.
     #[error(
-        "relief and print have strokes that the other one lacks (confidence in the pose {pose:.2}, in the same character {character:.3}); is it the print of another character?"
+        "relief and print have strokes that the other one lacks (confidence in the pose {pose:.2}, in the same character {character:.3}); {seen}"
     )]
     OtherCharacter {
         /// Probability that the best pose is right.
         pose: f64,
         /// Probability that relief and print show the same character.
         character: f64,
+        /// What is unusual.
+        seen: Observation,
     },
     /// Relief and print show different characters, or the evidence for the best pose is too weak.
     #[error(
-        "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; is it the print of another character?"
+        "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; {seen}"
     )]
     NoMatch {
         /// Probability that the best pose is right.
         confidence: f64,
         /// The setting.
         needs: f64,
+        /// What is unusual.
+        seen: Observation,
     },
 }
 
@@ -109,6 +114,14 @@ fn ratio(times: f64) -> String {
 }
 
 impl RegisterError {
+    /// Adds what is unusual about a pair that does not match.
+    pub(super) fn with(mut self, observe: impl FnOnce() -> Observation) -> Self {
+        if let Self::OtherCharacter { seen, .. } | Self::NoMatch { seen, .. } = &mut self {
+            *seen = observe();
+        }
+        self
+    }
+
     /// Returns what the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         FailureClass::NoSolution

@@ -31,8 +31,8 @@ const fn keep(upright: usize, mirrored: usize) -> BeamWidth {
 }
 /// Largest working size of print and relief in pixels.
 const BASE_PX: usize = 72;
-/// Threshold of the soft strokes in the search, as a share of the relief's depth. With `SEARCH_SOFTNESS`, strokes fall
-/// from 1 at the tops to 0 at half the depth. This tolerates a wrong threshold and a tilted plane.
+/// Threshold of the soft strokes in the search, as a fraction of the relief's depth. With `SEARCH_SOFTNESS`, strokes
+/// fall from 1 at the tops to 0 at half the depth. This tolerates a wrong threshold and a tilted plane.
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Number of poses that are refined.
@@ -43,7 +43,7 @@ const LEAST_SCORE: f64 = 0.12;
 /// score. Closer cases are decided after the refinement. A symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.3;
 /// A pose is the expected one if rotation, scale (natural logarithm) and position of the relief's middle differ by less
-/// than this. The position is a share of the print's longest side.
+/// than this. The position is a fraction of the print's longest side.
 const EXPECTED_DEG: f64 = 6.0;
 const EXPECTED_RATIO: f64 = 0.08;
 const EXPECTED_SHIFT: f64 = 0.06;
@@ -73,7 +73,7 @@ impl PoseSearch {
 
 /// Searches for poses of the relief on every interpretation of the print. Returns the poses on the best interpretation.
 ///
-/// `depths` holds, for each depth-map pixel, the depth below the tops as a share of the relief's depth. Poses map
+/// `depths` holds, for each depth-map pixel, the depth below the tops as a fraction of the relief's depth. Poses map
 /// depth-map pixels to print pixels. If a pose is expected, it has no competitors unless one matches much better.
 ///
 /// # Errors

@@ -4,6 +4,7 @@ use super::confidence;
 use super::half_canvas::HalfCanvas;
 use super::levelling;
 use super::metric_thresholds::{self, ChosenThreshold};
+use super::observation::Observation;
 use super::params::{RegisterError, RegisterParams};
 use super::pose_search::PoseSearch;
 use super::refine::{self, Refinement};
@@ -28,6 +29,8 @@ pub(super) struct Posed {
     pub(super) thresholds: Vec<ChosenThreshold>,
     /// Evidence for and against the pose.
     pub(super) features: PoseFeatures,
+    /// Heights of the relief.
+    relief: ReliefHeights,
     /// Distance by which the ink spreads over the strokes, in pixels of the half canvas.
     spread: f64,
 }
@@ -47,22 +50,28 @@ impl Posed {
     ) -> Result<Self, RegisterError> {
         let print = &normalized.prints[search.ink];
         let refined = refine::refine(depths, print, search, params).ok_or(RegisterError::NoPose)?;
-        require_match(&refined.features, params)?;
-        let canvas = HalfCanvas::new(
-            depth,
-            print,
-            &normalized.outcome.inks[search.ink].canvas_from_print,
-            &refined.print_from_depth,
-            normalized.outcome.canvas_px,
-        );
+        let canvas_from_print = normalized.outcome.inks[search.ink].canvas_from_print;
+        let canvas = || {
+            let (pose, side) = (&refined.print_from_depth, normalized.outcome.canvas_px);
+            HalfCanvas::new(depth, print, &canvas_from_print, pose, side)
+        };
+        require_match(&refined.features, params)
+            .map_err(|error| error.with(|| observe(depth, relief, &canvas())))?;
+        let canvas = canvas();
         let (thresholds, spread) = metric_thresholds::choose(depth, relief, &canvas, params)?;
         Ok(Self {
             features: with_unmatched(refined.features, &canvas, &thresholds),
             refined,
             canvas,
             thresholds,
+            relief: *relief,
             spread,
         })
+    }
+
+    /// Returns what is unusual about the pair, if it does not match. `depth` is the map that this pose places.
+    pub(super) fn observe(&self, depth: &DepthMap) -> Observation {
+        observe(depth, &self.relief, &self.canvas)
     }
 }
 
@@ -121,12 +130,18 @@ fn with_unmatched(
     let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
     let unmatched = Unmatched::of(canvas, range);
     PoseFeatures {
-        tops_alone: unmatched.tops_alone,
-        ink_alone: unmatched.ink_alone,
+        unmatched_tops: unmatched.tops,
+        unmatched_ink: unmatched.ink,
         edge_scatter: unmatched.edge_scatter,
         ink_area: unmatched.ink_area,
         ..features
     }
+}
+
+/// Returns what is unusual about a pair that does not match.
+fn observe(depth: &DepthMap, relief: &ReliefHeights, canvas: &HalfCanvas) -> Observation {
+    let halves = || Observation::of_halves(canvas, relief.level_at(&depth.scale, 0.5));
+    Observation::of_scan(depth, relief).or(halves)
 }
 
 /// Refuses pairs that are mirrored or whose pose is too unlikely.
@@ -145,6 +160,7 @@ pub(super) fn require_match(
         Err(RegisterError::NoMatch {
             confidence,
             needs: params.min_confidence,
+            seen: Observation::Nothing,
         })
     }
 }

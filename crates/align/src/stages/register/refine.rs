@@ -15,13 +15,13 @@ use mocban_core::domain::{Affine2, PoseFeatures};
 const SAME_POSE_DEG: f64 = 15.0;
 /// Number of upright poses that are refined.
 const TRIED: usize = 3;
-/// Depth range over which soft strokes fall from 1 to 0, as a share of the relief's depth.
+/// Depth range over which soft strokes fall from 1 to 0, as a fraction of the relief's depth.
 const SOFTNESS: f64 = 0.1;
-/// Poses are compared at this share of the working size.
+/// Poses are compared at this fraction of the working size.
 const COMPARED: f64 = 0.42;
-/// The threshold of the best pose is chosen at this share of the working size.
+/// The threshold of the best pose is chosen at this fraction of the working size.
 const CLOSER: f64 = 0.67;
-/// If a competitor scores more than this share of the best score, both competitors are refined at size `CLOSER` too.
+/// If a competitor scores more than this fraction of the best score, both competitors are refined at size `CLOSER` too.
 const CLOSE: f64 = 0.75;
 /// `fair_share` counts the ratio of the scores on all pixels only up to this value. Competing poses of a symmetric
 /// character can reach it.
@@ -46,7 +46,7 @@ pub(super) struct Refinement {
 
 /// Refines the poses of the search and returns the best one, or `None` if print or relief has no data.
 ///
-/// `depths` holds, for each depth-map pixel, the depth below the tops as a share of the relief's depth.
+/// `depths` holds, for each depth-map pixel, the depth below the tops as a fraction of the relief's depth.
 pub(super) fn refine(
     depths: &SoftMask,
     print: &PrintMasks,
@@ -79,7 +79,7 @@ struct RefinedPose {
 }
 
 impl RefinedPose {
-    /// Returns the score that ranks poses: the correlation times the share of the tops that ink covers. The share
+    /// Returns the score that ranks poses: the correlation times the fraction of the tops that ink covers. The fraction
     /// ignores ink without tops, which is common, because strokes break off the block after a print was made.
     fn score(&self) -> f64 {
         self.found.score * self.overlap.moving_covered
@@ -121,8 +121,8 @@ impl CompetingPoses {
         })
     }
 
-    /// Refines the best pose at a larger size. If a competitor's share exceeds `CLOSE`, refines both competitors too.
-    /// If the competitor at another angle then scores higher, it becomes the best pose.
+    /// Refines the best pose at a larger size. If a competitor's fraction exceeds `CLOSE`, refines both competitors
+    /// too. If the competitor at another angle then scores higher, it becomes the best pose.
     fn sharpen(&mut self, thresholds: &SoftThresholds) -> Option<()> {
         let is_close = self.shares.iter().any(|share| *share > CLOSE);
         self.best = sharpened(thresholds, &self.best.found)?;
@@ -171,8 +171,8 @@ impl CompetingPoses {
             mirrored,
             spread,
             // Measured when the thresholds are known.
-            tops_alone: 0.0,
-            ink_alone: 0.0,
+            unmatched_tops: 0.0,
+            unmatched_ink: 0.0,
             edge_scatter: 0.0,
             ink_area: 0.0,
         }
@@ -218,7 +218,7 @@ impl<'a> WorkingImages<'a> {
         })
     }
 
-    /// Scales print and relief to a share of the working size.
+    /// Scales print and relief to a fraction of the working size.
     fn at(&self, share: f64) -> ScaledImages<'_> {
         let px = (f64::from(self.params.working_px) * share).round() as usize;
         let sigma = self.params.smoothing_px * share.sqrt();
@@ -284,7 +284,7 @@ impl<'a> WorkingImages<'a> {
     }
 
     /// Maps the depth map's corners by both poses. Returns the mean distance between the two images of a corner, as a
-    /// share of the map's longest side.
+    /// fraction of the map's longest side.
     fn apart(&self, one: &PoseCandidate, other: &PoseCandidate) -> f64 {
         let [width, height] = self.middle.map(|middle| 2.0 * middle);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];

@@ -2,8 +2,8 @@
 
 use crate::stages::pose::{PoseCandidate, PyramidLevel, Refiner};
 
-/// Thresholds to try: depths below the tops, as shares of the relief's depth. Several are tried, because a print's ink
-/// spread is unknown, and strokes thinner or thicker than the ink would bias the scale.
+/// Thresholds to try: depths below the tops, as fractions of the relief's depth. Several are tried, because a print's
+/// ink spread is unknown, and strokes thinner or thicker than the ink would bias the scale.
 const CUTS: [f64; 5] = [0.05, 0.11, 0.2, 0.32, 0.47];
 /// Number of thresholds that are tried around an approximate one.
 const NEAR: usize = 3;

@@ -72,8 +72,7 @@ impl StrokeMap {
             }
             let unexplained = outside(set, other, explained);
             let is_near = |distance: f32| f64::from(distance) > -tolerance;
-            let near = InkEdge::of(&far);
-            let whole = near
+            let whole = InkEdge::of(&far)
                 .grid()
                 .zip_map(&unexplained, |d, set| set && is_near(d));
             (whole, count)

@@ -233,16 +233,16 @@ fn a_pair_with_strokes_elsewhere_is_refused() {
         other_angle: 0.6,
         mirrored: 0.6,
         spread: 0.0,
-        tops_alone: 0.0,
-        ink_alone: 0.0,
+        unmatched_tops: 0.0,
+        unmatched_ink: 0.0,
         edge_scatter: 0.1,
         ink_area: 25.0,
     };
     assert_eq!(require_match(&alike, &params), Ok(()));
     assert_eq!(require_character(&alike, &params), Ok(()));
     let other = PoseFeatures {
-        tops_alone: 3.0,
-        ink_alone: 3.0,
+        unmatched_tops: 3.0,
+        unmatched_ink: 3.0,
         ..alike
     };
     let refused = require_character(&other, &params);
@@ -251,7 +251,7 @@ fn a_pair_with_strokes_elsewhere_is_refused() {
         "{refused:?}"
     );
     let dry = PoseFeatures {
-        tops_alone: 3.0,
+        unmatched_tops: 3.0,
         ..alike
     };
     assert_eq!(require_character(&dry, &params), Ok(()));

@@ -9,7 +9,7 @@ use super::half_canvas::HalfCanvas;
 use super::ink_edge::InkEdge;
 use mocban_core::domain::ReliefHeights;
 
-/// Typical spread of the ink, and its deviation, as shares of the stroke width. Dry ink has negative spreads.
+/// Typical spread of the ink, and its deviation, as fractions of the stroke width. Dry ink has negative spreads.
 const SPREAD: f64 = 0.03;
 const SPREAD_DEVIATION: f64 = 0.05;
 /// Smallest deviation of the logarithm of the depth that the relief shows.

@@ -8,12 +8,12 @@ use super::ink_edge::{InkEdge, REACH};
 use mocban_core::raster::Mask;
 use mocban_core::raster::components::ConnectedComponents;
 
-/// Distance from the strokes of the other image, as a share of the stroke width, from which a pixel has no partner.
+/// Distance from the strokes of the other image, as a fraction of the stroke width, from which a pixel has no partner.
 /// Smaller distances are due to the spread of ink and to local misalignment.
 const TOLERANCE: f64 = 0.3;
 /// Least tolerance in pixels of the half canvas.
 const TOLERANCE_PX: f64 = 1.5;
-/// Edges that deviate by at least this share of the stroke width do not count for the scatter.
+/// Edges that deviate by at least this fraction of the stroke width do not count for the scatter.
 const NEAR: f64 = 0.5;
 /// Pieces within this many pixels of the border of the common area are left out. Walls, stains and neighbouring strokes
 /// lie there.
@@ -30,11 +30,11 @@ pub(super) fn tolerance_px(stroke_width: f64) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unmatched {
     /// Area of the largest connected piece of stroke tops without ink, in squares of the stroke width.
-    pub(super) tops_alone: f64,
+    pub(super) tops: f64,
     /// Area of the largest connected piece of ink without wood, in squares of the stroke width.
-    pub(super) ink_alone: f64,
+    pub(super) ink: f64,
     /// Mean absolute deviation of the distances from the ink's edge to the edge of the strokes, from their median, as a
-    /// share of the stroke width. The median is the spread of the ink.
+    /// fraction of the stroke width. The median is the spread of the ink.
     pub(super) edge_scatter: f64,
     /// Area of the ink, in squares of the stroke width.
     pub(super) ink_area: f64,
@@ -67,8 +67,8 @@ impl Unmatched {
             .zip_map(&canvas.ink, |distance, ink| is_far(&distance) && ink);
         let mut edge = canvas.distances_at_edges(|at| canvas.ink.data()[at], &wood);
         Self {
-            tops_alone: squares(&tops),
-            ink_alone: squares(&ink),
+            tops: squares(&tops),
+            ink: squares(&ink),
             edge_scatter: mean_deviation(&mut edge, NEAR * width) / width,
             ink_area: canvas.ink.count() as f64 / (width * width),
         }
@@ -121,15 +121,15 @@ mod tests {
     fn strokes_without_a_partner_are_measured_in_stroke_widths() {
         let all = [true; 3];
         let same = unmatched(all, all, 0);
-        assert_eq!((same.tops_alone, same.ink_alone), (0.0, 0.0));
+        assert_eq!((same.tops, same.ink), (0.0, 0.0));
         let missing = [true, false, true];
         // A bar of 64 x 8 pixels at a stroke width of about 8 pixels.
         let bare = unmatched(all, missing, 0);
-        assert!((6.0..9.0).contains(&bare.tops_alone), "{bare:?}");
-        assert_eq!(bare.ink_alone, 0.0);
+        assert!((6.0..9.0).contains(&bare.tops), "{bare:?}");
+        assert_eq!(bare.ink, 0.0);
         let lost = unmatched(missing, all, 0);
-        assert!((6.0..9.0).contains(&lost.ink_alone), "{lost:?}");
-        assert_eq!(lost.tops_alone, 0.0);
+        assert!((6.0..9.0).contains(&lost.ink), "{lost:?}");
+        assert_eq!(lost.tops, 0.0);
     }
 
     #[test]
@@ -148,15 +148,15 @@ mod tests {
         };
         let ink = Mask::from_fn(SIDE, SIDE, |x, y| y < 20 && level(x, y) == TOP);
         let mut canvas = HalfCanvas::of(Grid::from_fn(SIDE, SIDE, level), ink);
-        assert!(Unmatched::of(&canvas, [TOP, TOP]).tops_alone > 5.0);
+        assert!(Unmatched::of(&canvas, [TOP, TOP]).tops > 5.0);
         canvas.specks = Mask::from_fn(SIDE, SIDE, |x, y| x % 4 == 0 && y % 3 == 0);
-        assert!(Unmatched::of(&canvas, [TOP, TOP]).tops_alone < 0.2);
+        assert!(Unmatched::of(&canvas, [TOP, TOP]).tops < 0.2);
     }
 
     #[test]
     fn small_shifts_leave_no_strokes_alone() {
         let shifted = unmatched([true; 3], [true; 3], 2);
-        assert_eq!((shifted.tops_alone, shifted.ink_alone), (0.0, 0.0));
+        assert_eq!((shifted.tops, shifted.ink), (0.0, 0.0));
         assert!(shifted.edge_scatter > 0.15, "{shifted:?}");
         assert!(unmatched([true; 3], [true; 3], 0).edge_scatter < 0.02);
     }

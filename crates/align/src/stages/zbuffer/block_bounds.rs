@@ -3,7 +3,7 @@
 use super::triangle_block::{AffineForm, LANES, LaneArray, TriangleBlock};
 use mocban_core::simd::{max_f32, min_f32};
 
-/// A box is enlarged by this share of the sum of three lengths: the extent of the surface, half the side of the box,
+/// A box is enlarged by this fraction of the sum of three lengths: the extent of the surface, half the side of the box,
 /// and the distance of its centre from the origin. This exceeds rounding errors, so no corner is outside its box.
 const MARGIN: f32 = 2e-6;
 

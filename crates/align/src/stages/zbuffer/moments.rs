@@ -67,7 +67,7 @@ const SUM_COUNT: usize = 10;
 /// The bulk box about the origin.
 struct BulkBox {
     extent: f64,
-    /// Half sides, shares of the extent.
+    /// Half sides, as fractions of the extent.
     half: [f32; 3],
 }
 

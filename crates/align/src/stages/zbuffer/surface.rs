@@ -158,8 +158,8 @@ impl IndexedSurface {
         places.map(|place| place.min(self.blocks.len() - 1))
     }
 
-    /// Projects the surface along z of the frame. Returns the share of the projected area, 0..=1, with a winding that
-    /// faces +z. Returns `None` if there are no faces, or if the area is zero.
+    /// Projects the surface along z of the frame. Returns the fraction of the projected area, 0..=1, with a winding
+    /// that faces +z. Returns `None` if there are no faces, or if the area is zero.
     pub(crate) fn upward_facing_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
         if !self.has_faces {
             return None;

@@ -26,6 +26,12 @@ impl<I, R> Pending<I, R> {
         self.0.iter().map(|(item, _)| item)
     }
 
+    fn into_requests(self, request: fn(I, Reply<R>) -> Request) -> impl Iterator<Item = Request> {
+        self.0
+            .into_iter()
+            .map(move |(item, reply)| request(item, reply))
+    }
+
     fn answer(self, replies: Vec<R>) {
         for ((_, reply), answer) in self.0.into_iter().zip(replies) {
             // The sender may no longer wait.
@@ -241,37 +247,17 @@ impl Batch {
 
     /// Splits the batch into batches of one request each, in the order of execution.
     pub(crate) fn split(self) -> Vec<Self> {
-        let heartbeats = self
-            .heartbeats
-            .0
-            .into_iter()
-            .map(|(a, b)| Request::Heartbeat(a, b));
-        let checkpoints = self
-            .checkpoints
-            .0
-            .into_iter()
-            .map(|(a, b)| Request::Checkpoint(a, b));
-        let failures = self
-            .failures
-            .0
-            .into_iter()
-            .map(|(a, b)| Request::Fail(a, b));
-        let releases = self
-            .releases
-            .0
-            .into_iter()
-            .map(|(a, b)| Request::Release(a, b));
-        let claims = self.claims.0.into_iter().map(|(a, b)| Request::Claim(a, b));
-        let requests = heartbeats
-            .chain(checkpoints)
-            .chain(failures)
-            .chain(releases)
-            .chain(claims);
+        let mut requests: Vec<Request> = Vec::with_capacity(self.len());
+        requests.extend(self.heartbeats.into_requests(Request::Heartbeat));
+        requests.extend(self.checkpoints.into_requests(Request::Checkpoint));
+        requests.extend(self.failures.into_requests(Request::Fail));
+        requests.extend(self.releases.into_requests(Request::Release));
+        requests.extend(self.claims.into_requests(Request::Claim));
         let single = |request| {
             let mut batch = Self::default();
             batch.push(request);
             batch
         };
-        requests.map(single).collect()
+        requests.into_iter().map(single).collect()
     }
 }

@@ -89,8 +89,7 @@ pub(crate) async fn stored_before<'i>(
         .filter_map(|(lease, stages)| Some((lease.unit.0, (lease, position_after(stages)?))))
         .collect();
     let ended: BTreeMap<_, _> = ended.map(|lease| (lease.unit.0, lease)).collect();
-    let pairs = checkpoints.keys().chain(ended.keys());
-    let pairs: Vec<_> = pairs.copied().collect();
+    let pairs: Vec<_> = checkpoints.keys().chain(ended.keys()).copied().collect();
     if pairs.is_empty() {
         return Ok(Vec::new());
     }

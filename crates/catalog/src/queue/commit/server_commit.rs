@@ -10,9 +10,10 @@ use crate::queue::claim::ClaimRequest;
 use crate::queue::commit::group_commit::{Batch, BatchReply};
 use crate::queue::commit::known_leases::stored_before;
 use crate::queue::commit::write_connection::CatalogServerState;
-use crate::queue::counters::{self, DONE, cursor};
+use crate::queue::counters::{self, cursor};
 use crate::queue::lease::{Lease, was_written_long_ago};
 use crate::queue::{server_checkpoint, server_claim};
+use mocban_core::domain::JobStatus;
 
 /// Commits a batch of [`Batch::split_for_server`]. An earlier commit of the same batch may have been stored although its
 /// reply was lost.
@@ -41,7 +42,7 @@ async fn commit_parts(
     if batch.has_shared_transaction() {
         reply = batch.apply(conn, state.leases.is_searching()).await?;
         if !batch.heartbeats.is_empty() {
-            state.claim_start.begin_again();
+            state.claim_tracker.begin_again();
             // The reply does not depend on it. A broken connection shows at the next statement.
             match counters::fold(conn, !state.has_folded_all).await {
                 Ok(()) => state.has_folded_all = true,
@@ -53,7 +54,7 @@ async fn commit_parts(
             state.leases.remove(lease);
         }
         for lease in batch.releases.items() {
-            state.claim_start.note_release(lease);
+            state.claim_tracker.note_release(lease);
         }
         note_exclusive(failed(), state);
     }
@@ -108,7 +109,7 @@ async fn store(
         .map(|(lease, _)| is_kept(lease))
         .collect();
     for ((lease, stages), kept) in checkpoints.iter().zip(&kept) {
-        let is_done = position_after(stages).is_some_and(|(cursor, _)| cursor == DONE);
+        let is_done = position_after(stages).is_some_and(|(_, status)| status == JobStatus::Done);
         if is_done || !kept {
             state.leases.remove(lease);
         }
@@ -126,10 +127,10 @@ async fn claim(
     // Before the claim, because nothing may fail between its commit and its reply.
     let unknown = state.leases.unknown(conn, request.worker).await?;
     let began = Instant::now();
-    let start = state.claim_start.of(request, began);
+    let start = state.claim_tracker.of(request, began);
     let mut claimed = server_claim::claim(conn, request, start).await?;
     let times = [began, Instant::now()];
-    state.claim_start.note(request, start, &claimed, times);
+    state.claim_tracker.note(request, start, &claimed, times);
     claimed.extend(without_pairs_of(unknown, &claimed));
     state.leases.add(&claimed);
     Ok(claimed)
@@ -144,6 +145,6 @@ fn without_pairs_of(mut leases: Vec<Lease>, later: &[Lease]) -> Vec<Lease> {
 /// Lets claims search from the beginning after an exclusive lease, which prevented claims.
 fn note_exclusive<'l>(leases: impl Iterator<Item = &'l Lease>, state: &mut CatalogServerState) {
     for lease in leases.filter(|lease| lease.exclusive) {
-        state.claim_start.note_release(lease);
+        state.claim_tracker.note_release(lease);
     }
 }

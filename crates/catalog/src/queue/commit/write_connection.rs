@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use sqlx::{Connection as _, PgConnection};
 
 use crate::db::busy_retry::retry_while_busy;
-use crate::db::conn::{Conn, Held, Work};
+use crate::db::conn::{Conn, ConnectionKind, Work};
 use crate::db::dialect::Sql;
 use crate::db::error::{CatalogError, Result};
 use crate::db::log_watch::LogWatch;
@@ -16,7 +16,7 @@ use crate::db::postgres::LOCK_FOR_ANY_PLAN;
 use crate::db::postgres_address::PostgresAddress;
 use crate::db::query::query;
 use crate::db::retry_wait::RetryWait;
-use crate::queue::claim_start::ClaimStart;
+use crate::queue::claim_tracker::ClaimTracker;
 use crate::queue::commit::known_leases::KnownLeases;
 use crate::queue::worker_lock::WorkerLock;
 use mocban_core::domain::WorkerId;
@@ -51,7 +51,7 @@ struct Server {
 #[derive(Debug, Default)]
 pub(crate) struct CatalogServerState {
     pub(crate) leases: KnownLeases,
-    pub(crate) claim_start: ClaimStart,
+    pub(crate) claim_tracker: ClaimTracker,
     /// Whether the counters of all earlier slots were added up over this connection.
     pub(crate) has_folded_all: bool,
     pub(crate) worker_lock: WorkerLock,
@@ -77,7 +77,7 @@ impl WriteConnection {
         retry_wait: Arc<RetryWait>,
     ) -> Self {
         Self {
-            conn: Conn::Postgres(Held::Owned(conn)),
+            conn: Conn::Postgres(ConnectionKind::Owned(conn)),
             path: Path::new(&address.text()).into(),
             log: None,
             server: Some(Server {
@@ -145,7 +145,7 @@ impl WriteConnection {
         loop {
             match retry_wait.limit(server.address.reconnect()).await {
                 Ok(conn) => {
-                    self.conn = Conn::Postgres(Held::Owned(conn));
+                    self.conn = Conn::Postgres(ConnectionKind::Owned(conn));
                     self.is_broken = false;
                     server.state.leases.replies_may_be_lost();
                     server.state.has_folded_all = false;
@@ -170,9 +170,6 @@ impl WriteConnection {
     }
 
     /// Keeps the lock of a worker, over a new connection if the server was unavailable.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub(crate) async fn keep_worker_lock(&mut self, worker: WorkerId) -> Result<()> {
         self.reconnect_if_broken().await?;
         let mut repeats = 0;
@@ -247,7 +244,7 @@ impl WriteConnection {
             rollback(&mut self.conn).await;
         }
         if let Some(server) = &mut self.server {
-            server.state.claim_start.begin_again();
+            server.state.claim_tracker.begin_again();
         }
         self.check_log().await?;
         outcome
@@ -266,13 +263,13 @@ impl WriteConnection {
         let is_lost = self.log.as_ref().is_some_and(LogWatch::is_lost);
         let closed = match self.conn {
             // Closing would copy pages of the damaged log to the catalog. Exiting without closing does not.
-            Conn::Sqlite(Held::Owned(conn)) if is_lost => {
+            Conn::Sqlite(ConnectionKind::Owned(conn)) if is_lost => {
                 std::mem::forget(conn);
                 return;
             }
-            Conn::Sqlite(Held::Owned(conn)) => conn.close().await,
-            Conn::Postgres(Held::Owned(_)) if self.is_broken => return,
-            Conn::Postgres(Held::Owned(conn)) => conn.close().await,
+            Conn::Sqlite(ConnectionKind::Owned(conn)) => conn.close().await,
+            Conn::Postgres(ConnectionKind::Owned(_)) if self.is_broken => return,
+            Conn::Postgres(ConnectionKind::Owned(conn)) => conn.close().await,
             Conn::Sqlite(_) | Conn::Postgres(_) => return,
         };
         if let Err(error) = closed {

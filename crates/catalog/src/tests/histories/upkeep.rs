@@ -164,7 +164,7 @@ impl Game {
             reviewer: "ana".to_owned(),
             reason: None,
             note: None,
-            look: ReviewContext::default(),
+            context: ReviewContext::default(),
             at: None,
         };
         let stored = self.world.catalog.verdict_set(vec![verdict], self.wall);

@@ -3,7 +3,8 @@
 use super::header::{PlyElement, PlyHeader, PlyScalar, PlyType};
 use super::source::{BodyFault, NumberSource};
 use crate::domain::cancel::{PollCounter, polled};
-use crate::mesh::error::{self, MeshError, MeshLimits};
+use crate::mesh::error::{MeshError, MeshLimits};
+use crate::mesh::missing::PositionCheck;
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
@@ -14,20 +15,28 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// Rows that are read at a time.
 const CHUNK_ROWS: usize = 256;
 
+/// What the rows of a body define.
+pub(super) struct PlyBody {
+    pub(super) mesh: Mesh,
+    pub(super) check: PositionCheck,
+    /// White space and zeros after the last row, bytes.
+    pub(super) padding: usize,
+}
+
 /// Reads all elements in the order of the header.
 pub(super) fn read(
     header: &PlyHeader,
     source: impl NumberSource,
     limits: &MeshLimits,
-) -> Result<Mesh, MeshError> {
+) -> Result<PlyBody, MeshError> {
     let mut body = BodyReader {
         header,
         source,
         limits,
         declared_vertices: header.rows("vertex"),
         mesh: Mesh::default(),
+        check: PositionCheck::NONE,
         row: 0,
-        values: Vec::new(),
         counter: PollCounter::default(),
     };
     for element in &header.elements {
@@ -42,7 +51,11 @@ pub(super) fn read(
             bytes: rest.len() as u64,
         });
     }
-    Ok(body.mesh)
+    Ok(PlyBody {
+        padding: rest.len(),
+        mesh: body.mesh,
+        check: body.check,
+    })
 }
 
 struct BodyReader<'a, S> {
@@ -51,10 +64,9 @@ struct BodyReader<'a, S> {
     limits: &'a MeshLimits,
     declared_vertices: u64,
     mesh: Mesh,
+    check: PositionCheck,
     /// Complete rows of the current element.
     row: u64,
-    /// Values of the current row.
-    values: Vec<f64>,
     counter: PollCounter,
 }
 
@@ -126,13 +138,12 @@ impl<S: NumberSource> BodyReader<'_, S> {
             };
         }
         if element.is_packed_position() && columns == [0, 1, 2] {
-            self.packed_vertices(element.rows)?;
+            self.packed_vertices(element.rows);
         }
         while self.row < element.rows {
             self.counter.tick();
-            self.read_values(element)?;
-            let count = self.mesh.vertices.len() as u64 + 1;
-            let position = error::check_finite(columns.map(|column| self.values[column]), count)?;
+            let position = self.position(element, columns)?;
+            self.check.add(&[position]);
             match &mut self.mesh.vertices {
                 Vertices::Single(vertices) => vertices.push(position.map(|v| v as f32)),
                 Vertices::Double(vertices) => vertices.push(position),
@@ -144,17 +155,16 @@ impl<S: NumberSource> BodyReader<'_, S> {
 
     /// Reads rows of exactly three 32-bit floats, the most common layout, in blocks. Stops if the source returns no
     /// rows; the caller then reads the remaining rows one by one.
-    fn packed_vertices(&mut self, rows: u64) -> Result<(), MeshError> {
+    fn packed_vertices(&mut self, rows: u64) {
         let mut chunk = Vec::with_capacity(CHUNK_ROWS);
         while self.row < rows {
             self.counter.add(CHUNK_ROWS as u32);
-            chunk.clear();
             let most = (rows - self.row).min(CHUNK_ROWS as u64) as usize;
             self.source.packed_positions(most, &mut chunk);
             if chunk.is_empty() {
                 break;
             }
-            error::check_all_finite(&chunk, self.mesh.vertices.len())?;
+            self.check.add(&chunk);
             match &mut self.mesh.vertices {
                 Vertices::Single(vertices) => vertices.extend_from_slice(&chunk),
                 Vertices::Double(vertices) => {
@@ -163,23 +173,23 @@ impl<S: NumberSource> BodyReader<'_, S> {
             }
             self.row += chunk.len() as u64;
         }
-        Ok(())
     }
 
-    /// Reads a row into `self.values`, one value per property; 0 for a list.
-    fn read_values(&mut self, element: &PlyElement) -> Result<(), BodyFault> {
-        self.values.clear();
-        for property in &element.properties {
-            let value = match property.shape {
-                PlyType::Scalar(kind) => self.source.next(kind)?,
-                PlyType::List { .. } => {
-                    self.skip(property.shape)?;
-                    0.0
-                }
-            };
-            self.values.push(value);
+    /// Reads a row of vertices, whose coordinates are in the given columns; a list counts as 0.
+    fn position(
+        &mut self,
+        element: &PlyElement,
+        columns: [usize; 3],
+    ) -> Result<[f64; 3], BodyFault> {
+        let mut position = [0.0; 3];
+        for (column, property) in element.properties.iter().enumerate() {
+            let axis = columns.iter().position(|of_axis| *of_axis == column);
+            match (property.shape, axis) {
+                (PlyType::Scalar(kind), Some(axis)) => position[axis] = self.source.next(kind)?,
+                (other, _) => self.skip(other)?,
+            }
         }
-        Ok(())
+        Ok(position)
     }
 
     fn skip(&mut self, shape: PlyType) -> Result<(), BodyFault> {

@@ -165,7 +165,10 @@ impl PlyHeader {
         let mut elements = Vec::new();
         let mut at = 0;
         let head = &bytes[..bytes.len().min(MAX_HEADER_BYTES + 1)];
-        while let Some((line, next)) = line_at(head, at) {
+        // Binary data after the header may have any bytes.
+        let end = head.windows(10).position(|word| word == b"end_header");
+        let is_classic_mac = text::is_classic_mac(&head[..end.unwrap_or(head.len())]);
+        while let Some((line, next)) = line_at(head, at, is_classic_mac) {
             at = next;
             if at > MAX_HEADER_BYTES {
                 break;
@@ -174,7 +177,10 @@ impl PlyHeader {
             match words.as_slice() {
                 [b"end_header"] => {
                     let encoding = encoding.ok_or_else(|| header_error("no format line"))?;
-                    return Ok((Self { encoding, elements }, at));
+                    // Lines may end in LF CR.
+                    let is_lf_cr =
+                        bytes.get(3..5) == Some(b"\n\r") && bytes.get(at) == Some(&b'\r');
+                    return Ok((Self { encoding, elements }, at + usize::from(is_lf_cr)));
                 }
                 [b"format", name, ..] => encoding = Some(parse_encoding(name)?),
                 [b"element", name, rows] => elements.push(parse_element(name, rows)?),
@@ -205,6 +211,12 @@ impl PlyHeader {
         self.encoding != PlyEncoding::Ascii && vertices.all(PlyElement::is_single_position)
     }
 
+    /// Returns whether a row has a list.
+    pub(super) fn has_lists(&self) -> bool {
+        let mut elements = self.elements.iter().filter(|element| element.rows > 0);
+        elements.any(|element| element.fixed_size().is_none())
+    }
+
     /// Returns the number of rows of the elements with this name.
     pub(super) fn rows(&self, name: &str) -> u64 {
         let named = self.elements.iter().filter(|element| element.name == name);
@@ -212,13 +224,11 @@ impl PlyHeader {
     }
 }
 
-/// Returns the line at an offset and the offset of the next line. Returns `None` if the line has no end. If a CR alone
-/// ends the first line, CR ends every line. Later lines are not examined, as binary data may follow a CR.
-fn line_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
-    let old_mac = bytes.get(3) == Some(&b'\r') && bytes.get(4) != Some(&b'\n');
-    let end = if old_mac { b'\r' } else { b'\n' };
+/// Returns the line at an offset and the offset of the next line. Returns `None` if the line has no end.
+fn line_at(bytes: &[u8], at: usize, is_classic_mac: bool) -> Option<(&[u8], usize)> {
+    let is_end = |byte: &u8| *byte == b'\n' || (is_classic_mac && *byte == b'\r');
     let rest = bytes.get(at..)?;
-    let len = rest.iter().position(|byte| *byte == end)?;
+    let len = rest.iter().position(is_end)?;
     Some((rest[..len].trim_ascii(), at + len + 1))
 }
 

@@ -35,8 +35,8 @@ pub(super) trait NumberSource {
     /// Returns the bytes that have not been read.
     fn rest(&self) -> &[u8];
 
-    /// Appends the positions of up to `_most` rows, each of three 32-bit floats. Appends nothing if the body is text or
-    /// has ended.
+    /// Replaces `_into` by the positions of up to `_most` rows, each of three 32-bit floats. Does nothing if the body is
+    /// text.
     fn packed_positions(&mut self, _most: usize, _into: &mut Vec<[f32; 3]>) {}
 
     /// Appends the triangles of up to `_most` rows, each an 8-bit count and 32-bit indices. Stops before a row whose
@@ -71,10 +71,8 @@ impl<'a> AsciiSource<'a> {
             poll();
         }
     }
-}
 
-impl NumberSource for AsciiSource<'_> {
-    fn next(&mut self, _: PlyScalar) -> Result<f64, BodyFault> {
+    fn word(&mut self) -> Result<&[u8], BodyFault> {
         self.skip_space();
         let longest = self.rest.len().min(text::MAX_LINE_BYTES + 1);
         let len = self.rest[..longest]
@@ -92,12 +90,19 @@ impl NumberSource for AsciiSource<'_> {
         if word.is_empty() {
             return Err(BodyFault::End);
         }
-        text::parse(word).ok_or_else(|| BodyFault::Invalid(text::not_a_number(word)))
+        Ok(word)
+    }
+}
+
+impl NumberSource for AsciiSource<'_> {
+    fn next(&mut self, _: PlyScalar) -> Result<f64, BodyFault> {
+        let word = self.word()?;
+        text::number(word).ok_or_else(|| BodyFault::Invalid(text::not_a_number(word)))
     }
 
-    fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), BodyFault> {
+    fn skip(&mut self, _: PlyScalar, count: u64) -> Result<(), BodyFault> {
         for _ in polled(0..count) {
-            self.next(kind)?;
+            self.word()?;
         }
         Ok(())
     }
@@ -182,8 +187,13 @@ impl<const BIG_ENDIAN: bool> NumberSource for BinarySource<'_, BIG_ENDIAN> {
     fn packed_positions(&mut self, most: usize, into: &mut Vec<[f32; 3]>) {
         let rows = self.rows::<12>(most);
         self.rest = &self.rest[rows.as_flattened().len()..];
-        let position = |row| [0, 4, 8].map(|offset| f32::from_bits(Self::word(row, offset)));
-        into.extend(rows.iter().map(|row| position(row)));
+        into.resize(rows.len(), [0.0; 3]);
+        bytemuck::cast_slice_mut(into).copy_from_slice(rows);
+        if BIG_ENDIAN != cfg!(target_endian = "big") {
+            for bits in bytemuck::cast_slice_mut::<_, u32>(into) {
+                *bits = bits.swap_bytes();
+            }
+        }
     }
 
     fn packed_triangles(&mut self, most: usize, into: &mut Vec<[u32; 3]>) {

@@ -2,8 +2,9 @@
 
 use std::io::{self, Read};
 
-use crate::domain::cancel::poll;
-use crate::mesh::error::{self, MeshError, MeshLimits, MeshReadError};
+use crate::domain::cancel::{poll, polled};
+use crate::mesh::error::{MeshError, MeshLimits, MeshReadError};
+use crate::mesh::missing::PositionCheck;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 use crate::page_vec::{PageVec, fill};
 
@@ -39,7 +40,7 @@ pub(crate) fn read_facets(
     source: &mut impl Read,
     count: u32,
     limits: &MeshLimits,
-) -> Result<Mesh, MeshReadError> {
+) -> Result<(Mesh, PositionCheck), MeshReadError> {
     let mut facets = FacetBuffer::with_capacity(count, limits)?;
     let mut bytes = vec![0; FACET * (count as usize).min(READ_FACETS)];
     let mut left = count as usize;
@@ -48,7 +49,7 @@ pub(crate) fn read_facets(
         let bytes = &mut bytes[..most];
         let have = fill(source, bytes)?;
         let (whole, _) = bytes[..have].as_chunks();
-        facets.push(whole)?;
+        facets.push(whole);
         left -= whole.len();
         if have < bytes.len() {
             return Err(truncated(u64::from(count) - left as u64, count).into());
@@ -71,35 +72,74 @@ pub(crate) fn truncated(have: u64, count: u32) -> MeshError {
 }
 
 /// Reads a binary STL. Ignores normals, attributes, and trailing bytes that are too few for a triangle.
-pub(crate) fn read_binary(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
+pub(crate) fn read_binary(
+    bytes: &[u8],
+    limits: &MeshLimits,
+) -> Result<(Mesh, PositionCheck), MeshError> {
     let count = binary_count(bytes).ok_or_else(|| MeshError::Truncated {
         format: FORMAT,
         what: "bytes of its header".into(),
         have: bytes.len() as u64,
         want: HEADER as u64,
     })?;
-    let (rows, _) = bytes[HEADER..].as_chunks::<FACET>();
+    let rest = &bytes[HEADER..];
+    let (rows, _) = rest.as_chunks::<FACET>();
     let have = rows.len() as u64;
     if have < u64::from(count) {
         return Err(truncated(have, count));
     }
-    if have > u64::from(count) {
-        return Err(MeshError::Uncounted {
-            format: FORMAT,
-            what: "triangles",
-            have,
-            want: u64::from(count),
-        });
-    }
     let mut facets = FacetBuffer::with_capacity(count, limits)?;
-    facets.push(&rows[..count as usize])?;
+    // A few bytes may follow the last facet, but as many for each facet are part of them.
+    let is_each = !rest.is_empty() && rest.len().is_multiple_of(rows.len());
+    if rest.len() == FACET * rows.len() && have == u64::from(count) {
+        facets.push(rows);
+    } else if let Some(with_attributes) = facets_with_attributes(rest, count) {
+        for facet in with_attributes {
+            facets.push(&[*facet]);
+        }
+    } else if have == u64::from(count) && !is_each {
+        facets.push(rows);
+    } else {
+        return Err(uncounted(rest, count));
+    }
     facets.into_mesh()
+}
+
+/// Returns the facets of a body in which the last two bytes of each are the length of attributes after it. Returns `None`
+/// if such facets do not fill the body.
+fn facets_with_attributes(mut rest: &[u8], count: u32) -> Option<Vec<&[u8; FACET]>> {
+    let mut facets = Vec::new();
+    for _ in polled(0..count) {
+        let (facet, after) = rest.split_first_chunk()?;
+        let length = u16::from_le_bytes([facet[FACET - 2], facet[FACET - 1]]);
+        rest = after.get(usize::from(length)..)?;
+        facets.push(facet);
+    }
+    rest.is_empty().then_some(facets)
+}
+
+/// Returns the error of a body with more bytes than `count` facets have.
+fn uncounted(body: &[u8], count: u32) -> MeshError {
+    let (bytes, want) = (body.len() as u64, u64::from(count));
+    if want > 0 && bytes.is_multiple_of(want) && !bytes.is_multiple_of(want * FACET as u64) {
+        return MeshError::FacetBytes {
+            bytes: bytes / want,
+        };
+    }
+    MeshError::Uncounted {
+        format: FORMAT,
+        what: "triangles",
+        have: bytes / FACET as u64,
+        want,
+    }
 }
 
 /// Vertices of the facets read so far.
 struct FacetBuffer {
     vertices: PageVec<[f32; 3]>,
+    /// Corners of up to [`CHECKED_FACETS`] facets.
     chunk: Vec<[f32; 3]>,
+    check: PositionCheck,
 }
 
 impl FacetBuffer {
@@ -109,30 +149,32 @@ impl FacetBuffer {
         limits.check_vertices(3 * u64::from(count))?;
         Ok(Self {
             vertices: PageVec::with_capacity(3 * count as usize),
-            chunk: Vec::with_capacity(3 * CHECKED_FACETS),
+            chunk: vec![[0.0; 3]; 3 * CHECKED_FACETS],
+            check: PositionCheck::NONE,
         })
     }
 
-    fn push(&mut self, facets: &[[u8; FACET]]) -> Result<(), MeshError> {
+    fn push(&mut self, facets: &[[u8; FACET]]) {
         for (part, facets) in facets.chunks(CHECKED_FACETS).enumerate() {
             if part.is_multiple_of(PARTS_PER_POLL) {
                 poll();
             }
-            self.chunk.clear();
-            for facet in facets {
-                self.chunk.extend(corners(facet));
+            let (triangles, _) = self.chunk.as_chunks_mut::<3>();
+            for (triangle, facet) in triangles.iter_mut().zip(facets) {
+                *triangle = corners(facet);
             }
-            error::check_all_finite(&self.chunk, self.vertices.len())?;
-            self.vertices.extend_from_slice(&self.chunk);
+            let chunk = &self.chunk[..3 * facets.len()];
+            self.check.add_used(chunk);
+            self.vertices.extend_from_slice(chunk);
         }
-        Ok(())
     }
 
-    fn into_mesh(self) -> Result<Mesh, MeshError> {
+    fn into_mesh(self) -> Result<(Mesh, PositionCheck), MeshError> {
         if self.vertices.is_empty() {
             return Err(MeshError::NoFaces);
         }
-        Ok(Mesh::from_soup(Vertices::Single(self.vertices)))
+        let mesh = Mesh::from_soup(Vertices::Single(self.vertices));
+        Ok((mesh, self.check))
     }
 }
 

@@ -9,7 +9,7 @@ pub enum DecodeError {
     #[error("the file is empty (0 bytes)")]
     Empty,
     /// The content is of another kind than PNG, JPEG or TIFF.
-    #[error("the file is {0}; PNG, JPEG and TIFF images are read")]
+    #[error("{}", not_an_image(*.0))]
     NotAnImage(FileKind),
     /// More bytes than the settings allow.
     #[error("the file has {bytes} bytes; limits.image.max_bytes is {limit}")]
@@ -73,4 +73,8 @@ pub(super) fn broken(kind: FileKind, reason: &str) -> DecodeError {
         kind,
         reason: sanitize(reason, 160),
     }
+}
+
+fn not_an_image(kind: FileKind) -> String {
+    kind.refusal("image", "PNG, JPEG and TIFF images", kind.image_advice())
 }

@@ -1,15 +1,16 @@
 //! Decoder of print images: PNG, JPEG and TIFF, recognised by their content.
 
+mod colour_profile;
 mod error;
+mod jpeg;
 mod limits;
 mod orientation;
 mod print_image;
+mod tags;
 mod tiff;
-mod tiff_pages;
 
 use std::io::{BufRead, Cursor, Seek};
 
-use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use crate::domain::FileKind;
@@ -17,6 +18,7 @@ use crate::domain::cancel::PolledReader;
 
 use error::broken;
 use print_image::colours_on_white;
+use tags::TagFileWindow;
 
 pub use error::DecodeError;
 pub use limits::ImageLimits;
@@ -40,48 +42,50 @@ pub use print_image::PrintImage;
 /// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
 pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
     limits.check_bytes(bytes)?;
-    let kind = FileKind::of(bytes);
-    let format = format_of(kind)?;
-    let (rgb, orientation) = match kind {
+    let (rgb, orientation, profile, has_16_bits) = match FileKind::of(bytes) {
         FileKind::Tiff => {
-            let page = tiff_pages::find_print_page(bytes)?;
-            let bytes = page.reordered.as_deref().unwrap_or(bytes);
-            let rgb = match tiff::decode_uncommon(bytes, limits)? {
-                Some(rgb) => rgb,
-                None => colours_on_white(&decode_pixels(bytes, format, kind, limits)?.0),
-            };
-            (rgb, orientation::of_tag(page.orientation))
+            let image = tiff::decode(bytes, limits)?;
+            let orientation = orientation::of_tag(image.orientation);
+            (image.rgb, orientation, image.profile, image.has_16_bits)
         }
         FileKind::Png => {
-            check_png_header(bytes, limits)?;
-            let (pixels, _) = decode_pixels(bytes, format, kind, limits)?;
-            (colours_on_white(&pixels), orientation::of_png(bytes))
+            let (pixels, profile) = decode_png(bytes, limits)?;
+            let has_16_bits = matches!(
+                pixels,
+                DynamicImage::ImageLuma16(_) | DynamicImage::ImageRgb16(_)
+            );
+            let rgb = colours_on_white(&pixels);
+            (rgb, orientation::of_png(bytes), profile, has_16_bits)
         }
-        _ => {
-            let (pixels, orientation) = decode_pixels(bytes, format, kind, limits)?;
-            (colours_on_white(&pixels), orientation)
+        FileKind::Jpeg => {
+            let image = jpeg::decode(bytes, limits)?;
+            let orientation = orientation::of_exif(image.exif);
+            (image.rgb, orientation, image.profile, false)
         }
+        other => return Err(DecodeError::NotAnImage(other)),
     };
-    Ok(PrintImage {
+    let mut image = PrintImage {
         rgb: orientation::upright(rgb, orientation),
         turned: Some(orientation.to_exif()).filter(|number| *number != 1),
-    })
+        ignored_profile: None,
+    };
+    if has_16_bits {
+        print_image::widen_narrow(&mut image.rgb);
+    }
+    if let Some(profile) = profile {
+        image.ignored_profile = colour_profile::apply(&profile, &mut image.rgb).err();
+    }
+    Ok(image)
 }
 
 /// Returns the number of pixels according to an image's header, or `None` if the header cannot be read.
-pub fn header_pixel_count(file: impl BufRead + Seek) -> Option<u64> {
+pub fn header_pixel_count(mut file: impl BufRead + Seek) -> Option<u64> {
+    if FileKind::of(file.fill_buf().ok()?) == FileKind::Tiff {
+        return tiff::pixel_count(&TagFileWindow::new(file));
+    }
     let reader = ImageReader::new(file).with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;
     Some(u64::from(width) * u64::from(height))
-}
-
-fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
-    match kind {
-        FileKind::Png => Ok(ImageFormat::Png),
-        FileKind::Jpeg => Ok(ImageFormat::Jpeg),
-        FileKind::Tiff => Ok(ImageFormat::Tiff),
-        _ => Err(DecodeError::NotAnImage(kind)),
-    }
 }
 
 /// Checks the size at its fixed offset in a PNG, because the decoder first reads all chunks that precede the pixels.
@@ -94,70 +98,33 @@ fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeErro
     limits.check_size(side(16)?, side(20)?)
 }
 
-/// Decodes the pixels in stored order. Returns them with the orientation from the metadata, which is not yet applied.
-fn decode_pixels(
+/// Decodes the pixels of a PNG in stored order, and returns them with its ICC profile.
+fn decode_png(
     bytes: &[u8],
-    format: ImageFormat,
-    kind: FileKind,
     limits: &ImageLimits,
-) -> Result<(DynamicImage, Orientation), DecodeError> {
-    let whole = kind != FileKind::Jpeg || has_end_marker(bytes);
-    let refused = |error: ImageError| {
-        if whole {
-            decoder_error(kind, &error)
-        } else {
-            DecodeError::Truncated(kind)
-        }
-    };
-    let mut reader = ImageReader::with_format(PolledReader(Cursor::new(bytes)), format);
+) -> Result<(DynamicImage, Option<Vec<u8>>), DecodeError> {
+    check_png_header(bytes, limits)?;
+    let source = PolledReader(Cursor::new(bytes));
+    let mut reader = ImageReader::with_format(source, ImageFormat::Png);
     let mut memory = image::Limits::no_limits();
     memory.max_alloc = Some(limits.max_decoder_bytes());
     reader.limits(memory);
-    let mut decoder = reader.into_decoder().map_err(refused)?;
-    let (width, height) = decoder.dimensions();
-    limits.check_size(width, height)?;
-    if !whole {
-        return Err(DecodeError::Truncated(kind));
-    }
-    let orientation = orientation::of_decoder(&mut decoder);
-    // A JPEG is decoded in one call without a poll. Measured: 30 to 50 ns per pixel with the profile of tests, so at most
-    // 1.5 s for 30 million pixels, the default of `limits.image.max_pixels`.
-    let pixels = DynamicImage::from_decoder(decoder).map_err(refused)?;
-    Ok((pixels, orientation))
+    let mut decoder = reader.into_decoder().map_err(|error| png_error(&error))?;
+    let profile = decoder.icc_profile().ok().flatten();
+    let pixels = DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error))?;
+    Ok((pixels, profile))
 }
 
-fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
+fn png_error(error: &ImageError) -> DecodeError {
     let reason = error.to_string();
     let early_end = match error {
         ImageError::IoError(io) => io.kind() == std::io::ErrorKind::UnexpectedEof,
         _ => reason.contains("unexpected end of file") || reason.contains("UnexpectedEof"),
     };
     if early_end {
-        return DecodeError::Truncated(kind);
+        return DecodeError::Truncated(FileKind::Png);
     }
-    broken(kind, &reason)
-}
-
-/// Returns whether the segments of a JPEG lead to its end marker. If not, the image is truncated, and the decoder would
-/// fill it with grey. Searching for the marker is not enough, because a thumbnail has its own end marker.
-fn has_end_marker(bytes: &[u8]) -> bool {
-    let mut at = 2;
-    while let Some(marker) = bytes.get(at..at + 2) {
-        match (marker[0], marker[1]) {
-            (0xff, 0xd9) => return true,
-            (0xff, 0xff | 0x00 | 0x01 | 0xd0..=0xd8) => at += 1,
-            (0xff, _) => match bytes.get(at + 2..at + 4) {
-                Some(length) => at += 2 + usize::from(u16::from_be_bytes([length[0], length[1]])),
-                None => return false,
-            },
-            // Entropy-coded data: continue at the next byte that may begin a marker.
-            _ => match bytes[at..].iter().position(|byte| *byte == 0xff) {
-                Some(step) => at += step,
-                None => return false,
-            },
-        }
-    }
-    false
+    broken(FileKind::Png, &reason)
 }
 
 #[cfg(test)]
@@ -319,11 +286,28 @@ mod tests {
             decode(b"id,mesh,print\n", &LIMITS),
             Err(DecodeError::NotAnImage(FileKind::Text))
         );
-        let error = decode(b"GIF89a......", &LIMITS).expect_err("not read");
-        assert_eq!(
-            error.to_string(),
-            "the file is a GIF image; PNG, JPEG and TIFF images are read"
-        );
+        for (bytes, says) in [
+            (
+                &b"GIF89a......"[..],
+                "the file is a GIF image; PNG, JPEG and TIFF images are read: convert them, such as \
+                with ImageMagick: `magick mogrify -format png *.gif`",
+            ),
+            (
+                b"%PDF-1.7\n",
+                "the file is a PDF document; PNG, JPEG and TIFF images are read: save their pages as images, \
+                such as with `pdftoppm -r 600 -png FILE.pdf page`",
+            ),
+            (
+                b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n",
+                "the file is a pointer of Git LFS \
+                and does not hold the image; fetch the image with `git lfs pull`",
+            ),
+        ] {
+            assert_eq!(
+                decode(bytes, &LIMITS).expect_err("not read").to_string(),
+                says
+            );
+        }
     }
 
     #[test]
@@ -334,14 +318,13 @@ mod tests {
             (ImageFormat::Tiff, FileKind::Tiff),
         ] {
             let whole = file(&DynamicImage::ImageLuma8(grey_ramp()), format);
-            assert!(decode(&whole, &LIMITS).is_ok(), "{format:?}");
+            let picture = decode(&whole, &LIMITS).expect("decodes");
             for len in 1..whole.len() {
-                let error = decode(&whole[..len], &LIMITS);
-                // A PNG is complete once its pixels are, even without its last chunk.
-                if kind == FileKind::Png && len + 16 >= whole.len() {
-                    continue;
+                // A PNG or JPEG is complete once its pixels are, even without its last chunk or its end marker.
+                if let Ok(cut) = decode(&whole[..len], &LIMITS) {
+                    let has_pixels = kind != FileKind::Tiff && len + 16 >= whole.len();
+                    assert!(has_pixels && cut == picture, "{format:?} of {len} bytes");
                 }
-                assert!(error.is_err(), "{format:?} of {len} bytes");
             }
             let error = decode(&whole[..whole.len() / 2], &LIMITS);
             assert_eq!(error, Err(DecodeError::Truncated(kind)), "{format:?}");

@@ -1,32 +1,38 @@
 //! The EXIF orientation of an image: how the stored pixels are turned to show the image upright.
 
-use image::ImageDecoder;
 use image::metadata::Orientation;
 
+use super::tags::TaggedFile;
+use crate::domain::cancel::PollCounter;
 use crate::raster::Grid;
+
+const ORIENTATION: u64 = 274;
 
 /// Returns the orientation of a PNG. Its `eXIf` chunk may stand before or after the pixels.
 pub(super) fn of_png(bytes: &[u8]) -> Orientation {
+    let mut counter = PollCounter::default();
     let mut at = 8;
     while let Some(head) = bytes.get(at..at + 8) {
+        counter.tick();
         let (len, kind) = head.split_at(4);
         let len = len
             .iter()
             .fold(0, |sum, byte| sum << 8 | usize::from(*byte));
         if kind == b"eXIf" {
-            let chunk = bytes.get(at + 8..at + 8 + len);
-            return chunk
-                .and_then(Orientation::from_exif_chunk)
-                .unwrap_or(Orientation::NoTransforms);
+            return of_exif(bytes.get(at + 8..at + 8 + len));
         }
         at += 12 + len;
     }
     Orientation::NoTransforms
 }
 
-/// Returns the orientation that a decoder finds. An unreadable orientation counts as upright.
-pub(super) fn of_decoder(decoder: &mut impl ImageDecoder) -> Orientation {
-    decoder.orientation().unwrap_or(Orientation::NoTransforms)
+/// Returns the orientation in an EXIF block, whatever integer type it is stored as. An unreadable one counts as upright.
+pub(super) fn of_exif(block: Option<&[u8]>) -> Orientation {
+    // Some programs copy the prefix of JPEG segments to other formats.
+    let block = block.map(|block| block.strip_prefix(b"Exif\0\0").unwrap_or(block));
+    let block = block.unwrap_or_default();
+    let directory = TaggedFile::new(&block).and_then(|file| file.first_directory());
+    of_tag(directory.and_then(|directory| directory.number(ORIENTATION)))
 }
 
 /// Returns the orientation with a number from a tag. A number that is not in 1..=8 counts as upright.
@@ -60,7 +66,7 @@ mod tests {
     use image::DynamicImage;
     use image::metadata::Orientation;
 
-    use super::{of_tag, upright};
+    use super::{of_exif, of_png, of_tag, upright};
     use crate::raster::Grid;
 
     #[test]
@@ -75,6 +81,65 @@ mod tests {
             let size = (wanted.width() as usize, wanted.height() as usize);
             assert_eq!((found.width(), found.height()), size, "{number}");
             assert_eq!(found.data(), wanted.as_bytes(), "{number}");
+        }
+    }
+
+    /// Returns an EXIF block with an orientation of an integer type of a length, and nothing else.
+    fn exif(is_big_endian: bool, kind: u16, len: usize, number: u8) -> Vec<u8> {
+        let ordered = |value: u32, len: usize| {
+            let mut bytes = value.to_le_bytes()[..len].to_vec();
+            if is_big_endian {
+                bytes.reverse();
+            }
+            bytes
+        };
+        let mut value = ordered(u32::from(number), len);
+        value.resize(4, 0);
+        [
+            if is_big_endian {
+                b"MM".to_vec()
+            } else {
+                b"II".to_vec()
+            },
+            ordered(42, 2),
+            ordered(8, 4),
+            ordered(1, 2),
+            ordered(274, 2),
+            ordered(u32::from(kind), 2),
+            ordered(1, 4),
+            value,
+            ordered(0, 4),
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn the_orientation_is_read_from_every_integer_type_in_both_byte_orders() {
+        for (kind, len) in [(1, 1), (3, 2), (4, 4), (6, 1), (8, 2), (9, 4)] {
+            for is_big_endian in [false, true] {
+                let block = exif(is_big_endian, kind, len, 6);
+                let prefixed = [b"Exif\0\0", &block[..]].concat();
+                let png = |block: &[u8]| {
+                    let len = (block.len() as u32).to_be_bytes();
+                    [b"\x89PNG\r\n\x1a\n", &len[..], b"eXIf", block, &[0; 4]].concat()
+                };
+                for found in [
+                    of_exif(Some(&block)),
+                    of_exif(Some(&prefixed)),
+                    of_png(&png(&block)),
+                    of_png(&png(&prefixed)),
+                ] {
+                    assert_eq!(found, Orientation::Rotate90, "type {kind}");
+                }
+            }
+        }
+        for unreadable in [
+            &exif(false, 3, 2, 6)[..18],
+            &exif(false, 11, 4, 6),
+            b"",
+            b"II",
+        ] {
+            assert_eq!(of_exif(Some(unreadable)), Orientation::NoTransforms);
         }
     }
 

@@ -12,11 +12,28 @@ pub struct PrintImage {
     pub rgb: Grid<[u16; 3]>,
     /// EXIF orientation of the file (2 to 8), if its pixels were turned to make the image upright.
     pub turned: Option<u8>,
+    /// Name of the colour profile of the file, if it could not be applied.
+    pub ignored_profile: Option<String>,
+}
+
+impl PrintImage {
+    /// Returns a warning if the colours may differ from what the file means.
+    pub fn profile_warning(&self) -> Option<String> {
+        let profile = self.ignored_profile.as_ref()?;
+        Some(format!(
+            "its colour profile ({profile}) cannot be applied, so its colours are read as sRGB; if they look wrong, \
+             convert the image to sRGB"
+        ))
+    }
 }
 
 impl From<Grid<[u16; 3]>> for PrintImage {
     fn from(rgb: Grid<[u16; 3]>) -> Self {
-        Self { rgb, turned: None }
+        Self {
+            rgb,
+            turned: None,
+            ignored_profile: None,
+        }
     }
 }
 
@@ -30,36 +47,73 @@ pub(super) fn on_white([c @ .., a]: [u16; 4]) -> [u16; 3] {
 /// Rows that are converted between two polls for a cancellation.
 const BAND_ROWS: u32 = 16;
 
-const fn widen(value: u8) -> u16 {
+/// Returns 16 bits for 8.
+pub(super) const fn widen(value: u8) -> u16 {
     value as u16 * 257
 }
 
+/// Returns the colours of 8-bit samples, of which a pixel has one (grey) or three (RGB).
+pub(super) fn widened(
+    width: usize,
+    height: usize,
+    channels: usize,
+    samples: &[u8],
+) -> Grid<[u16; 3]> {
+    let mut colours = Vec::with_capacity(width * height);
+    for row in samples.chunks_exact(width * channels) {
+        poll();
+        if channels == 1 {
+            colours.extend(row.iter().map(|grey| [widen(*grey); 3]));
+        } else {
+            let pixels = row.as_chunks::<3>().0.iter();
+            colours.extend(pixels.map(|pixel| pixel.map(widen)));
+        }
+    }
+    // An image of w x h pixels has as many colours.
+    Grid::from_vec(width, height, colours).expect("one colour for each pixel")
+}
+
+/// Returns the colours of a decoded image, composited on white.
 pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let mut colours = Vec::with_capacity(width * height);
     match image {
-        DynamicImage::ImageLuma8(i) => {
-            for row in i.rows() {
-                poll();
-                colours.extend(row.map(|p| [widen(p[0]); 3]));
-            }
-        }
-        DynamicImage::ImageRgb8(i) => {
-            for row in i.rows() {
-                poll();
-                colours.extend(row.map(|p| p.0.map(widen)));
-            }
-        }
-        // The cost of a copy does not matter for other kinds (16 bits, transparency, floats in 0..=1), which are rare.
+        DynamicImage::ImageLuma8(image) => widened(width, height, 1, image),
+        DynamicImage::ImageRgb8(image) => widened(width, height, 3, image),
+        // The cost of a copy does not matter for other kinds (16 bits, transparency), which are rare.
         other => {
+            let mut colours = Vec::with_capacity(width * height);
             for top in (0..other.height()).step_by(BAND_ROWS as usize) {
                 poll();
                 let rows = BAND_ROWS.min(other.height() - top);
                 let band = other.crop_imm(0, top, other.width(), rows).to_rgba16();
                 colours.extend(band.pixels().map(|p| on_white(p.0)));
             }
+            Grid::from_vec(width, height, colours).expect("one colour for each pixel")
         }
     }
-    // An image of w x h pixels has as many colours.
-    Grid::from_vec(width, height, colours).expect("one colour for each pixel")
+}
+
+/// Scales the colours of an image of 16 bits if none needs more than 12 of them: cameras of 10 and 12 bits store their
+/// numbers without scaling, and the paper of a print is never as dark as a sixteenth of white.
+pub(super) fn widen_narrow(rgb: &mut Grid<[u16; 3]>) {
+    const TEN_BITS: u16 = (1 << 10) - 1;
+    const TWELVE_BITS: u16 = (1 << 12) - 1;
+    let mut most = 0;
+    for row in 0..rgb.height() {
+        most = rgb
+            .row(row)
+            .as_flattened()
+            .iter()
+            .fold(most, |most, c| most.max(*c));
+        if most > TWELVE_BITS {
+            return;
+        }
+    }
+    let white = if most > TEN_BITS {
+        TWELVE_BITS
+    } else {
+        TEN_BITS
+    };
+    let scale = |level: u16| (u32::from(level) * u32::from(u16::MAX) / u32::from(white)) as u16;
+    *rgb = rgb.map(|colour| colour.map(scale));
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use serde_json::{Map, Value};
 
 use crate::labels::error::LabelsProblem;
+use crate::labels::message::boxes;
 use crate::labels::model::PageFile;
 use crate::labels::page_choice::{PageEntry, choose_page};
 use crate::labels::page_fit::check_count;
@@ -31,48 +32,84 @@ pub(in crate::labels) fn read(
             .into_iter()
             .flatten()
     };
-    let mut by_image: HashMap<&str, Vec<&Value>> = HashMap::new();
-    let mut numbered: HashMap<i64, Vec<&Value>> = HashMap::new();
-    for annotation in list("annotations") {
-        match annotation.get("image_id") {
-            Some(Value::String(id)) => by_image.entry(id).or_default().push(annotation),
-            Some(Value::Number(id)) => {
-                let key = id.as_i64().unwrap_or(i64::MAX);
-                numbered.entry(key).or_default().push(annotation);
-            }
-            _ => {}
-        }
-    }
-    let of_image = |image: &Value| -> &[&Value] {
-        let found = match image.get("id") {
-            Some(Value::String(id)) => by_image.get(id.as_str()),
-            Some(Value::Number(id)) => numbered.get(&id.as_i64().unwrap_or(i64::MAX)),
-            _ => None,
-        };
-        found.map_or(&[], Vec::as_slice)
-    };
     let images: Vec<&Value> = list("images").collect();
-    let entry = |image: &&Value| PageEntry {
-        file_name: image
-            .get("file_name")
-            .and_then(Value::as_str)
-            .map(str::to_owned),
+    let (by_image, warnings) = by_image(&images, list("annotations"))?;
+    let entry = |(k, image): (usize, &&Value)| PageEntry {
+        file_name: file_name(image).map(str::to_owned),
         bytes: None,
-        has_boxes: !of_image(image).is_empty(),
+        has_boxes: !by_image[k].is_empty(),
     };
-    let entries: Vec<PageEntry> = images.iter().map(entry).collect();
+    let entries: Vec<PageEntry> = images.iter().enumerate().map(entry).collect();
     let chosen = choose_page(&entries, page)?;
-    let image = images[chosen];
     let categories = categories(list("categories"));
-    check_count(of_image(image).len())?;
-    let annotations = of_image(image).iter().enumerate();
+    check_count(by_image[chosen].len())?;
+    let annotations = by_image[chosen].iter().enumerate();
     let regions = annotations.map(|(k, annotation)| read_region(k + 1, annotation, &categories));
     Ok(PageRegions {
         file_name: entries[chosen].file_name.clone(),
         bytes: None,
-        size: size(image),
+        size: size(images[chosen]),
         regions: regions.collect::<Result<_, _>>()?,
+        warnings,
     })
+}
+
+fn file_name(image: &Value) -> Option<&str> {
+    image.get("file_name").and_then(Value::as_str)
+}
+
+/// Returns an id for comparison: some programs write numbers as text.
+fn id_key(id: Option<&Value>) -> Option<String> {
+    match id? {
+        Value::String(text) => filled(text),
+        Value::Number(number) => Some(match number.as_f64() {
+            Some(whole) if number.is_f64() => whole.to_string(),
+            _ => number.to_string(),
+        }),
+        _ => None,
+    }
+}
+
+/// Returns the annotations of each image, and a warning about those of other images. Instead of the id of an image, an
+/// annotation may have its file name.
+fn by_image<'a>(
+    images: &[&Value],
+    annotations: impl Iterator<Item = &'a Value>,
+) -> Result<(Vec<Vec<&'a Value>>, Vec<String>), LabelsProblem> {
+    let mut known: HashMap<String, usize> = HashMap::new();
+    for (k, image) in images.iter().enumerate() {
+        let Some(id) = id_key(image.get("id")) else {
+            continue;
+        };
+        if let Some(first) = known.insert(id, k) {
+            let reason = format!("it has the id of image {}", first + 1);
+            return Err(LabelsProblem::at(format!("image {}", k + 1), reason));
+        }
+    }
+    for (k, image) in images.iter().enumerate() {
+        if let Some(name) = file_name(image) {
+            known.entry(name.to_owned()).or_insert(k);
+        }
+    }
+    let mut found = vec![Vec::new(); images.len()];
+    let mut others = 0;
+    for (k, annotation) in annotations.enumerate() {
+        let id = id_key(annotation.get("image_id")).ok_or_else(|| {
+            let id = annotation
+                .get("image_id")
+                .map_or_else(|| "missing".to_owned(), shown);
+            LabelsProblem::at(format!("annotation {}", k + 1), format!("image_id is {id}"))
+        })?;
+        match known.get(&id) {
+            Some(image) => found[*image].push(annotation),
+            None => others += 1,
+        }
+    }
+    let warning = format!(
+        "{} left out, whose image_id is that of no image",
+        boxes(others)
+    );
+    Ok((found, (others > 0).then_some(warning).into_iter().collect()))
 }
 
 /// Returns width and height of an image, unless one is missing or zero.
@@ -87,9 +124,9 @@ fn size(image: &Value) -> Option<[f64; 2]> {
 }
 
 /// Returns the characters of the categories by their ids.
-fn categories<'a>(list: impl Iterator<Item = &'a Value>) -> HashMap<i64, String> {
+fn categories<'a>(list: impl Iterator<Item = &'a Value>) -> HashMap<String, String> {
     list.filter_map(|category| {
-        let id = category.get("id")?.as_i64()?;
+        let id = id_key(category.get("id"))?;
         Some((id, class_text(category.get("name")?.as_str()?)?))
     })
     .collect()
@@ -98,13 +135,13 @@ fn categories<'a>(list: impl Iterator<Item = &'a Value>) -> HashMap<i64, String>
 fn read_region(
     number: usize,
     value: &Value,
-    categories: &HashMap<i64, String>,
+    categories: &HashMap<String, String>,
 ) -> Result<LabelRegion, LabelsProblem> {
     let place = || format!("box {number}");
     let annotation = object(value, place)?;
     let attributes = annotation.get("attributes").and_then(Value::as_object);
     let own = |key: &str| annotation.get(key).and_then(Value::as_str).and_then(filled);
-    let category = || annotation.get("category_id")?.as_i64();
+    let category = || id_key(annotation.get("category_id"));
     // The id of the annotation itself only counts annotations.
     let name = attributes
         .and_then(name_attribute)

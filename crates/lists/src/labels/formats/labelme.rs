@@ -36,9 +36,9 @@ pub(in crate::labels) fn read(
             .get("imagePath")
             .and_then(Value::as_str)
             .map(str::to_owned),
-        bytes: None,
         size: size.map(|(width, height)| [width, height]),
         regions: regions.collect::<Result<_, _>>()?,
+        ..PageRegions::default()
     })
 }
 

@@ -3,8 +3,10 @@
 pub(super) mod bboxes;
 pub(super) mod coco;
 pub(super) mod labelme;
+mod page_levels;
 pub(super) mod page_xml;
 pub(super) mod via_csv;
 pub(super) mod via_json;
 mod via_shape;
 pub(super) mod yolo;
+mod yolo_columns;

@@ -1,20 +1,14 @@
 //! PAGE-XML: regions, lines, words and glyphs of one page.
 
-use quick_xml::XmlVersion;
-use quick_xml::escape::resolve_predefined_entity;
-use quick_xml::events::{BytesRef, BytesStart, Event};
-use quick_xml::reader::Reader;
+use quick_xml::events::BytesStart;
 
+use super::page_levels::{LEVELS, PageElement, characters};
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::{line_at, quoted};
 use crate::labels::page_fit::{MAX_CORNERS, check_count};
 use crate::labels::region::{Corners, LabelRegion, PageRegions, checked, filled, polygon};
-use mocban_core::domain::cancel::{PollCounter, polled};
-
-/// Elements that may stand for characters, the smallest first.
-const LEVELS: [&str; 4] = ["Glyph", "Word", "TextLine", "TextRegion"];
-/// Deepest nesting of elements.
-const MAX_DEPTH: usize = 64;
+use crate::xml::{self, XmlFault, XmlPart, local_name, read_xml};
+use mocban_core::domain::cancel::polled;
 
 /// An element that is open, and what it holds so far.
 #[derive(Debug, Default)]
@@ -26,75 +20,42 @@ struct OpenElement {
     text: Option<(u32, String)>,
     /// Index of a `TextEquiv`. Of a `Unicode`: 1 once its text was taken.
     index: u32,
+    /// Whether an element inside it may stand for a character and has an outline.
+    is_divided: bool,
 }
 
 /// Regions of a page while its file is read.
 #[derive(Debug, Default)]
 struct PageParser {
     open: Vec<OpenElement>,
-    /// Regions of each of [`LEVELS`].
-    found: [Vec<LabelRegion>; LEVELS.len()],
+    /// The elements that are not divided further.
+    found: Vec<PageElement>,
     page: Option<PageRegions>,
 }
 
-/// Reads the glyphs of a page, or its words if there are no glyphs, else its lines, else its regions.
+/// Reads the smallest elements of a page: glyphs, words that are not divided into glyphs, and so on. See [`characters`].
 pub(in crate::labels) fn read(text: &str) -> Result<PageRegions, LabelsProblem> {
-    let mut reader = Reader::from_str(text);
     let mut parser = PageParser::default();
-    let mut counter = PollCounter::default();
-    loop {
-        counter.tick();
-        let event = reader.read_event();
-        let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX);
-        let event = event.map_err(|error| match error {
-            // Errors of syntax are parts without end.
-            quick_xml::Error::Syntax(_) => truncated(text),
-            error => damaged(text, at, &error.to_string()),
-        })?;
-        let result = match event {
-            Event::Start(element) => parser.start(&element),
-            Event::Empty(element) => parser.start(&element).and_then(|()| parser.end()),
-            Event::End(_) => parser.end(),
-            Event::Text(part) => part
-                .decode()
-                .map(|part| parser.text(&part))
-                .map_err(|error| error.to_string().into()),
-            Event::CData(part) => part
-                .decode()
-                .map(|part| parser.text(&part))
-                .map_err(|error| error.to_string().into()),
-            Event::GeneralRef(reference) => parser.reference(&reference),
-            Event::Eof => break,
-            Event::Comment(_) | Event::Decl(_) | Event::PI(_) | Event::DocType(_) => Ok(()),
-        };
-        result.map_err(|problem| match problem {
-            XmlProblem::Syntax(reason) => damaged(text, at, &reason),
-            XmlProblem::Content(problem) => problem,
-        })?;
-    }
-    if !parser.open.is_empty() {
-        return Err(truncated(text));
-    }
+    let read = read_xml(text, |part| match part {
+        XmlPart::Start(element) => parser.start(&element),
+        XmlPart::End => parser.end(),
+        XmlPart::Text(part) => {
+            parser.text(&part);
+            Ok(())
+        }
+    });
+    read.map_err(|fault| match fault {
+        XmlFault::Truncated => truncated(text),
+        XmlFault::Damaged(at, reason)
+        | XmlFault::Refused(at, LabelsProblem::Damaged { reason, .. }) => {
+            damaged(text, at, &reason)
+        }
+        XmlFault::Refused(_, problem) => problem,
+    })?;
     let no_page = || LabelsProblem::at("the element PcGts", "it has no element Page");
     let mut page = parser.page.ok_or_else(no_page)?;
-    page.regions = parser
-        .found
-        .into_iter()
-        .find(|all| !all.is_empty())
-        .unwrap_or_default();
+    (page.regions, page.warnings) = characters(parser.found);
     Ok(page)
-}
-
-/// A problem inside the file.
-enum XmlProblem {
-    Syntax(String),
-    Content(LabelsProblem),
-}
-
-impl From<String> for XmlProblem {
-    fn from(reason: String) -> Self {
-        Self::Syntax(reason)
-    }
 }
 
 fn truncated(text: &str) -> LabelsProblem {
@@ -113,23 +74,18 @@ fn damaged(text: &str, at: usize, reason: &str) -> LabelsProblem {
 }
 
 /// Returns the value of an attribute.
-fn attribute(element: &BytesStart<'_>, key: &str) -> Result<Option<String>, XmlProblem> {
-    let found = element.try_get_attribute(key);
-    let Some(found) = found.map_err(|error| error.to_string())? else {
-        return Ok(None);
-    };
-    let value = found.normalized_value(XmlVersion::default());
-    Ok(Some(value.map_err(|error| error.to_string())?.into_owned()))
+fn attribute(element: &BytesStart<'_>, key: &str) -> Result<Option<String>, LabelsProblem> {
+    xml::attribute(element, key).map_err(|reason| LabelsProblem::Damaged {
+        format: "XML",
+        reason,
+    })
 }
 
 impl PageParser {
-    fn start(&mut self, element: &BytesStart<'_>) -> Result<(), XmlProblem> {
-        let name = String::from_utf8_lossy(element.local_name().as_ref()).into_owned();
+    fn start(&mut self, element: &BytesStart<'_>) -> Result<(), LabelsProblem> {
+        let name = local_name(element);
         if self.open.is_empty() && name != "PcGts" {
-            return Err(XmlProblem::Content(LabelsProblem::UnknownXml(name)));
-        }
-        if self.open.len() == MAX_DEPTH {
-            return Err(format!("more than {MAX_DEPTH} elements are nested").into());
+            return Err(LabelsProblem::UnknownXml(name));
         }
         match name.as_str() {
             "Page" => self.start_page(element)?,
@@ -161,12 +117,12 @@ impl PageParser {
         Ok(())
     }
 
-    fn start_page(&mut self, element: &BytesStart<'_>) -> Result<(), XmlProblem> {
+    fn start_page(&mut self, element: &BytesStart<'_>) -> Result<(), LabelsProblem> {
         if self.page.is_some() {
             let problem = LabelsProblem::at("the element PcGts", "it has several elements Page");
-            return Err(XmlProblem::Content(problem));
+            return Err(problem);
         }
-        let side = |key| -> Result<Option<f64>, XmlProblem> {
+        let side = |key| -> Result<Option<f64>, LabelsProblem> {
             let side = attribute(element, key)?.and_then(|side| side.trim().parse::<f64>().ok());
             Ok(side.filter(|side| side.is_finite() && *side >= 1.0))
         };
@@ -180,7 +136,7 @@ impl PageParser {
     }
 
     /// Reads `x,y x,y`.
-    fn points(&self, text: &str) -> Result<Corners, XmlProblem> {
+    fn points(&self, text: &str) -> Result<Corners, LabelsProblem> {
         let number = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
         let point = |word: &str| {
             let (x, y) = word.split_once(',')?;
@@ -198,12 +154,12 @@ impl PageParser {
         {
             return Err(self.too_many_corners());
         }
-        points.map_err(|reason| XmlProblem::Content(LabelsProblem::at(self.place(), reason)))
+        points.map_err(|reason| LabelsProblem::at(self.place(), reason))
     }
 
-    fn too_many_corners(&self) -> XmlProblem {
+    fn too_many_corners(&self) -> LabelsProblem {
         let (place, limit) = (self.place(), MAX_CORNERS);
-        XmlProblem::Content(LabelsProblem::TooManyCorners { place, limit })
+        LabelsProblem::TooManyCorners { place, limit }
     }
 
     /// Returns the innermost open element that has an id, for a message.
@@ -227,7 +183,7 @@ impl PageParser {
     }
 
     /// Adds corners to the element around the open `Coords`; points of other elements, such as baselines, are ignored.
-    fn add_corners(&mut self, corners: Corners) -> Result<(), XmlProblem> {
+    fn add_corners(&mut self, corners: Corners) -> Result<(), LabelsProblem> {
         let mut count = 0;
         if let [.., element, coords] = self.open.as_mut_slice()
             && coords.name == "Coords"
@@ -261,34 +217,27 @@ impl PageParser {
         }
     }
 
-    /// Adds a character that is written as a reference, such as `&amp;` or `&#22825;`.
-    fn reference(&mut self, reference: &BytesRef<'_>) -> Result<(), XmlProblem> {
-        let code = reference
-            .resolve_char_ref()
-            .map_err(|error| error.to_string())?;
-        if let Some(code) = code {
-            self.text(code.encode_utf8(&mut [0; 4]));
-            return Ok(());
-        }
-        let name = reference.decode().map_err(|error| error.to_string())?;
-        let text = resolve_predefined_entity(&name);
-        self.text(text.ok_or_else(|| format!("the entity {} is unknown", quoted(&name)))?);
-        Ok(())
-    }
-
-    fn end(&mut self) -> Result<(), XmlProblem> {
+    fn end(&mut self) -> Result<(), LabelsProblem> {
         let Some(element) = self.open.pop() else {
-            return Err("an element ends that did not begin".to_owned().into());
+            return Ok(());
         };
         if let Some(level) = LEVELS.iter().position(|level| **level == element.name) {
-            let found = &mut self.found[level];
-            check_count(found.len() + 1).map_err(XmlProblem::Content)?;
-            found.push(LabelRegion {
-                number: found.len() + 1,
+            let corners = element.corners.and_then(polygon);
+            if element.is_divided {
+                return Ok(());
+            }
+            for around in self.open.iter_mut().filter(|_| corners.is_some()) {
+                around.is_divided = true;
+            }
+            let number = self.found.len() + 1;
+            check_count(number)?;
+            let region = LabelRegion {
+                number,
                 name: element.id,
                 text: element.text.as_ref().and_then(|(_, text)| filled(text)),
-                corners: element.corners.and_then(polygon),
-            });
+                corners,
+            };
+            self.found.push(PageElement { level, region });
         }
         Ok(())
     }

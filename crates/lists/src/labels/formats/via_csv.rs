@@ -92,8 +92,8 @@ pub(in crate::labels) fn read(
     Ok(PageRegions {
         file_name: entry.file_name,
         bytes: entry.bytes,
-        size: None,
         regions,
+        ..PageRegions::default()
     })
 }
 

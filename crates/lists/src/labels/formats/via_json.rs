@@ -56,8 +56,8 @@ pub(in crate::labels) fn read(
         PageRegions {
             file_name: entry.file_name.clone(),
             bytes: entry.bytes,
-            size: None,
             regions,
+            ..PageRegions::default()
         },
     ))
 }

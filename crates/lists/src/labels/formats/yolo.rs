@@ -1,7 +1,7 @@
-//! YOLO text: one region per line, in fractions of the page.
+//! YOLO text: one region per line, in fractions of the page. What the columns mean is decided for the whole file.
 
+use super::yolo_columns::{FileColumns, MAX_COLUMNS, MIN_COLUMNS, YoloRow};
 use crate::labels::error::LabelsProblem;
-use crate::labels::message::quoted;
 use crate::labels::model::PageFile;
 use crate::labels::page_fit::{MAX_CORNERS, check_count};
 use crate::labels::region::{Corners, LabelRegion, PageRegions, box_between, polygon};
@@ -10,74 +10,83 @@ use mocban_core::domain::cancel::polled;
 /// Fractions beyond this are taken for pixels.
 const MAX_FRACTION: f64 = 2.0;
 
-/// Words of a line with the longest outline: a class, the corners and a confidence.
-const MAX_WORDS: usize = 2 * MAX_CORNERS + 2;
-
 /// Returns whether a line has at least a class and four numbers.
 pub(in crate::labels) fn is_region(line: &str) -> bool {
     let is_number = |word: &str| word.parse::<f64>().is_ok();
-    line.split_ascii_whitespace().all(is_number) && line.split_ascii_whitespace().count() >= 5
+    let words = || line.split_ascii_whitespace();
+    words().all(is_number) && words().count() >= MIN_COLUMNS
 }
 
 /// Reads the regions of a page. A line has a class, which is ignored, and the centre, width and height of a box, or x
-/// and y of the points of a polygon. A confidence may follow.
+/// and y of the points of a polygon. A confidence and the id of a track may follow.
 pub(in crate::labels) fn read(
     text: &str,
     page: &PageFile<'_>,
 ) -> Result<PageRegions, LabelsProblem> {
-    let mut regions = Vec::new();
-    for (k, line) in text.lines().enumerate() {
-        let words: Vec<&str> = polled(line.split_ascii_whitespace())
-            .take(MAX_WORDS + 1)
-            .collect();
-        if words.is_empty() {
-            continue;
+    let mut columns = FileColumns::default();
+    for (count, row) in (1..).zip(rows(text)) {
+        check_count(count)?;
+        let row = row?;
+        columns
+            .add(&row)
+            .map_err(|reason| malformed(row.line, reason))?;
+    }
+    let columns = columns
+        .decide()
+        .map_err(|(line, reason)| malformed(line, reason))?;
+    let regions = (1..).zip(rows(text)).map(|(number, row)| {
+        let row = row?;
+        let fractions = columns.coordinates(&row);
+        if fractions.len() > 2 * MAX_CORNERS {
+            return Err(too_many_corners(row.line));
         }
-        check_count(regions.len() + 1)?;
-        if words.len() > MAX_WORDS {
-            let (place, limit) = (format!("line {}", k + 1), MAX_CORNERS);
-            return Err(LabelsProblem::TooManyCorners { place, limit });
-        }
-        let corners = corners(&words, page);
-        regions.push(LabelRegion {
-            number: regions.len() + 1,
+        let corners = corners(fractions, page);
+        Ok(LabelRegion {
+            number,
             name: None,
             text: None,
-            corners: corners
-                .map_err(|reason| LabelsProblem::at(format!("line {}", k + 1), reason))?,
-        });
-    }
+            corners: corners.map_err(|reason| malformed(row.line, reason))?,
+        })
+    });
     Ok(PageRegions {
-        regions,
+        regions: regions.collect::<Result<_, LabelsProblem>>()?,
         ..PageRegions::default()
     })
 }
 
-fn corners(words: &[&str], page: &PageFile<'_>) -> Result<Option<Corners>, String> {
-    if words.len() < 5 {
-        let count = words.len();
+fn malformed(line: usize, reason: String) -> LabelsProblem {
+    LabelsProblem::at(format!("line {line}"), reason)
+}
+
+fn too_many_corners(line: usize) -> LabelsProblem {
+    let (place, limit) = (format!("line {line}"), MAX_CORNERS);
+    LabelsProblem::TooManyCorners { place, limit }
+}
+
+/// Returns the rows of a file. Blank lines are left out.
+fn rows(text: &str) -> impl Iterator<Item = Result<YoloRow, LabelsProblem>> {
+    let lines = (1..).zip(text.lines());
+    let filled = lines.filter(|(_, line)| !line.trim_ascii().is_empty());
+    filled.map(|(line, content)| {
+        let words = polled(content.split_ascii_whitespace()).take(MAX_COLUMNS + 1);
+        let row = YoloRow::new(line, words).map_err(|reason| malformed(line, reason))?;
+        if row.numbers.len() > MAX_COLUMNS {
+            return Err(too_many_corners(line));
+        }
+        Ok(row)
+    })
+}
+
+/// Returns the corners of a box or polygon from its coordinates, which are fractions of the page.
+fn corners(fractions: &[f64], page: &PageFile<'_>) -> Result<Option<Corners>, String> {
+    let is_pixels = |number: &&f64| number.abs() > MAX_FRACTION;
+    if let Some(number) = fractions.iter().find(is_pixels) {
         return Err(format!(
-            "{count} numbers; a line has a class and at least 4 more"
+            "{number} is not a fraction of the page from 0 to 1"
         ));
     }
-    // A confidence makes the count even.
-    let count = words.len() - usize::from(words.len().is_multiple_of(2));
-    let fraction = |word: &&str| {
-        let number = word.parse::<f64>().ok().filter(|number| number.is_finite());
-        let number = number.ok_or_else(|| format!("{} is not a number", quoted(word)))?;
-        if number.abs() > MAX_FRACTION {
-            return Err(format!(
-                "{number} is not a fraction of the page from 0 to 1"
-            ));
-        }
-        Ok(number)
-    };
-    let values: Vec<f64> = words[1..count]
-        .iter()
-        .map(fraction)
-        .collect::<Result<_, String>>()?;
     let size = [f64::from(page.width), f64::from(page.height)];
-    if let [cx, cy, width, height] = *values.as_slice() {
+    if let [cx, cy, width, height] = *fractions {
         let edge = |sign: f64| {
             [
                 (cx + sign * width / 2.0) * size[0],
@@ -87,5 +96,5 @@ fn corners(words: &[&str], page: &PageFile<'_>) -> Result<Option<Corners>, Strin
         return Ok(Some(box_between(edge(-1.0), edge(1.0))));
     }
     let point = |pair: &[f64]| [pair[0] * size[0], pair[1] * size[1]];
-    Ok(polygon(values.chunks_exact(2).map(point).collect()))
+    Ok(polygon(fractions.chunks_exact(2).map(point).collect()))
 }

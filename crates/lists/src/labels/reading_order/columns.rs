@@ -1,6 +1,6 @@
 //! Columns of boxes on a page that is turned upright.
 
-use super::spot::Spot;
+use super::box_extent::BoxExtent;
 
 /// Gap between centres that separates two columns, in the usual size.
 const COLUMN_GAP: f64 = 0.4;
@@ -23,21 +23,22 @@ pub(super) struct BoxColumn {
 }
 
 /// Returns the columns from right to left. Each box is in one column.
-pub(super) fn columns(spots: &[Spot], full_size: f64) -> Vec<BoxColumn> {
-    let all = 0..spots.len();
-    let (small, full): (Vec<usize>, Vec<usize>) = all.partition(|k| spots[*k].is_small(full_size));
-    let mut columns: Vec<BoxColumn> = groups(full, COLUMN_GAP * full_size, |k| spots[k].u)
+pub(super) fn columns(extents: &[BoxExtent], full_size: f64) -> Vec<BoxColumn> {
+    let all = 0..extents.len();
+    let (small, full): (Vec<usize>, Vec<usize>) =
+        all.partition(|k| extents[*k].is_small(full_size));
+    let mut columns: Vec<BoxColumn> = groups(full, COLUMN_GAP * full_size, |k| extents[k].u)
         .into_iter()
         .map(|boxes| BoxColumn {
-            middle: median(boxes.iter().map(|k| spots[*k].u).collect()),
+            middle: median(boxes.iter().map(|k| extents[*k].u).collect()),
             boxes,
         })
         .collect();
-    let notes: Vec<f64> = small.iter().map(|k| spots[*k].u).collect();
+    let notes: Vec<f64> = small.iter().map(|k| extents[*k].u).collect();
     let pitch = pitch(&columns, &notes, full_size).unwrap_or(USUAL_PITCH * full_size);
     let mut between: Vec<(usize, f64)> = Vec::new();
     for k in small {
-        let u = spots[k].u;
+        let u = extents[k].u;
         match nearest(&columns, u) {
             Some(column) if (columns[column].middle - u).abs() <= REACH * pitch => {
                 columns[column].boxes.push(k);

@@ -1,15 +1,15 @@
 //! Names of boxes by their place: columns from the right, rows from the top.
 
+mod box_extent;
 mod columns;
 mod rows;
-mod spot;
 mod straighten;
 #[cfg(test)]
 mod tests;
 
+use self::box_extent::{BoxExtent, full_size};
 use self::columns::columns;
 use self::rows::rows;
-use self::spot::{Spot, full_size};
 use self::straighten::straighten;
 use mocban_core::domain::BoxName;
 
@@ -45,17 +45,17 @@ use mocban_core::domain::BoxName;
 /// assert_eq!(names, ["c02-r01", "c01-r01", "c01-r02"]);
 /// ```
 pub fn reading_order(bounds: &[[f64; 4]]) -> Vec<BoxName> {
-    let mut spots: Vec<Spot> = bounds.iter().map(|bounds| Spot::of(*bounds)).collect();
-    let size = full_size(&spots);
-    straighten(&mut spots, size);
+    let mut extents: Vec<BoxExtent> = bounds.iter().map(|bounds| BoxExtent::of(*bounds)).collect();
+    let size = full_size(&extents);
+    straighten(&mut extents, size);
     let unnamed = BoxName {
         column: 0,
         row: 0,
         part: None,
     };
-    let mut names = vec![unnamed; spots.len()];
-    for (k, column) in columns(&spots, size).into_iter().enumerate() {
-        for (index, row, part) in rows(&spots, column.boxes, size) {
+    let mut names = vec![unnamed; extents.len()];
+    for (k, column) in columns(&extents, size).into_iter().enumerate() {
+        for (index, row, part) in rows(&extents, column.boxes, size) {
             names[index] = BoxName {
                 column: k as u32 + 1,
                 row,

@@ -1,6 +1,6 @@
 //! Rows of a column, with notes two by two.
 
-use super::spot::Spot;
+use super::box_extent::BoxExtent;
 use mocban_core::domain::NotePart;
 
 /// Distance from the middle between notes beyond which a small box is on one side, in the usual size.
@@ -22,18 +22,20 @@ struct BoxRow {
 
 /// Returns index, row from 1 and part of each box of a column.
 pub(super) fn rows(
-    spots: &[Spot],
+    extents: &[BoxExtent],
     column: Vec<usize>,
     full_size: f64,
 ) -> Vec<(usize, u32, Option<NotePart>)> {
     let mut order = column;
     order.sort_by(|a, b| {
-        let (a_spot, b_spot) = (&spots[*a], &spots[*b]);
-        let by_height = a_spot.v.total_cmp(&b_spot.v);
-        by_height.then(b_spot.u.total_cmp(&a_spot.u)).then(a.cmp(b))
+        let (a_extent, b_extent) = (&extents[*a], &extents[*b]);
+        let by_height = a_extent.v.total_cmp(&b_extent.v);
+        by_height
+            .then(b_extent.u.total_cmp(&a_extent.u))
+            .then(a.cmp(b))
     });
-    let mut rows = paired(spots, &order, full_size);
-    let is_small = |row: &BoxRow| spots[row.first].is_small(full_size);
+    let mut rows = paired(extents, &order, full_size);
+    let is_small = |row: &BoxRow| extents[row.first].is_small(full_size);
     for k in 1..rows.len() {
         if rows[k].middle.is_none() && is_small(&rows[k]) {
             rows[k].middle = rows[k - 1].middle;
@@ -48,11 +50,13 @@ pub(super) fn rows(
     for (k, row) in rows.iter().enumerate() {
         let number = k as u32 + 1;
         if let Some(other) = row.other {
-            let is_right = spots[row.first].u > spots[other].u;
+            let is_right = extents[row.first].u > extents[other].u;
             named.push((row.first, number, Some(part(is_right))));
             named.push((other, number, Some(part(!is_right))));
         } else {
-            let beside = row.middle.map_or(0.0, |middle| spots[row.first].u - middle);
+            let beside = row
+                .middle
+                .map_or(0.0, |middle| extents[row.first].u - middle);
             let has_part = beside.abs() > BESIDE * full_size;
             named.push((row.first, number, has_part.then_some(part(beside > 0.0))));
         }
@@ -69,7 +73,7 @@ const fn part(is_right: bool) -> NotePart {
 }
 
 /// Returns the rows of boxes in the order of their heights.
-fn paired(spots: &[Spot], order: &[usize], full_size: f64) -> Vec<BoxRow> {
+fn paired(extents: &[BoxExtent], order: &[usize], full_size: f64) -> Vec<BoxRow> {
     let mut used = vec![false; order.len()];
     let mut rows: Vec<BoxRow> = Vec::with_capacity(order.len());
     for (at, first) in order.iter().copied().enumerate() {
@@ -78,7 +82,7 @@ fn paired(spots: &[Spot], order: &[usize], full_size: f64) -> Vec<BoxRow> {
         }
         let end = order.len().min(at + 1 + MAX_LOOKED_AT);
         let is_other = |next: &usize| {
-            !used[*next] && are_side_by_side(&spots[first], &spots[order[*next]], full_size)
+            !used[*next] && are_side_by_side(&extents[first], &extents[order[*next]], full_size)
         };
         let next = (at + 1..end).find(is_other);
         if let Some(next) = next {
@@ -88,14 +92,14 @@ fn paired(spots: &[Spot], order: &[usize], full_size: f64) -> Vec<BoxRow> {
         rows.push(BoxRow {
             first,
             other,
-            middle: other.map(|other| f64::midpoint(spots[first].u, spots[other].u)),
+            middle: other.map(|other| f64::midpoint(extents[first].u, extents[other].u)),
         });
     }
     rows
 }
 
 /// Returns whether two boxes of a column are notes in a row.
-fn are_side_by_side(upper: &Spot, lower: &Spot, full_size: f64) -> bool {
+fn are_side_by_side(upper: &BoxExtent, lower: &BoxExtent, full_size: f64) -> bool {
     let height = upper.height.min(lower.height);
     let size = f64::midpoint(upper.size, lower.size);
     let apart = (upper.u - lower.u).abs();

@@ -1,6 +1,6 @@
 //! Straightening of a page from the centres of its boxes: rotation, keystone, and columns that are bent.
 
-use super::spot::Spot;
+use super::box_extent::BoxExtent;
 use mocban_core::domain::cancel::polled;
 
 /// Largest angle that is searched, in degrees.
@@ -50,14 +50,14 @@ struct BendFrame {
 /// Turns a page back by up to 6 degrees, and shifts its boxes sideways so that leaning and bent columns are upright.
 /// The shape is the one with the sharpest columns. Does nothing for fewer than six boxes, and only turns the page for
 /// fewer than 40.
-pub(super) fn straighten(spots: &mut [Spot], full_size: f64) {
-    if spots.len() < MIN_BOXES || full_size <= 0.0 {
+pub(super) fn straighten(extents: &mut [BoxExtent], full_size: f64) {
+    if extents.len() < MIN_BOXES || full_size <= 0.0 {
         return;
     }
-    let frame = BendFrame::of(spots, full_size);
-    let searched = searched(spots, full_size);
+    let frame = BendFrame::of(extents, full_size);
+    let searched = searched(extents, full_size);
     let mut search = BendSearch {
-        spots: &searched,
+        extents: &searched,
         frame,
         best: PageBend::default(),
         highest: f64::NEG_INFINITY,
@@ -65,7 +65,7 @@ pub(super) fn straighten(spots: &mut [Spot], full_size: f64) {
     search.try_bend(PageBend::default());
     search.along(0, COARSE_STEPS, 1.0 / f64::from(COARSE_STEPS));
     let mut values = 0..1;
-    if spots.len() >= MIN_BOXES_OF_BENT {
+    if extents.len() >= MIN_BOXES_OF_BENT {
         search.jointly();
         search.along(2, COARSE_STEPS, 1.0 / f64::from(COARSE_STEPS));
         values = 0..3;
@@ -76,21 +76,22 @@ pub(super) fn straighten(spots: &mut [Spot], full_size: f64) {
         }
     }
     let best = search.best;
-    for spot in spots {
-        *spot = frame.straightened(spot, best);
+    for extent in extents {
+        *extent = frame.straightened(extent, best);
     }
 }
 
 /// Returns the boxes by which the bend is searched: those of full size, unless they are few. Notes stand beside the middle
 /// of their column, so that wrong bends can bring them together with other columns.
-fn searched(spots: &[Spot], full_size: f64) -> Vec<Spot> {
-    let full = || spots.iter().filter(|spot| !spot.is_small(full_size));
+fn searched(extents: &[BoxExtent], full_size: f64) -> Vec<BoxExtent> {
+    let full = || extents.iter().filter(|extent| !extent.is_small(full_size));
     let count = full().count();
-    let enough = count >= MIN_BOXES_OF_BENT && count as f64 >= MIN_FULL_SHARE * spots.len() as f64;
-    let chosen: Vec<Spot> = if enough {
+    let enough =
+        count >= MIN_BOXES_OF_BENT && count as f64 >= MIN_FULL_SHARE * extents.len() as f64;
+    let chosen: Vec<BoxExtent> = if enough {
         full().copied().collect()
     } else {
-        spots.to_vec()
+        extents.to_vec()
     };
     let stride = chosen.len().div_ceil(MAX_SEARCHED);
     chosen.into_iter().step_by(stride).collect()
@@ -98,7 +99,7 @@ fn searched(spots: &[Spot], full_size: f64) -> Vec<Spot> {
 
 /// The search for the bend with the sharpest columns.
 struct BendSearch<'a> {
-    spots: &'a [Spot],
+    extents: &'a [BoxExtent],
     frame: BendFrame,
     best: PageBend,
     highest: f64,
@@ -111,7 +112,7 @@ impl BendSearch<'_> {
             return;
         }
         let costs = bend.shares.iter().map(|share| 1.0 - COST * share.abs());
-        let score = self.frame.sharpness(self.spots, bend) * costs.product::<f64>();
+        let score = self.frame.sharpness(self.extents, bend) * costs.product::<f64>();
         if score > self.highest {
             (self.best, self.highest) = (bend, score);
         }
@@ -144,14 +145,14 @@ impl BendSearch<'_> {
 }
 
 impl BendFrame {
-    fn of(spots: &[Spot], full_size: f64) -> Self {
+    fn of(extents: &[BoxExtent], full_size: f64) -> Self {
         let range = |values: &mut dyn Iterator<Item = f64>| {
             values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
                 [low.min(value), high.max(value)]
             })
         };
-        let [u0, u1] = range(&mut spots.iter().map(|spot| spot.u));
-        let [v0, v1] = range(&mut spots.iter().map(|spot| spot.v));
+        let [u0, u1] = range(&mut extents.iter().map(|extent| extent.u));
+        let [v0, v1] = range(&mut extents.iter().map(|extent| extent.v));
         let half = |low: f64, high: f64| ((high - low) / 2.0).max(full_size);
         Self {
             centre: [f64::midpoint(u0, u1), f64::midpoint(v0, v1)],
@@ -161,23 +162,23 @@ impl BendFrame {
     }
 
     /// Moves a box as if the page were not bent. The centre of the page becomes the origin.
-    fn straightened(self, spot: &Spot, bend: PageBend) -> Spot {
+    fn straightened(self, extent: &BoxExtent, bend: PageBend) -> BoxExtent {
         let [angle, keystone, bow] = bend.shares;
         let (sin, cos) = (angle * MAX_DEGREES).to_radians().sin_cos();
-        let (du, dv) = (spot.u - self.centre[0], spot.v - self.centre[1]);
+        let (du, dv) = (extent.u - self.centre[0], extent.v - self.centre[1]);
         let (u, v) = (du * cos + dv * sin, dv * cos - du * sin);
         let (across, down) = (u / self.half[0], v / self.half[1]);
         let shift = (keystone * across * down + bow * down * down) * MAX_SHIFT * self.full_size;
-        Spot {
+        BoxExtent {
             u: u - shift,
             v,
-            ..*spot
+            ..*extent
         }
     }
 
     /// Returns the sum of squared counts of boxes that share a place sideways without a bend.
-    fn sharpness(self, spots: &[Spot], bend: PageBend) -> f64 {
-        let places = polled(spots).map(|spot| self.straightened(spot, bend).u);
+    fn sharpness(self, extents: &[BoxExtent], bend: PageBend) -> f64 {
+        let places = polled(extents).map(|extent| self.straightened(extent, bend).u);
         let places: Vec<f64> = places.collect();
         let first = places.iter().copied().fold(f64::INFINITY, f64::min);
         let last = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -148,6 +148,14 @@ fn damaged_boxes() {
             "COCO with three numbers",
             text(COCO.replace("[1400,100,100,120]", "[1400,100,100]")),
         ),
+        (
+            "COCO without an image",
+            text(COCO.replace("\"image_id\":8,", "")),
+        ),
+        (
+            "COCO with an id twice",
+            text(COCO.replace("{\"id\":8", "{\"id\":\"7\"")),
+        ),
         ("an odd polygon", text(COCO.replace("[[1250,", "[["))),
         (
             "labelme shape",
@@ -166,6 +174,18 @@ fn damaged_boxes() {
             text(VIA_2.replace("c01-r02", "c01/r02")),
         ),
         ("a name twice", text(VIA_2.replace("c01-r02", "c01-r01"))),
+        (
+            "a name in other case",
+            text(VIA_2.replace("c01-r02", "C01-r01")),
+        ),
+        (
+            "a name in another form",
+            text(
+                VIA_2
+                    .replace("c01-r01", "ch\u{1eef}")
+                    .replace("c01-r02", "chu\u{31b}\u{303}"),
+            ),
+        ),
     ];
     insta::assert_snapshot!(messages(&files, &PAGE));
 }

@@ -170,6 +170,31 @@ fn coco_boxes_need_no_polygon_and_may_have_several() {
 }
 
 #[test]
+fn ids_of_coco_are_equal_as_numbers_and_as_text() {
+    for (from, to) in [
+        ("\"image_id\":7", "\"image_id\":\"7\""),
+        ("\"image_id\":7", "\"image_id\":7.0"),
+        ("\"image_id\":7", "\"image_id\":\"pages/page-03.jpg\""),
+        ("{\"id\":7", "{\"id\":\"7\""),
+        ("\"category_id\":2", "\"category_id\":\"2\""),
+        ("{\"id\":2,\"name\"", "{\"id\":\"2\",\"name\""),
+    ] {
+        assert!(COCO.contains(from), "{from}");
+        assert_eq!(
+            read_sample(&COCO.replace(from, to)).boxes,
+            expected(),
+            "{to}"
+        );
+    }
+    let other = read_sample(&COCO.replace("\"image_id\":8", "\"image_id\":9"));
+    assert_eq!(other.boxes, expected());
+    assert_eq!(
+        other.warnings,
+        ["labels: 1 box left out, whose image_id is that of no image"]
+    );
+}
+
+#[test]
 fn the_page_is_found_by_its_name_in_versions_of_via() {
     for text in [VIA_1, VIA_2] {
         let renamed = text.replace("\"filename\":\"page-03.jpg\",", "");

@@ -3,7 +3,9 @@
 mod any_bytes;
 mod errors;
 mod format_agreement;
+mod levels;
 mod limits;
 mod page_fit;
 mod round_trips;
 mod samples;
+mod yolo;

@@ -3,8 +3,8 @@
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use maud::{Markup, PreEscaped, html};
 
-use crate::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
-use crate::number_format::format_count;
+use mocban_results::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
+use mocban_results::number_format::format_count;
 
 /// Descriptions of the three images of a result.
 const LAYERS: [&str; 3] = [
@@ -93,6 +93,11 @@ const fn texts(reason: GalleryReason) -> (&'static str, &'static str, &'static s
             "off-truth",
             "Off the ground truth",
             "Results that miss the true alignment or the true stroke tops.",
+        ),
+        GalleryReason::LowConfidence => (
+            "low-confidence",
+            "Low confidence",
+            "Results of the ensemble with a confidence below 0.5, the lowest first.",
         ),
         GalleryReason::Random => (
             "random",

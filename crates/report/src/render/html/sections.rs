@@ -7,7 +7,6 @@ use super::markup::{prose, table};
 use super::plots;
 use crate::comparison::Basis;
 use crate::model::{FailureGroup, Report};
-use crate::number_format::format_count;
 use crate::render::block_table::blocks;
 use crate::render::comparison_tables::{
     comparison_sentences, comparisons, mean_intervals, score_comparisons,
@@ -18,6 +17,7 @@ use crate::render::risk_coverage_tables::{full_tables, short_tables};
 use crate::render::table::Table;
 use crate::score_comparison::conclusions;
 use mocban_core::domain::one_line;
+use mocban_results::number_format::format_count;
 
 /// Longest error message that is shown in full, characters.
 const MAX_ERROR_CHARS: usize = 600;

@@ -101,10 +101,10 @@ fn read_labels(
         .map_err(|error| BlockStageError::failed(FailureClass::BadInput, error.to_string()))?;
     let bounds: Vec<[f64; 4]> = read.boxes.iter().map(labels::LabelBox::bounds).collect();
     let order = reading_order(&bounds);
-    let given: HashSet<&str> = read
+    let given: HashSet<String> = read
         .boxes
         .iter()
-        .filter_map(|b| b.name.as_deref())
+        .filter_map(|b| Some(b.name.as_deref()?.to_lowercase()))
         .collect();
     let mut boxes: Vec<(usize, CharacterBox)> = (read.boxes.iter().zip(&bounds).zip(&order))
         .enumerate()
@@ -112,7 +112,7 @@ fn read_labels(
             let name = label.name.clone().unwrap_or_else(|| {
                 let name = place_name.to_string();
                 // A name from the file may look like a place.
-                if given.contains(name.as_str()) {
+                if given.contains(&name) {
                     format!("{name}-{place}")
                 } else {
                     name

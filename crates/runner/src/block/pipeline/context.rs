@@ -5,9 +5,8 @@ use std::sync::atomic::AtomicBool;
 use serde::de::DeserializeOwned;
 
 use crate::block_stages::{BlockArtifacts, BlockInputs, BlockStageError};
+use mocban_core::InputLimits;
 use mocban_core::domain::{BlockStage, BlockStageRecord};
-use mocban_core::mesh::MeshLimits;
-use mocban_core::raster::ImageLimits;
 
 /// What a stage reads and writes.
 pub(crate) struct StageContext<'a> {
@@ -15,8 +14,7 @@ pub(crate) struct StageContext<'a> {
     pub(crate) earlier: &'a [BlockStageRecord],
     pub(crate) artifacts: &'a dyn BlockArtifacts,
     pub(crate) stop: &'a AtomicBool,
-    pub(crate) mesh_limits: &'a MeshLimits,
-    pub(crate) image_limits: &'a ImageLimits,
+    pub(crate) limits: &'a InputLimits,
     /// Largest height map, in pixels.
     pub(crate) max_map_pixels: usize,
 }
@@ -34,8 +32,7 @@ impl StageContext<'_> {
         stage: BlockStage,
     ) -> Result<T, BlockStageError> {
         let record = self.record(stage)?;
-        let outcome = serde_json::from_str(&record.outcome);
-        outcome.map_err(|error| {
+        serde_json::from_str(&record.outcome).map_err(|error| {
             tracing::warn!(block = %self.inputs.name, %stage, "the outcome cannot be read: {error}; the stage runs again");
             BlockStageError::RerunFrom(stage)
         })

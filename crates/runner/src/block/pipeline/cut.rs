@@ -111,7 +111,7 @@ fn meshes(
     characters: &[PlacedCharacter],
 ) -> Result<Vec<Result<ArtifactRef, String>>, BlockStageError> {
     let scan = &context.inputs.mesh;
-    let mut stream = ScanStream::open(scan, context.mesh_limits, context.stop)?;
+    let mut stream = ScanStream::open(scan, &context.limits.mesh, context.stop)?;
     let spill_failed = |error: io::Error| {
         let text = format!("the temporary file of the cut: {error}");
         BlockStageError::failed(FailureClass::Io, text)

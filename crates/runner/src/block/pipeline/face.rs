@@ -1,5 +1,7 @@
 //! The stage `face`: finds the faces of a scan.
 
+use std::num::NonZeroU64;
+
 use super::context::StageContext;
 use super::failure::{failed, output};
 use super::scan_stream::ScanStream;
@@ -8,6 +10,7 @@ use mocban_align::block::{
     BlockError, FaceOutcome, FoundFace, HEIGHT_STEP_MM, Orientation, draw_height_maps, heights_role,
 };
 use mocban_core::domain::{BlockSide, LengthUnit};
+use mocban_core::mesh::missing_sentence;
 use mocban_core::raster::png_grey16;
 
 /// Least longer side of a face, mm, if the user gave the unit. A character has 6 to 30 mm.
@@ -17,11 +20,16 @@ const MIN_SIDE_MM: f64 = 60.0;
 pub(crate) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, BlockStageError> {
     let scan = &context.inputs.mesh;
     let fail = |error: BlockError| failed(scan, error);
-    let mut mesh = ScanStream::open(scan, context.mesh_limits, context.stop)?;
+    let mut mesh = ScanStream::open(scan, &context.limits.mesh, context.stop)?;
     let (frame, part) = Orientation::find(&mut mesh, context.inputs.unit).map_err(fail)?;
     let maps =
         draw_height_maps(&mut mesh, (&frame, &part), context.max_map_pixels).map_err(fail)?;
+    let missing_vertices = NonZeroU64::new(mesh.missing());
     drop(mesh);
+    if let Some(missing) = missing_vertices {
+        let said = missing_sentence(missing.get());
+        tracing::warn!(block = %context.inputs.name, "{}: {said}", scan.name());
+    }
     let mut faces = Vec::new();
     for (side, map) in [BlockSide::Front, BlockSide::Back].into_iter().zip(maps) {
         let Some(stored) = map.face() else {
@@ -57,6 +65,7 @@ pub(crate) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, Block
             .find(unit)
             .unwrap_or(LengthUnit::Mm),
         triangles: frame.triangles,
+        missing_vertices,
         faces,
     })
 }

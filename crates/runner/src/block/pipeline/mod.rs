@@ -21,18 +21,16 @@ use crate::block_stages::{
     BlockArtifacts, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
 };
 use crate::options::RunOptions;
+use mocban_core::InputLimits;
 use mocban_core::domain::{BlockStage, BlockStageRecord};
-use mocban_core::mesh::MeshLimits;
-use mocban_core::raster::ImageLimits;
 
 /// Version of each stage, in the order of the stages. A change of what a stage returns needs a new number.
-const REVISIONS: [u32; 4] = [2, 1, 2, 2];
+const REVISIONS: [u32; BlockStage::COUNT] = [2, 2, 2, 2];
 
 /// Computes the stages of blocks.
 #[derive(Debug)]
 pub(crate) struct BlockPipeline {
-    mesh_limits: MeshLimits,
-    image_limits: ImageLimits,
+    limits: InputLimits,
     max_map_pixels: usize,
     /// Inputs of the last stage, which the next stage of the same block reads again.
     held: HeldInputs,
@@ -42,8 +40,7 @@ impl BlockPipeline {
     /// Creates a pipeline with the limits of a run.
     pub(crate) fn new(options: &RunOptions) -> Self {
         Self {
-            mesh_limits: options.mesh_limits,
-            image_limits: options.image_limits,
+            limits: options.limits,
             max_map_pixels: max_map_pixels(options.memory),
             held: HeldInputs::default(),
         }
@@ -68,8 +65,7 @@ impl BlockStages for BlockPipeline {
             earlier,
             artifacts,
             stop,
-            mesh_limits: &self.mesh_limits,
-            image_limits: &self.image_limits,
+            limits: &self.limits,
             max_map_pixels: self.max_map_pixels,
         };
         let mut forgets = HeldGuard(Some(&self.held));

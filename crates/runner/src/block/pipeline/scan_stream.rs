@@ -18,6 +18,8 @@ const BUFFER: usize = 1 << 20;
 /// The scan of a block.
 pub(crate) struct ScanStream<'a> {
     source: ScanSource,
+    /// Vertices without a position that were left out of the mesh, or of the last pass.
+    missing: u64,
     limits: &'a MeshLimits,
     stop: &'a AtomicBool,
 }
@@ -40,6 +42,7 @@ impl<'a> ScanStream<'a> {
         stop: &'a AtomicBool,
     ) -> Result<Self, BlockStageError> {
         let mut file = scan.open()?;
+        let mut missing = 0;
         let read = || -> Result<ScanSource, MeshReadError> {
             let mut head = Vec::with_capacity(STL_HEAD);
             Stoppable(&mut file, stop)
@@ -50,8 +53,9 @@ impl<'a> ScanStream<'a> {
             }
             file.seek(SeekFrom::Start(0))?;
             let mut source = BufReader::with_capacity(BUFFER, Stoppable(&mut file, stop));
-            let mesh = mesh::read_from(&mut source, scan.size(), scan.name(), limits)?;
-            Ok(ScanSource::Mesh(mesh))
+            let read = mesh::read_from(&mut source, scan.size(), scan.name(), limits)?;
+            missing = read.missing;
+            Ok(ScanSource::Mesh(read.mesh))
         };
         let source = { read }().map_err(|error| failed(scan, BlockError::Mesh(error)))?;
         if let ScanSource::Mesh(mesh) = &source
@@ -62,9 +66,15 @@ impl<'a> ScanStream<'a> {
         }
         Ok(Self {
             source,
+            missing,
             limits,
             stop,
         })
+    }
+
+    /// Returns how many vertices were left out because they have no position.
+    pub(crate) const fn missing(&self) -> u64 {
+        self.missing
     }
 }
 
@@ -77,7 +87,8 @@ impl TriangleStream for ScanStream<'_> {
             ScanSource::Stl(file, count) => {
                 file.seek(SeekFrom::Start(STL_HEAD as u64))?;
                 let mut source = Stoppable(file, self.stop);
-                pass_over_binary_stl(&mut source, *count, self.limits, visit)
+                self.missing = pass_over_binary_stl(&mut source, *count, self.limits, visit)?;
+                Ok(())
             }
             ScanSource::Mesh(mesh) => {
                 let mut mesh = &*mesh;

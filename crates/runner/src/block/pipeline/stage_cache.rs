@@ -77,7 +77,7 @@ impl HeldInputs {
         context: &StageContext<'_>,
     ) -> Result<Arc<HeldPage>, BlockStageError> {
         let file = &context.inputs.page;
-        let bytes = file.read(context.image_limits.max_bytes, context.stop)?;
+        let bytes = file.read(context.limits.image.max_bytes, context.stop)?;
         let hash = ContentHash::of(&bytes);
         let mut held = self.page.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(page) = held.as_ref().filter(|page| page.hash == hash) {
@@ -85,8 +85,11 @@ impl HeldInputs {
         }
         // The memory of another page is freed first.
         *held = None;
-        let image = raster::decode(&bytes, context.image_limits)
+        let image = raster::decode(&bytes, &context.limits.image)
             .map_err(|error| file.failed(error.class(), error))?;
+        if let Some(warning) = image.profile_warning() {
+            tracing::warn!("{}: {warning}", file.name());
+        }
         drop(bytes);
         let ink = PageInk::of(&image).map_err(|error| failed(file, error))?;
         let page = Arc::new(HeldPage { hash, image, ink });

@@ -6,8 +6,8 @@ use super::axis::PlotAxis;
 use super::{SCALE, WIDTH, alt_text, at, figure, horizontal_axis};
 use crate::comparison::Basis;
 use crate::model::Report;
-use crate::number_format::format_rate;
 use crate::risk_coverage::RiskCoverageCurve;
+use mocban_results::number_format::format_rate;
 
 /// Left end of the axis of coverage, right of the tick labels of Acc.
 const LEFT: f64 = 62.0;

@@ -6,8 +6,8 @@ use super::axis::PlotAxis;
 use super::{LEFT, RIGHT, SCALE, alt_text, at, figure, horizontal_axis};
 use crate::comparison::Basis;
 use crate::model::Report;
-use crate::number_format::NumberStyle::Milliseconds;
-use crate::number_format::{format_number, format_rate};
+use mocban_results::number_format::NumberStyle::Milliseconds;
+use mocban_results::number_format::{format_number, format_rate};
 
 /// Height of a row.
 const ROW: f64 = 26.0;
@@ -94,8 +94,9 @@ fn dot_plot(rows: &[PlotRow], axis: &PlotAxis, title: &str, caption: &str) -> Ma
 #[cfg(test)]
 mod tests {
     use super::{accuracy, times};
-    use crate::{Basis, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{Basis, ReportAccumulator, test_fixtures};
     use mocban_core::domain::{Stage, Verdict};
+    use mocban_results::TruthEvaluation;
 
     #[test]
     fn points_are_at_their_numbers_on_the_axis() {

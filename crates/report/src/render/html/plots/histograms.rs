@@ -5,9 +5,9 @@ use maud::{Markup, html};
 use super::axis::PlotAxis;
 use super::{LEFT, RIGHT, SCALE, alt_text, at, figure, horizontal_axis};
 use crate::model::Report;
-use crate::number_format::NumberStyle::Score;
-use crate::number_format::{counted, format_number};
 use crate::thresholds::ThresholdDistribution;
+use mocban_results::number_format::NumberStyle::Score;
+use mocban_results::number_format::{counted, format_number};
 
 /// Height of the bars of a distribution.
 const BARS: f64 = 54.0;
@@ -57,7 +57,8 @@ fn bars(found: &ThresholdDistribution, axis: &PlotAxis, top: f64) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::thresholds;
-    use crate::{ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{ReportAccumulator, test_fixtures};
+    use mocban_results::TruthEvaluation;
 
     #[test]
     fn every_metric_has_bars_with_a_scale() {

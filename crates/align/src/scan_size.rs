@@ -1,0 +1,138 @@
+//! Recognizes scans of an unexpected size: a whole block that was given as one character, or a wrong unit.
+
+use crate::stages::StageError;
+use mocban_core::domain::cancel::polled;
+use mocban_core::domain::{FailureClass, LengthUnit};
+use mocban_core::mesh::Vertices;
+use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
+use mocban_core::raster::DepthMap;
+
+/// Lengths of whole blocks, mm. Characters have 6 to 30 mm.
+const BLOCK_MM: std::ops::RangeInclusive<f64> = 120.0..=1_000.0;
+
+/// Returns the advice for a scan that is as long as a whole block: a part of a sentence, or nothing for other scans.
+///
+/// `length` is in units of the mesh; an unknown unit counts as millimetres.
+fn advice(length: f64, unit: Option<LengthUnit>) -> String {
+    let length_mm = length * unit.map_or(1.0, LengthUnit::mm);
+    if !BLOCK_MM.contains(&length_mm) {
+        return String::new();
+    }
+    format!(
+        "; this looks like a whole block ({length_mm:.0} mm): import it with its page by `mocban import --block`"
+    )
+}
+
+/// Returns the advice of [`advice`] for an error of a stage that found no solution, nothing for other errors.
+pub fn advice_for(error: &StageError, length: f64, unit: Option<LengthUnit>) -> String {
+    match error.class() {
+        FailureClass::NoSolution => advice(length, unit),
+        _ => String::new(),
+    }
+}
+
+/// Lengths that a scan of a character or block can have, mm.
+const POSSIBLE_MM: std::ops::RangeInclusive<f64> = 0.5..=10_000.0;
+
+/// Lengths of most scans of characters and blocks, mm.
+const USUAL_MM: std::ops::RangeInclusive<f64> = 5.0..=1_000.0;
+
+/// Returns why the unit of a scan must be wrong, or `None` if it may be right. `length` is in units of the mesh.
+pub fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
+    let unit = unit?;
+    let length_mm = length * unit.mm();
+    if length == 0.0 || POSSIBLE_MM.contains(&length_mm) {
+        return None;
+    }
+    let shown = if length_mm > 1.0 {
+        format!("{:.1} m", length_mm / 1000.0)
+    } else {
+        format!("{length_mm:.3} mm")
+    };
+    let mut units = LengthUnit::ALL.into_iter();
+    let likely = units.find(|unit| USUAL_MM.contains(&(length * unit.mm())));
+    let likely = likely.map_or_else(String::new, |unit| format!(" (perhaps {unit})"));
+    Some(format!(
+        "with the unit {unit}, the scan is {shown} long; correct the unit in the list{likely} and import it again"
+    ))
+}
+
+/// Returns the longest side of the bounding box of vertices without distant specks, in units of the mesh.
+pub fn length_of(vertices: &Vertices) -> f64 {
+    let bulk = match vertices {
+        Vertices::Single(all) => bulk_box(all),
+        Vertices::Double(all) => bulk_box(all),
+    };
+    let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    for vertex in polled(vertices.iter()).filter(|vertex| is_in_box(&bulk, vertex)) {
+        for (bounds, value) in bounds.iter_mut().zip(vertex) {
+            *bounds = [bounds[0].min(value), bounds[1].max(value)];
+        }
+    }
+    bounds
+        .iter()
+        .map(|[low, high]| high - low)
+        .fold(0.0, f64::max)
+}
+
+/// Returns the longer side of a depth map, in units of the mesh.
+pub fn length_of_map(depth: &DepthMap) -> f64 {
+    let pixels = depth.levels.width().max(depth.levels.height());
+    pixels as f64 * depth.scale.mesh_unit_per_px
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{advice, length_of, wrong_unit};
+    use mocban_core::domain::LengthUnit;
+    use mocban_core::mesh::Vertices;
+
+    #[test]
+    fn only_scans_as_long_as_a_block_get_the_advice() {
+        assert!(advice(345.0, None).contains("345 mm"));
+        assert!(advice(12.6, Some(LengthUnit::In)).contains("320 mm"));
+        for (length, unit) in [(12.0, None), (1.2, Some(LengthUnit::Cm)), (2_500.0, None)] {
+            assert_eq!(advice(length, unit), "");
+        }
+    }
+
+    #[test]
+    fn impossible_lengths_are_those_of_a_wrong_unit() {
+        assert_eq!(
+            wrong_unit(12.54, Some(LengthUnit::M)).as_deref(),
+            Some(
+                "with the unit m, the scan is 12.5 m long; correct the unit in the list (perhaps mm) and import it again"
+            )
+        );
+        let text = wrong_unit(0.012, Some(LengthUnit::Mm)).expect("a grain of dust");
+        assert!(
+            text.contains("0.012 mm long") && text.contains("perhaps m)"),
+            "{text}"
+        );
+        for (length, unit) in [
+            (12.5, None),
+            (12.5, Some(LengthUnit::Mm)),
+            (0.0125, Some(LengthUnit::M)),
+            (1.6, Some(LengthUnit::M)),
+            (0.0, Some(LengthUnit::M)),
+        ] {
+            assert_eq!(wrong_unit(length, unit), None);
+        }
+    }
+
+    #[test]
+    fn the_length_is_the_longest_side_of_the_box() {
+        let vertices = [[1.0, -4.0, 0.0], [3.0, 9.0, 2.0]].into_iter().collect();
+        assert_eq!(length_of(&vertices), 13.0);
+    }
+
+    #[test]
+    fn a_vertex_far_away_does_not_change_the_length() {
+        let scan = |k: u32| [f64::from(k % 70), f64::from(k / 70), 0.0];
+        let mut vertices: Vertices = (0..4_900).map(scan).collect();
+        for far in [1e6, -1e30, f64::MAX] {
+            vertices.set(2_000, [3.0, far, 0.0]);
+            assert_eq!(length_of(&vertices), 69.0, "{far}");
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! What relief and print show when they do not match, so that a refusal says what was seen instead of guessing.
+
+use std::fmt;
+
+use super::half_canvas::HalfCanvas;
+use mocban_core::domain::ReliefHeights;
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{DepthMap, Mask};
+
+/// A piece of a scan counts if it has at least this fraction of the area with data.
+const PIECE: f64 = 0.15;
+/// More pieces than this are strokes or gaps of one scan.
+const MOST_PIECES: usize = 3;
+/// A relief that is less deep than this fraction of the longer side of the scan is no carving. Carvings have several percent.
+const FLAT: f64 = 0.012;
+/// One half of the print agrees with the relief if its `IoU` is at least the first value, and not if it is below the second.
+const HALF_IOU: [f64; 2] = [0.6, 0.25];
+
+/// Whether a pixel is in a part of a canvas.
+type InPart<'a> = &'a dyn Fn(usize, usize) -> bool;
+
+/// Something unusual about a pair that does not match.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Observation {
+    /// Nothing.
+    Nothing,
+    /// The scan consists of this many large pieces.
+    Pieces(usize),
+    /// The relief has only this depth, as a fraction of the longer side of the scan.
+    Flat(f64),
+    /// Strokes and ink agree in this half of the print and not in the other.
+    Half(&'static str),
+}
+
+impl fmt::Display for Observation {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nothing => write!(to, "is it the print of another character?"),
+            Self::Pieces(count) => write!(
+                to,
+                "the scan shows {count} separate pieces: does one file hold several characters or pieces?"
+            ),
+            Self::Flat(share) => write!(
+                to,
+                "the face of the scan is nearly flat (its relief is {:.1} % of its length): does it show the back of the block?",
+                100.0 * share
+            ),
+            Self::Half(half) => write!(
+                to,
+                "they agree in the {half} half of the print only: is the sheet folded, torn or covered there?"
+            ),
+        }
+    }
+}
+
+impl Observation {
+    /// Looks at a scan: its pieces, and whether it is carved.
+    pub(super) fn of_scan(depth: &DepthMap, relief: &ReliefHeights) -> Self {
+        let known = depth.levels.map(|level| *level != 0);
+        let parts = ConnectedComponents::label(&known).parts_of(&known);
+        let least = PIECE * known.count() as f64;
+        let large = parts.iter().filter(|(_, area)| *area as f64 >= least);
+        let pieces = large.count();
+        if (2..=MOST_PIECES).contains(&pieces) {
+            return Self::Pieces(pieces);
+        }
+        let longest = depth.levels.width().max(depth.levels.height()) as f64;
+        let share = relief.depth() / (longest * depth.scale.mesh_unit_per_px);
+        if share < FLAT {
+            return Self::Flat(share);
+        }
+        Self::Nothing
+    }
+
+    /// Compares the halves of a canvas, on which relief and print have the best pose.
+    pub(super) fn of_halves(canvas: &HalfCanvas, level: u16) -> Self {
+        let strokes = canvas.mask(level);
+        let (width, height) = (strokes.width(), strokes.height());
+        let halves: [(&str, InPart<'_>); 4] = [
+            ("left", &|x, _| x < width / 2),
+            ("right", &|x, _| x >= width / 2),
+            ("upper", &|_, y| y < height / 2),
+            ("lower", &|_, y| y >= height / 2),
+        ];
+        let iou = halves.map(|(_, is_inside)| half_iou(&strokes, &canvas.ink, is_inside));
+        let [agrees, differs] = HALF_IOU;
+        let found = (0..4).find(|half| iou[*half] >= agrees && iou[*half ^ 1] < differs);
+        found.map_or(Self::Nothing, |half| Self::Half(halves[half].0))
+    }
+
+    /// Returns whether the scan, rather than the print, is the likelier cause.
+    pub const fn is_of_scan(self) -> bool {
+        matches!(self, Self::Pieces(_) | Self::Flat(_))
+    }
+
+    /// Returns the first observation that is not nothing.
+    pub(super) fn or(self, other: impl FnOnce() -> Self) -> Self {
+        if self == Self::Nothing { other() } else { self }
+    }
+}
+
+/// Returns the `IoU` of two masks inside a part of them; 0 if both are empty there.
+fn half_iou(one: &Mask, other: &Mask, is_inside: impl Fn(usize, usize) -> bool) -> f64 {
+    let (mut both, mut any) = (0_u64, 0_u64);
+    for y in 0..one.height() {
+        for (x, (a, b)) in one.row(y).iter().zip(other.row(y)).enumerate() {
+            if is_inside(x, y) {
+                both += u64::from(*a && *b);
+                any += u64::from(*a || *b);
+            }
+        }
+    }
+    both as f64 / any.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HalfCanvas, Observation};
+    use mocban_core::domain::{Affine2, DepthScale, ReliefHeights};
+    use mocban_core::raster::{DepthMap, Grid, Mask};
+
+    const SIDE: usize = 100;
+
+    fn scan(is_known: impl Fn(usize, usize) -> bool) -> DepthMap {
+        DepthMap {
+            levels: Grid::from_fn(SIDE, SIDE, |x, y| u16::from(is_known(x, y))),
+            scale: DepthScale {
+                height_min: -1.0,
+                height_per_level: 1e-4,
+                mesh_unit_per_px: 0.1,
+                depth_from_plane: Affine2::IDENTITY,
+                curvature: None,
+                unit: None,
+            },
+        }
+    }
+
+    fn relief(depth: f64) -> ReliefHeights {
+        ReliefHeights {
+            top: 0.0,
+            ground: -depth,
+            tops_end: 0.3,
+            tops_end_log_deviation: 0.1,
+        }
+    }
+
+    #[test]
+    fn pieces_and_flat_faces_are_seen() {
+        let whole = scan(|_, _| true);
+        assert_eq!(
+            Observation::of_scan(&whole, &relief(0.8)),
+            Observation::Nothing
+        );
+        let flat = Observation::of_scan(&whole, &relief(0.05));
+        assert!(
+            flat.to_string()
+                .contains("nearly flat (its relief is 0.5 %"),
+            "{flat}"
+        );
+        let two = scan(|x, _| !(45..50).contains(&x));
+        assert_eq!(
+            Observation::of_scan(&two, &relief(0.8)),
+            Observation::Pieces(2)
+        );
+        let strokes = scan(|x, _| x % 20 < 10);
+        assert_eq!(
+            Observation::of_scan(&strokes, &relief(0.8)),
+            Observation::Nothing
+        );
+        // A crumb beside the block is no piece.
+        let crumb = scan(|x, y| x < 90 || (x > 95 && y < 5));
+        assert_eq!(
+            Observation::of_scan(&crumb, &relief(0.8)),
+            Observation::Nothing
+        );
+    }
+
+    #[test]
+    fn a_print_that_agrees_in_one_half_is_seen() {
+        let bars = |x: usize, y: usize| (10..90).contains(&x) && y % 20 < 8;
+        let canvas = |ink: &dyn Fn(usize, usize) -> bool| {
+            let level = |x, y| if bars(x, y) { 1000 } else { 1 };
+            HalfCanvas::of(
+                Grid::from_fn(SIDE, SIDE, level),
+                Mask::from_fn(SIDE, SIDE, ink),
+            )
+        };
+        let seen = |ink: &dyn Fn(usize, usize) -> bool| Observation::of_halves(&canvas(ink), 1000);
+        assert_eq!(seen(&bars), Observation::Nothing);
+        assert_eq!(
+            seen(&|x, y| bars(x, y) && x < 50),
+            Observation::Half("left")
+        );
+        assert_eq!(
+            seen(&|x, y| bars(x, y) && y >= 50),
+            Observation::Half("lower")
+        );
+        assert_eq!(seen(&|x, y| y % 20 > 12 && x < 90), Observation::Nothing);
+    }
+}

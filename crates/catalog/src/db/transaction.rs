@@ -1,0 +1,11 @@
+//! Write transactions whose body is an `async` block.
+
+/// Runs a block with a connection in a write transaction of its own: see [`Catalog::in_transaction`](crate::Catalog).
+macro_rules! in_transaction {
+    ($catalog:expr, |$conn:ident| $work:block) => {
+        $catalog
+            .in_transaction(move |$conn| Box::pin(async move $work))
+            .await
+    };
+}
+pub(crate) use in_transaction;

@@ -1,0 +1,68 @@
+//! Leases of blocks that are lost: what a worker stores under them is refused.
+
+use super::blocks::{continued, done, inputs, world};
+use super::register;
+use crate::{BlockInputVersions, BlockJob, CheckpointOutcome, DeadWorker, Lease};
+use mocban_core::domain::BlockStage;
+
+#[tokio::test]
+async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
+    let world = world().await;
+    let (lease, work) = world.leased_block().await;
+    // A second claim of the same worker returns the same lease: the reply to the first may have been lost.
+    assert_eq!(world.leased_block().await.0, lease);
+    let other = register(&world.catalog).await;
+    assert!(world.claim_block(other).await.is_none());
+    let recovered = world
+        .catalog
+        .recover(DeadWorker::AllExcept(other), 60)
+        .await;
+    assert_eq!(recovered.expect("a recovery").blocks, 1);
+    let stage = done(&work, BlockStage::Face);
+    let lost = lease.clone();
+    let late = world.catalog.checkpoint_block(lease, stage.clone()).await;
+    assert_eq!(late.expect("a reply"), CheckpointOutcome::LeaseLost);
+    let [kept, late_ones] = ["mesh", "other"].map(|mesh| inputs([mesh, "page", "labels"]));
+    let store = async |lease: &Lease<BlockJob>, seen: &BlockInputVersions| {
+        let stored = world
+            .catalog
+            .store_leased_inputs(lease.clone(), seen.clone(), 0);
+        stored.await.expect("a reply")
+    };
+    assert!(!store(&lost, &late_ones).await);
+    let (lease, _) = world.claim_block(other).await.expect("a ready block");
+    assert!(store(&lease, &kept).await);
+    assert!(!store(&lost, &late_ones).await);
+    let known = world.catalog.known_blocks().await.expect("a read");
+    assert_eq!(known[0].inputs, kept);
+    let advanced = world
+        .catalog
+        .checkpoint_block(lease.clone(), stage.clone())
+        .await;
+    let advanced = continued(advanced.expect("a reply"));
+    assert_eq!(advanced.cursor(), BlockStage::Align);
+    // The reply was lost, and the worker sends the same checkpoint again.
+    let again = world.catalog.checkpoint_block(lease, stage).await;
+    assert_eq!(again.expect("a reply"), CheckpointOutcome::Lease(advanced));
+}
+
+#[tokio::test]
+async fn a_block_that_kills_its_workers_is_quarantined() {
+    let world = world().await;
+    let mut worker = world.worker;
+    for crashes in 1..=3 {
+        assert!(world.claim_block(worker).await.is_some(), "{crashes}");
+        worker = register(&world.catalog).await;
+        let recovered = world
+            .catalog
+            .recover(DeadWorker::AllExcept(worker), 60)
+            .await;
+        let ready = u64::from(crashes < 3);
+        assert_eq!(recovered.expect("a recovery").blocks, ready, "{crashes}");
+    }
+    let states = world.catalog.block_states().await.expect("a read");
+    let failure = states[0].failure.clone().expect("a failure");
+    let message = "3 workers died or hung over it at face";
+    assert_eq!(failure.failure.message, message);
+    assert_eq!(world.requeue_blocks([9; 4]).await, []);
+}

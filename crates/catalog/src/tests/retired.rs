@@ -1,0 +1,226 @@
+//! Pairs that a person or a shorter list takes out of every count, and that come back.
+
+use super::block_pairs::{judge, names_of, status_of};
+use super::blocks::{block, character, world};
+use super::{World, fingerprints, name, row};
+use crate::{
+    CatalogError, CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, RetiredPair,
+    StatusCounts,
+};
+use mocban_core::domain::{BlockStage, JobStatus, PairName, RetireCause, Stage, Verdict};
+
+async fn status(world: &World) -> StatusCounts {
+    let status = world.catalog.status(&fingerprints([1; 4])).await;
+    status.expect("a read")
+}
+
+async fn retired(world: &World) -> Vec<RetiredPair> {
+    world.catalog.retired_pairs().await.expect("a read")
+}
+
+/// Imports a list with these ids that replaces the others.
+async fn replace(world: &World, ids: &[&str]) -> ImportSummary {
+    let (sender, chunks) = tokio::sync::mpsc::channel(2);
+    let rows = ids.iter().map(|id| row(id)).collect();
+    for chunk in [ImportChunk::Rows(rows), ImportChunk::End] {
+        sender.try_send(chunk).expect("room");
+    }
+    let terms = ImportTerms {
+        replace: true,
+        ..ImportTerms::default()
+    };
+    let (summary, _) = world
+        .catalog
+        .import_all(chunks, terms, 7)
+        .await
+        .expect("imported");
+    world.assert_counters().await;
+    summary
+}
+
+#[tokio::test]
+async fn a_retired_pair_is_in_no_count_and_comes_back_with_all_it_had() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    judge(&world, "p0").await;
+    let before = status(&world).await;
+    assert_eq!((before.pairs, before.verdicts[&Verdict::Pass]), (2, 1));
+    let names = [name("p0")];
+    let catalog = &world.catalog;
+    assert_eq!(catalog.retire_pairs(&names, 9).await.expect("retired"), 1);
+    assert_eq!(catalog.retire_pairs(&names, 10).await.expect("again"), 0);
+    world.assert_counters().await;
+    let counts = status(&world).await;
+    assert_eq!(
+        (
+            counts.pairs,
+            counts.retired,
+            counts.verdicts[&Verdict::Pass]
+        ),
+        (1, 1, 0)
+    );
+    assert_eq!(counts.jobs[&JobStatus::Done], 0);
+    let expected = RetiredPair {
+        name: name("p0"),
+        cause: RetireCause::Person,
+        at: 9,
+    };
+    assert_eq!(retired(&world).await, [expected]);
+    assert_eq!(status_of(&world, "p0").await, None);
+    assert_eq!(
+        catalog
+            .verdict_log(Some(&names[0]))
+            .await
+            .expect("the log")
+            .len(),
+        1
+    );
+    let shared = catalog.pair_groups("character").await.expect("groups");
+    assert_eq!(shared.values().sum::<u64>(), 1);
+    // A list with the pair does not bring it back, and gives it no new job.
+    let again = catalog
+        .import(vec![row("p0"), row("p1")], 11)
+        .await
+        .expect("the list");
+    assert_eq!((again.unchanged, again.restored), (2, 0));
+    world.assert_counters().await;
+    assert_eq!(status(&world).await, counts);
+    assert_eq!(catalog.restore_pairs(&names).await.expect("restored"), 1);
+    assert_eq!(catalog.restore_pairs(&names).await.expect("again"), 0);
+    world.assert_counters().await;
+    assert_eq!(status(&world).await, before);
+    assert_eq!(status_of(&world, "p0").await, Some(JobStatus::Done));
+}
+
+#[tokio::test]
+async fn the_lease_of_a_retired_pair_ends() {
+    let world = World::new(1).await;
+    let lease = world.claim(1).await.pop().expect("a ready pair");
+    world
+        .catalog
+        .retire_pairs(&[name("p0")], 9)
+        .await
+        .expect("retired");
+    assert!(world.claim(1).await.is_empty());
+    let stored = world
+        .catalog
+        .checkpoint_now(lease, world.done(Stage::Fit))
+        .await;
+    assert!(
+        matches!(stored, Ok(CheckpointOutcome::LeaseLost)),
+        "{stored:?}"
+    );
+    world
+        .catalog
+        .restore_pairs(&[name("p0")])
+        .await
+        .expect("restored");
+    assert_eq!(world.claim(1).await.len(), 1);
+}
+
+#[tokio::test]
+async fn a_list_that_replaces_the_others_retires_pairs_until_a_list_has_them_again() {
+    let world = World::new(3).await;
+    world
+        .catalog
+        .retire_pairs(&[name("p2")], 5)
+        .await
+        .expect("retired");
+    let shorter = replace(&world, &["p0", "p3"]).await;
+    assert_eq!(
+        (shorter.added, shorter.retired, shorter.restored),
+        (1, 1, 0)
+    );
+    let all = retired(&world).await;
+    assert_eq!(names_of(&all), [name("p1"), name("p2")]);
+    assert_eq!((all[0].cause, all[0].at), (RetireCause::List, 7));
+    assert_eq!(all[1].cause, RetireCause::Person);
+    assert_eq!(status(&world).await.pairs, 2);
+    let whole = replace(&world, &["p0", "p1", "p2", "p3"]).await;
+    assert_eq!((whole.retired, whole.restored), (0, 1));
+    // The pair that a person retired stays so.
+    assert_eq!(names_of(&retired(&world).await), [name("p2")]);
+    // A person may bring back what a list retired.
+    replace(&world, &["p0"]).await;
+    let back: Vec<PairName> = ["p1", "p2"].map(name).to_vec();
+    assert_eq!(
+        world.catalog.restore_pairs(&back).await.expect("restored"),
+        2
+    );
+    assert_eq!(names_of(&retired(&world).await), [name("p3")]);
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn an_interrupted_list_that_replaces_the_others_changes_nothing() {
+    let world = World::new(3).await;
+    let before = status(&world).await;
+    let (sender, chunks) = tokio::sync::mpsc::channel(1);
+    let rows = ImportChunk::Rows(vec![row("p0"), row("new")]);
+    sender.try_send(rows).expect("room");
+    drop(sender);
+    let terms = ImportTerms {
+        replace: true,
+        ..ImportTerms::default()
+    };
+    let refused = world.catalog.import_all(chunks, terms, 7).await;
+    assert!(
+        matches!(refused, Err(CatalogError::CutShort)),
+        "{refused:?}"
+    );
+    world.assert_counters().await;
+    assert_eq!(status(&world).await, before);
+    assert!(retired(&world).await.is_empty());
+}
+
+#[tokio::test]
+async fn pairs_of_blocks_are_retired_by_people_and_not_by_lists() {
+    let world = world().await;
+    world
+        .finish_block(vec![character("a", "a"), character("b", "b")])
+        .await;
+    let shorter = replace(&world, &["q0"]).await;
+    assert_eq!((shorter.added, shorter.retired), (1, 0));
+    let catalog = &world.catalog;
+    catalog
+        .retire_pairs(&[name("b_a")], 9)
+        .await
+        .expect("retired");
+    let state = async || {
+        let detail = catalog.block(&block("b")).await.expect("a read");
+        let state = detail.expect("the block").state;
+        (state.characters, state.retired)
+    };
+    assert_eq!(state().await, (1, 1));
+    // The next cut does not bring it back, and without its box neither does a person.
+    let known = catalog.known_blocks().await.expect("a read");
+    let cut = vec![(known[0].block, BlockStage::Cut)];
+    catalog.reset_blocks(cut.clone()).await.expect("reset");
+    world
+        .finish_block(vec![character("a", "new a"), character("b", "b")])
+        .await;
+    world.assert_counters().await;
+    assert_eq!(names_of(&retired(&world).await), [name("b_a")]);
+    catalog.reset_blocks(cut.clone()).await.expect("reset");
+    world.finish_block(vec![character("b", "b")]).await;
+    assert_eq!(
+        catalog
+            .restore_pairs(&[name("b_a")])
+            .await
+            .expect("not restored"),
+        0
+    );
+    catalog.reset_blocks(cut).await.expect("reset");
+    world
+        .finish_block(vec![character("a", "a"), character("b", "b")])
+        .await;
+    assert_eq!(
+        catalog
+            .restore_pairs(&[name("b_a")])
+            .await
+            .expect("restored"),
+        1
+    );
+    assert_eq!(state().await, (2, 0));
+    world.assert_counters().await;
+}

@@ -1,0 +1,233 @@
+//! Vertices without a position, which are left out of a mesh.
+//!
+//! Scanners and converters write NaN for a point that they did not measure, and 0 0 0 in organized clouds.
+
+use super::error::MeshError;
+use super::{Mesh, Vertices};
+use crate::domain::cancel::polled;
+
+/// A mesh as read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshRead {
+    /// The vertices with a position, and the faces between them.
+    pub mesh: Mesh,
+    /// Number of vertices that were left out because they have no position: a coordinate is NaN or infinite, or several
+    /// vertices without faces are at the origin.
+    pub missing: u64,
+}
+
+/// Says that vertices were left out.
+pub fn missing_sentence(missing: u64) -> String {
+    format!(
+        "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces: {missing}"
+    )
+}
+
+/// Notices vertices that may have no position, while a file is read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PositionCheck {
+    is_finite: bool,
+    /// Number of vertices at the origin.
+    origins: u64,
+}
+
+impl PositionCheck {
+    /// Checks no vertex yet.
+    pub(super) const NONE: Self = Self {
+        is_finite: true,
+        origins: 0,
+    };
+
+    /// Checks all vertices of a mesh.
+    pub(super) fn of(vertices: &Vertices) -> Self {
+        let mut check = Self::NONE;
+        match vertices {
+            Vertices::Single(all) => polled(all.chunks(256)).for_each(|part| check.add(part)),
+            Vertices::Double(all) => polled(all.chunks(256)).for_each(|part| check.add(part)),
+        }
+        check
+    }
+
+    /// Checks some more vertices that faces use.
+    pub(super) fn add_used<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
+        self.is_finite &= are_finite(positions);
+    }
+
+    /// Checks some more vertices.
+    #[inline]
+    pub(super) fn add<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
+        let values = positions.as_flattened().iter().map(|value| (*value).into());
+        let is_usual = |value: f64| (value.abs() > 0.0) & (value.abs() < f64::INFINITY);
+        if !values.fold(true, |usual, value| usual & is_usual(value)) {
+            self.is_finite &= are_finite(positions);
+            self.origins += origins(positions);
+        }
+    }
+
+    /// Leaves out vertices without a position, and faces that use them.
+    ///
+    /// Several vertices at the origin have no position if no face uses them; one may be a point.
+    ///
+    /// # Errors
+    /// Returns an error if nothing is left.
+    pub(super) fn without_missing(self, mesh: Mesh) -> Result<MeshRead, MeshError> {
+        if self.is_finite && self.origins < 2 {
+            return Ok(MeshRead { mesh, missing: 0 });
+        }
+        let Mesh {
+            vertices,
+            mut triangles,
+        } = mesh;
+        let finite: Vec<bool> = polled(vertices.iter()).map(is_finite).collect();
+        let mut uses = vec![Use::None; finite.len()];
+        let is_points = triangles.is_empty();
+        triangles = polled(triangles.iter().copied())
+            .filter(|corners| {
+                let corners = corners.map(|corner| corner as usize);
+                let is_kept = corners.iter().all(|corner| finite[*corner]);
+                for corner in corners {
+                    uses[corner] = uses[corner].max(if is_kept { Use::Kept } else { Use::Removed });
+                }
+                is_kept
+            })
+            .collect();
+        let (mut kept, mut missing) = (Vec::new(), 0);
+        for (index, vertex) in (0..).zip(polled(vertices.iter())) {
+            let used = uses[index as usize];
+            let is_unused_origin = used == Use::None && self.origins > 1 && is_origin(vertex);
+            if !finite[index as usize] || is_unused_origin {
+                missing += 1;
+            } else if used != Use::Removed {
+                kept.push(index);
+            }
+        }
+        if kept.is_empty() || (triangles.is_empty() && !is_points) {
+            let vertices = finite.len() as u64;
+            return Err(MeshError::NothingLeft { missing, vertices });
+        }
+        let mut new_index = vec![0; finite.len()];
+        for (new, old) in (0..).zip(polled(&kept)) {
+            new_index[*old as usize] = new;
+        }
+        for index in polled(triangles.as_flattened_mut()) {
+            *index = new_index[*index as usize];
+        }
+        let vertices = vertices.select(&kept);
+        let mesh = Mesh {
+            vertices,
+            triangles,
+        };
+        Ok(MeshRead { mesh, missing })
+    }
+}
+
+/// A coordinate of 32 or 64 bits, which is 0 by default.
+pub(super) trait CoordinateValue: Copy + Into<f64> + PartialEq + Default {}
+
+impl CoordinateValue for f32 {}
+impl CoordinateValue for f64 {}
+
+/// Returns whether no coordinate is NaN or infinite.
+#[inline(never)] // As a loop of its own, it is vectorized.
+fn are_finite<T: CoordinateValue>(positions: &[[T; 3]]) -> bool {
+    let values = positions.as_flattened().iter();
+    values.fold(true, |finite, value| finite & (*value).into().is_finite())
+}
+
+/// Returns the number of positions at the origin.
+fn origins<T: CoordinateValue>(positions: &[[T; 3]]) -> u64 {
+    if !has_adjacent_zeros(positions.as_flattened()) {
+        return 0;
+    }
+    let is_origin = |position: &&[T; 3]| **position == [T::default(); 3];
+    positions.iter().filter(is_origin).count() as u64
+}
+
+/// Returns whether a value and the next one are 0, as at every origin.
+#[inline(never)] // Like `are_finite`.
+fn has_adjacent_zeros<T: CoordinateValue>(values: &[T]) -> bool {
+    let zero = T::default();
+    let pairs = values.iter().zip(values.iter().skip(1));
+    pairs.fold(false, |found, (a, b)| found | ((*a == zero) & (*b == zero)))
+}
+
+/// Returns whether no coordinate is NaN or infinite.
+pub(super) fn is_finite(position: [f64; 3]) -> bool {
+    position.iter().all(|value| value.is_finite())
+}
+
+fn is_origin(position: [f64; 3]) -> bool {
+    position == [0.0; 3]
+}
+
+/// The faces that use a vertex.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Use {
+    None,
+    /// Only faces that are left out.
+    Removed,
+    /// At least one that is kept.
+    Kept,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PositionCheck;
+    use crate::mesh::{Mesh, MeshError};
+
+    const NAN: [f64; 3] = [1.0, f64::NAN, 0.0];
+
+    fn without_missing(
+        vertices: Vec<[f64; 3]>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<(Mesh, u64), MeshError> {
+        let mesh = Mesh {
+            vertices: vertices.into(),
+            triangles: triangles.into(),
+        };
+        let check = PositionCheck::of(&mesh.vertices);
+        check
+            .without_missing(mesh)
+            .map(|read| (read.mesh, read.missing))
+    }
+
+    #[test]
+    fn faces_go_with_their_vertices_and_others_are_renumbered() {
+        let [a, b, c, d] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0; 3]];
+        // The last vertex is used only by the face that is left out.
+        let vertices = vec![NAN, a, b, c, d, [9.0; 3]];
+        let (mesh, missing) =
+            without_missing(vertices, vec![[1, 2, 3], [0, 1, 5], [2, 4, 3]]).expect("sound");
+        assert_eq!(missing, 1);
+        assert_eq!(mesh.vertices, vec![a, b, c, d].into());
+        assert_eq!(*mesh.triangles, [[0, 1, 2], [1, 3, 2]]);
+    }
+
+    #[test]
+    fn one_point_at_the_origin_stays_and_several_without_faces_go() {
+        let points = vec![[0.0; 3], [1.0; 3], [0.0, -0.0, 0.0], [2.0; 3]];
+        let (mesh, missing) = without_missing(points[..2].to_vec(), Vec::new()).expect("sound");
+        assert_eq!((mesh.vertices.len(), missing), (2, 0));
+        let (mesh, missing) = without_missing(points.clone(), Vec::new()).expect("sound");
+        assert_eq!(
+            (mesh.vertices, missing),
+            (vec![[1.0; 3], [2.0; 3]].into(), 2)
+        );
+        let (mesh, missing) = without_missing(points, vec![[0, 1, 3]]).expect("sound");
+        assert_eq!((mesh.vertices.len(), missing), (3, 1));
+    }
+
+    #[test]
+    fn a_mesh_of_which_nothing_is_left_is_refused() {
+        let [all, faces] = [vec![], vec![[0, 1, 2]]].map(|triangles| {
+            let vertices = vec![NAN, [1.0; 3], [2.0, 1.0, 0.0]];
+            without_missing(vertices, triangles)
+        });
+        assert!(all.is_ok());
+        let refused = faces.expect_err("no face").to_string();
+        assert_eq!(
+            refused,
+            "1 of 3 vertices have no position (NaN, infinite or repeated 0 0 0), and without them nothing is left"
+        );
+    }
+}

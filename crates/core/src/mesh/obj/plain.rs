@@ -1,0 +1,261 @@
+//! Single-pass reader of OBJ files with usual lines only.
+
+use crate::domain::cancel::{PollCounter, polled};
+use crate::mesh::decimal;
+use crate::mesh::error::{MeshError, MeshLimits};
+use crate::mesh::text;
+use crate::mesh::triangle_mesh::{Mesh, Vertices};
+use crate::page_vec::PageVec;
+
+/// Digits of an index that is parsed without a check for overflow.
+const MAX_INDEX_DIGITS: usize = 18;
+/// Estimates of the bytes that a file needs per vertex and per triangle. They are high, so that too little memory is
+/// reserved rather than too much.
+const BYTES_PER_VERTEX: usize = 96;
+const BYTES_PER_TRIANGLE: usize = 48;
+
+/// A line that [`read`] leaves to another reader, counted from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct OddLine(pub(super) u64);
+
+/// Reads a file with these lines only:
+///
+/// - an empty line or a comment, or one that begins with `vn`, `vt`, `g`, `o`, `s`, `usemtl` or `mtllib`
+/// - `v` with three numbers, and then nothing, a weight of 1 or a colour
+/// - `f` with corners: an integer, which up to two more and slashes may follow
+///
+/// # Errors
+/// Returns the first other line. The inner error says that the file exceeds the limits, or that a face refers to a missing
+/// vertex.
+pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Result<Mesh, MeshError>, OddLine> {
+    if text::is_classic_mac(bytes) {
+        return Err(OddLine(1));
+    }
+    let mut reader = PlainReader {
+        rest: bytes,
+        line: 1,
+        vertices: PageVec::with_capacity(bytes.len() / BYTES_PER_VERTEX),
+        triangles: PageVec::with_capacity(bytes.len() / BYTES_PER_TRIANGLE),
+        last_used: (0, 1),
+    };
+    let mut counter = PollCounter::default();
+    while !reader.rest.is_empty() && limits.allow(reader.vertices.len(), reader.triangles.len()) {
+        let before = reader.rest.len();
+        reader.line(limits).ok_or(OddLine(reader.line))?;
+        counter.add(text::poll_items(before - reader.rest.len()));
+    }
+    Ok(reader.into_mesh(limits))
+}
+
+/// The unread part of a file, and the geometry read so far.
+struct PlainReader<'a> {
+    rest: &'a [u8],
+    /// The line that `rest` begins with, counted from 1.
+    line: u64,
+    /// Positions, in the mesh's unit.
+    vertices: PageVec<[f64; 3]>,
+    /// Indices of vertices, from 0; they may lie beyond the last vertex.
+    triangles: PageVec<[u32; 3]>,
+    /// The highest index in a face, and the first line with it.
+    last_used: (u32, u64),
+}
+
+impl PlainReader<'_> {
+    /// Keeps the vertices that faces use, in the order of their first use, or all vertices if there are no faces.
+    fn into_mesh(mut self, limits: &MeshLimits) -> Result<Mesh, MeshError> {
+        limits.check_vertices(self.vertices.len() as u64)?;
+        limits.check_triangles(self.triangles.len() as u64)?;
+        if !self.triangles.is_empty() {
+            let (index, line) = self.last_used;
+            if index as usize >= self.vertices.len() {
+                let reason = "a corner refers to a vertex that the file does not have".into();
+                return Err(MeshError::Line { line, reason });
+            }
+            self.vertices = in_order_of_use(&self.vertices, &mut self.triangles);
+        }
+        Ok(Mesh {
+            vertices: Vertices::Double(self.vertices),
+            triangles: self.triangles,
+        })
+    }
+
+    /// Reads a line; returns `None` if it is another than [`read`] lists.
+    #[inline]
+    fn line(&mut self, limits: &MeshLimits) -> Option<()> {
+        self.skip_space();
+        match self.rest {
+            [b'v', space, rest @ ..] if is_space(*space) => {
+                self.rest = rest;
+                self.vertex()?;
+            }
+            [b'f', space, rest @ ..] if is_space(*space) => {
+                self.rest = rest;
+                self.face(limits)?;
+            }
+            rest => {
+                let len = rest.iter().position(u8::is_ascii_whitespace);
+                let keyword = &rest[..len.unwrap_or(rest.len())];
+                if !matches!(
+                    keyword,
+                    [] | [b'#', ..] | b"vn" | b"vt" | b"g" | b"o" | b"s" | b"usemtl" | b"mtllib"
+                ) {
+                    return None;
+                }
+            }
+        }
+        self.next_line();
+        Some(())
+    }
+
+    fn next_line(&mut self) {
+        let len = self.rest.iter().position(|byte| *byte == b'\n');
+        let len = len.map_or(self.rest.len(), |len| len + 1);
+        self.rest = &self.rest[len..];
+        self.line += 1;
+    }
+
+    fn skip_space(&mut self) {
+        while let [byte, rest @ ..] = self.rest
+            && is_space(*byte)
+        {
+            self.rest = rest;
+        }
+    }
+
+    /// Parses three numbers, and skips a weight of 1 or the three or four words of a colour.
+    fn vertex(&mut self) -> Option<()> {
+        let mut position = [0.0; 3];
+        for value in &mut position {
+            self.skip_space();
+            *value = self.number()?;
+        }
+        self.vertices.push(position);
+        let (mut words, mut len, mut was_space) = (0, 0, true);
+        for byte in self.rest {
+            match byte {
+                b'\n' | b'#' => break,
+                byte if is_space(*byte) => was_space = true,
+                _ => words += u32::from(std::mem::take(&mut was_space)),
+            }
+            len += 1;
+        }
+        let (rest, end) = self.rest.split_at(len);
+        self.rest = end;
+        let is_plain = match words {
+            1 => text::parse(rest.trim_ascii()) == Some(1.0),
+            0 => true,
+            words => matches!(words, 3 | 4) && !rest.trim_ascii_end().ends_with(b"\\"),
+        };
+        is_plain.then_some(())
+    }
+
+    /// Parses a number up to the end of its word.
+    fn number(&mut self) -> Option<f64> {
+        if let Some((value, rest)) = decimal::parse(self.rest)
+            && rest.first().is_none_or(u8::is_ascii_whitespace)
+        {
+            self.rest = rest;
+            return Some(value);
+        }
+        // A comment may follow at once, but `1.#IND` has none.
+        let number_before = |is_end: fn(&u8) -> bool| {
+            let len = self.rest.iter().position(is_end).unwrap_or(self.rest.len());
+            let (word, rest) = self.rest.split_at(len);
+            text::number(word).map(|number| (number, rest))
+        };
+        let found = number_before(u8::is_ascii_whitespace);
+        let (value, rest) = found.or_else(|| number_before(|byte| is_end_of_word(*byte)))?;
+        self.rest = rest;
+        Some(value)
+    }
+
+    /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner. Polygons of
+    /// fewer than three corners add nothing. Stops at the first triangle that exceeds the limits.
+    fn face(&mut self, limits: &MeshLimits) -> Option<()> {
+        let before = self.triangles.len();
+        let (mut first, mut last, mut highest) = (0, 0, 0);
+        for count in polled(0..) {
+            self.skip_space();
+            let is_end = matches!(self.rest, [] | [b'\n' | b'#', ..]);
+            if is_end || self.triangles.len() as u64 > limits.max_triangles {
+                break;
+            }
+            let corner = self.corner()?;
+            match count {
+                0 => first = corner,
+                1 => {}
+                _ => self.triangles.push([first, last, corner]),
+            }
+            last = corner;
+            highest = highest.max(corner);
+        }
+        if self.triangles.len() > before && highest > self.last_used.0 {
+            self.last_used = (highest, self.line);
+        }
+        Some(())
+    }
+
+    /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn` and returns the vertex's index, from 0. A negative index counts back from
+    /// the last vertex so far. An index that no vertex can have is returned as the highest.
+    fn corner(&mut self) -> Option<u32> {
+        let index = self.index()?;
+        let mut parts = 1;
+        while let [b'/', rest @ ..] = self.rest {
+            self.rest = rest;
+            parts += 1;
+            if let Some(b'-' | b'+' | b'0'..=b'9') = rest.first() {
+                self.index().filter(|_| parts <= 3)?;
+            }
+        }
+        let place = if index < 0 {
+            self.vertices.len() as i64 + index
+        } else {
+            index - 1
+        };
+        let place = u32::try_from(place).unwrap_or(u32::MAX);
+        self.rest
+            .first()
+            .is_none_or(|byte| is_end_of_word(*byte))
+            .then_some(place)
+    }
+
+    /// Parses an integer.
+    fn index(&mut self) -> Option<i64> {
+        let word = self.rest;
+        let sign = usize::from(matches!(word.first(), Some(b'-' | b'+')));
+        let mut index = 0;
+        let digits = decimal::read_digits(&word[sign..], &mut index);
+        self.rest = &word[sign + digits..];
+        match digits {
+            0 => None,
+            1..=MAX_INDEX_DIGITS if word[0] == b'-' => Some(-(index as i64)),
+            1..=MAX_INDEX_DIGITS => Some(index as i64),
+            _ => text::parse(&word[..sign + digits]),
+        }
+    }
+}
+
+/// White space within a line.
+const fn is_space(byte: u8) -> bool {
+    byte.is_ascii_whitespace() && byte != b'\n'
+}
+
+const fn is_end_of_word(byte: u8) -> bool {
+    byte.is_ascii_whitespace() || byte == b'#'
+}
+
+/// Returns the vertices that triangles use, in the order of their first use, and renumbers the triangles to match.
+fn in_order_of_use(all: &[[f64; 3]], triangles: &mut PageVec<[u32; 3]>) -> PageVec<[f64; 3]> {
+    const UNUSED: u32 = u32::MAX;
+    let mut new_index = vec![UNUSED; all.len()];
+    let mut vertices = PageVec::with_capacity(all.len());
+    for index in polled(triangles.as_flattened_mut()) {
+        let new = &mut new_index[*index as usize];
+        if *new == UNUSED {
+            *new = vertices.len() as u32;
+            vertices.push(all[*index as usize]);
+        }
+        *index = *new;
+    }
+    vertices
+}

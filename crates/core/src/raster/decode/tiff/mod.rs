@@ -1,0 +1,244 @@
+//! Decodes TIFF images: strips and tiles, in planes or not, of samples of 1 to 64 bits or floats.
+
+mod chunks;
+mod fax;
+mod layout;
+mod pages;
+mod photometric;
+mod predictor;
+mod samples;
+mod shared_chroma;
+mod tag_numbers;
+#[cfg(test)]
+mod tests;
+
+use super::error::{DecodeError, broken};
+use super::limits::ImageLimits;
+use super::print_image::{on_white, widen};
+use super::tags::TagSource;
+use crate::domain::FileKind;
+use crate::domain::cancel::poll;
+use crate::raster::Grid;
+use chunks::DecodedChunk;
+use layout::TiffLayout;
+use photometric::{Photometric, YCbCrCode};
+
+const ORIENTATION: u64 = 274;
+const ICC_PROFILE: u64 = 34675;
+
+/// The print of a TIFF file, as stored.
+pub(super) struct TiffImage {
+    pub(super) rgb: Grid<[u16; 3]>,
+    /// EXIF orientation, if the page has one.
+    pub(super) orientation: Option<u64>,
+    /// ICC profile, if the colours are grey or RGB.
+    pub(super) profile: Option<Vec<u8>>,
+    pub(super) has_16_bits: bool,
+}
+
+/// Decodes the print of a TIFF file.
+///
+/// If all floats are in 0..=1, white is 1. Otherwise all must be whole numbers in 0..=255 or in 0..=65535, and white is
+/// the end of the smaller range that holds them.
+///
+/// # Errors
+/// Returns an error if there is no single print, or if it is too large, truncated, or stored in a way that is not read.
+pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, DecodeError> {
+    let print = pages::find_print_page(&bytes)?;
+    let layout = TiffLayout::read(&print.page, limits)?;
+    let has_profile = !matches!(layout.photometric, Photometric::Cmyk);
+    Ok(TiffImage {
+        rgb: pixels(&layout, bytes)?,
+        orientation: print.inherited(ORIENTATION),
+        profile: print
+            .inherited_bytes(ICC_PROFILE)
+            .filter(|_| has_profile)
+            .map(<[u8]>::to_vec),
+        has_16_bits: layout.used_bits == 16 && !layout.is_float,
+    })
+}
+
+/// Returns the number of pixels of the print of a TIFF file, or `None` if its tags cannot be read.
+pub(super) fn pixel_count(file: &dyn TagSource) -> Option<u64> {
+    let print = pages::find_print_page(file).ok()?;
+    Some(pages::pixel_count(&print.page))
+}
+
+fn pixels(layout: &TiffLayout<'_>, file: &[u8]) -> Result<Grid<[u16; 3]>, DecodeError> {
+    let [across, down] = layout.chunk_counts();
+    let mut out = Grid::new(layout.width, layout.height, [0; 3]);
+    let all = (0..across * down).map(|at| layout.decoded_chunk(file, at));
+    if layout.is_float || layout.used_bits < layout.bits {
+        // The range of all samples decides what white is.
+        let chunks = all.collect::<Result<Vec<_>, _>>()?;
+        let full = full_scale(layout, &chunks)?;
+        for chunk in &chunks {
+            convert(layout, chunk, full, &mut out)?;
+        }
+        return Ok(out);
+    }
+    let full = largest(layout.bits);
+    for chunk in all {
+        convert(layout, &chunk?, full, &mut out)?;
+    }
+    Ok(out)
+}
+
+/// Returns the largest number of some bits.
+fn largest(bits: usize) -> f64 {
+    2_f64.powi(bits as i32) - 1.0
+}
+
+fn full_scale(layout: &TiffLayout<'_>, chunks: &[DecodedChunk<'_>]) -> Result<f64, DecodeError> {
+    let (mut least, mut most, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
+    let (mut row, pixel) = (Vec::new(), layout.samples * layout.planes);
+    for chunk in chunks {
+        for y in 0..chunk.height {
+            poll();
+            layout.read_row(chunk, y, &mut row);
+            for pixel in row.chunks_exact(pixel) {
+                for value in &pixel[..layout.photometric.samples()] {
+                    if !value.is_finite() {
+                        let reason = format!("it holds the sample {value}");
+                        return Err(broken(FileKind::Tiff, &reason));
+                    }
+                    (least, most) = (least.min(*value), most.max(*value));
+                    whole &= value.fract() == 0.0;
+                }
+            }
+        }
+    }
+    match most {
+        _ if !layout.is_float => {
+            // Padded samples are at either end of their 16 bits.
+            let used = largest(layout.used_bits);
+            return Ok(if most > used {
+                largest(layout.bits)
+            } else {
+                used
+            });
+        }
+        _ if least < 0.0 => {}
+        ..=1.0 => return Ok(1.0),
+        ..=255.0 if whole => return Ok(255.0),
+        ..=65535.0 if whole => return Ok(65535.0),
+        _ => {}
+    }
+    let reason = format!(
+        "its floats go from {least} to {most}; 0 to 1 and whole numbers to 255 or 65535 are read"
+    );
+    Err(broken(FileKind::Tiff, &reason))
+}
+
+/// Writes the colours of a strip or tile. `full` is the sample of white or opaque.
+fn convert(
+    layout: &TiffLayout<'_>,
+    chunk: &DecodedChunk<'_>,
+    full: f64,
+    out: &mut Grid<[u16; 3]>,
+) -> Result<(), DecodeError> {
+    let pixel = layout.samples * layout.planes;
+    let (mut samples, mut levels) = (Vec::new(), Vec::new());
+    for y in 0..chunk.height {
+        poll();
+        let start = (chunk.top + y) * layout.width + chunk.left;
+        let target = &mut out.data_mut()[start..][..chunk.width];
+        if let Some(bytes) = layout.plain_bytes(chunk, y) {
+            copy_bytes(&layout.photometric, bytes, target);
+            continue;
+        }
+        layout.read_levels(chunk, y, full, &mut samples, &mut levels);
+        let pixels = target.iter_mut().zip(levels.chunks_exact(pixel));
+        match &layout.photometric {
+            Photometric::WhiteIsZero => {
+                pixels.for_each(|(target, levels)| *target = [u16::MAX - levels[0]; 3]);
+            }
+            Photometric::BlackIsZero => {
+                pixels.for_each(|(target, levels)| *target = [levels[0]; 3]);
+            }
+            Photometric::Rgb => {
+                pixels.for_each(|(target, levels)| *target = [levels[0], levels[1], levels[2]]);
+            }
+            Photometric::Cmyk => pixels.for_each(|(target, levels)| {
+                *target = [0, 1, 2].map(|at| without_ink(levels[at], levels[3]));
+            }),
+            Photometric::YCbCr(code) => pixels.for_each(|(target, levels)| {
+                *target = ycbcr_colour(code, [levels[0], levels[1], levels[2]]);
+            }),
+            Photometric::Palette(palette) => {
+                layout.read_row(chunk, y, &mut samples);
+                for (target, samples) in target.iter_mut().zip(samples.chunks_exact(pixel)) {
+                    *target = palette_colour(palette, samples[0])?;
+                }
+            }
+        }
+        if let Some(alpha) = layout.alpha {
+            for (target, levels) in target.iter_mut().zip(levels.chunks_exact(pixel)) {
+                *target = composited(*target, levels[alpha.index], alpha.is_premultiplied);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns a colour on white.
+fn composited([r, g, b]: [u16; 3], alpha: u16, is_premultiplied: bool) -> [u16; 3] {
+    if is_premultiplied {
+        [r, g, b].map(|c| c.saturating_add(u16::MAX - alpha))
+    } else {
+        on_white([r, g, b, alpha])
+    }
+}
+
+/// Converts rows of 8-bit grey or RGB.
+fn copy_bytes(photometric: &Photometric, bytes: &[u8], target: &mut [[u16; 3]]) {
+    match photometric {
+        Photometric::Rgb => {
+            for (bytes, target) in bytes.as_chunks::<3>().0.iter().zip(target) {
+                *target = bytes.map(widen);
+            }
+        }
+        Photometric::WhiteIsZero => {
+            for (byte, target) in bytes.iter().zip(target) {
+                *target = [widen(!byte); 3];
+            }
+        }
+        _ => {
+            for (byte, target) in bytes.iter().zip(target) {
+                *target = [widen(*byte); 3];
+            }
+        }
+    }
+}
+
+fn palette_colour(palette: &[u16], number: f64) -> Result<[u16; 3], DecodeError> {
+    let count = palette.len() / 3;
+    let at = number as usize;
+    if at >= count {
+        let reason = format!("a pixel has the colour {at} of a palette of {count}");
+        return Err(broken(FileKind::Tiff, &reason));
+    }
+    Ok([0, 1, 2].map(|channel| palette[channel * count + at]))
+}
+
+/// Returns the light that an ink and black leave of white.
+fn without_ink(ink: u16, black: u16) -> u16 {
+    let [light, left] = [ink, black].map(|ink| u32::from(u16::MAX - ink));
+    (light * left / u32::from(u16::MAX)) as u16
+}
+
+/// Returns the colour of luma and chroma.
+fn ycbcr_colour(code: &YCbCrCode, levels: [u16; 3]) -> [u16; 3] {
+    let [y, b, r] = levels.map(|level| f64::from(level) / 257.0);
+    let [black, white, no_blue, most_blue, no_red, most_red] = code.range;
+    let luma = (y - black) / (white - black);
+    // Chroma goes from -1/2 to 1/2, nearly.
+    let blue = (b - no_blue) / (most_blue - no_blue) * 127.0 / 255.0;
+    let red = (r - no_red) / (most_red - no_red) * 127.0 / 255.0;
+    let [red_weight, green_weight, blue_weight] = code.weights;
+    let red = luma + red * 2.0 * (1.0 - red_weight);
+    let blue = luma + blue * 2.0 * (1.0 - blue_weight);
+    let green = (luma - red_weight * red - blue_weight * blue) / green_weight;
+    [red, green, blue]
+        .map(|fraction| (fraction.clamp(0.0, 1.0) * f64::from(u16::MAX)).round() as u16)
+}

@@ -1,0 +1,130 @@
+//! The pages of a TIFF file: chooses the one page of a print.
+
+use crate::domain::FileKind;
+use crate::raster::decode::error::{DecodeError, broken};
+use crate::raster::decode::tags::{TagDirectory, TagSource, TaggedFile};
+
+/// Flags of `NewSubfileType`: a reduced copy of another page, and a mask.
+const REDUCED: u64 = 1;
+const MASK: u64 = 4;
+/// Value of the older `SubfileType` for a reduced copy of another page.
+const OLD_REDUCED: u64 = 2;
+/// Most pages that are counted.
+const MAX_PAGES: usize = 1000;
+
+const NEW_SUBFILE_TYPE: u64 = 254;
+const SUBFILE_TYPE: u64 = 255;
+const WIDTH: u64 = 256;
+const HEIGHT: u64 = 257;
+const SUB_DIRECTORIES: u64 = 330;
+
+/// The page of a print.
+#[derive(Clone, Copy)]
+pub(super) struct PrintPage<'b> {
+    pub(super) page: TagDirectory<'b>,
+    /// The page that refers to it, if it is a subdirectory. Metadata of the picture may be there.
+    parent: Option<TagDirectory<'b>>,
+}
+
+impl PrintPage<'_> {
+    /// Returns the first value of a tag of the page, or of its parent.
+    pub(super) fn inherited(&self, tag: u64) -> Option<u64> {
+        let own = self.page.number(tag);
+        own.or_else(|| self.parent?.number(tag))
+    }
+
+    /// Returns the bytes of a tag of the page, or of its parent.
+    pub(super) fn inherited_bytes(&self, tag: u64) -> Option<&[u8]> {
+        let own = self.page.values(tag);
+        let values = own.or_else(|| self.parent?.values(tag))?;
+        values.bytes()
+    }
+}
+
+/// Returns whether a page is a reduced copy or a mask of another page.
+fn is_auxiliary(page: &TagDirectory<'_>) -> bool {
+    let flags = page.number(NEW_SUBFILE_TYPE).unwrap_or(0);
+    flags & (REDUCED | MASK) != 0 || page.number(SUBFILE_TYPE) == Some(OLD_REDUCED)
+}
+
+/// Returns the number of pixels of a page.
+pub(super) fn pixel_count(page: &TagDirectory<'_>) -> u64 {
+    let [width, height] = [WIDTH, HEIGHT].map(|tag| page.number(tag).unwrap_or(0));
+    width.saturating_mul(height)
+}
+
+/// The pages that are found so far.
+#[derive(Default)]
+struct FoundPages<'b> {
+    count: usize,
+    full: Vec<PrintPage<'b>>,
+}
+
+impl<'b> FoundPages<'b> {
+    /// Counts a page.
+    ///
+    /// # Errors
+    /// Returns an error if there are too many, as in a file whose pages refer to each other.
+    fn count(&mut self) -> Result<(), DecodeError> {
+        self.count += 1;
+        if self.count > MAX_PAGES {
+            let reason = format!("it has more than {MAX_PAGES} pages; a print is one page");
+            return Err(broken(FileKind::Tiff, &reason));
+        }
+        Ok(())
+    }
+
+    /// Adds a page, or the full pictures of which it is a preview: cameras and Photoshop store them in subdirectories.
+    fn add(&mut self, page: TagDirectory<'b>) -> Result<(), DecodeError> {
+        self.count()?;
+        let is_full = !is_auxiliary(&page);
+        let mut larger = Vec::new();
+        let offsets = page.values(SUB_DIRECTORIES);
+        for offset in offsets.iter().flat_map(|offsets| offsets.iter().flatten()) {
+            self.count()?;
+            let picture = page.file.directory_at(offset);
+            larger.extend(picture.filter(|picture| {
+                !is_auxiliary(picture) && (!is_full || pixel_count(picture) > pixel_count(&page))
+            }));
+        }
+        if larger.is_empty() && is_full {
+            let parent = None;
+            self.full.push(PrintPage { page, parent });
+        }
+        let parent = Some(page);
+        let pictures = larger.into_iter().map(|page| PrintPage { page, parent });
+        self.full.extend(pictures);
+        Ok(())
+    }
+}
+
+/// Finds the only full page of a file. Skips reduced copies and masks, but accepts any single page.
+///
+/// # Errors
+/// Returns an error if several pages are full, because only the user knows which one is the print. Also returns an
+/// error if none of several pages is full, or if a page cannot be read.
+pub(super) fn find_print_page(bytes: &dyn TagSource) -> Result<PrintPage<'_>, DecodeError> {
+    let truncated = || DecodeError::Truncated(FileKind::Tiff);
+    let file = TaggedFile::new(bytes).ok_or_else(truncated)?;
+    let first = file.first_directory().ok_or_else(truncated)?;
+    let (mut page, mut found) = (first, FoundPages::default());
+    loop {
+        found.add(page)?;
+        match page.next_offset().ok_or_else(truncated)? {
+            0 => break,
+            offset => page = file.directory_at(offset).ok_or_else(truncated)?,
+        }
+    }
+    match found.full[..] {
+        [print] => Ok(print),
+        // The only page is marked as a copy or a mask.
+        [] if found.count == 1 => Ok(PrintPage {
+            page: first,
+            parent: None,
+        }),
+        _ => Err(DecodeError::Pages {
+            full: found.full.len(),
+            count: found.count,
+        }),
+    }
+}

@@ -1,0 +1,262 @@
+//! Tests of CSV lists.
+
+use super::{ManifestError, ManifestRow};
+use mocban_core::domain::LengthUnit;
+
+fn parse(text: &str) -> Result<Vec<ManifestRow>, ManifestError> {
+    super::parse_csv(text.as_bytes())
+}
+
+fn refusal(text: &str) -> String {
+    parse(text).expect_err(text).to_string()
+}
+
+#[test]
+fn known_columns_are_parsed_and_others_stored() {
+    let rows = parse(
+        "id,mesh,print,character,block,unit,scanned_face_down,folio\n\
+         b1_0001,m/1.stl,p/1.png,天,b1,mm,yes,12r\nb1_0002,m/2.stl,p/2.png,,,,,\n",
+    )
+    .expect("parses");
+    assert_eq!(rows[0].name.as_str(), "b1_0001");
+    assert_eq!(rows[0].mesh.to_str(), Some("m/1.stl"));
+    assert_eq!(rows[0].character.as_deref(), Some("天"));
+    assert_eq!(rows[0].unit, Some(LengthUnit::Mm));
+    assert_eq!(rows[0].scanned_face_down, Some(true));
+    assert_eq!(rows[0].meta["folio"], "12r");
+    assert_eq!(
+        (rows[1].line, rows[1].unit, &rows[1].block),
+        (3, None, &None)
+    );
+    assert!(rows[1].meta.is_empty());
+}
+
+#[test]
+fn order_case_spaces_bom_and_separators_do_not_matter() {
+    let plain = parse("id,mesh,print\na,b,c\n").expect("parses");
+    for text in [
+        "\u{feff}id,mesh,print\r\na,b,c\r\n",
+        " Mesh ; ID ; PRINT\nb;a;c",
+        "print\tid\tmesh\nc\ta\tb\n",
+        "id,mesh,print\na,\"b\",c\n,,\n",
+    ] {
+        assert_eq!(parse(text).expect(text), plain, "{text:?}");
+    }
+}
+
+#[test]
+fn lines_are_counted_through_blank_lines_and_long_cells() {
+    let rows = parse("\n\nid,mesh,print,note\n\na,b,c,\"two\nlines\"\r\n\r\n\nd,e,f,\ng,h,i,\n")
+        .expect("parses");
+    let lines: Vec<_> = rows.iter().map(|row| row.line).collect();
+    assert_eq!(lines, [5, 9, 10]);
+}
+
+#[test]
+fn every_problem_is_reported_with_its_line() {
+    let text = "id,mesh,print,unit,scanned_face_down\n\
+        a,m,p,,\n\
+        a/b,m,p,,\n\
+        ,m,p,,\n\
+        a,m,p,,\n\
+        c,,,furlong,maybe\n\
+        d,m\n";
+    assert_eq!(
+        refusal(text).lines().collect::<Vec<_>>(),
+        [
+            "line 3: id \"a/b\" holds '/'; an id has no slashes, control or invisible characters",
+            "line 4: the id is empty",
+            "line 5: id \"a\" is already on line 2",
+            "line 6: mesh is empty",
+            "line 6: print is empty",
+            "line 6: \"furlong\" is not a unit (mm, cm, m, in)",
+            "line 6: scanned_face_down is \"maybe\", not true, false, yes, no, 1 or 0",
+            "line 7: the row has 2 cells, the header has 5",
+        ]
+    );
+}
+
+#[test]
+fn ids_that_differ_in_case_or_unicode_form_only_are_refused() {
+    assert_eq!(
+        refusal("id,mesh,print\nA1,m,p\nb,m,p\na1,m,p\n"),
+        "line 4: id \"a1\" differs from that on line 2 only in upper and lower case, so their files would be one on \
+         Windows and macOS; rename one of them"
+    );
+    let [composed, decomposed] = ["chữ", "chu\u{31b}\u{303}"];
+    assert_eq!(
+        refusal(&format!(
+            "id,mesh,print\n{composed},m,p\n{decomposed},m,p\n"
+        )),
+        format!("line 3: id {decomposed:?} is already on line 2")
+    );
+    assert!(refusal("id,mesh,print\nĐĩa,m,p\nđĩa,m,p\n").contains("only in upper and lower case"));
+    assert!(parse("id,mesh,print\ndia,m,p\nđĩa,m,p\n").is_ok());
+}
+
+#[test]
+fn missing_and_repeated_columns_are_reported() {
+    assert_eq!(
+        refusal("id,model,print\na,b,c\n"),
+        "line 1: column \"mesh\" is missing; rename \"model\" to \"mesh\" if it is meant; the header has: id, \
+         model, print"
+    );
+    assert_eq!(
+        refusal("id,mesh,print,Mesh\na,b,c,d\n"),
+        "line 1: columns 2 and 4 are both named \"Mesh\""
+    );
+    assert_eq!(refusal(""), "the list is empty");
+    assert_eq!(refusal("id,mesh,print\n"), "the list contains no pairs");
+}
+
+#[test]
+fn a_row_without_closing_quotation_mark_is_refused_with_its_line() {
+    let rest = "b,m,p,\n".repeat(1 << 18);
+    let text = format!("id,mesh,print,note\n\n\na/b,m,p,\n\nc,m,p,\"open\n{rest}");
+    assert_eq!(
+        refusal(&text),
+        "line 6: a quote is opened here and never closed"
+    );
+    let long = "x".repeat(1 << 21);
+    let text = format!("id,mesh,print,note\na/b,m,p,\nc,m,p,\"{long}\"\n");
+    assert_eq!(
+        refusal(&text).lines().collect::<Vec<_>>(),
+        [
+            "line 2: id \"a/b\" holds '/'; an id has no slashes, control or invisible characters",
+            "line 3: the row has more than 1048576 bytes; a closing quotation mark may be missing",
+        ]
+    );
+    // The limit applies to each row, not to the list.
+    let rows: Vec<_> = (0..300_000).map(|n| format!("{n},m,p")).collect();
+    let rows = parse(&format!("id,mesh,print\n{}", rows.join("\n"))).expect("parses");
+    assert_eq!(rows.last().map(|row| row.line), Some(300_001));
+}
+
+#[test]
+fn a_long_column_name_is_refused() {
+    let name = "n".repeat(1001);
+    assert_eq!(
+        refusal(&format!("id,mesh,print,{name}\na,b,c,d\n")),
+        "line 1: the name of column 4 has 1001 bytes, over the limit of 1000"
+    );
+    let text = format!("id,mesh,print,{}\na,b,c,d\n", &name[1..]);
+    assert_eq!(parse(&text).expect("parses")[0].meta.len(), 1);
+}
+
+#[test]
+fn bytes_that_are_not_utf8_are_reported_with_line_and_column() {
+    let error = super::parse_csv(b"id,mesh,print\na,b,c\nd,\x01\xff\xfe,f\n").expect_err("bytes");
+    assert_eq!(
+        error.to_string(),
+        "line 3: the cell of column \"mesh\" is not UTF-8"
+    );
+    // "chữ" in Windows-1258: "ch", "ư" and a combining tilde.
+    let error = super::parse_csv(b"id,mesh,print\na,ch\xfd\xde.stl,c\n").expect_err("bytes");
+    assert_eq!(
+        error.to_string(),
+        "line 2: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
+         list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")"
+    );
+}
+
+#[test]
+fn the_encoding_is_that_of_all_lines_and_given_once() {
+    // Without the second row, the first could be Windows-1252.
+    let error =
+        super::parse_csv(b"id,mesh,print\na,\xe0.stl,c\nb,ch\xfd\xde.stl,c\n").expect_err("bytes");
+    assert_eq!(
+        error.to_string(),
+        "lines 2, 3: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
+         list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")"
+    );
+    // Only lines that are not UTF-8 decide, and this one is not text.
+    let list = ["id,mesh,print\nđá,a,b\ny,".as_bytes(), b"\x01\xff.stl,c\n"].concat();
+    let error = super::parse_csv(&list).expect_err("bytes");
+    assert_eq!(
+        error.to_string(),
+        "line 3: the cell of column \"mesh\" is not UTF-8"
+    );
+}
+
+#[test]
+fn swapped_columns_are_named_once() {
+    let swapped = "id,mesh,print\n1,p/1.JPG,m/1.ply\n2,p/2.jpg,m/2.ply\n";
+    assert_eq!(
+        refusal(swapped),
+        "lines 2, 3: mesh names an image and print names a mesh; swap the two"
+    );
+    assert_eq!(
+        refusal("id,mesh,print\nm/1.stl,1,p/1.png\nm/2.stl,2,p/2.png\n"),
+        "lines 2, 3: id names a file; give each pair an id, or swap the columns if they are mixed up"
+    );
+    // The content decides, so an unusual extension is no reason to refuse a row.
+    assert!(parse("id,mesh,print\n1,scan.tif,print.dat\n").is_ok());
+}
+
+#[test]
+fn a_misspelt_column_is_named() {
+    assert_eq!(
+        refusal("id,mech,print\na,b,c\n"),
+        "line 1: column \"mesh\" is missing; rename \"mech\" to \"mesh\" if it is meant; the header has: id, \
+         mech, print"
+    );
+    // Names that may mean something else are offered, not taken.
+    let renamed: Vec<_> = refusal("ảnh,mesh,tên\na,b,c\n")
+        .lines()
+        .map(|line| line.split("; ").nth(1).map(str::to_owned))
+        .collect();
+    assert_eq!(
+        renamed,
+        [
+            Some("rename \"tên\" to \"id\" if it is meant".to_owned()),
+            Some("rename \"ảnh\" to \"print\" if it is meant".to_owned())
+        ]
+    );
+}
+
+#[test]
+fn headers_may_be_vietnamese_in_any_case_and_with_blanks() {
+    let plain =
+        parse("id,mesh,print,character,block,unit,scanned_face_down,note\na,b,c,d,e,mm,yes,f\n")
+            .expect("parses");
+    for header in [
+        "Mã số,Bản quét,Bản in,Tên chữ,Khối,Đơn vị,Quét úp,note",
+        "MA SO,BAN QUET,BAN IN,CHU,SO HIEU VAN,DON VI,QUET UP,note",
+        "ID,Mesh ,print\u{a0},ký tự,số hiệu ván,unit,Scanned Face-Down,note",
+    ] {
+        let rows = parse(&format!("{header}\na,b,c,d,e,mm,Có,f\n")).expect(header);
+        assert_eq!(rows, plain, "{header}");
+    }
+    let read = super::read_csv(
+        "id,mesh,print,Khối,ván\na,b,c,d,e\n".as_bytes(),
+        &mut |row| {
+            assert_eq!((row.block.as_deref(), row.meta.len()), (Some("e"), 1));
+        },
+    );
+    let renamed = read.expect("parses").renamed;
+    assert_eq!(
+        renamed.into_iter().collect::<Vec<_>>(),
+        [("ván".to_owned(), "block")]
+    );
+}
+
+#[test]
+fn lists_of_spreadsheets_and_scripts_are_read() {
+    let plain = parse("id,mesh,print\na,b c,d\n").expect("parses");
+    for list in [
+        "sep=;\r\nid;mesh;print\r\na;b c;d\r\n",
+        "id, \"mesh\", \"print\"\na, \"b c\", \"d\"\n",
+        "id,mesh,print\n\u{a0}a,b c\u{a0},\u{feff}d\u{200b}\n",
+    ] {
+        let rows = parse(list).expect(list);
+        assert_eq!(rows[0].mesh, plain[0].mesh, "{list}");
+        assert_eq!(
+            (&rows[0].name, &rows[0].print),
+            (&plain[0].name, &plain[0].print)
+        );
+    }
+    let shifted = refusal("sep=;\nid;mesh;print\na;;d\n");
+    assert_eq!(shifted, "line 3: mesh is empty");
+    let spaced = parse("id,mesh,print\nchữ\u{a0}số,b,c\n").expect("parses");
+    assert_eq!(spaced[0].name.as_str(), "chữ số");
+}

@@ -1,0 +1,160 @@
+//! Splits a JSON array into the texts of its values, which are then parsed like the lines of JSON Lines.
+
+use super::error::{Problem, at_line};
+
+/// Calls `each` for every value of an array with the line on which it begins.
+///
+/// # Errors
+/// Returns an error if the array ends early, a comma is missing between two values, or text follows its end.
+pub(super) fn each_value(list: &[u8], each: &mut dyn FnMut(usize, &[u8])) -> Result<(), Problem> {
+    let mut place = ArrayPlace {
+        list,
+        at: 0,
+        line: 1,
+    };
+    place.skip_blanks();
+    // The opening bracket.
+    place.at += 1;
+    loop {
+        place.skip_blanks();
+        if place.byte()? == b']' {
+            break;
+        }
+        let (line, start) = (place.line, place.at);
+        place.skip_value();
+        each(line, &list[start..place.at]);
+        place.skip_blanks();
+        match place.byte()? {
+            b',' => place.at += 1,
+            b']' => break,
+            _ => return Err(at_line(place.line, "a comma is missing before this row")),
+        }
+    }
+    place.at += 1;
+    place.skip_blanks();
+    if place.at < list.len() {
+        return Err(at_line(place.line, "text follows the end of the list"));
+    }
+    Ok(())
+}
+
+/// A place in the text of an array.
+struct ArrayPlace<'l> {
+    list: &'l [u8],
+    at: usize,
+    /// Its line, from 1.
+    line: usize,
+}
+
+impl ArrayPlace<'_> {
+    fn byte(&self) -> Result<u8, Problem> {
+        let byte = self.list.get(self.at).copied();
+        byte.ok_or_else(|| at_line(self.line, "the list ends early; save or copy it again"))
+    }
+
+    fn go_to(&mut self, at: usize) {
+        let passed = &self.list[self.at..at];
+        self.line += passed.split(|byte| *byte == b'\n').count() - 1;
+        self.at = at;
+    }
+
+    fn skip_blanks(&mut self) {
+        let rest = self.list[self.at..].iter();
+        let blanks = rest.take_while(|byte| byte.is_ascii_whitespace()).count();
+        self.go_to(self.at + blanks);
+    }
+
+    /// Goes to the end of a value: behind the bracket that closes it, or before a comma, bracket or blank.
+    fn skip_value(&mut self) {
+        let (mut depth, mut in_text, mut is_escaped) = (0_usize, false, false);
+        let mut end = self.list.len();
+        for (at, byte) in self.list.iter().enumerate().skip(self.at) {
+            if in_text {
+                in_text = *byte != b'"' || is_escaped;
+                is_escaped = *byte == b'\\' && !is_escaped;
+                continue;
+            }
+            let closes = matches!(byte, b']' | b'}');
+            if depth == 0 && (*byte == b',' || closes || byte.is_ascii_whitespace()) {
+                // A bracket that closes nothing is a value that the parser refuses.
+                end = at.max(self.at + usize::from(*byte != b']'));
+                break;
+            }
+            match byte {
+                b'"' => in_text = true,
+                b'[' | b'{' => depth += 1,
+                _ if closes => depth -= 1,
+                _ => {}
+            }
+            if closes && depth == 0 {
+                end = at + 1;
+                break;
+            }
+        }
+        self.go_to(end);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::each_value;
+
+    fn values(list: &str) -> (Vec<(usize, String)>, Option<String>) {
+        let mut found = Vec::new();
+        let mut each =
+            |line, value: &[u8]| found.push((line, String::from_utf8_lossy(value).into_owned()));
+        let outcome = each_value(list.as_bytes(), &mut each);
+        (found, outcome.err().map(|problem| problem.to_string()))
+    }
+
+    #[test]
+    fn values_are_split_with_their_lines() {
+        let list = "\n[\n {\"a\": [1, {\"b\": \"],}\\\"\"}]},\n\n{\"c\"\n:2} , 3,]\n";
+        let expected = [
+            (3, "{\"a\": [1, {\"b\": \"],}\\\"\"}]}"),
+            (5, "{\"c\"\n:2}"),
+            (6, "3"),
+        ];
+        let (found, problem) = values(list);
+        assert_eq!(found, expected.map(|(line, text)| (line, text.to_owned())));
+        assert_eq!(problem, None);
+        assert_eq!(values("[]"), (vec![], None));
+    }
+
+    #[test]
+    fn damaged_arrays_are_refused_with_their_line() {
+        for (list, expected) in [
+            (
+                "[{}\n",
+                "line 2: the list ends early; save or copy it again",
+            ),
+            (
+                "[{\"a\": \"}]\n",
+                "line 2: the list ends early; save or copy it again",
+            ),
+            ("[{}\n {}]", "line 2: a comma is missing before this row"),
+            ("[{}]\n{}", "line 2: text follows the end of the list"),
+            ("[", "line 1: the list ends early; save or copy it again"),
+        ] {
+            assert_eq!(values(list).1.as_deref(), Some(expected), "{list}");
+        }
+        // The parser refuses what is no object.
+        for list in ["[,]", "[}]", "[{},,{}]", "[}}}]", "[,,,"] {
+            assert!(
+                values(list)
+                    .0
+                    .iter()
+                    .any(|(_, value)| !value.starts_with('{')),
+                "{list}"
+            );
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_text_ends(list in "[\\[\\]{},\"\\\\a \n]{0,40}") {
+            let (found, _) = values(&format!("[{list}"));
+            proptest::prop_assert!(found.len() <= list.len() + 1);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Why a workbook cannot be read.
+
+use mocban_core::domain::sanitize;
+
+/// Longest text of a workbook in a message, in characters.
+const MAX_SHOWN: usize = 100;
+/// Maximum number of sheets that a message names.
+const MAX_SHEETS: usize = 8;
+
+/// Why a workbook cannot be read, and what to do.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WorkbookError {
+    /// A ZIP archive without a workbook of Excel.
+    #[error("this is {0}, not an XLSX workbook; save the table as XLSX or as \"CSV UTF-8\"")]
+    OtherArchive(&'static str),
+    /// The archive or a part of it is damaged.
+    #[error("the workbook is damaged: {}; save it again", sanitize(.0, MAX_SHOWN))]
+    Damaged(String),
+    /// A part is larger than any table.
+    #[error("{} of the workbook has more than {} MiB; save the sheet alone", sanitize(.part, MAX_SHOWN), .limit >> 20)]
+    TooLarge {
+        /// The part.
+        part: String,
+        /// Largest size in bytes.
+        limit: u64,
+    },
+    /// There is no sheet of this name.
+    #[error("there is no sheet \"{}\"; the workbook has: {}", sanitize(.name, MAX_SHOWN), list(.sheets))]
+    NoSheet {
+        /// The name that was given.
+        name: String,
+        /// Names of the sheets.
+        sheets: Vec<String>,
+    },
+    /// An id or a file name that the spreadsheet program took for a date or a number.
+    #[error("cell {cell} of column \"{}\" is {kind}, {}, which the spreadsheet program may have made of a text such as {example}; give the column the format Text and write the cell again", sanitize(.column, MAX_SHOWN), sanitize(.text, MAX_SHOWN))]
+    Converted {
+        /// The cell, such as `B5`.
+        cell: String,
+        /// Name of its column.
+        column: String,
+        /// `a date` or `a power of ten`.
+        kind: &'static str,
+        /// What it shows.
+        text: String,
+        /// A text that is converted in this way.
+        example: &'static str,
+    },
+    /// A text longer than a spreadsheet program allows.
+    #[error("cell {cell} has more than {limit} bytes of text; shorten it")]
+    LongCell {
+        /// The cell.
+        cell: String,
+        /// Longest text in bytes.
+        limit: usize,
+    },
+    /// A formula that was never computed, as in a workbook that a script wrote.
+    #[error(
+        "cell {cell} has a formula without its result; open the workbook in a spreadsheet program and save it"
+    )]
+    NoResult {
+        /// The cell.
+        cell: String,
+    },
+    /// A formula that failed.
+    #[error("cell {cell} has the error {}; correct it, or clear the cell", sanitize(.value, MAX_SHOWN))]
+    CellError {
+        /// The cell, such as `B5`.
+        cell: String,
+        /// The error, such as `#REF!`.
+        value: String,
+    },
+}
+
+/// Returns the first names of sheets in quotation marks.
+pub(super) fn list(sheets: &[String]) -> String {
+    let shown = sheets.iter().take(MAX_SHEETS);
+    let shown = shown.map(|name| format!("\"{}\"", sanitize(name, MAX_SHOWN)));
+    let text = shown.collect::<Vec<_>>().join(", ");
+    match sheets.len().saturating_sub(MAX_SHEETS) {
+        0 => text,
+        more => format!("{text} and {more} more"),
+    }
+}

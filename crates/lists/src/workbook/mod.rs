@@ -1,0 +1,78 @@
+//! Workbooks of Excel (XLSX): ZIP archives of XML. A sheet becomes CSV text, which is then read like any list.
+
+mod archive;
+mod error;
+mod number_format;
+mod parts;
+mod table;
+#[cfg(any(test, feature = "test-helpers"))]
+pub mod test_helpers;
+#[cfg(test)]
+mod tests;
+
+use self::archive::Archive;
+use self::error::list;
+use self::parts::Workbook;
+pub use error::WorkbookError;
+
+/// First bytes of a ZIP archive.
+const START: &[u8] = b"PK\x03\x04";
+
+/// A sheet as a table in CSV.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SheetTable {
+    /// The table, separated by commas. Its lines are the rows of the sheet, so an error in a line is one in that row.
+    pub csv: Vec<u8>,
+    /// Says which sheet was read if there are others.
+    pub warning: Option<String>,
+}
+
+/// Returns whether a file may be a workbook: a ZIP archive.
+pub fn is_workbook(bytes: &[u8]) -> bool {
+    bytes.starts_with(START)
+}
+
+/// Reads the sheet with a name, or else the first one that is not hidden. Numbers and dates become text as a reader sees
+/// them, `0117` with the format `0000` and `2026-11-21`; of formulas, the stored results are taken.
+///
+/// # Errors
+/// Returns an error if the bytes are not those of an XLSX workbook, it is damaged or too large, has no such sheet, or if a
+/// cell holds the error of a formula.
+pub fn read_sheet(bytes: &[u8], name: Option<&str>) -> Result<SheetTable, WorkbookError> {
+    let archive = Archive::open(bytes)?;
+    let workbook = Workbook::read(&archive)?;
+    if workbook.sheets.is_empty() {
+        return Err(archive::damaged("it has no sheets"));
+    }
+    let visible = workbook.sheets.iter().filter(|sheet| !sheet.is_hidden);
+    let sheet = match name {
+        Some(name) => workbook.sheets.iter().find(|sheet| sheet.name == name),
+        None => visible.clone().next().or(workbook.sheets.first()),
+    };
+    let sheets = || {
+        workbook
+            .sheets
+            .iter()
+            .map(|sheet| sheet.name.clone())
+            .collect()
+    };
+    let sheet = sheet.ok_or_else(|| WorkbookError::NoSheet {
+        name: name.unwrap_or_default().to_owned(),
+        sheets: sheets(),
+    })?;
+    let text = archive.text(&sheet.file)?;
+    let text = text.ok_or_else(|| archive::damaged("the file of the sheet is missing"))?;
+    let others: Vec<String> = visible
+        .filter(|other| *other != sheet)
+        .map(|other| other.name.clone())
+        .collect();
+    let is_chosen = name.is_some() || others.is_empty();
+    let warning = || {
+        let (read, others) = (list(std::slice::from_ref(&sheet.name)), list(&others));
+        format!("only the sheet {read} is read; name another one with --sheet: {others}")
+    };
+    Ok(SheetTable {
+        csv: table::csv(&workbook, &sheet.file, &text)?,
+        warning: (!is_chosen).then(warning),
+    })
+}

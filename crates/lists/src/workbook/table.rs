@@ -1,0 +1,307 @@
+//! The cells of a sheet as CSV: one line for each row, so that a line is the row of the same number.
+
+use std::collections::BTreeMap;
+
+use super::archive::damaged;
+use super::error::WorkbookError;
+use super::parts::{TextCollector, Workbook, read_part, value};
+use crate::manifest::is_text_column;
+use crate::xml::{XmlPart, local_name};
+
+/// Largest sheet: rows and columns of Excel.
+const MAX_ROWS: usize = 1 << 20;
+const MAX_COLUMNS: usize = 1 << 14;
+/// Longest table, in bytes. Cells share texts, so a small workbook may hold a large one. Less in tests.
+const MAX_TABLE_BYTES: usize = if cfg!(test) { 4 << 20 } else { 512 << 20 };
+
+/// Longest text of a cell, in bytes. Excel allows 32,767 units of UTF-16, each of up to 3 bytes in UTF-8.
+const MAX_CELL_BYTES: usize = 3 * 32_767;
+
+/// A cell whose element is open.
+#[derive(Default)]
+struct OpenCell {
+    column: usize,
+    kind: String,
+    style: usize,
+    has_formula: bool,
+    /// Text of its value.
+    value: String,
+}
+
+/// Writes a sheet as CSV.
+struct TableWriter<'w> {
+    workbook: &'w Workbook,
+    csv: Vec<u8>,
+    /// Number of rows that were written.
+    rows: usize,
+    /// Number of columns of the header, the first row with a value; 0 before it.
+    width: usize,
+    /// Columns whose values are names, with the header's.
+    text_columns: BTreeMap<usize, String>,
+    /// Number of the open row, from 1, its cells, and the bytes of their texts.
+    row: usize,
+    cells: Vec<String>,
+    row_bytes: usize,
+    /// Column of the next cell if it does not say where it is.
+    next_column: usize,
+    cell: Option<OpenCell>,
+}
+
+/// Returns the text of a sheet as CSV. Columns without a name in the header, the first row with a value, are left out. Line
+/// breaks in cells become blanks.
+pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>, WorkbookError> {
+    let mut writer = TableWriter {
+        workbook,
+        csv: Vec::new(),
+        rows: 0,
+        width: 0,
+        text_columns: BTreeMap::new(),
+        row: 0,
+        cells: Vec::new(),
+        row_bytes: 0,
+        next_column: 0,
+        cell: None,
+    };
+    let mut collector = TextCollector::default();
+    read_part(file, text, |part| {
+        if let (XmlPart::Text(text), Some(cell)) = (&part, &mut writer.cell)
+            && collector.is_in("v")
+        {
+            cell.value.push_str(text);
+        }
+        if let (Some(text), Some(cell)) = (collector.add(&part), &mut writer.cell) {
+            cell.value.push_str(text);
+        }
+        match part {
+            XmlPart::Start(element) => match local_name(&element).as_str() {
+                "row" => writer.begin_row(&value(&element, "r")?),
+                "c" => {
+                    let style = value(&element, "s")?.parse().unwrap_or_default();
+                    writer.begin_cell(&value(&element, "r")?, value(&element, "t")?, style)
+                }
+                "f" => {
+                    if let Some(cell) = &mut writer.cell {
+                        cell.has_formula = true;
+                    }
+                    Ok(())
+                }
+                _ => Ok(()),
+            },
+            XmlPart::End if collector.is_in("row") => writer.end_cell(),
+            XmlPart::End if collector.is_in("sheetData") => writer.end_row(),
+            XmlPart::End | XmlPart::Text(_) => Ok(()),
+        }
+    })?;
+    Ok(writer.csv)
+}
+
+impl TableWriter<'_> {
+    fn begin_row(&mut self, number: &str) -> Result<(), WorkbookError> {
+        self.row = match number {
+            "" => self.row + 1,
+            number => number.parse().unwrap_or_default(),
+        };
+        if self.row <= self.rows || self.row > MAX_ROWS {
+            return Err(damaged(&format!("a row has the number {number}")));
+        }
+        self.cells.clear();
+        self.row_bytes = 0;
+        self.next_column = 0;
+        Ok(())
+    }
+
+    fn begin_cell(&mut self, place: &str, kind: String, style: usize) -> Result<(), WorkbookError> {
+        if place.is_empty() && self.next_column >= MAX_COLUMNS {
+            return Err(damaged(&format!("a row has more than {MAX_COLUMNS} cells")));
+        }
+        let column = match place {
+            "" => Some(self.next_column),
+            place => column(place),
+        };
+        let column = column.filter(|column| *column < MAX_COLUMNS);
+        let column = column.ok_or_else(|| damaged(&format!("there is no cell {place}")))?;
+        self.next_column = column + 1;
+        self.cell = Some(OpenCell {
+            column,
+            kind,
+            style,
+            has_formula: false,
+            value: String::new(),
+        });
+        Ok(())
+    }
+
+    fn end_cell(&mut self) -> Result<(), WorkbookError> {
+        let Some(cell) = self.cell.take() else {
+            return Ok(());
+        };
+        let column = cell.column;
+        if self.width > 0 && column >= self.width {
+            return Ok(());
+        }
+        let text = self.text(cell)?;
+        if text.trim().is_empty() {
+            return Ok(());
+        }
+        self.row_bytes += text.len();
+        check_table(self.csv.len() + self.row_bytes)?;
+        if self.cells.len() <= column {
+            self.cells.resize(column + 1, String::new());
+        }
+        self.cells[column] = text;
+        Ok(())
+    }
+
+    /// Returns the text of a cell.
+    fn text(&self, cell: OpenCell) -> Result<String, WorkbookError> {
+        let OpenCell {
+            column,
+            kind,
+            style,
+            has_formula,
+            value,
+        } = cell;
+        Ok(match kind.as_str() {
+            "s" => {
+                let index = value.trim().parse::<usize>().ok();
+                let string = index.and_then(|index| self.workbook.strings.get(index));
+                let string =
+                    string.ok_or_else(|| damaged(&format!("there is no string {value}")))?;
+                self.check_length(column, string)?;
+                string.clone()
+            }
+            "b" if value.trim() == "1" => "true".to_owned(),
+            "b" => "false".to_owned(),
+            "e" => {
+                let cell = self.name(column);
+                return Err(WorkbookError::CellError { cell, value });
+            }
+            "str" | "inlineStr" | "d" => {
+                self.check_length(column, &value)?;
+                value
+            }
+            _ if value.trim().is_empty() && has_formula => {
+                let cell = self.name(column);
+                return Err(WorkbookError::NoResult { cell });
+            }
+            _ if value.trim().is_empty() => String::new(),
+            _ => {
+                let format = self.workbook.formats.get(style).copied();
+                let format = format.unwrap_or_default();
+                let text = format.text(&value, self.workbook.is_1904);
+                if let (Some((kind, example)), Some(header)) =
+                    (format.conversion(), self.text_columns.get(&column))
+                {
+                    return Err(WorkbookError::Converted {
+                        cell: self.name(column),
+                        column: header.clone(),
+                        kind,
+                        text,
+                        example,
+                    });
+                }
+                text
+            }
+        })
+    }
+
+    /// Returns the name of a cell of the open row, such as `B5`.
+    fn name(&self, column: usize) -> String {
+        format!("{}{}", letters(column), self.row)
+    }
+
+    fn check_length(&self, column: usize, text: &str) -> Result<(), WorkbookError> {
+        if text.len() <= MAX_CELL_BYTES {
+            return Ok(());
+        }
+        let (cell, limit) = (self.name(column), MAX_CELL_BYTES);
+        Err(WorkbookError::LongCell { cell, limit })
+    }
+
+    /// Writes the open row. Rows before it that are missing become blank lines.
+    fn end_row(&mut self) -> Result<(), WorkbookError> {
+        if self.cells.is_empty() {
+            return Ok(());
+        }
+        if self.width == 0 {
+            self.width = self.cells.len();
+            let cells = self.cells.iter().enumerate();
+            let names = cells.filter(|(_, name)| is_text_column(name));
+            self.text_columns = names.map(|(k, name)| (k, name.clone())).collect();
+        }
+        for _ in self.rows + 1..self.row {
+            self.csv.push(b'\n');
+        }
+        for column in 0..self.width {
+            if column > 0 {
+                self.csv.push(b',');
+            }
+            let text = self.cells.get(column).map_or("", String::as_str);
+            push_cell(&mut self.csv, text);
+        }
+        self.csv.push(b'\n');
+        self.rows = self.row;
+        check_table(self.csv.len())
+    }
+}
+
+/// Refuses a table of too many bytes.
+fn check_table(bytes: usize) -> Result<(), WorkbookError> {
+    if bytes <= MAX_TABLE_BYTES {
+        return Ok(());
+    }
+    Err(WorkbookError::TooLarge {
+        part: "the table".to_owned(),
+        limit: MAX_TABLE_BYTES as u64,
+    })
+}
+
+/// Writes a cell in quotes. Line breaks become blanks.
+fn push_cell(csv: &mut Vec<u8>, text: &str) {
+    if text.is_empty() {
+        return;
+    }
+    let one_line = text.replace(['\r', '\n'], " ").replace('"', "\"\"");
+    for part in ["\"", &one_line, "\""] {
+        csv.extend_from_slice(part.as_bytes());
+    }
+}
+
+/// Returns the column of a cell such as `AB12`, from 0.
+fn column(place: &str) -> Option<usize> {
+    let letters = place.bytes().take_while(u8::is_ascii_alphabetic);
+    let number = letters.take(4).fold(0, |number, letter| {
+        number * 26 + usize::from(letter.to_ascii_uppercase() - b'A') + 1
+    });
+    number.checked_sub(1)
+}
+
+/// Returns the letters of a column.
+fn letters(column: usize) -> String {
+    let mut letters = Vec::new();
+    let mut rest = column + 1;
+    while rest > 0 {
+        rest -= 1;
+        letters.insert(0, b'A' + (rest % 26) as u8);
+        rest /= 26;
+    }
+    String::from_utf8_lossy(&letters).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{column, letters};
+
+    #[test]
+    fn columns_have_letters() {
+        for (name, number) in [("A1", 0), ("Z9", 25), ("AA1", 26), ("xfd1048576", 16_383)] {
+            assert_eq!(column(name), Some(number));
+            let upper = name
+                .trim_end_matches(|c: char| c.is_ascii_digit())
+                .to_uppercase();
+            assert_eq!(letters(number), upper);
+        }
+        assert_eq!(column("12"), None);
+        assert!(column("ZZZZZZZZZZZZZZZZ1").is_some_and(|column| column > 16_383));
+    }
+}

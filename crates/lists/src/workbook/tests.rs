@@ -1,0 +1,219 @@
+//! Workbooks as spreadsheet programs write them, and damaged ones.
+
+use proptest::prelude::{ProptestConfig, any, proptest};
+use proptest::sample::Index;
+
+use super::test_helpers::{archive, text_rows, workbook};
+use super::{WorkbookError, is_workbook, read_sheet};
+use crate::manifest::parse_csv;
+
+const STRINGS: &str = "<sst count=\"9\"><si><t>id</t></si><si><t xml:space=\"preserve\">mesh </t></si>\
+    <si><r><t>pr</t></r><r><rPr><b/></rPr><t>int</t></r><rPh sb=\"0\"><t>reading</t></rPh></si>\
+    <si><t>stl/1, \"a\" &amp; b.stl</t></si><si><t>x&#10;y</t></si><si/></sst>";
+
+const STYLES: &str = "<styleSheet><numFmts><numFmt numFmtId=\"164\" formatCode=\"0000\"/></numFmts>\
+    <cellStyleXfs><xf numFmtId=\"14\"/></cellStyleXfs>\
+    <cellXfs><xf numFmtId=\"0\"/><xf numFmtId=\"164\"/><xf numFmtId=\"14\"/></cellXfs></styleSheet>";
+
+/// A sheet with all kinds of cells, a gap of rows, and a value beside the table.
+const ROWS: &str = "<row r=\"2\"><c r=\"A2\" t=\"s\"><v>0</v></c><c r=\"B2\" t=\"s\"><v>1</v></c><c r=\"C2\" t=\"s\"><v>2</v></c>\
+    <c r=\"D2\" t=\"str\"><f>A1</f><v>made</v></c><c r=\"E2\" t=\"inlineStr\"><is><t>seen</t></is></c></row>\
+    <row r=\"3\"/>\
+    <row r=\"5\"><c r=\"A5\" s=\"1\"><v>117</v></c><c r=\"B5\" t=\"s\"><v>3</v></c><c r=\"C5\" t=\"s\"><v>4</v></c>\
+    <c r=\"D5\" s=\"2\"><v>46347</v></c><c r=\"E5\" t=\"b\"><v>1</v></c><c r=\"XFD5\"><v>9</v></c></row>\
+    <row r=\"6\"><c r=\"A6\"><v>12</v></c><c r=\"C6\" t=\"s\"><v>5</v></c><c r=\"D6\"><v>0.25</v></c></row>";
+
+fn csv(bytes: &[u8]) -> String {
+    let table = read_sheet(bytes, None).expect("a sheet");
+    String::from_utf8(table.csv).expect("UTF-8")
+}
+
+fn refusal(bytes: &[u8]) -> String {
+    read_sheet(bytes, None).expect_err("refused").to_string()
+}
+
+#[test]
+fn a_sheet_becomes_lines_with_the_numbers_of_its_rows() {
+    let bytes = workbook(&[("Sheet1", ROWS)], STRINGS, STYLES);
+    assert!(is_workbook(&bytes));
+    assert_eq!(
+        csv(&bytes),
+        "\n\"id\",\"mesh \",\"print\",\"made\",\"seen\"\n\n\n\
+         \"0117\",\"stl/1, \"\"a\"\" & b.stl\",\"x y\",\"2026-11-21\",\"true\"\n\"12\",,,\"0.25\",\n"
+    );
+    let rows = parse_csv(csv(&bytes).as_bytes()).expect_err("a row without files");
+    assert_eq!(
+        rows.to_string(),
+        "line 6: mesh is empty\nline 6: print is empty"
+    );
+}
+
+#[test]
+fn cells_without_places_follow_each_other_also_after_empty_ones() {
+    let rows = "<row><c t=\"s\"><v>0</v></c><c t=\"s\"><v>1</v></c><c t=\"s\"><v>2</v></c></row>\
+        <row><c><v>7</v></c><c/><c><v>9</v></c></row>";
+    let bytes = workbook(&[("a", rows)], STRINGS, "");
+    assert_eq!(csv(&bytes), "\"id\",\"mesh \",\"print\"\n\"7\",,\"9\"\n");
+}
+
+#[test]
+fn ids_that_became_dates_or_powers_of_ten_are_refused_and_other_columns_are_not() {
+    let styles = "<styleSheet><cellXfs><xf numFmtId=\"0\"/><xf numFmtId=\"16\"/><xf numFmtId=\"11\"/>\
+        <xf numFmtId=\"2\"/></cellXfs></styleSheet>";
+    let sheet = |header: &str, style: u32| {
+        let cell = format!("<c t=\"inlineStr\"><is><t>{header}</t></is></c>");
+        let rows = format!("<row>{cell}</row><row><c s=\"{style}\"><v>46115</v></c></row>");
+        workbook(&[("a", &rows)], "", styles)
+    };
+    for header in ["id", "Mã số", "Pair", "khối", "mesh"] {
+        for (style, kind) in [(1, "a date, 2026-04-03, "), (2, "a power of ten, 46115, ")] {
+            let refused = refusal(&sheet(header, style));
+            let start = format!("cell A2 of column \"{header}\" is {kind}which");
+            assert!(refused.starts_with(&start), "{refused}");
+        }
+        assert_eq!(
+            csv(&sheet(header, 3)),
+            format!("\"{header}\"\n\"46115.00\"\n")
+        );
+    }
+    assert_eq!(csv(&sheet("at", 1)), "\"at\"\n\"2026-04-03\"\n");
+    assert_eq!(csv(&sheet("weight", 2)), "\"weight\"\n\"46115\"\n");
+}
+
+#[test]
+fn the_first_visible_sheet_is_read_or_the_one_that_is_named() {
+    let rows = |id: &str| text_rows(&[&["id", "mesh", "print"], &[id, "m", "p"]]);
+    let (a, b) = (rows("a"), rows("b"));
+    let bytes = workbook(
+        &[
+            ("Ghi chú\" state=\"hidden", &a),
+            ("Khối 4", &b),
+            ("Khối 5", &a),
+        ],
+        "",
+        "",
+    );
+    let table = read_sheet(&bytes, None).expect("the second sheet");
+    assert_eq!(parse_csv(&table.csv).expect("rows")[0].name.as_str(), "b");
+    assert_eq!(
+        table.warning.as_deref(),
+        Some("only the sheet \"Khối 4\" is read; name another one with --sheet: \"Khối 5\"")
+    );
+    let table = read_sheet(&bytes, Some("Khối 5")).expect("the third sheet");
+    assert_eq!(
+        (
+            parse_csv(&table.csv).expect("rows")[0].name.as_str(),
+            table.warning
+        ),
+        ("a", None)
+    );
+    assert_eq!(
+        read_sheet(&bytes, Some("khối 6"))
+            .expect_err("no such sheet")
+            .to_string(),
+        "there is no sheet \"khối 6\"; the workbook has: \"Ghi chú\", \"Khối 4\", \"Khối 5\""
+    );
+}
+
+#[test]
+fn what_is_no_workbook_is_named() {
+    let plain = [("a.txt", "x")];
+    let sheet = |rows: &str| workbook(&[("a", rows)], "", "");
+    let error = "<row r=\"7\"><c r=\"AB7\" t=\"e\"><v>#REF!</v></c></row>";
+    let missing = "<row><c t=\"s\"><v>3</v></c></row>";
+    let whole = workbook(&[("Sheet1", ROWS)], STRINGS, STYLES);
+    let mut changed = archive(&[("xl/workbook.xml", "<workbook/>")], false);
+    changed[45] ^= 1;
+    let sentences = [
+        refusal(&archive(&plain, true)),
+        refusal(&archive(&[("content.xml", "x")], false)),
+        refusal(&archive(&[("xl/workbook.bin", "x")], false)),
+        refusal(&archive(&[("xl/workbook.xml", "<workbook>")], true)),
+        refusal(&archive(&[("xl/workbook.xml", "<workbook/>")], true)),
+        refusal(b"PK\x03\x04"),
+        refusal(&whole[..whole.len() / 2]),
+        refusal(&changed),
+        refusal(&sheet(error)),
+        refusal(&sheet(missing)),
+        refusal(&sheet("<row><c><f>B1&amp;C1</f><v></v></c></row>")),
+        refusal(&sheet("<row r=\"2\"><c><v>1</v></c></row><row r=\"2\"/>")),
+        refusal(&sheet("<row r=\"1048577\"/>")),
+        refusal(&sheet("<row><c r=\"ZZZZ1\"><v>1</v></c></row>")),
+        refusal(&sheet(&"<row>".repeat(100))),
+    ];
+    insta::assert_snapshot!(sentences.join("\n"));
+}
+
+#[test]
+fn a_small_archive_cannot_become_a_huge_table() {
+    let blanks = " ".repeat((4 << 20) + 1);
+    let bytes = archive(&[("xl/workbook.xml", &blanks)], true);
+    assert!(bytes.len() < 100_000);
+    let refused = read_sheet(&bytes, None).expect_err("too large");
+    assert!(
+        matches!(refused, WorkbookError::TooLarge { .. }),
+        "{refused}"
+    );
+    let text = "x".repeat(32_000);
+    let strings = format!("<sst><si><t>{text}</t></si></sst>");
+    let row = "<row><c t=\"s\"><v>0</v></c></row>".repeat(200);
+    let refused = read_sheet(&workbook(&[("a", &row)], &strings, ""), None).expect_err("too large");
+    assert_eq!(
+        refused.to_string(),
+        "the table of the workbook has more than 4 MiB; save the sheet alone"
+    );
+    let shared = "<c t=\"s\"><v>0</v></c>".repeat(200);
+    let row = format!("<row>{shared}</row>");
+    let refused = read_sheet(&workbook(&[("a", &row)], &strings, ""), None).expect_err("too large");
+    assert!(
+        matches!(refused, WorkbookError::TooLarge { .. }),
+        "{refused}"
+    );
+    let text = "x".repeat(1 << 20);
+    let strings = format!("<sst><si><t>{text}</t></si></sst>");
+    assert_eq!(
+        refusal(&workbook(
+            &[("a", "<row><c t=\"s\"><v>0</v></c></row>")],
+            &strings,
+            ""
+        )),
+        "cell A1 has more than 98301 bytes of text; shorten it"
+    );
+    let columns = format!("<row>{}</row>", "<c/>".repeat(16_385));
+    assert_eq!(
+        refusal(&workbook(&[("a", &columns)], "", "")),
+        "the workbook is damaged: a row has more than 16384 cells; save it again"
+    );
+    let many = "<si/>".repeat(1001);
+    let refused = refusal(&workbook(&[("a", ROWS)], &format!("<sst>{many}</sst>"), ""));
+    assert!(
+        refused.contains("more than 1000 shared strings"),
+        "{refused}"
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(256))]
+
+    #[test]
+    fn damaged_workbooks_are_read_or_refused(
+        changes in proptest::collection::vec((any::<Index>(), any::<u8>()), 0..6),
+        end in proptest::option::of(any::<Index>()),
+        is_deflated in any::<bool>(),
+    ) {
+        let files = [
+            ("xl/workbook.xml", "<workbook><sheets><sheet name=\"a\" r:id=\"1\"/></sheets></workbook>"),
+            ("xl/_rels/workbook.xml.rels", "<R><Relationship Id=\"1\" Target=\"s.xml\"/></R>"),
+            ("xl/s.xml", ROWS),
+        ];
+        let mut bytes = archive(&files, is_deflated);
+        for (at, byte) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        if let Some(end) = end {
+            bytes.truncate(end.index(bytes.len()));
+        }
+        let _ = read_sheet(&bytes, None);
+    }
+}

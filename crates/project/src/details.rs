@@ -1,0 +1,154 @@
+//! Everything about one pair or block, and the ids of all.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use crate::error::{ProjectError, ProjectResult};
+use crate::location::Location;
+use crate::selection;
+use mocban_catalog::{
+    BlockDetail, Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment,
+    StoredCharacter,
+};
+use mocban_core::domain::{
+    BlockName, DepthOutcome, MetricOutcome, PairName, Stage, ThresholdMetric,
+};
+use mocban_results::ManualCorrection;
+use mocban_runner::{NamedWork, fingerprints};
+
+/// A pair or a block.
+#[derive(Debug)]
+pub enum Details {
+    /// A pair.
+    Pair(Box<PairOverview>),
+    /// A block, and its characters.
+    Block(Box<BlockDetail>, Vec<StoredCharacter>),
+}
+
+/// A pair with what people and the next run do.
+#[derive(Debug)]
+pub struct PairOverview {
+    /// The pair.
+    pub detail: PairDetail,
+    /// Its manual alignments, oldest first, without the undone ones.
+    pub manual: Vec<ManualResult>,
+    /// What the next run would do.
+    pub next_run: Option<PlanEntry>,
+}
+
+/// A manual alignment beside the automatic result.
+#[derive(Debug, Serialize)]
+pub struct ManualResult {
+    /// The alignment.
+    #[serde(flatten)]
+    pub stored: StoredAlignment,
+    /// Difference from the automatic result. `None` if there is no automatic result, or if the depth map has changed.
+    pub adjustment: Option<Adjustment>,
+}
+
+/// How a manual alignment differs from the result of a metric.
+#[derive(Debug, Serialize)]
+pub struct Adjustment {
+    /// The metric.
+    pub from: ThresholdMetric,
+    /// The difference.
+    #[serde(flatten)]
+    pub by: ManualCorrection,
+    /// Intersection over union of the automatic result.
+    pub from_iou: f64,
+}
+
+/// Reads a pair or block by its id.
+///
+/// # Errors
+/// Returns an error if the pair is retired.
+pub async fn read(id: &str, catalog: &Catalog, location: &Location) -> ProjectResult<Details> {
+    let ids = [id.to_owned()];
+    let NamedWork { pairs, blocks } = selection::pairs_and_blocks(catalog, &ids).await?;
+    if let Some(block) = blocks.first() {
+        let Some(detail) = catalog.block(block).await? else {
+            let text = format!("block {block} was removed while it was read");
+            return Err(ProjectError::unexpected(text));
+        };
+        let characters = catalog.block_characters(block).await?;
+        return Ok(Details::Block(Box::new(detail), characters));
+    }
+    let Some(name) = pairs.first() else {
+        return Err(ProjectError::unexpected(format!("{id} was not looked up")));
+    };
+    let fingerprints = fingerprints(&location.settings()?.config.stages);
+    let next_run = catalog.why(name, &fingerprints).await?;
+    let Some(detail) = catalog.pair(name).await? else {
+        let text = format!("pair {name} was removed while it was read");
+        return Err(ProjectError::unexpected(text));
+    };
+    let manual = manual_results(catalog, &detail.results).await?;
+    Ok(Details::Pair(Box::new(PairOverview {
+        detail,
+        manual,
+        next_run,
+    })))
+}
+
+/// Returns the names of all blocks and of all pairs that are not retired.
+pub async fn names(catalog: &Catalog) -> ProjectResult<(Vec<BlockName>, Vec<PairName>)> {
+    let (blocks, mut pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
+    let retired = catalog.retired_pairs().await?.into_iter();
+    let retired: BTreeSet<PairName> = retired.map(|pair| pair.name).collect();
+    pairs.retain(|pair| !retired.contains(pair));
+    Ok((blocks, pairs))
+}
+
+/// Returns the first ids of blocks, and of pairs unless `only_blocks` is set, that begin with a text.
+pub async fn names_with_prefix(
+    location: &Location,
+    prefix: &str,
+    only_blocks: bool,
+    limit: usize,
+) -> ProjectResult<Vec<String>> {
+    let (_, catalog) = location.open_read_only().await?;
+    let blocks = catalog.block_names().await?.into_iter();
+    let blocks = blocks.map(|name| name.to_string());
+    let mut names: Vec<String> = blocks.filter(|name| name.starts_with(prefix)).collect();
+    if !only_blocks {
+        let pairs = catalog.pair_names_with_prefix(prefix, limit).await?;
+        names.extend(pairs.iter().map(PairName::to_string));
+    }
+    catalog.close().await;
+    names.truncate(limit);
+    Ok(names)
+}
+
+async fn manual_results(
+    catalog: &Catalog,
+    results: &PairResults,
+) -> Result<Vec<ManualResult>, CatalogError> {
+    let all = catalog.manual_alignments().await?.into_iter();
+    let name = &results.attributes.name;
+    let of_pair = all.filter(|stored| stored.made.pair == *name && stored.undone_at.is_none());
+    let with_adjustment = of_pair.map(|stored| ManualResult {
+        adjustment: adjustment(&stored, results),
+        stored,
+    });
+    Ok(with_adjustment.collect())
+}
+
+fn adjustment(manual: &StoredAlignment, results: &PairResults) -> Option<Adjustment> {
+    let automatic = automatic_result(results).filter(|_| manual.on_current_depth)?;
+    let depth: DepthOutcome = results.stage(Stage::Depth)?.parse().ok()?;
+    let (from, to) = (&automatic.print_from_depth, &manual.made.print_from_depth);
+    Some(Adjustment {
+        from: automatic.metric,
+        by: ManualCorrection::between(from, to, [depth.width, depth.height])?,
+        from_iou: automatic.scores.iou,
+    })
+}
+
+/// Returns the automatic result that manual alignments are compared with: the ensemble's, or else the first metric's.
+fn automatic_result(results: &PairResults) -> Option<&MetricOutcome> {
+    let ensemble = results.metric(ThresholdMetric::Ensemble);
+    ensemble
+        .or(results.metrics.first())
+        .map(|record| &record.outcome)
+}

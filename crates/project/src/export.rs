@@ -1,0 +1,62 @@
+//! Exports the aligned pairs of a project for other tools.
+
+use std::path::Path;
+
+use crate::error::ProjectResult;
+use crate::events::{Listener, LongWork, warn_about_set_apart};
+use crate::exit::Refusal;
+use crate::files;
+use crate::location::Location;
+use crate::status::warn_about_stale;
+use mocban_core::domain::ThresholdMetric;
+use mocban_export::{ExportFormat, ExportOptions, ExportSummary, export as export_pairs};
+
+/// Exports pairs to a folder. An earlier export there is replaced as a whole. Options without metrics choose all those of the
+/// settings.
+///
+/// # Errors
+/// Returns an error if an option has no effect or no result is selected, the folder is refused, or the catalog or the disk
+/// fails.
+pub async fn export(
+    output: &Path,
+    formats: &[ExportFormat],
+    mut options: ExportOptions,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<ExportSummary> {
+    files::refuse_project_file(output)?;
+    let (project, catalog) = location.open_read_only().await?;
+    let config = location.settings()?.config;
+    let computed = config.stages.pipeline.method.metrics();
+    let unknown = options
+        .metrics
+        .iter()
+        .find(|metric| !computed.contains(metric));
+    if let Some(metric) = unknown {
+        let names: Vec<&str> = computed.iter().map(|metric| metric.name()).collect();
+        let names = names.join(", ");
+        let text = format!("the settings compute no {metric}; choose from {names}");
+        return Err(Refusal::Usage(text).into());
+    }
+    let chosen = options.metrics;
+    let is_chosen = |metric: &&ThresholdMetric| chosen.is_empty() || chosen.contains(metric);
+    options.metrics = computed.iter().filter(is_chosen).copied().collect();
+    options.settings = config.that_change_results()?;
+    let checked = options.check(formats);
+    checked.map_err(|unused| Refusal::Usage(unused.to_string()))?;
+    warn_about_stale(&catalog, location, listener).await?;
+    let work = LongWork::begin(listener, "exporting");
+    let summary = export_pairs(&catalog, &project, output, formats, options).await;
+    drop(work);
+    let summary = summary?;
+    catalog.close().await;
+    if summary.is_nothing_selected {
+        let text = format!(
+            "no result is selected by --only or --min-confidence; nothing was written to {}",
+            output.display()
+        );
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    warn_about_set_apart(listener, &summary.set_apart);
+    Ok(summary)
+}

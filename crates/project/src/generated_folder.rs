@@ -1,0 +1,95 @@
+//! A folder whose files this program writes all at once, and which it replaces only if it holds nothing else.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::error::{ProjectResult, WithContext as _};
+use crate::exit::Refusal;
+use crate::files::refuse_project_file;
+use mocban_store::{Leftover, ReplacementFolder, create_folders};
+
+/// A folder and what it is for.
+#[derive(Debug, Clone, Copy)]
+pub struct GeneratedFolder<'a> {
+    /// The folder, which need not exist.
+    pub dir: &'a Path,
+    /// What its files are, such as `documentation`.
+    pub content: &'a str,
+}
+
+impl GeneratedFolder<'_> {
+    /// Writes files, as paths below the folder, in place of earlier ones. Returns an earlier folder that could not be
+    /// removed.
+    ///
+    /// # Errors
+    /// Returns an error like [`Self::refuse_foreign`], or if the folder cannot be replaced, which leaves it as it was.
+    pub fn write<P: AsRef<Path>>(self, files: &[(P, Vec<u8>)]) -> ProjectResult<Leftover> {
+        let names: Vec<&Path> = files.iter().map(|(path, _)| path.as_ref()).collect();
+        let failed = || {
+            format!(
+                "cannot write the {} to {}",
+                self.content,
+                self.dir.display()
+            )
+        };
+        self.refuse_foreign(&names)?;
+        let folder = ReplacementFolder::begin(self.dir).with_context(failed)?;
+        for (path, bytes) in files {
+            let path = folder.path().join(path);
+            let parent = path.parent().unwrap_or(folder.path());
+            create_folders(parent).with_context(failed)?;
+            fs::write(path, bytes).with_context(failed)?;
+        }
+        // Somebody may have put files there in the meantime.
+        self.refuse_foreign(&names)?;
+        folder.finish().with_context(failed)
+    }
+
+    /// Refuses a folder that holds anything but files with these paths, or that belongs to a project.
+    ///
+    /// # Errors
+    /// Returns an error that names a foreign file, or if the folder cannot be read.
+    pub fn refuse_foreign(self, names: &[&Path]) -> ProjectResult<()> {
+        refuse_project_file(self.dir)?;
+        let shown = self.dir.display();
+        let exists = self.dir.try_exists();
+        if !exists.with_context(|| format!("cannot read {shown}"))? {
+            return Ok(());
+        }
+        if !self.dir.is_dir() {
+            return Err(Refusal::Usage(format!("{shown} is not a directory")).into());
+        }
+        let Some(foreign) = foreign_file(self.dir, Path::new(""), names)? else {
+            return Ok(());
+        };
+        let (foreign, content) = (foreign.display(), self.content);
+        Err(Refusal::Usage(format!(
+            "{shown} holds {foreign}, which is not part of the {content}; name another directory"
+        ))
+        .into())
+    }
+}
+
+/// Returns a file, link or other entry below `dir/inner` that has none of the names, as a path below `dir`.
+fn foreign_file(dir: &Path, inner: &Path, names: &[&Path]) -> ProjectResult<Option<PathBuf>> {
+    let folder = dir.join(inner);
+    let failed = || format!("cannot read {}", folder.display());
+    for entry in fs::read_dir(&folder).with_context(failed)? {
+        let entry = entry.with_context(failed)?;
+        let path = inner.join(entry.file_name());
+        let kind = entry.file_type().with_context(failed)?;
+        // A generated folder has few levels; a foreign one is not searched.
+        let is_folder = kind.is_dir() && names.iter().any(|name| name.starts_with(&path));
+        let foreign = if is_folder {
+            foreign_file(dir, &path, names)?
+        } else if kind.is_file() && names.contains(&&*path) {
+            None
+        } else {
+            Some(path)
+        };
+        if foreign.is_some() {
+            return Ok(foreign);
+        }
+    }
+    Ok(None)
+}

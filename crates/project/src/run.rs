@@ -1,0 +1,164 @@
+//! Runs a project, or one part of a run.
+
+use std::time::Duration;
+
+use crate::closing::close;
+use crate::error::{ProjectResult, TaskStopped};
+use crate::events::{Listener, ProjectEvent, warn};
+use crate::failures::Failures;
+use crate::location::{Location, now};
+use crate::selection;
+use crate::status::are_results_missing;
+use mocban_catalog::Catalog;
+use mocban_config::Config;
+use mocban_core::domain::ErrorCode;
+use mocban_runner::{self as runner, RunOptions, RunPlan, RunSummary, Stop};
+use mocban_store::{Project, ProjectStorage};
+
+/// Longest time for looking at the roots of inputs before a run.
+const ROOT_CHECK: Duration = Duration::from_secs(5);
+
+/// Returns the options of a run of all pairs, from the settings alone.
+pub fn options(config: &Config) -> RunOptions {
+    let plain = RunOptions::default();
+    RunOptions {
+        workers: match config.run.workers {
+            0 => plain.workers,
+            workers => workers,
+        },
+        memory: match config.run.memory_mib {
+            0 => runner::default_memory_limit(),
+            mib => Some(mib << 20),
+        },
+        stage_timeout: Duration::from_secs(config.run.stage_timeout_s),
+        limits: config.limits,
+        ..plain
+    }
+}
+
+/// A run that has not begun.
+#[derive(Debug)]
+pub struct PreparedRun {
+    project: Project,
+    catalog: Catalog,
+    config: Box<Config>,
+    options: RunOptions,
+}
+
+/// How a run ended.
+#[derive(Debug)]
+pub struct RunOutcome {
+    /// What it did.
+    pub summary: RunSummary,
+    /// What failed, in this run and earlier ones.
+    pub failures: Failures,
+    /// Whether there are results, but none of their files.
+    pub are_results_missing: bool,
+}
+
+impl PreparedRun {
+    /// Opens a project for a run of the pairs and blocks with these ids, or of all. A project that cannot be written to is
+    /// opened only for a plan.
+    ///
+    /// # Errors
+    /// Returns an error if an object store does not answer or an id does not exist.
+    pub async fn new(
+        names: &[String],
+        options: RunOptions,
+        is_plan: bool,
+        location: &Location,
+        listener: &dyn Listener,
+    ) -> ProjectResult<Self> {
+        let config = Box::new(location.settings()?.config);
+        let (project, catalog) = match open(location, listener).await {
+            Err(error)
+                if is_plan
+                    && matches!(error.code(), ErrorCode::NotWritable | ErrorCode::DiskFull) =>
+            {
+                let text = "the project cannot be written to, so input files that changed since the last run are not noticed";
+                warn(listener, text);
+                location.open_read_only().await?
+            }
+            opened => opened?,
+        };
+        let only = match names {
+            [] => None,
+            typed => Some(selection::pairs_and_blocks(&catalog, typed).await?),
+        };
+        Ok(Self {
+            project,
+            catalog,
+            config,
+            options: RunOptions { only, ..options },
+        })
+    }
+
+    /// Returns what would run and why, and whether another process works on the project.
+    pub async fn plan(self) -> ProjectResult<(RunPlan, bool)> {
+        let (project, catalog) = (&self.project, &self.catalog);
+        let plan = runner::plan(project, catalog, &self.config.stages, &self.options).await?;
+        let is_running = runner::is_running(project, catalog, now()).await?;
+        self.catalog.close().await;
+        Ok((plan, is_running))
+    }
+
+    /// Runs until nothing is left or `stop` is set.
+    ///
+    /// # Errors
+    /// Returns an error if another process runs the project, or if the catalog or the place of the artifacts fails.
+    pub async fn run(self, stop: &Stop, listener: &dyn Listener) -> ProjectResult<RunOutcome> {
+        let (project, catalog) = (&self.project, &self.catalog);
+        let ended = runner::run(
+            project,
+            catalog,
+            &self.config.stages,
+            &self.options,
+            stop,
+            |event| {
+                listener.event(ProjectEvent::Run(&event));
+            },
+        )
+        .await;
+        listener.event(ProjectEvent::Ended);
+        // After an error, the catalog may not reply any more.
+        let failures = match &ended {
+            Ok(_) => Failures::read(catalog, false).await,
+            Err(_) => Ok(Failures::default()),
+        };
+        close(self.catalog, stop).await;
+        let (summary, failures) = (ended?, failures?);
+        Ok(RunOutcome {
+            are_results_missing: are_results_missing(&self.project, &summary.status.jobs),
+            summary,
+            failures,
+        })
+    }
+}
+
+/// Opens a project for a run, and asks the object stores of the settings whether they answer. Warns about roots of inputs
+/// that are not there.
+async fn open(location: &Location, listener: &dyn Listener) -> ProjectResult<(Project, Catalog)> {
+    let (project, catalog) = location.open().await?;
+    if project.storage().is_none() {
+        return Ok((project, catalog));
+    }
+    let checked = project.clone();
+    let check = move || checked.storage().map_or(Ok(()), ProjectStorage::check);
+    let checked = tokio::task::spawn_blocking(check).await;
+    if let Err(error) = checked.map_err(TaskStopped)? {
+        catalog.close().await;
+        return Err(error.into());
+    }
+    let checked = project.clone();
+    let find = move || {
+        checked
+            .storage()
+            .map_or_else(Vec::new, ProjectStorage::unusable_roots)
+    };
+    // The run needs a root only if one of its pairs does. A disk may hang.
+    let found = tokio::time::timeout(ROOT_CHECK, tokio::task::spawn_blocking(find)).await;
+    for root in found.into_iter().flatten().flatten() {
+        warn(listener, root);
+    }
+    Ok((project, catalog))
+}

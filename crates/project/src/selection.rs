@@ -1,0 +1,178 @@
+//! Pairs and blocks that a user names by their ids. An id that does not exist is refused, with similar ids.
+
+use std::collections::BTreeSet;
+
+use crate::error::ProjectResult;
+use crate::exit::Refusal;
+use mocban_catalog::{Catalog, RetiredPair};
+use mocban_core::domain::spelling::nearest;
+use mocban_core::domain::{BlockName, PairName, RetireCause};
+use mocban_runner::NamedWork;
+use mocban_system::time_text::local;
+
+/// Largest number of similar ids in a message.
+const MAX_SIMILAR: usize = 3;
+/// Fewest characters by which ids that contain a text are similar to it, such as `b1_c01-r01` to `c01-r01`.
+const MIN_PART_CHARS: usize = 3;
+
+/// Looks up pairs by their ids.
+///
+/// # Errors
+/// Returns an error if a pair does not exist, or is retired.
+pub async fn pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
+    let names = known_pairs(catalog, typed).await?;
+    refuse_retired(catalog, &names).await?;
+    Ok(names)
+}
+
+/// Refuses pairs that are retired.
+async fn refuse_retired(catalog: &Catalog, names: &[PairName]) -> ProjectResult<()> {
+    let names: BTreeSet<&PairName> = names.iter().collect();
+    let retired = catalog.retired_pairs().await?;
+    let Some(pair) = retired.iter().find(|pair| names.contains(&pair.name)) else {
+        return Ok(());
+    };
+    Err(Refusal::NothingSelected(retired_text(pair)).into())
+}
+
+/// Says who retired a pair, and how it comes back.
+pub(crate) fn retired_text(pair: &RetiredPair) -> String {
+    let (name, date) = (&pair.name, local(pair.at));
+    match pair.cause {
+        RetireCause::Person => format!(
+            "pair {name} was retired on {date}; its results and verdicts are kept, and `retire --undo` brings it back"
+        ),
+        RetireCause::List => format!(
+            "pair {name} was retired on {date}, because a list that replaced the others does not have it; its results and \
+             verdicts are kept, and `retire --undo` or a list with it brings it back"
+        ),
+        RetireCause::Labels => format!(
+            "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
+        ),
+    }
+}
+
+/// Looks up pairs by their ids, also retired ones.
+pub async fn known_pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
+    let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    let is_known = |text: &&String| {
+        text.parse::<PairName>()
+            .is_ok_and(|name| !unknown.contains(&name))
+    };
+    match typed.iter().find(|text| !is_known(text)) {
+        None => Ok(names),
+        Some(text) => {
+            let all = catalog.pair_names().await?;
+            Err(no_such("pair", text, all.iter().map(PairName::as_str)).into())
+        }
+    }
+}
+
+/// Looks up pairs by their ids. Returns `None`, which means all pairs, if no id is given.
+pub async fn some_or_all(
+    catalog: &Catalog,
+    typed: &[String],
+) -> ProjectResult<Option<Vec<PairName>>> {
+    match typed {
+        [] => Ok(None),
+        typed => Ok(Some(pairs(catalog, typed).await?)),
+    }
+}
+
+/// Looks up one pair.
+pub async fn pair(catalog: &Catalog, typed: &str) -> ProjectResult<PairName> {
+    let names = pairs(catalog, &[typed.to_owned()]).await?;
+    names
+        .into_iter()
+        .next()
+        .ok_or_else(|| no_such("pair", typed, std::iter::empty()).into())
+}
+
+/// Returns the block with this id, if there is one and no pair has the same id.
+pub async fn block(catalog: &Catalog, typed: &str) -> ProjectResult<Option<BlockName>> {
+    let Ok(name) = typed.parse::<BlockName>() else {
+        return Ok(None);
+    };
+    if let Ok(pair) = typed.parse::<PairName>()
+        && catalog.unknown_names(&[pair]).await?.is_empty()
+    {
+        return Ok(None);
+    }
+    Ok(catalog.block_names().await?.contains(&name).then_some(name))
+}
+
+/// Looks up pairs and blocks by their ids. An id of both is that of the pair.
+///
+/// # Errors
+/// Returns an error if there is neither a pair nor a block with an id, or a pair is retired.
+pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectResult<NamedWork> {
+    let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    let are_all_pairs = unknown.is_empty() && names.len() == typed.len();
+    let all_blocks = if are_all_pairs {
+        Vec::new()
+    } else {
+        catalog.block_names().await?
+    };
+    let mut found = NamedWork::default();
+    for text in typed {
+        let pair = text.parse::<PairName>().ok();
+        if let Some(pair) = pair.filter(|name| !unknown.contains(name)) {
+            found.pairs.push(pair);
+            continue;
+        }
+        let block = text.parse::<BlockName>().ok();
+        if let Some(block) = block.filter(|name| all_blocks.contains(name)) {
+            found.blocks.push(block);
+            continue;
+        }
+        let pairs = catalog.pair_names().await?;
+        let blocks = all_blocks.iter().map(BlockName::as_str);
+        let all = pairs.iter().map(PairName::as_str).chain(blocks);
+        return Err(no_such("pair or block", text, all).into());
+    }
+    refuse_retired(catalog, &found.pairs).await?;
+    Ok(found)
+}
+
+/// Looks up one block.
+pub async fn existing_block(catalog: &Catalog, typed: &str) -> ProjectResult<BlockName> {
+    let all = catalog.block_names().await?;
+    let name = typed.parse::<BlockName>().ok();
+    name.filter(|name| all.contains(name))
+        .ok_or_else(|| no_such("block", typed, all.iter().map(BlockName::as_str)).into())
+}
+
+/// Returns the refusal of an id that does not exist, with similar ids.
+fn no_such<'a>(what: &str, typed: &str, all: impl Iterator<Item = &'a str> + Clone) -> Refusal {
+    let mut similar = nearest(typed, all.clone(), MAX_SIMILAR);
+    if similar.is_empty() && typed.chars().count() >= MIN_PART_CHARS {
+        similar = all
+            .filter(|name| name.contains(typed))
+            .take(MAX_SIMILAR)
+            .collect();
+    }
+    let hint = if similar.is_empty() {
+        String::new()
+    } else {
+        format!("; similar ids: {}", similar.join(", "))
+    };
+    Refusal::NothingSelected(format!("there is no {what} {typed}{hint}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::no_such;
+
+    #[test]
+    fn similar_ids_are_suggested() {
+        let text = |typed| no_such("pair", typed, ["0001", "0002", "b04-0117"].into_iter());
+        assert_eq!(
+            text("b4-0117").to_string(),
+            "there is no pair b4-0117; similar ids: b04-0117"
+        );
+        assert_eq!(text("zzz").to_string(), "there is no pair zzz");
+        assert!(text("117").to_string().ends_with("; similar ids: b04-0117"));
+    }
+}

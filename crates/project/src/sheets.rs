@@ -1,0 +1,106 @@
+//! Draws many pairs, or a whole block, on one PNG.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{ProjectResult, TaskStopped};
+use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
+use crate::exit::Refusal;
+use crate::files;
+use crate::location::Location;
+use crate::selection;
+use mocban_catalog::Catalog;
+use mocban_core::domain::ThresholdMetric;
+use mocban_core::raster::png_rgb8;
+use mocban_export::block_view::BlockView;
+use mocban_export::{ContactSheet, ContactSheetOptions, draw_contact_sheet};
+use mocban_store::Project;
+
+/// Draws the pairs with these ids, or all, and writes the sheet. By default, it is `sheet.png` in the project. Returns its
+/// path too. A sheet that lacks images replaces an earlier one only if `allow_missing` is set.
+///
+/// # Errors
+/// Returns an error if no pair to draw has a result of the metric, or if the catalog or the disk fails.
+pub async fn contact_sheet(
+    pairs: &[String],
+    options: ContactSheetOptions,
+    output: Option<&Path>,
+    allow_missing: bool,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<(PathBuf, ContactSheet)> {
+    let (project, catalog) = location.open_read_only().await?;
+    let path = output.map_or_else(|| project.dir().join("sheet.png"), Path::to_owned);
+    files::refuse_used_file(&path, &project, &catalog).await?;
+    let metric = options.metric;
+    let options = ContactSheetOptions {
+        pairs: selection::some_or_all(&catalog, pairs).await?,
+        limits: location.settings()?.config.limits.image,
+        ..options
+    };
+    let work = LongWork::begin(listener, "drawing the contact sheet");
+    let sheet = draw_contact_sheet(&catalog, &project, options).await;
+    drop(work);
+    let sheet = sheet?;
+    warn_about_set_apart(listener, &sheet.set_apart);
+    catalog.close().await;
+    if sheet.shown == 0 {
+        let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    for (pair, why) in &sheet.problems {
+        let text = format!("{pair} is not drawn completely: {why}");
+        warn(listener, text);
+    }
+    let is_complete = allow_missing || sheet.problems.is_empty();
+    let written = files::write_output(&path, &png_rgb8(&sheet.picture), is_complete);
+    files::or_elsewhere(written, output)?;
+    Ok((path, sheet))
+}
+
+/// Draws the page of a block with the boxes of its characters, or relief and ink over each other, and writes the picture. By
+/// default, it is `page.png` or `overlay.png` in the project. Returns its path and the number of characters.
+///
+/// # Errors
+/// Returns an error if the block does not exist or is not aligned, or if the catalog or the disk fails.
+pub async fn block_sheet(
+    block: &str,
+    is_overlay: bool,
+    metric: Option<ThresholdMetric>,
+    output: Option<&Path>,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<(PathBuf, usize)> {
+    let (project, catalog) = location.open_read_only().await?;
+    let default = ["page.png", "overlay.png"][usize::from(is_overlay)];
+    let path = output.map_or_else(|| project.dir().join(default), Path::to_owned);
+    files::refuse_used_file(&path, &project, &catalog).await?;
+    let work = LongWork::begin(listener, "drawing the page");
+    let view = block_view(block, metric, &project, &catalog, location).await?;
+    let draw = move || {
+        let picture = if is_overlay {
+            view.draw_overlay()
+        } else {
+            view.draw_boxes()
+        };
+        (png_rgb8(&picture), view.characters.len())
+    };
+    let drawn = tokio::task::spawn_blocking(draw).await;
+    drop(work);
+    let (png, characters) = drawn.map_err(TaskStopped)?;
+    catalog.close().await;
+    files::or_elsewhere(files::write_output(&path, &png, true), output)?;
+    Ok((path, characters))
+}
+
+/// Reads a block by its id.
+pub async fn block_view(
+    block: &str,
+    metric: Option<ThresholdMetric>,
+    project: &Project,
+    catalog: &Catalog,
+    location: &Location,
+) -> ProjectResult<BlockView> {
+    let name = selection::existing_block(catalog, block).await?;
+    let limits = location.settings()?.config.limits;
+    Ok(BlockView::read(catalog, project, &name, metric, limits).await?)
+}

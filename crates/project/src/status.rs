@@ -1,0 +1,117 @@
+//! The state of a project: its pairs and blocks, what failed, and whether a process works on it.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use crate::error::ProjectResult;
+use crate::events::{Listener, warn};
+use crate::failures::Failures;
+use crate::location::{Location, now};
+use mocban_catalog::{Catalog, StatusCounts};
+use mocban_core::domain::JobStatus;
+use mocban_runner::{fingerprints, is_running};
+use mocban_store::Project;
+
+/// The state of a project.
+#[derive(Debug)]
+pub struct ProjectStatus {
+    /// Counts of pairs.
+    pub counts: StatusCounts,
+    /// Whether a process works on the project. If not, leased pairs count as interrupted, not as running.
+    pub running: bool,
+    /// What failed.
+    pub failures: Failures,
+    /// Whether there are results, but none of their files.
+    pub are_results_missing: bool,
+}
+
+impl ProjectStatus {
+    /// Reads the state, with all failed pairs or the first ones.
+    pub async fn read(
+        project: &Project,
+        catalog: &Catalog,
+        all_failures: bool,
+        location: &Location,
+    ) -> ProjectResult<Self> {
+        let fingerprints = fingerprints(&location.settings()?.config.stages);
+        // Read before the counts: a run that ends in between leaves no leases.
+        let running = is_running(project, catalog, now()).await?;
+        let failures = Failures::read(catalog, all_failures).await?;
+        let counts = catalog.status(&fingerprints).await?;
+        Ok(Self {
+            are_results_missing: are_results_missing(project, &counts.jobs),
+            counts,
+            running,
+            failures,
+        })
+    }
+
+    /// Returns the number of pairs with a status.
+    pub fn jobs(&self, status: JobStatus) -> u64 {
+        self.counts.jobs.get(&status).copied().unwrap_or(0)
+    }
+
+    /// Returns the number of pairs that a run would work on.
+    pub fn waiting(&self) -> u64 {
+        self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff)
+    }
+
+    /// Returns the number of pairs that a process is working on.
+    pub fn in_process(&self) -> u64 {
+        self.jobs(JobStatus::Leased) - self.interrupted()
+    }
+
+    /// Returns the number of leased pairs whose run died or ended with an error. The next run continues these pairs.
+    pub fn interrupted(&self) -> u64 {
+        u64::from(!self.running) * self.jobs(JobStatus::Leased)
+    }
+
+    /// Returns the number of failed pairs.
+    pub fn failed(&self) -> u64 {
+        self.jobs(JobStatus::Quarantined)
+    }
+
+    /// Returns the state as JSON, with the failed pairs on request.
+    pub fn json(&self, with_failures: bool) -> ProjectResult<Value> {
+        let mut json = serde_json::to_value(&self.counts)?;
+        json["running"] = Value::from(self.running);
+        if !self.failures.blocks.is_empty() {
+            json["blocks"] = self.failures.blocks.json();
+        }
+        if with_failures {
+            json["failures"] = self.failures.json();
+        }
+        Ok(json)
+    }
+}
+
+/// Returns whether a project has results, but none of their files, as one that was made of a backup. Files that are only
+/// partly missing are found by `check`.
+pub(crate) fn are_results_missing(project: &Project, jobs: &BTreeMap<JobStatus, u64>) -> bool {
+    jobs.get(&JobStatus::Done).is_some_and(|done| *done > 0) && project.has_no_artifacts()
+}
+
+/// Warns about results that were computed with other settings or files than the current ones. Does nothing if the settings
+/// are invalid.
+pub(crate) async fn warn_about_stale(
+    catalog: &Catalog,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<()> {
+    let Ok(settings) = location.settings() else {
+        return Ok(());
+    };
+    let stale = catalog
+        .count_stale(&fingerprints(&settings.config.stages))
+        .await?;
+    let pairs = match stale {
+        0 => return Ok(()),
+        1 => "1 pair is".to_owned(),
+        pairs => format!("{pairs} pairs are"),
+    };
+    let text =
+        "stale: computed with other settings or files than the current ones; `run` updates them";
+    warn(listener, format!("{pairs} {text}"));
+    Ok(())
+}

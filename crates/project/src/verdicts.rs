@@ -1,0 +1,127 @@
+//! Records, imports, lists and undoes people's verdicts on the results. Their log is append-only.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use crate::error::ProjectResult;
+use crate::exit::Refusal;
+use crate::files::{self, ListFile, RefusedLine};
+use crate::location::{Location, now};
+use crate::selection;
+use crate::verdict_file::{self, VerdictList};
+use mocban_catalog::{CatalogError, FaultyRow, ImportedVerdicts, NewVerdict, VerdictEvent};
+use mocban_core::domain::PairName;
+
+/// Records a verdict on the current result of a pair, which `verdict` makes for the name of that pair. Returns the verdict,
+/// and whether it is new: the same one may have been recorded before.
+///
+/// # Errors
+/// Returns an error if the pair does not exist or has no result, the verdict is invalid, the user of the database may not
+/// record it, or the catalog fails.
+pub async fn record(
+    pair: &str,
+    verdict: impl FnOnce(PairName) -> NewVerdict,
+    location: &Location,
+) -> ProjectResult<(NewVerdict, bool)> {
+    let (_project, catalog) = location.open().await?;
+    let rights = catalog.review_rights().await?;
+    let verdict = verdict(selection::pair(&catalog, pair).await?);
+    rights.require_verdicts(&verdict.reviewer)?;
+    let checked = verdict.check(now());
+    checked.map_err(|error| Refusal::Usage(error.to_string()))?;
+    let stored = catalog.verdict_set(vec![verdict.clone()], now()).await?;
+    catalog.close().await;
+    Ok((verdict, stored > 0))
+}
+
+/// Records the verdicts of a file in CSV or JSON Lines, or of a sheet of a workbook. If a line is refused, no verdict is
+/// recorded. Returns a warning about other sheets, too.
+pub async fn import(
+    file: &Path,
+    sheet: Option<&str>,
+    location: &Location,
+) -> ProjectResult<(ImportedVerdicts, Option<String>)> {
+    let ListFile { bytes, warning } = files::read_list(file, sheet)?;
+    let (_project, catalog) = location.open().await?;
+    let refused = |error: RefusedLine| error.in_file(file, "no verdict was recorded");
+    let is_jsonl = files::is_jsonl(file, &bytes);
+    let list = VerdictList::new(bytes, is_jsonl).map_err(refused)?;
+    let (mut first_lines, mut reviewers) = (BTreeMap::new(), BTreeSet::new());
+    // Lines with verdicts on the current results, whatever these are.
+    let mut current_lines = BTreeMap::new();
+    for row in list.rows() {
+        let row = row.map_err(refused)?;
+        verdict_file::check_values(&row, now()).map_err(refused)?;
+        let NewVerdict { pair, reviewer, .. } = row.listed.verdict;
+        if row.listed.judged.is_none() {
+            current_lines.entry(pair.clone()).or_insert(row.line);
+        }
+        first_lines.entry(pair).or_insert(row.line);
+        reviewers.insert(reviewer);
+    }
+    let rights = catalog.review_rights().await?;
+    for reviewer in &reviewers {
+        rights.require_verdicts(reviewer)?;
+    }
+    let names: Vec<_> = first_lines.keys().cloned().collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    if !unknown.is_empty() {
+        let known = catalog.pair_names().await?;
+        verdict_file::refuse_unknown(&first_lines, &unknown, &known).map_err(refused)?;
+    }
+    let retired = catalog.retired_pairs().await?.into_iter();
+    let retired = retired.filter_map(|pair| Some((*current_lines.get(&pair.name)?, pair)));
+    if let Some((line, pair)) = retired.min_by_key(|(line, _)| *line) {
+        let reason = selection::retired_text(&pair);
+        return Err(refused(RefusedLine::new(line, &reason)).into());
+    }
+    // All rows were valid in the first pass.
+    let rows = list.rows().map(|row| match row {
+        Ok(row) => Ok(row.listed),
+        Err(_) => Err(CatalogError::CutShort),
+    });
+    let imported = catalog.import_verdicts(rows, now()).await?;
+    catalog.close().await;
+    Ok((imported, warning))
+}
+
+/// The verdicts of a project or a pair.
+#[derive(Debug)]
+pub struct VerdictLog {
+    /// All that were recorded, oldest first.
+    pub events: Vec<VerdictEvent>,
+    /// Damaged rows, which are not counted.
+    pub damaged: Vec<FaultyRow>,
+}
+
+/// Returns the verdicts on a pair, which may be retired, or on all pairs.
+pub async fn log(pair: Option<&str>, location: &Location) -> ProjectResult<VerdictLog> {
+    let (_project, catalog) = location.open_read_only().await?;
+    let pair = match pair {
+        Some(typed) => {
+            let pairs = selection::known_pairs(&catalog, &[typed.to_owned()]).await?;
+            pairs.into_iter().next()
+        }
+        None => None,
+    };
+    let (sound, mut damaged) = catalog.without_faulty_rows().await?;
+    let events = sound.verdict_log(pair.as_ref()).await?;
+    catalog.close().await;
+    if let Some(pair) = &pair {
+        damaged.retain(|row| row.pair.as_deref() == Some(pair.as_str()));
+    }
+    damaged.retain(|row| row.table.is_of_verdicts());
+    Ok(VerdictLog { events, damaged })
+}
+
+/// Undoes the newest verdict, of a reviewer or of anyone. The log keeps it, marked as undone. Returns the undone verdicts on
+/// all metrics.
+pub async fn undo(reviewer: Option<&str>, location: &Location) -> ProjectResult<Vec<VerdictEvent>> {
+    let (_project, catalog) = location.open().await?;
+    let rights = catalog.review_rights().await?;
+    let reviewer = reviewer.or(rights.only_reviewer());
+    rights.require_review(reviewer)?;
+    let undone = catalog.verdict_undo(reviewer, now()).await?;
+    catalog.close().await;
+    Ok(undone)
+}

@@ -1,0 +1,402 @@
+//! Agreement of reviewers with each other and with themselves, and their answers to attention checks.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::attention_checks::{self, AttentionCheckRates};
+use super::consensus::{Consensus, partition_verdicts};
+use super::pair_artifacts::group_identical;
+use super::stats::{AgreementTable, Rate};
+use mocban_catalog::{
+    AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults, SetApart,
+};
+use mocban_core::domain::{AttentionCheck, ContentHash, PairName, Verdict};
+
+/// Version of the JSON form.
+const SCHEMA: u32 = 1;
+
+/// Kappa and AC1 are shown only if both reviewers passed or failed at least this number of the same results.
+///
+/// If two reviewers agree on all of 30 results, the 95 % interval of their agreement still extends down to 0.89.
+pub const MIN_RESULTS: u64 = 30;
+
+/// Agreement of all reviewers of a project.
+///
+/// Results of one pair with the same threshold and alignment count once. Adjudications are not compared, because
+/// adjudicators have seen the verdicts of other reviewers.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReviewerAgreement {
+    /// Version of the JSON form.
+    pub schema: u32,
+    /// Results on which reviewers disagree and that nobody adjudicated.
+    pub conflicts: u64,
+    /// Every two reviewers who judged the same results, by name.
+    pub reviewer_pairs: Vec<ReviewerPair>,
+    /// Every reviewer, by name.
+    pub reviewers: Vec<ReviewerRecord>,
+    /// Planted faults that reviewers failed, as a share of all answers to planted faults.
+    pub attention_checks: Rate,
+    /// Damaged rows that the numbers do not include.
+    #[serde(skip_serializing_if = "SetApart::is_empty")]
+    pub set_apart: SetApart,
+}
+
+/// Two reviewers on the same results.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReviewerPair {
+    /// The first by name.
+    pub a: String,
+    /// The second by name.
+    pub b: String,
+    /// Their agreement.
+    #[serde(flatten)]
+    pub agreement: VerdictAgreement,
+}
+
+/// The agreement of two reviewers. A number that cannot be computed is `None`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct VerdictAgreement {
+    /// Number of results that both reviewers passed or failed. All other fields except `unsure` refer to these results.
+    pub n: u64,
+    /// Results that both judged and at least one was unsure about.
+    pub unsure: u64,
+    /// Results with equal verdicts.
+    pub agreed: u64,
+    /// `agreed / n`.
+    pub agreement: Option<f64>,
+    /// Wilson's 95 % interval of `agreement`.
+    pub agreement_ci95: Option<[f64; 2]>,
+    /// Cohen's kappa; see [`AgreementTable::cohen_kappa`].
+    pub kappa: Option<f64>,
+    /// Gwet's AC1; see [`AgreementTable::gwet_ac1`].
+    pub ac1: Option<f64>,
+    /// Results that at least one failed.
+    pub failed_by_any: u64,
+    /// Results that both failed.
+    pub failed_by_both: u64,
+    /// Whether `n` is at least [`MIN_RESULTS`].
+    pub sufficient: bool,
+}
+
+/// One reviewer's record.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ReviewerRecord {
+    /// The reviewer.
+    pub reviewer: String,
+    /// Current results that they judged.
+    pub judged: u64,
+    /// Share of results shown twice that got the same verdict both times.
+    pub duplicates: Rate,
+    /// Share of answered planted faults that they failed.
+    pub attention_checks: AttentionCheckRates,
+}
+
+/// Pairs in memory at a time.
+const PAIRS_PER_PAGE: usize = 256;
+
+/// Computes the agreement of a project's reviewers from the current state of its catalog.
+///
+/// # Errors
+/// Returns an error if the catalog cannot be read.
+pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
+    let (catalog, damaged) = &catalog.without_faulty_rows().await?;
+    let mut counts = AgreementCounts::default();
+    let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
+    while let Some(page) = pages.next().await? {
+        for pair in &page {
+            counts.add(pair);
+        }
+    }
+    for (reviewer, answers) in &attention_checks::answers_by_reviewer(catalog).await? {
+        let own = own_verdicts(catalog, reviewer).await?;
+        counts.add_checks(reviewer, answers, &own);
+    }
+    Ok(ReviewerAgreement {
+        set_apart: SetApart::of(damaged),
+        ..counts.finish()
+    })
+}
+
+/// A reviewer's newest verdicts on results.
+type OwnVerdicts = BTreeMap<(PairName, ContentHash), Verdict>;
+
+async fn own_verdicts(catalog: &Catalog, reviewer: &str) -> Result<OwnVerdicts, CatalogError> {
+    let mut verdicts = OwnVerdicts::new();
+    // Answers come oldest first, so the newest of each result is kept.
+    for answer in catalog.answers(reviewer).await? {
+        if let AnsweredOn::Result(hash) = answer.on {
+            verdicts.insert((answer.pair, hash), answer.verdict);
+        }
+    }
+    Ok(verdicts)
+}
+
+/// Two reviewers' verdicts on the same results, counted.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct VerdictTable {
+    decided: AgreementTable,
+    unsure: u64,
+}
+
+impl VerdictTable {
+    /// Counts one result.
+    pub(super) fn add(&mut self, first: Verdict, second: Verdict) {
+        if first == Verdict::Unsure || second == Verdict::Unsure {
+            self.unsure += 1;
+        } else {
+            self.decided
+                .add(first == Verdict::Pass, second == Verdict::Pass);
+        }
+    }
+
+    /// Returns the agreement.
+    pub(super) fn finish(self) -> VerdictAgreement {
+        let agreed = Rate::new(self.decided.agreed(), self.decided.n());
+        VerdictAgreement {
+            n: agreed.n,
+            unsure: self.unsure,
+            agreed: agreed.count,
+            agreement: agreed.share,
+            agreement_ci95: agreed.ci95,
+            kappa: self.decided.cohen_kappa(),
+            ac1: self.decided.gwet_ac1(),
+            failed_by_any: self.decided.failed_by_any(),
+            failed_by_both: self.decided.both_fail,
+            sufficient: agreed.n >= MIN_RESULTS,
+        }
+    }
+}
+
+/// The counts so far.
+#[derive(Debug, Default)]
+struct AgreementCounts {
+    conflicts: u64,
+    reviewer_pairs: BTreeMap<(String, String), VerdictTable>,
+    reviewers: BTreeMap<String, ReviewerRecord>,
+}
+
+impl AgreementCounts {
+    /// Counts the distinct results of one pair.
+    fn add(&mut self, pair: &PairResults) {
+        for group in group_identical(&pair.metrics) {
+            let is_conflict = |record: &&MetricRecord| Consensus::of(record) == Consensus::Conflict;
+            self.conflicts += u64::from(group.iter().any(is_conflict));
+            let verdicts: Vec<(&str, Verdict)> = independent_verdicts(&group).into_iter().collect();
+            for (i, (a, first)) in verdicts.iter().enumerate() {
+                self.record(a).judged += 1;
+                for (b, second) in &verdicts[i + 1..] {
+                    let two = ((*a).to_owned(), (*b).to_owned());
+                    let table = self.reviewer_pairs.entry(two).or_default();
+                    table.add(*first, *second);
+                }
+            }
+        }
+    }
+
+    /// Counts a reviewer's answers to attention checks.
+    fn add_checks(&mut self, reviewer: &str, answers: &[AttentionCheckAnswer], own: &OwnVerdicts) {
+        let answers = attention_checks::newest(answers);
+        let duplicates = answers
+            .iter()
+            .filter(|answer| answer.check == AttentionCheck::Duplicate);
+        let same = duplicates.filter_map(|answer| {
+            let first = own.get(&(answer.pair.clone(), answer.result_hash))?;
+            Some(*first == answer.verdict)
+        });
+        let record = self.record(reviewer);
+        record.duplicates = Rate::of(same);
+        record.attention_checks = AttentionCheckRates::of(answers.iter().copied());
+    }
+
+    fn record(&mut self, reviewer: &str) -> &mut ReviewerRecord {
+        let record = self.reviewers.entry(reviewer.to_owned());
+        record.or_insert_with(|| ReviewerRecord {
+            reviewer: reviewer.to_owned(),
+            ..ReviewerRecord::default()
+        })
+    }
+
+    fn finish(self) -> ReviewerAgreement {
+        let reviewer_pairs = self.reviewer_pairs.into_iter();
+        let reviewers: Vec<ReviewerRecord> = self.reviewers.into_values().collect();
+        ReviewerAgreement {
+            schema: SCHEMA,
+            conflicts: self.conflicts,
+            reviewer_pairs: reviewer_pairs
+                .map(|((a, b), table)| ReviewerPair {
+                    a,
+                    b,
+                    agreement: table.finish(),
+                })
+                .collect(),
+            attention_checks: Rate::total(
+                reviewers.iter().map(|record| record.attention_checks.all),
+            ),
+            set_apart: SetApart::default(),
+            reviewers,
+        }
+    }
+}
+
+/// Returns each reviewer's independent verdict on results with the same threshold and alignment.
+fn independent_verdicts<'a>(group: &[&'a MetricRecord]) -> BTreeMap<&'a str, Verdict> {
+    let mut by_reviewer = BTreeMap::new();
+    for record in group {
+        for given in partition_verdicts(record).1 {
+            // The review page stores one verdict for all results of the group. If stored verdicts differ, the first
+            // counts.
+            by_reviewer
+                .entry(given.reviewer.as_str())
+                .or_insert(given.verdict);
+        }
+    }
+    by_reviewer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{AgreementCounts, MIN_RESULTS, OwnVerdicts, VerdictTable};
+    use crate::test_fixtures;
+    use mocban_catalog::{AttentionCheckAnswer, MetricRecord, ReviewContext, ReviewerVerdict};
+    use mocban_core::domain::{
+        AttentionCheck, ContentHash, PairName, ReviewOrder, ThresholdMetric, Verdict,
+    };
+
+    fn answer(pair: &str, check: AttentionCheck, verdict: Verdict) -> AttentionCheckAnswer {
+        AttentionCheckAnswer {
+            id: 0,
+            pair: PairName::new(pair).expect("test names are ids"),
+            metric: ThresholdMetric::Density,
+            result_hash: ContentHash::of(pair.as_bytes()),
+            check,
+            verdict,
+            reviewer: "lan".to_owned(),
+            reason: None,
+            note: None,
+            context: ReviewContext::default(),
+            at: 0,
+            undone_at: None,
+        }
+    }
+
+    #[test]
+    fn results_that_look_the_same_count_once() {
+        let mut counts = AgreementCounts::default();
+        counts.add(&test_fixtures::done(
+            "a",
+            0.8,
+            &[Verdict::Pass, Verdict::Fail],
+        ));
+        let mut apart = test_fixtures::done("b", 0.8, &[Verdict::Pass, Verdict::Pass]);
+        apart.metrics[0].outcome.threshold_level += 1;
+        counts.add(&apart);
+        let found = counts.finish();
+        assert_eq!((found.conflicts, found.reviewers[0].judged), (1, 3));
+        let two = &found.reviewer_pairs[0];
+        assert_eq!((two.a.as_str(), two.b.as_str()), ("r0", "r1"));
+        assert_eq!((two.agreement.n, two.agreement.agreed), (3, 2));
+    }
+
+    #[test]
+    fn an_adjudicator_is_compared_with_nobody() {
+        let mut counts = AgreementCounts::default();
+        let mut pair = test_fixtures::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]);
+        let adjudicate = |record: &mut MetricRecord| {
+            record.verdicts.push(ReviewerVerdict {
+                reviewer: "third".to_owned(),
+                verdict: Verdict::Fail,
+                reason: None,
+                review_order: Some(ReviewOrder::Adjudicate),
+            });
+        };
+        pair.metrics.iter_mut().for_each(adjudicate);
+        counts.add(&pair);
+        let found = counts.finish();
+        assert_eq!((found.conflicts, found.reviewer_pairs.len()), (0, 1));
+        assert_eq!(found.reviewers.len(), 2);
+    }
+
+    #[test]
+    fn every_two_of_three_reviewers_are_compared() {
+        let mut counts = AgreementCounts::default();
+        counts.add(&test_fixtures::done("a", 0.8, &[Verdict::Pass; 3]));
+        let found = counts.finish().reviewer_pairs;
+        let names: Vec<_> = found
+            .iter()
+            .map(|two| (two.a.as_str(), two.b.as_str()))
+            .collect();
+        assert_eq!(names, [("r0", "r1"), ("r0", "r2"), ("r1", "r2")]);
+    }
+
+    #[test]
+    fn a_fail_detects_a_fault_and_the_newest_answer_counts() {
+        let turned = AttentionCheck::Turned { angle_deg: 9.0 };
+        let answers = [
+            answer("a", turned, Verdict::Pass),
+            answer("a", turned, Verdict::Fail),
+            answer("b", turned, Verdict::Unsure),
+            answer("b", AttentionCheck::Mirrored, Verdict::Fail),
+        ];
+        let mut counts = AgreementCounts::default();
+        counts.add_checks("lan", &answers, &OwnVerdicts::new());
+        let found = counts.finish();
+        let lan = &found.reviewers[0];
+        assert_eq!(
+            (lan.attention_checks.all.count, lan.attention_checks.all.n),
+            (2, 3)
+        );
+        let turned = lan.attention_checks.by_kind["turned"];
+        assert_eq!((turned.count, turned.n), (1, 2));
+        assert_eq!(lan.attention_checks.all, found.attention_checks);
+        assert_eq!(lan.duplicates.n, 0);
+    }
+
+    #[test]
+    fn a_duplicate_is_compared_with_the_reviewers_own_verdict() {
+        let own = OwnVerdicts::from(["a", "b"].map(|name| {
+            let first = answer(name, AttentionCheck::Duplicate, Verdict::Pass);
+            ((first.pair, first.result_hash), Verdict::Pass)
+        }));
+        let answers = [
+            answer("a", AttentionCheck::Duplicate, Verdict::Pass),
+            answer("b", AttentionCheck::Duplicate, Verdict::Fail),
+            // The first verdict on it was undone.
+            answer("c", AttentionCheck::Duplicate, Verdict::Pass),
+        ];
+        let mut counts = AgreementCounts::default();
+        counts.add_checks("lan", &answers, &own);
+        let lan = counts.finish().reviewers.remove(0);
+        assert_eq!((lan.duplicates.count, lan.duplicates.n), (1, 2));
+        assert_eq!(
+            (lan.attention_checks.all.n, lan.attention_checks.all.share),
+            (0, None)
+        );
+    }
+
+    #[test]
+    fn unsure_verdicts_neither_agree_nor_disagree() {
+        let mut table = VerdictTable::default();
+        for (first, second) in [
+            (Verdict::Pass, Verdict::Pass),
+            (Verdict::Fail, Verdict::Pass),
+            (Verdict::Unsure, Verdict::Pass),
+            (Verdict::Fail, Verdict::Unsure),
+        ] {
+            table.add(first, second);
+        }
+        let found = table.finish();
+        assert_eq!((found.n, found.agreed, found.unsure), (2, 1, 2));
+        assert_eq!((found.failed_by_any, found.failed_by_both), (1, 0));
+        assert!(!found.sufficient);
+    }
+
+    #[test]
+    fn thirty_results_are_sufficient() {
+        let mut table = VerdictTable::default();
+        (1..MIN_RESULTS).for_each(|_| table.add(Verdict::Pass, Verdict::Pass));
+        assert!(!table.finish().sufficient);
+        table.add(Verdict::Fail, Verdict::Pass);
+        assert!(table.finish().sufficient);
+    }
+}

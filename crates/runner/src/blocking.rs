@@ -1,0 +1,52 @@
+//! Blocking calls and tasks whose panics go on in their callers, and the text of a panic.
+
+use std::any::Any;
+
+use tokio::task::JoinError;
+
+use mocban_core::domain::sanitize;
+
+/// Longest excerpt of a panic's message, in characters.
+const MAX_PANIC_CHARS: usize = 160;
+
+/// Describes a panic and what to do about it.
+pub(super) fn panic_text(payload: &(dyn Any + Send)) -> String {
+    let message = payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    let message = message.map_or_else(String::new, |text| {
+        format!(" ({})", sanitize(text, MAX_PANIC_CHARS))
+    });
+    format!(
+        "the stage panicked{message}: this is a bug, please report it with the output of `run --rerun failed -v`"
+    )
+}
+
+/// Runs a blocking call on a thread for such calls; resumes its panic.
+pub(super) async fn run_blocking<T: Send + 'static>(
+    call: impl FnOnce() -> T + Send + 'static,
+) -> T {
+    task_result(tokio::task::spawn_blocking(call).await)
+}
+
+/// Returns what a task returned; resumes its panic.
+pub(super) fn task_result<T>(ended: Result<T, JoinError>) -> T {
+    match ended {
+        Ok(result) => result,
+        Err(error) => std::panic::resume_unwind(error.into_panic()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MAX_PANIC_CHARS, panic_text};
+
+    #[test]
+    fn the_message_of_a_panic_is_sanitized_and_shortened() {
+        for message in ["a\u{1b}[2J".to_owned(), "a".repeat(MAX_PANIC_CHARS + 1)] {
+            let text = panic_text(&message);
+            assert!(!text.contains(&message), "{text:?}");
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! `align MESH PRINT`: aligns one pair without a project.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::Value;
+
+use crate::cli::output::context::Context;
+use crate::cli::output::table::columns;
+use mocban_align::stages::{AlignedPair, Print, ScanHints};
+use mocban_core::domain::LengthUnit;
+use mocban_export::{ALIGNMENT_FILES, alignment_files};
+use mocban_project::align::{self, AlignInput, FileAlignment, side};
+use mocban_project::generated_folder::GeneratedFolder;
+use mocban_project::{ExitCode, ProjectResult};
+
+/// The file with the numbers.
+const NUMBERS: &str = "alignment.json";
+
+/// Arguments of `align`.
+#[derive(Debug, Args)]
+pub(crate) struct AlignArgs {
+    /// The scan: OBJ, PLY, STL or XYZ
+    pub(crate) mesh: PathBuf,
+    /// The image of its print: PNG, JPEG or TIFF
+    pub(crate) print: PathBuf,
+    /// Write depth map, masks, overlay and alignment.json to this directory; files that this command wrote there
+    /// earlier are replaced
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Unit of the mesh: mm, cm, m or in [default: unknown]
+    #[arg(long)]
+    pub(crate) unit: Option<LengthUnit>,
+    /// Whether the carved face points towards -z of the mesh [default: found out]
+    #[arg(long, value_name = "BOOL")]
+    pub(crate) scanned_face_down: Option<bool>,
+}
+
+pub(crate) async fn align(args: AlignArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let folder = args.output.as_deref().map(|dir| GeneratedFolder {
+        dir,
+        content: "alignment",
+    });
+    if let Some(folder) = folder {
+        let names = ALIGNMENT_FILES.iter().chain([&NUMBERS]);
+        folder.refuse_foreign(&names.map(Path::new).collect::<Vec<_>>())?;
+    }
+    let files = AlignInput {
+        mesh: args.mesh,
+        print: args.print,
+        hints: ScanHints {
+            unit: args.unit,
+            scanned_face_down: args.scanned_face_down,
+        },
+    };
+    let found = align::align(files, &context.location).await?;
+    let json = found.to_json();
+    let (pair, print) = match &found {
+        FileAlignment::Aligned { pair, print } => (pair, print),
+        FileAlignment::Refused(failure) => {
+            context.print_json(&json)?;
+            if !context.global.json {
+                context.warn(&format!("not aligned: {failure}"));
+            }
+            return Ok(ExitCode::SomeFailed);
+        }
+    };
+    if let Some(folder) = folder {
+        write_files(folder, pair, print, &json, context)?;
+    }
+    context.print(&json, || text(pair))?;
+    Ok(ExitCode::Done)
+}
+
+fn write_files(
+    folder: GeneratedFolder<'_>,
+    pair: &AlignedPair,
+    print: &Print,
+    json: &Value,
+    context: &Context,
+) -> ProjectResult<()> {
+    let mut files = alignment_files(pair, print).to_vec();
+    files.push((NUMBERS, format!("{json:#}\n").into_bytes()));
+    if let Some((path, error)) = folder.write(&files)? {
+        let path = path.display();
+        context.warn(&format!(
+            "the earlier files were replaced but could not be removed from {path}: {error}"
+        ));
+    }
+    context.info(&format!("the files are in {}", folder.dir.display()));
+    Ok(())
+}
+
+/// Returns what was found in five lines.
+fn text(pair: &AlignedPair) -> String {
+    let metric = pair.first_metric();
+    let [x, y] = metric.shift_px;
+    let confidence = match metric.confidence {
+        Some(confidence) if metric.is_low_confidence() => {
+            format!("{confidence:.2}: look at it before you use it")
+        }
+        Some(confidence) => format!("{confidence:.2}"),
+        None => "not known under this method".to_owned(),
+    };
+    let map = pair.print_from_mesh(metric);
+    let scale = pixels_per_unit(&map.0);
+    let rows = [
+        ("confidence", confidence),
+        (
+            "pose",
+            format!(
+                "turned by {:.2} degrees, shifted by {x:.1}, {y:.1} px, {scale:.2} px per unit of the mesh",
+                metric.angle_deg
+            ),
+        ),
+        ("carved side", format!("towards {} of the mesh", side(pair))),
+        (
+            "threshold",
+            format!(
+                "{} at {:.3} below the fitted surface, in units of the mesh",
+                metric.metric, -metric.threshold_depth
+            ),
+        ),
+        (
+            "agreement",
+            format!(
+                "SSIM {:.3}, IoU {:.3}, Dice {:.3}",
+                metric.scores.ssim, metric.scores.iou, metric.scores.dice
+            ),
+        ),
+    ];
+    columns(rows.map(|(name, value)| vec![name.to_owned(), value]), "<<")
+}
+
+/// Returns how many pixels of the print a unit of the mesh is long on it.
+fn pixels_per_unit(map: &[[f64; 4]; 3]) -> f64 {
+    let length = |row: &[f64; 4]| {
+        row[..3]
+            .iter()
+            .map(|value| value * value)
+            .sum::<f64>()
+            .sqrt()
+    };
+    f64::midpoint(length(&map[0]), length(&map[1]))
+}

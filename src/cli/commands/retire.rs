@@ -1,0 +1,56 @@
+//! `retire`: takes pairs out of every count and brings them back.
+
+use clap::Args;
+use serde_json::json;
+
+use crate::cli::output::context::Context;
+use crate::cli::output::table::count;
+use mocban_project::retire::{self, RetireOutcome};
+use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectResult};
+
+/// Arguments of `retire`.
+#[derive(Debug, Args)]
+pub(crate) struct RetireArgs {
+    /// The pairs
+    #[arg(value_name = "PAIR", required = true)]
+    pub(crate) pairs: Vec<String>,
+    /// Bring the pairs back, with their results and verdicts
+    #[arg(long)]
+    pub(crate) undo: bool,
+}
+
+pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let RetireOutcome {
+        names,
+        changed,
+        warnings,
+    } = if args.undo {
+        retire::undo(&args.pairs, &context.location).await?
+    } else {
+        retire::retire(&args.pairs, &context.location).await?
+    };
+    let others = names.len() as u64 - changed;
+    let (key, text) = if args.undo {
+        ("restored", "back in every count")
+    } else {
+        let text = "out of every count; results and verdicts are kept";
+        ("retired", text)
+    };
+    context.print_json(&json!({"schema": 1, key: changed, "unchanged": others}))?;
+    if changed > 0 {
+        context.info(&format!("{} {text}", count(changed, "pair")));
+    }
+    if others > 0 && !args.undo {
+        context.info(&format!("{} retired already", count(others, "pair")));
+    }
+    for warning in &warnings {
+        context.warn(warning);
+    }
+    if args.undo {
+        context.next("run");
+    } else if let [pair] = names.as_slice() {
+        context.next(&format!("retire --undo {}", shell_quoted(pair.as_str())));
+    }
+    Ok(ExitCode::Done)
+}

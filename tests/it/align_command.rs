@@ -1,0 +1,146 @@
+//! `align`: one pair without a project gives the result and the files that a project gives.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::cli::{Call, empty, mocban};
+
+/// Fields of a result that both `align --json` and the export have.
+const NUMBERS: [&str; 7] = [
+    "threshold_depth",
+    "ssim",
+    "nl_ssim",
+    "iou",
+    "iou_box",
+    "dice",
+    "confidence",
+];
+
+/// Files that have the same name in an export; the last two belong to the metric shown first.
+const FILES: [&str; 6] = [
+    "print_mask.png",
+    "depth.png",
+    "depth.json",
+    "aligned_depth.png",
+    "aligned_mask.png",
+    "overlay.png",
+];
+
+/// Makes a demo project `d` and exports it to `e`.
+fn exported(dir: &Path) {
+    let tiers = ["demo", "d", "--tier", "pose", "--pairs", "4"];
+    mocban(dir, &tiers).expect(0);
+    mocban(dir, &["-C", "d", "export", "--to", "jsonl", "-o", "e"]).expect(0);
+}
+
+fn align(dir: &Path, line: &Value, more: &[&str]) -> Call {
+    let [mesh, print] = ["mesh", "print"].map(|name| {
+        let path = line[name].as_str().expect("a path");
+        format!("d/{path}")
+    });
+    let face_down = line["scanned_face_down"]
+        .as_bool()
+        .map(|down| down.to_string());
+    let mut args = vec!["--json", "align", &mesh, &print];
+    if let Some(unit) = line["unit"].as_str() {
+        args.extend(["--unit", unit]);
+    }
+    if let Some(face_down) = &face_down {
+        args.extend(["--scanned-face-down", face_down]);
+    }
+    mocban(dir, &[&args, more].concat())
+}
+
+#[test]
+fn a_pair_alone_gives_the_results_and_files_of_a_project() {
+    let dir = empty();
+    exported(dir.path());
+    let lines = crate::export_readback::lines(&dir.path().join("e"));
+    let firsts = lines.iter().filter(|line| line["metric"] == "relief");
+    let mut compared = 0;
+    for first in firsts {
+        let found = align(dir.path(), first, &["-o", "chữ/kết quả"])
+            .expect(0)
+            .json();
+        assert_eq!(found["status"], "aligned");
+        let same = [
+            ("rotation_deg", "angle_deg"),
+            ("scale", "scale"),
+            ("shift_px", "shift_px"),
+        ];
+        for (ours, theirs) in same {
+            assert_eq!(found[ours], first[theirs], "{ours}");
+        }
+        assert_eq!(found["print_from_mesh"], first["print_from_mesh"]);
+        for line in lines.iter().filter(|line| line["id"] == first["id"]) {
+            let metric = line["metric"].as_str().expect("a name");
+            for name in NUMBERS {
+                assert_eq!(
+                    found["results"][metric][name], line[name],
+                    "{metric} {name}"
+                );
+            }
+        }
+        let folder = dir.path().join("chữ/kết quả");
+        for file in FILES {
+            let name = file.split('.').next().expect("a name");
+            let path = match file {
+                "depth.json" => first["files"]["depth"]
+                    .as_str()
+                    .map(|path| path.replace(".png", ".json")),
+                _ => first["files"][name].as_str().map(ToOwned::to_owned),
+            };
+            let theirs =
+                fs::read(dir.path().join("e").join(path.expect("a path"))).expect("a file");
+            assert!(
+                fs::read(folder.join(file)).expect("a file") == theirs,
+                "{file}"
+            );
+        }
+        let stored = fs::read_to_string(folder.join("alignment.json")).expect("the numbers");
+        assert_eq!(serde_json::from_str::<Value>(&stored).expect("JSON"), found);
+        compared += 1;
+    }
+    assert_eq!(compared, 4);
+}
+
+#[test]
+fn a_pair_of_two_characters_is_refused_and_writes_nothing() {
+    let dir = empty();
+    exported(dir.path());
+    let (mesh, print) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0001.png");
+    let refused = mocban(dir.path(), &["align", mesh, print, "-o", "out"]).expect(3);
+    assert!(refused.err.contains("not aligned: "), "{}", refused.err);
+    assert!(!dir.path().join("out").exists());
+    let json = mocban(dir.path(), &["align", mesh, print, "--json"])
+        .expect(3)
+        .json();
+    assert_eq!(json["status"], "refused");
+    assert_eq!(json["refusal"]["code"], "no_solution");
+    let damaged = ["align", mesh, "d/data/manifest.csv", "--json"];
+    let damaged = mocban(dir.path(), &damaged).expect(3).json();
+    assert_eq!(damaged["refusal"]["code"], "bad_input");
+}
+
+#[test]
+fn wrong_files_and_folders_are_named_before_anything_is_computed() {
+    let dir = empty();
+    fs::create_dir(dir.path().join("mine")).expect("a folder");
+    fs::write(dir.path().join("mine/notes.txt"), "").expect("a file");
+    // The files do not exist either, and are not looked at.
+    let foreign = mocban(dir.path(), &["align", "a.stl", "a.png", "-o", "mine"]).expect(2);
+    assert!(
+        foreign.err.contains("mine holds notes.txt"),
+        "{}",
+        foreign.err
+    );
+    let missing = mocban(dir.path(), &["align", "a.stl", "a.png", "-o", "new"]).expect(2);
+    assert!(
+        missing.err.contains("a.stl is not there"),
+        "{}",
+        missing.err
+    );
+    assert!(!dir.path().join("new").exists());
+}

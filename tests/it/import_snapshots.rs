@@ -1,0 +1,149 @@
+//! Snapshots of imports: lists of pairs as people have them, workbooks, and directories.
+
+use mocban::workbook::test_helpers::{text_rows, workbook};
+
+use crate::cli::{empty, mocban};
+use crate::snapshots::{TWO_PAIRS, assert_call, write};
+
+#[test]
+fn import() {
+    let dir = empty();
+    let args = ["-C", "p", "import", "pairs.csv", "--allow-missing"];
+    write(dir.path(), "pairs.csv", TWO_PAIRS);
+    assert_call("import_new", dir.path(), &args);
+    assert_call("import_unchanged", dir.path(), &args);
+    write(
+        dir.path(),
+        "pairs.csv",
+        &TWO_PAIRS.replace("b.png", "B.png"),
+    );
+    assert_call("import_changed", dir.path(), &args);
+    assert_call(
+        "import_json",
+        dir.path(),
+        &[
+            "-C",
+            "p",
+            "--json",
+            "import",
+            "pairs.csv",
+            "--allow-missing",
+        ],
+    );
+    write(
+        dir.path(),
+        "pairs.csv",
+        "id,mesh,print,charactr,unitt\na,a.stl,a.png,x,mm\n",
+    );
+    assert_call("import_misspelt_columns", dir.path(), &args);
+    write(
+        dir.path(),
+        "case.csv",
+        "id,mesh,print\nA1,pairs.csv,pairs.csv\na1,pairs.csv,pairs.csv\n",
+    );
+    assert_call(
+        "import_similar_ids",
+        dir.path(),
+        &["-C", "q", "import", "case.csv", "--allow-missing"],
+    );
+}
+
+#[test]
+fn lists_as_spreadsheets_and_scripts_write_them() {
+    let dir = empty();
+    std::fs::create_dir(dir.path().join("quét")).expect("a directory");
+    for name in ["quét/0117.STL", "quét/bản in 117.png"] {
+        write(dir.path(), name, "x");
+    }
+    let rows = [
+        &[
+            "Số hiệu",
+            "Bản quét",
+            "Bản in",
+            "Tên chữ",
+            "Khối",
+            "Ghi chú",
+        ][..],
+        &[
+            "0117",
+            "quét/0117.STL",
+            "quét/bản\u{a0}in 117.png",
+            "天",
+            "4",
+            "x",
+        ],
+    ];
+    let sheets = [("Ván 4", text_rows(&rows)), ("Ván 5", String::new())];
+    let sheets = sheets.each_ref().map(|(name, rows)| (*name, rows.as_str()));
+    std::fs::write(dir.path().join("cặp.xlsx"), workbook(&sheets, "", "")).expect("written");
+    let import = |list| ["-C", "p", "import", list];
+    assert_call("import_xlsx", dir.path(), &import("cặp.xlsx"));
+    let sheet = [&import("cặp.xlsx")[..], &["--sheet", "Ván 6"]].concat();
+    assert_call("error_no_sheet", dir.path(), &sheet);
+    write(
+        dir.path(),
+        "117.csv",
+        "sep=;\nid;mesh;print\n117;quét/0117.STL;quét/bản in 117.png\n",
+    );
+    assert_call("error_lost_zeros", dir.path(), &import("117.csv"));
+    write(
+        dir.path(),
+        "nhan.json",
+        "[{\"id\": 118, \"mesh\": \"Quét/117.stl\", \"print\": \"quét/bản in 117.tif\", \"block\": NaN}]",
+    );
+    assert_call("error_similar_files", dir.path(), &import("nhan.json"));
+    write(
+        dir.path(),
+        "chấm.csv",
+        "Mã số,Đánh giá,Người chấm\n117,Đạt,lan\n",
+    );
+    let verdicts = ["-C", "p", "verdict", "import", "chấm.csv"];
+    assert_call("error_verdict_of_similar_pair", dir.path(), &verdicts);
+}
+
+#[test]
+fn import_of_directories() {
+    let dir = empty();
+    for folder in ["bản khắc", "bản in"] {
+        std::fs::create_dir(dir.path().join(folder)).expect("a directory");
+    }
+    for name in ["bản khắc/1.stl", "bản khắc/2.stl", "bản khắc/notes.txt"] {
+        write(dir.path(), name, "x");
+    }
+    for name in ["bản in/1.png", "bản in/3.png"] {
+        write(dir.path(), name, "x");
+    }
+    let folders = ["--meshes", "bản khắc", "--prints", "bản in"];
+    let import = ["-C", "dự án", "import"];
+    let args = [&import[..], &folders].concat();
+    assert_call("import_directories", dir.path(), &args);
+    let swapped = ["--meshes", "bản in", "--prints", "bản khắc"];
+    let args_swapped = [&import[..], &swapped].concat();
+    assert_call("error_swapped_directories", dir.path(), &args_swapped);
+    write(dir.path(), "bản khắc/1.ply", "x");
+    assert_call("error_same_stem", dir.path(), &args);
+    std::fs::remove_file(dir.path().join("bản khắc/1.ply")).expect("removed");
+    for (folder, extension) in [("bản khắc", "stl"), ("bản in", "png")] {
+        for block in ["ván 1", "ván 2"] {
+            std::fs::create_dir(dir.path().join(folder).join(block)).expect("a directory");
+            for k in 1..4 {
+                write(
+                    dir.path(),
+                    &format!("{folder}/{block}/{k}.{extension}"),
+                    "x",
+                );
+            }
+        }
+    }
+    assert_call("import_directories_in_directories", dir.path(), &args);
+    let block = |name: &str| ["bản khắc", "bản in"].map(|folder| format!("{folder}/{name}"));
+    for (name, block) in ["ván 1", "ván 2"].map(|name| (name, block(name))) {
+        let folders = ["--meshes", &block[0], "--prints", &block[1]];
+        let args = [&["-C", "q", "import"][..], &folders].concat();
+        if name == "ván 1" {
+            mocban(dir.path(), &args).expect(0);
+        } else {
+            assert_call("error_changed_files", dir.path(), &args);
+        }
+    }
+}

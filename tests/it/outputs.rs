@@ -1,0 +1,199 @@
+//! Outputs of commands: folders are made, and a project's own files are never an output.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::block_view::finished_block;
+use crate::browser::Browser;
+use crate::check::{at, done};
+use crate::cli::{binary, empty, mocban};
+use crate::page::Page;
+
+#[test]
+fn every_command_makes_the_folder_of_its_output() {
+    let dir = empty();
+    let project = done(dir.path());
+    let new = |name: &str| dir.path().join("new").join(name).display().to_string();
+    for (args, file) in [
+        (&["report", "-o"][..], "a/report.html"),
+        (&["contact-sheet", "-o"], "b/sheet.png"),
+        (&["export", "-o"], "c/out"),
+        (&["backup"], "d/b.sqlite"),
+        (&["backup", "-o"], "e/b.sqlite"),
+        (&["docs"], "f/docs"),
+        (&["docs", "-o"], "g/docs"),
+        (&["man"], "h/man"),
+        (&["man", "-o"], "i/man"),
+        (&["completions", "bash", "-o"], "j/mocban"),
+        (&["status", "--log-file"], "k/log.txt"),
+    ] {
+        let output = new(file);
+        at(&project, &[args, &[output.as_str()]].concat()).expect(0);
+        assert!(Path::new(&output).exists(), "{output}");
+    }
+}
+
+#[test]
+fn files_of_a_project_are_never_an_output() {
+    let dir = empty();
+    let project = done(dir.path());
+    let own = |name: &str| project.dir().join(name).display().to_string();
+    for name in [
+        "catalog.sqlite",
+        "mocban.toml",
+        "artifacts/x.html",
+        "artifacts",
+    ] {
+        let output = own(name);
+        for args in [
+            &["report", "-o"][..],
+            &["contact-sheet", "-o"],
+            &["export", "-o"],
+            &["docs", "-o"],
+            &["man", "-o"],
+            &["completions", "zsh", "-o"],
+            &["status", "--log-file"],
+        ] {
+            let refused = at(&project, &[args, &[output.as_str()]].concat()).expect(2);
+            assert!(refused.err.contains("project"), "{args:?}: {}", refused.err);
+        }
+    }
+    assert!(!project.dir().join("artifacts/x.html").exists());
+    at(&project, &["check"]).expect(0);
+}
+
+#[test]
+fn files_of_a_block_are_never_an_output() {
+    let dir = empty();
+    finished_block(dir.path());
+    for name in ["d/data/page.jpg", "d/data/block.ply", "few.json"] {
+        let refused = mocban(dir.path(), &["-C", "p", "report", "-o", name]).expect(2);
+        assert!(refused.err.contains("is an input of b1"), "{}", refused.err);
+    }
+}
+
+#[test]
+fn equal_warnings_are_a_few_with_a_count() {
+    let dir = empty();
+    let demo = [
+        "demo",
+        "p",
+        "--pairs",
+        "6",
+        "--set",
+        "depth.longest_px=96",
+        "-q",
+    ];
+    mocban(dir.path(), &demo).expect(0);
+    std::fs::remove_dir_all(dir.path().join("p/data/prints")).expect("removed");
+    let export = ["-C", "p", "--progress", "none", "export", "-o", "out"];
+    let lost = mocban(dir.path(), &export).expect(3);
+    let warnings: Vec<&str> = lost
+        .err
+        .lines()
+        .filter(|line| line.starts_with("warning:"))
+        .collect();
+    assert_eq!(warnings.len(), 4, "{}", lost.err);
+    assert!(warnings[0].contains("upright-0000"), "{}", lost.err);
+    assert_eq!(warnings[3], "warning: 3 more like this one; -v shows all");
+    let all = mocban(dir.path(), &[&export[..], &["-v"]].concat()).expect(3);
+    assert!(all.err.contains("no files of upright-0005"), "{}", all.err);
+}
+
+/// Returns what bash completes after the words of a command line, of which the last one is not finished.
+fn bash_completes(dir: &Path, words: &str) -> String {
+    let program = binary().get_program().to_owned();
+    let script = format!(
+        "source <(\"$0\" completions bash)\nmocban() {{ \"$0\" \"$@\"; }}\nCOMP_WORDS=({words})\n\
+         COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 ))\n_mocban_with_names mocban \"${{COMP_WORDS[COMP_CWORD]}}\"\n\
+         printf '%s\\n' \"${{COMPREPLY[@]}}\""
+    );
+    let mut bash = Command::new("bash");
+    bash.args(["-c", &script])
+        .arg(program)
+        .current_dir(dir)
+        .env("LC_ALL", "C.UTF-8");
+    let output = bash.output().expect("bash starts");
+    assert!(
+        output.stderr.is_empty(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+#[test]
+fn bash_completes_the_names_of_pairs() {
+    let dir = empty();
+    let list = "id,mesh,print\nb04-0117,a.stl,a.png\nb04-0118,a.stl,a.png\nchữ 1,a.stl,a.png\n";
+    std::fs::write(dir.path().join("pairs.csv"), list).expect("written");
+    let import = ["-C", "p", "-q", "import", "pairs.csv", "--allow-missing"];
+    mocban(dir.path(), &import).expect(0);
+    let complete = |words: &str| bash_completes(dir.path(), words);
+    assert_eq!(complete("mocban -C p show b04"), "b04-0117\nb04-0118\n");
+    assert_eq!(complete("mocban -C p view chữ"), "chữ\\ 1\n");
+    assert!(complete("mocban -C p sho").contains("show"));
+    // Where there is no project, or no name, the options and commands are completed without an error.
+    assert!(complete("mocban show --lo").contains("--low"));
+    complete("mocban show b04");
+}
+
+#[test]
+fn pages_have_the_language_that_is_asked_for() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = empty();
+    done(dir.path());
+    for (args, lang, expected) in [
+        (&["--lang", "vi"][..], "C", "Từ gỗ đến mực"),
+        (&[], "vi_VN.UTF-8", "Từ gỗ đến mực"),
+        (&["--lang", "en"], "vi_VN.UTF-8", "Wood to ink"),
+        (&[], "C", "Wood to ink"),
+    ] {
+        let view = ["-C", "p", "--json", "view", "--no-open", "upright-0000"];
+        let mut command = binary();
+        command
+            .current_dir(dir.path())
+            .env_remove("LC_ALL")
+            .env_remove("LC_MESSAGES");
+        let page = Page::of(command.env("LANG", lang).args(view).args(args));
+        let tab = browser.tab(900, 900);
+        tab.open(&page.url);
+        tab.wait("window.mocbanViewer");
+        tab.wait(&format!("document.body.textContent.includes('{expected}')"));
+    }
+}
+
+#[test]
+fn the_documentation_folds_and_searches() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = empty();
+    mocban(dir.path(), &["docs", "-o", "docs"]).expect(0);
+    let tab = browser.tab(400, 800);
+    let page = dir.path().join("docs/tutorial/first-hour.html");
+    tab.open(&format!("file://{}", page.display()));
+    let contents = "getComputedStyle(document.getElementById('contents')).display";
+    tab.wait(&format!("{contents} === 'none'"));
+    tab.screenshot("docs-phone");
+    tab.eval("document.getElementById('contents-button').click(), null");
+    tab.wait(&format!("{contents} !== 'none'"));
+    tab.resize([1440, 900]);
+    tab.wait(&format!("{contents} !== 'none'"));
+    tab.eval("document.getElementById('search-text').focus(), null");
+    tab.text("bao cao");
+    tab.wait("document.querySelectorAll('#search-results a').length > 0");
+    tab.screenshot("docs-search");
+    // A search without marks finds words with marks.
+    let found = tab.eval("document.getElementById('search-results').textContent");
+    assert!(
+        found.as_str().is_some_and(|text| text.contains("báo cáo")),
+        "{found}"
+    );
+    tab.eval("document.querySelector('.translation a').click(), null");
+    tab.wait("document.documentElement.lang === 'vi' && document.querySelector('main h1')");
+    tab.eval("document.querySelector('a[rel=next]').click(), null");
+    tab.wait("location.pathname.endsWith('thuat-ngu.html')");
+}

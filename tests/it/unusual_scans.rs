@@ -1,0 +1,148 @@
+//! Scans in files that other programs wrote, from the file to the exported result.
+
+use std::fs;
+use std::path::Path;
+
+use mocban::demo::{PairGenerator, Tier};
+use serde_json::Value;
+
+use crate::cli::{empty, mocban};
+use crate::mesh_forms::{self, MeshForm};
+
+/// Largest error of a landmark, px.
+const LANDMARK_PX: f64 = 3.0;
+/// Largest difference between the IoU of a form and that of the plain file.
+const IOU: f64 = 0.005;
+
+/// Returns the exported results with the consensus of all metrics, one a pair.
+fn exported(dir: &Path) -> Vec<Value> {
+    mocban(dir, &["-C", "p", "export", "--to", "jsonl", "-o", "out"]).expect(0);
+    let text = fs::read_to_string(dir.join("out/pairs.jsonl")).expect("the lines");
+    text.lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"))
+        .filter(|line| line["metric"] == "ensemble")
+        .collect()
+}
+
+/// Returns where a map with rows of four numbers puts a point, px.
+fn place(map: &Value, point: &Value) -> [f64; 2] {
+    let number = |value: &Value| value.as_f64().expect("a number");
+    [0, 1].map(|axis| {
+        let row = &map[axis];
+        let terms = (0..3).map(|k| number(&row[k]) * number(&point[k]));
+        terms.sum::<f64>() + number(&row[3])
+    })
+}
+
+/// Every form is aligned like its plain twin; the user learns of vertices without a position, and why other files are
+/// refused.
+#[test]
+fn every_form_of_a_scan_is_aligned_like_its_plain_twin() {
+    let dir = empty();
+    let pairs = PairGenerator::new(Tier::Upright, 5).with_vertices(Some(12_000));
+    let mut pair = pairs.pair(0).expect("images encode");
+    // The coordinates of the file, so that all forms hold the same mesh.
+    pair.mesh
+        .vertices
+        .map_in_place(|point| point.map(|value| f64::from(value as f32)));
+    let groups = [
+        mesh_forms::with_faces(&pair.mesh),
+        mesh_forms::points(&pair.mesh),
+    ];
+    let refused = [
+        (
+            "pointer.stl",
+            "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n",
+            "does not hold the mesh; fetch the mesh with `git lfs pull`",
+        ),
+        (
+            "scene.ply",
+            "{\"asset\": {\"version\": \"2.0\"}}",
+            "the file is a glTF scene; OBJ, PLY and STL meshes and XYZ points are read: open them in MeshLab",
+        ),
+    ];
+    let print = format!("print.{}", pair.print_extension);
+    fs::write(dir.path().join(&print), &pair.print).expect("written");
+    let mut list = "id,mesh,print\n".to_owned();
+    let all = groups
+        .iter()
+        .flatten()
+        .map(|form| (form.name, &form.bytes[..]));
+    for (name, bytes) in all.chain(refused.map(|(name, text, _)| (name, text.as_bytes()))) {
+        fs::write(dir.path().join(name), bytes).expect("written");
+        list.extend([name, ",", name, ",", &print, "\n"]);
+    }
+    fs::write(dir.path().join("pairs.csv"), list).expect("written");
+    mocban(dir.path(), &["-C", "p", "import", "pairs.csv"]).expect(0);
+    let run = mocban(dir.path(), &["-C", "p", "--progress", "none", "run"]).expect(3);
+    for (name, _, sentence) in refused {
+        let shown = mocban(dir.path(), &["-C", "p", "show", name]).expect(0).out;
+        assert!(shown.contains(sentence), "{name}: {shown}");
+    }
+    let results = exported(dir.path());
+    let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
+    for forms in &groups {
+        let result = |form: &MeshForm| {
+            let found = results.iter().find(|line| line["id"] == form.name);
+            found.unwrap_or_else(|| panic!("{} has no result: {}", form.name, run.err))
+        };
+        let iou = |form: &MeshForm| result(form)["iou"].as_f64().expect("a score");
+        let plain = iou(&forms[0]);
+        assert!(plain > 0.5, "{plain}");
+        for form in forms {
+            let name = form.name;
+            assert!(
+                (iou(form) - plain).abs() < IOU,
+                "{name}: {} {plain}",
+                iou(form)
+            );
+            for landmark in truth["landmarks"].as_array().expect("points") {
+                let [found, wanted] = [result(form), &truth]
+                    .map(|source| place(&source["print_from_mesh"], landmark));
+                let error = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
+                assert!(error < LANDMARK_PX, "{name}: {error} px");
+            }
+            assert_says_missing(dir.path(), form, &run.err);
+        }
+    }
+}
+
+/// The log of the run and `show` say once how many vertices have no position.
+fn assert_says_missing(dir: &Path, form: &MeshForm, log: &str) {
+    let sentence = format!(
+        "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces: {}",
+        form.missing
+    );
+    let name = form.name;
+    let shown = mocban(dir, &["-C", "p", "show", name]).expect(0).out;
+    let of_form = log.lines().filter(|line| line.contains(name));
+    let warnings = of_form.filter(|line| line.contains(&sentence)).count();
+    let expected = usize::from(form.missing > 0);
+    assert_eq!(warnings, expected, "{name}: {log}");
+    assert_eq!(
+        shown.matches(&sentence).count(),
+        expected,
+        "{name}: {shown}"
+    );
+}
+
+/// A list of scans in a format that is not read gets one sentence when it is imported.
+#[test]
+fn scans_of_another_format_are_refused_when_their_folder_is_imported() {
+    let dir = empty();
+    for name in ["scans/a.glb", "scans/b.glb", "scans/c.off", "prints/a.png"] {
+        let path = dir.path().join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        fs::write(path, "").expect("written");
+    }
+    let import = [
+        "-C", "p", "import", "--meshes", "scans", "--prints", "prints",
+    ];
+    let refused = mocban(dir.path(), &import).expect(2).err;
+    for sentence in [
+        "a glTF scene is not read: scans/a.glb and 1 more; open",
+        "an OFF mesh is not read: scans/c.off; open",
+    ] {
+        assert_eq!(refused.matches(sentence).count(), 1, "{refused}");
+    }
+}
