@@ -1,18 +1,19 @@
 //! A refined pose with its canvas and thresholds, for the depth map as rendered or for a levelled one.
 
 use super::confidence;
-use super::half_canvas::HalfCanvas;
+use super::half_canvas::{HalfCanvas, half_from_print};
+use super::ink_edge::InkEdge;
 use super::levelling;
 use super::metric_thresholds::{self, ChosenThreshold};
 use super::observation::Observation;
 use super::params::{RegisterError, RegisterParams};
 use super::pose_search::PoseSearch;
 use super::refine::{self, Refinement};
-use super::unmatched::Unmatched;
+use super::unmatched::{self, Unmatched};
 use crate::stages::normalize::{Normalized, relative_depths, relief_heights};
 use crate::stages::pose::SoftMask;
-use mocban_core::domain::{Levelling, PoseFeatures, ReliefHeights, ThresholdMetric};
-use mocban_core::raster::DepthMap;
+use mocban_core::domain::{Affine2, Levelling, PoseFeatures, ReliefHeights, ThresholdMetric};
+use mocban_core::raster::{DepthMap, warp_depth};
 
 /// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
@@ -21,6 +22,9 @@ const MIRROR_WINS: f64 = 1.06;
 /// A levelled depth map is used only if the edges of ink and strokes scatter by at most this share of what they scatter
 /// on the map as rendered. It is 0.3 to 0.85 where a levelling is needed, and about 1 where strokes are lost.
 const LESS_SCATTER: f64 = 0.85;
+/// A levelled depth map is registered only if the edges scatter by at most this share at the pose of the map as rendered.
+/// The registration costs as much as that of the map as rendered.
+const LESS_SCATTER_BEFORE: f64 = 0.95;
 
 /// A refined pose, the print and the depth map at it, and the thresholds.
 pub(super) struct Posed {
@@ -97,15 +101,19 @@ impl Levelled {
             |chosen: &&ChosenThreshold| chosen.choice.metric == ThresholdMetric::Ensemble;
         let level = single.thresholds.iter().find(of_ensemble)?.choice.level;
         let canvas_from_print = normalized.outcome.inks[search.ink].canvas_from_print;
+        let canvas_from_depth = canvas_from_print.after(&single.refined.print_from_depth);
         let levelling = levelling::fit(
             depth,
             &single.canvas,
-            &canvas_from_print.after(&single.refined.print_from_depth),
+            &canvas_from_depth,
             relief,
             level,
             single.spread,
         )?;
         let map = depth.levelled(&levelling);
+        if !scatters_less(&map, &canvas_from_depth, &single.canvas, level) {
+            return None;
+        }
         let relief = relief_heights(&map)?;
         let depths = relative_depths(&map, &relief);
         let posed = Posed::new(&map, &depths, &relief, normalized, search, params).ok()?;
@@ -118,6 +126,23 @@ impl Levelled {
             posed,
         })
     }
+}
+
+/// Returns whether the edges of ink and strokes scatter less on a levelled depth map, at the pose and the threshold of the
+/// map as rendered. `canvas` shows the map as rendered.
+fn scatters_less(
+    levelled: &DepthMap,
+    canvas_from_depth: &Affine2,
+    canvas: &HalfCanvas,
+    level: u16,
+) -> bool {
+    let (width, height) = (canvas.levels.width(), canvas.levels.height());
+    let half_from_depth = half_from_print(canvas_from_depth);
+    let levels = warp_depth(levelled, &half_from_depth, width, height);
+    let strokes = levels.zip_map(&canvas.levels, |found, known| known > 0 && found >= level);
+    let [after, before] = [strokes, canvas.mask(level)]
+        .map(|strokes| unmatched::edge_scatter(canvas, &InkEdge::of(&strokes)));
+    after <= LESS_SCATTER_BEFORE * before
 }
 
 /// Adds the strokes without a partner to the evidence for the pose.
