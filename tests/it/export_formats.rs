@@ -114,16 +114,21 @@ fn formats_agree_on_pairs_and_numbers() {
     }
     assert!(!out.join("jsonl/blocks.jsonl").exists());
 
-    let mut table = csv::Reader::from_path(out.join("csv/pairs.csv")).expect("a table");
-    let header = table.headers().expect("a header").clone();
-    let column = |name: &str| header.iter().position(|found| found == name).expect(name);
-    for (row, line) in table.records().zip(&rows) {
-        let row = row.expect("a row");
-        assert_eq!(&row[column("id")], line["id"]);
-        assert_eq!(&row[column("meta_tier")], "upright");
-        let number: f64 = row[column("print_from_mesh_2_4")]
-            .parse()
-            .expect("a number");
+    let [table, matrices] = ["pairs", "matrices"].map(|name| {
+        let table = csv::Reader::from_path(out.join(format!("csv/{name}.csv"))).expect("a table");
+        let rows: Result<Vec<BTreeMap<String, String>>, _> = table.into_deserialize().collect();
+        rows.expect("rows")
+    });
+    assert_eq!([table.len(), matrices.len()], [rows.len(); 2]);
+    for ((row, matrices), line) in table.iter().zip(&matrices).zip(&rows) {
+        for table in [row, matrices] {
+            assert_eq!(
+                [&table["id"], &table["metric"]],
+                [&line["id"], &line["metric"]]
+            );
+        }
+        assert_eq!(row["meta_tier"], "upright");
+        let number: f64 = matrices["print_from_mesh_2_4"].parse().expect("a number");
         assert_eq!(number, line["print_from_mesh"][1][3]);
     }
 

@@ -74,7 +74,7 @@ fn every_form_of_a_scan_is_aligned_like_its_plain_twin() {
     }
     fs::write(dir.path().join("pairs.csv"), list).expect("written");
     mocban(dir.path(), &["-C", "p", "import", "pairs.csv"]).expect(0);
-    let run = mocban(dir.path(), &["-C", "p", "--progress", "none", "run"]).expect(3);
+    let run = mocban(dir.path(), &["-C", "p", "--progress", "none", "run", "-v"]).expect(3);
     for (name, _, sentence) in refused {
         let shown = mocban(dir.path(), &["-C", "p", "show", name]).expect(0).out;
         assert!(shown.contains(sentence), "{name}: {shown}");

@@ -23,7 +23,7 @@ fn advice(length: f64, unit: Option<LengthUnit>) -> String {
     )
 }
 
-/// Returns the advice of [`advice`] for an error of a stage that found no solution, nothing for other errors.
+/// Returns the advice for the error of a stage: on scans as long as a block if it found no solution, nothing otherwise.
 pub fn advice_for(error: &StageError, length: f64, unit: Option<LengthUnit>) -> String {
     match error.class() {
         FailureClass::NoSolution => advice(length, unit),

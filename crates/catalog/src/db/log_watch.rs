@@ -10,6 +10,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use sqlx::SqliteConnection;
 
 use crate::db::error::{CatalogError, LogLoss, Result};
+use crate::db::error_kind::CatalogErrorKind;
 use crate::db::lock_owner::sidecar;
 use mocban_core::domain::UnixMillis;
 use mocban_system::platform::{FileId, stat};
@@ -159,21 +160,22 @@ async fn checkpoint(conn: &mut SqliteConnection, pragma: &'static str) -> Result
     Ok(sqlx::query_as(pragma).fetch_one(conn).await?)
 }
 
-/// Returns whether a log that became shorter is too short for the pages that SQLite's index lists. Another process may
-/// have emptied the log properly, and then the index lists fewer pages.
+/// Returns whether a log that became shorter is too short for the pages that SQLite's index lists, or cannot be read any
+/// more. Another process may have emptied the log properly, and then the index lists fewer pages.
 async fn is_cut(conn: &mut SqliteConnection, log: &WatchedFile) -> bool {
-    let Ok(page_bytes) = sqlx::query_scalar::<_, i64>("PRAGMA page_size")
-        .fetch_one(&mut *conn)
-        .await
-    else {
-        return false;
+    let page_bytes = sqlx::query_scalar::<_, i64>("PRAGMA page_size");
+    let page_bytes = match page_bytes.fetch_one(&mut *conn).await {
+        Ok(page_bytes) => page_bytes,
+        Err(error) => return is_damage(&error.into()),
     };
     let noop = "PRAGMA wal_checkpoint(NOOP)";
     // The number of pages may change while the length is read.
-    while let Ok((_, pages, _)) = checkpoint(conn, noop).await {
+    loop {
+        let pages = checkpoint(conn, noop).await;
         let state = log.state();
-        let Ok((_, same, _)) = checkpoint(conn, noop).await else {
-            break;
+        let (pages, same) = match (pages, checkpoint(conn, noop).await) {
+            (Ok((_, pages, _)), Ok((_, same, _))) => (pages, same),
+            (Err(error), _) | (_, Err(error)) => return is_damage(&error),
         };
         if pages == same {
             let frames = u64::try_from(pages).unwrap_or(0);
@@ -184,7 +186,11 @@ async fn is_cut(conn: &mut SqliteConnection, log: &WatchedFile) -> bool {
             return matches!(state, FileState::Same(length) if length < needed);
         }
     }
-    false
+}
+
+/// Returns whether SQLite read pages that cannot be right.
+fn is_damage(error: &CatalogError) -> bool {
+    error.kind() == Some(CatalogErrorKind::Damaged)
 }
 
 fn now() -> UnixMillis {

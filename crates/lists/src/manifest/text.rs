@@ -50,7 +50,7 @@ pub struct CsvText<'t> {
 
 impl<'t> CsvText<'t> {
     /// Decodes a list and finds its separator: the one that a first line such as `sep=;` names for Excel, or
-    /// [`delimiter`]. The content of that line, and blanks before quoted cells, are left out; no line moves.
+    /// `delimiter`. The content of that line, and blanks before quoted cells, are left out; no line moves.
     ///
     /// # Errors
     /// Returns an error if the bytes are not text.
