@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use mocban::export::ALIGNMENT_FILES;
 use serde_json::Value;
 
 use crate::cli::{Call, empty, mocban};
@@ -16,16 +17,6 @@ const NUMBERS: [&str; 7] = [
     "iou_box",
     "dice",
     "confidence",
-];
-
-/// Files that have the same name in an export; the last two belong to the metric shown first.
-const FILES: [&str; 6] = [
-    "print_mask.png",
-    "depth.png",
-    "depth.json",
-    "aligned_depth.png",
-    "aligned_mask.png",
-    "overlay.png",
 ];
 
 /// Makes a demo project `d` of four pairs of a tier and exports it to `e`.
@@ -95,7 +86,7 @@ fn levelled_pairs_that_equal_a_project(tier: &str) -> usize {
             }
         }
         let folder = dir.path().join("chữ/kết quả");
-        for file in FILES {
+        for file in ALIGNMENT_FILES {
             let name = file.split('.').next().expect("a name");
             let path = match file {
                 "depth.json" => first["files"]["depth"]

@@ -250,7 +250,15 @@ fn a_run_whose_log_is_deleted_replaced_or_cut_stops_and_claims_nothing_false() {
             let err = String::from_utf8(ended.stderr).expect("UTF-8");
             // A log whose pages are all in the main file may be cut without loss, and the run goes on.
             let is_harmless = attack == LogAttack::Cut && ended.status.success();
-            if !is_harmless {
+            // A log that is cut between the look at it and the end of a commit has a hole, which reads as damage.
+            let is_damaged = attack == LogAttack::Cut && err.contains("part of it was overwritten");
+            if is_damaged {
+                assert!(!ended.status.success(), "{err}");
+                if mocban(p.dir(), &["check"]).code != 0 {
+                    continue;
+                }
+            }
+            if !is_harmless && !is_damaged {
                 assert_eq!(ended.status.code(), Some(12), "{attack:?}: {err}");
                 let wanted = "another program deleted, replaced or cut";
                 assert!(err.contains(wanted) && !err.contains("is safe"), "{err}");

@@ -186,7 +186,7 @@ fn of_huggingface(folder: &Path) -> Vec<ResultLabel> {
     .collect()
 }
 
-/// Which results a format has, of those that are exported.
+/// The exported results that a format contains.
 enum ExportedResults {
     /// All of them.
     All,

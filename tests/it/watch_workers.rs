@@ -13,8 +13,8 @@ use crate::page;
 use crate::postgres_server::Server;
 use crate::resume::{project, run};
 
-/// Heartbeats once in 0.1 s.
-const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "100");
+/// Heartbeats once in 0.5 s. Leases last 2.5 s: if they ended on a slow machine, stages would run again.
+const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "20");
 
 /// A worker that serves its metrics and is held in the fit of its second pair.
 struct HeldWorker {

@@ -60,7 +60,7 @@ pub struct PairImport {
     pub allowed: AllowedChanges,
 }
 
-/// What an import accepts only if it is asked for.
+/// Changes that an import makes only if the user allows them.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AllowedChanges {
     /// Whether files may be missing; such pairs and blocks fail if they are run before the files exist.

@@ -2,11 +2,11 @@
 
 use clap::{Arg, Command};
 
-/// The ids of arguments that are pairs or blocks.
-const PAIR_ARGUMENTS: [&str; 4] = ["pair", "pairs", "name", "names"];
-/// The ids of arguments that are blocks.
+/// Ids of the arguments that are pairs or blocks.
+pub(crate) const PAIR_ARGUMENTS: [&str; 4] = ["pair", "pairs", "name", "names"];
+/// Id of the arguments that are blocks.
 const BLOCK_ARGUMENT: &str = "block";
-/// Commands whose arguments of these ids are new names.
+/// Commands in which arguments with these ids are new names.
 const WITH_NEW_NAMES: [&str; 2] = ["import", "demo"];
 
 /// A name that may be completed, and the project that has it.
@@ -25,7 +25,7 @@ pub(crate) struct NameRequest {
 }
 
 impl NameRequest {
-    /// Returns what the last word may be, or `None` if it is no name. `command` is the program, after `Command::build`, and
+    /// Returns the name that the last word begins, or `None` if it is no name. `command` is the program, after `Command::build`, and
     /// `words` the command line without its name, as the shell has it: with quotes and backslashes.
     pub(crate) fn of(command: &Command, words: &[String]) -> Option<Self> {
         let words: Vec<String> = words.iter().map(|word| unquoted(word)).collect();

@@ -3,6 +3,8 @@
 use clap::Command;
 use clap_complete::Shell;
 
+use crate::cli::input::name_request::PAIR_ARGUMENTS;
+
 /// Returns the script of a shell.
 pub(crate) fn completion_script(shell: Shell, command: &mut Command) -> String {
     let mut script = Vec::new();
@@ -17,7 +19,7 @@ pub(crate) fn completion_script(shell: Shell, command: &mut Command) -> String {
     let note = place.lines().map(|line| format!("# {line}\n"));
     let note: String = note.collect();
     match shell {
-        // The first line tells zsh for which command the file is.
+        // zsh reads the name of the command from the first line.
         Shell::Zsh => match script.split_once('\n') {
             Some((first, rest)) => format!("{first}\n{note}\n{ZSH_NAMES}{rest}"),
             None => script,
@@ -97,8 +99,7 @@ complete -c mocban -n "__fish_seen_subcommand_from show view run retry retire co
 fn with_zsh_names(script: &str) -> String {
     let is_name = |line: &str| {
         let line = line.trim_start();
-        let names = ["pair", "pairs", "name", "names"];
-        names.iter().any(|name| {
+        PAIR_ARGUMENTS.iter().any(|name| {
             ["':", "'::", "'*::"]
                 .iter()
                 .any(|start| line.starts_with(&format!("{start}{name} -- ")))

@@ -6,7 +6,7 @@ use std::io::Write as _;
 use flate2::write::DeflateEncoder;
 use flate2::{Compression, Crc};
 
-/// Returns a ZIP archive of files with names. They are deflated if that is asked for.
+/// Returns a ZIP archive of named files, deflated or stored.
 pub fn archive(files: &[(&str, &str)], is_deflated: bool) -> Vec<u8> {
     let (mut bytes, mut directory) = (Vec::new(), Vec::new());
     for (name, text) in files {

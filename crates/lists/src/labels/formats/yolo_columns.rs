@@ -1,5 +1,5 @@
-//! What the columns of YOLO text mean. Boxes with a confidence and the id of a track have as many columns as a triangle,
-//! so a single line does not tell: the whole file is looked at.
+//! The meaning of the columns of YOLO text. A box with a confidence and the id of a track has as many columns as a triangle,
+//! so all lines of a file decide together.
 
 use crate::labels::message::quoted;
 use crate::labels::model::bounds;
