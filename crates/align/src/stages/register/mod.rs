@@ -100,13 +100,7 @@ pub fn register(
         Some(found) => (&found.map, Some(found.levelling), &found.posed),
         None => (depth, None, &single),
     };
-    let Posed {
-        refined,
-        canvas,
-        thresholds,
-        features,
-        ..
-    } = posed;
+    let (refined, thresholds, features) = (&posed.refined, &posed.thresholds, &posed.features);
     require_tops(
         depth,
         &normalized.outcome.inks,
@@ -114,7 +108,9 @@ pub fn register(
         thresholds,
         params,
     )?;
-    require_character(features, params).map_err(|error| error.with(|| posed.observe(depth)))?;
+    for features in [features, &single.features] {
+        require_character(features, params).map_err(|error| error.with(|| posed.observe(depth)))?;
+    }
     let alignments: Vec<Alignment> = thresholds
         .iter()
         .map(|ChosenThreshold { choice, .. }| Alignment {
@@ -127,7 +123,7 @@ pub fn register(
         .collect();
     let canvas_print = canvas_print(normalized, search.ink);
     let stroke_map = |alignment: &Alignment| {
-        StrokeMap::of(canvas, alignment.level, normalized.outcome.canvas_px)
+        StrokeMap::of(&posed.canvas, alignment.level, normalized.outcome.canvas_px)
     };
     let mut registered = score_alignments(
         depth,
@@ -140,7 +136,8 @@ pub fn register(
     )?;
     let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);
     let metrics = &mut registered.outcome.metrics;
-    registered.confidence_inputs = confidence::set_confidence(metrics, features, probabilities);
+    registered.confidence_inputs =
+        confidence::set_confidence(metrics, features, &single.features, probabilities);
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
     Ok(registered)
