@@ -138,10 +138,10 @@ fn spread_input(spread: f64) -> f64 {
 ///
 /// The heights of a levelling are chosen from the ink, so that a wrong pose and a wrong print agree better too. A levelling
 /// is evidence for the mask, but neither for the pose nor for the character.
-fn less_likely<'a>(
+fn less_likely(
     probability: fn(&PoseFeatures) -> f64,
-    [rendered, levelled]: [&'a PoseFeatures; 2],
-) -> &'a PoseFeatures {
+    [rendered, levelled]: [&PoseFeatures; 2],
+) -> &PoseFeatures {
     if probability(rendered) < probability(levelled) {
         rendered
     } else {
