@@ -3,7 +3,7 @@
 use mocban::domain::FitOutcome;
 use mocban::mesh;
 use mocban::raster;
-use mocban::stages::{AlignedPair, Print, Scan, Settings, StageError, depth, pipeline};
+use mocban::stages::{AlignedPair, Print, Scan, ScanHints, Settings, StageError, depth, pipeline};
 
 use super::times::{Part, Times};
 
@@ -84,6 +84,7 @@ fn align(
         })
         .map_err(StageError::from)?;
     let aligned = AlignedPair {
+        hints: ScanHints::default(),
         fit: plane.clone(),
         depth: registered.levelled(depth),
         normalized,

@@ -112,6 +112,63 @@ fn levelled_pairs_that_equal_a_project(tier: &str) -> usize {
 }
 
 #[test]
+fn vertices_without_a_position_are_told() {
+    let dir = empty();
+    exported(dir.path());
+    let (mesh, print) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0000.png");
+    let whole = mocban(dir.path(), &["align", mesh, print, "--json"]).expect(0);
+    assert_eq!(
+        (whole.json()["warnings"].to_string(), whole.err.as_str()),
+        ("[]".into(), "")
+    );
+    let mut bytes = fs::read(dir.path().join(mesh)).expect("a mesh");
+    // The first coordinate of the first triangle.
+    bytes[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
+    fs::write(dir.path().join("holes.stl"), bytes).expect("a mesh");
+    let found = mocban(dir.path(), &["align", "holes.stl", print, "--json"]).expect(0);
+    let warning = found.json()["warnings"][0]
+        .as_str()
+        .expect("a warning")
+        .to_owned();
+    assert!(warning.starts_with("mesh: "), "{warning}");
+    assert!(found.err.contains(&warning), "{}", found.err);
+}
+
+#[test]
+fn what_is_said_of_a_scan_is_compared_with_what_was_found() {
+    let dir = empty();
+    mocban(dir.path(), &["demo", "d", "--pairs", "1", "--no-run"]).expect(0);
+    let (mesh, print) = (
+        "d/data/meshes/upright-0000.ply",
+        "d/data/prints/upright-0000.jpg",
+    );
+    let found = mocban(dir.path(), &["align", mesh, print, "--json"])
+        .expect(0)
+        .json();
+    let is_down = found["side"] == "-z";
+    assert!(is_down || found["side"] == "+z", "{}", found["side"]);
+    let wrong = (!is_down).to_string();
+    let said = ["--unit", "in", "--scanned-face-down", &wrong];
+    let args = [&["align", mesh, print, "--json"], &said[..]].concat();
+    let warnings = mocban(dir.path(), &args).expect(0).json()["warnings"].to_string();
+    for part in ["mm deep, but most blocks", "scanned_face_down says"] {
+        assert!(warnings.contains(part), "{warnings}");
+    }
+    // Project: the same, when the pair is run and when it is shown.
+    let list = format!("id,mesh,print,unit,scanned_face_down\na,{mesh},{print},in,{wrong}\n");
+    fs::write(dir.path().join("list.csv"), list).expect("a list");
+    mocban(dir.path(), &["-C", "p", "import", "list.csv"]).expect(0);
+    let ran = mocban(dir.path(), &["-C", "p", "run"]).expect(0);
+    assert!(ran.err.contains("mm deep, but most blocks"), "{}", ran.err);
+    let shown = mocban(dir.path(), &["-C", "p", "show", "a"]).expect(0);
+    assert!(
+        shown.out.contains("scanned_face_down says"),
+        "{}",
+        shown.out
+    );
+}
+
+#[test]
 fn a_pair_of_two_characters_is_refused_and_writes_nothing() {
     let dir = empty();
     exported(dir.path(), "pose");

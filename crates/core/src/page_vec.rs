@@ -40,6 +40,13 @@ impl<T: Pod> PageVec<T> {
         pages.unwrap_or_else(|| Self(Storage::Heap(Vec::with_capacity(capacity))))
     }
 
+    /// Copies a slice.
+    pub fn copied(all: &[T]) -> Self {
+        let mut copy = Self::with_capacity(all.len());
+        copy.extend_from_slice(all);
+        copy
+    }
+
     /// Creates an empty vector on pages; `None` if the system has none.
     fn on_pages(bytes: usize) -> Option<Self> {
         let pages = PageBuffer::allocate(bytes)?;

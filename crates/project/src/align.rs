@@ -6,12 +6,14 @@ use serde_json::{Map, Value, json};
 
 use crate::error::{ProjectResult, TaskStopped};
 use crate::exit::Refusal;
+use crate::generated_folder::GeneratedFolder;
 use crate::location::Location;
 use mocban_align::scan_size;
-use mocban_align::stages::{AlignedPair, Print, Scan, ScanHints, Settings, StageError};
-use mocban_core::domain::{Failure, FailureClass, MetricOutcome};
+use mocban_align::stages::{AlignedPair, Print, Scan, ScanHints, Settings};
+use mocban_core::domain::{Failure, FailureClass, LengthUnit, MetricOutcome};
 use mocban_core::{InputLimits, mesh, raster};
-use mocban_store::{Input, InputError, open_input, read_input};
+use mocban_export::{ALIGNMENT_FILES, alignment_files};
+use mocban_store::{Input, InputError, Leftover, open_input, read_input};
 
 /// One scan and one print.
 #[derive(Debug, Clone)]
@@ -63,40 +65,72 @@ fn align_files(
         (Ok(scan), Ok(print)) => (scan, print),
         (Err(failure), _) | (_, Err(failure)) => return Ok(FileAlignment::Refused(failure)),
     };
-    let length = scan_size::length_of(&scan.mesh().vertices);
-    if let Some(reason) = scan_size::wrong_unit(length, files.hints.unit) {
-        let text = format!("{}: {reason}", files.mesh.display());
-        return Ok(FileAlignment::Refused(Failure::new(
-            FailureClass::BadInput,
-            text,
-        )));
+    let named = |failure: AlignFailure| {
+        let path = if failure.is_of_print {
+            &files.print
+        } else {
+            &files.mesh
+        };
+        let text = format!("{}: {}", path.display(), failure.message);
+        FileAlignment::Refused(Failure::new(failure.class, text))
+    };
+    if let Some(failure) = wrong_unit(&scan, files.hints.unit) {
+        return Ok(named(failure));
     }
-    Ok(
-        match AlignedPair::with_hints(&scan, &print, files.hints, settings) {
-            Ok(pair) => FileAlignment::Aligned {
-                pair: Box::new(pair),
-                print: Box::new(print),
-            },
-            Err(error) => FileAlignment::Refused(refusal(&error, files, length)),
+    Ok(match align_pair(&scan, &print, files.hints, settings) {
+        Ok(pair) => FileAlignment::Aligned {
+            pair: Box::new(pair),
+            print: Box::new(print),
         },
-    )
+        Err(failure) => named(failure),
+    })
 }
 
-fn refusal(error: &StageError, files: &AlignInput, length: f64) -> Failure {
-    let path = if error.is_of_print() {
-        &files.print
-    } else {
-        &files.mesh
-    };
-    let advice = scan_size::advice_for(error, length, files.hints.unit);
-    Failure::new(
-        error.class(),
-        format!("{}: {error}{advice}", path.display()),
-    )
+/// Why a pair in memory is not aligned. The message does not name the scan or the print.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AlignFailure {
+    /// What the failure means for the pair.
+    pub class: FailureClass,
+    /// Lower-case fragment with the values.
+    pub message: String,
+    /// Whether the print is the likelier cause.
+    pub is_of_print: bool,
+}
+
+/// Returns why the unit of a scan must be wrong, or `None` if it may be right.
+pub fn wrong_unit(scan: &Scan, unit: Option<LengthUnit>) -> Option<AlignFailure> {
+    unit?;
+    let length = scan_size::length_of(&scan.mesh().vertices);
+    scan_size::wrong_unit(length, unit).map(|message| AlignFailure {
+        class: FailureClass::BadInput,
+        message,
+        is_of_print: false,
+    })
+}
+
+/// Runs the four stages on a pair in memory.
+///
+/// # Errors
+/// Returns the failure of the first stage that finds no result.
+pub fn align_pair(
+    scan: &Scan,
+    print: &Print,
+    hints: ScanHints,
+    settings: &Settings,
+) -> Result<AlignedPair, AlignFailure> {
+    AlignedPair::with_hints(scan, print, hints, settings).map_err(|error| {
+        let length = scan_size::length_of(&scan.mesh().vertices);
+        let advice = scan_size::advice_for(&error, length, hints.unit);
+        AlignFailure {
+            class: error.class(),
+            message: format!("{error}{advice}"),
+            is_of_print: error.is_of_print(),
+        }
+    })
 }
 
 /// Reads a mesh. The inner error is that of its content.
-fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failure>, Refusal> {
+pub fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failure>, Refusal> {
     let input = Input::file(path.to_owned());
     let opened = open_input(&input, limits.mesh.max_bytes, "limits.mesh.max_bytes");
     let mut file = opened.map_err(|error| unreadable(&error))?;
@@ -111,7 +145,7 @@ fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failure>,
 }
 
 /// Reads a print. The inner error is that of its content.
-fn read_print(path: &Path, limits: &InputLimits) -> Result<Result<Print, Failure>, Refusal> {
+pub fn read_print(path: &Path, limits: &InputLimits) -> Result<Result<Print, Failure>, Refusal> {
     let input = Input::file(path.to_owned());
     let read = read_input(&input, limits.image.max_bytes, "limits.image.max_bytes");
     let file = read.map_err(|error| unreadable(&error))?;
@@ -129,7 +163,7 @@ impl FileAlignment {
     /// Returns the result as `align --json` prints it.
     pub fn to_json(&self) -> Value {
         match self {
-            Self::Aligned { pair, .. } => aligned_json(pair),
+            Self::Aligned { pair, print } => aligned_json(pair, print),
             Self::Refused(failure) => json!({
                 "schema": 1,
                 "status": "refused",
@@ -139,7 +173,19 @@ impl FileAlignment {
     }
 }
 
-fn aligned_json(pair: &AlignedPair) -> Value {
+/// Returns what may be wrong with the files of an aligned pair, one sentence each.
+pub fn warnings(pair: &AlignedPair, print: &Print) -> Vec<String> {
+    let missing = pair.fit.missing_vertices;
+    let missing = missing.map(|number| format!("mesh: {}", mesh::missing_sentence(number.get())));
+    let profile = print.image().profile_warning();
+    let profile = profile.map(|warning| format!("print: {warning}"));
+    let said = scan_size::contradictions(&pair.fit, pair.hints).into_iter();
+    let said = said.map(|text| format!("mesh: {text}"));
+    missing.into_iter().chain(said).chain(profile).collect()
+}
+
+/// Returns the result of an aligned pair as `align --json` prints it.
+pub fn aligned_json(pair: &AlignedPair, print: &Print) -> Value {
     let first = pair.first_metric();
     let result = |metric: &MetricOutcome| {
         let scores = &metric.scores;
@@ -170,7 +216,39 @@ fn aligned_json(pair: &AlignedPair) -> Value {
         "side": side(pair),
         "print_from_mesh": pair.print_from_mesh(first),
         "results": results,
+        "warnings": warnings(pair, print),
     })
+}
+
+/// The file with the numbers.
+const NUMBERS: &str = "alignment.json";
+
+/// Returns the folder for the files of an alignment.
+///
+/// # Errors
+/// Returns an error if it holds anything else.
+pub fn alignment_folder(dir: &Path) -> ProjectResult<GeneratedFolder<'_>> {
+    let folder = GeneratedFolder {
+        dir,
+        content: "alignment",
+    };
+    let names = ALIGNMENT_FILES.iter().chain([&NUMBERS]);
+    folder.refuse_foreign(&names.map(Path::new).collect::<Vec<_>>())?;
+    Ok(folder)
+}
+
+/// Writes the pictures and the numbers of an alignment. Returns an earlier folder that could not be removed.
+///
+/// # Errors
+/// Returns an error like [`alignment_folder`], or if the folder cannot be replaced, which leaves it as it was.
+pub fn write_alignment(dir: &Path, pair: &AlignedPair, print: &Print) -> ProjectResult<Leftover> {
+    let folder = alignment_folder(dir)?;
+    let mut files = alignment_files(pair, print).to_vec();
+    files.push((
+        NUMBERS,
+        format!("{:#}\n", aligned_json(pair, print)).into_bytes(),
+    ));
+    folder.write(&files)
 }
 
 /// Returns the direction of the mesh towards which the carved face points: the nearest of its axes, such as `+z`.

@@ -9,8 +9,21 @@ use crate::files::{self, ListFile, RefusedLine};
 use crate::location::{Location, now};
 use crate::selection;
 use crate::verdict_file::{self, VerdictList};
-use mocban_catalog::{CatalogError, FaultyRow, ImportedVerdicts, NewVerdict, VerdictEvent};
-use mocban_core::domain::PairName;
+use mocban_catalog::{
+    CatalogError, FaultyRow, ImportedVerdicts, ListedVerdict, NewVerdict, VerdictEvent,
+};
+use mocban_core::domain::{ContentHash, PairName};
+
+/// What became of a verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecordedVerdict {
+    /// It was recorded.
+    New,
+    /// The same one had been recorded before.
+    Known,
+    /// It is on another result than the current one, and was not recorded.
+    Stale,
+}
 
 /// Records a verdict on the current result of a pair, which `verdict` makes for the name of that pair. Returns the verdict,
 /// and whether it is new: the same one may have been recorded before.
@@ -23,15 +36,37 @@ pub async fn record(
     verdict: impl FnOnce(PairName) -> NewVerdict,
     location: &Location,
 ) -> ProjectResult<(NewVerdict, bool)> {
+    let (verdict, recorded) = record_on(pair, None, verdict, location).await?;
+    Ok((verdict, recorded == RecordedVerdict::New))
+}
+
+/// Records a verdict like [`record`], but only if `judged` is the hash of the current result of its metric.
+pub async fn record_on(
+    pair: &str,
+    judged: Option<ContentHash>,
+    verdict: impl FnOnce(PairName) -> NewVerdict,
+    location: &Location,
+) -> ProjectResult<(NewVerdict, RecordedVerdict)> {
     let (_project, catalog) = location.open().await?;
     let rights = catalog.review_rights().await?;
     let verdict = verdict(selection::pair(&catalog, pair).await?);
     rights.require_verdicts(&verdict.reviewer)?;
     let checked = verdict.check(now());
     checked.map_err(|error| Refusal::Usage(error.to_string()))?;
-    let stored = catalog.verdict_set(vec![verdict.clone()], now()).await?;
+    let listed = ListedVerdict {
+        verdict: verdict.clone(),
+        judged,
+    };
+    let counts = catalog
+        .import_verdicts([Ok(listed)].into_iter(), now())
+        .await?;
     catalog.close().await;
-    Ok((verdict, stored > 0))
+    let recorded = match counts {
+        ImportedVerdicts { left_out: 1.., .. } => RecordedVerdict::Stale,
+        ImportedVerdicts { recorded: 1.., .. } => RecordedVerdict::New,
+        _ => RecordedVerdict::Known,
+    };
+    Ok((verdict, recorded))
 }
 
 /// Records the verdicts of a file in CSV or JSON Lines, or of a sheet of a workbook. If a line is refused, no verdict is

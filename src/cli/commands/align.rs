@@ -2,20 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
-use serde_json::Value;
-
 use crate::cli::output::context::Context;
 use crate::cli::output::table::columns;
+use clap::Args;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
 use mocban_core::domain::LengthUnit;
-use mocban_export::{ALIGNMENT_FILES, alignment_files};
 use mocban_project::align::{self, AlignInput, FileAlignment, side};
-use mocban_project::generated_folder::GeneratedFolder;
 use mocban_project::{ExitCode, ProjectResult};
-
-/// The file with the numbers.
-const NUMBERS: &str = "alignment.json";
 
 /// Arguments of `align`.
 #[derive(Debug, Args)]
@@ -37,13 +30,8 @@ pub(crate) struct AlignArgs {
 }
 
 pub(crate) async fn align(args: AlignArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let folder = args.output.as_deref().map(|dir| GeneratedFolder {
-        dir,
-        content: "alignment",
-    });
-    if let Some(folder) = folder {
-        let names = ALIGNMENT_FILES.iter().chain([&NUMBERS]);
-        folder.refuse_foreign(&names.map(Path::new).collect::<Vec<_>>())?;
+    if let Some(dir) = &args.output {
+        align::alignment_folder(dir)?;
     }
     let files = AlignInput {
         mesh: args.mesh,
@@ -61,33 +49,36 @@ pub(crate) async fn align(args: AlignArgs, context: &Context) -> ProjectResult<E
             context.print_json(&json)?;
             if !context.global.json {
                 context.warn(&format!("not aligned: {failure}"));
+                if let Some(dir) = &args.output {
+                    context.warn(&format!("nothing was written to {}", dir.display()));
+                }
             }
             return Ok(ExitCode::SomeFailed);
         }
     };
-    if let Some(folder) = folder {
-        write_files(folder, pair, print, &json, context)?;
+    for warning in align::warnings(pair, print) {
+        context.warn(&warning);
+    }
+    if let Some(dir) = &args.output {
+        write_files(dir, pair, print, context)?;
     }
     context.print(&json, || text(pair))?;
     Ok(ExitCode::Done)
 }
 
 fn write_files(
-    folder: GeneratedFolder<'_>,
+    dir: &Path,
     pair: &AlignedPair,
     print: &Print,
-    json: &Value,
     context: &Context,
 ) -> ProjectResult<()> {
-    let mut files = alignment_files(pair, print).to_vec();
-    files.push((NUMBERS, format!("{json:#}\n").into_bytes()));
-    if let Some((path, error)) = folder.write(&files)? {
+    if let Some((path, error)) = align::write_alignment(dir, pair, print)? {
         let path = path.display();
         context.warn(&format!(
             "the earlier files were replaced but could not be removed from {path}: {error}"
         ));
     }
-    context.info(&format!("the files are in {}", folder.dir.display()));
+    context.info(&format!("the files are in {}", dir.display()));
     Ok(())
 }
 

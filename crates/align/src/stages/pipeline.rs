@@ -142,6 +142,8 @@ pub struct ScanHints {
 /// Results of the four stages for one mesh and print.
 #[derive(Debug, Clone)]
 pub struct AlignedPair {
+    /// What was known of the scan.
+    pub hints: ScanHints,
     /// The plane.
     pub fit: FitOutcome,
     /// The depth map, which reads like the print, levelled as the registration requires.
@@ -204,6 +206,7 @@ impl AlignedPair {
         }?;
         let registered = register(&depth, &normalized, None, settings)?;
         Ok(Self {
+            hints,
             fit,
             depth: registered.levelled(depth),
             normalized,

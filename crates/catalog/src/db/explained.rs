@@ -14,7 +14,7 @@ impl Explained for CatalogError {
     fn code(&self) -> ErrorCode {
         match self {
             Self::Shared(error) => error.code(),
-            Self::Missing(_) => ErrorCode::NoProject,
+            Self::Missing(_) | Self::NoSchema(_) => ErrorCode::NoProject,
             Self::NetworkFileSystem { .. }
             | Self::TransactionPooler(_)
             | Self::NotEmpty(_)
@@ -180,6 +180,8 @@ mod tests {
         let missing = CatalogError::Missing("p/catalog.sqlite".into());
         assert_eq!(missing.advice(Path::new("p")), None);
         assert_eq!(missing.code(), ErrorCode::NoProject);
+        let empty = CatalogError::NoSchema("postgresql://server/empty".into());
+        assert_eq!(empty.code(), ErrorCode::NoProject);
     }
 
     #[test]

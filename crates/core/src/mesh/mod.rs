@@ -1,5 +1,6 @@
 //! Triangle meshes and point sets in their own frame and unit, and their readers and writers.
 
+mod arrays;
 mod clustering;
 mod decimal;
 mod error;
@@ -19,6 +20,7 @@ mod weld;
 pub mod write;
 mod xyz;
 
+pub use arrays::{MeshArrayError, PositionSlice};
 pub use error::{MeshError, MeshLimits, MeshReadError};
 pub use missing::{MeshRead, missing_sentence};
 pub use triangle_mesh::{Mesh, Vertices};

@@ -18,7 +18,9 @@ mod warp_depth;
 mod warp_mask;
 mod warp_rgb;
 
-pub use decode::{DecodeError, ImageLimits, PrintImage, decode, header_pixel_count};
+pub use decode::{
+    DecodeError, ImageLimits, PrintImage, PrintSamples, SampleSlice, decode, header_pixel_count,
+};
 pub use depth_map::DepthMap;
 pub use encode::{
     PngError, compact_rgb8, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8,

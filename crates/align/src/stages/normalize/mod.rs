@@ -16,7 +16,7 @@ pub use params::{NormalizeError, NormalizeParams};
 pub(super) use relief::{relative_depths, relief_heights, soft_stroke};
 
 use super::print::Print;
-use mocban_core::raster::DepthMap;
+use mocban_core::raster::{DepthMap, Mask};
 
 /// Raised by every change of the code that may change results.
 pub const REVISION: u32 = 16;
@@ -36,4 +36,14 @@ pub fn normalize(
     let inks = print.hypotheses()?;
     let relief = relief::relief_heights(depth).ok_or(NormalizeError::NoStrokes)?;
     Normalized::new(inks, Some(relief), params)
+}
+
+/// Returns the pixels of a print that are ink in the likeliest interpretation, for use without a scan. Registration may
+/// choose another interpretation.
+///
+/// # Errors
+/// Returns an error if the print shows no ink.
+pub fn likeliest_ink(print: &Print) -> Result<Mask, NormalizeError> {
+    // There is at least one interpretation.
+    Ok(print.hypotheses()?[0].mask.clone())
 }

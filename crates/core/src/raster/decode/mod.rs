@@ -6,6 +6,7 @@ mod jpeg;
 mod limits;
 mod orientation;
 mod print_image;
+mod samples;
 mod tags;
 mod tiff;
 
@@ -23,6 +24,7 @@ use tags::TagFileWindow;
 pub use error::DecodeError;
 pub use limits::ImageLimits;
 pub use print_image::PrintImage;
+pub use samples::{PrintSamples, SampleSlice};
 
 /// Decodes a grey, RGB or palette image of a print. Transparent pixels are composited on white.
 ///

@@ -1,0 +1,157 @@
+//! Runs work on a thread of its own, without the GIL, until it ends or Python gets a signal such as Ctrl-C.
+
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+
+use crate::failure::raise;
+use crate::log;
+use mocban_core::domain::cancel::{CancelToken, Cancelled};
+
+/// Time between two looks for a signal.
+const SIGNAL_POLL: Duration = Duration::from_millis(50);
+
+/// Bytes of the stack of a thread, as in the program.
+const STACK_BYTES: usize = 8 << 20;
+
+/// Nothing was computed yet.
+const UNUSED: u8 = 0;
+/// This process has computed something.
+const USED: u8 = 1;
+/// A parent of this process has computed something, and locks that its threads held may never be released.
+const FORKED: u8 = 2;
+
+static STATE: AtomicU8 = AtomicU8::new(UNUSED);
+
+/// Notes that this process is the child of a fork.
+#[pyfunction]
+pub(crate) fn forked() {
+    // A child of a parent that computed nothing is as good as new.
+    let _ = STATE.compare_exchange(USED, FORKED, Ordering::SeqCst, Ordering::SeqCst);
+}
+
+/// Refuses work in the child of a fork of a process that had computed something.
+fn refuse_after_fork(py: Python<'_>) -> PyResult<()> {
+    let before = STATE.compare_exchange(UNUSED, USED, Ordering::SeqCst, Ordering::SeqCst);
+    if before != Err(FORKED) {
+        return Ok(());
+    }
+    let text = "mocban was used before this process was forked, and locks of the parent may never be released; start \
+                processes with multiprocessing.get_context(\"spawn\"), or use threads";
+    Err(raise(py, "Error", "forked", text, None))
+}
+
+/// What a thread sends.
+enum Sent<T, E> {
+    Event(E),
+    Ended(Result<T, Cancelled>),
+}
+
+/// Sends events of work to the thread that waits for its result.
+pub(crate) struct EventSender<E>(Box<dyn Fn(E) + Send + Sync>);
+
+impl<E> EventSender<E> {
+    pub(crate) fn send(&self, event: E) {
+        (self.0)(event);
+    }
+}
+
+/// Returns the result of work, or the exception of a signal handler, which cancels the work.
+pub(crate) fn compute<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let (token, receiver) = start(py, |_: EventSender<()>| work())?;
+    loop {
+        match receive(py, &receiver)? {
+            Some(Sent::Ended(result)) => return ended(py, result),
+            Some(Sent::Event(())) => {}
+            None => {
+                if let Err(signal) = py.check_signals() {
+                    token.cancel();
+                    return Err(signal);
+                }
+            }
+        }
+    }
+}
+
+/// Like [`compute`], with events, which `on_event` handles with the GIL. After a signal or an exception of `on_event`, calls
+/// `stop` and waits for the end of the work, before it returns the exception.
+pub(crate) fn compute_with_events<T: Send + 'static, E: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(EventSender<E>) -> T + Send + 'static,
+    mut on_event: impl FnMut(E) -> PyResult<()>,
+    stop: impl Fn(),
+) -> PyResult<T> {
+    let (_token, receiver) = start(py, work)?;
+    let mut exception = None;
+    loop {
+        let happened = match receive(py, &receiver)? {
+            Some(Sent::Ended(result)) => return exception.map_or_else(|| ended(py, result), Err),
+            Some(Sent::Event(event)) if exception.is_none() => on_event(event),
+            Some(Sent::Event(_)) => Ok(()),
+            None => py.check_signals(),
+        };
+        if let Err(error) = happened {
+            stop();
+            exception = Some(error);
+        }
+    }
+}
+
+type SentBy<T, E> = Mutex<Receiver<Sent<T, E>>>;
+
+fn start<T: Send + 'static, E: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(EventSender<E>) -> T + Send + 'static,
+) -> PyResult<(CancelToken, SentBy<T, E>)> {
+    refuse_after_fork(py)?;
+    log::install();
+    let token = CancelToken::default();
+    let (sender, receiver) = mpsc::channel();
+    let inner = token.clone();
+    let body = move || {
+        let events: Sender<Sent<T, E>> = sender.clone();
+        // Nobody may be waiting any more.
+        let events = EventSender(Box::new(move |event| drop(events.send(Sent::Event(event)))));
+        let result = inner.run(|| work(events));
+        let _ = sender.send(Sent::Ended(result));
+    };
+    let builder = thread::Builder::new()
+        .name("mocban".to_owned())
+        .stack_size(STACK_BYTES);
+    builder.spawn(body).map_err(|error| {
+        let text = format!("no thread can be started: {error}");
+        raise(py, "Error", "unexpected", &text, None)
+    })?;
+    Ok((token, Mutex::new(receiver)))
+}
+
+/// Waits for a message; `None` if it is time to look for a signal.
+fn receive<T: Send, E: Send>(
+    py: Python<'_>,
+    receiver: &SentBy<T, E>,
+) -> PyResult<Option<Sent<T, E>>> {
+    let received = py.detach(|| {
+        let receiver = receiver.lock().unwrap_or_else(PoisonError::into_inner);
+        receiver.recv_timeout(SIGNAL_POLL)
+    });
+    log::forward(py)?;
+    match received {
+        Ok(sent) => Ok(Some(sent)),
+        Err(RecvTimeoutError::Timeout) => Ok(None),
+        Err(RecvTimeoutError::Disconnected) => {
+            let text = "the computation panicked, which is a defect of mocban; please report the message above";
+            Err(raise(py, "Error", "bug", text, None))
+        }
+    }
+}
+
+fn ended<T>(py: Python<'_>, result: Result<T, Cancelled>) -> PyResult<T> {
+    result.map_err(|Cancelled| raise(py, "Error", "cancelled", "the work was cancelled", None))
+}

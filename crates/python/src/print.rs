@@ -1,0 +1,161 @@
+//! The image of a print, from an array or a file.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+
+use crate::compute::compute;
+use crate::failure::{raise, unreadable};
+use crate::settings::NativeSettings;
+use mocban_align::stages::{Print, normalize};
+use mocban_core::raster::{PrintSamples, SampleSlice};
+use mocban_project::align;
+
+/// The image of a print and its file.
+#[pyclass(frozen, module = "mocban._native")]
+pub(crate) struct NativePrint {
+    source: Arc<Mutex<PrintSource>>,
+    #[pyo3(get)]
+    pub(crate) path: Option<PathBuf>,
+}
+
+/// The samples of an array until the image is needed, so that creating a print only copies them.
+enum PrintSource {
+    Samples(PrintSamples),
+    Image(Arc<Print>),
+}
+
+impl NativePrint {
+    fn new(source: PrintSource, path: Option<PathBuf>) -> Self {
+        Self {
+            source: Arc::new(Mutex::new(source)),
+            path,
+        }
+    }
+
+    /// Returns a function that returns the image, for use without the GIL.
+    pub(crate) fn image(&self) -> impl FnOnce() -> Arc<Print> + Send + use<> {
+        let source = Arc::clone(&self.source);
+        move || {
+            let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            let print = match &*source {
+                PrintSource::Image(print) => return Arc::clone(print),
+                PrintSource::Samples(samples) => Arc::new(samples.to_image().into()),
+            };
+            *source = PrintSource::Image(Arc::clone(&print));
+            print
+        }
+    }
+}
+
+#[pymethods]
+impl NativePrint {
+    /// Copies the samples of an image.
+    #[new]
+    fn from_samples(
+        py: Python<'_>,
+        eight: Option<PyReadonlyArray1<'_, u8>>,
+        sixteen: Option<PyReadonlyArray1<'_, u16>>,
+        width: usize,
+        height: usize,
+        channels: usize,
+    ) -> PyResult<Self> {
+        let samples = match (&eight, &sixteen) {
+            (Some(eight), _) => SampleSlice::Eight(eight.as_slice()?),
+            (None, Some(sixteen)) => SampleSlice::Sixteen(sixteen.as_slice()?),
+            (None, None) => SampleSlice::Eight(&[]),
+        };
+        let samples = PrintSamples::copied([width, height], channels, samples);
+        let samples = samples.ok_or_else(|| {
+            let text = "the image has no pixels";
+            raise(py, "ImageError", "bad_input", text, None)
+        })?;
+        Ok(Self::new(PrintSource::Samples(samples), None))
+    }
+
+    /// Returns width and height.
+    fn size(&self, py: Python<'_>) -> (usize, usize) {
+        let source = Arc::clone(&self.source);
+        // Without the GIL, because a thread that holds the lock may wait for it.
+        py.detach(move || {
+            let source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            match &*source {
+                PrintSource::Samples(samples) => samples.size().into(),
+                PrintSource::Image(print) => {
+                    let rgb = &print.image().rgb;
+                    (rgb.width(), rgb.height())
+                }
+            }
+        })
+    }
+
+    /// Returns the colours in 8 bits.
+    fn rgb8<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        let image = self.image();
+        let colours = compute(py, move || image().image().to_rgb8())?;
+        Ok(PyArray1::from_vec(py, colours))
+    }
+
+    /// Returns the colours in 16 bits.
+    fn rgb16<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u16>>> {
+        let print = compute(py, self.image())?;
+        let colours = print.image().rgb.data().as_flattened();
+        Ok(PyArray1::from_slice(py, colours))
+    }
+
+    /// Returns what may be wrong with the colours.
+    fn warnings(&self, py: Python<'_>) -> Vec<String> {
+        let source = Arc::clone(&self.source);
+        py.detach(move || {
+            let source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            match &*source {
+                PrintSource::Samples(_) => Vec::new(),
+                PrintSource::Image(print) => print.image().profile_warning().into_iter().collect(),
+            }
+        })
+    }
+
+    /// Returns the ink of the likeliest interpretation.
+    fn ink<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let image = self.image();
+        let ink = compute(py, move || normalize::likeliest_ink(&image()))?;
+        let ink = ink.map_err(|error| {
+            let text = error.to_string();
+            raise(
+                py,
+                "ImageError",
+                error.class().name(),
+                &text,
+                self.path.as_deref(),
+            )
+        })?;
+        Ok(PyArray1::from_slice(py, ink.data()))
+    }
+}
+
+/// Reads the file of a print.
+#[pyfunction]
+pub(crate) fn read_print(
+    py: Python<'_>,
+    path: PathBuf,
+    settings: &NativeSettings,
+) -> PyResult<NativePrint> {
+    let (file, limits) = (path.clone(), settings.limits);
+    let read = compute(py, move || align::read_print(&file, &limits))?;
+    let content = read.map_err(|error| unreadable(py, "ImageError", &error, &path))?;
+    let print = content.map_err(|failure| {
+        raise(
+            py,
+            "ImageError",
+            failure.class.name(),
+            &failure.message,
+            Some(&path),
+        )
+    })?;
+    Ok(NativePrint::new(
+        PrintSource::Image(Arc::new(print)),
+        Some(path),
+    ))
+}

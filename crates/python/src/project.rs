@@ -1,0 +1,373 @@
+//! A project. Each call opens its catalog, so that nothing stays open between calls.
+
+use std::future::Future;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use serde_json::{Value, json};
+
+use crate::alignment::NativeAlignment;
+use crate::compute::{EventSender, compute_with_events};
+use crate::failure::{project_failure, raise};
+use crate::{stored_block, stored_pair};
+use mocban_catalog::{NewVerdict, ReviewContext};
+use mocban_core::domain::ContentHash;
+use mocban_export::{ExportFormat, ExportOptions};
+use mocban_project::events::{Listener, ProjectEvent};
+use mocban_project::import_blocks::ImportedBlock;
+use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
+use mocban_project::location::Location;
+use mocban_project::report::{ReportOptions, report};
+use mocban_project::run::{PreparedRun, options};
+use mocban_project::status::ProjectStatus;
+use mocban_project::verdicts::{self, RecordedVerdict};
+use mocban_project::{ProjectError, ProjectResult, Refusal, export};
+use mocban_results::IntervalMethod;
+use mocban_runner::Stop;
+
+/// A project folder and its settings.
+#[pyclass(frozen, module = "mocban._native")]
+pub(crate) struct NativeProject {
+    location: Location,
+}
+
+/// An event in JSON: of a run, or a warning.
+enum Heard {
+    Run(String),
+    Warning(String),
+}
+
+/// Sends the events of a function to Python.
+struct Hearing(EventSender<Heard>);
+
+impl Listener for Hearing {
+    fn event(&self, event: ProjectEvent<'_>) {
+        match event {
+            ProjectEvent::Run(event) => self.0.send(Heard::Run(json!(event).to_string())),
+            ProjectEvent::Warning(text) => self.0.send(Heard::Warning(text)),
+            ProjectEvent::Begun(_) | ProjectEvent::Ended => {}
+        }
+    }
+}
+
+fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    let logger = py
+        .import("logging")?
+        .call_method1("getLogger", ("mocban",))?;
+    logger.call_method1("warning", ("%s", text))?;
+    Ok(())
+}
+
+/// Parses a name, such as that of a metric.
+fn parsed<T: std::str::FromStr>(name: &str) -> ProjectResult<T>
+where
+    T::Err: std::fmt::Display,
+{
+    name.parse()
+        .map_err(|error: T::Err| Refusal::Usage(error.to_string()).into())
+}
+
+impl NativeProject {
+    /// Runs a function of the project library in a runtime of its own.
+    fn call<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(Location, Hearing, Arc<Stop>) -> F + Send + 'static,
+        mut on_event: impl FnMut(&str) -> PyResult<()>,
+    ) -> PyResult<T> {
+        let (location, stop) = (self.location.clone(), Arc::new(Stop::new()));
+        let inner = Arc::clone(&stop);
+        let body = move |events| {
+            let mut builder = tokio::runtime::Builder::new_multi_thread();
+            let runtime = builder.worker_threads(2).enable_all().build();
+            let runtime = runtime.map_err(|error| ProjectError::unexpected(error.to_string()))?;
+            runtime.block_on(work(location, Hearing(events), inner))
+        };
+        let hear = |heard| match heard {
+            Heard::Run(event) => on_event(&event),
+            Heard::Warning(text) => warn(py, &text),
+        };
+        let result = compute_with_events(py, body, hear, || {
+            stop.escalate();
+        })?;
+        result.map_err(|error| project_failure(py, &error, &self.location.dir))
+    }
+
+    fn simple<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(Location, Hearing) -> F + Send + 'static,
+    ) -> PyResult<T> {
+        self.call(
+            py,
+            |location, hearing, _stop| work(location, hearing),
+            |_| Ok(()),
+        )
+    }
+}
+
+#[pymethods]
+impl NativeProject {
+    /// Names a project folder, and the address of its catalog if that is not in the settings.
+    #[new]
+    fn new(dir: PathBuf, catalog: Option<String>) -> Self {
+        let mut location = Location::new(dir);
+        location.catalog = catalog;
+        Self { location }
+    }
+
+    /// Opens the catalog once, so that errors come early.
+    fn check(&self, py: Python<'_>, readonly: bool) -> PyResult<()> {
+        self.simple(py, move |location, _| async move {
+            let opened = if readonly {
+                location.open_read_only().await
+            } else {
+                location.open().await
+            };
+            opened?.1.close().await;
+            Ok(())
+        })
+    }
+
+    /// Returns the counts of pairs, with failures, in JSON.
+    fn status(&self, py: Python<'_>) -> PyResult<String> {
+        self.simple(py, |location, _| async move {
+            let (project, catalog) = location.open_read_only().await?;
+            let status = ProjectStatus::read(&project, &catalog, true, &location).await?;
+            catalog.close().await;
+            Ok(status.json(true)?.to_string())
+        })
+    }
+
+    /// Returns the settings in JSON.
+    fn settings(&self, py: Python<'_>) -> PyResult<String> {
+        self.simple(py, |location, _| async move {
+            Ok(serde_json::to_string(&location.settings()?.config)?)
+        })
+    }
+
+    /// Returns everything about a pair in JSON.
+    fn pair(&self, py: Python<'_>, id: String) -> PyResult<String> {
+        self.simple(py, |location, _| async move {
+            let detail = stored_pair::detail(&id, &location).await?;
+            Ok(serde_json::to_string(&detail)?)
+        })
+    }
+
+    /// Returns the alignment of a finished pair.
+    fn alignment(&self, py: Python<'_>, id: String) -> PyResult<NativeAlignment> {
+        let (pair, print) = self.simple(py, |location, _| async move {
+            stored_pair::alignment(&id, &location).await
+        })?;
+        Ok(NativeAlignment {
+            pair: Arc::new(pair),
+            print: Arc::new(print),
+        })
+    }
+
+    /// Returns the log of verdicts in JSON.
+    fn verdicts(&self, py: Python<'_>) -> PyResult<String> {
+        self.simple(py, |location, _| async move {
+            let log = verdicts::log(None, &location).await?;
+            Ok(serde_json::to_string(&log.events)?)
+        })
+    }
+
+    /// Records a verdict. Returns whether it is new.
+    #[expect(clippy::too_many_arguments, reason = "the fields of a verdict")]
+    fn add_verdict(
+        &self,
+        py: Python<'_>,
+        id: String,
+        metric: Option<&str>,
+        verdict: &str,
+        reviewer: String,
+        reason: Option<&str>,
+        note: Option<String>,
+        expect: Option<&str>,
+    ) -> PyResult<bool> {
+        let refuse = |error: ProjectError| project_failure(py, &error, &self.location.dir);
+        let metric = metric.map(parsed).transpose().map_err(refuse)?;
+        let verdict = parsed(verdict).map_err(refuse)?;
+        let reason = reason.map(parsed).transpose().map_err(refuse)?;
+        let judged: Option<ContentHash> = expect.map(parsed).transpose().map_err(refuse)?;
+        let name = id.clone();
+        let recorded = self.simple(py, move |location, _| async move {
+            let new = |pair| NewVerdict {
+                pair,
+                metric,
+                verdict,
+                reviewer: reviewer.trim().to_owned(),
+                reason,
+                note,
+                context: ReviewContext::default(),
+                at: None,
+            };
+            Ok(verdicts::record_on(&id, judged, new, &location).await?.1)
+        })?;
+        if recorded == RecordedVerdict::Stale {
+            let text = format!(
+                "the result of pair {name} has changed since it was read; look at it again before you judge it"
+            );
+            return Err(raise(
+                py,
+                "StaleResult",
+                "stale_result",
+                &text,
+                Some(&self.location.dir),
+            ));
+        }
+        Ok(recorded == RecordedVerdict::New)
+    }
+
+    /// Imports rows in JSON Lines. Returns what changed, in JSON.
+    fn import_pairs(
+        &self,
+        py: Python<'_>,
+        file: PathBuf,
+        rows: Vec<u8>,
+        allow_missing: bool,
+        allow_changed_files: bool,
+        replace: bool,
+    ) -> PyResult<String> {
+        self.simple(py, move |location, hearing| async move {
+            let import = PairImport {
+                source: PairSource::List {
+                    file,
+                    bytes: Some(rows),
+                },
+                truth: None,
+                allowed: AllowedChanges {
+                    missing: allow_missing,
+                    files: allow_changed_files,
+                    replace,
+                },
+            };
+            let outcome = import_pairs(import, &location, &hearing).await?;
+            let summary = outcome.summary;
+            let changed = summary.changed.iter().map(|pair| pair.name.to_string());
+            let counts = json!({
+                "added": summary.added,
+                "changed": changed.collect::<Vec<_>>(),
+                "unchanged": summary.unchanged,
+                "retired": summary.retired,
+                "restored": summary.restored,
+                "missing_files": outcome.missing.lines,
+                "warnings": outcome.warnings,
+            });
+            Ok(counts.to_string())
+        })
+    }
+
+    /// Imports a block. Returns what changed, in JSON.
+    #[expect(clippy::too_many_arguments, reason = "the files of a block")]
+    fn import_block(
+        &self,
+        py: Python<'_>,
+        mesh: PathBuf,
+        page: PathBuf,
+        labels: Option<PathBuf>,
+        name: Option<String>,
+        unit: Option<&str>,
+        side: Option<&str>,
+    ) -> PyResult<String> {
+        let refuse = |error: ProjectError| project_failure(py, &error, &self.location.dir);
+        let block = ImportedBlock {
+            mesh,
+            page,
+            labels,
+            side: side.map(parsed).transpose().map_err(refuse)?,
+            name,
+            unit: unit.map(parsed).transpose().map_err(refuse)?,
+        };
+        self.simple(py, |location, hearing| async move {
+            stored_block::import(block, &location, &hearing).await
+        })
+    }
+
+    /// Returns everything about a block, and its characters, in JSON.
+    fn block(&self, py: Python<'_>, id: String) -> PyResult<String> {
+        self.simple(py, |location, _| async move {
+            stored_block::detail(&id, &location).await
+        })
+    }
+
+    /// Runs pairs until none is left. Returns the summary in JSON.
+    fn run(
+        &self,
+        py: Python<'_>,
+        ids: Vec<String>,
+        workers: Option<usize>,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<String> {
+        let on_event = |event: &str| {
+            progress
+                .as_ref()
+                .map_or(Ok(()), |call| call.call1((event,)).map(drop))
+        };
+        let work = move |location: Location, hearing: Hearing, stop: Arc<Stop>| async move {
+            let mut options = options(&location.settings()?.config);
+            if let Some(workers) = workers {
+                options.workers = workers;
+            }
+            let run = PreparedRun::new(&ids, options, false, &location, &hearing).await?;
+            let outcome = run.run(&stop, &hearing).await?;
+            Ok(serde_json::to_string(&outcome.summary)?)
+        };
+        self.call(py, work, on_event)
+    }
+
+    /// Returns the report in a format.
+    fn report(&self, py: Python<'_>, format: String) -> PyResult<String> {
+        self.simple(py, move |location, hearing| async move {
+            let options = ReportOptions {
+                format: parsed(&format)?,
+                interval: IntervalMethod::default(),
+                with_times: false,
+            };
+            Ok(report(options, None, &location, &hearing).await?.text)
+        })
+    }
+
+    /// Exports pairs to a folder. Returns what was written and left out, in JSON.
+    fn export(
+        &self,
+        py: Python<'_>,
+        dir: PathBuf,
+        formats: Vec<String>,
+        metrics: Vec<String>,
+        only: String,
+        images: bool,
+    ) -> PyResult<String> {
+        self.simple(py, move |location, hearing| async move {
+            let formats = formats
+                .iter()
+                .map(|name| parsed(name))
+                .collect::<ProjectResult<Vec<ExportFormat>>>()?;
+            let metrics = metrics
+                .iter()
+                .map(|name| parsed(name))
+                .collect::<ProjectResult<Vec<_>>>()?;
+            let limits = location.settings()?.config.limits;
+            let options = ExportOptions {
+                only: parsed(&only)?,
+                images,
+                ..ExportOptions::all_of(&metrics, limits)
+            };
+            let summary = export::export(&dir, &formats, options, &location, &hearing).await?;
+            let unreadable = summary.unreadable.iter();
+            let unreadable: Vec<Value> = unreadable
+                .map(|(id, why)| json!({"id": id, "error": why}))
+                .collect();
+            let counts = json!({
+                "done": summary.pairs.done,
+                "without_result": summary.pairs.without_result,
+                "left_out": summary.pairs.left_out,
+                "unreadable": unreadable,
+                "kept_earlier": summary.kept_earlier,
+            });
+            Ok(counts.to_string())
+        })
+    }
+}

@@ -1,0 +1,144 @@
+//! An alignment as JSON and bytes, for `pickle`.
+
+use serde::{Deserialize, Serialize};
+
+use mocban_align::stages::normalize::{Normalized, PrintMasks};
+use mocban_align::stages::register::Registered;
+use mocban_align::stages::{AlignedPair, Print, ScanHints};
+use mocban_core::domain::{DepthScale, FitOutcome, LengthUnit, NormalizeOutcome, RegisterOutcome};
+use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage};
+
+/// Version of the form.
+const FORM: u32 = 1;
+
+#[derive(Serialize, Deserialize)]
+struct AlignmentNumbers {
+    form: u32,
+    unit: Option<LengthUnit>,
+    scanned_face_down: Option<bool>,
+    fit: FitOutcome,
+    scale: DepthScale,
+    normalize: NormalizeOutcome,
+    register: RegisterOutcome,
+    depth_size: [usize; 2],
+    print_size: [usize; 2],
+    stroke_map_sides: Vec<usize>,
+    print_turned: Option<u8>,
+    ignored_profile: Option<String>,
+}
+
+/// Removes what no function of an alignment needs.
+pub(crate) fn needed(mut pair: AlignedPair) -> AlignedPair {
+    let ink = pair.registered.outcome.ink;
+    let masks = pair.normalized.prints.swap_remove(ink);
+    let hypothesis = pair.normalized.outcome.inks[ink];
+    pair.normalized.prints = vec![masks];
+    pair.normalized.outcome.inks = vec![hypothesis];
+    pair.registered.outcome.ink = 0;
+    pair.registered.canvas_depths = Vec::new();
+    pair.registered.canvas_print = Mask::new(0, 0, false);
+    pair.registered.confidence_inputs = Vec::new();
+    pair
+}
+
+/// Returns the numbers and the images of an alignment.
+pub(crate) fn save(pair: &AlignedPair, print: &Print) -> (String, Vec<u8>) {
+    let (levels, image) = (&pair.depth.levels, print.image());
+    let maps = &pair.registered.stroke_maps;
+    let numbers = AlignmentNumbers {
+        form: FORM,
+        unit: pair.hints.unit,
+        scanned_face_down: pair.hints.scanned_face_down,
+        fit: pair.fit.clone(),
+        scale: pair.depth.scale.clone(),
+        normalize: pair.normalized.outcome.clone(),
+        register: pair.registered.outcome.clone(),
+        depth_size: [levels.width(), levels.height()],
+        print_size: [image.rgb.width(), image.rgb.height()],
+        stroke_map_sides: maps.iter().map(Grid::width).collect(),
+        print_turned: image.turned,
+        ignored_profile: image.ignored_profile.clone(),
+    };
+    let mut images = Vec::new();
+    images.extend(levels.data().iter().flat_map(|level| level.to_le_bytes()));
+    images.extend(pair.normalized.prints[0].to_grey().data());
+    images.extend(
+        image
+            .rgb
+            .data()
+            .as_flattened()
+            .iter()
+            .flat_map(|v| v.to_le_bytes()),
+    );
+    for map in maps {
+        images.extend(map.data());
+    }
+    (serde_json::json!(numbers).to_string(), images)
+}
+
+/// Returns the alignment of a state, or `None` if the state is damaged.
+pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Print)> {
+    let numbers: AlignmentNumbers = serde_json::from_str(numbers).ok()?;
+    let is_whole = numbers.form == FORM
+        && numbers.normalize.inks.len() == 1
+        && numbers.register.ink == 0
+        && !numbers.register.metrics.is_empty();
+    if !is_whole {
+        return None;
+    }
+    let mut images = ImageBytes(images);
+    let levels = images.sixteen(numbers.depth_size, 1)?;
+    let levels = Grid::from_vec(numbers.depth_size[0], numbers.depth_size[1], levels)?;
+    let [width, height] = numbers.print_size;
+    let masks = Grid::from_vec(width, height, images.eight(numbers.print_size)?)?;
+    let samples = images.sixteen(numbers.print_size, 3)?;
+    let rgb = Grid::from_vec(width, height, samples.as_chunks::<3>().0.to_vec())?;
+    let maps = numbers.stroke_map_sides.iter();
+    let maps = maps.map(|side| Grid::from_vec(*side, *side, images.eight([*side; 2])?));
+    let stroke_maps = maps.collect::<Option<Vec<_>>>()?;
+    let print = PrintImage {
+        rgb,
+        turned: numbers.print_turned,
+        ignored_profile: numbers.ignored_profile,
+    };
+    let pair = AlignedPair {
+        hints: ScanHints {
+            unit: numbers.unit,
+            scanned_face_down: numbers.scanned_face_down,
+        },
+        fit: numbers.fit,
+        depth: DepthMap {
+            levels,
+            scale: numbers.scale,
+        },
+        normalized: Normalized {
+            outcome: numbers.normalize,
+            prints: vec![PrintMasks::from_grey(&masks)],
+        },
+        registered: Registered {
+            outcome: numbers.register,
+            canvas_print: Mask::new(0, 0, false),
+            canvas_depths: Vec::new(),
+            stroke_maps,
+            confidence_inputs: Vec::new(),
+        },
+    };
+    images.0.is_empty().then(|| (pair, print.into()))
+}
+
+/// Images one after another.
+struct ImageBytes<'a>(&'a [u8]);
+
+impl ImageBytes<'_> {
+    fn eight(&mut self, [width, height]: [usize; 2]) -> Option<Vec<u8>> {
+        let (image, rest) = self.0.split_at_checked(width.checked_mul(height)?)?;
+        self.0 = rest;
+        Some(image.to_vec())
+    }
+
+    fn sixteen(&mut self, [width, height]: [usize; 2], channels: usize) -> Option<Vec<u16>> {
+        let bytes = self.eight([width.checked_mul(2 * channels)?, height])?;
+        let values = bytes.as_chunks::<2>().0.iter();
+        Some(values.map(|value| u16::from_le_bytes(*value)).collect())
+    }
+}

@@ -1,0 +1,97 @@
+//! A pair of a project: its numbers, and its alignment from the stored files.
+
+use mocban_align::stages::normalize::{Normalized, PrintMasks};
+use mocban_align::stages::register::Registered;
+use mocban_align::stages::{AlignedPair, Print, ScanHints};
+use mocban_catalog::{Catalog, PairDetail, PairResults};
+use mocban_core::InputLimits;
+use mocban_core::domain::artifact_role::stroke_map;
+use mocban_core::domain::{JobStatus, NormalizeOutcome, RegisterOutcome, Stage};
+use mocban_core::raster::Mask;
+use mocban_export::SourcePrint;
+use mocban_project::location::Location;
+use mocban_project::{ProjectError, ProjectResult, Refusal, selection};
+use mocban_results::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use mocban_store::Project;
+
+/// Reads everything about a pair.
+pub(crate) async fn detail(id: &str, location: &Location) -> ProjectResult<PairDetail> {
+    let (_project, catalog) = location.open_read_only().await?;
+    let detail = read(&catalog, id).await;
+    catalog.close().await;
+    detail
+}
+
+async fn read(catalog: &Catalog, id: &str) -> ProjectResult<PairDetail> {
+    let name = selection::pair(catalog, id).await?;
+    let detail = catalog.pair(&name).await?;
+    let gone = || ProjectError::unexpected(format!("pair {id} was removed while it was read"));
+    detail.ok_or_else(gone)
+}
+
+/// Reads the alignment of a finished pair, and the print that was aligned.
+pub(crate) async fn alignment(
+    id: &str,
+    location: &Location,
+) -> ProjectResult<(AlignedPair, Print)> {
+    let limits = location.settings()?.config.limits;
+    let (project, catalog) = location.open_read_only().await?;
+    let detail = read(&catalog, id).await;
+    catalog.close().await;
+    let results = detail?.results;
+    if results.status != JobStatus::Done {
+        let text = format!("pair {id} has no alignment; `status` of the pair says why");
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    assembled(&project, &results, limits)
+}
+
+fn assembled(
+    project: &Project,
+    results: &PairResults,
+    limits: InputLimits,
+) -> ProjectResult<(AlignedPair, Print)> {
+    let unreadable = |error: PairArtifactsError| {
+        Refusal::Damaged(format!("pair {}: {error}", results.attributes.name))
+    };
+    let print = SourcePrint::read(project, results, &limits.image)
+        .map_err(|error| Refusal::Damaged(format!("pair {}: {error}", results.attributes.name)))?;
+    let artifacts = PairArtifacts::new(project, results);
+    let mut normalize: NormalizeOutcome =
+        artifacts.outcome(Stage::Normalize).map_err(unreadable)?;
+    let mut register: RegisterOutcome = artifacts.outcome(Stage::Register).map_err(unreadable)?;
+    let masks = PrintMasks::from_grey(&artifacts.print_grey().map_err(unreadable)?);
+    normalize.inks = normalize
+        .inks
+        .get(register.ink)
+        .copied()
+        .into_iter()
+        .collect();
+    register.ink = 0;
+    let maps = register.metrics.iter().filter_map(|metric| {
+        let role = stroke_map(metric.metric);
+        artifacts.artifact(Stage::Register, &role).ok()?;
+        Some(artifacts.grey(Stage::Register, &role))
+    });
+    let stroke_maps = maps.collect::<Result<Vec<_>, _>>().map_err(unreadable)?;
+    let pair = AlignedPair {
+        hints: ScanHints {
+            unit: results.attributes.unit,
+            scanned_face_down: results.attributes.scanned_face_down,
+        },
+        fit: artifacts.outcome(Stage::Fit).map_err(unreadable)?,
+        depth: artifacts.depth().map_err(unreadable)?,
+        normalized: Normalized {
+            outcome: normalize,
+            prints: vec![masks],
+        },
+        registered: Registered {
+            outcome: register,
+            canvas_print: Mask::new(0, 0, false),
+            canvas_depths: Vec::new(),
+            stroke_maps,
+            confidence_inputs: Vec::new(),
+        },
+    };
+    Ok((pair, print.picture.into()))
+}

@@ -1,0 +1,77 @@
+"""Whole blocks with their pages."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import mocban
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def aligned(block: Path, tmp_path_factory: pytest.TempPathFactory) -> mocban.BlockAlignment:
+    """A block that is aligned from its files, in a project of its own."""
+    folder = tmp_path_factory.mktemp("aligned") / "khối"
+    labels = block / "labels.json"
+    return mocban.align_block(block / "block.ply", block / "page.jpg", labels=labels, folder=folder)
+
+
+def test_characters_of_files_are_those_of_the_project(aligned: mocban.BlockAlignment) -> None:
+    assert aligned.status == "done" and aligned.error is None
+    assert aligned.agreement is not None and aligned.agreement > 0.8
+    assert [one.label for one in aligned.characters] == ["c01-r01", "c01-r02", "c01-r03", "c01-r04"]
+    first = aligned.characters[0]
+    assert first.pair == "block_c01-r01" and first.alignment == aligned.project.pair("block_c01-r01").alignment
+    assert first.alignment.confidence is not None and first.alignment.confidence > 0.9
+    # The map of the block leads into the box of the character.
+    mesh = mocban.read_mesh(aligned.project.pair(first.pair).files["mesh"])
+    assert first.page_from_mesh is not None
+    pixels = mesh.vertices.mean(axis=0) @ first.page_from_mesh[:2, :3].T + first.page_from_mesh[:2, 3]
+    left, top, right, bottom = first.box
+    assert left < pixels[0] < right and top < pixels[1] < bottom
+    again = aligned.project.block("block")
+    assert again == aligned and hash(again) == hash(aligned)
+    assert pickle.loads(pickle.dumps(aligned)) == aligned
+    with pytest.raises(mocban.ProjectError, match="is a pair, not a block"):
+        aligned.project.block("block_c01-r01")
+
+
+def test_arrays_give_the_result_of_their_files(aligned: mocban.BlockAlignment, block: Path) -> None:
+    mesh, page = mocban.read_mesh(block / "block.ply"), mocban.read_print(block / "page.jpg")
+    labels = [{"box": one.box, "label": one.label, "character": one.character} for one in aligned.characters]
+    events: list[str] = []
+    found = mocban.align_block(
+        mesh, page.image, labels=labels, workers=1, progress=lambda event: events.append(event["message_type"])
+    )
+    assert events.count("pair_done") == 4 and found.agreement == aligned.agreement
+    for one, other in zip(found.characters, aligned.characters):
+        assert (one.label, one.character, one.box, one.confidence) == (
+            other.label,
+            other.character,
+            other.box,
+            other.confidence,
+        )
+        assert np.array_equal(one.page_from_mesh, other.page_from_mesh)
+        assert one.alignment == other.alignment
+    with pytest.raises(TypeError, match="temporary folder"):
+        pickle.dumps(found)
+    folder = found.project.folder
+    assert folder.exists()
+    del found, one
+    assert not folder.exists()
+
+
+def test_wrong_files_are_named(block: Path, tmp_path: Path) -> None:
+    with pytest.raises(mocban.ProjectError, match="no.ply"):
+        mocban.align_block(tmp_path / "no.ply", block / "page.jpg")
+    with pytest.raises(mocban.Error, match="has no box"):
+        mocban.align_block(block / "block.ply", block / "page.jpg", labels=[{"label": "a"}])
+    with pytest.raises(mocban.MeshError, match="give a mocban.Mesh"):
+        mocban.align_block(object(), block / "page.jpg")  # type: ignore[arg-type]
+    (tmp_path / "block.ply").write_bytes(b"ply\n")
+    broken = mocban.align_block(tmp_path / "block.ply", block / "page.jpg")
+    assert broken.status != "done" and broken.error is not None and broken.characters == ()
+    with pytest.raises(mocban.Refused, match="the block is not aligned"):
+        mocban.align_block(tmp_path / "block.ply", block / "page.jpg", strict=True)

@@ -1,0 +1,114 @@
+"""Many pairs: threads, processes, memory."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import multiprocessing
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import mocban
+import pytest
+
+from conftest import DemoPair
+
+
+def test_results_come_in_order_and_failures_end_nothing(pairs: list[DemoPair], tmp_path: Path) -> None:
+    todo = [(pair.id, pair.mesh, pair.print) for pair in pairs[:6]]
+    todo.insert(2, ("missing", tmp_path / "no.stl", pairs[0].print))
+    found = list(mocban.align_many(todo, threads=2))
+    assert [key for key, _ in found] == [key for key, _, _ in todo]
+    assert isinstance(found[2][1], mocban.InputNotFound)
+    one = list(mocban.align_many(iter(todo), threads=1, max_bytes=1))
+    assert [result for key, result in one if key != "missing"] == [r for key, r in found if key != "missing"]
+    assert found[0][1] == mocban.align(pairs[0].mesh, pairs[0].print)
+
+
+def test_pairs_are_taken_when_they_are_needed(pair: DemoPair) -> None:
+    taken = 0
+
+    def endless():
+        nonlocal taken
+        while True:
+            taken += 1
+            yield taken, pair.mesh, pair.print
+
+    results = mocban.align_many(endless(), threads=2, metrics="density")
+    assert taken == 0, "nothing begins before the first result is asked for"
+    assert next(results)[0] == 1 and taken <= 4
+    assert list(next(results)[1].results) == ["density"]
+    results.close()
+    for thread in threading.enumerate():
+        if thread.name == "mocban align_many":
+            thread.join(10)
+    assert not any(thread.name == "mocban align_many" for thread in threading.enumerate())
+
+
+def test_other_exceptions_end_the_iteration(pair: DemoPair) -> None:
+    def broken():
+        yield 1, pair.mesh, pair.print
+        raise KeyError("rows")
+
+    with pytest.raises(KeyError):
+        list(mocban.align_many(broken(), threads=1))
+    with pytest.raises(ValueError, match="threads is 0"):
+        mocban.align_many([], threads=0)
+    assert list(mocban.align_many([])) == []
+
+
+def confidence(mesh: str, image: str) -> float:
+    return mocban.align(mesh, image).confidence
+
+
+def test_threads_and_spawned_processes_give_the_same_result(pair: DemoPair) -> None:
+    arguments = (str(pair.mesh), str(pair.print))
+    expected = mocban.align(*arguments)
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        assert all(found == expected for found in pool.map(mocban.align, *zip(*[arguments] * 4)))
+    spawn = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=spawn) as pool:
+        assert pool.submit(mocban.align, *arguments).result(60) == expected, "results are pickled"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+def test_work_after_a_fork_is_refused_and_a_fork_before_any_work_is_not(pair: DemoPair) -> None:
+    script = (
+        "import mocban, os, sys, warnings\n"
+        "warnings.simplefilter('ignore')\n"
+        "if sys.argv[3] == 'used': mocban.align(sys.argv[1], sys.argv[2])\n"
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    try: print(mocban.align(sys.argv[1], sys.argv[2]).status, flush=True)\n"
+        "    except mocban.Error as error: print(error.code, 'spawn' in error.hint, flush=True)\n"
+        "    os._exit(0)\n"
+        "os.waitpid(child, 0)\n"
+    )
+    for state, expected in (("used", "forked True"), ("fresh", "aligned")):
+        command = [sys.executable, "-c", script, pair.mesh, pair.print, state]
+        assert subprocess.check_output(command, text=True, timeout=60).strip() == expected
+
+
+def test_memory_does_not_grow(pair: DemoPair) -> None:
+    """The bar is 20 MB in 1,000 calls; MOCBAN_CALLS is their number."""
+    resource = pytest.importorskip("resource")
+    if not sys.platform.startswith("linux"):
+        pytest.skip("the memory in use is read from /proc")
+    page = resource.getpagesize()
+
+    def in_use() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * page
+
+    mesh, image = mocban.read_mesh(pair.mesh), mocban.read_print(pair.print).image
+    arrays = (mesh.vertices, mesh.faces)
+    calls = int(os.environ.get("MOCBAN_CALLS", "40"))
+    for call in range(calls + 10):
+        if call == 10:
+            before = in_use()
+        found = mocban.align(mocban.Mesh(*arrays), image)
+        found.overlay()
+        with pytest.raises(mocban.MeshError):
+            mocban.Mesh(arrays[0][:, :2])
+    assert in_use() - before < 20e6, f"{(in_use() - before) / 1e6:.1f} MB"

@@ -1,0 +1,157 @@
+"""Projects: what the command line writes is read, and the other way round."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import shutil
+from pathlib import Path
+
+import mocban
+import numpy as np
+import pytest
+
+from conftest import DemoPair, mocban_command
+
+
+@pytest.fixture()
+def copied(demo: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(demo, tmp_path / "dự án"))
+
+
+def test_status_settings_and_report_are_those_of_the_command_line(demo: Path) -> None:
+    with mocban.open(demo) as project:
+        status = json.loads(mocban_command("-C", demo, "status", "--json").stdout)
+        assert {key: project.status()[key] for key in ("pairs", "jobs", "stages")} == {
+            key: status[key] for key in ("pairs", "jobs", "stages")
+        }
+        report = json.loads(mocban_command("-C", demo, "report", "--format", "json").stdout)
+        assert project.report() == report
+        assert project.settings["depth"]["longest_px"] == 512
+        assert pickle.loads(pickle.dumps(project)).status() == project.status()
+
+
+def test_pairs_are_an_arrow_table(demo: Path, tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    compute = pytest.importorskip("pyarrow.compute")
+    project = mocban.open(str(demo))
+    table = project.pairs()
+    assert isinstance(table, pyarrow.Table) and table.num_rows == 24
+    assert set(table["metric"].to_pylist()) == {"relief"}
+    assert project.pairs(metric=None).num_rows == 96
+    chosen = project.pairs(["id", "iou"], metric="density", where=compute.field("iou") > 0.5)
+    assert chosen.column_names == ["id", "iou"] and 0 < chosen.num_rows <= 24
+    mocban_command("-C", demo, "export", "--to", "parquet", "-o", tmp_path / "out")
+    exported = pyarrow.parquet.read_table(tmp_path / "out" / "pairs.parquet")
+    assert project.pairs(metric=None).equals(exported.replace_schema_metadata(None))
+
+
+def test_a_stored_alignment_is_that_of_align(demo: Path, pairs: list[DemoPair]) -> None:
+    project = mocban.open(demo)
+    compared = 0
+    for pair in pairs[:8]:
+        stored = project.pair(pair.id)
+        assert stored.id == pair.id and stored.files["mesh"].samefile(pair.mesh)
+        if stored.status != "done":
+            with pytest.raises(mocban.ProjectError, match="no alignment"):
+                stored.alignment
+            continue
+        mesh = mocban.read_mesh(pair.mesh, unit=pair.unit)
+        found = mocban.align(mesh, pair.print, scanned_face_down=pair.scanned_face_down)
+        assert stored.alignment == found and hash(stored.alignment) == hash(found)
+        assert stored.print() == mocban.read_print(pair.print)
+        np.testing.assert_array_equal(stored.mask("density"), found.results["density"].aligned_mask())
+        np.testing.assert_array_equal(stored.overlay(), found.overlay())
+        assert stored.history() and stored.depth().dtype == np.float64
+        assert len(stored.metrics["relief"]["result_hash"]) == 64
+        compared += 1
+    assert compared >= 6
+    with pytest.raises(mocban.ProjectError, match="nobody") as error:
+        project.pair("nobody")
+    assert error.value.code == "nothing_selected"
+
+
+def test_verdicts_have_the_rules_of_the_command_line(copied: Path, pair: DemoPair) -> None:
+    project = mocban.open(copied, readonly=False)
+    judged = project.pair(pair.id).metrics["relief"]["result_hash"]
+    assert project.add_verdict(pair.id, "relief", "fail", reason="angle", reviewer="Lan", expect=judged)
+    mocban_command("-C", copied, "verdict", "set", pair.id, "pass", "--reviewer", "Minh", "--metric", "density")
+    log = project.verdicts()
+    assert [(v["reviewer"], v["metric"], v["verdict"]) for v in log] == [
+        ("Lan", "relief", "fail"),
+        ("Minh", "density", "pass"),
+    ]
+    assert project.pair(pair.id).metrics["relief"]["verdicts"][0]["reviewer"] == "Lan"
+    with pytest.raises(mocban.StaleResult, match="has changed") as stale:
+        project.add_verdict(pair.id, "relief", "pass", reviewer="Lan", expect="0" * 64)
+    assert stale.value.code == "stale_result"
+    for arguments in ({"verdict": "good"}, {"metric": "relif"}, {"reason": "ugly"}, {"expect": "x"}, {"reviewer": ""}):
+        wrong = {"metric": "relief", "verdict": "fail", "reviewer": "Lan"} | arguments
+        with pytest.raises(mocban.ProjectError) as error:
+            project.add_verdict(pair.id, **wrong)
+        assert error.value.code == "usage", arguments
+    assert project.verdicts() == log
+    readonly = mocban.open(copied)
+    for write in (
+        lambda: readonly.add_verdict(pair.id, "relief", "pass", reviewer="Lan"),
+        lambda: readonly.import_pairs([]),
+        lambda: readonly.run(),
+    ):
+        with pytest.raises(PermissionError, match="readonly=False") as refused:
+            write()
+        assert isinstance(refused.value, mocban.ReadOnlyProject)
+
+
+def test_rows_are_imported_and_run_with_progress(pairs: list[DemoPair], tmp_path: Path) -> None:
+    folder = tmp_path / "mới"
+    rows = [{"id": p.id, "mesh": p.mesh, "print": p.print, "note": float("nan"), "unit": p.unit} for p in pairs[:3]]
+    with pytest.raises(mocban.NotAProject):
+        mocban.open(folder)
+    project = mocban.Project.create(folder)
+    assert project.import_pairs(rows)["added"] == 3
+    assert project.import_pairs(iter(rows))["unchanged"] == 3
+    fewer = project.import_pairs(rows[:2], replace=True)
+    assert fewer["retired"] == 1 and project.status()["pairs"] == 2
+    assert project.import_pairs(rows)["restored"] == 1
+    moved = [row | {"mesh": p.mesh, "print": p.print} for row, p in zip(rows, pairs[1:4])]
+    with pytest.raises(mocban.ProjectError, match="allow_changed_files|--allow-changed-files"):
+        project.import_pairs(moved)
+    assert len(project.import_pairs(moved, allow_changed_files=True)["changed"]) == 3
+    project.import_pairs(rows, allow_changed_files=True)
+    pandas = pytest.importorskip("pyarrow").Table.from_pylist([{"id": 7, "mesh": "no.stl", "print": "no.png"}])
+    with pytest.raises(mocban.ProjectError, match="no.stl"):
+        project.import_pairs(pandas)
+    assert project.import_pairs(pandas, allow_missing=True)["missing_files"]
+    with pytest.raises(mocban.ProjectError, match="line 1"):
+        project.import_pairs([{"id": "", "mesh": "a", "print": "b"}])
+    events: list[str] = []
+
+    def stop(event: dict) -> object:
+        events.append(event["message_type"])
+        return event["message_type"] != "pair_done"
+
+    with pytest.raises(mocban.Cancelled):
+        project.run(ids=[p.id for p in pairs[:3]], workers=1, progress=stop)
+    assert events[0] == "started" and "stage_finished" in events
+    with pytest.raises(ZeroDivisionError):
+        project.run(progress=lambda event: 1 / 0)
+    summary = project.run(workers=2)
+    assert summary["left"] == 0 and summary["failed_in_all"] == 1
+    assert "no.stl" in project.pair("7").error and project.status()["jobs"]["quarantined"] == 1
+    assert project.run()["stages"] == 0
+    exported = project.export(tmp_path / "out", ["jsonl", "csv"], metrics=["relief"])
+    assert exported["done"] + exported["without_result"] == 4
+    assert (tmp_path / "out" / "jsonl" / "pairs.jsonl").exists()
+
+
+def test_folders_that_are_no_project_are_refused(demo: Path, tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError) as missing:
+        mocban.open(tmp_path)
+    assert isinstance(missing.value, mocban.NotAProject) and missing.value.code == "no_project"
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "catalog.sqlite").write_bytes(b"not a database" * 100)
+    with pytest.raises(mocban.ProjectError) as damaged:
+        mocban.open(other)
+    assert "catalog.sqlite" in damaged.value.hint and damaged.value.path == str(other)
+    assert pickle.loads(pickle.dumps(damaged.value)).hint == damaged.value.hint
