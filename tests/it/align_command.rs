@@ -114,7 +114,7 @@ fn levelled_pairs_that_equal_a_project(tier: &str) -> usize {
 #[test]
 fn vertices_without_a_position_are_told() {
     let dir = empty();
-    exported(dir.path());
+    exported(dir.path(), "pose");
     let (mesh, print) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0000.png");
     let whole = mocban(dir.path(), &["align", mesh, print, "--json"]).expect(0);
     assert_eq!(
