@@ -3,7 +3,7 @@
 use mocban::domain::{Affine2, FitOutcome};
 use mocban::mesh;
 use mocban::raster;
-use mocban::stages::{AlignedPair, Print, Scan, Settings, StageError, depth, pipeline};
+use mocban::stages::{AlignedPair, Print, Scan, ScanHints, Settings, StageError, depth, pipeline};
 
 use super::times::{Part, Times};
 
@@ -89,8 +89,9 @@ fn align(
         metric.print_from_depth = input.full_from_print.after(&metric.print_from_depth);
     }
     let aligned = AlignedPair {
+        hints: ScanHints::default(),
         fit: plane.clone(),
-        depth,
+        depth: registered.levelled(depth),
         normalized,
         registered,
     };

@@ -10,10 +10,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from . import _native as _rust
-from ._errors import Error, Refused, UnitError
+from ._errors import Error, InputError, Refused, UnitError
 from ._frozen import Frozen
 from ._inputs import Mesh, Print, mesh_of, print_of
-from ._settings import Settings, settings as default_settings
+from ._settings import Settings, settings_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -147,6 +147,8 @@ class Alignment(Frozen):
     print_from_mesh : array of shape (3, 4) or None
         Rows 1 and 2 give the print pixel of a mesh point ``[x, y, z, 1]``, row 3 its height over the plane.
     results : mapping of str to MetricResult
+    warnings : tuple of str
+        What may be wrong with the mesh or the print, such as vertices without a position.
 
     Examples
     --------
@@ -159,7 +161,7 @@ class Alignment(Frozen):
 
     __slots__ = (
         "status", "refusal", "confidence", "rotation_deg", "scale", "shift_px", "mirrored", "side", "print_from_mesh",
-        "results", "_native", "_first",
+        "results", "warnings", "_native", "_first",
     )  # fmt: skip
     status: Literal["aligned", "refused"]
     refusal: Refusal | None
@@ -171,6 +173,7 @@ class Alignment(Frozen):
     side: str | None
     print_from_mesh: NDArray[np.float64] | None
     results: Mapping[str, MetricResult]
+    warnings: tuple[str, ...]
     _native: _rust.NativeAlignment | None
     _first: str | None
 
@@ -183,7 +186,7 @@ class Alignment(Frozen):
         if native is None:
             names = ("confidence", "rotation_deg", "scale", "shift_px", "mirrored", "side", "print_from_mesh")
             self._set(status="refused", refusal=refusal, results=MappingProxyType({}), _native=None, _first=None)
-            self._set(**dict.fromkeys(names))
+            self._set(warnings=(), **dict.fromkeys(names))
             return
         import numpy as np
 
@@ -205,6 +208,7 @@ class Alignment(Frozen):
             side=numbers["side"],
             print_from_mesh=matrix,
             results=MappingProxyType(results),
+            warnings=tuple(numbers["warnings"]),
             _native=native,
             _first="relief" if "relief" in all_results else "ensemble",
         )
@@ -348,7 +352,8 @@ def _confidence(value: float | None) -> str:
 def _points(values: ArrayLike, columns: int, np: Any) -> Any:
     points = np.asarray(values, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != columns:
-        raise ValueError(f"the points have the shape {points.shape}; give an array of shape (N, {columns})")
+        text = f"the points have the shape {points.shape}; give an array of shape (N, {columns})"
+        raise InputError(text, "bad_input")
     return points
 
 
@@ -389,8 +394,9 @@ def align(
     print: Print | str | os.PathLike[str] | ArrayLike,
     *,
     metrics: Iterable[str] | None = None,
-    settings: Settings | None = None,
+    settings: Settings | str | None = None,
     strict: bool = False,
+    unit: str | None = None,
     scanned_face_down: bool | None = None,
 ) -> Alignment:
     """Align a scan with its print.
@@ -401,16 +407,19 @@ def align(
     Parameters
     ----------
     mesh : Mesh or path-like
-        The scan. The unit of a file counts as unknown; use `read_mesh` to give it.
+        The scan.
     print : Print, path-like or array_like
         The image of the print.
     metrics : iterable of str, optional
         Metrics whose results to keep; all of the method by default.
-    settings : Settings, optional
+    settings : Settings or name of a preset, optional
     strict : bool
         Whether a refusal is an exception.
+    unit : {"mm", "cm", "m", "in"}, optional
+        Unit of a file; not known by default. A `Mesh` has its own.
     scanned_face_down : bool, optional
-        Whether the carved face points towards -z of the mesh; found out by default.
+        Whether the carved face points towards -z of the mesh; found out by default. It decides only where the scan does
+        not show it; ``warnings`` of the result has a sentence if the carving was found on the other side.
 
     Returns
     -------
@@ -433,9 +442,9 @@ def align(
     >>> found.results["relief"].iou > 0.6
     True
     """
-    chosen = default_settings() if settings is None else settings
-    names = None if metrics is None else _checked(metrics, chosen)
-    scan, image = mesh_of(mesh, chosen), print_of(print, chosen)
+    chosen = settings_of(settings)
+    names = None if metrics is None else metric_names(metrics, chosen)
+    scan, image = mesh_of(mesh, chosen, unit), print_of(print, chosen)
     if scan.warnings:
         raise UnitError(f"{scan.path or 'the mesh'}: {scan.warnings[0]}", "wrong_unit", scan.path)
     native, refused = _rust.align_pair(scan._native, image._native, chosen._native, scanned_face_down)
@@ -449,10 +458,13 @@ def align(
     return Alignment(None, refusal)
 
 
-def _checked(metrics: Iterable[str], chosen: Settings) -> tuple[str, ...]:
+def metric_names(metrics: Iterable[str], chosen: Settings) -> tuple[str, ...]:
+    """Return the names of metrics, all of which the method gives."""
     names = (metrics,) if isinstance(metrics, str) else tuple(metrics)
+    if not names:
+        raise InputError("metrics is empty; leave it out for all metrics", "usage")
     known = METRICS if chosen["pipeline.method"] == "default" else METRICS[:-1]
     for name in names:
         if name not in known:
-            raise Error(f"there is no metric {name!r}, only {', '.join(known)}", "usage")
+            raise InputError(f"there is no metric {name!r}, only {', '.join(known)}", "usage")
     return names

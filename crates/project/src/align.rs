@@ -163,7 +163,7 @@ impl FileAlignment {
     /// Returns the result as `align --json` prints it.
     pub fn to_json(&self) -> Value {
         match self {
-            Self::Aligned { pair, .. } => aligned_json(pair),
+            Self::Aligned { pair, print } => aligned_json(pair, print),
             Self::Refused(failure) => json!({
                 "schema": 1,
                 "status": "refused",
@@ -173,8 +173,19 @@ impl FileAlignment {
     }
 }
 
+/// Returns what may be wrong with the files of an aligned pair, one sentence each.
+pub fn warnings(pair: &AlignedPair, print: &Print) -> Vec<String> {
+    let missing = pair.fit.missing_vertices;
+    let missing = missing.map(|number| format!("mesh: {}", mesh::missing_sentence(number.get())));
+    let profile = print.image().profile_warning();
+    let profile = profile.map(|warning| format!("print: {warning}"));
+    let said = scan_size::contradictions(&pair.fit, pair.hints).into_iter();
+    let said = said.map(|text| format!("mesh: {text}"));
+    missing.into_iter().chain(said).chain(profile).collect()
+}
+
 /// Returns the result of an aligned pair as `align --json` prints it.
-pub fn aligned_json(pair: &AlignedPair) -> Value {
+pub fn aligned_json(pair: &AlignedPair, print: &Print) -> Value {
     let first = pair.first_metric();
     let result = |metric: &MetricOutcome| {
         let scores = &metric.scores;
@@ -205,6 +216,7 @@ pub fn aligned_json(pair: &AlignedPair) -> Value {
         "side": side(pair),
         "print_from_mesh": pair.print_from_mesh(first),
         "results": results,
+        "warnings": warnings(pair, print),
     })
 }
 
@@ -232,7 +244,10 @@ pub fn alignment_folder(dir: &Path) -> ProjectResult<GeneratedFolder<'_>> {
 pub fn write_alignment(dir: &Path, pair: &AlignedPair, print: &Print) -> ProjectResult<Leftover> {
     let folder = alignment_folder(dir)?;
     let mut files = alignment_files(pair, print).to_vec();
-    files.push((NUMBERS, format!("{:#}\n", aligned_json(pair)).into_bytes()));
+    files.push((
+        NUMBERS,
+        format!("{:#}\n", aligned_json(pair, print)).into_bytes(),
+    ));
     folder.write(&files)
 }
 

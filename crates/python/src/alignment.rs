@@ -87,7 +87,7 @@ impl NativeAlignment {
 
     /// Returns the result as `align --json` prints it.
     fn json(&self) -> String {
-        align::aligned_json(&self.pair).to_string()
+        align::aligned_json(&self.pair, &self.print).to_string()
     }
 
     /// Returns the results of all stages in JSON.

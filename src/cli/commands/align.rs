@@ -49,10 +49,16 @@ pub(crate) async fn align(args: AlignArgs, context: &Context) -> ProjectResult<E
             context.print_json(&json)?;
             if !context.global.json {
                 context.warn(&format!("not aligned: {failure}"));
+                if let Some(dir) = &args.output {
+                    context.warn(&format!("nothing was written to {}", dir.display()));
+                }
             }
             return Ok(ExitCode::SomeFailed);
         }
     };
+    for warning in align::warnings(pair, print) {
+        context.warn(&warning);
+    }
     if let Some(dir) = &args.output {
         write_files(dir, pair, print, context)?;
     }

@@ -39,7 +39,7 @@ const LEAST_CHARACTER_PX: f64 = 8.0;
 pub enum BinarizeError {
     /// Ink and background differ too little in grey.
     #[error(
-        "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
+        "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white; if you see ink, raise the contrast of the image"
     )]
     NoContrast {
         /// Difference between the two classes of grey, 0..=1.
