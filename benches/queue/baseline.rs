@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use mocban::catalog::PairAttributes;
 use mocban::mesh;
-use mocban::raster::{self, Grid};
+use mocban::raster;
 use mocban::runner::RunOptions;
 use mocban::stages::normalize::PrintMasks;
 use mocban::stages::{Print, Scan, Settings, depth, pipeline};
@@ -95,7 +95,7 @@ impl Worker {
         drop(scan);
         writes.push(self.write(vec![raster::png_grey16(&depth.levels)]));
         let normalized = pipeline::normalize(&depth, &print, settings)?;
-        let masks = normalized.prints.iter().map(encode);
+        let masks = normalized.prints.iter().map(PrintMasks::to_grey);
         writes.push(self.write(masks.map(|grey| raster::png_grey8(&grey)).collect()));
         let registered = pipeline::register(&depth, &normalized, None, settings)?;
         let canvases = [&registered.canvas_print].into_iter();
@@ -117,16 +117,4 @@ impl Worker {
             Ok(project.write_artifacts(&files, &|| {})?)
         })
     }
-}
-
-/// Encodes ink, specks, background and unknown pixels, as a run does.
-fn encode(PrintMasks { ink, specks, known }: &PrintMasks) -> Grid<u8> {
-    Grid::from_fn(ink.width(), ink.height(), |x, y| {
-        match (ink.at(x, y), known.at(x, y), specks.at(x, y)) {
-            (true, _, _) => 255,
-            (false, true, true) => 64,
-            (false, true, false) => 0,
-            (false, false, _) => 128,
-        }
-    })
 }

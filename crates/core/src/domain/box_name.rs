@@ -64,7 +64,7 @@ impl FromStr for BoxName {
             (_, Some(row)) => (row, Some(NotePart::Left)),
             (None, None) => (row, None),
         };
-        let number = |digits: &str| digits.parse().map_err(|_| NotABoxName);
+        let number = |digits: &str| digits.parse().map_err(|_not_digits| NotABoxName);
         let name = Self {
             column: number(column)?,
             row: number(row)?,
