@@ -193,10 +193,28 @@ fn on_page(
             boxes(count)
         ));
     }
+    warnings.extend(over_edges(&inside, size));
     for corner in inside.iter_mut().flat_map(|placed| &mut placed.corners) {
         *corner = [corner[0].clamp(0.0, size[0]), corner[1].clamp(0.0, size[1])];
     }
     Ok(inside)
+}
+
+/// Warns about boxes that reach over an edge of the page by a pixel or more.
+fn over_edges(inside: &[PlacedRegion], [width, height]: [f64; 2]) -> Option<String> {
+    let is_over = |placed: &&PlacedRegion| {
+        let [x0, y0, x1, y1] = bounds(&placed.corners);
+        (-x0).max(-y0).max(x1 - width).max(y1 - height) >= MIN_SIDE
+    };
+    let over = inside.iter().filter(is_over);
+    let names: Vec<String> = over.map(|placed| placed.region.shown()).collect();
+    let verb = for_count(
+        names.len(),
+        "reaches over an edge of the page and was",
+        "reach over an edge of the page and were",
+    );
+    (!names.is_empty())
+        .then(|| format!("{} {verb} cut there: {}", boxes(names.len()), list(&names)))
 }
 
 /// Returns the share of the area of a box that lies on the page.

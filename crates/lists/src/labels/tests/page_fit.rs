@@ -119,6 +119,14 @@ fn empty_boxes_and_points_are_left_out() {
 }
 
 #[test]
+fn boxes_that_are_cut_at_an_edge_are_named() {
+    let labels = read_boxes(&[[-9.0, 2.0, 30.0, 30.0], [-0.9, 40.0, 30.0, 70.0]]);
+    assert_eq!(bounds(&labels)[0], [-0.5, 1.5, 29.5, 29.5]);
+    let expected = "b.json: 1 box reaches over an edge of the page and was cut there: box 1";
+    assert_eq!(labels.warnings, [expected]);
+}
+
+#[test]
 fn many_names_are_counted() {
     let mut boxes = vec![[1700.0, 0.0, 1800.0, 50.0]; 12];
     for (k, edges) in boxes.iter_mut().enumerate() {
