@@ -16,9 +16,29 @@ const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
 const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
 /// Folders that name a kind of file, such as `stl` in `block-4/stl/12.stl`. They are no part of ids.
-const KIND_FOLDERS: [&str; 17] = [
-    "image", "images", "img", "jpeg", "jpg", "mesh", "meshes", "obj", "ply", "png", "print",
-    "prints", "scan", "scans", "stl", "tif", "tiff",
+const KIND_FOLDERS: [&str; 22] = [
+    "image",
+    "images",
+    "img",
+    "jpeg",
+    "jpg",
+    "mesh",
+    "meshes",
+    "obj",
+    "ply",
+    "png",
+    "print",
+    "prints",
+    "scan",
+    "scans",
+    "stl",
+    "tif",
+    "tiff",
+    "quét",
+    "bản quét",
+    "in",
+    "bản in",
+    "ảnh in",
 ];
 
 /// Longest list of similar files in a message.
@@ -77,8 +97,10 @@ pub fn pair_folders(
 ) -> Result<FolderPairs, ManifestError> {
     let mut problems = ManifestError::default();
     let is_same = meshes.root == prints.root;
+    let roots = [&meshes.root, &prints.root];
     let (meshes, other_meshes) = by_id(meshes, is_named_like_mesh, "meshes", &mut problems);
     let (mut prints, other_prints) = by_id(prints, is_named_like_print, "prints", &mut problems);
+    let without = without_files(roots, [meshes.is_empty(), prints.is_empty()]);
     let (mut pairs, mut meshes_alone) = (Vec::new(), Vec::new());
     for (id, mesh) in meshes {
         match prints.remove(&id) {
@@ -100,7 +122,8 @@ pub fn pair_folders(
         && other_prints.iter().any(|path| is_named_like_mesh(path));
     let similar = similar(&meshes_alone, &prints_alone);
     if rows.is_empty() {
-        return Err(of_list(&no_pair(is_swapped && meshes_alone.is_empty(), &similar)).into());
+        let is_swapped = is_swapped && meshes_alone.is_empty();
+        return Err(of_list(&no_pair(is_swapped, without, &similar)).into());
     }
     for alone in [&mut meshes_alone, &mut prints_alone] {
         alone.sort_by_key(FolderFile::place);
@@ -120,10 +143,27 @@ pub fn pair_folders(
     })
 }
 
+/// Says which of the folders of meshes and of prints have none, such as `scans holds no meshes`.
+fn without_files(roots: [&PathBuf; 2], are_empty: [bool; 2]) -> Option<String> {
+    let [meshes, prints] = roots.map(|root| root.display());
+    match are_empty {
+        [true, true] if roots[0] == roots[1] => {
+            Some(format!("{meshes} holds no meshes and no images"))
+        }
+        [true, true] => Some(format!("{meshes} holds no meshes, and {prints} no images")),
+        [true, false] => Some(format!("{meshes} holds no meshes")),
+        [false, true] => Some(format!("{prints} holds no images")),
+        [false, false] => None,
+    }
+}
+
 /// Returns why a list of folders has no pairs.
-fn no_pair(is_swapped: bool, similar: &[String]) -> String {
+fn no_pair(is_swapped: bool, without: Option<String>, similar: &[String]) -> String {
     if is_swapped {
         return "--meshes holds images and --prints holds meshes; swap the two".to_owned();
+    }
+    if let Some(without) = without {
+        return without;
     }
     let reason = "no mesh has the same file name as a print";
     match similar.first() {
@@ -326,6 +366,9 @@ mod tests {
             ["d/b1/1.stl", "d/b1/1.png"],
             ["d/b1/stl/1.stl", "d/b1/print/1.png"],
             ["d/Meshes/b1/1.stl", "d/Prints/B1/1.png"],
+            ["d/b1/quét/1.stl", "d/b1/in/1.png"],
+            ["d/b1/Bản Quét/1.stl", "d/b1/BẢN IN/1.png"],
+            ["d/b1/que\u{301}t/1.stl", "d/b1/a\u{309}nh in/1.png"],
         ] {
             let both = root(&[mesh, print, "d/notes.txt"]);
             let found = super::pair_folders(&both, &both).expect("a pair");
@@ -411,6 +454,18 @@ mod tests {
             error.expect_err("twice").to_string(),
             "a.stl: a.ply has the same stem; meshes are paired by stem"
         );
+    }
+
+    #[test]
+    fn a_folder_without_files_of_its_kind_is_named() {
+        for (meshes, prints, expected) in [
+            (vec!["a.stl"], vec!["a.stl"], "p holds no images"),
+            (vec![], vec!["a.png"], "m holds no meshes"),
+            (vec!["a.txt"], vec![], "m holds no meshes, and p no images"),
+        ] {
+            let refused = pair_folders(&files(&meshes), &files(&prints)).expect_err("no pair");
+            assert_eq!(refused.to_string(), expected);
+        }
     }
 
     #[test]
