@@ -46,6 +46,7 @@ pub mod input_paths;
 pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
+pub mod missing_inputs;
 pub mod new_project;
 pub mod pair_table;
 pub mod report;
