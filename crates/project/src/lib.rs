@@ -26,6 +26,7 @@
 
 pub mod align;
 pub mod backup;
+mod block_files;
 pub mod block_status;
 pub mod check;
 pub mod closing;
