@@ -10,7 +10,7 @@ use crate::{
 };
 use mocban_core::domain::{
     ArtifactSet, BlockCharacterState, BlockName, BlockStage, ContentHash, Failure, FailureClass,
-    PairName, WorkerId,
+    JobStatus, PairName, WorkerId,
 };
 
 pub(super) fn block(text: &str) -> BlockName {

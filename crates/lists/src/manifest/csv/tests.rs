@@ -306,7 +306,9 @@ fn chinese_text_is_not_taken_for_vietnamese() {
 #[test]
 fn names_of_columns_that_are_not_utf8_are_one_problem() {
     let list = b"m\xe3,mesh,print,ch\xfd\xde,kh\xf4i\n1,a.stl,a.png,x,y\n";
-    let refused = super::parse_csv(list).expect_err("Windows-1258").to_string();
+    let refused = super::parse_csv(list)
+        .expect_err("Windows-1258")
+        .to_string();
     assert!(
         refused.starts_with(
             "line 1: the names of columns 1, 4, 5 are not UTF-8; it seems to be Windows-1258"
