@@ -80,8 +80,11 @@ fn boxes_outside_are_left_out_and_named() {
             [99.5, 979.5, 149.5, 999.5]
         ]
     );
-    let expected = "b.json: 2 of 5 boxes lie outside the page and were left out: box 2, box 4";
-    assert_eq!(labels.warnings, [expected]);
+    let expected = [
+        "b.json: 2 of 5 boxes lie outside the page and were left out: box 2, box 4",
+        "b.json: 2 boxes reach over an edge of the page and were cut there: box 3, box 5",
+    ];
+    assert_eq!(labels.warnings, expected);
 }
 
 #[test]
