@@ -155,11 +155,12 @@ pub(super) fn unended_line(bytes: &[u8]) -> Option<(u64, Vec<&[u8]>)> {
     Some((number, words(line).collect()))
 }
 
-/// Says that a file seems to be cut off if a fault lies in its last line and nothing ends this line.
+/// Says that a file of several lines seems to be cut off if a fault lies in its last line and nothing ends this line.
 pub(super) fn fault_at_end(fault: MeshError, bytes: &[u8]) -> MeshError {
     match fault {
         MeshError::Line { line, reason }
-            if !reason.ends_with(CUT_OFF)
+            if line > 1
+                && !reason.ends_with(CUT_OFF)
                 && unended_line(bytes).is_some_and(|(last, _)| last == line) =>
         {
             let reason = format!("{reason}; it is the last line, so {CUT_OFF}");
