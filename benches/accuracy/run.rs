@@ -3,7 +3,7 @@
 use mocban::domain::FitOutcome;
 use mocban::mesh;
 use mocban::raster;
-use mocban::stages::{AlignedPair, Print, Scan, Settings, StageError, depth, pipeline};
+use mocban::stages::{AlignedPair, Print, Scan, ScanHints, Settings, StageError, depth, pipeline};
 
 use super::times::{Part, Times};
 
@@ -84,8 +84,9 @@ fn align(
         })
         .map_err(StageError::from)?;
     let aligned = AlignedPair {
+        hints: ScanHints::default(),
         fit: plane.clone(),
-        depth,
+        depth: registered.levelled(depth),
         normalized,
         registered,
     };

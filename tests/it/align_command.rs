@@ -19,10 +19,10 @@ const NUMBERS: [&str; 7] = [
     "confidence",
 ];
 
-/// Makes a demo project `d` and exports it to `e`.
-fn exported(dir: &Path) {
-    let tiers = ["demo", "d", "--tier", "pose", "--pairs", "4"];
-    mocban(dir, &tiers).expect(0);
+/// Makes a demo project `d` of four pairs of a tier and exports it to `e`.
+fn exported(dir: &Path, tier: &str) {
+    let demo = ["demo", "d", "--tier", tier, "--pairs", "4"];
+    mocban(dir, &demo).expect(0);
     mocban(dir, &["-C", "d", "export", "--to", "jsonl", "-o", "e"]).expect(0);
 }
 
@@ -46,11 +46,22 @@ fn align(dir: &Path, line: &Value, more: &[&str]) -> Call {
 
 #[test]
 fn a_pair_alone_gives_the_results_and_files_of_a_project() {
+    assert_eq!(levelled_pairs_that_equal_a_project("pose"), 0);
+}
+
+#[test]
+fn a_pair_alone_is_levelled_as_in_a_project() {
+    assert!(levelled_pairs_that_equal_a_project("stitched") > 0);
+}
+
+/// Aligns each of four pairs of a tier alone, and compares results and files with those of a project. Returns the number
+/// of pairs whose depth map was levelled.
+fn levelled_pairs_that_equal_a_project(tier: &str) -> usize {
     let dir = empty();
-    exported(dir.path());
+    exported(dir.path(), tier);
     let lines = crate::export_readback::lines(&dir.path().join("e"));
     let firsts = lines.iter().filter(|line| line["metric"] == "relief");
-    let mut compared = 0;
+    let (mut compared, mut levelled) = (0, 0);
     for first in firsts {
         let found = align(dir.path(), first, &["-o", "chữ/kết quả"])
             .expect(0)
@@ -92,15 +103,18 @@ fn a_pair_alone_gives_the_results_and_files_of_a_project() {
         }
         let stored = fs::read_to_string(folder.join("alignment.json")).expect("the numbers");
         assert_eq!(serde_json::from_str::<Value>(&stored).expect("JSON"), found);
+        let sidecar = fs::read_to_string(folder.join("depth.json")).expect("the scale");
+        levelled += usize::from(sidecar.contains("levelling"));
         compared += 1;
     }
     assert_eq!(compared, 4);
+    levelled
 }
 
 #[test]
 fn vertices_without_a_position_are_told() {
     let dir = empty();
-    exported(dir.path());
+    exported(dir.path(), "pose");
     let (mesh, print) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0000.png");
     let whole = mocban(dir.path(), &["align", mesh, print, "--json"]).expect(0);
     assert_eq!(
@@ -121,9 +135,43 @@ fn vertices_without_a_position_are_told() {
 }
 
 #[test]
+fn what_is_said_of_a_scan_is_compared_with_what_was_found() {
+    let dir = empty();
+    mocban(dir.path(), &["demo", "d", "--pairs", "1", "--no-run"]).expect(0);
+    let (mesh, print) = (
+        "d/data/meshes/upright-0000.ply",
+        "d/data/prints/upright-0000.jpg",
+    );
+    let found = mocban(dir.path(), &["align", mesh, print, "--json"])
+        .expect(0)
+        .json();
+    let is_down = found["side"] == "-z";
+    assert!(is_down || found["side"] == "+z", "{}", found["side"]);
+    let wrong = (!is_down).to_string();
+    let said = ["--unit", "in", "--scanned-face-down", &wrong];
+    let args = [&["align", mesh, print, "--json"], &said[..]].concat();
+    let warnings = mocban(dir.path(), &args).expect(0).json()["warnings"].to_string();
+    for part in ["mm deep, but most blocks", "scanned_face_down says"] {
+        assert!(warnings.contains(part), "{warnings}");
+    }
+    // Project: the same, when the pair is run and when it is shown.
+    let list = format!("id,mesh,print,unit,scanned_face_down\na,{mesh},{print},in,{wrong}\n");
+    fs::write(dir.path().join("list.csv"), list).expect("a list");
+    mocban(dir.path(), &["-C", "p", "import", "list.csv"]).expect(0);
+    let ran = mocban(dir.path(), &["-C", "p", "run"]).expect(0);
+    assert!(ran.err.contains("mm deep, but most blocks"), "{}", ran.err);
+    let shown = mocban(dir.path(), &["-C", "p", "show", "a"]).expect(0);
+    assert!(
+        shown.out.contains("scanned_face_down says"),
+        "{}",
+        shown.out
+    );
+}
+
+#[test]
 fn a_pair_of_two_characters_is_refused_and_writes_nothing() {
     let dir = empty();
-    exported(dir.path());
+    exported(dir.path(), "pose");
     let (mesh, print) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0001.png");
     let refused = mocban(dir.path(), &["align", mesh, print, "-o", "out"]).expect(3);
     assert!(refused.err.contains("not aligned: "), "{}", refused.err);

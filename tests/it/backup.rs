@@ -37,7 +37,7 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
         .expect("the binary starts");
     // `fit` writes no files, `depth` does.
     while pairs_done(&original, Stage::Depth) == 0 {
-        std::thread::yield_now();
+        crate::waiting::pause();
     }
     at(&original, &backup).expect(0);
     assert!(

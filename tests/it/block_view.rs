@@ -8,6 +8,7 @@ use serde_json::json;
 
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
+use crate::made_once::copy_of;
 use crate::page::Page;
 use crate::small_block::{demo_block, few_labels};
 
@@ -17,6 +18,10 @@ const INK_ONLY: [u8; 3] = [0, 114, 178];
 
 /// Creates a project `p` with a finished block `b1` of six characters. The truth is in `d/data/truth.json`.
 pub(crate) fn finished_block(dir: &Path) {
+    copy_of("a finished block", dir, finish_block);
+}
+
+fn finish_block(dir: &Path) {
     demo_block(dir);
     few_labels(dir, &dir.join("few.json"));
     let import = [

@@ -9,6 +9,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use serde_json::Value;
 
 use crate::cli::{Call, empty, mocban};
+use crate::made_once::copy_of;
 
 /// The formats that this file compares in detail.
 const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset";
@@ -22,10 +23,12 @@ const FIXED_NAMES: &str = "id character block unit mesh print meta metric status
 /// Returns a folder with the finished project `p` of 30 pairs of three blocks.
 fn project() -> tempfile::TempDir {
     let dir = empty();
-    let demo = [
-        "demo", "p", "--tier", "upright", "--pairs", "30", "--seed", "2",
-    ];
-    mocban(dir.path(), &demo).expect(0);
+    copy_of("thirty pairs", dir.path(), |dir| {
+        let demo = [
+            "demo", "p", "--tier", "upright", "--pairs", "30", "--seed", "2",
+        ];
+        mocban(dir, &demo).expect(0);
+    });
     dir
 }
 

@@ -151,7 +151,7 @@ fn an_export_that_is_killed_keeps_the_earlier_one() {
                 None,
                 "{path} is not written"
             );
-            std::thread::yield_now();
+            crate::waiting::pause();
         }
         child.kill().expect("killed");
         child.wait().expect("a child");

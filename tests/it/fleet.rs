@@ -10,15 +10,17 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use crate::cli::{Call, binary, call, empty, mocban};
+use crate::made_once::copy_of;
 use crate::postgres_server::Server;
 use crate::resume::{copy_folder, project};
 use crate::test_size::size_from_env;
 use crate::uninterrupted::files;
+use crate::waiting::pause;
 
 /// Shortens leases to five seconds.
 const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "10");
 
-/// A project in a file that has been run, and the same pairs in PostgreSQL, not run yet.
+/// A project in a file that has been run and exported, and the same pairs in PostgreSQL, not run yet.
 pub(crate) struct Fleet {
     dir: tempfile::TempDir,
     server: Server,
@@ -29,11 +31,14 @@ impl Fleet {
     pub(crate) fn new(pairs: &str) -> Option<Self> {
         let server = Server::start()?;
         let dir = empty();
-        let fresh = project(dir.path(), "file", pairs);
-        copy_folder(fresh.dir(), &dir.path().join("shared"));
+        copy_of(&format!("a fleet of {pairs}"), dir.path(), |dir| {
+            let fresh = project(dir, "file", pairs);
+            copy_folder(fresh.dir(), &dir.join("shared"));
+            mocban(dir, &["-C", "file", "run"]).expect(0);
+            mocban(dir, &["-C", "file", "export", "-o", "file-export"]).expect(0);
+        });
+        mocban(dir.path(), &["copy", "shared", server.url()]).expect(0);
         std::fs::remove_file(dir.path().join("shared/catalog.sqlite")).expect("removed");
-        mocban(dir.path(), &["copy", "file", server.url()]).expect(0);
-        mocban(dir.path(), &["-C", "file", "run"]).expect(0);
         Some(Self { dir, server })
     }
 
@@ -94,7 +99,9 @@ impl Fleet {
                 exists.fetch_one(conn).await
             })
         };
-        while !is_known() && worker.try_wait().expect("a state").is_none() {}
+        while !is_known() && worker.try_wait().expect("a state").is_none() {
+            pause();
+        }
         worker
     }
 
@@ -131,6 +138,7 @@ impl Fleet {
             if jobs["done"].as_u64() > Some(0) && jobs["leased"].as_u64() > Some(0) {
                 return;
             }
+            pause();
         }
     }
 
@@ -141,7 +149,6 @@ impl Fleet {
         assert_eq!(status["jobs"]["leased"], 0, "{status}");
         assert_eq!(status["jobs"]["quarantined"], 0, "{status}");
         self.shared(&["check"]).expect(0);
-        mocban(self.path(), &["-C", "file", "export", "-o", "file-export"]).expect(0);
         self.shared(&["export", "-o", "shared-export"]).expect(0);
         let [one, other] =
             ["file-export", "shared-export"].map(|name| files(&self.path().join(name)));
@@ -159,7 +166,7 @@ impl Fleet {
 
 #[test]
 fn workers_on_postgres_give_the_results_of_one_run_on_a_file() {
-    let Some(fleet) = Fleet::new("24") else {
+    let Some(fleet) = Fleet::new("30") else {
         return;
     };
     fleet.shared(&["plan"]).expect(0);
@@ -282,6 +289,7 @@ fn no_result_names_files_that_were_removed_while_its_commit_waited() {
     let mut worker = fleet.worker_with(&hold);
     while !held.exists() {
         assert!(worker.try_wait().expect("a state").is_none(), "it ended");
+        pause();
     }
     // The time since the files were written is what matters, so there is no event to wait for.
     std::thread::sleep(WAIT);
@@ -346,10 +354,12 @@ fn pairs_of_a_killed_worker_are_taken_before_their_leases_end() {
     let mut victim = fleet.worker_with(&hold);
     while !held.exists() {
         assert!(victim.try_wait().expect("a state").is_none(), "it ended");
+        pause();
     }
     let mut other = fleet.worker_with(&[]);
     while fleet.shared(&["status", "--json"]).expect(0).json()["jobs"]["done"] == 0 {
         assert!(other.try_wait().expect("a state").is_none(), "it ended");
+        pause();
     }
     victim.kill().expect("killed");
     victim.wait().expect("an exit code");

@@ -65,6 +65,7 @@ mod lab;
 mod large_lists;
 mod layers;
 mod limits;
+mod made_once;
 #[cfg(unix)]
 mod manners;
 #[cfg(unix)]
@@ -141,5 +142,6 @@ mod tiff_kinds;
 mod tls_to_server;
 mod uninterrupted;
 mod unusual_scans;
+mod waiting;
 #[cfg(unix)]
 mod watch_workers;

@@ -89,7 +89,7 @@ fn demo_stopped_while_writing_its_files_reports_that() {
     let has_started = || std::fs::read_dir(&meshes).is_ok_and(|mut files| files.next().is_some());
     while !has_started() {
         assert_eq!(child.try_wait().expect("a child"), None);
-        std::thread::yield_now();
+        crate::waiting::pause();
     }
     let pid = child.id().to_string();
     let sent = Command::new("kill").args(["-INT", &pid]).status();

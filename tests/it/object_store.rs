@@ -278,7 +278,7 @@ fn a_stop_request_does_not_wait_until_a_request_is_given_up() {
     let mut run = command.spawn().expect("the binary starts");
     while !outage.has_begun() {
         assert!(run.try_wait().expect("a state").is_none(), "it ended");
-        std::thread::yield_now();
+        crate::waiting::pause();
     }
     let asked = Instant::now();
     let id = rustix::process::Pid::from_child(&run);

@@ -158,7 +158,7 @@ impl Page {
                 return ended.code();
             }
             assert!(Instant::now() < deadline, "the server does not end");
-            std::thread::yield_now();
+            crate::waiting::pause();
         }
     }
 

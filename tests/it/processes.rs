@@ -137,7 +137,7 @@ impl Running {
             let ended = self.child().try_wait().expect("the child's state");
             assert!(ended.is_none(), "it ended before {what}: {ended:?}");
             assert!(Instant::now() < deadline, "timeout before {what}");
-            std::thread::yield_now();
+            crate::waiting::pause();
         }
     }
 

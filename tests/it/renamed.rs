@@ -21,7 +21,7 @@ pub(crate) fn held(project: &Project, failpoint: &str, hold: &Path) -> Child {
         .expect("the binary starts");
     while !hold.exists() {
         assert_eq!(child.try_wait().expect("a child"), None);
-        std::thread::yield_now();
+        crate::waiting::pause();
     }
     child
 }

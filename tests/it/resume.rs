@@ -199,7 +199,7 @@ fn a_run_killed_at_every_failpoint_and_resumed_gives_the_results_of_an_uninterru
             ended.is_none(),
             "the run ended before it was killed: {ended:?}"
         );
-        std::thread::yield_now();
+        crate::waiting::pause();
     }
     child.kill().expect("killed");
     child.wait().expect("dead");

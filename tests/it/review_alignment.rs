@@ -191,7 +191,7 @@ impl HeldRun {
         let deadline = Instant::now() + Duration::from_mins(2);
         while !file.exists() {
             assert!(Instant::now() < deadline, "the point was not reached");
-            std::thread::sleep(Duration::from_millis(5));
+            crate::waiting::pause();
         }
         Self { process, file }
     }

@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
+use crate::made_once::copy_of;
 use crate::page::{Page, read_project, send};
 use crate::review_browser::{PLAIN, enter, judge};
 
@@ -29,8 +30,10 @@ const VISIBLE_VERTICES: &str = "(() => {
 
 /// Creates a project `p` with one finished pair.
 fn one_pair(dir: &Path) -> &'static str {
-    let demo = ["demo", "p", "--tier", "pose", "--pairs", "1", "--seed", "5"];
-    mocban(dir, &demo).expect(0);
+    copy_of("a pair to view", dir, |dir| {
+        let demo = ["demo", "p", "--tier", "pose", "--pairs", "1", "--seed", "5"];
+        mocban(dir, &demo).expect(0);
+    });
     "pose-0000"
 }
 

@@ -2,20 +2,18 @@
 
 use std::fs;
 use std::path::Path;
-use std::sync::OnceLock;
 
 use serde_json::{Value, json};
 
 use crate::cli::mocban;
+use crate::made_once::copy_of;
 
 /// Number of characters that [`few_labels`] names.
 pub(crate) const CHARACTERS: usize = 6;
 
 /// Creates the folder `d/data` with the files of `demo --block`, at a spacing of 0.5 mm. All tests copy the same files.
 pub(crate) fn demo_block(dir: &Path) {
-    static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
-    let made = MADE.get_or_init(|| {
-        let made = tempfile::tempdir().expect("a temporary directory");
+    copy_of("a block", dir, |dir| {
         let demo = [
             "demo",
             "d",
@@ -26,15 +24,10 @@ pub(crate) fn demo_block(dir: &Path) {
             "0.5",
             "--no-run",
         ];
-        mocban(made.path(), &demo).expect(0);
-        made
+        mocban(dir, &demo).expect(0);
+        // Tests make projects of their own from the files.
+        fs::remove_file(dir.join("d/catalog.sqlite")).expect("removed");
     });
-    let data = dir.join("d/data");
-    fs::create_dir_all(&data).expect("a folder");
-    for entry in fs::read_dir(made.path().join("d/data")).expect("the files") {
-        let entry = entry.expect("a file");
-        fs::copy(entry.path(), data.join(entry.file_name())).expect("copied");
-    }
 }
 
 /// Writes labels of a few characters of the block that [`demo_block`] has created.

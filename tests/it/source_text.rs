@@ -64,7 +64,7 @@ pub(crate) fn rust_files(dir: &Path) -> Vec<PathBuf> {
 }
 
 /// Returns the names of all crates, each with its `src`.
-fn crates() -> Vec<(String, PathBuf)> {
+pub(crate) fn crates() -> Vec<(String, PathBuf)> {
     let mut found = vec![("mocban".to_owned(), package_dir().join("src"))];
     for entry in std::fs::read_dir(package_dir().join("crates")).expect("a readable directory") {
         let dir = entry.expect("a readable entry").path();

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::source_text::{identifier, package_dir, rust_files, source_files};
+use crate::source_text::{crates, identifier, package_dir, rust_files, source_files};
 
 /// Longest source file, tests included.
 const MAX_LINES: usize = 450;
@@ -203,4 +203,33 @@ fn the_container_image_is_built_with_every_included_folder() {
         let is_copied = ignored.lines().any(|line| line == format!("!{folder}"));
         assert!(is_copied, "{folder} is not copied into the image");
     }
+}
+
+/// Returns whether documentation has an example that would run.
+fn has_example(text: &str) -> bool {
+    let lines = text.lines().map(str::trim_start);
+    let docs = lines.filter_map(|line| line.strip_prefix("///").or(line.strip_prefix("//!")));
+    let fences = docs.map(str::trim).filter(|line| line.starts_with("```"));
+    // Every second fence ends a block.
+    fences
+        .step_by(2)
+        .any(|fence| matches!(fence, "```" | "```rust"))
+}
+
+#[test]
+fn crates_whose_examples_do_not_run_have_none() {
+    let mut checked = 0;
+    for (name, src) in crates() {
+        let manifest = src.with_file_name("Cargo.toml");
+        let manifest = std::fs::read_to_string(manifest).expect("a manifest");
+        if !manifest.lines().any(|line| line == "doctest = false") {
+            continue;
+        }
+        checked += 1;
+        for path in rust_files(&src) {
+            let text = std::fs::read_to_string(&path).expect("readable source");
+            assert!(!has_example(&text), "{name}: {}", path.display());
+        }
+    }
+    assert!(checked > 0 && has_example("/// ```text\n/// a\n/// ```\n/// ```\n"));
 }

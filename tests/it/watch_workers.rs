@@ -93,7 +93,7 @@ fn until(what: &str, condition: impl Fn() -> bool) {
     let deadline = std::time::Instant::now() + std::time::Duration::from_mins(2);
     while !condition() {
         assert!(std::time::Instant::now() < deadline, "timeout: {what}");
-        std::thread::yield_now();
+        crate::waiting::pause();
     }
 }
 

@@ -1,8 +1,9 @@
-//! Recognizes scans of an unexpected size: a whole block that was given as one character, or a wrong unit.
+//! Recognizes scans of an unexpected size: a whole block that was given as one character, or a wrong unit. Compares what is
+//! said of a scan with what was found.
 
-use crate::stages::StageError;
+use crate::stages::{ScanHints, StageError};
 use mocban_core::domain::cancel::polled;
-use mocban_core::domain::{FailureClass, LengthUnit};
+use mocban_core::domain::{FailureClass, FitOutcome, LengthUnit};
 use mocban_core::mesh::Vertices;
 use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
 use mocban_core::raster::DepthMap;
@@ -34,6 +35,9 @@ pub fn advice_for(error: &StageError, length: f64, unit: Option<LengthUnit>) -> 
 /// Lengths that a scan of a character or block can have, mm.
 const POSSIBLE_MM: std::ops::RangeInclusive<f64> = 0.5..=10_000.0;
 
+/// Lengths of most scans of characters, mm.
+const CHARACTER_MM: std::ops::RangeInclusive<f64> = 5.0..=60.0;
+
 /// Lengths of most scans of characters and blocks, mm.
 const USUAL_MM: std::ops::RangeInclusive<f64> = 5.0..=1_000.0;
 
@@ -49,12 +53,40 @@ pub fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
     } else {
         format!("{length_mm:.3} mm")
     };
-    let mut units = LengthUnit::ALL.into_iter();
-    let likely = units.find(|unit| USUAL_MM.contains(&(length * unit.mm())));
+    let first_in = |range: std::ops::RangeInclusive<f64>| {
+        let mut units = LengthUnit::ALL.into_iter();
+        units.find(|unit| range.contains(&(length * unit.mm())))
+    };
+    let likely = first_in(CHARACTER_MM).or_else(|| first_in(USUAL_MM));
     let likely = likely.map_or_else(String::new, |unit| format!(" (perhaps {unit})"));
     Some(format!(
-        "with the unit {unit}, the scan is {shown} long; correct the unit in the list{likely} and import it again"
+        "with the unit {unit}, the scan is {shown} long; correct the unit{likely}"
     ))
+}
+
+/// Depths of the carving of most blocks, mm. Deep ones have 5 mm.
+const USUAL_RELIEF_MM: std::ops::RangeInclusive<f64> = 0.01..=10.0;
+
+/// Least share of the z axis of the mesh in the direction of the carved face from which the face points up or down.
+const MIN_NORMAL_Z: f64 = 0.3;
+
+/// Returns how the result of `fit` contradicts what was said of the scan, one sentence each.
+pub fn contradictions(fit: &FitOutcome, hints: ScanHints) -> Vec<String> {
+    let relief_mm = hints.unit.map(|unit| fit.relief * unit.mm());
+    let relief = relief_mm.filter(|mm| !USUAL_RELIEF_MM.contains(mm)).map(|mm| {
+        format!(
+            "its carving is {mm:.3} mm deep, but most blocks are carved 0.3 to 5 mm deep; if the unit is wrong, so are all lengths in mm"
+        )
+    });
+    let up = fit.plane_from_mesh.0[2][2];
+    let side = hints
+        .scanned_face_down
+        .filter(|face_down| *face_down != (up < 0.0) && up.abs() >= MIN_NORMAL_Z);
+    let side = side.map(|face_down| {
+        let [said, found] = if face_down { ["-z", "+z"] } else { ["+z", "-z"] };
+        format!("scanned_face_down says that the carved face points towards {said}, but carving was found towards {found}")
+    });
+    relief.into_iter().chain(side).collect()
 }
 
 /// Returns the longest side of the bounding box of vertices without distant specks, in units of the mesh.
@@ -100,9 +132,7 @@ mod tests {
     fn impossible_lengths_are_those_of_a_wrong_unit() {
         assert_eq!(
             wrong_unit(12.54, Some(LengthUnit::M)).as_deref(),
-            Some(
-                "with the unit m, the scan is 12.5 m long; correct the unit in the list (perhaps mm) and import it again"
-            )
+            Some("with the unit m, the scan is 12.5 m long; correct the unit (perhaps mm)")
         );
         let text = wrong_unit(0.012, Some(LengthUnit::Mm)).expect("a grain of dust");
         assert!(
@@ -118,6 +148,12 @@ mod tests {
         ] {
             assert_eq!(wrong_unit(length, unit), None);
         }
+    }
+
+    #[test]
+    fn the_likeliest_unit_gives_a_character() {
+        let text = wrong_unit(0.484, Some(LengthUnit::Mm)).expect("half a millimetre");
+        assert!(text.ends_with("(perhaps in)"), "{text}");
     }
 
     #[test]

@@ -179,7 +179,9 @@ pub fn warnings(pair: &AlignedPair, print: &Print) -> Vec<String> {
     let missing = missing.map(|number| format!("mesh: {}", mesh::missing_sentence(number.get())));
     let profile = print.image().profile_warning();
     let profile = profile.map(|warning| format!("print: {warning}"));
-    missing.into_iter().chain(profile).collect()
+    let said = scan_size::contradictions(&pair.fit, pair.hints).into_iter();
+    let said = said.map(|text| format!("mesh: {text}"));
+    missing.into_iter().chain(said).chain(profile).collect()
 }
 
 /// Returns the result of an aligned pair as `align --json` prints it.

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use mocban_align::stages::normalize::{Normalized, PrintMasks};
 use mocban_align::stages::register::Registered;
-use mocban_align::stages::{AlignedPair, Print};
-use mocban_core::domain::{DepthScale, FitOutcome, NormalizeOutcome, RegisterOutcome};
+use mocban_align::stages::{AlignedPair, Print, ScanHints};
+use mocban_core::domain::{DepthScale, FitOutcome, LengthUnit, NormalizeOutcome, RegisterOutcome};
 use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage};
 
 /// Version of the form.
@@ -14,6 +14,8 @@ const FORM: u32 = 1;
 #[derive(Serialize, Deserialize)]
 struct AlignmentNumbers {
     form: u32,
+    unit: Option<LengthUnit>,
+    scanned_face_down: Option<bool>,
     fit: FitOutcome,
     scale: DepthScale,
     normalize: NormalizeOutcome,
@@ -45,6 +47,8 @@ pub(crate) fn save(pair: &AlignedPair, print: &Print) -> (String, Vec<u8>) {
     let maps = &pair.registered.stroke_maps;
     let numbers = AlignmentNumbers {
         form: FORM,
+        unit: pair.hints.unit,
+        scanned_face_down: pair.hints.scanned_face_down,
         fit: pair.fit.clone(),
         scale: pair.depth.scale.clone(),
         normalize: pair.normalized.outcome.clone(),
@@ -98,6 +102,10 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
         ignored_profile: numbers.ignored_profile,
     };
     let pair = AlignedPair {
+        hints: ScanHints {
+            unit: numbers.unit,
+            scanned_face_down: numbers.scanned_face_down,
+        },
         fit: numbers.fit,
         depth: DepthMap {
             levels,

@@ -2,7 +2,7 @@
 
 use mocban_align::stages::normalize::{Normalized, PrintMasks};
 use mocban_align::stages::register::Registered;
-use mocban_align::stages::{AlignedPair, Print};
+use mocban_align::stages::{AlignedPair, Print, ScanHints};
 use mocban_catalog::{Catalog, PairDetail, PairResults};
 use mocban_core::InputLimits;
 use mocban_core::domain::artifact_role::stroke_map;
@@ -40,7 +40,11 @@ pub(crate) async fn alignment(
     catalog.close().await;
     let results = detail?.results;
     if results.status != JobStatus::Done {
-        let text = format!("pair {id} has no alignment; `status` of the pair says why");
+        let why = match &results.failure {
+            Some(failed) => format!("it failed: {}", failed.failure.message),
+            None => "run it".to_owned(),
+        };
+        let text = format!("pair {id} has no alignment: {why}");
         return Err(Refusal::NothingSelected(text).into());
     }
     assembled(&project, &results, limits)
@@ -75,6 +79,10 @@ fn assembled(
     });
     let stroke_maps = maps.collect::<Result<Vec<_>, _>>().map_err(unreadable)?;
     let pair = AlignedPair {
+        hints: ScanHints {
+            unit: results.attributes.unit,
+            scanned_face_down: results.attributes.scanned_face_down,
+        },
         fit: artifacts.outcome(Stage::Fit).map_err(unreadable)?,
         depth: artifacts.depth().map_err(unreadable)?,
         normalized: Normalized {

@@ -31,8 +31,9 @@
 //! | `checkpointer.rs` | a checkpoint of a pair is refused | this and later results are dropped; the stage that runs is cancelled |
 //! | `block/checkpoint.rs`, `block/task.rs` | a checkpoint of a block, or the versions of its files, are refused | the task ends; no stage runs meanwhile |
 //! | `pair_failure.rs`, `block/checkpoint.rs` | a failure is refused | the failure is not stored |
-//! | `worker_session.rs` | a heartbeat is refused | all stages that run are cancelled; the process releases what it has not started, registers as a new worker, and recovers the jobs of its old id |
-//! | nobody | a release is refused | nothing: the job has another owner |
+//! | `worker_session.rs` | a heartbeat is refused | all stages that run are cancelled (`scheduler.rs`, `prefetch.rs`); the process releases what it has not started, registers as a new worker, and recovers the jobs of its old id |
+//! | `checkpointer.rs`, `block/checkpoint.rs` | files were written more than 30 minutes ago (pairs on a server, blocks) | nothing is stored; the job stays leased to this worker, which claims it again |
+//! | `checkpointer.rs` | a release is refused | the pair ends as `LeaseLost`; a block ends as released |
 //!
 //! The pair or block ends as `LeaseLost`, which counts neither as done nor as failed. Stages stored before stay. The job of a
 //! retired pair is removed, which ends its lease too. A pair that another worker recovered runs alone until its next stage

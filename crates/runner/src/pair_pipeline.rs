@@ -11,7 +11,7 @@ use super::stage_inputs::StageInputs;
 use super::stage_output::{self, PairStageError, PairStageOutput, png};
 use mocban_align::scan_size;
 use mocban_align::stages::normalize::{Normalized, PrintMasks};
-use mocban_align::stages::{Settings, StageError, depth, pipeline};
+use mocban_align::stages::{ScanHints, Settings, StageError, depth, pipeline};
 use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };
@@ -70,7 +70,10 @@ impl PairPipeline {
         }
         let length = scan_size::length_of(&scan.mesh().vertices);
         if let Some(reason) = scan_size::wrong_unit(length, pair.attributes.unit) {
-            let text = format!("{}: {reason}", pair.attributes.mesh_path);
+            let text = format!(
+                "{}: {reason} in the list, and import it again",
+                pair.attributes.mesh_path
+            );
             return Err(PairStageError::failed(FailureClass::BadInput, text));
         }
         // A fit that does not read the print stays valid when the print changes.
@@ -82,6 +85,13 @@ impl PairPipeline {
         let face_down = pair.attributes.scanned_face_down;
         let outcome = pipeline::fit(&scan, print.as_ref(), face_down, &self.settings)
             .map_err(|error| in_file(pair, &error.into(), length))?;
+        let hints = ScanHints {
+            unit: pair.attributes.unit,
+            scanned_face_down: face_down,
+        };
+        for said in scan_size::contradictions(&outcome, hints) {
+            tracing::warn!(pair = %pair.attributes.name, "{}: {said}", pair.attributes.mesh_path);
+        }
         let (outcome, json) = round_trip(&outcome)?;
         (pair.scan, pair.print) = (Some(scan), print);
         pair.fit = Some(outcome);

@@ -56,7 +56,7 @@ pub(super) enum PairEnd {
     Retry,
     /// The pair was released unfinished.
     Released,
-    /// The lease was lost: it expired, or another process of the run recovered the job.
+    /// The lease was lost: it expired, another process of the run recovered the job, or the files are too old to be stored.
     LeaseLost,
 }
 
@@ -86,7 +86,7 @@ impl RunContext {
         *self.worker.borrow()
     }
 
-    /// Waits until the leases of this worker have expired.
+    /// Waits until this process works under another id than `worker`, whose leases have expired.
     pub(super) async fn expired(&self, worker: WorkerId) {
         let mut now = self.worker.subscribe();
         // The sender lives in `self`, so the channel cannot close while this waits.

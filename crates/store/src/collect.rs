@@ -6,7 +6,7 @@
 //! never used again. An object that is named by its content, such as the mesh of a cut character, may be written again
 //! at the moment when it is removed, so it is removed only while no run is active. A file in the project's folder is
 //! named by its content, and a worker may find that an unreferenced file holds just the bytes that it wants to write.
-//! It then sets the file's time of change, and the collector looks at this time again after it has moved the file
+//! It then sets the file's modification time, and the collector looks at this time again after it has moved the file
 //! aside.
 
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use super::referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind}
 use super::remote::{Bucket, PACKS, pack_key, pack_number};
 use mocban_core::domain::{ARTIFACTS, ArtifactRef};
 
-/// Key of an object whose time of change is the present time of the store.
+/// Key of an object whose modification time is the present time of the store.
 const MARKER: &str = "collect-marker";
 
 impl ReferencedArtifacts {
@@ -51,14 +51,14 @@ impl ReferencedArtifacts {
         let marker = tempfile::NamedTempFile::new_in(&aside).map_err(failed)?;
         let meta = marker.as_file().metadata().map_err(failed)?;
         let now = meta.modified().map_err(failed)?;
-        let before = now.checked_sub(age).unwrap_or(SystemTime::UNIX_EPOCH);
+        let cutoff = now.checked_sub(age).unwrap_or(SystemTime::UNIX_EPOCH);
         let listed = self.for_each_unreferenced(project, |file| {
-            let is_ours = file.kind != UnreferencedKind::UnknownFile;
-            let removed =
-                is_ours && file.path != marker.path() && remove(&file.path, &aside, before);
-            if file.path != marker.path() {
-                each(&file, removed);
+            if file.path == marker.path() {
+                return;
             }
+            let is_ours = file.kind != UnreferencedKind::UnknownFile;
+            let removed = is_ours && remove(&file.path, &aside, cutoff);
+            each(&file, removed);
         });
         listed.map_err(failed)
     }
@@ -72,7 +72,7 @@ impl ReferencedArtifacts {
         each: &mut impl FnMut(&UnreferencedFile, bool),
     ) -> Result<(), super::BucketError> {
         bucket.write(MARKER, Vec::new())?;
-        let before = bucket.stat(MARKER)?.modified - age.as_millis() as i64;
+        let cutoff = bucket.stat(MARKER)?.modified - age.as_millis() as i64;
         let mut found = Vec::new();
         bucket.list(PACKS, |key, stat| {
             // A project whose place is below this folder has packs that are not ours.
@@ -95,7 +95,7 @@ impl ReferencedArtifacts {
             })?;
         }
         for (key, stat, is_ours) in found {
-            let is_old = is_ours && stat.modified < before;
+            let is_old = is_ours && stat.modified < cutoff;
             if is_old {
                 bucket.remove(&key)?;
             }

@@ -49,6 +49,9 @@ pub(crate) async fn align(args: AlignArgs, context: &Context) -> ProjectResult<E
             context.print_json(&json)?;
             if !context.global.json {
                 context.warn(&format!("not aligned: {failure}"));
+                if let Some(dir) = &args.output {
+                    context.warn(&format!("nothing was written to {}", dir.display()));
+                }
             }
             return Ok(ExitCode::SomeFailed);
         }

@@ -3,6 +3,8 @@
 use super::digits::significant;
 use super::screen::{Palette, Tone};
 use super::table::columns;
+use mocban_align::scan_size;
+use mocban_align::stages::ScanHints;
 use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
@@ -122,11 +124,14 @@ impl PairPage<'_> {
     }
 
     fn stages(&self) -> String {
-        let unit = self.detail.results.attributes.unit;
-        let unit = unit.map_or("mesh units", LengthUnit::name);
+        let attributes = &self.detail.results.attributes;
+        let hints = ScanHints {
+            unit: attributes.unit,
+            scanned_face_down: attributes.scanned_face_down,
+        };
         let rows = self.detail.results.stages.iter().map(|record| {
             let (stage, took) = (format!("  {}", record.stage), duration(record.ms));
-            let numbers = numbers(record, unit);
+            let numbers = numbers(record, hints);
             vec![stage, took, record.result_hash.short(), numbers]
         });
         section("stages", rows, "<><<", self.palette)
@@ -194,10 +199,11 @@ pub(crate) const fn state_name(status: JobStatus) -> &'static str {
 /// Significant digits of lengths, which have the unit of the mesh.
 const DIGITS: i32 = 3;
 
-/// Returns the few numbers of a stage that show whether it succeeded. Lengths are in `unit`.
-fn numbers(record: &StageRecord, unit: &str) -> String {
+/// Returns the few numbers of a stage that show whether it succeeded. Lengths are in units of the mesh.
+fn numbers(record: &StageRecord, hints: ScanHints) -> String {
+    let unit = hints.unit.map_or("mesh units", LengthUnit::name);
     let text = match record.stage {
-        Stage::Fit => record.parse().map(|fit| fit_numbers(&fit, unit)),
+        Stage::Fit => record.parse().map(|fit| fit_numbers(&fit, unit, hints)),
         Stage::Depth => record.parse().map(|depth| depth_numbers(&depth, unit)),
         Stage::Normalize => record.parse().map(|found| ink_numbers(&found)),
         Stage::Register => Ok(String::new()),
@@ -205,7 +211,7 @@ fn numbers(record: &StageRecord, unit: &str) -> String {
     text.unwrap_or_else(|_| "written by another version of this program".to_owned())
 }
 
-fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
+fn fit_numbers(fit: &FitOutcome, unit: &str, hints: ScanHints) -> String {
     let curvature = match fit.curvature {
         Some(_) => format!(
             ", curvature {} {unit}",
@@ -213,12 +219,18 @@ fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
         ),
         None => String::new(),
     };
-    let missing = fit.missing_vertices.map_or(String::new(), |missing| {
-        format!("; {}", missing_sentence(missing.get()))
-    });
+    let missing = fit.missing_vertices;
+    let missing = missing.map(|missing| missing_sentence(missing.get()));
+    let said = scan_size::contradictions(fit, hints);
+    let notes: Vec<String> = missing.into_iter().chain(said).collect();
+    let notes = if notes.is_empty() {
+        String::new()
+    } else {
+        format!("; {}", notes.join("; "))
+    };
     let [relief, rms] = [fit.relief, fit.rms].map(|length| significant(length, DIGITS));
     format!(
-        "relief {relief} {unit}, rms {rms} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{missing}",
+        "relief {relief} {unit}, rms {rms} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{notes}",
         fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }

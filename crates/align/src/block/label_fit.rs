@@ -3,17 +3,17 @@
 use super::characters::CharacterBox;
 use super::page_ink::PageInk;
 
-/// Largest fraction of the outlines on ink of labels that fit. Right labels have 1 to 5 %, those of another page or of
-/// the mirrored page about 20 %.
+/// If a larger fraction of all outlines crosses ink, the labels do not fit. Right labels have 1 to 5 %, those of another page
+/// or of the mirrored page about 20 %.
 const MAX_ON_INK: f64 = 0.1;
-/// Labels that fit a mirrored or turned page have at most this fraction of the one that they have on the page.
-const MIN_GAIN: f64 = 0.5;
+/// The labels belong to the mirrored or turned page if their fraction there is at most this part of the fraction on the page.
+const MAX_CHANGED: f64 = 0.5;
 /// Points along each side of a box.
 const POINTS: usize = 24;
 
 /// Why labels do not fit a page.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum LabelFit {
+pub enum LabelMisfit {
     /// The labels were drawn on a mirrored image.
     #[error(
         "the labels were drawn on the mirrored image: {on_page:.0} % of the outlines cross ink, mirrored {changed:.0} %; \
@@ -50,7 +50,7 @@ pub enum LabelFit {
 ///
 /// # Errors
 /// Returns an error if too many points of the outlines lie on ink.
-pub fn check_label_fit(page: &PageInk, boxes: &[CharacterBox]) -> Result<(), LabelFit> {
+pub fn check_label_fit(page: &PageInk, boxes: &[CharacterBox]) -> Result<(), LabelMisfit> {
     let [width, height] = page.size().map(|side| side as f64 - 1.0);
     let share = |change: &dyn Fn([f64; 2]) -> [f64; 2]| share_on_ink(page, boxes, change);
     let on_page = share(&|at| at);
@@ -61,15 +61,15 @@ pub fn check_label_fit(page: &PageInk, boxes: &[CharacterBox]) -> Result<(), Lab
     let mirrored = share(&|[x, y]| [width - x, y]);
     let turned = share(&|[x, y]| [width - x, height - y]);
     let changed = mirrored.min(turned);
-    if changed > MIN_GAIN * on_page {
+    if changed > MAX_CHANGED * on_page {
         let on_page = percent(on_page);
-        return Err(LabelFit::OtherPage { on_page });
+        return Err(LabelMisfit::OtherPage { on_page });
     }
     let (on_page, changed) = (percent(on_page), percent(changed));
     Err(if mirrored <= turned {
-        LabelFit::Mirrored { on_page, changed }
+        LabelMisfit::Mirrored { on_page, changed }
     } else {
-        LabelFit::Turned { on_page, changed }
+        LabelMisfit::Turned { on_page, changed }
     })
 }
 
@@ -99,7 +99,7 @@ fn share_on_ink(
 
 #[cfg(test)]
 mod tests {
-    use super::{LabelFit, check_label_fit};
+    use super::{LabelMisfit, check_label_fit};
     use crate::block::{CharacterBox, PageInk};
     use mocban_core::raster::Grid;
 
@@ -144,17 +144,17 @@ mod tests {
         let mirrored = boxes(|[l, t, r, b]| [w - r, t, w - l, b]);
         assert!(matches!(
             check_label_fit(&page(), &mirrored),
-            Err(LabelFit::Mirrored { .. })
+            Err(LabelMisfit::Mirrored { .. })
         ));
         let turned = boxes(|[l, t, r, b]| [w - r, h - b, w - l, h - t]);
         assert!(matches!(
             check_label_fit(&page(), &turned),
-            Err(LabelFit::Turned { .. })
+            Err(LabelMisfit::Turned { .. })
         ));
         let other = boxes(|[l, t, r, b]| [l + 22.0, t + 24.0, r + 22.0, b + 24.0]);
         assert!(matches!(
             check_label_fit(&page(), &other),
-            Err(LabelFit::OtherPage { .. })
+            Err(LabelMisfit::OtherPage { .. })
         ));
     }
 }

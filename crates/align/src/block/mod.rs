@@ -39,7 +39,7 @@ pub use cut::{CUT_MARGIN_MM, CutError, CutPlan, cut_meshes};
 pub use error::BlockError;
 pub use found_boxes::{FoundBox, find_boxes};
 pub use height_map::{HEIGHT_STEP_MM, HeightMap, MAX_MAP_PIXELS, draw_height_maps};
-pub use label_fit::{LabelFit, check_label_fit};
+pub use label_fit::{LabelMisfit, check_label_fit};
 pub use orientation::Orientation;
 pub use outcomes::{AlignOutcome, BoxesOutcome, CutOutcome, FaceOutcome, FoundFace, heights_role};
 pub use page_ink::{InkSampler, PageInk};

@@ -142,9 +142,11 @@ pub struct ScanHints {
 /// Results of the four stages for one mesh and print.
 #[derive(Debug, Clone)]
 pub struct AlignedPair {
+    /// What was known of the scan.
+    pub hints: ScanHints,
     /// The plane.
     pub fit: FitOutcome,
-    /// The depth map, which reads like the print.
+    /// The depth map, which reads like the print, levelled as the registration requires.
     pub depth: DepthMap,
     /// Ink and canvas of the print, heights of the relief.
     pub normalized: Normalized,
@@ -204,8 +206,9 @@ impl AlignedPair {
         }?;
         let registered = register(&depth, &normalized, None, settings)?;
         Ok(Self {
+            hints,
             fit,
-            depth,
+            depth: registered.levelled(depth),
             normalized,
             registered,
         })

@@ -202,7 +202,7 @@ pub struct StageCheckpoint<K: JobKind = PairJob> {
 }
 
 /// Longest time from the writing of files to the commit of their rows, which may wait for a server that is unavailable.
-/// Later, the files may have been removed as unreferenced (`store/collect.rs`), so their stages are computed again.
+/// Later, the files may have been removed as unreferenced (`crates/store/src/collect.rs`), so their stages are computed again.
 const LONGEST_COMMIT: Duration = Duration::from_mins(30);
 
 /// Returns whether files that were written at this time may have been removed, because no row names them yet.

@@ -15,13 +15,13 @@ pub const MAX_BOXES: usize = 100_000;
 pub(super) const MAX_CORNERS: usize = 100_000;
 /// Largest area of all boxes together, as a multiple of the area of the page.
 const MAX_OVERLAP: f64 = 32.0;
-/// Largest difference of the ratio of width to height between labels and page that is scaled.
+/// If the ratio of width to height differs by more than this between labels and page, the labels are refused, not scaled.
 const MAX_STRETCH: f64 = 0.01;
 /// Smallest side of a box in pixels of the page.
 const MIN_SIDE: f64 = 1.0;
 /// Boxes with a smaller share of their area on the page lie outside.
 const MIN_INSIDE: f64 = 0.5;
-/// Boxes whose edges are equal within this many pixels are the same.
+/// Edges are rounded to multiples of this many pixels. Boxes whose rounded edges are equal are the same.
 const SAME_EDGE: f64 = 0.01;
 
 /// A region with an area, and its corners on the page.

@@ -142,7 +142,7 @@ impl BlockSlot {
         match ended? {
             BlockEnd::Done => self.counts.done += 1,
             BlockEnd::Failed => self.counts.failed += 1,
-            BlockEnd::LeaseLost => tracing::info!("the lease of the block is lost"),
+            BlockEnd::LeaseLost => tracing::info!("the lease of a block is lost"),
             BlockEnd::Retry | BlockEnd::Released => {}
         }
         Ok(())

@@ -42,7 +42,7 @@ pub enum BinarizeError {
     TooSmall { width: usize, height: usize },
     /// Ink and background differ too little in grey.
     #[error(
-        "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
+        "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white; if you see ink, raise the contrast of the image"
     )]
     NoContrast {
         /// Difference between the two classes of grey, 0..=1.

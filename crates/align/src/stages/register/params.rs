@@ -52,7 +52,7 @@ pub enum RegisterError {
     EmptyMask(ThresholdMetric),
     /// The relief reads in mirror writing.
     #[error(
-        "the relief matches the mirrored print better ({} as well as the print itself); the print may be of another character, the mesh may be mirrored, or the scan may show another side of the block",
+        "the relief matches the mirrored print better ({} as well as the print itself); the print or the mesh may be mirrored, the print may be of another character, or the scan may show another side of the block",
         ratio(*.times)
     )]
     Mirrored {
@@ -89,7 +89,7 @@ pub enum RegisterError {
     },
     /// Relief and print show different characters, or the evidence for the best pose is too weak.
     #[error(
-        "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; {seen}"
+        "relief and print do not match: confidence {confidence:.2} in the pose is below register.min_confidence {needs}; {seen}"
     )]
     NoMatch {
         /// Probability that the best pose is right.

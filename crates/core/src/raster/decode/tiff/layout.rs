@@ -217,7 +217,7 @@ fn sample_type(page: &TagDirectory<'_>) -> Result<(usize, bool), DecodeError> {
             "its samples have {bits} bits; save it with 8 or 16 bits per sample"
         )),
         _ => refuse(
-            "its samples are signed or of an unknown kind; unsigned numbers and floats are read",
+            "its samples are signed or of an unknown kind; unsigned numbers and floats are read; save it with 8 or 16 unsigned bits",
         ),
     }
 }

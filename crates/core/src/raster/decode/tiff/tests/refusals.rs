@@ -31,7 +31,7 @@ fn what_is_not_read_is_refused_with_what_to_do() {
         "its colours are of the kind 4 (tag 262); save it as RGB or grey",
         "its samples have different sizes (5, 6, 5); save it with 8 or 16 bits per sample",
         "its samples have 40 bits; save it with 8 or 16 bits per sample",
-        "its samples are signed or of an unknown kind; unsigned numbers and floats are read",
+        "its samples are signed or of an unknown kind; unsigned numbers and floats are read; save it with 8 or 16 unsigned bits",
         "it has 5000 samples per pixel; at most 64 are read",
         "it has 2 samples per pixel; its colours need 3",
         "its samples of 8 bits are stored by the predictor 9; save it without a predictor",
