@@ -128,7 +128,7 @@ pub(super) fn position<'a>(mut words: impl Iterator<Item = &'a [u8]>) -> Result<
 
 /// Says that a word is not a number, and quotes its beginning.
 pub(super) fn not_a_number(word: &[u8]) -> String {
-    let is_decimal_comma = word.iter().filter(|byte| **byte == b',').count() == 1 && {
+    let is_decimal_comma = word.split(|byte| *byte == b',').count() == 2 && {
         let pointed: Vec<u8> = polled(word)
             .map(|byte| if *byte == b',' { b'.' } else { *byte })
             .collect();
