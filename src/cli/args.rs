@@ -13,6 +13,7 @@ use super::commands::{
 };
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
+use mocban_core::domain::spelling::nearest;
 use mocban_project::ExitCode;
 use mocban_project::shell::shell_quoted;
 
@@ -123,7 +124,9 @@ const FLAGS: [char; 6] = ['h', 'n', 'q', 'v', 'V', 'w'];
 /// Parses a command line.
 pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
     let command = without_global_options(command().color(help_color(args)));
-    let matches = command.try_get_matches_from(args).map_err(with_tip)?;
+    let matches = command
+        .try_get_matches_from(args)
+        .map_err(|error| with_tip(error, args))?;
     let mut cli = Cli::from_arg_matches(&matches)?;
     // If a flag is given before and after the command's name, clap keeps only the values after it.
     cli.global.set = values_of("--set", args);
@@ -132,7 +135,8 @@ pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
 }
 
 /// Adds a tip to the error of a command line in which a project folder or a name with spaces is written wrongly.
-fn with_tip(mut error: clap::Error) -> clap::Error {
+fn with_tip(mut error: clap::Error, args: &[OsString]) -> clap::Error {
+    drop_far_commands(&mut error);
     let word = |kind| match error.get(kind) {
         Some(ContextValue::String(word)) => Some(word.clone()),
         _ => None,
@@ -146,6 +150,10 @@ fn with_tip(mut error: clap::Error) -> clap::Error {
         }
         _ => None,
     };
+    // A dash makes a value of the option, so that another word may be named in the error.
+    let words = || args.iter().skip(1).filter_map(|arg| arg.to_str());
+    let dash = words().find_map(dash_tip);
+    let tip = dash.or_else(|| two_folders_tip(words())).or(tip);
     if let Some(tip) = tip {
         error.insert(
             ContextKind::Suggested,
@@ -153,6 +161,41 @@ fn with_tip(mut error: clap::Error) -> clap::Error {
         );
     }
     error
+}
+
+/// Removes suggested commands that resemble the unknown one by a few letters only.
+fn drop_far_commands(error: &mut clap::Error) {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else {
+        return;
+    };
+    let word = word.clone();
+    let Some(ContextValue::Strings(found)) = error.remove(ContextKind::SuggestedSubcommand) else {
+        return;
+    };
+    let names = found.iter().map(String::as_str);
+    let near = nearest(&word, names, found.len()).into_iter();
+    let near: Vec<String> = near.map(str::to_owned).collect();
+    if !near.is_empty() {
+        error.insert(
+            ContextKind::SuggestedSubcommand,
+            ContextValue::Strings(near),
+        );
+    }
+}
+
+/// Returns a tip on an import that names two folders without options.
+fn two_folders_tip<'a>(words: impl Iterator<Item = &'a str> + Clone) -> Option<String> {
+    let mut after = words.skip_while(|word| *word != "import").skip(1);
+    let is_folder = |word: &&str| Path::new(word).is_dir();
+    match [after.next(), after.next(), after.next()] {
+        [Some(meshes), Some(prints), None] if is_folder(&meshes) && is_folder(&prints) => {
+            let [meshes, prints] = [meshes, prints].map(shell_quoted);
+            Some(format!(
+                "name the folders with options, as in: mocban import --meshes {meshes} --prints {prints}"
+            ))
+        }
+        _ => None,
+    }
 }
 
 /// Returns a tip on a word that is no command.
@@ -296,6 +339,17 @@ mod tests {
         assert!(json.contains("as in: --json\n"), "{json}");
         let folder = error("mocban status src");
         assert!(folder.contains("mocban -C src status"), "{folder}");
+        let folders = error("mocban import src tests");
+        assert!(
+            folders.contains("import --meshes src --prints tests"),
+            "{folders}"
+        );
+        let dash = error("mocban import --meshes src \u{2013}-prints tests");
+        assert!(dash.contains("as in: --prints\n"), "{dash}");
+        let far = error("mocban xem");
+        assert!(!far.contains("similar"), "{far}");
+        let near = error("mocban reprot");
+        assert!(near.contains("'report'"), "{near}");
         let small = error("mocban -c blocks status");
         assert!(small.contains("capital -C"), "{small}");
         let plain = error("mocban report --fomat html");

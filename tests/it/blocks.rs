@@ -195,6 +195,39 @@ fn exported(dir: &Path, project: &str) -> Vec<Value> {
 }
 
 #[test]
+fn boxes_that_are_left_out_are_told_by_run_and_kept_in_show() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    demo_block(dir);
+    few_labels_with(dir, &dir.join("bad.json"), |few| {
+        few[1] = few[0].clone();
+        few[1]["region_attributes"] = serde_json::json!({});
+        few[2]["shape_attributes"]["width"] = 0.into();
+    });
+    let files = ["--block", "d/data/block.ply", "--page", "d/data/page.jpg"];
+    let labels = ["--labels", "bad.json", "--name", "b", "--unit", "mm"];
+    project(dir, &[&["import"], &files[..], &labels].concat()).expect(0);
+    let run = project(dir, &["run", "-q"]).expect(0);
+    let shown = project(dir, &["show", "b"]).expect(0);
+    let json = project(dir, &["show", "b", "--json"]).expect(0).json();
+    let warnings = json["warnings"].as_array().expect("a list");
+    assert_eq!(warnings.len(), 2, "{json}");
+    for (warning, part) in warnings
+        .iter()
+        .zip(["smaller than a pixel", "repeats another"])
+    {
+        let warning = warning.as_str().expect("a text");
+        assert!(warning.contains(part), "{warning}");
+        assert!(
+            run.err.contains(&format!("warning: block b: {warning}")),
+            "{}",
+            run.err
+        );
+        assert!(shown.out.contains(warning), "{}", shown.out);
+    }
+}
+
+#[test]
 fn replaced_labels_give_the_results_of_a_new_import() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let dir = dir.path();

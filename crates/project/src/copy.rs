@@ -6,6 +6,7 @@ use crate::error::{ProjectError, ProjectResult};
 use crate::events::{Listener, LongWork, warn};
 use crate::exit::Refusal;
 use crate::location::{now, refuse_password, settings_of};
+use crate::new_project::check_new_folder;
 use mocban_catalog::{Catalog, CatalogCopy, CatalogError};
 use mocban_core::domain::is_address;
 use mocban_runner::is_running;
@@ -78,6 +79,7 @@ async fn write(source: &Catalog, from: &str, to: &str) -> ProjectResult<CatalogC
         return source.copy_to_server(to, progress).await.map_err(failed);
     }
     let dir = Path::new(to);
+    check_new_folder(dir)?;
     let existed = dir.exists();
     let project = Project::create(dir).map_err(|error| of_target(error, to))?;
     let copied = source.copy_to_file(&project.catalog_path(), progress).await;

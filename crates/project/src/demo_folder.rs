@@ -6,6 +6,7 @@ use crate::error::{ProjectResult, TaskStopped, WithContext as _};
 
 use crate::exit::Refusal;
 use crate::files;
+use crate::new_project::check_new_folder;
 use crate::shell::shell_quoted;
 use mocban_demo::block::{BlockOptions, block_options};
 use mocban_demo::{DatasetError, DemoOptions};
@@ -56,6 +57,7 @@ impl DemoContent {
 
 /// Refuses a directory that holds another demo, another project or foreign data, so that nothing is overwritten.
 pub fn check_directory(dir: &Path, data: &Path, wanted: &DemoContent) -> ProjectResult<()> {
+    check_new_folder(dir)?;
     let refuse = |reason: &str| {
         let shown = dir.display();
         let text = format!("{shown} {reason}; name another directory for this demo");

@@ -46,6 +46,12 @@ pub fn read_list(path: &Path, sheet: Option<&str>) -> Result<ListFile, Refusal> 
             warning: table.warning.map(|warning| format!("{shown}: {warning}")),
         });
     }
+    if is_html(&bytes) {
+        let text = format!(
+            "{shown} is an HTML table; save it as XLSX or as \"CSV UTF-8\" in the spreadsheet program"
+        );
+        return Err(Refusal::Usage(text));
+    }
     match sheet {
         None => Ok(ListFile {
             bytes,
@@ -56,6 +62,13 @@ pub fn read_list(path: &Path, sheet: Option<&str>) -> Result<ListFile, Refusal> 
             Err(Refusal::Usage(text))
         }
     }
+}
+
+/// Returns whether a file begins like HTML, which some programs save as a file of Excel.
+fn is_html(bytes: &[u8]) -> bool {
+    let head = bytes[..bytes.len().min(1024)].to_ascii_lowercase();
+    let starts = |tag: &str| head.windows(tag.len()).any(|part| part == tag.as_bytes());
+    head.trim_ascii_start().starts_with(b"<") && ["<html", "<table"].into_iter().any(starts)
 }
 
 /// Returns the metadata of a file or folder, or `None` if it does not exist.
@@ -210,8 +223,25 @@ pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> ProjectResu
         );
         return Err(Refusal::Incomplete(text).into());
     }
+    if path.is_dir() {
+        let text = format!("\"{shown}\" is a folder; name a file in it for the output");
+        return Err(Refusal::Usage(text).into());
+    }
     create_parent(path)?;
     write_atomic(path, bytes).with_context(failed)
+}
+
+/// Refuses a file with the extension of another format than PNG for a picture, which is always one.
+pub fn require_png(output: Option<&Path>) -> Result<(), Refusal> {
+    let extension = output.and_then(Path::extension).unwrap_or_default();
+    if extension.is_empty() || extension.eq_ignore_ascii_case("png") {
+        return Ok(());
+    }
+    let text = format!(
+        "the picture cannot be written as {}; name a file that ends in .png",
+        extension.display()
+    );
+    Err(Refusal::Usage(text))
 }
 
 /// Adds what to do if an output could not be written to its place in the project because no other was named.
@@ -310,7 +340,7 @@ fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> 
 mod tests {
     use std::path::Path;
 
-    use super::{is_jsonl, list_below, write_output};
+    use super::{is_jsonl, list_below, require_png, write_output};
 
     #[test]
     fn files_in_folders_are_listed_without_hidden_folders_and_results() {
@@ -346,6 +376,26 @@ mod tests {
             refused.to_string().ends_with("1.stl is not a directory"),
             "{refused}"
         );
+    }
+
+    #[test]
+    fn a_folder_and_other_formats_than_png_are_no_outputs_of_pictures() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let refused = write_output(dir.path(), b"text", true)
+            .expect_err("a folder")
+            .to_string();
+        assert!(
+            refused.ends_with("\" is a folder; name a file in it for the output"),
+            "{refused}"
+        );
+        for (name, is_refused) in [("a.jpg", true), ("a.PNG", false), ("a", false)] {
+            assert_eq!(
+                require_png(Some(Path::new(name))).is_err(),
+                is_refused,
+                "{name}"
+            );
+        }
+        require_png(None).expect("the usual place");
     }
 
     #[test]

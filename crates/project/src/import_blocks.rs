@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::block_files;
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
@@ -13,8 +14,8 @@ use crate::manifest_file::{locate_file, refuse};
 use crate::missing_files::MissingFiles;
 use crate::new_project::import_with;
 use mocban_catalog::{BlockAttributes, BlockImportSummary};
-use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
-use mocban_lists::manifest::{BlockRow, is_block_list, parse_blocks};
+use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
+use mocban_lists::manifest::{BlockRow, is_block_list, is_named_like_mesh, parse_blocks};
 use mocban_store::Project;
 
 /// What an import of blocks changed.
@@ -85,6 +86,7 @@ impl ListedItems {
             return Ok((Self::Pairs(pairs(None)), None));
         }
         let ListFile { bytes, warning } = files::read_list(file, sheet)?;
+        refuse_input(file, &bytes)?;
         let is_list = !files::is_jsonl(file, &bytes) && is_block_list(&bytes);
         let items = if is_list {
             Self::Blocks(BlockSource::List {
@@ -97,6 +99,30 @@ impl ListedItems {
         Ok((items, warning))
     }
 }
+
+/// Refuses a mesh or an image in place of a list.
+fn refuse_input(file: &Path, bytes: &[u8]) -> Result<(), Refusal> {
+    let head = &bytes[..bytes.len().min(HEAD_BYTES)];
+    let what = match FileKind::of(head) {
+        // The marks of other images are few letters, which a list may begin with.
+        FileKind::OtherImage(_) if head.is_ascii() => return Ok(()),
+        kind @ (FileKind::Ply
+        | FileKind::OtherMesh(_)
+        | FileKind::Png
+        | FileKind::Jpeg
+        | FileKind::Tiff
+        | FileKind::OtherImage(_)) => kind.description(),
+        FileKind::Text | FileKind::Binary if is_named_like_mesh(file) => "a mesh",
+        _ => return Ok(()),
+    };
+    let shown = file.display();
+    Err(Refusal::Usage(format!(
+        "{shown} is {what}, not a list; name folders with --meshes DIR --prints DIR, or a list of pairs"
+    )))
+}
+
+/// Bytes at the beginning of a list that show its kind.
+const HEAD_BYTES: usize = 4096;
 
 /// Imports blocks. If the import fails, no block is imported.
 pub async fn import_blocks(
@@ -115,6 +141,9 @@ pub async fn import_blocks(
     }
     if missing.count > 0 && !allowed.missing {
         return Err(missing.refusal().into());
+    }
+    if missing.count == 0 {
+        block_files::check(&listing.rows, &listing.label, &project)?;
     }
     let rows = listing.rows.iter().map(|row| stored_row(row, &project));
     let rows: Vec<BlockAttributes> = rows.collect::<Result<_, _>>()?;
@@ -197,4 +226,30 @@ fn stored_row(row: &BlockRow, project: &Project) -> ProjectResult<BlockAttribute
         unit: row.unit,
         side: row.side,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ListedItems;
+
+    #[test]
+    fn a_mesh_an_image_or_an_html_table_is_no_list() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let advice = "not a list; name folders with --meshes DIR --prints DIR, or a list of pairs";
+        for (name, bytes, expected) in [
+            ("a.ply", &b"ply\nformat ascii 1.0\n"[..], format!("a.ply is a PLY mesh, {advice}")),
+            ("a.stl", b"solid a", format!("a.stl is a mesh, {advice}")),
+            ("a.csv", b"\x89PNG\r\n\x1a\n", format!("a.csv is a PNG image, {advice}")),
+            (
+                "a.xls",
+                b"<html><table></table></html>",
+                "a.xls is an HTML table; save it as XLSX or as \"CSV UTF-8\" in the spreadsheet program".to_owned(),
+            ),
+        ] {
+            let file = dir.path().join(name);
+            std::fs::write(&file, bytes).expect("written");
+            let refused = ListedItems::of(&file, None).expect_err("no list").to_string();
+            assert!(refused.ends_with(&expected), "{refused}");
+        }
+    }
 }

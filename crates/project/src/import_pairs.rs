@@ -82,6 +82,8 @@ pub struct ImportOutcome {
     pub missing: MissingFiles,
     /// Warnings about the list, one line each.
     pub warnings: Vec<String>,
+    /// Which columns of the list were read under other names.
+    pub renamed: Option<String>,
 }
 
 /// Imports pairs. If the import fails, no pair is imported.
@@ -93,6 +95,7 @@ pub async fn import_pairs(
     let _work = LongWork::begin(listener, "importing");
     let mut listing = listing(import.source)?;
     let warnings = std::mem::take(&mut listing.warnings);
+    let renamed = listing.renamed.take();
     let truths = match &import.truth {
         Some(file) => read_truths(file, &listing.ids, location).await?,
         None => Vec::new(),
@@ -119,6 +122,7 @@ pub async fn import_pairs(
         truths,
         missing,
         warnings,
+        renamed,
     })
 }
 

@@ -42,7 +42,7 @@ fn written_differently(path: &Path) -> Option<PathBuf> {
 }
 
 /// Returns the existing path whose parts are those of a path, as written, composed or decomposed.
-fn in_any_form(path: &Path) -> Option<PathBuf> {
+pub(crate) fn in_any_form(path: &Path) -> Option<PathBuf> {
     let mut found = PathBuf::new();
     for part in path.components() {
         let Component::Normal(name) = part else {

@@ -26,6 +26,7 @@
 
 pub mod align;
 pub mod backup;
+mod block_files;
 pub mod block_status;
 pub mod check;
 pub mod closing;
@@ -46,6 +47,7 @@ pub mod input_paths;
 pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
+pub mod missing_inputs;
 pub mod new_project;
 pub mod pair_table;
 pub mod report;

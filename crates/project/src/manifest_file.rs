@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::exit::Refusal;
 use super::files;
 use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
-use super::missing_files::WINDOWS_HINT;
+use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
 use super::unread_files::UnreadFiles;
 use crate::error::ProjectResult;
 use mocban_core::domain::{FileKind, LengthUnit, sanitize};
@@ -24,6 +24,8 @@ pub struct Listing {
     pub ids: RowIds,
     /// Warnings, one line each.
     pub warnings: Vec<String>,
+    /// Which columns were read under other names.
+    pub renamed: Option<String>,
     /// Label of row numbers in messages: `pairs.csv: line`, or `pair` for directories.
     row_label: String,
 }
@@ -76,8 +78,8 @@ impl Listing {
         let mut misspelt = MisspeltColumns::default();
         let mut each = |row: ManifestRow| misspelt.add(&row);
         let read = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
-        let mut warnings = misspelt.warnings();
-        warnings.extend(renamed(&read));
+        let warnings = misspelt.warnings();
+        let renamed = renamed(&read);
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
@@ -87,6 +89,7 @@ impl Listing {
             },
             ids: read.ids,
             warnings,
+            renamed,
             row_label: format!("{shown}: line"),
         })
     }
@@ -127,6 +130,7 @@ impl Listing {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
             warnings: warnings.chain(found.similar).collect(),
+            renamed: None,
             row_label: "pair".to_owned(),
         })
     }
@@ -201,7 +205,14 @@ pub fn locate_file(
         _ => find_on_disk(path),
     };
     let problem = match exists {
+        Ok(true) if place_of(path, project).is_dir() => IS_FOLDER.to_owned(),
         Ok(true) => return None,
+        Ok(false) if has_scheme(path, "file://") => {
+            "does not exist; write its path without file://".to_owned()
+        }
+        Ok(false) if has_scheme(path, "://") => {
+            "is a web address; download the file and write the path of the copy".to_owned()
+        }
         Ok(false) if is_windows_path(path) => format!("does not exist{WINDOWS_HINT}"),
         Ok(false) => {
             let similar = searches
@@ -214,6 +225,19 @@ pub fn locate_file(
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
     Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
+}
+
+/// Returns the place of a file, which may be below a named root.
+pub(crate) fn place_of(path: &Path, project: &Project) -> PathBuf {
+    match path.to_str() {
+        Some(stored) if project.is_below_root(stored) => project.input_path(stored),
+        _ => path.to_owned(),
+    }
+}
+
+/// Returns whether a path of a list is an address. The folder of the list may stand before it, and a path has no `//`.
+fn has_scheme(path: &Path, scheme: &str) -> bool {
+    path.to_string_lossy().contains(scheme)
 }
 
 /// Returns `ignored, mesh without print: a.stl, b.stl and 3 more`.
@@ -270,6 +294,20 @@ mod tests {
             missing[1].ends_with(" does not exist; there is Á.stl"),
             "{missing:?}"
         );
+        std::fs::create_dir(dir.path().join("d.stl")).expect("a folder");
+        let list = "id,mesh,print\na,d.stl,https://museum.vn/1.png\nb,file:///d/1.stl,pairs.csv\n";
+        std::fs::write(&file, list).expect("written");
+        let mut odd = Vec::new();
+        let listing = Listing::from_file(&file).expect("valid");
+        listing.rows(&Project::at(dir.path()), |_, lines| odd.extend(lines));
+        for (line, end) in odd.iter().zip([
+            "d.stl of a is a folder, not a file",
+            "https://museum.vn/1.png of a is a web address; download the file and write the path of the copy",
+            "file:///d/1.stl of b does not exist; write its path without file://",
+        ]) {
+            assert!(line.ends_with(end), "{line}");
+        }
+        assert_eq!(odd.len(), 3, "{odd:?}");
         let refused = Listing::from_file(dir.path()).expect_err("a directory");
         assert!(refused.to_string().contains("--meshes"), "{refused}");
     }

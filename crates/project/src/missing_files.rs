@@ -9,6 +9,9 @@ const MAX_MISSING: usize = 1000;
 pub const WINDOWS_HINT: &str =
     "; it is a path of a Windows computer: write paths relative to the list";
 
+/// Ends the message of a path that leads to a folder.
+pub const IS_FOLDER: &str = "is a folder, not a file";
+
 /// Files of a list that do not exist.
 #[derive(Debug, Default)]
 pub struct MissingFiles {
@@ -40,8 +43,13 @@ impl MissingFiles {
             0 => String::new(),
             more => format!("\n  and {more} more"),
         };
+        let missing = if self.lines.iter().any(|line| line.ends_with(IS_FOLDER)) {
+            "missing or a folder"
+        } else {
+            "missing"
+        };
         Refusal::Usage(format!(
-            "{} missing, nothing was imported:\n  {}{more}\ncorrect the paths, or use --allow-missing if the files are added \
+            "{} {missing}, nothing was imported:\n  {}{more}\ncorrect the paths, or use --allow-missing if the files are added \
              before the run",
             match self.count {
                 1 => "1 file is".to_owned(),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::ProjectResult;
+use crate::exit::Refusal;
 use mocban_catalog::{Catalog, CatalogError, NewCatalog};
 use mocban_store::Project;
 
@@ -15,6 +16,22 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
+/// Refuses a new folder whose name begins or ends with white space, because it looks like another one.
+pub fn check_new_folder(dir: &Path) -> Result<(), Refusal> {
+    let mut names = missing_dirs(dir).into_iter();
+    let is_odd = |dir: &PathBuf| {
+        let name = dir.file_name().unwrap_or_default().to_string_lossy();
+        name.trim() != name
+    };
+    match names.find(is_odd) {
+        None => Ok(()),
+        Some(dir) => Err(Refusal::Usage(format!(
+            "the name of the new folder \"{}\" begins or ends with white space, so it would look like that of another folder; name it without",
+            dir.display()
+        ))),
+    }
+}
+
 /// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded; a new catalog on a
 /// server is created before.
 pub async fn import_with<T>(
@@ -22,6 +39,7 @@ pub async fn import_with<T>(
     url: Option<&str>,
     import: impl AsyncFn(&Catalog) -> ProjectResult<T>,
 ) -> ProjectResult<T> {
+    check_new_folder(project.dir())?;
     let missing_dirs = missing_dirs(project.dir());
     let stored = store(project, url, import).await;
     if stored.is_err() {
@@ -78,4 +96,30 @@ async fn begin(project: &Project) -> ProjectResult<Option<NewCatalog>> {
 async fn try_begin(project: &Project) -> ProjectResult<Option<NewCatalog>> {
     Project::create(project.dir())?;
     Ok(NewCatalog::begin(&project.catalog_path()).await?)
+}
+
+#[cfg(test)]
+mod tests {
+    use unicode_normalization::UnicodeNormalization as _;
+
+    use super::check_new_folder;
+    use crate::location::Location;
+
+    #[test]
+    fn folders_that_look_like_another_are_not_created() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = dir.path().join("dự án 1");
+        check_new_folder(&project).expect("a plain name");
+        std::fs::create_dir(&project).expect("a folder");
+        for name in ["dự án 1 ", " dự án 1", "dự án 2\u{a0}/project"] {
+            let refused = check_new_folder(&dir.path().join(name)).expect_err("a blank");
+            assert!(refused.to_string().contains("white space"), "{refused}");
+        }
+        let odd = dir.path().join("odd ");
+        std::fs::create_dir(&odd).expect("a folder");
+        check_new_folder(&odd).expect("it exists");
+        let decomposed: String = "dự án 1".nfd().collect();
+        let found = Location::new(dir.path().join(decomposed)).dir;
+        assert_eq!(found, project);
+    }
 }

@@ -10,8 +10,11 @@ use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
 use crate::location::Location;
-use mocban_catalog::Catalog;
+use crate::missing_inputs::{self, MissingInputs};
+use crate::new_project::check_new_folder;
+use mocban_catalog::{Catalog, RetrySelection};
 use mocban_config::{LocalSettings, make_local};
+use mocban_core::domain::FailureClass;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, place_new_file, write_synced,
 };
@@ -38,6 +41,8 @@ pub struct Restored {
     pub settings: Option<LocalSettings>,
     /// Paths of meshes and prints that `--inputs` did not find.
     pub missing: Vec<String>,
+    /// Without `--inputs`, files that are not at their old places.
+    pub not_in_place: Option<MissingInputs>,
 }
 
 /// Makes a project of a backup. Everything that can refuse it is checked before anything is written. `location` has the
@@ -61,9 +66,18 @@ pub async fn restore(
         check_inputs(inputs)?;
     }
     check_directory(&Project::at(dir))?;
+    check_new_folder(dir)?;
     location.at(dir).require_local("the restored project")?;
     let existed = dir.exists();
-    let restored = restore_into(backup, dir, inputs.as_deref()).await;
+    let mut restored = restore_into(backup, dir, inputs.as_deref()).await;
+    if let (Ok(restored), None) = (&mut restored, inputs) {
+        // The project is there already, so what cannot be looked up is no error.
+        if let Ok((project, catalog)) = location.at(dir).open_read_only().await {
+            let missing = missing_inputs::find(&project, &catalog, restored.pairs).await;
+            restored.not_in_place = missing.ok().flatten();
+            catalog.close().await;
+        }
+    }
     if restored.is_err() && !existed {
         // Fails unless the directory is empty.
         let _ = std::fs::remove_dir(dir);
@@ -110,6 +124,7 @@ async fn restore_into(backup: &Path, dir: &Path, inputs: Option<&Path>) -> Proje
         verdicts,
         settings,
         missing,
+        not_in_place: None,
     })
 }
 
@@ -130,6 +145,12 @@ async fn locate_inputs(project: &Project, new: &Path, inputs: &Path) -> ProjectR
         })
     });
     let missing = replaced.await;
+    if missing.is_ok() {
+        // What failed because a file was not there runs again with the file at its new place.
+        let unread = FailureClass::Io;
+        let (pairs, blocks) = (RetrySelection::Class(unread), RetrySelection::Class(unread));
+        catalog.retry_pairs_and_blocks(&pairs, &blocks).await?;
+    }
     catalog.close().await;
     if let Some(error) = unreadable.get() {
         let text = format!("cannot look for a mesh or print: {error}");

@@ -7,6 +7,7 @@ use crate::error::{ProjectResult, TaskStopped};
 use crate::events::{Listener, ProjectEvent, warn};
 use crate::failures::Failures;
 use crate::location::{Location, now};
+use crate::missing_inputs::{self, MissingInputs};
 use crate::selection;
 use crate::status::are_results_missing;
 use mocban_catalog::Catalog;
@@ -54,6 +55,8 @@ pub struct RunOutcome {
     pub failures: Failures,
     /// Whether there are results, but none of their files.
     pub are_results_missing: bool,
+    /// Input files that are no longer at their places.
+    pub missing_inputs: Option<MissingInputs>,
 }
 
 impl PreparedRun {
@@ -125,9 +128,17 @@ impl PreparedRun {
             Ok(_) => Failures::read(catalog, false).await,
             Err(_) => Ok(Failures::default()),
         };
+        let missing_inputs = match &ended {
+            Ok(summary) if !summary.stopped => {
+                let pairs = summary.status.pairs + summary.status.retired;
+                missing_inputs::find(project, catalog, pairs).await
+            }
+            _ => Ok(None),
+        };
         close(self.catalog, stop).await;
         let (summary, failures) = (ended?, failures?);
         Ok(RunOutcome {
+            missing_inputs: missing_inputs?,
             are_results_missing: are_results_missing(&self.project, &summary.status.jobs),
             summary,
             failures,

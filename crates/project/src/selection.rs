@@ -102,7 +102,8 @@ pub async fn block(catalog: &Catalog, typed: &str) -> ProjectResult<Option<Block
     Ok(catalog.block_names().await?.contains(&name).then_some(name))
 }
 
-/// Looks up pairs and blocks by their ids. An id of both is that of the pair.
+/// Looks up pairs and blocks by their ids. An id of both is that of the pair. The id of a block that only lists of pairs
+/// have stands for its pairs.
 ///
 /// # Errors
 /// Returns an error if there is neither a pair nor a block with an id, or a pair is retired.
@@ -125,6 +126,11 @@ pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectRes
         let block = text.parse::<BlockName>().ok();
         if let Some(block) = block.filter(|name| all_blocks.contains(name)) {
             found.blocks.push(block);
+            continue;
+        }
+        let listed = catalog.pairs_of_listed_block(text).await?;
+        if !listed.is_empty() {
+            found.pairs.extend(listed);
             continue;
         }
         let pairs = catalog.pair_names().await?;
@@ -163,7 +169,45 @@ fn no_such<'a>(what: &str, typed: &str, all: impl Iterator<Item = &'a str> + Clo
 
 #[cfg(test)]
 mod tests {
-    use super::no_such;
+    use super::{no_such, pairs_and_blocks};
+    use crate::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
+    use crate::location::Location;
+    use mocban_core::domain::PairName;
+
+    #[tokio::test]
+    async fn the_block_of_a_list_stands_for_its_pairs() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let list = "id,mesh,print,block\na,a.stl,a.png,Ván 01\nb,b.stl,b.png,Ván 02\nc,c.stl,c.png,Ván 01\n";
+        let location = Location::new(dir.path().join("project"));
+        let import = PairImport {
+            source: PairSource::List {
+                file: dir.path().join("pairs.csv"),
+                bytes: Some(list.as_bytes().to_vec()),
+            },
+            truth: None,
+            allowed: AllowedChanges {
+                missing: true,
+                ..AllowedChanges::default()
+            },
+        };
+        import_pairs(import, &location, &())
+            .await
+            .expect("imported");
+        let (_, catalog) = location.open_read_only().await.expect("a project");
+        let found = pairs_and_blocks(&catalog, &["Ván 01".to_owned()])
+            .await
+            .expect("pairs");
+        assert_eq!(
+            found.pairs.iter().map(PairName::as_str).collect::<Vec<_>>(),
+            ["a", "c"]
+        );
+        assert!(
+            pairs_and_blocks(&catalog, &["Ván 03".to_owned()])
+                .await
+                .is_err()
+        );
+        catalog.close().await;
+    }
 
     #[test]
     fn similar_ids_are_suggested() {

@@ -28,6 +28,7 @@ pub async fn contact_sheet(
     location: &Location,
     listener: &dyn Listener,
 ) -> ProjectResult<(PathBuf, ContactSheet)> {
+    files::require_png(output)?;
     let (project, catalog) = location.open_read_only().await?;
     let path = output.map_or_else(|| project.dir().join("sheet.png"), Path::to_owned);
     files::refuse_used_file(&path, &project, &catalog).await?;
@@ -70,6 +71,7 @@ pub async fn block_sheet(
     location: &Location,
     listener: &dyn Listener,
 ) -> ProjectResult<(PathBuf, usize)> {
+    files::require_png(output)?;
     let (project, catalog) = location.open_read_only().await?;
     let default = ["page.png", "overlay.png"][usize::from(is_overlay)];
     let path = output.map_or_else(|| project.dir().join(default), Path::to_owned);

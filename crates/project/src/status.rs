@@ -8,6 +8,7 @@ use crate::error::ProjectResult;
 use crate::events::{Listener, warn};
 use crate::failures::Failures;
 use crate::location::{Location, now};
+use crate::missing_inputs::{self, MissingInputs};
 use mocban_catalog::{Catalog, StatusCounts};
 use mocban_core::domain::JobStatus;
 use mocban_runner::{fingerprints, is_running};
@@ -24,6 +25,8 @@ pub struct ProjectStatus {
     pub failures: Failures,
     /// Whether there are results, but none of their files.
     pub are_results_missing: bool,
+    /// Input files that are no longer at their places. They are not looked at during a run.
+    pub missing_inputs: Option<MissingInputs>,
 }
 
 impl ProjectStatus {
@@ -39,7 +42,13 @@ impl ProjectStatus {
         let running = is_running(project, catalog, now()).await?;
         let failures = Failures::read(catalog, all_failures).await?;
         let counts = catalog.status(&fingerprints).await?;
+        let missing_inputs = if running {
+            None
+        } else {
+            missing_inputs::find(project, catalog, counts.pairs + counts.retired).await?
+        };
         Ok(Self {
+            missing_inputs,
             are_results_missing: are_results_missing(project, &counts.jobs),
             counts,
             running,
@@ -76,6 +85,9 @@ impl ProjectStatus {
     pub fn json(&self, with_failures: bool) -> ProjectResult<Value> {
         let mut json = serde_json::to_value(&self.counts)?;
         json["running"] = Value::from(self.running);
+        if let Some(missing) = &self.missing_inputs {
+            json["missing_inputs"] = serde_json::to_value(missing)?;
+        }
         if !self.failures.blocks.is_empty() {
             json["blocks"] = self.failures.blocks.json();
         }

@@ -48,6 +48,7 @@ pub(super) fn log_event(event: &RunEvent) {
             tracing::info!(reason, at_once, "the run stops");
         }
         RunEvent::BlockStageFinished { .. }
+        | RunEvent::BlockWarned { .. }
         | RunEvent::BlockDone { .. }
         | RunEvent::BlockFailed { .. }
         | RunEvent::BlockBackingOff { .. } => log_block_event(event),
@@ -59,6 +60,12 @@ fn log_block_event(event: &RunEvent) {
         RunEvent::BlockStageFinished { block, stage, ms } => {
             tracing::debug!(%block, %stage, ms, "a stage is stored");
         }
+        // The progress shows it, so it is no warning here.
+        RunEvent::BlockWarned {
+            block,
+            stage,
+            warning,
+        } => tracing::info!(%block, %stage, warning, "a stage warned"),
         RunEvent::BlockDone {
             block,
             added,

@@ -86,6 +86,15 @@ pub enum RunEvent {
         /// Computing time in milliseconds.
         ms: u64,
     },
+    /// A stored stage of a block assumed something or left something out.
+    BlockWarned {
+        /// The block.
+        block: BlockName,
+        /// The stage.
+        stage: BlockStage,
+        /// What was assumed or left out.
+        warning: String,
+    },
     /// All stages of a block are stored, and its characters are pairs.
     BlockDone {
         /// The block.

@@ -74,10 +74,12 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult
     let (location, terminal) = (&context.location, Terminal::new(context));
     match items {
         ListedItems::Blocks(source) => {
-            let outcome = import_blocks(&source, allowed, location, &terminal).await?;
+            let outcome = import_blocks(&source, allowed, location, &terminal).await;
+            // The table may be on another sheet.
             if let Some(warning) = warning {
                 context.warn(&warning);
             }
+            let outcome = outcome?;
             context.print_json(&import_blocks::as_json(&outcome))?;
             import_blocks::print_outcome(&outcome, context);
         }
@@ -87,7 +89,12 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult
                 truth: args.truth,
                 allowed,
             };
-            let mut outcome = import_pairs(import, location, &terminal).await?;
+            let outcome = import_pairs(import, location, &terminal).await;
+            if let (Err(_), Some(warning)) = (&outcome, &warning) {
+                // The table may be on another sheet.
+                context.warn(warning);
+            }
+            let mut outcome = outcome?;
             outcome.warnings.extend(warning);
             context.print_json(&as_json(&outcome))?;
             print_outcome(&outcome, context);
@@ -144,6 +151,9 @@ pub(crate) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
     for line in &outcome.warnings {
         context.warn(line);
     }
+    if let Some(renamed) = &outcome.renamed {
+        context.info(renamed);
+    }
     let summary = &outcome.summary;
     let truths = match outcome.truths {
         0 => String::new(),
@@ -190,5 +200,6 @@ fn as_json(outcome: &ImportOutcome) -> Value {
         "missing_files": outcome.missing.lines,
         "more_missing_files": outcome.missing.count - outcome.missing.lines.len(),
         "warnings": outcome.warnings,
+        "renamed_columns": outcome.renamed,
     })
 }

@@ -107,7 +107,8 @@ fn format_of_file(path: &Path) -> Result<ReportFormat, Refusal> {
         "md" | "markdown" => ReportFormat::Markdown,
         "tex" => ReportFormat::Latex,
         "html" | "htm" => ReportFormat::Html,
-        "pdf" | "doc" | "docx" | "odt" | "xls" | "xlsx" | "ods" => {
+        "pdf" | "doc" | "docx" | "odt" | "xls" | "xlsx" | "ods" | "png" | "jpg" | "jpeg"
+        | "tif" | "tiff" => {
             let text = format!(
                 "a report cannot be written as {extension}; html can be printed to PDF by a browser, and spreadsheet \
                  programs open csv"

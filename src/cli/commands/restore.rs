@@ -57,6 +57,11 @@ pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResu
             inputs.display()
         ));
     }
+    if let Some(missing) = &restored.not_in_place {
+        context.warn(&format!(
+            "{missing}; `restore --inputs DIR` looks for them in another folder"
+        ));
+    }
     if let Some(removed) = restored.settings.map(|settings| settings.removed)
         && !removed.is_empty()
     {

@@ -91,6 +91,10 @@ pub(crate) async fn execute(
         context.warn(missing_results::TEXT);
         context.next(missing_results::NEXT);
     }
+    if let Some(missing) = &outcome.missing_inputs {
+        context.warn(&missing.to_string());
+        context.next("check");
+    }
     for command in next_steps(&outcome) {
         let command = match (part, command.as_str()) {
             (RunPart::Work, "run") => "worker",

@@ -73,6 +73,7 @@ pub(crate) fn next_steps(outcome: &RunOutcome) -> Vec<String> {
         summary,
         failures,
         are_results_missing,
+        ..
     } = outcome;
     let mut steps = Vec::new();
     if summary.status.pairs == 0 && failures.blocks.is_empty() {

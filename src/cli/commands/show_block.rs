@@ -56,6 +56,7 @@ fn as_json(
 ) -> ProjectResult<Value> {
     let mut value = serde_json::to_value(detail)?;
     value["schema"] = json!(1);
+    value["warnings"] = warnings(detail).collect();
     value["character_list"] = serde_json::to_value(characters)?;
     value["artifacts_dir"] = json!(project.artifacts_dir().to_string_lossy());
     Ok(value)
@@ -109,6 +110,7 @@ fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) 
         parts.push(format!("{word} at {stage}: {message} ({class})\n"));
     }
     parts.push(stages_text(detail, palette));
+    parts.push(warnings_text(detail, palette));
     parts.push(characters_text(detail, characters, palette));
     parts.push(history_text(detail, palette));
     parts.concat()
@@ -128,6 +130,24 @@ fn stages_text(detail: &BlockDetail, palette: Palette) -> String {
     });
     let head = palette.paint(Tone::Strong, "stages");
     format!("{head}\n{}", columns(rows, "<><"))
+}
+
+/// Returns what the stages assumed or left out.
+fn warnings(detail: &BlockDetail) -> impl Iterator<Item = &str> {
+    let lists = detail.stages.iter();
+    let lists = lists.filter_map(|stage| stage.outcome.get("warnings")?.as_array());
+    lists.flatten().filter_map(Value::as_str)
+}
+
+fn warnings_text(detail: &BlockDetail, palette: Palette) -> String {
+    let rows: Vec<_> = warnings(detail)
+        .map(|text| vec![format!("  {}", one_line(text))])
+        .collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let head = palette.paint(Tone::Warn, "warnings");
+    format!("{head}\n{}", columns(rows, "<"))
 }
 
 /// Formats the numbers and short texts of an outcome on its first level: `agreement 0.93, side front`.

@@ -172,6 +172,9 @@ fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Palette) -> Str
     if status.are_results_missing {
         parts.push(line("files", missing_results::TEXT));
     }
+    if let Some(missing) = &status.missing_inputs {
+        parts.push(line("inputs", &missing.to_string()));
+    }
     parts.extend(low_confidence_line(&status.counts).map(|text| line("confidence", &text)));
     parts.extend(verdict_line(&status.counts).map(|text| line("verdicts", &text)));
     parts.concat()
@@ -287,6 +290,7 @@ mod tests {
         screen,
     };
     use mocban_project::failures::Failures;
+    use mocban_project::missing_inputs::MissingInputs;
 
     fn status(done: u64, ready: u64) -> ProjectStatus {
         let stage = StageCounts {
@@ -308,6 +312,7 @@ mod tests {
             running: true,
             failures: Failures::default(),
             are_results_missing: false,
+            missing_inputs: None,
         }
     }
 
@@ -371,6 +376,11 @@ mod tests {
         assert_eq!(steps[1..], ["report"]);
         done.counts.verdicts.insert(Verdict::Pass, 1);
         assert_eq!(next_steps(&done), ["report"]);
+        done.missing_inputs = Some(MissingInputs {
+            missing: 3,
+            looked_at: 8,
+            first: "d/1.stl".to_owned(),
+        });
         done.are_results_missing = true;
         done.running = false;
         assert_eq!(
@@ -380,6 +390,10 @@ mod tests {
         let text = screen(&done, "demo", false, Palette::PLAIN);
         assert!(
             text.contains("files        the depth maps and masks"),
+            "{text}"
+        );
+        assert!(
+            text.contains("inputs       3 of 8 input files that were looked at are missing or have moved, first d/1.stl; `check` lists all\n"),
             "{text}"
         );
     }

@@ -226,6 +226,8 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
         RunEvent::Started { .. }
         | RunEvent::BlockStageStarted { .. }
         | RunEvent::BlockStageFinished { .. }
+        // The terminal shows it as other warnings.
+        | RunEvent::BlockWarned { .. }
         | RunEvent::StageStarted { .. }
         | RunEvent::StageFinished { .. }
         | RunEvent::PairDone { .. } => None,

@@ -64,6 +64,7 @@ impl RunProgress {
             RunEvent::StageStarted { .. }
             | RunEvent::BlockStageStarted { .. }
             | RunEvent::BlockStageFinished { .. }
+            | RunEvent::BlockWarned { .. }
             | RunEvent::BlockFailed { .. }
             | RunEvent::BlockBackingOff { .. }
             | RunEvent::PairBackingOff { .. }

@@ -5,7 +5,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::busy::Busy;
 use super::context::Context;
 use super::progress::ProgressReporter;
+use crate::cli::input::global::ProgressMode;
 use mocban_project::events::{Listener, ProjectEvent};
+use mocban_runner::RunEvent;
 
 /// Shows work that takes long, warnings, and the progress of a run.
 pub(crate) struct Terminal<'a> {
@@ -50,6 +52,11 @@ impl Listener for Terminal<'_> {
             }
             ProjectEvent::Warning(text) => self.context.warn(&text),
             ProjectEvent::Run(event) => {
+                if let RunEvent::BlockWarned { block, warning, .. } = event
+                    && self.context.global.progress != ProgressMode::Json
+                {
+                    self.context.warn(&format!("block {block}: {warning}"));
+                }
                 if let Some(progress) = locked(&self.progress).as_mut() {
                     progress.event(event);
                 }

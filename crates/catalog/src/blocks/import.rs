@@ -1,10 +1,13 @@
 //! Import of blocks: names, paths and attributes.
 
+use crate::blocks::block_job::BlockJob;
 use crate::blocks::model::BlockAttributes;
+use crate::blocks::queue::uncounted;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::transaction::in_transaction;
+use crate::queue::requeue::{self, RetrySelection};
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::similar_names;
@@ -65,6 +68,13 @@ impl Catalog {
             for row in &rows {
                 import_block(conn, row, now, &mut summary).await?;
             }
+            // What failed with another file is tried again, also if the earlier file was never read.
+            let is_file = |field: &&str| matches!(*field, "mesh" | "page" | "labels");
+            let changed = summary.changed.iter();
+            let moved = changed.filter(|(_, fields)| fields.iter().any(is_file));
+            let moved: Vec<BlockName> = moved.map(|(name, _)| name.clone()).collect();
+            let moved = RetrySelection::<BlockJob>::Names(moved);
+            requeue::retry(conn, &moved, &mut uncounted()).await?;
             if summary.added > 0 {
                 similar_names::refuse_blocks(conn).await?;
             }

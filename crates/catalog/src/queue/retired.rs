@@ -13,6 +13,7 @@ use crate::db::row::from_row;
 use crate::db::rows::{json_array, names_json};
 use crate::db::transaction::in_transaction;
 use crate::queue::counters::{Deltas, KeyedJob};
+use crate::queue::selection::PairSelection;
 use crate::{Catalog, Result};
 use mocban_core::domain::{JobStatus, PairId, PairName, RetireCause, Stage, UnixMillis};
 
@@ -93,7 +94,18 @@ struct RemovedJob {
 
 from_row! { RemovedJob { job in row, token, low_confidence } }
 
+const RETIRED_AMONG: &str =
+    "SELECT pair FROM retired_pair WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
+
 impl Catalog {
+    /// Returns the retired ones of some pairs.
+    pub async fn retired_among(&self, pairs: &PairSelection) -> Result<HashSet<PairId>> {
+        let mut conn = self.read_conn().await?;
+        let retired = query_scalar(RETIRED_AMONG).bind(&pairs.json);
+        let retired: Vec<PairId> = retired.fetch_all(&mut conn).await?;
+        Ok(retired.into_iter().collect())
+    }
+
     /// Returns the retired pairs, sorted by name.
     pub async fn retired_pairs(&self) -> Result<Vec<RetiredPair>> {
         let mut conn = self.read_conn().await?;

@@ -12,6 +12,8 @@ use crate::db::row::FromRow as _;
 use crate::db::rows::json_array;
 use crate::db::transaction::in_transaction;
 use crate::queue::counters::{CounterKey, Deltas};
+use crate::queue::pair_job::PairJob;
+use crate::queue::requeue::{self, RetrySelection};
 use crate::queue::retired;
 use crate::queue::selection::{PairSelection, select, unknown_names};
 use crate::records::checksums::{self, ChecksummedTable};
@@ -132,6 +134,8 @@ const WITH_PREFIX: &str = "
 SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id
 WHERE p.name >= ?1 AND p.name < ?2 ORDER BY p.name LIMIT ?3";
 
+const OF_LISTED_BLOCK: &str = "SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id WHERE p.block = ?1 ORDER BY p.name";
+
 impl Catalog {
     /// Imports streamed rows, and true alignments, in one transaction. Adds new pairs and updates existing ones. If a
     /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
@@ -203,6 +207,13 @@ impl Catalog {
         names.bind(limit as i64).fetch_all(&mut conn).await
     }
 
+    /// Returns the names of the pairs that a list assigns to a block with this id, sorted, without retired pairs.
+    pub async fn pairs_of_listed_block(&self, block: &str) -> Result<Vec<PairName>> {
+        let mut conn = self.read_conn().await?;
+        let names = query_scalar(OF_LISTED_BLOCK).bind(block);
+        names.fetch_all(&mut conn).await
+    }
+
     /// Returns the unknown names among `names`, in the given order.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
@@ -258,6 +269,8 @@ pub(crate) async fn import_chunk(
         // A row with an invalid value is replaced.
         stored.insert(row.get("name")?, PairAttributes::from_row(row).ok());
     }
+    // Pairs with another mesh or print. What failed is tried again, also if the earlier file was never read.
+    let mut moved = Vec::new();
     for row in chunk {
         let fields = match stored.insert(row.name.clone(), Some(row.clone())) {
             None => {
@@ -272,6 +285,12 @@ pub(crate) async fn import_chunk(
             Some(Some(old)) => differing(&old, row),
             Some(None) => vec!["a damaged value"],
         };
+        if fields
+            .iter()
+            .any(|field| matches!(*field, "mesh" | "print"))
+        {
+            moved.push(row.name.clone());
+        }
         summary.changed.push(PairChange {
             name: row.name.clone(),
             fields,
@@ -292,6 +311,7 @@ pub(crate) async fn import_chunk(
     let rows = upsert.fetch_all(&mut *conn).await?;
     checksums::store_of_rows(conn, ChecksummedTable::Pair, &rows).await?;
     let ids: Vec<i64> = rows.iter().map(|row| row.get(0)).collect::<Result<_>>()?;
+    requeue::retry::<PairJob>(conn, &RetrySelection::Names(moved), deltas).await?;
     query(NEW_JOBS)
         .bind(json_array(ids.iter().copied()))
         .execute(conn)

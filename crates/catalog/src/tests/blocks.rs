@@ -10,7 +10,7 @@ use crate::{
 };
 use mocban_core::domain::{
     ArtifactSet, BlockCharacterState, BlockName, BlockStage, ContentHash, Failure, FailureClass,
-    PairName, WorkerId,
+    JobStatus, PairName, WorkerId,
 };
 
 pub(super) fn block(text: &str) -> BlockName {
@@ -290,6 +290,28 @@ async fn an_earlier_stage_that_is_computed_again_continues_with_the_stage_after_
         let stored = world.catalog.checkpoint_block(lease, done(&work, stage));
         lease = continued(stored.await.expect("stored"));
         assert_eq!(Some(lease.cursor), stage.next());
+    }
+}
+
+#[tokio::test]
+async fn a_failed_block_runs_again_after_an_import_with_another_page() {
+    let world = world().await;
+    let (lease, work) = world.leased_block().await;
+    let refused = failed(&work, BlockStage::Face, FailureAction::Quarantine);
+    let stored = world.catalog.fail_block(lease, refused).await;
+    assert!(stored.expect("stored"));
+    let mut attributes = work.attributes.clone();
+    for (page, expected) in [
+        (attributes.page_path.clone(), JobStatus::Quarantined),
+        ("elsewhere.png".to_owned(), JobStatus::Ready),
+    ] {
+        attributes.page_path = page;
+        let import = world
+            .catalog
+            .import_blocks(vec![attributes.clone()], false, 9);
+        import.await.expect("imported");
+        let states = world.catalog.block_states().await.expect("a read");
+        assert_eq!(states[0].status, expected);
     }
 }
 

@@ -136,6 +136,35 @@ async fn a_changed_path_is_read_again_and_changed_metadata_reruns_nothing() {
 }
 
 #[tokio::test]
+async fn a_failed_pair_runs_again_after_an_import_with_another_path() {
+    let world = World::new(2).await;
+    for lease in world.claim(2).await {
+        let failed = StageFailure {
+            stage: Stage::Fit,
+            failure: Failure::new(FailureClass::Io, "p0.stl is not there"),
+            action: FailureAction::Quarantine,
+            provenance: super::done(world.fingerprints, Stage::Fit).provenance,
+            inputs: InputVersions::default(),
+            ms: None,
+            at: 5,
+            alive_since: 0,
+        };
+        assert!(world.catalog.fail(lease, failed).await.expect("stored"));
+    }
+    let mut moved = row("p0");
+    moved.mesh_path = "elsewhere.stl".to_owned();
+    let mut described = row("p1");
+    described.character = Some("字".to_owned());
+    let rows = vec![moved, described];
+    world.catalog.import(rows, 9).await.expect("imported");
+    for (pair, expected) in [("p0", JobStatus::Ready), ("p1", JobStatus::Quarantined)] {
+        let detail = world.catalog.pair(&name(pair)).await.expect("a read");
+        assert_eq!(detail.expect("the pair").results.status, expected, "{pair}");
+    }
+    world.assert_counters().await;
+}
+
+#[tokio::test]
 async fn a_failed_pair_is_requeued_when_its_settings_change() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);

@@ -75,7 +75,8 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
         DetectedFormat::StlBinary => stl::read_binary(bytes, limits),
         DetectedFormat::StlAscii => stl::read_ascii(bytes, limits).map(checked),
         DetectedFormat::Xyz => xyz::read(bytes, limits).map(checked),
-    }?;
+    }
+    .map_err(|fault| text::fault_at_end(fault, bytes))?;
     if mesh.vertices.is_empty() {
         return Err(MeshError::NoVertices);
     }

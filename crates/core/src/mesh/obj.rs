@@ -26,8 +26,25 @@ use super::triangle_mesh::Mesh;
 /// refers to a missing vertex.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     text::check_lines(bytes)?;
+    check_end(bytes)?;
     match plain::read(bytes, limits) {
         Ok(mesh) => mesh,
         Err(odd) => by_tobj::read(bytes, odd, limits),
     }
+}
+
+/// Refuses a file that ends within a face of fewer than three corners. Elsewhere, such faces are ignored.
+fn check_end(bytes: &[u8]) -> Result<(), MeshError> {
+    let Some((line, words)) = text::unended_line(bytes) else {
+        return Ok(());
+    };
+    let corners = words.iter().skip(1);
+    let corners = corners.take_while(|word| !word.starts_with(b"#")).count();
+    if words.first() != Some(&&b"f"[..]) || corners >= 3 {
+        return Ok(());
+    }
+    let noun = if corners == 1 { "corner" } else { "corners" };
+    let cut_off = text::CUT_OFF;
+    let reason = format!("the last line is a face with {corners} {noun}; {cut_off}");
+    Err(MeshError::Line { line, reason })
 }

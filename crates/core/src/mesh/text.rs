@@ -128,7 +128,46 @@ pub(super) fn position<'a>(mut words: impl Iterator<Item = &'a [u8]>) -> Result<
 
 /// Says that a word is not a number, and quotes its beginning.
 pub(super) fn not_a_number(word: &[u8]) -> String {
-    format!("{} is not a number", quote(word))
+    let is_decimal_comma = word.split(|byte| *byte == b',').count() == 2 && {
+        let pointed: Vec<u8> = polled(word)
+            .map(|byte| if *byte == b',' { b'.' } else { *byte })
+            .collect();
+        number(&pointed).is_some()
+    };
+    let advice = if is_decimal_comma {
+        "; save the file with decimal points instead of commas"
+    } else {
+        ""
+    };
+    format!("{} is not a number{advice}", quote(word))
+}
+
+/// Ends the reasons of files that end within a line.
+pub(super) const CUT_OFF: &str = "the file seems to be cut off";
+
+/// Returns the number and the words of the last line, if the file ends within it.
+pub(super) fn unended_line(bytes: &[u8]) -> Option<(u64, Vec<&[u8]>)> {
+    let is_ended = matches!(bytes.last(), None | Some(b'\n' | b'\r'));
+    if is_ended || check_lines(bytes).is_err() {
+        return None;
+    }
+    let (number, line) = lines(bytes).last()?;
+    Some((number, words(line).collect()))
+}
+
+/// Says that a file of several lines seems to be cut off if a fault lies in its last line and nothing ends this line.
+pub(super) fn fault_at_end(fault: MeshError, bytes: &[u8]) -> MeshError {
+    match fault {
+        MeshError::Line { line, reason }
+            if line > 1
+                && !reason.ends_with(CUT_OFF)
+                && unended_line(bytes).is_some_and(|(last, _)| last == line) =>
+        {
+            let reason = format!("{reason}; it is the last line, so {CUT_OFF}");
+            MeshError::Line { line, reason }
+        }
+        fault => fault,
+    }
 }
 
 /// Quotes the beginning of a word without control characters.

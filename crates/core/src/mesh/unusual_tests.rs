@@ -371,3 +371,65 @@ fn a_binary_stl_whose_facets_have_no_position_is_refused() {
         })
     );
 }
+
+#[test]
+fn a_text_that_ends_within_a_line_is_named_as_cut_off() {
+    let obj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n";
+    let stl = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n";
+    for (name, text, expected) in [
+        (
+            "a.obj",
+            format!("{obj}f 2 1"),
+            "line 5: the last line is a face with 2 corners; the file seems to be cut off",
+        ),
+        (
+            "a.obj",
+            format!("{obj}f"),
+            "line 5: the last line is a face with 0 corners; the file seems to be cut off",
+        ),
+        (
+            "a.obj",
+            format!("{obj}v 1 2"),
+            "line 5: 2 of 3 coordinates; it is the last line, so the file seems to be cut off",
+        ),
+        (
+            "a.stl",
+            format!("{stl}vertex 1 2"),
+            "line 5: 2 of 3 coordinates; it is the last line, so the file seems to be cut off",
+        ),
+        (
+            "a.xyz",
+            "0 0 0\n0 1 0\n1".to_owned(),
+            "line 3: 1 of 3 coordinates; it is the last line, so the file seems to be cut off",
+        ),
+        // A fault in a line that is ended.
+        (
+            "a.obj",
+            format!("{obj}v 1 2\n"),
+            "line 5: 2 of 3 coordinates",
+        ),
+    ] {
+        let error = read(text.as_bytes(), name, &MeshLimits::SUGGESTED).expect_err("cut off");
+        assert_eq!(error.to_string(), expected, "{text}");
+    }
+    for text in [format!("{obj}f 2 1\n"), format!("{obj}f 3 2 1")] {
+        read(text.as_bytes(), "a.obj", &MeshLimits::SUGGESTED).expect("complete");
+    }
+}
+
+#[test]
+fn decimal_commas_are_named() {
+    let advice = "\"1,5\" is not a number; save the file with decimal points instead of commas";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+        property float z\nend_header\n1,5 0 0\n";
+    let stl = "solid\nfacet normal 0 0 1\nouter loop\nvertex 1,5 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
+        endloop\nendfacet\nendsolid\n";
+    for (name, text, place) in [
+        ("a.obj", "v 0 0 0\nv 1,5 0 0\nf 1 2 1\n", "line 2"),
+        ("a.ply", ply, "vertex 1"),
+        ("a.stl", stl, "line 4"),
+    ] {
+        let error = read(text.as_bytes(), name, &MeshLimits::SUGGESTED).expect_err("a comma");
+        assert_eq!(error.to_string(), format!("{place}: {advice}"));
+    }
+}

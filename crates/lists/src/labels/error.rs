@@ -125,8 +125,8 @@ pub enum LabelsProblem {
         page: [u32; 2],
     },
     /// Most boxes lie outside the page.
-    #[error("{outside} of {} {} outside the page of {} x {} px: labels of another page?", boxes(*.count),
-        for_count(*.outside, "lies", "lie"), .page[0], .page[1])]
+    #[error("{outside} of {} {} outside the page of {} x {} px: {}?", boxes(*.count),
+        for_count(*.outside, "lies", "lie"), .page[0], .page[1], likely_fault(*.are_corners))]
     Outside {
         /// Boxes outside.
         outside: usize,
@@ -134,6 +134,8 @@ pub enum LabelsProblem {
         count: usize,
         /// Width and height of the page.
         page: [u32; 2],
+        /// Whether all boxes lie on the page if their numbers are two corners.
+        are_corners: bool,
     },
     /// Two boxes have the same name.
     #[error("box {first} and box {second} are both named {} (upper and lower case are equal); rename one of them", quoted(.name))]
@@ -180,5 +182,14 @@ fn turned([width, height]: [f64; 2], page: [u32; 2]) -> &'static str {
         " (the labelled image was turned, perhaps by its EXIF orientation)"
     } else {
         ""
+    }
+}
+
+/// Returns the likely reason why most boxes lie outside the page.
+const fn likely_fault(are_corners: bool) -> &'static str {
+    if are_corners {
+        "as two corners, their numbers fit the page; are they corners where this format has width and height"
+    } else {
+        "labels of another page"
     }
 }

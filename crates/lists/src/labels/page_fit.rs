@@ -172,12 +172,14 @@ fn on_page(
     let size = [f64::from(page.width), f64::from(page.height)];
     let is_inside =
         |placed: &PlacedRegion| share_inside(bounds(&placed.corners), size) >= MIN_INSIDE;
+    let are_corners = are_corners(&placed, size);
     let (mut inside, outside): (Vec<_>, Vec<_>) = placed.into_iter().partition(is_inside);
     if 2 * outside.len() > count {
         return Err(LabelsProblem::Outside {
             outside: outside.len(),
             count,
             page: [page.width, page.height],
+            are_corners,
         });
     }
     if !outside.is_empty() {
@@ -193,10 +195,42 @@ fn on_page(
             boxes(count)
         ));
     }
+    warnings.extend(over_edges(&inside, size));
     for corner in inside.iter_mut().flat_map(|placed| &mut placed.corners) {
         *corner = [corner[0].clamp(0.0, size[0]), corner[1].clamp(0.0, size[1])];
     }
     Ok(inside)
+}
+
+/// Returns whether all boxes lie on the page if the numbers that were read as width and height are the second corner:
+/// beside the first corner, as in COCO, or beside the centre, as in YOLO.
+fn are_corners(placed: &[PlacedRegion], [width, height]: [f64; 2]) -> bool {
+    let all = |first: fn([f64; 4]) -> [f64; 2]| {
+        placed.iter().all(|placed| {
+            let edges = bounds(&placed.corners);
+            let ([x0, y0], [x1, y1]) = (first(edges), [edges[2] - edges[0], edges[3] - edges[1]]);
+            x0 >= 0.0 && y0 >= 0.0 && x0 < x1 && y0 < y1 && x1 <= width && y1 <= height
+        })
+    };
+    all(|[x0, y0, _, _]| [x0, y0])
+        || all(|[x0, y0, x1, y1]| [f64::midpoint(x0, x1), f64::midpoint(y0, y1)])
+}
+
+/// Warns about boxes that reach over an edge of the page by a pixel or more.
+fn over_edges(inside: &[PlacedRegion], [width, height]: [f64; 2]) -> Option<String> {
+    let is_over = |placed: &&PlacedRegion| {
+        let [x0, y0, x1, y1] = bounds(&placed.corners);
+        (-x0).max(-y0).max(x1 - width).max(y1 - height) >= MIN_SIDE
+    };
+    let over = inside.iter().filter(is_over);
+    let names: Vec<String> = over.map(|placed| placed.region.shown()).collect();
+    let verb = for_count(
+        names.len(),
+        "reaches over an edge of the page and was",
+        "reach over an edge of the page and were",
+    );
+    (!names.is_empty())
+        .then(|| format!("{} {verb} cut there: {}", boxes(names.len()), list(&names)))
 }
 
 /// Returns the share of the area of a box that lies on the page.

@@ -11,38 +11,53 @@ pub(super) fn similar_column(found: &str, name: &str) -> bool {
         ..=5 => 1,
         _ => 2,
     };
-    let found: String = found.nfc().collect();
-    OTHER_NAMES.contains(&(found.as_str(), name)) || strsim::osa_distance(&found, name) <= max_wrong
+    let found = found.nfc().collect::<String>().replace(['_', '-'], " ");
+    OTHER_NAMES.contains(&(found.as_str(), name))
+        || strsim::osa_distance(&found, &name.replace('_', " ")) <= max_wrong
 }
 
 /// Other words for the columns, in English and Vietnamese, in lower case.
-const OTHER_NAMES: [(&str, &str); 22] = [
+const OTHER_NAMES: [(&str, &str); 34] = [
     ("name", "id"),
+    ("no", "id"),
+    ("no.", "id"),
+    ("number", "id"),
     ("mã", "id"),
     ("tên", "id"),
     ("scan", "mesh"),
+    ("mesh file", "mesh"),
+    ("scan file", "mesh"),
     ("model", "mesh"),
     ("stl", "mesh"),
     ("lưới", "mesh"),
     ("bản quét", "mesh"),
     ("quét", "mesh"),
     ("image", "print"),
+    ("print file", "print"),
+    ("image file", "print"),
     ("rubbing", "print"),
     ("bản in", "print"),
     ("ảnh", "print"),
     ("hình", "print"),
     ("in", "print"),
     ("char", "character"),
+    ("character name", "character"),
     ("chữ", "character"),
     ("ký tự", "character"),
     ("blk", "block"),
+    ("block id", "block"),
+    ("block name", "block"),
     ("ván", "block"),
     ("mộc bản", "block"),
     ("đơn vị", "unit"),
+    ("face down", "scanned_face_down"),
+    ("facedown", "scanned_face_down"),
 ];
 
 /// Largest number of columns that are shown and compared.
 const MAX_SHOWN: usize = 12;
+/// Largest number of characters that are shown of a header without separators.
+const MAX_SHOWN_CHARS: usize = 100;
 
 /// Describes a missing column of a header. Suggests a column that is not known and has a similar name.
 pub(super) fn missing_column(
@@ -56,6 +71,14 @@ pub(super) fn missing_column(
         .iter()
         .zip(columns)
         .filter(|(_, known)| known.is_none());
+    if let [alone] = header
+        && columns == [None]
+    {
+        let shown: String = alone.chars().take(MAX_SHOWN_CHARS).collect();
+        return format!(
+            "column {name:?} is missing; the header has no comma, semicolon or tab between columns: {shown}"
+        );
+    }
     let mut similar = unknown.filter(|(field, _)| similar_column(&field.to_lowercase(), name));
     let hint = similar
         .next()

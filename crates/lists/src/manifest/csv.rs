@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::column_names::missing_column;
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
-use super::error::{ManifestError, at_line, of_list};
+use super::error::{ManifestError, Problem, at_line, of_list};
 use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::{HeaderColumns, SameColumn};
@@ -56,7 +56,7 @@ pub fn read_csv(
             (Ok(false), None) => return Err(of_list("the list is empty").into()),
             (Ok(true), Some(header)) => rows.push(line, header.draft(line, &record)),
             (Ok(true), None) => {
-                let mut parsed = CsvHeader::parse(line, &record, bytes)?;
+                let mut parsed = CsvHeader::parse(line, &record, (bytes, delimiter))?;
                 rows.add_renamed(std::mem::take(&mut parsed.renamed));
                 header = Some(parsed);
             }
@@ -110,10 +110,10 @@ pub(super) fn column_names<'r>(
 ) -> Result<Vec<&'r str>, ManifestError> {
     let mut problems = ManifestError::default();
     let mut names = Vec::new();
+    let mut undecoded = Vec::new();
     for (number, field) in (1..).zip(record) {
         let Ok(name) = std::str::from_utf8(field) else {
-            let reason = format!("the name of column {number} is not UTF-8{encoding_hint}");
-            problems.add(at_line(line, &reason));
+            undecoded.push(number);
             continue;
         };
         if name.len() > MAX_NAME_BYTES {
@@ -124,8 +124,62 @@ pub(super) fn column_names<'r>(
         }
         names.push(trimmed(name));
     }
+    problems
+        .extend(not_utf8(&undecoded).map(|text| at_line(line, &format!("{text}{encoding_hint}"))));
     problems.check(false)?;
     Ok(names)
+}
+
+/// Says which columns have names that are not UTF-8, once for all.
+fn not_utf8(columns: &[usize]) -> Option<String> {
+    match columns {
+        [] => None,
+        [column] => Some(format!("the name of column {column} is not UTF-8")),
+        columns => {
+            let shown: Vec<String> = columns
+                .iter()
+                .take(MAX_COLUMNS_SHOWN)
+                .map(usize::to_string)
+                .collect();
+            let more = match columns.len().saturating_sub(MAX_COLUMNS_SHOWN) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            Some(format!(
+                "the names of columns {}{more} are not UTF-8",
+                shown.join(", ")
+            ))
+        }
+    }
+}
+
+/// Largest number of columns that a message names.
+const MAX_COLUMNS_SHOWN: usize = 12;
+
+/// Number of lines in which a header below a title is searched.
+const MAX_TITLE_LINES: usize = 20;
+
+/// Says which of the first lines has the required columns, if a title stands above it. Its separator may be another one.
+fn later_header(list: &[u8], delimiter: u8) -> Option<Problem> {
+    let lines = list.split(|byte| *byte == b'\n').take(MAX_TITLE_LINES);
+    let has_columns = |line: &&[u8]| {
+        let is_header = |delimiter: u8| {
+            let Ok(text) = std::str::from_utf8(line) else {
+                return false;
+            };
+            let unquoted = |name: &str| trimmed(trimmed(name).trim_matches('"')).to_owned();
+            let names: Vec<String> = text.split(char::from(delimiter)).map(unquoted).collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            COLUMNS.assign(&names).is_ok_and(|found| {
+                let is_there = |name: &&str| found.columns.contains(&Some(*name));
+                REQUIRED.iter().all(is_there)
+            })
+        };
+        line.len() <= MAX_ROW_BYTES && [delimiter, b',', b';', b'\t'].into_iter().any(is_header)
+    };
+    let (number, _) = (1..).zip(lines).find(|(_, line)| has_columns(line))?;
+    let text = format!("line {number} has these columns; remove the lines above it");
+    Some(of_list(&text))
 }
 
 /// The header of a list.
@@ -139,7 +193,11 @@ struct CsvHeader {
 }
 
 impl CsvHeader {
-    fn parse(line: usize, record: &::csv::ByteRecord, list: &[u8]) -> Result<Self, ManifestError> {
+    fn parse(
+        line: usize,
+        record: &::csv::ByteRecord,
+        (list, delimiter): (&[u8], u8),
+    ) -> Result<Self, ManifestError> {
         let encoding_hint = match std::str::from_utf8(list) {
             Ok(_) => String::new(),
             Err(_) => encoding_hint(list),
@@ -162,7 +220,10 @@ impl CsvHeader {
             .iter()
             .filter(|name| !columns.contains(&Some(**name)));
         problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
-        problems.check(false)?;
+        if let Err(mut problems) = problems.check(false) {
+            problems.extend(later_header(list, delimiter));
+            return Err(problems);
+        }
         let names = names.into_iter().map(str::to_owned);
         Ok(Self {
             columns: columns.into_iter().zip(names).collect(),

@@ -13,7 +13,7 @@ use super::row::{COLUMNS, ManifestRow, ReadRows};
 use super::text::{as_utf8, trimmed};
 use crate::columns::HeaderColumns;
 use crate::json_numbers::{nan_as_null, unknown_number};
-use mocban_core::domain::{KEY_TWICE, UniqueKeys};
+use mocban_core::domain::{KEY_TWICE, UniqueKeys, sanitize};
 
 /// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` counts as no value. Blank lines are ignored.
 ///
@@ -97,11 +97,22 @@ impl RowKeys {
     }
 }
 
+/// Longest name of a key in a message, in characters.
+const MAX_KEY_CHARS: usize = 60;
+
 fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, String> {
     let text = std::str::from_utf8(content)
         .map_err(|error| format!("byte {} is not UTF-8", error.valid_up_to() + 1))?;
     let JsonEntries(object) = parsed(text).map_err(|error| wrong_json(&error, line, text))?;
     keys.update(&object)?;
+    if let [(key, Value::Array(_))] = object.as_slice()
+        && keys.columns.columns == [None]
+    {
+        return Err(format!(
+            "the rows are in the list {:?} of an object; save this list alone",
+            sanitize(key, MAX_KEY_CHARS)
+        ));
+    }
     let mut draft = DraftRow::new(line);
     for ((key, value), known) in object.into_iter().zip(&keys.columns.columns) {
         match (*known, value) {

@@ -98,6 +98,8 @@ mod tests {
             "column \"Units\" is kept as metadata; rename it to \"unit\" if it is meant, and import again"
         );
         assert_eq!(warnings("id,mesh,print,char\na,m,p,x\n").len(), 1);
+        let found = warnings("id,mesh,print,character name,block id,face down\na,m,p,x,b,no\n");
+        assert_eq!(found.len(), 3, "{found:?}");
         let found = warnings("id,mesh,print,Chữ,ván,đơn vị\na,m,p,天,b,mm\n");
         assert_eq!(found.len(), 0, "{found:?}");
     }

@@ -163,12 +163,25 @@ pub(super) fn encoding_hint(list: &[u8]) -> String {
         pairs.any(|pair| is_vowel(pair[0]) && VIETNAMESE_TONES.contains(&pair[1]))
     };
     let has_letter = |line: &[u8]| line.iter().any(|byte| VIETNAMESE_LETTERS.contains(byte));
-    let name = if lines.iter().any(|line| has_tone(line) || has_letter(line)) {
+    let name = if lines.iter().all(|line| is_chinese(line)) {
+        "GB 18030 (Chinese)"
+    } else if lines.iter().any(|line| has_tone(line) || has_letter(line)) {
         "Windows-1258 (Vietnamese)"
     } else {
         "Windows-1252 (Western European)"
     };
     format!("; it seems to be {name}: save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")")
+}
+
+/// Returns whether all bytes of a line above ASCII are characters of GB 2312, two bytes each, and no letter stands beside
+/// them. Vietnamese words mix such bytes with ASCII letters.
+fn is_chinese(line: &[u8]) -> bool {
+    let mut words = line.split(|byte| byte.is_ascii() && !byte.is_ascii_alphabetic());
+    words.all(|word| {
+        let (pairs, rest) = word.as_chunks::<2>();
+        let is_character = |pair: &[u8; 2]| matches!(pair, [0xb0..=0xf7, 0xa1..=0xfe]);
+        word.is_ascii() || (rest.is_empty() && pairs.iter().all(is_character))
+    })
 }
 
 fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, NotText> {

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::time::Instant;
 
+use serde::Deserialize;
+
 use super::inputs::as_failure;
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
@@ -68,13 +70,32 @@ pub(crate) async fn store_stage(
 }
 
 /// Reports a stage that is stored.
-fn finished(context: &RunContext, block: &BlockName, stage: BlockStage, ms: u64) {
+fn finished(context: &RunContext, block: &BlockName, checkpoint: &StageCheckpoint<BlockJob>) {
+    let (stage, ms) = (checkpoint.stage, checkpoint.ms);
     failpoint::hit(stage, Point::Committed, Some(block));
     context.emit(RunEvent::BlockStageFinished {
         block: block.clone(),
         stage,
         ms,
     });
+    for warning in warnings_of(&checkpoint.outcome) {
+        context.emit(RunEvent::BlockWarned {
+            block: block.clone(),
+            stage,
+            warning,
+        });
+    }
+}
+
+/// Returns the warnings in the outcome of a stage.
+fn warnings_of(outcome: &str) -> Vec<String> {
+    #[derive(Default, Deserialize)]
+    struct Warned {
+        #[serde(default)]
+        warnings: Vec<String>,
+    }
+    let warned: Warned = serde_json::from_str(outcome).unwrap_or_default();
+    warned.warnings
 }
 
 async fn advance(
@@ -89,7 +110,7 @@ async fn advance(
         return Ok(AfterStage::End(BlockEnd::LeaseLost));
     };
     let stage = checkpoint.stage;
-    finished(context, &block.work.attributes.name, stage, checkpoint.ms);
+    finished(context, &block.work.attributes.name, &checkpoint);
     block.lease = lease;
     block.work.results.retain(|earlier| earlier.stage < stage);
     block.work.results.push(BlockStageRecord {
@@ -131,7 +152,7 @@ async fn finish_cut(
         retired,
     } = summary;
     let block = block.work.attributes.name;
-    finished(context, &block, BlockStage::Cut, checkpoint.ms);
+    finished(context, &block, &checkpoint);
     context.emit(RunEvent::BlockDone {
         block,
         added,

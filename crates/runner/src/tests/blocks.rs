@@ -378,6 +378,23 @@ async fn two_runs_work_on_different_blocks_and_share_the_pairs() {
 }
 
 #[tokio::test]
+async fn what_a_stage_left_out_is_an_event() {
+    for (labels, expected) in [
+        ("r1 beside", vec!["b_1: 1 box was left out"]),
+        ("r1 a", vec![]),
+    ] {
+        let fixture = RunFixture::of_blocks(&["b_1"], labels).await;
+        fixture.run(&options(1)).await;
+        let events = fixture.events.lock().expect("an unpoisoned lock");
+        let warned = events.iter().filter_map(|event| match event {
+            RunEvent::BlockWarned { block, warning, .. } => Some(format!("{block}: {warning}")),
+            _ => None,
+        });
+        assert_eq!(warned.collect::<Vec<_>>(), expected);
+    }
+}
+
+#[tokio::test]
 async fn events_name_the_block_and_its_pairs() {
     let fixture = RunFixture::of_blocks(&["b_1"], "r1 a\nr2 b").await;
     fixture.run(&options(1)).await;

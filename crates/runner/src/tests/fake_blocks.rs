@@ -115,8 +115,13 @@ impl BlockStages for FakeBlocks {
             BlockStage::Boxes => {
                 let found = || Ok("r1 found".to_owned());
                 let labels = inputs.labels.as_ref().map_or_else(found, text)?;
+                let is_warned = labels.contains("beside");
+                let warnings: Vec<&str> = is_warned
+                    .then_some("1 box was left out")
+                    .into_iter()
+                    .collect();
                 return Ok(BlockStageOutput {
-                    outcome: json!({ "labels": labels }),
+                    outcome: json!({ "labels": labels, "warnings": warnings }),
                     characters: Vec::new(),
                 });
             }

@@ -49,7 +49,7 @@ pub(super) fn read(bytes: &[u8], odd: OddLine, limits: &MeshLimits) -> Result<Me
     let mut source = PolledReader(Cursor::new(text.as_bytes()));
     let loaded = tobj::load_obj_buf(&mut source, &options, no_materials);
     let read = &text.as_bytes()[..source.0.position() as usize];
-    let (models, _) = loaded.map_err(|error| fault(error, text::lines(read).count() as u64 - 1))?;
+    let (models, _) = loaded.map_err(|error| fault(error, read))?;
     let model = models
         .into_iter()
         .next()
@@ -121,11 +121,17 @@ fn without_comment(line: &str) -> &str {
         .trim_ascii_end()
 }
 
-/// Says why `tobj` refused a file. `line` is the last that it read, counted from 1.
-fn fault(error: LoadError, line: u64) -> MeshError {
+/// Says why `tobj` refused a file, of which it has read the lines up to that with the fault.
+fn fault(error: LoadError, read: &[u8]) -> MeshError {
+    let line = text::lines(read).count() as u64 - 1;
     let reason = match error {
         LoadError::FaceVertexOutOfBounds => return MeshError::NoSuchVertex,
-        LoadError::PositionParseError => "a coordinate is missing or not a number".into(),
+        LoadError::PositionParseError => {
+            let fault = text::lines(read).find(|(number, _)| *number == line);
+            let words = text::words(fault.map_or(&[][..], |(_, line)| line));
+            let reason = text::position(words.skip(1)).err();
+            reason.unwrap_or_else(|| "a coordinate is missing or not a number".into())
+        }
         LoadError::ColorParseError => {
             "neither a weight of 1 nor a colour follows the coordinates".into()
         }

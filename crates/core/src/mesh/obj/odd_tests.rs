@@ -87,9 +87,10 @@ fn rewritten(bytes: &[u8]) -> (String, usize) {
     (out, vertices)
 }
 
-/// Returns whether a file is refused that `tobj` reads, for a weight.
+/// Returns whether a file is refused that `tobj` reads, for a weight or because it ends within a face.
 fn is_stricter(error: &MeshError) -> bool {
-    error.to_string().contains("neither a weight of 1")
+    let error = error.to_string();
+    error.contains("neither a weight of 1") || error.contains("the last line is a face with")
 }
 
 /// Returns the characters that end lines: LF, and also CR if that ends more of them.

@@ -75,10 +75,10 @@ fn faces_of_two_corners_and_lines_are_ignored() {
 fn faults_are_reported_with_their_place() {
     let fault = |text: &str| read(text).expect_err(text).to_string();
     for (text, expected) in [
-        ("v 0 0\n", "line 1: a coordinate is missing or not a number"),
+        ("v 0 0\n", "line 1: 2 of 3 coordinates"),
         (
             "v 0 0 0\nv 0,5 0 0\n",
-            "line 2: a coordinate is missing or not a number",
+            "line 2: \"0,5\" is not a number; save the file with decimal points instead of commas",
         ),
         (
             "v 0 0 0 1\nv 1 1 1 2\n",

@@ -146,7 +146,7 @@ mod tests {
         );
         assert_eq!(
             open(cut(" 1e-1").as_bytes()).expect_err("cut").to_string(),
-            "line 6: 2 of 3 coordinates"
+            "line 6: 2 of 3 coordinates; it is the last line, so the file seems to be cut off"
         );
     }
 }

@@ -80,8 +80,11 @@ fn boxes_outside_are_left_out_and_named() {
             [99.5, 979.5, 149.5, 999.5]
         ]
     );
-    let expected = "b.json: 2 of 5 boxes lie outside the page and were left out: box 2, box 4";
-    assert_eq!(labels.warnings, [expected]);
+    let expected = [
+        "b.json: 2 of 5 boxes lie outside the page and were left out: box 2, box 4",
+        "b.json: 2 boxes reach over an edge of the page and were cut there: box 3, box 5",
+    ];
+    assert_eq!(labels.warnings, expected);
 }
 
 #[test]
@@ -115,6 +118,48 @@ fn empty_boxes_and_points_are_left_out() {
     ]);
     assert_eq!(bounds(&labels), [[0.5, 0.5, 8.5, 8.5]]);
     let expected = "b.json: 2 boxes are smaller than a pixel, a point or a line and were left out: box 1, box 3";
+    assert_eq!(labels.warnings, [expected]);
+}
+
+#[test]
+fn corners_in_place_of_width_and_height_are_named() {
+    let corners = [
+        [1400, 850, 1490, 940],
+        [1500, 800, 1590, 890],
+        [1500, 900, 1590, 990],
+    ];
+    let annotation = |bbox: &[i32; 4]| serde_json::json!({"image_id": 1, "bbox": bbox});
+    let coco = serde_json::json!({
+        "images": [{"id": 1, "file_name": PAGE.name, "width": PAGE.width, "height": PAGE.height}],
+        "annotations": corners.iter().map(annotation).collect::<Vec<_>>(),
+    });
+    let line = |[x0, y0, x1, y1]: &[i32; 4]| {
+        let x = |x: &i32| f64::from(*x) / f64::from(PAGE.width);
+        let y = |y: &i32| f64::from(*y) / f64::from(PAGE.height);
+        format!("0 {} {} {} {}\n", x(x0), y(y0), x(x1), y(y1))
+    };
+    let yolo: String = corners.iter().map(line).collect();
+    for text in [coco.to_string(), yolo] {
+        let refused = read(text.as_bytes(), "l", &PAGE)
+            .expect_err("outside")
+            .to_string();
+        assert!(
+            refused.contains("as two corners, their numbers fit the page"),
+            "{refused}"
+        );
+    }
+    let other = boxes_file(&[[5000.0, 100.0, 5100.0, 200.0]]);
+    let refused = read(other.as_bytes(), "l", &PAGE)
+        .expect_err("outside")
+        .to_string();
+    assert!(refused.ends_with("labels of another page?"), "{refused}");
+}
+
+#[test]
+fn boxes_that_are_cut_at_an_edge_are_named() {
+    let labels = read_boxes(&[[-9.0, 2.0, 30.0, 30.0], [-0.9, 40.0, 30.0, 70.0]]);
+    assert_eq!(bounds(&labels)[0], [-0.5, 1.5, 29.5, 29.5]);
+    let expected = "b.json: 1 box reaches over an edge of the page and was cut there: box 1";
     assert_eq!(labels.warnings, [expected]);
 }
 

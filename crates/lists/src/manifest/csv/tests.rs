@@ -260,3 +260,60 @@ fn lists_of_spreadsheets_and_scripts_are_read() {
     let spaced = parse("id,mesh,print\nchữ\u{a0}số,b,c\n").expect("parses");
     assert_eq!(spaced[0].name.as_str(), "chữ số");
 }
+
+#[test]
+fn a_header_below_a_title_and_other_separators_are_named() {
+    let title = refusal("# my list, of mine,,\n\nid,mesh,print,note\n1,a.stl,a.png,x\n");
+    assert!(
+        title.ends_with("\nline 3 has these columns; remove the lines above it"),
+        "{title}"
+    );
+    let title = refusal("Block 4\nid;mesh;print\n1;a.stl;a.png\n");
+    assert!(title.contains("line 2 has these columns"), "{title}");
+    let pipes = refusal("id|mesh|print\n1|a.stl|a.png\n");
+    assert_eq!(
+        pipes.lines().next(),
+        Some(
+            "line 1: column \"id\" is missing; the header has no comma, semicolon or tab between columns: id|mesh|print"
+        )
+    );
+    assert!(!pipes.contains("remove the lines"), "{pipes}");
+}
+
+#[test]
+fn names_of_columns_with_file_or_number_are_suggested() {
+    let found = refusal("No.,mesh file,print file\n1,a.stl,a.png\n");
+    for (written, name) in [
+        ("No.", "id"),
+        ("mesh file", "mesh"),
+        ("print file", "print"),
+    ] {
+        let hint = format!("rename {written:?} to {name:?} if it is meant");
+        assert!(found.contains(&hint), "{found}");
+    }
+}
+
+#[test]
+fn chinese_text_is_not_taken_for_vietnamese() {
+    let list = b"id,mesh,print,character\n1,a.stl,a.png,\xc3\xf7\n2,b.stl,b.png,\xcf\xc2\n";
+    let refused = super::parse_csv(list).expect_err("GB 18030").to_string();
+    assert!(
+        refused.contains("it seems to be GB 18030 (Chinese)"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn names_of_columns_that_are_not_utf8_are_one_problem() {
+    let list = b"m\xe3,mesh,print,ch\xfd\xde,kh\xf4i\n1,a.stl,a.png,x,y\n";
+    let refused = super::parse_csv(list)
+        .expect_err("Windows-1258")
+        .to_string();
+    assert!(
+        refused.starts_with(
+            "line 1: the names of columns 1, 4, 5 are not UTF-8; it seems to be Windows-1258"
+        ),
+        "{refused}"
+    );
+    assert_eq!(refused.lines().count(), 1, "{refused}");
+}

@@ -96,9 +96,26 @@ impl<'b> FoundPages<'b> {
         self.full.extend(pictures);
         Ok(())
     }
+
+    /// Drops pages of which both sides are at most half of those of the largest page: many programs do not mark previews.
+    fn drop_previews(&mut self) {
+        let sides =
+            |page: &TagDirectory<'_>| [WIDTH, HEIGHT].map(|tag| page.number(tag).unwrap_or(0));
+        let largest = self
+            .full
+            .iter()
+            .max_by_key(|found| pixel_count(&found.page));
+        let Some(largest) = largest.map(|found| sides(&found.page)) else {
+            return;
+        };
+        self.full.retain(|found| {
+            let halves = sides(&found.page).map(|side| side.saturating_mul(2));
+            halves[0] > largest[0] || halves[1] > largest[1]
+        });
+    }
 }
 
-/// Finds the only full page of a file. Skips reduced copies and masks, but accepts any single page.
+/// Finds the only full page of a file. Skips reduced copies, also unmarked ones, and masks, but accepts any single page.
 ///
 /// # Errors
 /// Returns an error if several pages are full, because only the user knows which one is the print. Also returns an
@@ -115,6 +132,7 @@ pub(super) fn find_print_page(bytes: &dyn TagSource) -> Result<PrintPage<'_>, De
             offset => page = file.directory_at(offset).ok_or_else(truncated)?,
         }
     }
+    found.drop_previews();
     match found.full[..] {
         [print] => Ok(print),
         // The only page is marked as a copy or a mask.

@@ -69,6 +69,18 @@ fn smaller_copies_in_subdirectories_are_skipped_and_a_larger_picture_is_not() {
 }
 
 #[test]
+fn a_small_page_that_is_not_marked_is_a_preview() {
+    let page = |width, height| plain_page(&Grid::from_fn(width, height, |x, y| picture().at(x, y)));
+    let full = plain_page(&picture());
+    for pages in [[full.clone(), page(10, 7)], [page(10, 7), full.clone()]] {
+        let file = TestTiff::default().encode(&pages);
+        assert_eq!(colours(&file).expect("reads"), widened(&picture()));
+    }
+    let file = TestTiff::default().encode(&[full, page(11, 7)]);
+    assert!(colours(&file).is_err());
+}
+
+#[test]
 fn several_pictures_of_a_preview_are_refused_with_their_number() {
     let full = plain_page(&picture());
     assert_eq!(
