@@ -6,14 +6,13 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::json;
 
-use super::verdict::reviewer_name;
 use crate::cli::input::browser::open;
 use crate::cli::input::language::language_of_system;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
 use crate::cli::output::table::count;
-use mocban_catalog::{Catalog, SetApart, StatusCounts};
+use mocban_catalog::{Catalog, SetApart, StatusCounts, reviewer_name};
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_pages::review::{

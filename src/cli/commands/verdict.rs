@@ -10,8 +10,7 @@ use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::streams;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{
-    FaultyRow, ImportedVerdicts, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
-    check_reviewer,
+    FaultyRow, ImportedVerdicts, NewVerdict, ReviewContext, SetApart, VerdictEvent, reviewer_name,
 };
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
 use mocban_project::shell::shell_quoted;
@@ -80,13 +79,6 @@ pub(crate) struct VerdictUndoArgs {
     /// Only verdicts of this reviewer [default: of anyone]
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(crate) reviewer: Option<String>,
-}
-
-/// Parses a reviewer's name, which is one line of text.
-pub(crate) fn reviewer_name(text: &str) -> Result<String, InvalidVerdict> {
-    let name = text.trim();
-    check_reviewer(name)?;
-    Ok(name.to_owned())
 }
 
 /// Parses an angle from -180 to 180 degrees.
