@@ -52,6 +52,7 @@ pub mod report;
 pub mod restore;
 pub mod retire;
 pub mod retry;
+pub mod reviewers;
 mod row_spool;
 pub mod run;
 pub mod selection;
@@ -61,6 +62,7 @@ pub mod status;
 pub mod truth_file;
 mod unread_files;
 pub mod verdict_file;
+pub mod verdict_words;
 pub mod verdicts;
 pub mod worker_totals;
 
