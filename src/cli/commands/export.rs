@@ -73,6 +73,9 @@ pub(crate) struct ExportArgs {
     /// Begin CSV files with a byte order mark, so that Excel reads them as UTF-8
     #[arg(long)]
     pub(crate) csv_bom: bool,
+    /// Write CSV files with semicolons and decimal commas, as Excel in Vietnamese reads them
+    #[arg(long)]
+    pub(crate) csv_decimal_comma: bool,
     /// Include pictures in Parquet tables
     #[arg(long)]
     pub(crate) images: bool,
@@ -134,6 +137,7 @@ pub(crate) async fn export(args: ExportArgs, context: &Context) -> ProjectResult
         }),
         with_times: args.with_times,
         csv_bom: args.csv_bom,
+        csv_decimal_comma: args.csv_decimal_comma,
         images: args.images,
         shard_mib: args.shard_mib,
         license: args.license.clone(),
