@@ -86,7 +86,7 @@ fn align(
     let aligned = AlignedPair {
         hints: ScanHints::default(),
         fit: plane.clone(),
-        depth,
+        depth: registered.levelled(depth),
         normalized,
         registered,
     };

@@ -142,6 +142,7 @@ fn checkpoints(
                 ink: 0,
                 metrics: metrics.iter().map(|metric| metric.outcome).collect(),
                 features: None,
+                levelling: None,
             })
         } else {
             json!({ "stage": stage })

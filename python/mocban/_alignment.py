@@ -10,10 +10,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from . import _native as _rust
-from ._errors import Error, Refused, UnitError
+from ._errors import Error, InputError, Refused, UnitError
 from ._frozen import Frozen
 from ._inputs import Mesh, Print, mesh_of, print_of
-from ._settings import Settings, settings as default_settings
+from ._settings import Settings, settings_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -352,7 +352,8 @@ def _confidence(value: float | None) -> str:
 def _points(values: ArrayLike, columns: int, np: Any) -> Any:
     points = np.asarray(values, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != columns:
-        raise ValueError(f"the points have the shape {points.shape}; give an array of shape (N, {columns})")
+        text = f"the points have the shape {points.shape}; give an array of shape (N, {columns})"
+        raise InputError(text, "bad_input")
     return points
 
 
@@ -393,8 +394,9 @@ def align(
     print: Print | str | os.PathLike[str] | ArrayLike,
     *,
     metrics: Iterable[str] | None = None,
-    settings: Settings | None = None,
+    settings: Settings | str | None = None,
     strict: bool = False,
+    unit: str | None = None,
     scanned_face_down: bool | None = None,
 ) -> Alignment:
     """Align a scan with its print.
@@ -405,16 +407,19 @@ def align(
     Parameters
     ----------
     mesh : Mesh or path-like
-        The scan. The unit of a file counts as unknown; use `read_mesh` to give it.
+        The scan.
     print : Print, path-like or array_like
         The image of the print.
     metrics : iterable of str, optional
         Metrics whose results to keep; all of the method by default.
-    settings : Settings, optional
+    settings : Settings or name of a preset, optional
     strict : bool
         Whether a refusal is an exception.
+    unit : {"mm", "cm", "m", "in"}, optional
+        Unit of a file; not known by default. A `Mesh` has its own.
     scanned_face_down : bool, optional
-        Whether the carved face points towards -z of the mesh; found out by default.
+        Whether the carved face points towards -z of the mesh; found out by default. It decides only where the scan does
+        not show it; ``warnings`` of the result has a sentence if the carving was found on the other side.
 
     Returns
     -------
@@ -437,9 +442,9 @@ def align(
     >>> found.results["relief"].iou > 0.6
     True
     """
-    chosen = default_settings() if settings is None else settings
-    names = None if metrics is None else _checked(metrics, chosen)
-    scan, image = mesh_of(mesh, chosen), print_of(print, chosen)
+    chosen = settings_of(settings)
+    names = None if metrics is None else metric_names(metrics, chosen)
+    scan, image = mesh_of(mesh, chosen, unit), print_of(print, chosen)
     if scan.warnings:
         raise UnitError(f"{scan.path or 'the mesh'}: {scan.warnings[0]}", "wrong_unit", scan.path)
     native, refused = _rust.align_pair(scan._native, image._native, chosen._native, scanned_face_down)
@@ -453,10 +458,13 @@ def align(
     return Alignment(None, refusal)
 
 
-def _checked(metrics: Iterable[str], chosen: Settings) -> tuple[str, ...]:
+def metric_names(metrics: Iterable[str], chosen: Settings) -> tuple[str, ...]:
+    """Return the names of metrics, all of which the method gives."""
     names = (metrics,) if isinstance(metrics, str) else tuple(metrics)
+    if not names:
+        raise InputError("metrics is empty; leave it out for all metrics", "usage")
     known = METRICS if chosen["pipeline.method"] == "default" else METRICS[:-1]
     for name in names:
         if name not in known:
-            raise Error(f"there is no metric {name!r}, only {', '.join(known)}", "usage")
+            raise InputError(f"there is no metric {name!r}, only {', '.join(known)}", "usage")
     return names

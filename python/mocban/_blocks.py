@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._alignment import Alignment
-from ._errors import Error, ImageError, MeshError, Refused
+from ._errors import ImageError, InputError, MeshError, ProjectError, Refused
 from ._frozen import Frozen
 from ._inputs import Mesh, Print
 
@@ -213,7 +213,7 @@ def align_block(
     Raises
     ------
     ProjectError
-        If a file is missing, or the folder holds anything else.
+        If a file is missing, or ``folder`` holds anything but the project of an earlier call.
     Refused
         If the block is refused and ``strict`` is true.
 
@@ -231,6 +231,8 @@ def align_block(
         temporary = tempfile.TemporaryDirectory(prefix="mocban-")
         folder = temporary.name
     place = Path(folder)
+    if temporary is None:
+        _require_own(place)
     made = place / "inputs"
     if isinstance(mesh, Mesh):
         unit = mesh.unit
@@ -243,11 +245,28 @@ def align_block(
         labels = _written(made / "labels.json", json.dumps([_box(one) for one in labels], ensure_ascii=False).encode())
     project = Project.create(place)
     project.import_block(mesh, page, labels=labels, id="block", unit=unit, side=side)
-    project.run(workers=workers, progress=progress)
+    project.run(workers=workers, progress=progress, stop_at_once=True)
     found = BlockAlignment(project._block("block"), project, temporary)
     if strict and found.error is not None:
         raise Refused(f"the block is not aligned: {found.error}", "no_solution", os.fspath(mesh))
     return found
+
+
+def _require_own(folder: Path) -> None:
+    """Refuse a folder that holds anything but the project of an earlier call."""
+    from ._project import Project
+
+    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+        return
+    try:
+        project = Project(folder, None, True)
+        status = project.status()
+        project._block("block")
+    except (ProjectError, OSError):
+        status = {}
+    if status.get("blocks", {}).get("total") != 1:
+        text = f"{folder} holds something else than a block of align_block; give a new folder"
+        raise ProjectError(text, "usage", folder)
 
 
 def _written(path: Path, content: bytes) -> Path:
@@ -264,7 +283,10 @@ def _box(label: Mapping[str, Any]) -> dict[str, Any]:
         left, top, right, bottom = (float(edge) + 0.5 for edge in label["box"])
     except (KeyError, TypeError, ValueError) as reason:
         text = f"the label {label!r} has no box: give {{'box': (left, top, right, bottom)}}"
-        raise Error(text, "bad_input") from reason
+        raise InputError(text, "bad_input") from reason
+    if not (left < right and top < bottom):
+        text = f"the box of the label {label!r} is empty: give left < right and top < bottom"
+        raise InputError(text, "bad_input")
     named = {name: str(label[key]) for name, key in (("id", "label"), ("character", "character")) if label.get(key)}
     return {"x_min": left, "y_min": top, "x_max": right, "y_max": bottom, **named}
 

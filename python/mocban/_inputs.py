@@ -7,7 +7,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from . import _native as _rust
-from ._errors import ImageError, MeshError
+from ._errors import ImageError, MeshError, UnitError
 from ._frozen import Frozen
 from ._settings import Settings, settings
 
@@ -70,6 +70,9 @@ class Mesh(Frozen):
     def __init__(self, vertices: ArrayLike, faces: ArrayLike | None = None, *, unit: str | None = "mm") -> None:
         import numpy as np
 
+        if hasattr(vertices, "vertices"):
+            text = f"the vertices are a {type(vertices).__name__}; give its arrays: mocban.Mesh(mesh.vertices, mesh.faces)"
+            raise MeshError(text, "bad_input")
         points = _numbers(vertices, "vertices", MeshError)
         if points.dtype.kind not in "fiu":
             raise MeshError(f"the vertices have the type {points.dtype}; give numbers", "bad_input")
@@ -115,6 +118,10 @@ class Mesh(Frozen):
         """
         import numpy as np
 
+        try:
+            mm_per_px = float(mm_per_px)
+        except (TypeError, ValueError):
+            raise MeshError(f"mm_per_px is {mm_per_px!r}; give a number", "bad_input") from None
         heights = _numbers(z, "heights", MeshError)
         if heights.ndim != 2 or heights.dtype.kind not in "fiu":
             text = f"the heights have the shape {heights.shape} and type {heights.dtype}; give numbers of shape (H, W)"
@@ -178,8 +185,12 @@ class Mesh(Frozen):
 
     def __repr__(self) -> str:
         vertices, faces = self._native.counts()
-        parts = [f"{vertices} vertices", f"{faces} face{'' if faces == 1 else 's'}", self.unit or "unit not known"]
+        parts = [f"{vertices} vert{'ex' if vertices == 1 else 'ices'}", f"{faces} face{'' if faces == 1 else 's'}", self.unit or "unit not known"]
         return f"<mocban.Mesh: {', '.join(parts)}>"
+
+
+def _max_pixels() -> int:
+    return int(settings()["limits.image.max_pixels"])
 
 
 def _mesh(vertices: Any, faces: Any, unit: str | None) -> Mesh:
@@ -189,8 +200,12 @@ def _mesh(vertices: Any, faces: Any, unit: str | None) -> Mesh:
 def _numbers(values: Any, what: str, error: type[MeshError] | type[ImageError]) -> NDArray[Any]:
     import numpy as np
 
-    if isinstance(values, (str, bytes, os.PathLike)):
-        raise error(f"the {what} are the path {values!r}; give an array, or read the file first", "bad_input")
+    if values is None:
+        raise error(f"the {what} are None; give an array (was the file read?)", "bad_input")
+    if isinstance(values, (str, os.PathLike)):
+        raise error(f"the {what} are the path {os.fspath(values)!r}; give an array, or read the file first", "bad_input")
+    if isinstance(values, (bytes, bytearray)) or hasattr(values, "read"):
+        raise error(f"the {what} are the bytes of a file; give an array, or the path of the file", "bad_input")
     try:
         array = np.asarray(values)
     except (ValueError, TypeError, RuntimeError) as reason:
@@ -231,7 +246,8 @@ class Print(Frozen):
     ----------
     image : array_like of shape (H, W) or (H, W, C)
         Grey, grey with alpha, RGB or RGB with alpha (C of 1 to 4), as uint8 (255 is white) or uint16 (65535 is white).
-        Transparent pixels count as white. OpenCV's arrays are BGR: convert them first.
+        Transparent pixels count as white. OpenCV's arrays are BGR, and those of CMYK images have four channels too: convert
+        them first. Lists of whole numbers from 0 to 255 count as uint8.
 
     Attributes
     ----------
@@ -243,7 +259,7 @@ class Print(Frozen):
     Raises
     ------
     ImageError
-        If the array has another shape or type.
+        If the array has another shape or type, or more pixels than the setting ``limits.image.max_pixels``.
 
     Examples
     --------
@@ -262,8 +278,13 @@ class Print(Frozen):
         if mode is not None and mode not in _PIL_MODES:
             raise ImageError(f'the image has the mode {mode}; convert it first: image.convert("RGB")', "bad_input")
         pixels = _numbers(image, "pixels", ImageError)
+        if isinstance(image, (list, tuple)) and pixels.dtype.kind == "i" and pixels.size:
+            if 0 <= pixels.min() and pixels.max() <= 255:
+                pixels = pixels.astype(np.uint8)
         if pixels.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
-            text = f"the image has the type {pixels.dtype}; give uint8 (255 is white) or uint16 (65535 is white)"
+            hints = {"b": "; a mask of ink is 255 * ~mask", "f": "; numbers from 0 to 1 are (255 * image).round()"}
+            hint = hints.get(pixels.dtype.kind, "")
+            text = f"the image has the type {pixels.dtype}; give uint8 (255 is white) or uint16 (65535 is white){hint}"
             raise ImageError(text, "bad_input")
         if pixels.ndim == 2:
             pixels = pixels[:, :, np.newaxis]
@@ -271,6 +292,10 @@ class Print(Frozen):
             text = f"the image has the shape {pixels.shape}; give an array of shape (H, W) or (H, W, 1 to 4)"
             raise ImageError(text, "bad_input")
         height, width, channels = pixels.shape
+        most = _max_pixels()
+        if height * width > most:
+            text = f"the image has {height * width} pixels, more than limits.image.max_pixels ({most}); make it smaller"
+            raise ImageError(text, "bad_input")
         flat = _flat(pixels, pixels.dtype.newbyteorder("="))
         eight, sixteen = (flat, None) if flat.dtype == np.uint8 else (None, flat)
         self._set(_native=_rust.NativePrint(eight, sixteen, width, height, channels))
@@ -394,12 +419,15 @@ def _logged(read: Any) -> Any:
     return read
 
 
-def mesh_of(mesh: Mesh | str | os.PathLike[str], chosen: Settings) -> Mesh:
+def mesh_of(mesh: Mesh | str | os.PathLike[str], chosen: Settings, unit: str | None = None) -> Mesh:
     """Return a mesh, or read its file."""
     if isinstance(mesh, Mesh):
+        if unit is not None and unit != mesh.unit:
+            text = f"the unit is {unit}, but that of the mesh is {mesh.unit or 'not known'}; give it to the mesh"
+            raise UnitError(text, "unknown_unit")
         return mesh
     if isinstance(mesh, (str, os.PathLike)):
-        return _logged(Mesh._of(_rust.read_mesh(os.fspath(mesh), None, chosen._native)))
+        return _logged(Mesh._of(_rust.read_mesh(os.fspath(mesh), unit, chosen._native)))
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         raise MeshError("give mocban.Mesh(mesh.vertices, mesh.faces, unit=...) instead of the object", "bad_input")
     raise MeshError(f"the mesh is a {type(mesh).__name__}; give a mocban.Mesh or a path", "bad_input")

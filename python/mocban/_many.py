@@ -7,10 +7,10 @@ import threading
 from collections.abc import Hashable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ._alignment import Alignment, align
-from ._errors import Error
+from ._alignment import Alignment, align, metric_names
+from ._errors import Error, InputError
 from ._inputs import Mesh, Print
-from ._settings import Settings
+from ._settings import Settings, settings_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -29,7 +29,7 @@ def align_many(
     threads: int | None = None,
     max_bytes: int | None = None,
     metrics: Iterable[str] | None = None,
-    settings: Settings | None = None,
+    settings: Settings | str | None = None,
 ) -> Iterator[tuple[Key, Alignment | Error]]:
     """Align pairs on several threads, and yield results in the order of the pairs.
 
@@ -51,7 +51,7 @@ def align_many(
     ------
     (key, Alignment or Error)
         A pair that cannot be aligned because of its inputs gives its exception and does not end the iteration. Other
-        exceptions, such as those of ``pairs``, do.
+        exceptions do; that of ``pairs`` comes after the results of the pairs before it.
 
     Examples
     --------
@@ -61,11 +61,13 @@ def align_many(
     a aligned
     b not_found
     """
+    for name, number in (("threads", threads), ("max_bytes", max_bytes)):
+        if number is not None and not (isinstance(number, int) and number >= 1):
+            raise InputError(f"{name} is {number!r}; give a whole number of at least 1", "usage")
     count = (os.cpu_count() or 1) if threads is None else threads
-    if count < 1:
-        raise ValueError(f"threads is {threads}; give a number of at least 1")
-    names = None if metrics is None else ((metrics,) if isinstance(metrics, str) else tuple(metrics))
-    return _results(iter(pairs), count, max_bytes, {"metrics": names, "settings": settings})
+    chosen = settings_of(settings)
+    names = None if metrics is None else metric_names(metrics, chosen)
+    return _results(iter(pairs), count, max_bytes, {"metrics": names, "settings": chosen})
 
 
 class _Work:
@@ -92,6 +94,15 @@ class _Work:
         finally:
             self.mesh = self.image = None
             self.done.set()
+
+
+def _next(pairs: Iterator[Any]) -> _Work | None:
+    """Return the next pair; None if there is none."""
+    for taken in pairs:
+        if isinstance(taken, (tuple, list)) and len(taken) == 3:
+            return _Work(*taken)
+        raise InputError(f"a pair is {taken!r:.80}; give (key, mesh, print)", "usage")
+    return None
 
 
 def _size(value: Any) -> int:
@@ -125,16 +136,19 @@ def _results(
     pool: list[threading.Thread] = []
     waiting: list[_Work] = []
     held: _Work | None = None
+    failure: Exception | None = None
     more = True
     try:
         while True:
             while more and len(waiting) < 2 * threads:
                 if held is None:
-                    taken = next(pairs, None)
-                    if taken is None:
+                    try:
+                        held = _next(pairs)
+                    except Exception as error:  # raised again after the results of the pairs before it
+                        failure = error
+                    if held is None:
                         more = False
                         break
-                    held = _Work(*taken)
                 in_process = sum(work.bytes for work in waiting if not work.done.is_set())
                 if max_bytes is not None and in_process and in_process + held.bytes > max_bytes:
                     break
@@ -145,6 +159,8 @@ def _results(
                 todo.put(held)
                 held = None
             if not waiting:
+                if failure is not None:
+                    raise failure
                 return
             first = waiting.pop(0)
             # A wait without a limit would not notice Ctrl-C on every system.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from . import _native as _rust
 from ._alignment import METRICS, Alignment
 from ._blocks import BlockAlignment
-from ._errors import Cancelled, Error, ReadOnlyProject
+from ._errors import Cancelled, Error, InputError, ReadOnlyProject
 from ._frozen import Frozen
 from ._inputs import Print, read_print
 
@@ -69,7 +69,7 @@ class Pair(Frozen):
 
     @property
     def alignment(self) -> Alignment:
-        """The stored alignment, equal to that of `align` for the same files.
+        """The stored alignment, equal to that of `align` for the same files, unit and side.
 
         Raises
         ------
@@ -90,7 +90,10 @@ class Pair(Frozen):
 
     def mask(self, metric: str = "relief") -> NDArray[np.bool_]:
         """Return the strokes of a metric in the frame of the print."""
-        return self.alignment.results[metric].aligned_mask()
+        results = self.alignment.results
+        if metric not in results:
+            raise InputError(f"there is no metric {metric!r}, only {', '.join(results)}", "usage")
+        return results[metric].aligned_mask()
 
     def overlay(self, metric: str = "relief") -> NDArray[np.uint8]:
         """Return the print with the edges of the strokes."""
@@ -102,9 +105,12 @@ class Pair(Frozen):
 
     @property
     def files(self) -> dict[str, Path]:
-        """Paths of the mesh and the print."""
+        """Paths by name: ``"mesh"`` and ``"print"``."""
         folder = self._project.folder
         return {"mesh": folder / self._detail["mesh_path"], "print": folder / self._detail["print_path"]}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Pair, (self._project, self._detail)
 
     def __repr__(self) -> str:
         return f"<mocban.Pair {self.id}: {self.status}>"
@@ -157,6 +163,12 @@ class Project:
     ) -> None:
         return None
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Project) and self.__reduce__() == other.__reduce__()
+
+    def __hash__(self) -> int:
+        return hash(self.__reduce__())
+
     def __reduce__(self) -> tuple[Any, ...]:
         return Project, (self._folder, self._catalog, self._readonly)
 
@@ -202,9 +214,15 @@ class Project:
             For polars.from_arrow, pandas (``to_pandas()``) and duckdb.
         """
         try:
+            import pyarrow.compute
             import pyarrow.parquet
         except ImportError:
             raise ImportError("Project.pairs needs pyarrow: pip install 'mocban[arrow]'") from None
+        if metric is not None and metric not in METRICS:
+            raise InputError(f"there is no metric {metric!r}, only {', '.join(METRICS)}", "usage")
+        if where is not None and not isinstance(where, pyarrow.compute.Expression):
+            text = "where is no expression of pyarrow; give one such as pyarrow.compute.field('iou') > 0.9"
+            raise InputError(text, "usage")
         metrics: list[str] = list(METRICS) if metric is None else [metric]
         if self.settings["pipeline"]["method"] == "paper":
             metrics = [name for name in metrics if name != "relief"] or ["ensemble"]
@@ -213,7 +231,12 @@ class Project:
         with tempfile.TemporaryDirectory(prefix="mocban-") as folder:
             table = Path(folder) / "table"
             self._native.export(os.fspath(table), ["parquet"], metrics, "all", False)
-            read = pyarrow.parquet.read_table(table / "pairs.parquet", columns=columns, filters=where, memory_map=False)
+            file = table / "pairs.parquet"
+            known = pyarrow.parquet.read_schema(file).names
+            for name in columns or ():
+                if name not in known:
+                    raise InputError(f"there is no column {name!r}, only {', '.join(known)}", "usage")
+            read = pyarrow.parquet.read_table(file, columns=columns, filters=where, memory_map=False)
         return read.replace_schema_metadata(None)
 
     def pair(self, id: str) -> Pair:
@@ -302,7 +325,8 @@ class Project:
         ----------
         rows : iterable of mappings, or a data frame of pandas, polars or pyarrow
             With the columns ``id``, ``mesh`` and ``print``; optional ``character``, ``block``, ``unit`` and
-            ``scanned_face_down``; others are kept. Paths are relative to the working directory. None and NaN are left out.
+            ``scanned_face_down``; others are kept, as text if JSON has no such type. Paths are relative to the working
+            directory. None and NaN are left out. Messages call the first row line 1.
         allow_missing : bool
             Whether files may be missing.
         allow_changed_files : bool
@@ -316,8 +340,9 @@ class Project:
         dict
             Numbers ``added``, ``unchanged``, ``retired`` and ``restored``, ids ``changed``, and ``missing_files``.
         """
-        lines = "".join(json.dumps(_row(row), ensure_ascii=False) + "\n" for row in _records(rows))
-        file = Path.cwd() / "rows.jsonl"
+        records = enumerate(_records(rows), 1)
+        lines = "".join(json.dumps(_row(row, line), ensure_ascii=False, default=str) + "\n" for line, row in records)
+        file = Path.cwd() / "rows"
         project = self._writable()
         rows_json = lines.encode()
         outcome = json.loads(
@@ -365,10 +390,12 @@ class Project:
         ids: Iterable[str] | None = None,
         workers: int | None = None,
         progress: Callable[[dict[str, Any]], object] | None = None,
+        stop_at_once: bool = False,
     ) -> dict[str, Any]:
         """Run pairs until none is left, as ``mocban run`` does.
 
-        Ctrl-C finishes the stages in progress, stores them and raises KeyboardInterrupt; a second one stops at once.
+        Ctrl-C finishes the stages in progress, stores them and raises KeyboardInterrupt; a second one, or the first with
+        ``stop_at_once``, stops at once. What was stored before stays.
 
         Parameters
         ----------
@@ -378,7 +405,9 @@ class Project:
             Pairs computed at the same time; that of the settings by default.
         progress : callable, optional
             Called with each event, a dict with ``message_type`` such as ``"started"`` or ``"pair_done"``. If it returns
-            False, the run is stopped.
+            False, the run is stopped; an exception stops it too, and is raised.
+        stop_at_once : bool
+            Whether a stop loses the stages in progress, which take seconds if they are of a block.
 
         Returns
         -------
@@ -404,7 +433,7 @@ class Project:
                 text = "the run was stopped by its progress function; what was computed so far is stored"
                 raise Cancelled(text, "cancelled", self._folder)
 
-        return json.loads(self._writable().run(names, workers, None if progress is None else heard))
+        return json.loads(self._writable().run(names, workers, None if progress is None else heard, stop_at_once))
 
     def report(self) -> dict[str, Any]:
         """Return the report of ``mocban report --format json``."""
@@ -435,6 +464,8 @@ class Project:
             Numbers of pairs, and those that cannot be read.
         """
         chosen = [formats] if isinstance(formats, str) else list(formats)
+        if not chosen:
+            raise InputError("formats is empty; give one such as 'csv'", "usage")
         return json.loads(self._native.export(os.fspath(dir), chosen, list(metrics or ()), only, False))
 
 
@@ -445,6 +476,9 @@ def _warn(text: str) -> None:
 
 
 def _records(rows: Any) -> Iterable[Mapping[str, Any]]:
+    if isinstance(rows, (str, bytes, os.PathLike, Mapping)):
+        text = f"the rows are a {type(rows).__name__}; give a list of dicts or a data frame"
+        raise InputError(text, "usage")
     for method in ("to_dicts", "to_pylist"):  # polars, pyarrow
         if hasattr(rows, method):
             return getattr(rows, method)()
@@ -453,7 +487,10 @@ def _records(rows: Any) -> Iterable[Mapping[str, Any]]:
     return rows
 
 
-def _row(row: Mapping[str, Any]) -> dict[str, Any]:
+def _row(row: Any, line: int) -> dict[str, Any]:
+    if not isinstance(row, Mapping):
+        text = f"line {line} of the rows is a {type(row).__name__}; give a dict with id, mesh and print"
+        raise InputError(text, "usage")
     values: dict[str, Any] = {}
     for name, value in row.items():
         if hasattr(value, "item"):
@@ -470,7 +507,7 @@ def open(
     path_or_url: str | os.PathLike[str],
     *,
     readonly: bool = True,
-    folder: str | os.PathLike[str] = ".",
+    folder: str | os.PathLike[str] | None = None,
 ) -> Project:
     """Open a project.
 
@@ -481,7 +518,7 @@ def open(
     readonly : bool
         Whether methods that write are refused.
     folder : path-like
-        The project's folder, if an address is given.
+        The project's folder, if an address is given; the working directory by default.
 
     Returns
     -------
@@ -503,6 +540,10 @@ def open(
     """
     text = os.fspath(path_or_url)
     is_url = text.startswith(("postgres://", "postgresql://"))
-    project = Project(folder, text, readonly) if is_url else Project(text, None, readonly)
+    if "://" in text and not is_url:
+        raise InputError(f"{text} is no address of a catalog; give postgresql://...", "usage")
+    if folder is not None and not is_url:
+        raise InputError("folder is only for an address; give the folder of the project alone", "usage")
+    project = Project(folder or ".", text, readonly) if is_url else Project(text, None, readonly)
     project._native.check(readonly)
     return project

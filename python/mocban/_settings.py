@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from . import _native as _rust
@@ -54,6 +54,16 @@ class Settings(Frozen):
         except (KeyError, TypeError):
             raise KeyError(name) from None
         return value
+
+    def __contains__(self, name: object) -> bool:
+        try:
+            self[str(name)]
+        except KeyError:
+            return False
+        return True
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.to_dict())
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Settings) and self._native.json == other._native.json
@@ -117,7 +127,9 @@ def settings(preset: str = "default", **changes: Any) -> Settings:
             flat.extend((f"{name}.{inner}", part) for inner, part in value.items())
         else:
             flat.append((name, value))
-    for name, _ in flat:
+    for place, (name, _) in enumerate(flat):
+        if any(name == other for other, _ in flat[:place]):
+            raise SettingsError(f"{name} is given twice", "settings")
         section = name.partition(".")[0]
         if section in ("run", "storage", "review"):
             text = f"{name} belongs to a project and not to an alignment; set it in the project's mocban.toml"
@@ -126,3 +138,13 @@ def settings(preset: str = "default", **changes: Any) -> Settings:
             text = f"{name} is not of the form section__key, such as depth__longest_px"
             raise SettingsError(text, "settings")
     return Settings(preset, tuple(flat))
+
+
+def settings_of(chosen: Settings | str | None) -> Settings:
+    """Return settings, those of a preset, or the default ones."""
+    if chosen is None or isinstance(chosen, str):
+        return settings(chosen or "default")
+    if isinstance(chosen, Settings):
+        return chosen
+    text = f"the settings are a {type(chosen).__name__}; give mocban.settings(...)"
+    raise SettingsError(text, "settings")

@@ -11,7 +11,7 @@ from . import _native as _rust
 from ._alignment import heights_of
 from ._frozen import Frozen
 from ._inputs import Mesh, Print, mesh_of, print_of
-from ._settings import Settings, settings as default_settings
+from ._settings import Settings, settings_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -139,7 +139,7 @@ def fit_surface(
     mesh: Mesh | str | os.PathLike[str],
     print: Print | str | os.PathLike[str] | ArrayLike | None = None,
     *,
-    settings: Settings | None = None,
+    settings: Settings | str | None = None,
     scanned_face_down: bool | None = None,
 ) -> Surface:
     """Fit a surface to the stroke tops of a scan, on its carved side.
@@ -149,9 +149,10 @@ def fit_surface(
     mesh : Mesh or path-like
     print : Print, path-like or array_like, optional
         Helps to find the carved side.
-    settings : Settings, optional
+    settings : Settings or name of a preset, optional
     scanned_face_down : bool, optional
-        Whether the carved face points towards -z of the mesh; found out by default.
+        Whether the carved face points towards -z of the mesh; found out by default. It decides only where the scan does not
+        show it.
 
     Returns
     -------
@@ -168,7 +169,7 @@ def fit_surface(
     >>> mocban.fit_surface("pair.stl", "pair.png").plane_from_mesh.shape
     (4, 4)
     """
-    chosen = default_settings() if settings is None else settings
+    chosen = settings_of(settings)
     scan = mesh_of(mesh, chosen)._native
     image = None if print is None else print_of(print, chosen)._native
     return Surface(_rust.fit_surface(scan, image, chosen._native, scanned_face_down))
@@ -178,7 +179,7 @@ def depth_map(
     mesh: Mesh | str | os.PathLike[str],
     surface: Surface | None = None,
     *,
-    settings: Settings | None = None,
+    settings: Settings | str | None = None,
 ) -> DepthMap:
     """Render the heights of a scan over a surface.
 
@@ -187,7 +188,7 @@ def depth_map(
     mesh : Mesh or path-like
     surface : Surface, optional
         That of `fit_surface` by default.
-    settings : Settings, optional
+    settings : Settings or name of a preset, optional
 
     Returns
     -------
@@ -204,20 +205,22 @@ def depth_map(
     >>> max(mocban.depth_map("pair.stl").levels.shape)
     512
     """
-    chosen = default_settings() if settings is None else settings
+    chosen = settings_of(settings)
     scan = mesh_of(mesh, chosen)
     fitted = fit_surface(scan, settings=chosen) if surface is None else surface
     width, height, levels, scale = _rust.depth_map(scan._native, fitted._json, chosen._native)
     return DepthMap(levels.reshape(height, width), scale)
 
 
-def print_mask(print: Print | str | os.PathLike[str] | ArrayLike, *, settings: Settings | None = None) -> NDArray[np.bool_]:
+def print_mask(
+    print: Print | str | os.PathLike[str] | ArrayLike, *, settings: Settings | str | None = None
+) -> NDArray[np.bool_]:
     """Return the ink of a print in its likeliest interpretation. `align` may choose another one.
 
     Parameters
     ----------
     print : Print, path-like or array_like
-    settings : Settings, optional
+    settings : Settings or name of a preset, optional
         Only the limits of files are used.
 
     Returns
@@ -236,6 +239,6 @@ def print_mask(print: Print | str | os.PathLike[str] | ArrayLike, *, settings: S
     >>> bool(0.01 < ink.mean() < 0.7)
     True
     """
-    image = print_of(print, default_settings() if settings is None else settings)
+    image = print_of(print, settings_of(settings))
     width, height = image.size
     return image._native.ink().reshape(height, width)

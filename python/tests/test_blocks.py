@@ -18,7 +18,7 @@ def aligned(block: Path, tmp_path_factory: pytest.TempPathFactory) -> mocban.Blo
     return mocban.align_block(block / "block.ply", block / "page.jpg", labels=labels, folder=folder)
 
 
-def test_characters_of_files_are_those_of_the_project(aligned: mocban.BlockAlignment) -> None:
+def test_characters_of_files_are_those_of_the_project(aligned: mocban.BlockAlignment, block: Path) -> None:
     assert aligned.status == "done" and aligned.error is None
     assert aligned.agreement is not None and aligned.agreement > 0.8
     assert [one.label for one in aligned.characters] == ["c01-r01", "c01-r02", "c01-r03", "c01-r04"]
@@ -31,6 +31,9 @@ def test_characters_of_files_are_those_of_the_project(aligned: mocban.BlockAlign
     pixels = mesh.vertices.mean(axis=0) @ first.page_from_mesh[:2, :3].T + first.page_from_mesh[:2, 3]
     left, top, right, bottom = first.box
     assert left < pixels[0] < right and top < pixels[1] < bottom
+    labels = block / "labels.json"
+    folder = aligned.project.folder
+    assert mocban.align_block(block / "block.ply", block / "page.jpg", labels=labels, folder=folder) == aligned
     again = aligned.project.block("block")
     assert again == aligned and hash(again) == hash(aligned)
     assert pickle.loads(pickle.dumps(aligned)) == aligned
@@ -63,9 +66,17 @@ def test_arrays_give_the_result_of_their_files(aligned: mocban.BlockAlignment, b
     assert not folder.exists()
 
 
-def test_wrong_files_are_named(block: Path, tmp_path: Path) -> None:
+def test_wrong_files_are_named(block: Path, demo: Path, tmp_path: Path) -> None:
     with pytest.raises(mocban.ProjectError, match="no.ply"):
         mocban.align_block(tmp_path / "no.ply", block / "page.jpg")
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "notes.txt").touch()
+    for folder in (other, demo):
+        with pytest.raises(mocban.ProjectError, match="something else than a block"):
+            mocban.align_block(block / "block.ply", block / "page.jpg", folder=folder)
+    with pytest.raises(mocban.InputError, match="left < right"):
+        mocban.align_block(block / "block.ply", block / "page.jpg", labels=[{"box": (5, 5, 1, 1)}])
     with pytest.raises(mocban.Error, match="has no box"):
         mocban.align_block(block / "block.ply", block / "page.jpg", labels=[{"label": "a"}])
     with pytest.raises(mocban.MeshError, match="give a mocban.Mesh"):

@@ -67,7 +67,7 @@ def test_the_copy_is_apart_from_the_array() -> None:
         (np.zeros((4, 3), dtype=complex), None, "complex128"),
         (np.array([["a"] * 3]), None, "<U1"),
         ("scan.stl", None, "path 'scan.stl'"),
-        (None, None, "object"),
+        (None, None, "are None"),
         ([[0, 0, 0], [1, 1]], None, "no array"),
         (np.ma.masked_equal(CORNERS, 1.5), None, "masked"),
         (np.where(CORNERS == 1.5, np.nan, CORNERS), FACES, r"vertex 3 \(counted from 0\) has the coordinate NaN"),
@@ -127,7 +127,7 @@ def test_images_of_every_layout_are_copied(channels: int, dtype: object) -> None
         (np.zeros((4, 4, 5), dtype=np.uint8), r"shape \(4, 4, 5\)"),
         (np.zeros((2, 4, 4, 3), dtype=np.uint8), "shape"),
         ("print.png", "path"),
-        (None, "object"),
+        (None, "are None"),
     ],
 )
 def test_arrays_that_are_no_image_are_refused(image: object, says: str) -> None:
@@ -194,3 +194,27 @@ def test_warnings_go_to_the_logger(pair: DemoPair, caplog: pytest.LogCaptureFixt
     with caplog.at_level(logging.WARNING, logger="mocban"):
         mocban.read_mesh(pair.mesh, unit="m")
     assert "perhaps mm" in caplog.text
+
+
+def test_inputs_that_are_no_arrays_have_a_sentence() -> None:
+    wrong: list[tuple[str, object]] = [
+        ("pixels are None.*was the file read", None),
+        ("bytes of a file", b"\x89PNG"),
+        ("limits.image.max_pixels", np.broadcast_to(np.uint8(255), (100_000, 100_000))),
+        ("255 . ~mask", np.zeros((40, 30), dtype=bool)),
+        ("round", np.zeros((40, 30))),
+    ]
+    for sentence, image in wrong:
+        with pytest.raises(mocban.ImageError, match=sentence):
+            mocban.Print(image)  # type: ignore[arg-type]
+    assert mocban.Print([[0, 255]] * 2) == mocban.Print(np.array([[0, 255]] * 2, dtype=np.uint8))
+    mesh = mocban.Mesh(CORNERS, FACES)
+    with pytest.raises(mocban.MeshError, match="give its arrays"):
+        mocban.Mesh(mesh)  # type: ignore[arg-type]
+    with pytest.raises(mocban.MeshError, match="give a number"):
+        mocban.Mesh.from_heights(np.zeros((3, 3)), mm_per_px="a")  # type: ignore[arg-type]
+    with pytest.raises(mocban.UnitError, match="that of the mesh is mm"):
+        mocban.align(mesh, [[0, 255]] * 2, unit="in")
+    with pytest.raises(mocban.SettingsError, match="given twice"):
+        mocban.settings(depth={"longest_px": 256}, depth__longest_px=128)
+    assert "depth.longest_px" in mocban.settings() and "depth" in list(mocban.settings())

@@ -27,6 +27,23 @@ def test_results_come_in_order_and_failures_end_nothing(pairs: list[DemoPair], t
     assert found[0][1] == mocban.align(pairs[0].mesh, pairs[0].print)
 
 
+def test_an_exception_of_the_pairs_comes_after_the_results_before_it(pair: DemoPair) -> None:
+    def failing():
+        yield "a", pair.mesh, pair.print
+        yield "b", pair.mesh, pair.print
+        raise LookupError("no more")
+
+    found = mocban.align_many(failing(), threads=2)
+    assert [next(found)[0], next(found)[0]] == ["a", "b"]
+    with pytest.raises(LookupError):
+        next(found)
+    with pytest.raises(mocban.InputError, match="give .key, mesh, print."):
+        list(mocban.align_many([(pair.mesh, pair.print)]))  # type: ignore[list-item]
+    for wrong in ({"threads": 1.5}, {"max_bytes": 0}, {"metrics": ["nope"]}, {"metrics": []}, {"settings": {}}):
+        with pytest.raises(mocban.Error):
+            mocban.align_many([], **wrong)  # type: ignore[arg-type]
+
+
 def test_pairs_are_taken_when_they_are_needed(pair: DemoPair) -> None:
     taken = 0
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+import datetime
 import json
 import pickle
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import mocban
@@ -142,6 +145,35 @@ def test_rows_are_imported_and_run_with_progress(pairs: list[DemoPair], tmp_path
     exported = project.export(tmp_path / "out", ["jsonl", "csv"], metrics=["relief"])
     assert exported["done"] + exported["without_result"] == 4
     assert (tmp_path / "out" / "jsonl" / "pairs.jsonl").exists()
+
+
+def test_wrong_arguments_have_a_sentence(demo: Path, tmp_path: Path) -> None:
+    project = mocban.open(demo)
+    pair = project.pair(project.pairs(["id"])["id"][0].as_py())
+    assert pickle.loads(pickle.dumps(pair)).files == pair.files and copy.deepcopy(project) == project
+    new = mocban.Project.create(tmp_path / "new")
+    wrong: list[tuple[str, Callable[[], object]]] = [
+        ("no column 'nope', only id", lambda: project.pairs(["nope"])),
+        ("where is no expression", lambda: project.pairs(where="iou > 0.9")),
+        ("no metric 'nope'", lambda: project.pairs(metric="nope")),
+        ("no metric 'nope'", lambda: pair.mask("nope")),
+        ("formats is empty", lambda: project.export(tmp_path / "e", [])),
+        ("the rows are a str", lambda: new.import_pairs("rows.csv")),
+        ("the rows are a dict", lambda: new.import_pairs({"id": "a"})),
+        ("line 1 of the rows is a int", lambda: new.import_pairs([1])),
+        ("no address of a catalog", lambda: mocban.open("mysql://server/x")),
+        ("folder is only for an address", lambda: mocban.open(demo, folder=tmp_path)),
+    ]
+    for sentence, call in wrong:
+        with pytest.raises(mocban.InputError, match=sentence):
+            call()
+    row = {"id": "a", "mesh": pair.files["mesh"], "print": pair.files["print"], "when": datetime.date(2020, 1, 2)}
+    assert new.import_pairs([row])["added"] == 1
+    assert new.pair("a").meta["when"] == "2020-01-02"
+    with pytest.raises(mocban.ProjectError, match="pair a has no alignment: run it"):
+        new.pair("a").alignment
+    with pytest.raises(mocban.ProjectError, match="/rows"):
+        new.import_pairs([{"id": "b", "mesh": "", "print": "x.png"}])
 
 
 def test_folders_that_are_no_project_are_refused(demo: Path, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import mocban
@@ -12,10 +12,17 @@ import mocban
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "python.md"
 
 
+def call_of(value: Callable[..., object]) -> str:
+    """Return the parameters with their defaults."""
+    signature = inspect.signature(value)
+    bare = [p.replace(annotation=inspect.Parameter.empty) for p in signature.parameters.values() if p.name != "self"]
+    return str(signature.replace(parameters=bare, return_annotation=inspect.Signature.empty))
+
+
 def described(name: str, value: object, level: int) -> Iterator[str]:
     heading = name
     if inspect.isfunction(value) or inspect.ismethod(value):
-        heading = f"{name}{inspect.signature(value)}" if len(str(inspect.signature(value))) < 60 else f"{name}(...)"
+        heading = f"{name}{call_of(value)}"
     yield f"{'#' * level} `{heading}`\n"
     doc = inspect.getdoc(value)
     if doc:

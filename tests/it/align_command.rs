@@ -19,10 +19,10 @@ const NUMBERS: [&str; 7] = [
     "confidence",
 ];
 
-/// Makes a demo project `d` and exports it to `e`.
-fn exported(dir: &Path) {
-    let tiers = ["demo", "d", "--tier", "pose", "--pairs", "4"];
-    mocban(dir, &tiers).expect(0);
+/// Makes a demo project `d` of four pairs of a tier and exports it to `e`.
+fn exported(dir: &Path, tier: &str) {
+    let demo = ["demo", "d", "--tier", tier, "--pairs", "4"];
+    mocban(dir, &demo).expect(0);
     mocban(dir, &["-C", "d", "export", "--to", "jsonl", "-o", "e"]).expect(0);
 }
 
@@ -46,11 +46,22 @@ fn align(dir: &Path, line: &Value, more: &[&str]) -> Call {
 
 #[test]
 fn a_pair_alone_gives_the_results_and_files_of_a_project() {
+    assert_eq!(levelled_pairs_that_equal_a_project("pose"), 0);
+}
+
+#[test]
+fn a_pair_alone_is_levelled_as_in_a_project() {
+    assert!(levelled_pairs_that_equal_a_project("stitched") > 0);
+}
+
+/// Aligns each of four pairs of a tier alone, and compares results and files with those of a project. Returns the number
+/// of pairs whose depth map was levelled.
+fn levelled_pairs_that_equal_a_project(tier: &str) -> usize {
     let dir = empty();
-    exported(dir.path());
+    exported(dir.path(), tier);
     let lines = crate::export_readback::lines(&dir.path().join("e"));
     let firsts = lines.iter().filter(|line| line["metric"] == "relief");
-    let mut compared = 0;
+    let (mut compared, mut levelled) = (0, 0);
     for first in firsts {
         let found = align(dir.path(), first, &["-o", "chữ/kết quả"])
             .expect(0)
@@ -92,15 +103,18 @@ fn a_pair_alone_gives_the_results_and_files_of_a_project() {
         }
         let stored = fs::read_to_string(folder.join("alignment.json")).expect("the numbers");
         assert_eq!(serde_json::from_str::<Value>(&stored).expect("JSON"), found);
+        let sidecar = fs::read_to_string(folder.join("depth.json")).expect("the scale");
+        levelled += usize::from(sidecar.contains("levelling"));
         compared += 1;
     }
     assert_eq!(compared, 4);
+    levelled
 }
 
 #[test]
 fn vertices_without_a_position_are_told() {
     let dir = empty();
-    exported(dir.path());
+    exported(dir.path(), "pose");
     let (mesh, print) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0000.png");
     let whole = mocban(dir.path(), &["align", mesh, print, "--json"]).expect(0);
     assert_eq!(
@@ -157,7 +171,7 @@ fn what_is_said_of_a_scan_is_compared_with_what_was_found() {
 #[test]
 fn a_pair_of_two_characters_is_refused_and_writes_nothing() {
     let dir = empty();
-    exported(dir.path());
+    exported(dir.path(), "pose");
     let (mesh, print) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0001.png");
     let refused = mocban(dir.path(), &["align", mesh, print, "-o", "out"]).expect(3);
     assert!(refused.err.contains("not aligned: "), "{}", refused.err);

@@ -21,6 +21,9 @@ pub(super) const WIDE_MARGIN: f64 = 1.1;
 /// Minimum gap between the character and its neighbours, mm.
 const CLEARANCE_MM: f64 = 0.35;
 
+/// Distance of a close rule from the character, mm.
+const CLOSE_RULE_MM: f64 = 0.5;
+
 /// The strokes of one character.
 #[derive(Debug, Clone)]
 pub(super) struct Artwork {
@@ -120,6 +123,15 @@ impl Artwork {
         }
         clear_around(&mut neighbours, &self.strokes);
         neighbours
+    }
+
+    /// Adds a rule on either side of the character, so close that crops contain it.
+    pub(super) fn add_close_rules(&self, neighbours: &mut ScalarField, rng: &mut ChaCha8Rng) {
+        let (left, right) = (self.stroke_bounds.min[0], self.stroke_bounds.max[0]);
+        for u in [left - CLOSE_RULE_MM, right + CLOSE_RULE_MM] {
+            add_rule(neighbours, u, rng);
+        }
+        clear_around(neighbours, &self.strokes);
     }
 
     /// Returns the distance field of a scene without neighbours: `-size_mm` everywhere.

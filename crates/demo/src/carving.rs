@@ -23,7 +23,12 @@ pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) 
     let cut = ScalarField::from_fn(frame, |point, x, y| {
         let inside = all.at(x, y);
         if inside > 0.0 {
-            -worn_share * wear.at(point, inside)
+            let raised_mm = if scene.block_neighbours.at(x, y) > 0.0 {
+                scene.conditions.raised_mm
+            } else {
+                0.0
+            };
+            raised_mm - worn_share * wear.at(point, inside)
         } else {
             -worn_share * wear.at(point, 0.0) - knife.depth_mm(point, -inside, x, y)
         }

@@ -6,6 +6,7 @@ use super::draw::{number_within, one_of, within};
 use super::kind::{Base, Crop, DemoKind, NumberRange};
 use super::noise::Noise;
 use super::paper_geometry::PaperGeometry;
+use super::slow_errors::SlowErrors;
 use super::weathering::Weathering;
 
 /// Conditions of carving, scan, print and crop. The default applies to the tiers without a kind.
@@ -30,6 +31,8 @@ pub(super) struct Conditions {
     pub paper: Option<PaperGeometry>,
     /// Which of mesh and print shows all neighbours.
     pub crop: Crop,
+    /// Height of neighbours and column rules above the character's tops, mm.
+    pub raised_mm: f64,
 }
 
 /// Errors of a scan beyond those of every scan.
@@ -41,6 +44,8 @@ pub(super) struct ScanErrors {
     pub ripple_mm: f64,
     /// Standard deviation of the smoothing, mm.
     pub smoothing_mm: f64,
+    /// Slow errors, if any.
+    pub slow: Option<SlowErrors>,
     /// Number of large holes.
     pub holes: u32,
     /// Number of far outlier vertices.
@@ -79,6 +84,7 @@ impl Default for Conditions {
                 noise: 1.0,
                 ripple_mm: 0.0,
                 smoothing_mm: 0.0,
+                slow: None,
                 holes: 0,
                 spikes: 0,
                 blobs: 0,
@@ -88,6 +94,7 @@ impl Default for Conditions {
             ink: None,
             paper: None,
             crop: Crop::Character,
+            raised_mm: 0.0,
         }
     }
 }
@@ -98,7 +105,7 @@ impl Conditions {
         let Some(kind) = kind else {
             return Self::default();
         };
-        Self {
+        let mut conditions = Self {
             depth: within(kind.depth, rng),
             weathering: Weathering::draw(kind, rng),
             lost: (kind.lost[1] > 0.0).then_some(kind.lost),
@@ -106,6 +113,7 @@ impl Conditions {
                 noise: within(kind.noise, rng),
                 ripple_mm: within(kind.ripple_mm, rng),
                 smoothing_mm: within(kind.smoothing_mm, rng),
+                slow: None,
                 holes: number_within(kind.holes, rng),
                 spikes: number_within(kind.spikes, rng),
                 blobs: number_within(kind.blobs, rng),
@@ -123,6 +131,13 @@ impl Conditions {
             }),
             paper: PaperGeometry::draw(kind, rng),
             crop: kind.crop,
+            raised_mm: 0.0,
+        };
+        // Kinds without these draw no random numbers for them.
+        conditions.scan.slow = SlowErrors::draw(kind, rng);
+        if kind.raised_mm[1] > 0.0 {
+            conditions.raised_mm = within(kind.raised_mm, rng);
         }
+        conditions
     }
 }

@@ -48,6 +48,12 @@ pub(super) struct DemoKind {
     pub ripple_mm: NumberRange,
     /// Standard deviation of the Gaussian by which the scan is smoothed, mm.
     pub smoothing_mm: NumberRange,
+    /// Amplitude of slow scan errors with features of some millimetres, mm.
+    pub drift_mm: NumberRange,
+    /// Height of the step between the two views that a scan was stitched from, mm. 0 for one view.
+    pub step_mm: NumberRange,
+    /// Height of neighbours and column rules above the character's tops, mm.
+    pub raised_mm: NumberRange,
     /// Number of large holes of the scan.
     pub holes: NumberRange,
     /// Number of far outlier vertices.
@@ -88,6 +94,9 @@ const ORDINARY: DemoKind = DemoKind {
     noise: [1.0, 1.0],
     ripple_mm: [0.0, 0.0],
     smoothing_mm: [0.0, 0.0],
+    drift_mm: [0.0, 0.0],
+    step_mm: [0.0, 0.0],
+    raised_mm: [0.0, 0.0],
     holes: [0.0, 0.0],
     spikes: [0.0, 0.0],
     blobs: [0.0, 0.0],
@@ -155,6 +164,24 @@ pub(super) const SMOOTHED: DemoKind = DemoKind {
 pub(super) const NOISY: DemoKind = DemoKind {
     noise: [1.5, 8.0],
     ripple_mm: [0.0, 0.07],
+    ..ORDINARY
+};
+
+/// Slow height errors, up to more than the carved depth.
+pub(super) const DRIFT: DemoKind = DemoKind {
+    drift_mm: [0.1, 1.2],
+    ..ORDINARY
+};
+
+/// Scans stitched from two views that do not meet: one is higher, and tilted.
+pub(super) const STITCHED: DemoKind = DemoKind {
+    step_mm: [0.05, 0.5],
+    ..ORDINARY
+};
+
+/// Rules and neighbours that are higher than the character.
+pub(super) const RAISED: DemoKind = DemoKind {
+    raised_mm: [0.05, 0.6],
     ..ORDINARY
 };
 

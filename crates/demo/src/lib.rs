@@ -36,6 +36,7 @@ mod scalar_field;
 mod scan_pose;
 mod scanner;
 mod scene;
+mod slow_errors;
 mod solvable;
 mod tier;
 mod truth_line;

@@ -132,6 +132,7 @@ impl SampledSurface {
                 });
                 let (u, v) = (u + shift[0], v + shift[1]);
                 let z = surface.value([u, v]) + style.noise_mm * normal(rng);
+                let z = z + style.errors.slow.map_or(0.0, |slow| slow.at([u, v]));
                 let z = ripple.map_or(z, |noise| {
                     z + ripple_mm * noise.at(u / RIPPLE_MM, v / RIPPLE_MM)
                 });

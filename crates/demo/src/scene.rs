@@ -74,7 +74,10 @@ impl Scene {
         let character = characters[rng.random_range(0..characters.len())];
         let crop = conditions.crop;
         let artwork = Artwork::of_glyph(glyphs, character, crop, rng);
-        let block_neighbours = artwork.draw_neighbours(glyphs, crop, rng);
+        let mut block_neighbours = artwork.draw_neighbours(glyphs, crop, rng);
+        if conditions.raised_mm > 0.0 {
+            artwork.add_close_rules(&mut block_neighbours, rng);
+        }
         let (print_neighbours, damage) = if tier.is_damaged() {
             let other = artwork.draw_neighbours(glyphs, crop, rng);
             (other, Damage::draw(&artwork, rng))

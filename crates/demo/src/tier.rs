@@ -35,6 +35,12 @@ pub enum Tier {
     Smoothed,
     /// Scans with strong noise and ripples.
     Noisy,
+    /// Scans with slow height errors, up to more than the carved depth.
+    Drift,
+    /// Scans stitched from two views that do not meet.
+    Stitched,
+    /// Rules and neighbours that are higher than the character.
+    RaisedRules,
     /// A block or foot deeper than wide.
     Thick,
     /// Another character on the back of the block.
@@ -70,7 +76,8 @@ pub enum Tier {
 enum_names! { pub Tier, "a tier":
     Upright = "upright", Pose = "pose", Hard = "hard", Real = "real",
     Field = "field", Worn = "worn", Shallow = "shallow", Filled = "filled",
-    Smoothed = "smoothed", Noisy = "noisy", Thick = "thick", DoubleFaced = "double-faced",
+    Smoothed = "smoothed", Noisy = "noisy", Drift = "drift", Stitched = "stitched",
+    RaisedRules = "raised-rules", Thick = "thick", DoubleFaced = "double-faced",
     Table = "table", Debris = "debris", Holes = "holes", Dry = "dry",
     Heavy = "heavy", Photo = "photo", Wavy = "wavy", Shrunk = "shrunk",
     Lost = "lost", GridMesh = "grid-mesh", GridPrint = "grid-print", Mixed = "mixed",
@@ -103,6 +110,9 @@ impl Tier {
             Self::Filled => &kind::FILLED,
             Self::Smoothed => &kind::SMOOTHED,
             Self::Noisy => &kind::NOISY,
+            Self::Drift => &kind::DRIFT,
+            Self::Stitched => &kind::STITCHED,
+            Self::RaisedRules => &kind::RAISED,
             Self::Thick => &kind::THICK,
             Self::DoubleFaced => &kind::DOUBLE_FACED,
             Self::Table => &kind::TABLE,

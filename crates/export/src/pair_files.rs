@@ -8,7 +8,7 @@ use super::pair_pictures::{PairPictures, PictureError};
 use mocban_catalog::MetricRecord;
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask, stroke_map};
 use mocban_core::domain::{
-    DepthScale, LengthUnit, MetricOutcome, PairName, Stage, ThresholdMetric,
+    DepthScale, LengthUnit, Levelling, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
 use mocban_core::raster::{compact_rgb8, png_grey16, png_mask};
 use mocban_results::pair_artifacts::same_alignment;
@@ -71,6 +71,9 @@ struct DepthSidecar<'a> {
     curvature: [f64; 6],
     /// Millimetres per mesh unit, where the unit is known.
     mm_per_mesh_unit: Option<f64>,
+    /// Heights over the curved surface that were subtracted, if the map was levelled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    levelling: Option<Levelling>,
 }
 
 /// Encodes the files of a finished pair. Returns the patterns of each selected metric.
@@ -86,7 +89,11 @@ pub(super) fn write_files(
     encoded.add_file(shared("depth.png"), pictures.depth_file()?);
     encoded.add_file(
         shared("depth.json"),
-        sidecar(&pictures.outcomes.depth.scale).into_bytes(),
+        sidecar(
+            &pictures.outcomes.depth.scale,
+            pictures.outcomes.register.levelling,
+        )
+        .into_bytes(),
     );
     let canvas = pictures.stored_file(Stage::Register, CANVAS_PRINT_MASK)?;
     encoded.add_file(shared("canvas_print_mask.png"), canvas);
@@ -201,12 +208,13 @@ fn first_of_each<T>(items: &[T], is_same: impl Fn(&T, &T) -> bool) -> Vec<usize>
 }
 
 /// Returns the text of the file beside a depth map that gives its scale.
-pub(super) fn sidecar(scale: &DepthScale) -> String {
+pub(super) fn sidecar(scale: &DepthScale, levelling: Option<Levelling>) -> String {
     let sidecar = DepthSidecar {
         no_data: 0,
         scale,
         curvature: scale.curvature.map_or([0.0; 6], |curvature| curvature.0),
         mm_per_mesh_unit: scale.unit.map(LengthUnit::mm),
+        levelling,
     };
     let text = serde_json::to_string_pretty(&sidecar)
         .expect("a scale holds only numbers, lists and names");

@@ -12,7 +12,9 @@ use mocban_core::InputLimits;
 use mocban_core::domain::artifact_role::DEPTH;
 use mocban_core::domain::{Affine2, ArtifactRef, Explained, MetricOutcome, Stage};
 use mocban_core::mesh::{self, Mesh, MeshError, MeshReadError};
-use mocban_core::raster::{DepthMap, Grid, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb};
+use mocban_core::raster::{
+    DepthMap, Grid, Mask, png_grey16, png_rgb8, warp_depth, warp_mask, warp_rgb,
+};
 use mocban_results::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_store::{InputError, Project, open_input};
 
@@ -132,8 +134,16 @@ impl<'a> PairPictures<'a> {
         get_or_read(&self.print_mask, || Ok(self.artifacts().print_mask()?))
     }
 
-    /// Returns the depth map, in its own frame, as the stored PNG.
-    pub(super) fn depth_file(&self) -> Result<&[u8], PictureError> {
+    /// Returns the depth map, in its own frame, as a PNG. It is the stored file unless the map was levelled.
+    pub(super) fn depth_file(&self) -> Result<Cow<'_, [u8]>, PictureError> {
+        if self.outcomes.register.levelling.is_some() {
+            return Ok(Cow::Owned(png_grey16(&self.depth()?.levels)));
+        }
+        Ok(Cow::Borrowed(self.stored_depth()?))
+    }
+
+    /// Returns the depth map as the depth stage stored it.
+    fn stored_depth(&self) -> Result<&[u8], PictureError> {
         let file = get_or_read(&self.depth_file, || self.stored_file(Stage::Depth, DEPTH))?;
         Ok(file)
     }
@@ -141,7 +151,7 @@ impl<'a> PairPictures<'a> {
     /// Returns the depth map, in its own frame.
     pub(super) fn depth(&self) -> Result<&DepthMap, PictureError> {
         get_or_read(&self.depth, || {
-            Ok(self.artifacts().decode_depth(self.depth_file()?)?)
+            Ok(self.artifacts().decode_depth(self.stored_depth()?)?)
         })
     }
 

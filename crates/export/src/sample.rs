@@ -135,7 +135,7 @@ pub(super) fn pictures(
     let files = [
         print,
         png_mask(&result.print_mask()?),
-        result.depth_file()?.to_vec(),
+        result.depth_file()?.into_owned(),
         png_grey16(&result.aligned_depth(outcome)?),
         png_mask(result.aligned_mask(outcome)?.as_ref()),
     ];

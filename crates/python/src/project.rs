@@ -25,7 +25,7 @@ use mocban_project::verdict_words;
 use mocban_project::verdicts::{self, RecordedVerdict};
 use mocban_project::{ProjectError, ProjectResult, Refusal, export};
 use mocban_results::IntervalMethod;
-use mocban_runner::Stop;
+use mocban_runner::{Stop, StopLevel};
 
 /// A project folder and its settings.
 #[pyclass(frozen, module = "mocban._native")]
@@ -105,6 +105,14 @@ impl NativeProject {
             |location, hearing, _stop| work(location, hearing),
             |_| Ok(()),
         )
+    }
+}
+
+/// Turns the request for a drain into one for an immediate stop.
+async fn stop_soon(stop: Arc<Stop>) {
+    stop.reached(StopLevel::Drain).await;
+    while stop.level() < StopLevel::Now {
+        stop.escalate();
     }
 }
 
@@ -308,6 +316,7 @@ impl NativeProject {
         ids: Vec<String>,
         workers: Option<usize>,
         progress: Option<Bound<'_, PyAny>>,
+        stop_at_once: bool,
     ) -> PyResult<String> {
         let on_event = |event: &str| {
             progress
@@ -315,6 +324,9 @@ impl NativeProject {
                 .map_or(Ok(()), |call| call.call1((event,)).map(drop))
         };
         let work = move |location: Location, hearing: Hearing, stop: Arc<Stop>| async move {
+            if stop_at_once {
+                tokio::spawn(stop_soon(Arc::clone(&stop)));
+            }
             let mut options = options(&location.settings()?.config);
             if let Some(workers) = workers {
                 options.workers = workers;

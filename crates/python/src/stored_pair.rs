@@ -40,7 +40,11 @@ pub(crate) async fn alignment(
     catalog.close().await;
     let results = detail?.results;
     if results.status != JobStatus::Done {
-        let text = format!("pair {id} has no alignment; `status` of the pair says why");
+        let why = match &results.failure {
+            Some(failed) => format!("it failed: {}", failed.failure.message),
+            None => "run it".to_owned(),
+        };
+        let text = format!("pair {id} has no alignment: {why}");
         return Err(Refusal::NothingSelected(text).into());
     }
     assembled(&project, &results, limits)

@@ -5,8 +5,8 @@ use serde::de::DeserializeOwned;
 use mocban_catalog::{MetricRecord, PairResults, StageRecord};
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, print_mask};
 use mocban_core::domain::{
-    Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh,
-    RegisterOutcome, Stage,
+    Affine2, ArtifactRef, DepthOutcome, FitOutcome, Levelling, MetricOutcome, NormalizeOutcome,
+    PrintFromMesh, RegisterOutcome, Stage,
 };
 use mocban_core::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
 use mocban_store::Project;
@@ -105,7 +105,7 @@ impl<'a> PairArtifacts<'a> {
         Ok(self.project.read_artifact(self.artifact(stage, role)?)?)
     }
 
-    /// Reads the depth map with its scale.
+    /// Reads the depth map with its scale, levelled as its registration requires.
     ///
     /// # Errors
     /// Returns an error if the result or the image of the depth stage cannot be read.
@@ -113,17 +113,31 @@ impl<'a> PairArtifacts<'a> {
         self.decode_depth(&self.bytes(Stage::Depth, DEPTH)?)
     }
 
-    /// Decodes the bytes of the depth map's artifact.
+    /// Decodes the bytes of the depth map's artifact, and levels the map if the registration did. Thresholds refer to the
+    /// result.
     ///
     /// # Errors
     /// Returns an error if the result of the depth stage cannot be read, or the bytes are not an image.
     pub fn decode_depth(&self, bytes: &[u8]) -> Result<DepthMap, PairArtifactsError> {
         let outcome: DepthOutcome = self.outcome(Stage::Depth)?;
         let levels = decode_grey16(bytes);
-        Ok(DepthMap {
+        let map = DepthMap {
             levels: levels.map_err(undecodable(DEPTH))?,
             scale: outcome.scale,
+        };
+        Ok(match self.levelling()? {
+            Some(levelling) => map.levelled(&levelling),
+            None => map,
         })
+    }
+
+    /// Returns the levelling that the registration found, if any.
+    fn levelling(&self) -> Result<Option<Levelling>, PairArtifactsError> {
+        if self.pair.stage(Stage::Register).is_none() {
+            return Ok(None);
+        }
+        let register: RegisterOutcome = self.outcome(Stage::Register)?;
+        Ok(register.levelling)
     }
 
     /// Reads the ink mask of the print. The mask has the frame and the size of the print image.

@@ -146,7 +146,7 @@ pub struct AlignedPair {
     pub hints: ScanHints,
     /// The plane.
     pub fit: FitOutcome,
-    /// The depth map, which reads like the print.
+    /// The depth map, which reads like the print, levelled as the registration requires.
     pub depth: DepthMap,
     /// Ink and canvas of the print, heights of the relief.
     pub normalized: Normalized,
@@ -208,7 +208,7 @@ impl AlignedPair {
         Ok(Self {
             hints,
             fit,
-            depth,
+            depth: registered.levelled(depth),
             normalized,
             registered,
         })

@@ -226,6 +226,7 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
         ink: 0,
         metrics: ThresholdMetric::ALL.map(metric).to_vec(),
         features: None,
+        levelling: None,
     };
     let last = stage == Stage::Register;
     let metrics = register.metrics.iter().map(|outcome| MetricResult {

@@ -20,6 +20,7 @@ mod height_from_mesh;
 mod ids;
 mod input_version;
 mod job;
+mod levelling;
 mod metric;
 mod outcome;
 mod pair_name;
@@ -59,6 +60,7 @@ pub use height_from_mesh::HeightFromMesh;
 pub use ids::{PairId, WorkerId};
 pub use input_version::InputVersion;
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
+pub use levelling::Levelling;
 pub use metric::ThresholdMetric;
 pub use outcome::{
     Curvature, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,

@@ -6,7 +6,7 @@ use std::num::NonZeroU64;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Affine2, LengthUnit, PrintOutline, Rigid3, ThresholdMetric};
+use super::{Affine2, LengthUnit, Levelling, PrintOutline, Rigid3, ThresholdMetric};
 
 /// The curved surface of the stroke tops. All lengths are in mesh units.
 ///
@@ -347,4 +347,7 @@ pub struct RegisterOutcome {
     /// Features of the pose, which is the same for all metrics. `None` under the paper's method.
     #[serde(default)]
     pub features: Option<PoseFeatures>,
+    /// Correction of the depth map to which the thresholds refer. `None` if one threshold fits the whole character.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levelling: Option<Levelling>,
 }

@@ -3,7 +3,7 @@
 use super::warp_mask::warp_level_sets;
 use super::{Grid, Mask};
 use crate::domain::cancel::poll;
-use crate::domain::{Affine2, DepthScale};
+use crate::domain::{Affine2, DepthScale, Levelling};
 
 /// Levels that are copied between two polls for a cancellation.
 const LEVELS_PER_POLL: usize = 1 << 16;
@@ -42,6 +42,27 @@ impl DepthMap {
         self.levels.map(|found| *found >= level.max(1))
     }
 
+    /// Returns the map with heights over the surface of a levelling. The scale stays the same: heights beyond its range
+    /// get its first or last level.
+    #[must_use]
+    pub fn levelled(&self, levelling: &Levelling) -> Self {
+        let size = [self.levels.width(), self.levels.height()];
+        let levels = Grid::from_fn(size[0], size[1], |x, y| {
+            let level = self.levels.at(x, y);
+            let height = levelling.height_at([x as f64, y as f64], size);
+            let moved = f64::from(level) - height / self.scale.height_per_level;
+            if level == 0 {
+                0
+            } else {
+                moved.round().clamp(1.0, 65_535.0) as u16
+            }
+        });
+        Self {
+            levels,
+            scale: self.scale.clone(),
+        }
+    }
+
     /// Returns the stroke masks at several thresholds, warped into another frame of `width` x `height` pixels.
     /// `to_from` maps depth-map pixels to pixels of that frame.
     pub fn warped_stroke_masks(
@@ -74,5 +95,35 @@ mod testing {
                 },
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DepthMap, Grid};
+    use crate::domain::Levelling;
+
+    #[test]
+    fn a_levelled_map_has_the_height_over_the_levelling_at_each_pixel() {
+        let levels = Grid::from_fn(
+            7,
+            7,
+            |x, y| if x == y { 0 } else { 30_000 + 100 * x as u16 },
+        );
+        let map = DepthMap::of_levels(levels);
+        let mut levelling = Levelling::default();
+        for row in &mut levelling.heights {
+            *row = [0.0, 0.1, 0.2, 0.3];
+        }
+        let levelled = map.levelled(&levelling);
+        for (x, y) in (0..49).map(|at| (at % 7, at / 7)) {
+            let wanted = map.height(x, y).map(|height| height - 0.05 * x as f64);
+            match (levelled.height(x, y), wanted) {
+                (Some(found), Some(wanted)) => assert!((found - wanted).abs() < 2e-5),
+                (found, wanted) => assert_eq!(found, wanted),
+            }
+        }
+        levelling.heights[0] = [-9.0; 4];
+        assert_eq!(map.levelled(&levelling).levels.at(1, 0), u16::MAX);
     }
 }

@@ -84,6 +84,11 @@ impl SingleResultFormat for PlacedScanFormat {
             [print.width(), print.height()],
         )
         .ok_or_else(|| PictureError::Unencodable("the alignment has no inverse".to_owned()))?;
+        let (levelling, map) = (
+            pictures.outcomes.register.levelling,
+            &pictures.outcomes.depth,
+        );
+        let placement = placement.levelled(levelling, [map.width, map.height]);
         let title = ScanTitle {
             pair: &view.record.pair.id,
             metric: shown.fields.metric,

@@ -6,8 +6,8 @@
 //! against the rows of the print, and x against its columns. Only texture coordinates contain the reflection.
 
 use mocban_core::domain::{
-    Affine2, DepthScale, FitOutcome, HeightFromMesh, LengthUnit, MetricOutcome, PrintFromMesh,
-    Rigid3,
+    Affine2, DepthScale, FitOutcome, HeightFromMesh, LengthUnit, Levelling, MetricOutcome,
+    PrintFromMesh, Rigid3,
 };
 
 /// Places the points of a scan in the frame of exported meshes.
@@ -20,6 +20,8 @@ pub(crate) struct MeshPlacement {
     height_from_mesh: HeightFromMesh,
     frame_from_plane: Rigid3,
     writing_is_mirrored: bool,
+    /// Levelling of the depth map, if any, with the width and the height of the map.
+    levelling: Option<(Levelling, [usize; 2])>,
 }
 
 /// A placed point of a scan.
@@ -29,7 +31,7 @@ pub(super) struct PlacedPoint {
     pub(super) position: [f64; 3],
     /// Print pixel.
     pub(super) pixel: [f64; 2],
-    /// Height over the fitted surface, in the unit of `position`.
+    /// Height over the fitted surface, or over its levelling, in the unit of `position`.
     pub(super) height: f64,
     /// Whether the point belongs to a stroke at the metric's threshold.
     pub(super) is_stroke: bool,
@@ -65,7 +67,16 @@ impl MeshPlacement {
             writing_is_mirrored: print_from_plane.determinant() >= 0.0,
             fit,
             scale,
+            levelling: None,
         })
+    }
+
+    /// Measures heights over the levelling of the depth map, if there is one. `size` is the map's width and height.
+    #[must_use]
+    pub(crate) fn levelled(mut self, levelling: Option<Levelling>, size: [u32; 2]) -> Self {
+        let size = size.map(|side| side as usize);
+        self.levelling = levelling.map(|levelling| (levelling, size));
+        self
     }
 
     /// Returns the unit of the mesh, if it is known.
@@ -98,7 +109,11 @@ impl MeshPlacement {
     pub(super) fn place(&self, point: [f64; 3]) -> PlacedPoint {
         let scale = self.frame_unit_per_mesh_unit();
         let on_plane = self.fit.plane_from_mesh.apply(point);
-        let height = self.height_from_mesh.apply(point);
+        let height = self.height_from_mesh.apply(point)
+            - self.levelling.map_or(0.0, |(levelling, size)| {
+                let px = [on_plane[0], on_plane[1]];
+                levelling.height_at(self.scale.depth_from_plane.apply(px), size)
+            });
         let [u, v, _] = self.print_from_mesh.apply(point);
         let region = self.fit.region.as_ref();
         PlacedPoint {
@@ -132,7 +147,7 @@ fn upright_axes(print_from_plane: &Affine2) -> [[f64; 2]; 2] {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::MeshPlacement;
+    use super::{Levelling, MeshPlacement};
     use mocban_core::domain::{
         Affine2, Curvature, DepthScale, Disagreement, FitOutcome, LengthUnit, MetricOutcome,
         Rigid3, ScanRegion, Scores, SideEvidence, ThresholdMetric,
@@ -306,5 +321,17 @@ pub(super) mod tests {
     fn a_singular_alignment_has_no_placement() {
         let flat = outcome(Affine2([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0]]));
         assert!(MeshPlacement::new(fit(), scale(None), &flat, SIZE).is_none());
+    }
+
+    #[test]
+    fn heights_are_measured_over_the_levelling() {
+        let levelling = Levelling {
+            heights: [[0.25; Levelling::NODES]; Levelling::NODES],
+        };
+        let levelled = placement(None).levelled(Some(levelling), [100, 80]);
+        let point = [1.0, 2.0, 3.0];
+        let [plain, levelled] =
+            [placement(None), levelled].map(|placed| placed.place(point).height);
+        assert!((plain - levelled - 0.25).abs() < 1e-12);
     }
 }

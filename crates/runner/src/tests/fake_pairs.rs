@@ -150,6 +150,7 @@ impl PairStages for FakePairs {
             ink: 0,
             metrics: ThresholdMetric::ALL.map(values::metric_outcome).to_vec(),
             features: None,
+            levelling: None,
         };
         let last = stage == Stage::Register;
         Ok(PairStageOutput {

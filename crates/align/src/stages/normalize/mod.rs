@@ -13,7 +13,7 @@ mod steepness;
 pub(super) use normalized::box_wrap;
 pub use normalized::{Normalized, PrintMasks};
 pub use params::{NormalizeError, NormalizeParams};
-pub(super) use relief::{relative_depths, soft_stroke};
+pub(super) use relief::{relative_depths, relief_heights, soft_stroke};
 
 use super::print::Print;
 use mocban_core::raster::{DepthMap, Mask};

@@ -23,7 +23,7 @@ const MOST_BELOW: f64 = 0.3;
 ///
 /// Otsu's threshold splits the heights into two classes. The ground is the median of the lower class. The top is the
 /// most frequent height near the upper class, whose median would be too low because of worn rims and walls.
-pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
+pub(crate) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
     let bounds = depth.levels.map(|level| *level != 0).bounding_box()?;
     let samples = samples(depth, bounds);
     let side = bounds.longest_side() as f64 * depth.scale.mesh_unit_per_px;

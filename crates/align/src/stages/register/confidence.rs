@@ -134,20 +134,37 @@ fn spread_input(spread: f64) -> f64 {
     (spread / UNSEEN_SPREAD).ln_1p()
 }
 
+/// Returns the features with the lower probability.
+///
+/// The heights of a levelling are chosen from the ink, so that a wrong pose and a wrong print agree better too. A levelling
+/// is evidence for the mask, but neither for the pose nor for the character.
+fn less_likely(
+    probability: fn(&PoseFeatures) -> f64,
+    [rendered, levelled]: [&PoseFeatures; 2],
+) -> &PoseFeatures {
+    if probability(rendered) < probability(levelled) {
+        rendered
+    } else {
+        levelled
+    }
+}
+
 fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N]) -> f64 {
     let sum: f64 = weights.iter().zip(inputs).map(|(w, x)| w * x).sum();
     1.0 / (1.0 + (-sum).exp())
 }
 
-/// Sets the confidence of each metric, and returns each metric's model inputs. `probabilities` holds the probability
-/// that the mask is right, for each metric.
+/// Sets the confidence of each metric, and returns each metric's model inputs. `rendered` are the features of the depth
+/// map as rendered, which differ from `features` if the map was levelled. `probabilities` holds the probability that the
+/// mask is right, for each metric.
 pub(super) fn set_confidence(
     metrics: &mut [MetricOutcome],
     features: &PoseFeatures,
+    rendered: &PoseFeatures,
     probabilities: impl Iterator<Item = f64>,
 ) -> Vec<ConfidenceInputs> {
-    let pose = pose_inputs(features);
-    let character = character_inputs(features);
+    let pose = pose_inputs(less_likely(of_pose, [rendered, features]));
+    let character = character_inputs(less_likely(of_character, [rendered, features]));
     let of_metric = |(outcome, probability): (&mut MetricOutcome, f64)| {
         let inputs = ConfidenceInputs {
             pose,
@@ -166,7 +183,7 @@ pub(super) fn set_confidence(
 
 #[cfg(test)]
 mod tests {
-    use super::{MASK, logistic, mask_inputs, of_character, of_pose};
+    use super::{MASK, less_likely, logistic, mask_inputs, of_character, of_pose};
     use mocban_core::domain::PoseFeatures;
 
     fn of_mask(features: &PoseFeatures, probability_right: f64) -> f64 {
@@ -223,6 +240,20 @@ mod tests {
         assert!(probability(0.99) > 0.95);
         assert!(probability(0.5) < probability(0.99) - 0.05);
         assert!(probability(0.05) < 0.4);
+    }
+
+    #[test]
+    fn a_levelled_map_that_agrees_better_is_no_evidence_for_pose_and_character() {
+        let levelled = PoseFeatures {
+            correlation: 0.95,
+            edge_scatter: 0.02,
+            ..PLAIN
+        };
+        for probability in [of_pose, of_character] {
+            assert!(probability(&levelled) > probability(&PLAIN));
+            assert_eq!(less_likely(probability, [&PLAIN, &levelled]), &PLAIN);
+            assert_eq!(less_likely(probability, [&levelled, &PLAIN]), &PLAIN);
+        }
     }
 
     #[test]

@@ -43,7 +43,8 @@ pub(super) struct ChosenThreshold {
     pub(super) probability_right: f64,
 }
 
-/// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`].
+/// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`]. Also returns the distance by which the ink
+/// spreads over the strokes of `relief`, in pixels of the half canvas.
 ///
 /// # Errors
 /// Returns an error if no threshold leaves strokes, or if no ink lies where the depth map has data.
@@ -52,7 +53,7 @@ pub(super) fn choose(
     relief: &ReliefHeights,
     canvas: &HalfCanvas,
     params: &RegisterParams,
-) -> Result<Vec<ChosenThreshold>, RegisterError> {
+) -> Result<(Vec<ChosenThreshold>, f64), RegisterError> {
     let mut levels = candidate_levels(depth, relief, params);
     let highest = canvas.levels.data().iter().max().copied().unwrap_or(0);
     levels.retain(|(_, level)| *level <= highest);
@@ -91,7 +92,7 @@ pub(super) fn choose(
         },
         probability_right: edge.probability_right(k),
     };
-    Ok(vec![
+    let chosen = vec![
         choice(ThresholdMetric::NlSsim, best, structure.at(best)),
         choice(
             ThresholdMetric::Density,
@@ -104,7 +105,8 @@ pub(super) fn choose(
             combined(&candidates[ensemble]),
         ),
         choice(ThresholdMetric::Relief, by_relief, 0.0),
-    ])
+    ];
+    Ok((chosen, spread))
 }
 
 /// Returns the index of the first candidate with the lowest value.
@@ -267,7 +269,7 @@ mod tests {
 
     /// Returns the depth that a metric chooses, as a fraction of the relief.
     fn chosen(depth: &DepthMap, canvas: &HalfCanvas, metric: ThresholdMetric) -> f64 {
-        let all = choose(depth, &RELIEF, canvas, &params()).expect("strokes and ink");
+        let (all, _) = choose(depth, &RELIEF, canvas, &params()).expect("strokes and ink");
         let choice = all
             .iter()
             .map(|chosen| chosen.choice)
@@ -306,7 +308,7 @@ mod tests {
             let order = |a: &&(f64, u16), b: &&(f64, u16)| score(**a).total_cmp(&score(**b));
             levels.iter().rev().max_by(order).expect("levels").1
         };
-        let all = choose(&depth, &RELIEF, &canvas, &params).expect("strokes and ink");
+        let (all, _) = choose(&depth, &RELIEF, &canvas, &params).expect("strokes and ink");
         let wanted = [
             best(&|(_, level)| structure(level)),
             best(&|(_, level)| -gap(level)),

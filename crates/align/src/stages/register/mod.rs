@@ -9,10 +9,12 @@ mod anisotropic_scale;
 mod confidence;
 mod half_canvas;
 mod ink_edge;
+mod levelling;
 mod metric_thresholds;
 mod observation;
 mod params;
 mod pose_search;
+mod posed;
 mod refine;
 mod scoring;
 mod soft_thresholds;
@@ -29,18 +31,13 @@ pub use stroke_map::StrokeMap;
 
 use super::normalize::{Normalized, relative_depths};
 use crate::stages::binarize::rim_share;
-use half_canvas::HalfCanvas;
 use metric_thresholds::ChosenThreshold;
 use mocban_core::domain::{Affine2, InkHypothesis, PoseFeatures};
 use mocban_core::raster::DepthMap;
-use unmatched::Unmatched;
+use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 20;
-
-/// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
-/// score. The factor is above 1 because a symmetric character scores about the same both ways.
-const MIRROR_WINS: f64 = 1.06;
+pub const REVISION: u32 = 21;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -97,29 +94,23 @@ pub fn register(
     let relief = normalized.outcome.relief.ok_or(RegisterError::NoStrokes)?;
     let depths = relative_depths(depth, &relief);
     let search = pose_search::search(&depths, &normalized.prints, expected, params)?;
-    let print = &normalized.prints[search.ink];
-    let refined = refine::refine(&depths, print, &search, params).ok_or(RegisterError::NoPose)?;
-    let canvas_from_print = normalized.outcome.inks[search.ink].canvas_from_print;
-    let canvas = || {
-        let (pose, side) = (&refined.print_from_depth, normalized.outcome.canvas_px);
-        HalfCanvas::new(depth, print, &canvas_from_print, pose, side)
+    let single = Posed::new(depth, &depths, &relief, normalized, &search, params)?;
+    let levelled = Levelled::try_new(depth, &relief, &single, normalized, &search, params);
+    let (depth, levelling, posed) = match &levelled {
+        Some(found) => (&found.map, Some(found.levelling), &found.posed),
+        None => (depth, None, &single),
     };
-    let observe = |canvas: &HalfCanvas| {
-        let halves = || Observation::of_halves(canvas, relief.level_at(&depth.scale, 0.5));
-        Observation::of_scan(depth, &relief).or(halves)
-    };
-    require_match(&refined.features, params).map_err(|error| error.with(|| observe(&canvas())))?;
-    let canvas = canvas();
-    let thresholds = metric_thresholds::choose(depth, &relief, &canvas, params)?;
+    let (refined, thresholds, features) = (&posed.refined, &posed.thresholds, &posed.features);
     require_tops(
         depth,
         &normalized.outcome.inks,
         search.ink,
-        &thresholds,
+        thresholds,
         params,
     )?;
-    let features = with_unmatched(refined.features, &canvas, &thresholds);
-    require_character(&features, params).map_err(|error| error.with(|| observe(&canvas)))?;
+    for features in [features, &single.features] {
+        require_character(features, params).map_err(|error| error.with(|| posed.observe(depth)))?;
+    }
     let alignments: Vec<Alignment> = thresholds
         .iter()
         .map(|ChosenThreshold { choice, .. }| Alignment {
@@ -132,7 +123,7 @@ pub fn register(
         .collect();
     let canvas_print = canvas_print(normalized, search.ink);
     let stroke_map = |alignment: &Alignment| {
-        StrokeMap::of(&canvas, alignment.level, normalized.outcome.canvas_px)
+        StrokeMap::of(&posed.canvas, alignment.level, normalized.outcome.canvas_px)
     };
     let mut registered = score_alignments(
         depth,
@@ -145,8 +136,10 @@ pub fn register(
     )?;
     let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);
     let metrics = &mut registered.outcome.metrics;
-    registered.confidence_inputs = confidence::set_confidence(metrics, &features, probabilities);
-    registered.outcome.features = Some(features);
+    registered.confidence_inputs =
+        confidence::set_confidence(metrics, features, &single.features, probabilities);
+    registered.outcome.features = Some(*features);
+    registered.outcome.levelling = levelling;
     Ok(registered)
 }
 
@@ -198,42 +191,6 @@ fn require_tops(
         return Err(RegisterError::Inverted);
     }
     Ok(())
-}
-
-/// Adds the strokes without a partner to the evidence for the pose.
-fn with_unmatched(
-    features: PoseFeatures,
-    canvas: &HalfCanvas,
-    thresholds: &[ChosenThreshold],
-) -> PoseFeatures {
-    let levels = || thresholds.iter().map(|chosen| chosen.choice.level);
-    let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
-    let unmatched = Unmatched::of(canvas, range);
-    PoseFeatures {
-        unmatched_tops: unmatched.tops,
-        unmatched_ink: unmatched.ink,
-        edge_scatter: unmatched.edge_scatter,
-        ink_area: unmatched.ink_area,
-        ..features
-    }
-}
-
-/// Refuses pairs that are mirrored or whose pose is too unlikely.
-fn require_match(features: &PoseFeatures, params: &RegisterParams) -> Result<(), RegisterError> {
-    let confidence = confidence::of_pose(features);
-    if features.mirrored > MIRROR_WINS && params.min_confidence > 0.0 {
-        Err(RegisterError::Mirrored {
-            times: features.mirrored,
-        })
-    } else if confidence >= params.min_confidence {
-        Ok(())
-    } else {
-        Err(RegisterError::NoMatch {
-            confidence,
-            needs: params.min_confidence,
-            seen: Observation::Nothing,
-        })
-    }
 }
 
 #[cfg(test)]

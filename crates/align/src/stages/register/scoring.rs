@@ -42,6 +42,17 @@ pub struct Registered {
     pub confidence_inputs: Vec<ConfidenceInputs>,
 }
 
+impl Registered {
+    /// Levels the depth map that was registered, if the registration did. Thresholds refer to the result.
+    #[must_use]
+    pub fn levelled(&self, depth: DepthMap) -> DepthMap {
+        match &self.outcome.levelling {
+            Some(levelling) => depth.levelled(levelling),
+            None => depth,
+        }
+    }
+}
+
 /// Warps one interpretation of the print's ink to the pair's canvas.
 pub(crate) fn canvas_print(normalized: &Normalized, ink: usize) -> Mask {
     let side = normalized.outcome.canvas_px as usize;
@@ -101,6 +112,7 @@ pub(crate) fn score_alignments(
             ink,
             metrics,
             features: None,
+            levelling: None,
         },
         confidence_inputs: Vec::new(),
         canvas_print,

@@ -1,19 +1,19 @@
 //! The four stages recover known alignments.
 
-use super::{
-    ChosenThreshold, RegisterError, RegisterParams, require_character, require_match, require_tops,
-};
-use crate::stages::StageError;
+use super::posed::require_match;
+use super::{ChosenThreshold, RegisterError, RegisterParams, require_character, require_tops};
 use crate::stages::testing::{
     SyntheticSheet, grid_print, landmark_error_px, paper_settings, print, run, settings,
     shrunk_print, some_turn,
 };
+use crate::stages::{AlignedPair, Print, Scan, StageError};
 use mocban_core::domain::{
     Affine2, InkHypothesis, MetricOutcome, PoseFeatures, PrintFromMesh, ThresholdChoice,
     ThresholdMetric,
 };
 use mocban_core::mesh::Mesh;
-use mocban_core::raster::{DepthMap, Grid};
+use mocban_core::raster::{DepthMap, Grid, ImageLimits, decode, warp_mask};
+use mocban_demo::{PairGenerator, Tier};
 
 #[test]
 fn any_pose_unit_and_winding_is_aligned() {
@@ -305,4 +305,34 @@ fn light_prints_of_a_surface_seen_from_its_back_are_refused() {
     }
     assert_eq!(check(&front, &light_first, 0), Ok(()));
     assert_eq!(check(&back, &light_first, 0), Err(RegisterError::Inverted));
+}
+
+/// Returns the intersection over union of the strokes at `relief`'s threshold with the true tops, in the print's frame.
+fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f64 {
+    let strokes = depth.stroke_mask(outcome.threshold_level);
+    let map = &outcome.print_from_depth;
+    let strokes = warp_mask(&strokes, map, tops.width(), tops.height());
+    let pixels = strokes.data().iter().zip(tops.data());
+    let (mut both, mut either) = (0.0, 0.0);
+    for (stroke, top) in pixels.filter(|(_, top)| **top != 128) {
+        both += f64::from(u8::from(*stroke && *top == 255));
+        either += f64::from(u8::from(*stroke || *top == 255));
+    }
+    both / either
+}
+
+#[test]
+fn a_scan_of_views_that_do_not_meet_is_levelled() {
+    let pair = PairGenerator::new(Tier::Stitched, 51)
+        .pair(34)
+        .expect("images encode");
+    let print = decode(&pair.print, &ImageLimits::SUGGESTED).expect("an image");
+    let (scan, print) = (Scan::from(pair.mesh), Print::from(print));
+    let aligned = AlignedPair::new(&scan, &print, &settings()).expect("an alignment");
+    let levelling = aligned.registered.outcome.levelling;
+    assert!(levelling.is_some());
+    for outcome in aligned.metrics() {
+        let iou = tops_iou(&aligned.depth, outcome, &pair.tops);
+        assert!(iou > 0.8, "{}: {iou}", outcome.metric);
+    }
 }

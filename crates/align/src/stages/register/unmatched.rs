@@ -65,14 +65,20 @@ impl Unmatched {
         let ink = wood
             .grid()
             .zip_map(&canvas.ink, |distance, ink| is_far(&distance) && ink);
-        let mut edge = canvas.distances_at_edges(|at| canvas.ink.data()[at], &wood);
         Self {
             tops: squares(&tops),
             ink: squares(&ink),
-            edge_scatter: mean_deviation(&mut edge, NEAR * width) / width,
+            edge_scatter: edge_scatter(canvas, &wood),
             ink_area: canvas.ink.count() as f64 / (width * width),
         }
     }
+}
+
+/// Returns the scatter of the ink's edge over the edge of the strokes, see [`Unmatched::edge_scatter`].
+pub(super) fn edge_scatter(canvas: &HalfCanvas, strokes: &InkEdge) -> f64 {
+    let width = canvas.stroke_width;
+    let mut distances = canvas.distances_at_edges(|at| canvas.ink.data()[at], strokes);
+    mean_deviation(&mut distances, NEAR * width) / width
 }
 
 /// Returns the mean of the absolute deviations from the median, of the values that deviate by less than `most`. Returns

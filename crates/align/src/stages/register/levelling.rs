@@ -1,0 +1,291 @@
+//! Finds a levelling of the depth map from the ink: the height of the stroke tops as a function of place.
+//!
+//! One threshold below the fitted surface is right for most scans. It is wrong where a scan drifts, was stitched from
+//! views that do not meet, or has rules that are higher than the text. There, whole ridges lie under ink but below the
+//! threshold, or ground above it. The heights of a coarse grid of nodes are then chosen so that the strokes that one
+//! threshold separates cover the most ink and the least background.
+
+use super::half_canvas::{HalfCanvas, half_from_print};
+use mocban_core::domain::{Affine2, Levelling, ReliefHeights};
+use mocban_core::raster::DepthMap;
+
+const NODES: usize = Levelling::NODES;
+/// Heights of a node over the threshold reach this share of the relief up and down.
+const REACH: f64 = 2.0;
+/// Step between the heights that are tried, as a share of the relief.
+const STEP: f64 = 0.02;
+const BINS: usize = (2.0 * REACH / STEP) as usize + 1;
+/// Distance between the pixels from which the heights are chosen, in pixels of the half canvas. A quarter of all pixels
+/// suffices for 16 heights.
+const SAMPLING_PX: usize = 2;
+/// Maximum number of times that all nodes are chosen, each time given the others.
+const ROUNDS: usize = 5;
+/// Weight of the prior in the score of a node: its height is probably that of the nodes around it.
+const SMOOTH: f64 = 0.06;
+/// Weight of the prior in the score of a node: its height is probably that of the fitted surface.
+const FLAT: f64 = 0.02;
+/// Pixels at least this far from the edge of the corrected ink have full weight, in pixels of the half canvas.
+const FULL_PX: f64 = 1.0;
+/// A levelling is tried if it increases the agreement with the ink by at least this share of the ink. On scans that need
+/// none, it increases by 0.00 to 0.03, more if the ink is heavy or strokes are lost.
+const LEAST_GAIN: f64 = 0.035;
+/// The search ends after the first round if it increases the agreement by less than this.
+const FIRST_GAIN: f64 = 0.015;
+
+/// Heights of the nodes, as shares of the relief.
+type NodeHeights = [[f64; NODES]; NODES];
+
+/// Fits a levelling to a pose. `level` is a threshold that suits a large part of the character, and `spread` the spread
+/// of the ink in pixels of the half canvas. Returns `None` if one threshold suits about as well.
+pub(super) fn fit(
+    depth: &DepthMap,
+    canvas: &HalfCanvas,
+    canvas_from_depth: &Affine2,
+    relief: &ReliefHeights,
+    level: u16,
+    spread: f64,
+) -> Option<Levelling> {
+    let depth_from_half = half_from_print(canvas_from_depth).inverse()?;
+    let samples = InkSamples::new(depth, canvas, &depth_from_half, relief, level, spread);
+    let single = samples.best_single_agreement();
+    let mut heights = [[0.0; NODES]; NODES];
+    for round in 0..ROUNDS {
+        for node in 0..NODES * NODES {
+            let [x, y] = [node % NODES, node / NODES];
+            heights[y][x] = samples.best_height(&heights, [x, y]);
+        }
+        if round == 0 && samples.agreement(&heights) - single < FIRST_GAIN {
+            return None;
+        }
+    }
+    let gain = samples.agreement(&heights) - single;
+    (gain >= LEAST_GAIN).then(|| Levelling {
+        heights: heights.map(|row| row.map(|height| height * relief.depth())),
+    })
+}
+
+/// A pixel with data.
+#[derive(Debug, Clone, Copy)]
+struct InkSample {
+    /// Height over the threshold, as a share of the relief.
+    height: f64,
+    /// 1 on ink, -1 on the background.
+    weight: f64,
+    /// Weights of the four nodes around it, row by row.
+    nodes: [f64; 4],
+}
+
+/// Pixels of a canvas with data.
+struct InkSamples {
+    /// The samples of each cell between four nodes, row by row.
+    cells: [Vec<InkSample>; (NODES - 1) * (NODES - 1)],
+    /// Sum of the weights of the ink, at least 1.
+    all_ink: f64,
+}
+
+impl InkSamples {
+    fn new(
+        depth: &DepthMap,
+        canvas: &HalfCanvas,
+        depth_from_half: &Affine2,
+        relief: &ReliefHeights,
+        level: u16,
+        spread: f64,
+    ) -> Self {
+        let size = [depth.levels.width(), depth.levels.height()];
+        let per_level = depth.scale.height_per_level / relief.depth();
+        let [width, height] = [canvas.levels.width(), canvas.levels.height()];
+        let mut cells: [Vec<InkSample>; (NODES - 1) * (NODES - 1)] = Default::default();
+        let mut all_ink = 0.0;
+        let along = |side: usize| (0..side).step_by(SAMPLING_PX);
+        let pixels = along(height).flat_map(|y| along(width).map(move |x| (x, y)));
+        for (x, y) in pixels.filter(|(x, y)| canvas.levels.at(*x, *y) > 0) {
+            let px = depth_from_half.apply([x as f64, y as f64]);
+            let (found, distance) = (canvas.levels.at(x, y), canvas.edge.grid().at(x, y));
+            let weights = Levelling::weights(px, size);
+            let [x, y] = weights[0].0;
+            let weight = ((f64::from(distance) - spread) / FULL_PX).clamp(-1.0, 1.0);
+            all_ink += f64::max(weight, 0.0);
+            cells[y * (NODES - 1) + x].push(InkSample {
+                height: (f64::from(found) - f64::from(level)) * per_level,
+                weight,
+                nodes: weights.map(|(_, weight)| weight),
+            });
+        }
+        Self {
+            cells,
+            all_ink: f64::max(all_ink, 1.0),
+        }
+    }
+
+    /// Returns the best agreement of one threshold with the ink, as a share of the ink.
+    fn best_single_agreement(&self) -> f64 {
+        let mut bins = [0.0; BINS];
+        for sample in self.cells.iter().flatten() {
+            bins[bin(sample.height)] += sample.weight;
+        }
+        let mut above = 0.0;
+        let agreements = bins.iter().rev().map(|weight| {
+            above += weight;
+            above
+        });
+        agreements.fold(0.0, f64::max) / self.all_ink
+    }
+
+    /// Returns the agreement of the samples above the nodes with the ink, as a share of the ink.
+    fn agreement(&self, heights: &NodeHeights) -> f64 {
+        let mut sum = 0.0;
+        for (cell, samples) in self.cells.iter().enumerate() {
+            let corners = corners(heights, cell);
+            let above = samples.iter().filter(|sample| sample.over(&corners) >= 0.0);
+            sum += above.map(|sample| sample.weight).sum::<f64>();
+        }
+        sum / self.all_ink
+    }
+
+    /// Returns the best height of a node, given the heights of the others.
+    fn best_height(&self, heights: &NodeHeights, [x, y]: [usize; 2]) -> f64 {
+        let now = heights[y][x];
+        let mut bins = [0.0; BINS];
+        for corner in 0..4 {
+            let [left, top] = [x.wrapping_sub(corner % 2), y.wrapping_sub(corner / 2)];
+            if left >= NODES - 1 || top >= NODES - 1 {
+                continue;
+            }
+            let cell = top * (NODES - 1) + left;
+            let corners = corners(heights, cell);
+            for sample in &self.cells[cell] {
+                bins[bin(sample.over(&corners) + now)] += sample.nodes[corner] * sample.weight;
+            }
+        }
+        let around = mean_around(heights, [x, y]);
+        let ink = self.all_ink / (NODES * NODES) as f64;
+        let (mut above, mut best) = (0.0, (f64::NEG_INFINITY, now));
+        for (k, weight) in bins.iter().enumerate().rev() {
+            above += weight;
+            let height = k as f64 * STEP - REACH;
+            let prior = SMOOTH * (height - around).powi(2) + FLAT * height * height;
+            let score = above / ink - prior;
+            if score > best.0 {
+                best = (score, height);
+            }
+        }
+        best.1
+    }
+}
+
+impl InkSample {
+    /// Returns the height over the surface between four nodes.
+    fn over(&self, corners: &[f64; 4]) -> f64 {
+        let products = self.nodes.iter().zip(corners);
+        self.height
+            - products
+                .map(|(weight, height)| weight * height)
+                .sum::<f64>()
+    }
+}
+
+/// Returns the heights of the four nodes around a cell, row by row.
+fn corners(heights: &NodeHeights, cell: usize) -> [f64; 4] {
+    let [x, y] = [cell % (NODES - 1), cell / (NODES - 1)];
+    [
+        heights[y][x],
+        heights[y][x + 1],
+        heights[y + 1][x],
+        heights[y + 1][x + 1],
+    ]
+}
+
+/// Returns the mean height of the neighbours of a node.
+fn mean_around(heights: &NodeHeights, [x, y]: [usize; 2]) -> f64 {
+    let beside = [
+        (x.wrapping_sub(1), y),
+        (x + 1, y),
+        (x, y.wrapping_sub(1)),
+        (x, y + 1),
+    ];
+    let found = beside.iter().filter_map(|(x, y)| heights.get(*y)?.get(*x));
+    let (sum, count) = found.fold((0.0, 0), |(sum, count), height| (sum + height, count + 1));
+    sum / f64::from(count.max(1))
+}
+
+/// Returns the bin of a height, as a share of the relief. Heights beyond the reach are in the first or the last.
+fn bin(height: f64) -> usize {
+    ((height + REACH) / STEP).clamp(0.0, (BINS - 1) as f64) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fit;
+    use crate::stages::register::half_canvas::HalfCanvas;
+    use mocban_core::domain::{Affine2, Levelling, ReliefHeights};
+    use mocban_core::raster::{DepthMap, Grid, Mask};
+
+    const SIDE: usize = 120;
+    const RELIEF: ReliefHeights = ReliefHeights {
+        top: 0.0,
+        ground: -0.4,
+        tops_end: 0.1,
+        tops_end_log_deviation: 0.1,
+    };
+
+    /// Returns whether a column is on one of the bars of 6 px, each of which is `wider` px wider on each side.
+    fn on_bar(x: usize, wider: usize) -> bool {
+        (x + 13 + wider) % 20 < 6 + 2 * wider
+    }
+
+    /// Returns a map of the bars whose heights rise by `drift` of the relief from the left to the right.
+    fn drifting(drift: f64) -> DepthMap {
+        let level = |x: usize, _| {
+            let height = if on_bar(x, 0) { 0.0 } else { -0.4 };
+            let drift = 0.4 * drift * (x as f64 / (SIDE - 1) as f64 - 0.5);
+            (1.0 + (height + drift + 1.0) / 2e-5) as u16
+        };
+        DepthMap::of_levels(Grid::from_fn(SIDE, SIDE, level))
+    }
+
+    /// Returns a threshold a tenth of the relief below tops without drift.
+    fn level(depth: &DepthMap) -> u16 {
+        RELIEF.level_at(&depth.scale, 0.1)
+    }
+
+    /// Fits a levelling to a map of the bars. The ink is `wider` px wider on each side.
+    fn levelling(depth: &DepthMap, wider: usize) -> Option<Levelling> {
+        let ink = Mask::from_fn(SIDE, SIDE, |x, _| on_bar(x, wider));
+        let canvas = HalfCanvas::of(depth.levels.clone(), ink);
+        let canvas_from_depth = Affine2::scale_shift(2.0, [0.5, 0.5]);
+        let level = level(depth);
+        fit(
+            depth,
+            &canvas,
+            &canvas_from_depth,
+            &RELIEF,
+            level,
+            wider as f64,
+        )
+    }
+
+    /// Returns the share of the pixels that the threshold puts on the right side.
+    fn right(depth: &DepthMap) -> f64 {
+        let bars = Mask::from_fn(SIDE, SIDE, |x, _| on_bar(x, 0));
+        let strokes = depth.stroke_mask(level(depth));
+        let pixels = strokes.data().iter().zip(bars.data());
+        pixels.filter(|(stroke, bar)| stroke == bar).count() as f64 / (SIDE * SIDE) as f64
+    }
+
+    #[test]
+    fn one_threshold_fits_a_levelled_map_whose_drift_exceeded_the_relief() {
+        let depth = drifting(2.4);
+        assert!(right(&depth) < 0.85);
+        let found = levelling(&depth, 0).expect("one threshold does not fit");
+        let share = right(&depth.levelled(&found));
+        assert!(share > 0.97, "{share}");
+    }
+
+    #[test]
+    fn scans_of_one_height_are_not_levelled() {
+        for wider in 0..3 {
+            assert_eq!(levelling(&drifting(0.0), wider), None);
+        }
+    }
+}
