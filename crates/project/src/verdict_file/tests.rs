@@ -195,7 +195,7 @@ fn unknown_pair_is_reported_by_line() {
         refused,
         [
             "line 3: there is no pair 2; did you mean \"0002\"?",
-            "line 4: there is no pair 0"
+            "line 4: there is no pair 0; did you mean \"0002\"?"
         ]
     );
 }
