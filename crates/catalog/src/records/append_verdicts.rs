@@ -112,6 +112,9 @@ struct JudgedResult {
 /// What a verdict says.
 type Content = (Verdict, Option<Reason>, Option<String>);
 
+/// Number of an item, and the id and content of the newest verdict on its result.
+type NewestVerdictRow = (i64, i64, Verdict, Option<Reason>, Option<String>);
+
 /// A verdict on one result.
 struct VerdictRowDraft<'v> {
     /// Position of the verdict in its part of the list.
@@ -370,8 +373,7 @@ async fn newest_contents(
         let spellings = stored_names.of(&new.reviewer);
         spellings.map(move |reviewer| new.item(number, reviewer, now))
     }));
-    let mut found: Vec<(i64, i64, Verdict, Option<Reason>, Option<String>)> =
-        query_as(NEWEST).bind(items).fetch_all(conn).await?;
+    let mut found: Vec<NewestVerdictRow> = query_as(NEWEST).bind(items).fetch_all(conn).await?;
     // The newest of all spellings replaces the others.
     found.sort_unstable_by_key(|(_, id, ..)| *id);
     let found = found.into_iter().map(|(number, _, verdict, reason, note)| {
