@@ -32,6 +32,10 @@ enum_names! {
 }
 
 /// What to export, and how.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "independent choices of the command line"
+)]
 #[derive(Debug, Clone, Serialize)]
 pub struct ExportOptions {
     /// Metrics to export. A pair without a result still has one line for each of these metrics.
