@@ -19,6 +19,7 @@ use mocban_project::export::export as export_project;
 use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `export`.
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
     /// Formats, separated by commas. One format is written to DIR itself, several each to DIR/FORMAT

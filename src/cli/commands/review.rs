@@ -34,6 +34,7 @@ const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(1);
 const CLOSE: Duration = Duration::from_secs(2);
 
 /// Arguments of `review`.
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 #[derive(Debug, Args)]
 pub(crate) struct ReviewArgs {
     /// Name of the reviewer; a label for the verdicts, not a login, unless the catalog in PostgreSQL has roles
