@@ -104,9 +104,9 @@ function updateSurroundings(item, layers) {
   refresh();
 }
 
-/** Warns while the last answers came faster than anybody can look at all strokes. */
+/** Warns, while images are left and the last answers came faster than anybody can look at all strokes. */
 function warnIfTooFast() {
-  if (times.length < FAST_COUNT || requests.problem) return;
+  if (!queue.current || times.length < FAST_COUNT || requests.problem) return;
   const median = ui.median(times.slice(-FAST_COUNT));
   if (median < FAST_MS) ui.alert(translate("too_fast", { n: FAST_COUNT, s: ui.seconds(median) }));
 }
@@ -145,7 +145,7 @@ function answer(verdict, reason, pressedAt) {
   const item = queue.current;
   if (!item) return;
   if (requests.isFull) return ui.alert(translate("blocked"));
-  if (shownAt === null || pressedAt - shownAt < minViewMs) return ui.announce(translate("too_soon"));
+  if (shownAt === null || pressedAt - shownAt < minViewMs) return ui.announce(translate("too_soon"), 3);
   const body = { ...answerBody(item, verdict, reason), shown_ms: Math.round(pressedAt - shownAt) };
   times.push(body.shown_ms);
   queue.answer(item, body);

@@ -81,6 +81,6 @@ export class Practice {
     this.index = this.examples.length;
     ui.endPractice();
     this.onEnd();
-    if (all > 0) ui.announce(translate(right < MIN_RIGHT * all ? "practice_done_again" : "practice_done", { right, all }));
+    if (all > 0) ui.announce(translate(right < MIN_RIGHT * all ? "practice_done_again" : "practice_done", { right, all }), 8);
   }
 }

@@ -120,7 +120,7 @@ export function legend(entries, extra) {
     const mark = document.createElement("span");
     const swatch = document.createElement("i");
     swatch.className = "swatch";
-    swatch.style.setProperty("background", colour);
+    swatch.style.setProperty("--colour", colour);
     mark.append(swatch, text);
     return mark;
   });
@@ -140,8 +140,14 @@ export function faultShortage(shortage) {
   if (shortage) byId("fault-shortage").textContent = translate("fault_shortage", shortage);
 }
 
-/** Announces a text in the live region, for screen readers too. */
-export const announce = (text) => (byId("live").textContent = text);
+let ending = null;
+
+/** Announces a text in the live region, for screen readers too. It is removed after `seconds`, if given. */
+export function announce(text, seconds) {
+  clearTimeout(ending);
+  byId("live").textContent = text;
+  if (seconds) ending = setTimeout(() => (byId("live").textContent = ""), 1000 * seconds);
+}
 
 export function alert(text) {
   const element = byId("alert");

@@ -101,6 +101,7 @@ class NativeProject:
         reason: str | None,
         note: str | None,
         expect: str | None,
+        new_reviewer: bool,
     ) -> bool: ...
     def import_pairs(self, file: str, rows: bytes, allow_missing: bool, allow_changed_files: bool, replace: bool) -> str: ...
     def import_block(

@@ -276,6 +276,7 @@ class Project:
         note: str | None = None,
         reviewer: str,
         expect: str | None = None,
+        new_reviewer: bool = False,
     ) -> bool:
         """Record a verdict on the current result of a pair, under the rules of ``mocban verdict set``.
 
@@ -291,6 +292,8 @@ class Project:
         reviewer : str
         expect : str, optional
             ``result_hash`` of the result that was looked at.
+        new_reviewer : bool
+            Whether a new reviewer's name may differ from that of another only in case or accents.
 
         Returns
         -------
@@ -304,7 +307,9 @@ class Project:
         ReadOnlyProject
             If the project was opened for reading.
         """
-        return self._writable().add_verdict(id, metric, verdict, reviewer, reason, note, expect)
+        return self._writable().add_verdict(
+            id, metric, verdict, reviewer, reason, note, expect, new_reviewer
+        )
 
     def import_pairs(
         self,

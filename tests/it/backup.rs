@@ -287,7 +287,7 @@ fn exported_verdicts_can_be_imported_into_another_project() {
     let pair = first["pair"].as_str().expect("a name");
     let to_undo = ["verdict", "set", pair, "fail", "--reviewer", "lan"];
     at(&project, &to_undo).expect(0);
-    at(&project, &["verdict", "undo"]).expect(0);
+    at(&project, &["verdict", "undo", "--reviewer", "lan"]).expect(0);
     let out = dir.path().join("out");
     at(&project, &["export", "-o", out.to_str().expect("UTF-8")]).expect(0);
     let lines = out.join("verdicts.jsonl");

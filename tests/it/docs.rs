@@ -131,7 +131,11 @@ fn the_book_lists_every_page() {
 fn both_tutorials_have_the_same_commands() {
     let commands = |name: &str| MarkdownPage::read(&package_dir().join(name)).commands;
     let english = commands("docs/tutorial/first-hour.md");
-    assert_eq!(english, commands("docs/vi/gio-dau-tien.md"));
+    let mut vietnamese = commands("docs/vi/gio-dau-tien.md");
+    for command in &mut vietnamese {
+        *command = command.replace(" --lang vi", "");
+    }
+    assert_eq!(english, vietnamese);
     assert!(english.len() > 10, "{english:?}");
 }
 

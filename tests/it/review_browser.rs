@@ -436,5 +436,6 @@ fn typing_a_note_with_verdict_keys_stores_no_verdict() {
     let tab = enter(&browser, &page, [1024, 768]);
     tab.key("KeyP");
     tab.wait("document.getElementById('live').textContent === 'Please look at the image first'");
+    tab.wait("document.getElementById('live').textContent === ''");
     assert!(current_verdicts(&project, "minh").is_empty());
 }

@@ -37,6 +37,18 @@ fn is_reachable(tab: &Tab<'_>, selector: &str) -> bool {
     tab.eval(&script) == json!(true)
 }
 
+/// Returns the first of some elements that is not wholly in the window as it is scrolled, or that another element covers.
+fn first_out_of_sight(tab: &Tab<'_>, selector: &str) -> Value {
+    let script = format!(
+        "[...document.querySelectorAll({selector:?})].filter((element) => element.checkVisibility()).find((element) => {{
+            const box = element.getBoundingClientRect();
+            const at = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+            return box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth || !element.contains(at);
+        }})?.outerHTML ?? null"
+    );
+    tab.eval(&script)
+}
+
 /// Answers an example of the practice round and returns the text that explains the answer.
 fn practise(tab: &Tab<'_>, key: &str) -> String {
     tab.wait("document.body.dataset.shown?.startsWith('example-')");
@@ -77,7 +89,7 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
         for (i, key) in keys.into_iter().enumerate() {
             let text = practise(tab, key);
             let starts = if i == 3 {
-                "Not correct. Pass"
+                "Not correct. Answer: Pass"
             } else {
                 "Correct."
             };
@@ -90,6 +102,7 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
         }
         tab.wait("document.getElementById('live').textContent.includes('5 of 6')");
         tab.wait("document.getElementById('practice').hidden");
+        tab.wait("document.getElementById('live').textContent === ''");
         assert_eq!(
             tab.eval("document.getElementById('bar').value"),
             0,
@@ -267,6 +280,50 @@ fn every_answer_is_reachable_on_a_narrow_screen() {
                 assert!(is_reachable(tab, &selector), "{language}: {action}");
             }
             tab.screenshot(&format!("narrow-{language}-reasons"));
+        });
+    }
+}
+
+/// Shows a long message, as after answers that were too fast.
+const LONG_MESSAGE: &str = "(() => {
+    const alert = document.getElementById('alert');
+    alert.textContent = '10 câu trả lời gần nhất chỉ mất khoảng 0,6 giây mỗi hình. Hãy xem kỹ mọi nét trước khi trả lời.';
+    alert.hidden = false;
+})()";
+
+#[test]
+fn nothing_that_is_needed_is_covered_or_out_of_sight() {
+    for (language, size) in ["en", "vi"]
+        .into_iter()
+        .flat_map(|language| [(language, [1366, 660]), (language, [400, 800])])
+    {
+        let options = [&PLAIN[..], &["--lang", language]].concat();
+        on_a_page_of(read_project, &options, size, |_, tab| {
+            let is_seen = |state: &str, selector: &str| {
+                let out = first_out_of_sight(tab, selector);
+                assert_eq!(out, Value::Null, "{language} {size:?} {state}: {selector}");
+                tab.screenshot(&format!("sight-{language}-{}-{state}", size[0]));
+            };
+            let head = "header b, header a, header button, #progress, #saved";
+            is_seen("start", ".verdicts button");
+            tab.eval(LONG_MESSAGE);
+            is_seen(
+                "message",
+                &format!("{head}, #alert, .verdicts button, .history > button"),
+            );
+            tab.eval("document.getElementById('alert').hidden = true");
+            tab.key("KeyN");
+            tab.wait("!document.getElementById('note-row').hidden");
+            is_seen("note", "#note-row input, .history > button");
+            tab.key("Escape");
+            tab.key("KeyC");
+            tab.wait("!document.getElementById('alignment').hidden");
+            is_seen("alignment", "#alignment button");
+            tab.key("Escape");
+            let rows = tab.eval(
+                "new Set([...document.querySelectorAll('.modes button')].map((button) => button.offsetTop)).size",
+            );
+            assert_eq!(rows, json!(1), "{language} {size:?}: rows of tools");
         });
     }
 }

@@ -276,6 +276,35 @@ fn another_result_takes_the_place_of_one_that_cannot_be_read() {
 }
 
 #[test]
+fn a_finished_review_stays_finished_when_others_judge() {
+    let (_dir, project, page) = open_review(&[]);
+    for pair in pairs_with_faults(&project, &page) {
+        set(
+            &project,
+            &[pair.as_str(), "không đạt", "--reviewer", "binh"],
+        );
+    }
+    drop(page);
+    let queue = Page::open(&project, "lan", &[]).queue();
+    let open = queue.iter().filter(|item| item["answer"].is_null()).count();
+    assert_eq!(open, 0, "of {}", queue.len());
+}
+
+#[test]
+fn a_decomposed_name_is_of_the_same_reviewer() {
+    let (_dir, project, page) = open_review(&NO_CHECKS);
+    let pair = page.queue()[0]["pair"].as_str().expect("a pair").to_owned();
+    let [decomposed, composed] = ["Bi\u{300}nh", "B\u{ec}nh"];
+    set(&project, &[&pair, "pass", "--reviewer", decomposed]);
+    set(&project, &[&pair, "pass", "--reviewer", composed]);
+    let log = log(&project);
+    assert!(log.len() <= 4, "{log:?}");
+    assert!(log.iter().all(|event| event["reviewer"] == composed));
+    let queue = Page::open(&project, decomposed, &NO_CHECKS).queue();
+    assert!(queue.iter().any(|item| item["answer"]["verdict"] == "pass"));
+}
+
+#[test]
 fn verdicts_of_others_are_shown_to_an_adjudicator_after_the_answer() {
     let (_dir, project, first) = open_review(&NO_CHECKS);
     let item = first.queue().remove(0);

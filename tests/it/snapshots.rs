@@ -255,7 +255,8 @@ fn verdicts() {
             "nghiêng",
         ],
     );
-    at("verdict_undo", &["verdict", "undo"]);
+    let undo = ["verdict", "undo", "--reviewer", "Trần Lan"];
+    at("verdict_undo", &undo);
     at("verdict_log", &["verdict", "log"]);
     write(
         dir.path(),
@@ -264,10 +265,29 @@ fn verdicts() {
     );
     at("verdict_import", &["verdict", "import", "verdicts.csv"]);
     at("status_judged", &["status"]);
+    at("error_undo_of_several", &["verdict", "undo"]);
+    let similar = ["verdict", "set", "upright-0001", "đạt", "--reviewer", "Ân"];
+    at("error_similar_reviewer", &similar);
+    let insisted = [&similar[..], &["--new-reviewer"]].concat();
+    at("verdict_set_in_vietnamese", &insisted);
+    let placeholder = [
+        "verdict",
+        "set",
+        "upright-0001",
+        "pass",
+        "--reviewer",
+        "NAME",
+    ];
+    at("error_reviewer_of_example", &placeholder);
     for (name, text) in [
         ("pair", "pair,verdict,reviewer\nz,pass,an\n"),
         ("word", "pair,verdict,reviewer\nupright-0000,good,an\n"),
         ("column", "pair,verdict,reveiwer\nupright-0000,pass,an\n"),
+        ("columns", "id,result,who\nupright-0000,pass,an\n"),
+        (
+            "rows",
+            "pair,verdict,reviewer\nupright-0000,good,an\nz,pass,an\nupright-0001,pass,\n",
+        ),
         (
             "time",
             "pair,verdict,reviewer,at\nupright-0000,pass,an,today\n",

@@ -32,6 +32,10 @@ enum_names! {
 }
 
 /// What to export, and how.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "independent choices of the command line"
+)]
 #[derive(Debug, Clone, Serialize)]
 pub struct ExportOptions {
     /// Metrics to export. A pair without a result still has one line for each of these metrics.
@@ -48,6 +52,8 @@ pub struct ExportOptions {
     pub with_times: bool,
     /// Whether CSV files begin with a byte order mark, which Excel needs to read them as UTF-8.
     pub csv_bom: bool,
+    /// Whether CSV files have semicolons between columns and decimal commas, as Excel in many languages reads them.
+    pub csv_decimal_comma: bool,
     /// Whether Parquet tables hold the pictures.
     pub images: bool,
     /// Size in MiB at which the next shard or table begins.
@@ -82,6 +88,7 @@ impl ExportOptions {
             split: None,
             with_times: false,
             csv_bom: false,
+            csv_decimal_comma: false,
             images: false,
             shard_mib: None,
             license: None,
@@ -111,6 +118,12 @@ impl ExportOptions {
             (
                 "--csv-bom",
                 self.csv_bom,
+                |format| format == ExportFormat::Csv,
+                "writes no CSV",
+            ),
+            (
+                "--csv-decimal-comma",
+                self.csv_decimal_comma,
                 |format| format == ExportFormat::Csv,
                 "writes no CSV",
             ),

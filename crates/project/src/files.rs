@@ -304,6 +304,9 @@ pub fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     }
 }
 
+/// Number of refused lines that are listed.
+pub(crate) const MAX_SHOWN: usize = 20;
+
 /// What is wrong with a line of a file that is refused as a whole.
 #[derive(Debug, thiserror::Error)]
 #[error("line {line}: {reason}")]
@@ -319,6 +322,28 @@ impl RefusedLine {
             line,
             reason: sanitize(reason, 300),
         }
+    }
+
+    /// Refuses the file with all its refused lines, of which the first are listed; `outcome` says that nothing was changed.
+    /// Returns `None` if no line is refused.
+    pub fn all_in_file(mut lines: Vec<Self>, file: &Path, outcome: &str) -> Option<Refusal> {
+        lines.sort_by_key(|refused| refused.line);
+        let (first, others) = lines.split_first()?;
+        if others.is_empty() {
+            return Some(first.in_file(file, outcome));
+        }
+        let shown = lines.iter().take(MAX_SHOWN);
+        let shown: Vec<String> = shown.map(|refused| format!("\n  {refused}")).collect();
+        let more = match lines.len().saturating_sub(MAX_SHOWN) {
+            0 => String::new(),
+            more => format!("\n  and {more} more"),
+        };
+        let (file, count) = (file.display(), lines.len());
+        let text = format!(
+            "{file}: {count} lines are refused; {outcome}:{}{more}",
+            shown.concat()
+        );
+        Some(Refusal::Usage(text))
     }
 
     /// Refuses the file; `outcome` says that nothing was changed.

@@ -54,6 +54,7 @@ pub mod report;
 pub mod restore;
 pub mod retire;
 pub mod retry;
+pub mod reviewers;
 mod row_spool;
 pub mod run;
 pub mod selection;
@@ -63,6 +64,7 @@ pub mod status;
 pub mod truth_file;
 mod unread_files;
 pub mod verdict_file;
+pub mod verdict_words;
 pub mod verdicts;
 pub mod worker_totals;
 

@@ -9,11 +9,12 @@ use std::sync::Arc;
 use csv::StringRecord;
 use serde::Deserialize;
 
-use super::files::RefusedLine;
-use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext};
+use super::files::{MAX_SHOWN, RefusedLine};
+use super::verdict_words;
+use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
-use mocban_core::domain::{ContentHash, PairName, Reason, UnixMillis, Verdict};
-use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn, plain_name};
+use mocban_core::domain::{ContentHash, PairName, UnixMillis};
+use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
 use mocban_lists::json_numbers::nan_as_null;
 use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, trimmed};
 use mocban_lists::quotes::check_quotes;
@@ -46,24 +47,6 @@ const COLUMNS: KnownColumns = KnownColumns {
     ],
 };
 const REQUIRED: usize = 3;
-
-/// Verdicts and reasons in other words, as [`plain_name`] writes them: those of the page in Vietnamese.
-const VERDICTS: [(&str, Verdict); 4] = [
-    ("dat", Verdict::Pass),
-    ("khong_dat", Verdict::Fail),
-    ("chua_chac", Verdict::Unsure),
-    ("khong_chac", Verdict::Unsure),
-];
-const REASONS: [(&str, Reason); 8] = [
-    ("sai_goc", Reason::Angle),
-    ("mat_net", Reason::StrokesLost),
-    ("lan_nen", Reason::BackgroundIn),
-    ("sai_vi_tri_hoac_ti_le", Reason::ShiftOrScale),
-    ("bi_lat_guong", Reason::Mirrored),
-    ("lat_guong", Reason::Mirrored),
-    ("sai_cap_hoac_du_lieu_hong", Reason::WrongPair),
-    ("sai_cap", Reason::WrongPair),
-];
 
 /// One verdict and its line number.
 #[derive(Debug, Clone, PartialEq)]
@@ -160,25 +143,27 @@ pub fn check_values(row: &VerdictRow, now: UnixMillis) -> Result<(), RefusedLine
     checked.map_err(|error| RefusedLine::new(row.line, &error.to_string()))
 }
 
-/// Refuses a list with unknown pairs. `first_lines` has the first line of each pair, `known` the pairs that exist, of which
-/// a similar one is suggested.
-pub fn refuse_unknown(
+/// Returns why a list with unknown pairs is refused, one line for each pair. `first_lines` has the first line of each pair,
+/// `known` the pairs that exist, of which a similar one is suggested.
+pub fn unknown_pairs(
     first_lines: &BTreeMap<PairName, usize>,
     unknown: &[PairName],
     known: &[PairName],
-) -> Result<(), RefusedLine> {
+) -> Vec<RefusedLine> {
     let lines = unknown.iter().map(|pair| (first_lines.get(pair), pair));
-    match lines.min() {
-        Some((line, pair)) => {
-            let line = line.copied().unwrap_or_default();
-            let hint = hint(pair.as_str(), known.iter().map(PairName::as_str));
-            Err(RefusedLine::new(
-                line,
-                &format!("there is no pair {pair}{hint}"),
-            ))
-        }
-        None => Ok(()),
-    }
+    let mut lines: Vec<_> = lines.collect();
+    lines.sort_unstable();
+    // A suggestion compares with every pair, so only lines that may be shown get one.
+    let refused = lines.into_iter().enumerate().map(|(number, (line, pair))| {
+        let hint = if number < MAX_SHOWN {
+            hint(pair.as_str(), known.iter().map(PairName::as_str))
+        } else {
+            String::new()
+        };
+        let reason = format!("there is no pair {pair}{hint}");
+        RefusedLine::new(line.copied().unwrap_or_default(), &reason)
+    });
+    refused.collect()
 }
 
 /// Returns the position of each of [`COLUMNS`] in the file. The header is on this line.
@@ -187,19 +172,42 @@ fn positions(headers: &StringRecord, line: usize) -> Result<[Option<usize>; 7], 
     let refuse = |reason: &str| RefusedLine::new(line, reason);
     let same = |same: SameColumn| refuse(&same.reason(&names));
     let HeaderColumns { columns, .. } = COLUMNS.assign(&names).map_err(same)?;
-    if let Some(unknown) = columns.iter().position(Option::is_none) {
-        let unknown = names[unknown];
-        let hint = hint(unknown, COLUMNS.names.iter().copied());
-        return Err(refuse(&format!("there is no column {unknown}{hint}")));
+    let unknown = (0..names.len()).filter(|k| columns[*k].is_none());
+    let unknown: Vec<&str> = unknown.map(|k| names[k]).collect();
+    let required = COLUMNS.names[..REQUIRED].iter().copied();
+    let missing: Vec<&str> = required
+        .filter(|name| !columns.contains(&Some(*name)))
+        .collect();
+    if !unknown.is_empty() || !missing.is_empty() {
+        return Err(refuse(&columns_reason(&missing, &unknown)));
     }
     let mut positions = [None; 7];
     for (position, name) in positions.iter_mut().zip(COLUMNS.names) {
         *position = columns.iter().position(|column| *column == Some(name));
     }
-    match positions[..REQUIRED].iter().position(Option::is_none) {
-        Some(at) => Err(refuse(&format!("column {} is missing", COLUMNS.names[at]))),
-        None => Ok(positions),
-    }
+    Ok(positions)
+}
+
+/// Returns which columns are missing and which are unknown: `columns verdict, reviewer are missing; columns result, who
+/// are unknown`.
+fn columns_reason(missing: &[&str], unknown: &[&str]) -> String {
+    let list = |names: &[&str], are: &str| match names {
+        [] => None,
+        [name] => Some(format!("column {name} is {are}")),
+        names => Some(format!("columns {} are {are}", names.join(", "))),
+    };
+    let similar = match unknown {
+        [one] if missing.is_empty() => hint(one, COLUMNS.names.iter().copied()),
+        [one] => hint(one, missing.iter().copied()),
+        _ => String::new(),
+    };
+    let parts = [list(missing, "missing"), list(unknown, "unknown")];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    let known = COLUMNS.names[REQUIRED..].join(", ");
+    format!(
+        "{}{similar}; needed are pair, verdict and reviewer, and possible {known}",
+        parts.join("; ")
+    )
 }
 
 fn row(
@@ -217,12 +225,14 @@ fn row(
         cell(column)
             .ok_or_else(|| RefusedLine::new(line, &format!("{} is empty", COLUMNS.names[column])))
     };
+    let metric = |text| at_line(line, verdict_words::word(text, &[]));
+    let reason = |text| at_line(line, verdict_words::reason(text));
     let verdict = NewVerdict {
         pair: value(required(0)?, line)?,
-        verdict: word(required(1)?, &VERDICTS, line)?,
-        reviewer: required(2)?.to_owned(),
-        metric: cell(3).map(|text| word(text, &[], line)).transpose()?,
-        reason: cell(4).map(|text| word(text, &REASONS, line)).transpose()?,
+        verdict: at_line(line, verdict_words::verdict(required(1)?))?,
+        reviewer: person_name(required(2)?),
+        metric: cell(3).map(metric).transpose()?,
+        reason: cell(4).map(reason).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
         context: ReviewContext::default(),
         at: cell(6).map(|text| time(text, line)).transpose()?,
@@ -230,6 +240,11 @@ fn row(
     let judged = None;
     let listed = ListedVerdict { verdict, judged };
     Ok(VerdictRow { line, listed })
+}
+
+/// Names the line of what was not understood.
+fn at_line<T>(line: usize, parsed: Result<T, String>) -> Result<T, RefusedLine> {
+    parsed.map_err(|reason| RefusedLine::new(line, &reason))
 }
 
 fn time(text: &str, line: usize) -> Result<UnixMillis, RefusedLine> {
@@ -246,19 +261,6 @@ where
 {
     text.parse()
         .map_err(|error: T::Err| RefusedLine::new(line, &error.to_string()))
-}
-
-/// Parses a name in any case and with blanks, or one of some other words.
-fn word<T>(text: &str, other: &[(&str, T)], line: usize) -> Result<T, RefusedLine>
-where
-    T: FromStr<Err: std::fmt::Display> + Copy,
-{
-    let plain = plain_name(text);
-    let found = other.iter().find(|(word, _)| *word == plain);
-    let found = found.map(|(_, found)| *found);
-    found
-        .or_else(|| plain.parse().ok())
-        .map_or_else(|| value(text, line), Ok)
 }
 
 fn csv_error(error: &csv::Error, text: &ListText) -> RefusedLine {
@@ -315,8 +317,7 @@ fn json_row(
         result_hash: judged,
         undone_at,
     } = parsed.map_err(|error| RefusedLine::new(line, &json_error(&error)))?;
-    let reviewer = verdict.reviewer.trim().to_owned();
-    verdict.reviewer = reviewer;
+    verdict.reviewer = person_name(&verdict.reviewer);
     if verdict.reviewer.is_empty() {
         return Err(RefusedLine::new(line, "reviewer is empty"));
     }

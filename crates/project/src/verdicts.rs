@@ -7,10 +7,11 @@ use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::files::{self, ListFile, RefusedLine};
 use crate::location::{Location, now};
+use crate::reviewers;
 use crate::selection;
-use crate::verdict_file::{self, VerdictList};
+use crate::verdict_file::{self, VerdictList, VerdictRow};
 use mocban_catalog::{
-    CatalogError, FaultyRow, ImportedVerdicts, ListedVerdict, NewVerdict, VerdictEvent,
+    CatalogError, FaultyRow, ImportedVerdicts, ListedVerdict, NewVerdict, VerdictEvent, person_name,
 };
 use mocban_core::domain::{ContentHash, PairName};
 
@@ -26,7 +27,8 @@ pub enum RecordedVerdict {
 }
 
 /// Records a verdict on the current result of a pair, which `verdict` makes for the name of that pair. Returns the verdict,
-/// and whether it is new: the same one may have been recorded before.
+/// and whether it is new: the same one may have been recorded before. A new reviewer whose name is similar to that of another
+/// is refused unless `is_new_allowed`.
 ///
 /// # Errors
 /// Returns an error if the pair does not exist or has no result, the verdict is invalid, the user of the database may not
@@ -34,9 +36,10 @@ pub enum RecordedVerdict {
 pub async fn record(
     pair: &str,
     verdict: impl FnOnce(PairName) -> NewVerdict,
+    is_new_allowed: bool,
     location: &Location,
 ) -> ProjectResult<(NewVerdict, bool)> {
-    let (verdict, recorded) = record_on(pair, None, verdict, location).await?;
+    let (verdict, recorded) = record_on(pair, None, verdict, is_new_allowed, location).await?;
     Ok((verdict, recorded == RecordedVerdict::New))
 }
 
@@ -45,14 +48,20 @@ pub async fn record_on(
     pair: &str,
     judged: Option<ContentHash>,
     verdict: impl FnOnce(PairName) -> NewVerdict,
+    is_new_allowed: bool,
     location: &Location,
 ) -> ProjectResult<(NewVerdict, RecordedVerdict)> {
     let (_project, catalog) = location.open().await?;
     let rights = catalog.review_rights().await?;
-    let verdict = verdict(selection::pair(&catalog, pair).await?);
+    let mut verdict = verdict(selection::pair(&catalog, pair).await?);
+    verdict.reviewer = person_name(&verdict.reviewer);
     rights.require_verdicts(&verdict.reviewer)?;
     let checked = verdict.check(now());
     checked.map_err(|error| Refusal::Usage(error.to_string()))?;
+    if !is_new_allowed {
+        let reviewers = BTreeSet::from([verdict.reviewer.clone()]);
+        reviewers::refuse_similar(&catalog, &rights, &reviewers).await?;
+    }
     let listed = ListedVerdict {
         verdict: verdict.clone(),
         judged,
@@ -70,45 +79,45 @@ pub async fn record_on(
 }
 
 /// Records the verdicts of a file in CSV or JSON Lines, or of a sheet of a workbook. If a line is refused, no verdict is
-/// recorded. Returns a warning about other sheets, too.
+/// recorded. A new reviewer whose name is similar to another is refused unless `is_new_allowed`. Returns a warning about other
+/// sheets, too.
 pub async fn import(
     file: &Path,
     sheet: Option<&str>,
+    is_new_allowed: bool,
     location: &Location,
 ) -> ProjectResult<(ImportedVerdicts, Option<String>)> {
     let ListFile { bytes, warning } = files::read_list(file, sheet)?;
     let (_project, catalog) = location.open().await?;
-    let refused = |error: RefusedLine| error.in_file(file, "no verdict was recorded");
+    let outcome = "no verdict was recorded";
     let is_jsonl = files::is_jsonl(file, &bytes);
-    let list = VerdictList::new(bytes, is_jsonl).map_err(refused)?;
-    let (mut first_lines, mut reviewers) = (BTreeMap::new(), BTreeSet::new());
-    // Lines with verdicts on the current results, whatever these are.
-    let mut current_lines = BTreeMap::new();
-    for row in list.rows() {
-        let row = row.map_err(refused)?;
-        verdict_file::check_values(&row, now()).map_err(refused)?;
-        let NewVerdict { pair, reviewer, .. } = row.listed.verdict;
-        if row.listed.judged.is_none() {
-            current_lines.entry(pair.clone()).or_insert(row.line);
-        }
-        first_lines.entry(pair).or_insert(row.line);
-        reviewers.insert(reviewer);
+    let list = VerdictList::new(bytes, is_jsonl).map_err(|error| error.in_file(file, outcome))?;
+    let ListedNames {
+        first_lines,
+        current_lines,
+        reviewers,
+        mut refused,
+    } = ListedNames::read(&list);
+    let names: Vec<_> = first_lines.keys().cloned().collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    if !unknown.is_empty() {
+        let known = catalog.pair_names().await?;
+        refused.extend(verdict_file::unknown_pairs(&first_lines, &unknown, &known));
+    }
+    for pair in catalog.retired_pairs().await? {
+        let line = current_lines.get(&pair.name);
+        let reason = selection::retired_text(&pair);
+        refused.extend(line.map(|line| RefusedLine::new(*line, &reason)));
+    }
+    if let Some(refusal) = RefusedLine::all_in_file(refused, file, outcome) {
+        return Err(refusal.into());
     }
     let rights = catalog.review_rights().await?;
     for reviewer in &reviewers {
         rights.require_verdicts(reviewer)?;
     }
-    let names: Vec<_> = first_lines.keys().cloned().collect();
-    let unknown = catalog.unknown_names(&names).await?;
-    if !unknown.is_empty() {
-        let known = catalog.pair_names().await?;
-        verdict_file::refuse_unknown(&first_lines, &unknown, &known).map_err(refused)?;
-    }
-    let retired = catalog.retired_pairs().await?.into_iter();
-    let retired = retired.filter_map(|pair| Some((*current_lines.get(&pair.name)?, pair)));
-    if let Some((line, pair)) = retired.min_by_key(|(line, _)| *line) {
-        let reason = selection::retired_text(&pair);
-        return Err(refused(RefusedLine::new(line, &reason)).into());
+    if !is_new_allowed {
+        reviewers::refuse_similar(&catalog, &rights, &reviewers).await?;
     }
     // All rows were valid in the first pass.
     let rows = list.rows().map(|row| match row {
@@ -118,6 +127,41 @@ pub async fn import(
     let imported = catalog.import_verdicts(rows, now()).await?;
     catalog.close().await;
     Ok((imported, warning))
+}
+
+/// Names in a list of verdicts, and its refused lines.
+#[derive(Debug, Default)]
+struct ListedNames {
+    /// The first line of each pair.
+    first_lines: BTreeMap<PairName, usize>,
+    /// The first lines with verdicts on the current results, whatever these are.
+    current_lines: BTreeMap<PairName, usize>,
+    reviewers: BTreeSet<String>,
+    refused: Vec<RefusedLine>,
+}
+
+impl ListedNames {
+    fn read(list: &VerdictList) -> Self {
+        let mut names = Self::default();
+        for row in list.rows() {
+            let checked = row.and_then(|row| {
+                verdict_file::check_values(&row, now())?;
+                Ok(row)
+            });
+            match checked {
+                Ok(VerdictRow { line, listed }) => {
+                    let NewVerdict { pair, reviewer, .. } = listed.verdict;
+                    if listed.judged.is_none() {
+                        names.current_lines.entry(pair.clone()).or_insert(line);
+                    }
+                    names.first_lines.entry(pair).or_insert(line);
+                    names.reviewers.insert(reviewer);
+                }
+                Err(error) => names.refused.push(error),
+            }
+        }
+        names
+    }
 }
 
 /// The verdicts of a project or a pair.
@@ -149,13 +193,16 @@ pub async fn log(pair: Option<&str>, location: &Location) -> ProjectResult<Verdi
     Ok(VerdictLog { events, damaged })
 }
 
-/// Undoes the newest verdict, of a reviewer or of anyone. The log keeps it, marked as undone. Returns the undone verdicts on
-/// all metrics.
+/// Undoes the newest verdict of a reviewer, who need not be named if there is only one. The log keeps it, marked as undone.
+/// Returns the undone verdicts on all metrics.
 pub async fn undo(reviewer: Option<&str>, location: &Location) -> ProjectResult<Vec<VerdictEvent>> {
     let (_project, catalog) = location.open().await?;
     let rights = catalog.review_rights().await?;
     let reviewer = reviewer.or(rights.only_reviewer());
     rights.require_review(reviewer)?;
+    if reviewer.is_none() {
+        reviewers::refuse_several(&catalog).await?;
+    }
     let undone = catalog.verdict_undo(reviewer, now()).await?;
     catalog.close().await;
     Ok(undone)

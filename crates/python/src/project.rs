@@ -21,6 +21,7 @@ use mocban_project::location::Location;
 use mocban_project::report::{ReportOptions, report};
 use mocban_project::run::{PreparedRun, options};
 use mocban_project::status::ProjectStatus;
+use mocban_project::verdict_words;
 use mocban_project::verdicts::{self, RecordedVerdict};
 use mocban_project::{ProjectError, ProjectResult, Refusal, export};
 use mocban_results::IntervalMethod;
@@ -194,11 +195,14 @@ impl NativeProject {
         reason: Option<&str>,
         note: Option<String>,
         expect: Option<&str>,
+        new_reviewer: bool,
     ) -> PyResult<bool> {
         let refuse = |error: ProjectError| project_failure(py, &error, &self.location.dir);
         let metric = metric.map(parsed).transpose().map_err(refuse)?;
-        let verdict = parsed(verdict).map_err(refuse)?;
-        let reason = reason.map(parsed).transpose().map_err(refuse)?;
+        let verdict = verdict_words::verdict(verdict);
+        let verdict = verdict.map_err(|text| refuse(Refusal::Usage(text).into()))?;
+        let reason = reason.map(verdict_words::reason).transpose();
+        let reason = reason.map_err(|text| refuse(Refusal::Usage(text).into()))?;
         let judged: Option<ContentHash> = expect.map(parsed).transpose().map_err(refuse)?;
         let name = id.clone();
         let recorded = self.simple(py, move |location, _| async move {
@@ -206,13 +210,17 @@ impl NativeProject {
                 pair,
                 metric,
                 verdict,
-                reviewer: reviewer.trim().to_owned(),
+                reviewer,
                 reason,
                 note,
                 context: ReviewContext::default(),
                 at: None,
             };
-            Ok(verdicts::record_on(&id, judged, new, &location).await?.1)
+            Ok(
+                verdicts::record_on(&id, judged, new, new_reviewer, &location)
+                    .await?
+                    .1,
+            )
         })?;
         if recorded == RecordedVerdict::Stale {
             let text = format!(

@@ -12,7 +12,10 @@ pub(crate) async fn agreement(context: &Context) -> ProjectResult<ExitCode> {
     context.warn_about_set_apart(&found.set_apart);
     context.print(&found, || agreement_text(&found))?;
     if found.conflicts > 0 {
-        context.next("review --adjudicate --reviewer NAME");
+        let command = context.command("review --adjudicate --reviewer NAME");
+        context.info(&format!(
+            "a person who did not judge these results settles them (put that person's name for NAME): {command}"
+        ));
     }
     Ok(ExitCode::Done)
 }

@@ -19,6 +19,7 @@ use mocban_project::export::export as export_project;
 use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `export`.
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
     /// Formats, separated by commas. One format is written to DIR itself, several each to DIR/FORMAT
@@ -73,6 +74,9 @@ pub(crate) struct ExportArgs {
     /// Begin CSV files with a byte order mark, so that Excel reads them as UTF-8
     #[arg(long)]
     pub(crate) csv_bom: bool,
+    /// Write CSV files with semicolons and decimal commas, as Excel in Vietnamese reads them
+    #[arg(long)]
+    pub(crate) csv_decimal_comma: bool,
     /// Include pictures in Parquet tables
     #[arg(long)]
     pub(crate) images: bool,
@@ -134,6 +138,7 @@ pub(crate) async fn export(args: ExportArgs, context: &Context) -> ProjectResult
         }),
         with_times: args.with_times,
         csv_bom: args.csv_bom,
+        csv_decimal_comma: args.csv_decimal_comma,
         images: args.images,
         shard_mib: args.shard_mib,
         license: args.license.clone(),

@@ -1,19 +1,19 @@
 //! `review`: serves the review page on this machine.
 
+use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::time::Duration;
 
 use clap::Args;
 use serde_json::json;
 
-use super::verdict::reviewer_name;
 use crate::cli::input::browser::open;
 use crate::cli::input::language::language_of_system;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
 use crate::cli::output::table::count;
-use mocban_catalog::{Catalog, SetApart, StatusCounts};
+use mocban_catalog::{Catalog, SetApart, StatusCounts, reviewer_name};
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_pages::review::{
@@ -23,6 +23,7 @@ use mocban_pages::review::{
 use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::error::explanation;
 use mocban_project::location::now;
+use mocban_project::reviewers;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
@@ -33,11 +34,15 @@ const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(1);
 const CLOSE: Duration = Duration::from_secs(2);
 
 /// Arguments of `review`.
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 #[derive(Debug, Args)]
 pub(crate) struct ReviewArgs {
     /// Name of the reviewer; a label for the verdicts, not a login, unless the catalog in PostgreSQL has roles
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     reviewer: String,
+    /// Accept a new reviewer whose name differs from that of another only in case or accents
+    #[arg(long)]
+    new_reviewer: bool,
     /// Order of the results: random gives an unbiased estimate of the accuracy; least-confident finds failures sooner
     #[arg(long, default_value = "random", value_parser = order)]
     order: ReviewOrder,
@@ -110,6 +115,10 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     let (project, catalog) = context.location.open().await?;
     let rights = catalog.review_rights().await?;
     rights.require_review(Some(&args.reviewer))?;
+    if !args.new_reviewer {
+        let names = BTreeSet::from([args.reviewer.clone()]);
+        reviewers::refuse_similar(&catalog, &rights, &names).await?;
+    }
     let (catalog, damaged) = catalog.without_faulty_rows().await?;
     context.warn_about_set_apart(&SetApart::of(&damaged));
     let language = args.lang.or_else(language_of_system);
@@ -162,7 +171,10 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     context.info(closing_line(kept == 0));
     context.next("report");
     if !args.adjudicate {
-        context.next(&queue_options(&args).for_another_reviewer());
+        let command = context.command(&queue_options(&args).for_another_reviewer());
+        context.info(&format!(
+            "to measure the agreement, another person judges the same results (put that person's name for NAME): {command}"
+        ));
     }
     Ok(ExitCode::Done)
 }

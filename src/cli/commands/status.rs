@@ -269,6 +269,9 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     }
     if let Some(first) = status.failures.pairs.first() {
         steps.push(format!("show {}", shell_quoted(first.name.as_str())));
+        if status.failures.may_succeed_unchanged() {
+            steps.push("retry".to_owned());
+        }
     }
     if status.counts.low_confidence > 0 {
         steps.push("show --low".to_owned());
@@ -289,6 +292,8 @@ mod tests {
         JobStatus, Palette, ProjectStatus, Stage, StageCounts, StatusCounts, Verdict, next_steps,
         screen,
     };
+    use mocban_catalog::{FailedPair, StoredFailure};
+    use mocban_core::domain::{Failure, FailureClass};
     use mocban_project::failures::Failures;
     use mocban_project::missing_inputs::MissingInputs;
 
@@ -364,6 +369,24 @@ mod tests {
             steps[..2],
             ["show --low", "contact-sheet --order confidence"]
         );
+    }
+
+    #[test]
+    fn a_failure_that_may_not_occur_again_is_offered_to_retry() {
+        let mut status = status(3, 0);
+        status.failures.pairs = vec![FailedPair {
+            name: "b1".parse().expect("a name"),
+            status: JobStatus::Quarantined,
+            failure: StoredFailure {
+                stage: Stage::Fit,
+                failure: Failure::new(FailureClass::Io, "no space left"),
+                at: 0,
+            },
+        }];
+        status.failures.counts = vec![(FailureClass::Io, 1)];
+        assert_eq!(next_steps(&status)[..2], ["show b1", "retry"]);
+        status.failures.counts = vec![(FailureClass::BadInput, 1)];
+        assert!(!next_steps(&status).contains(&"retry".to_owned()));
     }
 
     #[test]

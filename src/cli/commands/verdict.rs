@@ -10,11 +10,11 @@ use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::streams;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{
-    FaultyRow, ImportedVerdicts, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
-    check_reviewer,
+    FaultyRow, ImportedVerdicts, NewVerdict, ReviewContext, SetApart, VerdictEvent, reviewer_name,
 };
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
 use mocban_project::shell::shell_quoted;
+use mocban_project::verdict_words;
 use mocban_project::verdicts::{self, VerdictLog};
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_system::time_text::{duration, local};
@@ -29,7 +29,7 @@ pub(crate) enum VerdictCommand {
     Import(VerdictImportArgs),
     /// Print the log, oldest first
     Log(VerdictLogArgs),
-    /// Undo the newest verdict; the log keeps it, marked as undone
+    /// Undo a reviewer's newest verdict; the log keeps it, marked as undone
     Undo(VerdictUndoArgs),
 }
 
@@ -38,16 +38,20 @@ pub(crate) enum VerdictCommand {
 pub(crate) struct VerdictSetArgs {
     /// The pair
     pub(crate) pair: String,
-    /// The verdict: pass, fail or unsure
+    /// The verdict: pass, fail or unsure, or a word of the review page
+    #[arg(value_parser = verdict_words::verdict)]
     pub(crate) verdict: Verdict,
     /// Name of the reviewer
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(crate) reviewer: String,
+    /// Accept a new reviewer whose name differs from that of another only in case or accents
+    #[arg(long)]
+    pub(crate) new_reviewer: bool,
     /// Only the result of this metric: `nl_ssim`, density, ensemble or relief [default: all]
     #[arg(long)]
     pub(crate) metric: Option<ThresholdMetric>,
     /// Reason of a failure: angle, `strokes_lost`, `background_in`, `shift_or_scale`, mirrored or `wrong_pair`
-    #[arg(long)]
+    #[arg(long, value_parser = verdict_words::reason)]
     pub(crate) reason: Option<Reason>,
     /// Free text
     #[arg(long, value_name = "TEXT")]
@@ -65,6 +69,9 @@ pub(crate) struct VerdictImportArgs {
     /// Sheet of an XLSX file [default: the first one]
     #[arg(long, value_name = "NAME")]
     pub(crate) sheet: Option<String>,
+    /// Accept new reviewers whose names differ from those of others only in case or accents
+    #[arg(long)]
+    pub(crate) new_reviewer: bool,
 }
 
 /// Arguments of `verdict log`.
@@ -77,16 +84,9 @@ pub(crate) struct VerdictLogArgs {
 /// Arguments of `verdict undo`.
 #[derive(Debug, Args)]
 pub(crate) struct VerdictUndoArgs {
-    /// Only verdicts of this reviewer [default: of anyone]
+    /// Only verdicts of this reviewer; may be left out if nobody else has verdicts
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(crate) reviewer: Option<String>,
-}
-
-/// Parses a reviewer's name, which is one line of text.
-pub(crate) fn reviewer_name(text: &str) -> Result<String, InvalidVerdict> {
-    let name = text.trim();
-    check_reviewer(name)?;
-    Ok(name.to_owned())
 }
 
 /// Parses an angle from -180 to 180 degrees.
@@ -120,7 +120,8 @@ async fn set(args: VerdictSetArgs, context: &Context) -> ProjectResult<ExitCode>
         },
         at: None,
     };
-    let (new, is_new) = verdicts::record(&args.pair, verdict, &context.location).await?;
+    let (new, is_new) =
+        verdicts::record(&args.pair, verdict, args.new_reviewer, &context.location).await?;
     context.info(&if is_new {
         set_text(&new)
     } else {
@@ -147,7 +148,8 @@ fn verdict_text(new: &NewVerdict) -> String {
 
 async fn import(args: VerdictImportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let sheet = args.sheet.as_deref();
-    let (imported, warning) = verdicts::import(&args.file, sheet, &context.location).await?;
+    let (imported, warning) =
+        verdicts::import(&args.file, sheet, args.new_reviewer, &context.location).await?;
     if let Some(warning) = warning {
         context.warn(&warning);
     }

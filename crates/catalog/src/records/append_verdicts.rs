@@ -11,6 +11,7 @@ use crate::db::rows::json_array;
 use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::review_context::ReviewContext;
+use crate::records::reviewer_names::{Spellings, person_name, to_store};
 use crate::records::verdicts::NewVerdict;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{
@@ -74,10 +75,10 @@ SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1) AS item WHERE EXISTS (SELE
         AND v.note IS NOT DISTINCT FROM value ->> 7 AND v.at = CAST(value ->> 8 AS bigint) AND v.id <= ?2)"
 );
 
-/// Selects the reviewer's newest verdict on the result of each item.
+/// Selects the newest verdict on the result of each item by its reviewer, in one spelling of the name.
 const NEWEST: &str = concat!(
     "
-SELECT CAST(value ->> 0 AS bigint), last.verdict, last.reason, last.note FROM json_each(?1) AS item
+SELECT CAST(value ->> 0 AS bigint), last.id, last.verdict, last.reason, last.note FROM json_each(?1) AS item
     JOIN verdict AS last ON last.id = (SELECT v.id FROM verdict AS v WHERE ",
     is_of_item!(),
     " ORDER BY v.id DESC LIMIT 1)"
@@ -111,18 +112,23 @@ struct JudgedResult {
 /// What a verdict says.
 type Content = (Verdict, Option<Reason>, Option<String>);
 
+/// Number of an item, and the id and content of the newest verdict on its result.
+type NewestVerdictRow = (i64, i64, Verdict, Option<Reason>, Option<String>);
+
 /// A verdict on one result.
 struct VerdictRowDraft<'v> {
     /// Position of the verdict in its part of the list.
     row: usize,
     new: &'v NewVerdict,
     result: JudgedResult,
+    /// The one spelling of the reviewer's name.
+    reviewer: String,
 }
 
 impl VerdictRowDraft<'_> {
     /// Returns what two verdicts share if one of them can replace the other.
     fn key(&self) -> (JudgedResult, &str) {
-        (self.result, &self.new.reviewer)
+        (self.result, &self.reviewer)
     }
 
     fn content(&self) -> Content {
@@ -136,15 +142,16 @@ impl VerdictRowDraft<'_> {
         self.new.at.is_none() && self.new.context == ReviewContext::default()
     }
 
-    /// Returns the item for a statement. `first` is its number, or the number of its action.
-    fn item(&self, first: i64, now: UnixMillis) -> Value {
+    /// Returns the item for a statement. `first` is its number, or the number of its action, and `reviewer` a spelling of the
+    /// name.
+    fn item(&self, first: i64, reviewer: &str, now: UnixMillis) -> Value {
         let Self { new, result, .. } = self;
         let context = &new.context;
         json!([
             first,
             result.pair,
             result.metric.name(),
-            new.reviewer,
+            reviewer,
             result.hash,
             new.verdict.name(),
             new.reason.map(Reason::name),
@@ -190,13 +197,14 @@ impl Catalog {
         in_transaction!(self, |conn| {
             let newest = "SELECT coalesce(max(id), 0) FROM verdict";
             let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
+            let mut stored_names = Spellings::read(conn).await?;
             let mut counts = ImportedVerdicts::default();
             loop {
                 let part: Vec<_> = list.by_ref().take(CHUNK).collect::<Result<_>>()?;
                 if part.is_empty() {
                     return Ok(counts);
                 }
-                let of_part = append(conn, &part, newest, now).await?;
+                let of_part = append(conn, &part, &mut stored_names, newest, now).await?;
                 counts.recorded += of_part.recorded;
                 counts.known += of_part.known;
                 counts.left_out += of_part.left_out;
@@ -213,6 +221,7 @@ impl Catalog {
 async fn append(
     conn: &mut Conn,
     rows: &[ListedVerdict],
+    stored_names: &mut Spellings,
     newest: i64,
     now: UnixMillis,
 ) -> Result<ImportedVerdicts> {
@@ -227,15 +236,18 @@ async fn append(
             row,
             new: &listed.verdict,
             result,
+            reviewer: person_name(&listed.verdict.reviewer),
         }));
     }
-    let new = without_stored(conn, candidates, newest, now).await?;
-    let acts = begin_acts(conn, &new).await?;
+    let new = without_stored(conn, candidates, stored_names, newest, now).await?;
+    let written = written_names(conn, &new).await?;
+    stored_names.add(written.values());
+    let acts = begin_acts(conn, &new, &written).await?;
     counts.recorded = acts.len() as u64;
     counts.known = rows.len() as u64 - counts.left_out - counts.recorded;
     let items = new
         .iter()
-        .filter_map(|new| Some(new.item(*acts.get(&new.row)?, now)));
+        .filter_map(|new| Some(new.item(*acts.get(&new.row)?, &written[&new.reviewer], now)));
     let mut ids: Vec<i64> = query_scalar(INSERT)
         .bind(json_array(items))
         .fetch_all(&mut *conn)
@@ -298,19 +310,23 @@ fn judged(
 async fn without_stored<'v>(
     conn: &mut Conn,
     candidates: Vec<VerdictRowDraft<'v>>,
+    stored_names: &Spellings,
     newest: i64,
     now: UnixMillis,
 ) -> Result<Vec<VerdictRowDraft<'v>>> {
     let mut events = stored_events(conn, &candidates).await?;
     let with_time = (0..).zip(&candidates);
     let with_time = with_time.filter(|(_, new)| new.new.at.is_some());
-    let items = json_array(with_time.map(|(number, new)| new.item(number, now)));
+    let items = json_array(with_time.flat_map(|(number, new)| {
+        let spellings = stored_names.of(&new.reviewer);
+        spellings.map(move |reviewer| new.item(number, reviewer, now))
+    }));
     let stored = query_scalar(STORED).bind(items).bind(newest);
     let stored: BTreeSet<i64> = stored.fetch_all(&mut *conn).await?.into_iter().collect();
-    let mut last = newest_contents(conn, &candidates, now).await?;
+    let mut last = newest_contents(conn, &candidates, stored_names, now).await?;
     let mut new = Vec::with_capacity(candidates.len());
     for (number, candidate) in (0..).zip(candidates) {
-        let of_result = (candidate.result, candidate.new.reviewer.clone());
+        let of_result = (candidate.result, candidate.reviewer.clone());
         let content = candidate.content();
         let is_known = stored.contains(&number)
             || candidate.is_compared_with_newest() && last.get(&of_result) == Some(&content);
@@ -343,6 +359,7 @@ async fn stored_events(
 async fn newest_contents(
     conn: &mut Conn,
     candidates: &[VerdictRowDraft<'_>],
+    stored_names: &Spellings,
     now: UnixMillis,
 ) -> Result<BTreeMap<(JudgedResult, String), Content>> {
     let compared: BTreeMap<_, _> = candidates
@@ -352,22 +369,45 @@ async fn newest_contents(
         .collect();
     let compared: Vec<_> = compared.into_values().collect();
     let items = (0..).zip(&compared);
-    let items = json_array(items.map(|(number, new)| new.item(number, now)));
-    let found: Vec<(i64, Verdict, Option<Reason>, Option<String>)> =
-        query_as(NEWEST).bind(items).fetch_all(conn).await?;
-    let found = found.into_iter().map(|(number, verdict, reason, note)| {
+    let items = json_array(items.flat_map(|(number, new)| {
+        let spellings = stored_names.of(&new.reviewer);
+        spellings.map(move |reviewer| new.item(number, reviewer, now))
+    }));
+    let mut found: Vec<NewestVerdictRow> = query_as(NEWEST).bind(items).fetch_all(conn).await?;
+    // The newest of all spellings replaces the others.
+    found.sort_unstable_by_key(|(_, id, ..)| *id);
+    let found = found.into_iter().map(|(number, _, verdict, reason, note)| {
         let new = compared[number as usize];
-        let of_result = (new.result, new.new.reviewer.clone());
+        let of_result = (new.result, new.reviewer.clone());
         (of_result, (verdict, reason, note))
     });
     Ok(found.collect())
 }
 
+/// Returns the spelling in which each reviewer's name is stored.
+async fn written_names(
+    conn: &mut Conn,
+    new: &[VerdictRowDraft<'_>],
+) -> Result<BTreeMap<String, String>> {
+    let mut written = BTreeMap::new();
+    for new in new {
+        if !written.contains_key(&new.reviewer) {
+            let name = to_store(conn, &new.reviewer).await?;
+            written.insert(new.reviewer.clone(), name);
+        }
+    }
+    Ok(written)
+}
+
 /// Begins an action for each verdict with a new row. Returns the actions by position of the verdict.
-async fn begin_acts(conn: &mut Conn, new: &[VerdictRowDraft<'_>]) -> Result<BTreeMap<usize, i64>> {
+async fn begin_acts(
+    conn: &mut Conn,
+    new: &[VerdictRowDraft<'_>],
+    written: &BTreeMap<String, String>,
+) -> Result<BTreeMap<usize, i64>> {
     let reviewers: BTreeMap<usize, &str> = new
         .iter()
-        .map(|new| (new.row, new.new.reviewer.as_str()))
+        .map(|new| (new.row, written[&new.reviewer].as_str()))
         .collect();
     let begun = query_as(ACTS).bind(json_array(reviewers.values().copied()));
     let begun: Vec<(i64, String)> = begun.fetch_all(conn).await?;

@@ -10,6 +10,7 @@ use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::review_answers::pair_id;
+use crate::records::reviewer_names::{of_row, to_store};
 use crate::{Catalog, Result};
 use mocban_core::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
 
@@ -42,7 +43,7 @@ pub struct ManualAlignment {
     pub note: Option<String>,
 }
 
-from_row! { ManualAlignment { event, pair, reviewer, print_from_depth, print_from_mesh, mesh_hash, print_hash, depth_hash, seen, iou, dice, note } }
+from_row! { ManualAlignment { event, pair, reviewer by of_row, print_from_depth, print_from_mesh, mesh_hash, print_hash, depth_hash, seen, iou, dice, note } }
 
 /// A stored manual alignment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -131,7 +132,7 @@ impl Catalog {
                 .bind(serde_json::to_string(&made.print_from_mesh)?)
                 .bind(made.iou)
                 .bind(made.dice)
-                .bind(&made.reviewer)
+                .bind(to_store(conn, &made.reviewer).await?)
                 .bind(&made.note)
                 .bind(now)
                 .fetch_optional(&mut *conn)

@@ -9,6 +9,7 @@ use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::review_context::ReviewContext;
+use crate::records::reviewer_names::{Spellings, of_row, to_store};
 use crate::records::verdicts::{self, NewVerdict};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{
@@ -104,7 +105,7 @@ pub struct AttentionCheckAnswer {
     pub undone_at: Option<UnixMillis>,
 }
 
-from_row! { AttentionCheckAnswer { id, pair, metric, result_hash, check, verdict, reviewer, reason, note, context in row, at, undone_at } }
+from_row! { AttentionCheckAnswer { id, pair, metric, result_hash, check, verdict, reviewer by of_row, reason, note, context in row, at, undone_at } }
 
 const INSERT_CHECK: &str = "
 INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, shown_ms, angle_read_deg,
@@ -116,13 +117,13 @@ RETURNING id";
 const KNOWN: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict WHERE event = ?1) OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1)";
 
-/// Selects the answers of a reviewer, without the verdicts of `?2`, the answers of `?4`, and their undos of `?3` and `?5`.
+/// Selects the answers of a reviewer, with the spellings `?1` of the name, without the verdicts of `?2`, the answers of `?4`, and their undos of `?3` and `?5`.
 const ANSWERS: &str = concat!(
     "
 SELECT coalesce(v.event, 'act-' || v.act) AS event, p.name AS pair, v.result_hash AS hash, 0 AS is_check,
     v.verdict, v.reason, v.note, v.at AS at, v.id AS id
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair
-WHERE v.reviewer = ?1 AND ",
+WHERE v.reviewer IN (SELECT atom FROM json_each(?1)) AND ",
     is_counted!("v.id", "?2"),
     " AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act AND ",
     is_counted!("u.act", "?3"),
@@ -130,7 +131,7 @@ WHERE v.reviewer = ?1 AND ",
 UNION ALL
 SELECT c.event, p.name, c.seen, 1, c.verdict, c.reason, c.note, c.at, c.id
 FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair
-WHERE c.reviewer = ?1 AND ",
+WHERE c.reviewer IN (SELECT atom FROM json_each(?1)) AND ",
     is_counted!("c.id", "?4"),
     " AND NOT EXISTS (SELECT 1 FROM attention_check_undo AS u WHERE u.answer = c.id AND ",
     is_counted!("u.answer", "?5"),
@@ -156,25 +157,25 @@ const UNDO: [(ChecksummedTable, &str); 3] = [
     (
         ChecksummedTable::VerdictUndo,
         "INSERT INTO verdict_undo (act, reviewer, at) SELECT DISTINCT act, reviewer, ?3 FROM verdict
-        WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING act",
+        WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer IN (SELECT atom FROM json_each(?2)) ON CONFLICT DO NOTHING RETURNING act",
     ),
     (
         ChecksummedTable::AnswerUndo,
         "INSERT INTO attention_check_undo (answer, reviewer, at) SELECT id, reviewer, ?3 FROM attention_check_answer
-        WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING answer",
+        WHERE event = ?1 AND reviewer IN (SELECT atom FROM json_each(?2)) ON CONFLICT DO NOTHING RETURNING answer",
     ),
     (
         ChecksummedTable::ManualAlignmentUndo,
         "INSERT INTO manual_alignment_undo (alignment, reviewer, at) SELECT id, reviewer, ?3 FROM manual_alignment
-        WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING alignment",
+        WHERE event = ?1 AND reviewer IN (SELECT atom FROM json_each(?2)) ON CONFLICT DO NOTHING RETURNING alignment",
     ),
 ];
 
 /// Whether a reviewer stored anything under an event id, undone or not.
 const EXISTS: &str = "
-SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2)
-    OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1 AND reviewer = ?2)
-    OR EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1 AND reviewer = ?2)";
+SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer IN (SELECT atom FROM json_each(?2)))
+    OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1 AND reviewer IN (SELECT atom FROM json_each(?2)))
+    OR EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1 AND reviewer IN (SELECT atom FROM json_each(?2)))";
 
 impl Catalog {
     /// Appends an answer to a shown item durably, even if the shown result is outdated. Returns `false`, and stores
@@ -189,6 +190,10 @@ impl Catalog {
                 return Ok(false);
             }
             let pair = pair_id(conn, &given.pair).await?;
+            let given = NewVerdict {
+                reviewer: to_store(conn, &given.reviewer).await?,
+                ..given
+            };
             match &shown {
                 Shown::Results(results) => {
                     let mut act = None;
@@ -224,16 +229,17 @@ impl Catalog {
     pub async fn undo_event(&self, event: &str, reviewer: &str, now: UnixMillis) -> Result<()> {
         let (event, reviewer) = (event.to_owned(), reviewer.to_owned());
         in_transaction!(self, |conn| {
+            let spellings = Spellings::read(conn).await?.json(&reviewer);
             let exists: bool = query_scalar(EXISTS)
                 .bind(&event)
-                .bind(&reviewer)
+                .bind(&spellings)
                 .fetch_one(&mut *conn)
                 .await?;
             if !exists {
                 return Err(CatalogError::NothingToUndo(Some(reviewer)));
             }
             for (table, undo) in UNDO {
-                let undo = query_scalar(undo).bind(&event).bind(&reviewer);
+                let undo = query_scalar(undo).bind(&event).bind(&spellings);
                 let undone: Vec<i64> = undo.bind(now).fetch_all(&mut *conn).await?;
                 checksums::store(conn, table, &undone).await?;
             }
@@ -246,8 +252,9 @@ impl Catalog {
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
         let left_out = &self.left_out;
+        let spellings = Spellings::read(&mut conn).await?;
         let query = query_as(ANSWERS)
-            .bind(reviewer)
+            .bind(spellings.json(reviewer))
             .bind(left_out.of(ChecksummedTable::Verdict))
             .bind(left_out.of(ChecksummedTable::VerdictUndo))
             .bind(left_out.of(ChecksummedTable::Answer))

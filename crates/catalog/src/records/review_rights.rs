@@ -2,6 +2,7 @@
 
 use crate::db::query::query_as;
 use crate::db::row::from_row;
+use crate::records::reviewer_names::person_name;
 use crate::{Catalog, CatalogError, Result};
 
 /// Rights of the user of the database.
@@ -70,7 +71,10 @@ impl ReviewRights {
         if !is_granted {
             return Err(CatalogError::MayNotReview(self.quoted.clone()));
         }
-        let other = reviewer.filter(|name| self.only_reviewer().is_some_and(|own| own != *name));
+        let other = reviewer.filter(|name| {
+            self.only_reviewer()
+                .is_some_and(|own| person_name(own) != person_name(name))
+        });
         match other {
             Some(reviewer) => Err(CatalogError::OtherReviewer {
                 user: self.user.clone(),

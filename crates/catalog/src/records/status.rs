@@ -8,21 +8,43 @@ use crate::queue::counters::{JobCounts, by_status, counters};
 use crate::queue::fingerprint::{Fingerprints, current_json};
 use crate::queue::staleness::count_stale;
 use crate::records::model::{StageCounts, StatusCounts};
+use crate::records::reviewer_names::Spellings;
 use crate::{Catalog, Result};
 use mocban_core::domain::{JobStatus, Stage, Verdict};
 
+/// Returns the name of the reviewer of a verdict in its one spelling.
+macro_rules! person {
+    ($verdict:literal) => {
+        concat!(
+            "coalesce((SELECT value ->> 1 FROM json_each(?1) WHERE value ->> 0 = ",
+            $verdict,
+            ".reviewer), ",
+            $verdict,
+            ".reviewer)"
+        )
+    };
+}
+
 /// Counts verdicts on current results. Only the newest verdict of each reviewer on a result counts. Leaves out the verdicts
 /// that the owner has set apart; damaged ones that nobody knows of yet are found by a check or a report.
-const VERDICTS: &str = "
+///
+/// `?1` has the stored spellings of names that are not the spelling of the name.
+const VERDICTS: &str = concat!(
+    "
 SELECT v.verdict, count(*) FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
 WHERE v.id = (
     SELECT max(n.id) FROM verdict AS n
-    WHERE n.pair = v.pair AND n.metric = v.metric AND n.reviewer = v.reviewer AND n.result_hash = v.result_hash
+    WHERE n.pair = v.pair AND n.metric = v.metric AND ",
+    person!("n"),
+    " = ",
+    person!("v"),
+    " AND n.result_hash = v.result_hash
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act)
         AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))
     AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = v.pair)
-GROUP BY v.verdict";
+GROUP BY v.verdict"
+);
 
 /// Completed pairs whose result of the default metric has a low confidence.
 pub(crate) const LOW_CONFIDENCE: &str =
@@ -82,7 +104,8 @@ fn by_stage(counted: &JobCounts) -> BTreeMap<Stage, StageCounts> {
 
 async fn verdicts(conn: &mut Conn) -> Result<BTreeMap<Verdict, u64>> {
     let mut counts: BTreeMap<_, _> = Verdict::ALL.map(|verdict| (verdict, 0)).into();
-    let found: Vec<(Verdict, u64)> = query_as(VERDICTS).fetch_all(conn).await?;
+    let renamed = Spellings::read(conn).await?.renamed();
+    let found: Vec<(Verdict, u64)> = query_as(VERDICTS).bind(renamed).fetch_all(conn).await?;
     counts.extend(found);
     Ok(counts)
 }

@@ -1,5 +1,6 @@
 //! Which values a new verdict may have, wherever it comes from: the review page, a command or a file.
 
+use crate::records::reviewer_names::person_name;
 use crate::records::verdicts::NewVerdict;
 use mocban_core::domain::{UnixMillis, Verdict, is_hidden};
 
@@ -18,6 +19,9 @@ pub enum InvalidVerdict {
     /// The name is empty, too long, or not one visible line.
     #[error("the reviewer's name must be one line of 1 to {REVIEWER_CHARS} visible characters")]
     Reviewer,
+    /// The name is a word of an example.
+    #[error("NAME and TÊN stand for a name; give the name of the reviewer")]
+    Placeholder,
     /// A reason without a fail.
     #[error("only a fail has a reason")]
     Reason,
@@ -74,11 +78,27 @@ impl NewVerdict {
     }
 }
 
-/// Checks the name of a reviewer.
+/// Returns a reviewer's name in its one spelling: see [`person_name`].
 ///
 /// # Errors
 /// Returns an error if the name is empty or too long, or has characters that are not shown.
-pub fn check_reviewer(name: &str) -> Result<(), InvalidVerdict> {
+pub fn reviewer_name(text: &str) -> Result<String, InvalidVerdict> {
+    let name = person_name(text);
+    check_reviewer(&name)?;
+    Ok(name)
+}
+
+/// Checks the name of a reviewer.
+///
+/// # Errors
+/// Returns an error if the name is empty or too long, has characters that are not shown, or is a word of an example.
+fn check_reviewer(name: &str) -> Result<(), InvalidVerdict> {
+    if matches!(
+        name,
+        "NAME" | "TÊN" | "<NAME>" | "<TÊN>" | "<name>" | "<tên>"
+    ) {
+        return Err(InvalidVerdict::Placeholder);
+    }
     let is_valid = name.trim() == name && !name.contains(is_hidden);
     if is_valid && (1..=REVIEWER_CHARS).contains(&name.chars().count()) {
         Ok(())
@@ -103,7 +123,7 @@ pub fn check_event(event: &str) -> Result<(), InvalidVerdict> {
 
 #[cfg(test)]
 mod tests {
-    use super::{DAY_MS, InvalidVerdict, NOTE_CHARS, check_event, check_reviewer};
+    use super::{DAY_MS, InvalidVerdict, NOTE_CHARS, check_event, check_reviewer, reviewer_name};
     use crate::{NewVerdict, ReviewContext};
     use mocban_core::domain::{Reason, Verdict};
 
@@ -176,6 +196,8 @@ mod tests {
     #[test]
     fn names_of_reviewers_are_one_visible_line() {
         assert_eq!(check_reviewer(&"ê".repeat(100)), Ok(()));
+        let typed = reviewer_name(" Le\u{302} \u{a0} Lan\n");
+        assert_eq!(typed.as_deref(), Ok("Lê Lan"));
         for wrong in [
             "",
             " ",
@@ -191,6 +213,14 @@ mod tests {
                 "{wrong:?}"
             );
         }
+    }
+
+    #[test]
+    fn placeholders_are_no_names() {
+        for wrong in ["NAME", "TÊN", "<NAME>"] {
+            assert_eq!(reviewer_name(wrong), Err(InvalidVerdict::Placeholder));
+        }
+        assert_eq!(check_reviewer("Name"), Ok(()));
     }
 
     #[test]

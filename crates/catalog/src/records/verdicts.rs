@@ -12,6 +12,7 @@ use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::{LeftOut, is_counted};
 use crate::records::review_context::ReviewContext;
+use crate::records::reviewer_names::{Spellings, of_row};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{
     ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
@@ -71,7 +72,7 @@ pub struct VerdictEvent {
     pub current: bool,
 }
 
-from_row! { VerdictEvent { id, act, pair, metric, result_hash, verdict, reviewer, reason, note, context in row, at, undone_at, current } }
+from_row! { VerdictEvent { id, act, pair, metric, result_hash, verdict, reviewer by of_row, reason, note, context in row, at, undone_at, current } }
 
 /// A reviewer's newest verdict on a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -86,18 +87,19 @@ pub struct ReviewerVerdict {
     pub review_order: Option<ReviewOrder>,
 }
 
-from_row! { ReviewerVerdict { reviewer, verdict, reason, review_order } }
+from_row! { ReviewerVerdict { reviewer by of_row, verdict, reason, review_order } }
 
 /// A verdict that was not undone, with the result that it judges.
 #[derive(Debug)]
 pub(crate) struct ResultVerdict {
+    id: i64,
     pair: i64,
     metric: ThresholdMetric,
     pub(crate) result_hash: ContentHash,
     pub(crate) verdict: ReviewerVerdict,
 }
 
-from_row! { ResultVerdict { pair, metric, result_hash, verdict in row } }
+from_row! { ResultVerdict { id, pair, metric, result_hash, verdict in row } }
 
 /// Begins an action, unless a verdict with the same event and metric exists.
 const NEW_ACT: &str = "
@@ -134,7 +136,7 @@ INSERT INTO verdict_undo (act, reviewer, at) SELECT id, reviewer, ?2 FROM review
 /// Selects the verdicts of the pairs of `?1`, without the verdicts of `?2` and the undos of `?3`.
 pub(crate) const COUNTED: &str = concat!(
     "
-SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.review_order
+SELECT v.id, v.pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.review_order
 FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = CAST(wanted.atom AS bigint)
 WHERE ",
     is_counted!("v.id", "?2"),
@@ -157,11 +159,15 @@ impl Catalog {
     ) -> Result<Vec<VerdictEvent>> {
         let reviewer = reviewer.map(str::to_owned);
         in_transaction!(self, |conn| {
+            let spellings = match &reviewer {
+                Some(reviewer) => Some(Spellings::read(conn).await?.json(reviewer)),
+                None => None,
+            };
             let act: Option<i64> = query_scalar(
-                "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer = ?1)
+                "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer IN (SELECT atom FROM json_each(?1)))
                         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)",
             )
-            .bind(&reviewer)
+            .bind(&spellings)
             .fetch_one(&mut *conn)
             .await?;
             let Some(act) = act else {
@@ -271,13 +277,21 @@ pub(crate) async fn of_pairs(
     let query = query.bind(left_out.of(ChecksummedTable::VerdictUndo));
     let found: Vec<ResultVerdict> = query.fetch_all(conn).await?;
     let mut counted: BTreeMap<_, Vec<ResultVerdict>> = BTreeMap::new();
-    for newest in found {
-        let of_metric = counted.entry((newest.pair, newest.metric)).or_default();
-        // Each reviewer's verdicts come oldest first, so a later verdict on a result replaces the earlier one.
-        of_metric.retain(|old| {
-            old.verdict.reviewer != newest.verdict.reviewer || old.result_hash != newest.result_hash
+    for given in found {
+        let of_metric = counted.entry((given.pair, given.metric)).or_default();
+        let same = of_metric.iter_mut().find(|other| {
+            other.verdict.reviewer == given.verdict.reviewer
+                && other.result_hash == given.result_hash
         });
-        of_metric.push(newest);
+        match same {
+            // Each spelling's verdicts come oldest first, but those of another spelling may be newer.
+            Some(other) if other.id < given.id => *other = given,
+            Some(_) => {}
+            None => of_metric.push(given),
+        }
+    }
+    for of_metric in counted.values_mut() {
+        of_metric.sort_by(|a, b| a.verdict.reviewer.cmp(&b.verdict.reviewer));
     }
     Ok(counted)
 }

@@ -87,6 +87,57 @@ async fn a_verdict_without_a_time_that_equals_the_newest_is_not_stored_again() {
     assert_eq!(set(&[Verdict::Fail]).await, 1);
 }
 
+/// A name with decomposed letters, as macOS writes it, and the one spelling of it.
+const DECOMPOSED: &str = "Tra\u{302}\u{300}n  Bi\u{300}nh ";
+const COMPOSED: &str = "Tr\u{1ea7}n B\u{ec}nh";
+
+#[tokio::test]
+async fn one_person_is_one_reviewer_however_her_name_is_spelled() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let set = |name: &str, given| world.catalog.verdict_set(vec![verdict(name, given)], 5);
+    assert_eq!(set(DECOMPOSED, Verdict::Pass).await.expect("stored"), 1);
+    assert_eq!(set(COMPOSED, Verdict::Pass).await.expect("known"), 0);
+    let log = world.catalog.verdict_log(None).await.expect("a log");
+    assert!(
+        log.iter().all(|event| event.reviewer == COMPOSED),
+        "{log:?}"
+    );
+}
+
+#[tokio::test]
+async fn names_stored_in_an_older_spelling_are_of_the_same_reviewer() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let set = |name: &str, given| world.catalog.verdict_set(vec![verdict(name, given)], 5);
+    set(COMPOSED, Verdict::Pass).await.expect("stored");
+    let mut conn = world.place.conn().await;
+    for sql in [
+        "INSERT INTO review_act (reviewer) VALUES (?1)",
+        "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at)
+        SELECT (SELECT max(id) FROM review_act), pair, metric, result_hash, 'unsure', ?1, 6 FROM verdict",
+    ] {
+        query(sql)
+            .bind(DECOMPOSED)
+            .execute(&mut conn)
+            .await
+            .expect("stored");
+    }
+    let newest = [(COMPOSED.to_owned(), Verdict::Unsure)];
+    assert_eq!(counted(&world.catalog).await, newest);
+    let status = world.catalog.status(&super::fingerprints([1; 4])).await;
+    let counts = status.expect("a read").verdicts;
+    assert_eq!(counts[&Verdict::Unsure], METRICS as u64);
+    assert_eq!(counts[&Verdict::Pass], 0);
+    let answers = world.catalog.answers(COMPOSED).await.expect("a read");
+    assert_eq!(answers.len(), 2 * METRICS);
+    assert_eq!(set(COMPOSED, Verdict::Unsure).await.expect("known"), 0);
+    let undone = world.catalog.verdict_undo(Some(COMPOSED), 7).await;
+    assert_eq!(undone.expect("undone")[0].verdict, Verdict::Unsure);
+    let names = world.catalog.reviewer_names().await.expect("a read");
+    assert_eq!(names.into_iter().collect::<Vec<_>>(), [COMPOSED]);
+}
+
 #[tokio::test]
 async fn undo_affects_the_newest_act_and_the_log_keeps_both() {
     let world = World::new(1).await;

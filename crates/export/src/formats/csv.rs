@@ -66,6 +66,8 @@ struct ResultColumn {
 struct CsvTable {
     columns: Vec<ResultColumn>,
     file: SharedFile,
+    /// Whether numbers have decimal commas, and columns are separated by semicolons.
+    has_decimal_commas: bool,
 }
 
 impl CsvTable {
@@ -77,8 +79,13 @@ impl CsvTable {
         }
         let columns = columns(fields, &folder.context.meta_columns);
         let header = columns.iter().map(|column| text_cell(&column.name));
-        file.append(&rows([header.collect()]))?;
-        Ok(Self { columns, file })
+        let has_decimal_commas = folder.context.options.csv_decimal_comma;
+        file.append(&rows([header.collect()], has_decimal_commas))?;
+        Ok(Self {
+            columns,
+            file,
+            has_decimal_commas,
+        })
     }
 
     /// Returns rows of the table from the fields of results.
@@ -86,11 +93,11 @@ impl CsvTable {
         let cells = |result: &Value| {
             let cell = |column: &ResultColumn| {
                 let value = result.pointer(&column.pointer);
-                value.map_or_else(String::new, cell)
+                value.map_or_else(String::new, |value| cell(value, self.has_decimal_commas))
             };
             self.columns.iter().map(cell).collect()
         };
-        rows(results.iter().map(cells))
+        rows(results.iter().map(cells), self.has_decimal_commas)
     }
 }
 
@@ -155,10 +162,16 @@ impl FormatWriter for CsvWriter {
 
     fn guide(&self) -> FormatGuide {
         let tables = [("Columns", &PAIR_FIELDS[..]), ("", &METRIC_FIELDS[..])];
+        let is_with_commas = self.folder.context.options.csv_decimal_comma;
+        let (separated, read) = if is_with_commas {
+            ("separated by semicolons, with decimal commas", "read.csv2")
+        } else {
+            ("comma-separated", "read.csv")
+        };
         FormatGuide {
             purpose: "Results of block scans aligned with prints, as a table with one row per pair and metric.".to_owned(),
             files: vec![
-                [TABLE, "numbers and texts: UTF-8, comma-separated, lines end with CR LF"].map(str::to_owned),
+                [TABLE.to_owned(), format!("numbers and texts: UTF-8, {separated}, lines end with CR LF")],
                 [MATRICES, "matrices of the same rows, by `id` and `metric`"].map(str::to_owned),
             ],
             usage: "\
@@ -168,11 +181,11 @@ the newest verdict of each reviewer, as `lan=pass; minh=fail (angle)`. A text th
 begins with `'`.
 
 ```r
-pairs <- read.csv(\"pairs.csv\", fileEncoding = \"UTF-8-BOM\")
-matrices <- read.csv(\"matrices.csv\", fileEncoding = \"UTF-8-BOM\")
+pairs <- READ(\"pairs.csv\", fileEncoding = \"UTF-8-BOM\")
+matrices <- READ(\"matrices.csv\", fileEncoding = \"UTF-8-BOM\")
 pairs <- merge(pairs, matrices, by = c(\"id\", \"metric\"))
 ```"
-            .to_owned(),
+            .replace("READ", read),
             fields: markdown_table(&schema_of::<RowSchema>(), &tables),
             ..FormatGuide::default()
         }
@@ -287,14 +300,21 @@ fn judgements(verdicts: &[ReviewerFields]) -> String {
 }
 
 /// Returns a value as a cell: numbers with all digits, lists and objects as JSON.
-fn cell(value: &Value) -> String {
+fn cell(value: &Value, has_decimal_commas: bool) -> String {
     match value {
         Value::Null => String::new(),
         Value::String(text) => text_cell(text),
         // Display of f64 has no exponent, unlike JSON.
-        Value::Number(number) if number.is_f64() => number
-            .as_f64()
-            .map_or_else(String::new, |number| number.to_string()),
+        Value::Number(number) if number.is_f64() => {
+            number.as_f64().map_or_else(String::new, |number| {
+                let text = number.to_string();
+                if has_decimal_commas {
+                    text.replace('.', ",")
+                } else {
+                    text
+                }
+            })
+        }
         other => other.to_string(),
     }
 }
@@ -309,9 +329,10 @@ fn text_cell(text: &str) -> String {
     if is_formula { "'" } else { "" }.to_owned() + text
 }
 
-/// Returns rows as CSV (RFC 4180).
-fn rows(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
+/// Returns rows as CSV (RFC 4180), with semicolons between the columns beside decimal commas.
+fn rows(rows: impl IntoIterator<Item = Vec<String>>, has_decimal_commas: bool) -> Vec<u8> {
     let mut writer = WriterBuilder::new()
+        .delimiter(if has_decimal_commas { b';' } else { b',' })
         .terminator(Terminator::CRLF)
         .from_writer(Vec::new());
     for row in rows {
@@ -326,7 +347,11 @@ fn rows(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
 mod tests {
     use serde_json::json;
 
-    use super::{FIRST_FIELDS, all_fields, cell, columns, matrix_fields, table_fields};
+    use super::{FIRST_FIELDS, all_fields, columns, matrix_fields, rows, table_fields};
+
+    fn cell(value: &serde_json::Value) -> String {
+        super::cell(value, false)
+    }
 
     fn names(fields: &[&str]) -> Vec<String> {
         let columns = columns(fields, &["tờ".to_owned()]);
@@ -396,5 +421,13 @@ mod tests {
         }
         assert_eq!(cell(&json!(-1.5e-7)), "-0.00000015");
         assert_eq!(cell(&json!(-3)), "-3");
+    }
+
+    #[test]
+    fn decimal_commas_come_with_semicolons() {
+        let values = [json!("a;b"), json!(-0.25), json!(3), json!("1.5")];
+        let row = values.iter().map(|value| super::cell(value, true));
+        let row = rows([row.collect()], true);
+        assert_eq!(row, b"\"a;b\";-0,25;3;1.5\r\n");
     }
 }

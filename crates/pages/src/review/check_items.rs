@@ -1,7 +1,9 @@
 //! Attention checks: planted faults and duplicates, shown among the results to measure how reliable a reviewer is.
 
+use std::collections::BTreeSet;
+
 use super::item::{ItemView, ReviewItem};
-use mocban_core::domain::{AttentionCheck, SeededRandom};
+use mocban_core::domain::{AttentionCheck, ContentHash, SeededRandom};
 use mocban_core::raster::{DepthMap, Mask};
 
 /// How many attention checks are added to a queue.
@@ -38,10 +40,13 @@ pub(super) struct FaultCandidates<'a> {
 }
 
 /// Returns the items from which a fault may be made. Wanted are `rates.faults` of the reviewed items, and at least
-/// [`MIN_FAULTS`]. If there are too few reviewed items, `others` are used, which are not reviewed themselves.
+/// [`MIN_FAULTS`]. If there are too few reviewed items, `others` are used, which are not reviewed themselves. Items with
+/// a result of `answered`, whose fault the reviewer has answered before, come first: the faults of a queue stay when others
+/// judge the same results.
 pub(super) fn fault_candidates<'a>(
     items: &'a [ReviewItem],
     others: &'a [ReviewItem],
+    answered: &BTreeSet<ContentHash>,
     rates: &CheckRates,
     random: &SeededRandom,
 ) -> FaultCandidates<'a> {
@@ -49,8 +54,14 @@ pub(super) fn fault_candidates<'a>(
         return FaultCandidates::default();
     }
     let draw = |item: &ReviewItem| random.draw(&item.view.hash(), "control");
+    let is_answered = |item: &ReviewItem| {
+        let mut results = item.results.iter();
+        results.any(|(_, hash)| answered.contains(hash))
+    };
     let by_draw = |items: &'a [ReviewItem]| {
-        let reliable = items.iter().filter(|item| item.is_reliable);
+        let reliable = items
+            .iter()
+            .filter(|item| item.is_reliable || is_answered(item));
         let mut drawn: Vec<(f64, &ReviewItem)> = reliable.map(|item| (draw(item), item)).collect();
         drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
         drawn
@@ -58,6 +69,7 @@ pub(super) fn fault_candidates<'a>(
     let mut drawn = by_draw(items);
     let count = drawn.partition_point(|(number, _)| *number < rates.faults);
     drawn.extend(by_draw(others));
+    drawn.sort_by_key(|(_, item)| !is_answered(item));
     FaultCandidates {
         wanted: count.max(MIN_FAULTS).min(drawn.len()),
         items: drawn.into_iter().map(|(_, item)| item).collect(),
@@ -162,6 +174,8 @@ pub(super) fn interleave(
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::{CheckRates, fault_candidates, interleave, plant_fault};
     use crate::review::item::ReviewItem;
     use crate::review::item::test_fixtures::item;
@@ -203,7 +217,7 @@ mod tests {
         rates: &CheckRates,
         random: &SeededRandom,
     ) -> Vec<&'a ReviewItem> {
-        let mut found = fault_candidates(items, others, rates, random);
+        let mut found = fault_candidates(items, others, &BTreeSet::new(), rates, random);
         found.items.truncate(found.wanted);
         found.items
     }
@@ -287,6 +301,29 @@ mod tests {
         }
         let random = SeededRandom::new(5, "ana");
         assert!(selected(&unreliable, &unreliable, &RATES, &random).is_empty());
+    }
+
+    #[test]
+    fn answered_faults_stay_when_others_judge_the_results() {
+        let random = SeededRandom::new(5, "ana");
+        let mut all: Vec<ReviewItem> = (0..60).map(item).collect();
+        for unjudged in all.iter_mut().step_by(2) {
+            unjudged.is_reliable = false;
+        }
+        let names = |all: &[ReviewItem], answered: &BTreeSet<_>| -> BTreeSet<_> {
+            let (items, others) = all.split_at(8);
+            let found = fault_candidates(items, others, answered, &RATES, &random);
+            let planted = found.items.iter().take(found.wanted);
+            planted.map(|item| item.pair.clone()).collect()
+        };
+        let planted = names(&all, &BTreeSet::new());
+        let of_planted = all.iter().filter(|item| planted.contains(&item.pair));
+        let answered: BTreeSet<_> = of_planted.map(|item| item.results[0].1).collect();
+        for judged in &mut all {
+            judged.is_reliable = !judged.is_reliable;
+        }
+        assert_ne!(names(&all, &BTreeSet::new()), planted);
+        assert_eq!(names(&all, &answered), planted);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The reviewer's history: current answers and manual alignments, by item.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::item::ReviewItem;
 use super::options::QueueOptions;
@@ -12,6 +12,8 @@ use mocban_core::domain::ContentHash;
 pub(super) struct ReviewerHistory {
     answers: BTreeMap<AnsweredOn, Answer>,
     alignments: BTreeMap<ContentHash, ManualAlignment>,
+    /// Results in which a fault was planted that the reviewer has answered, also if the answer was undone.
+    faulty_results: BTreeSet<ContentHash>,
     /// Whether alignments are also shown for items without an answer. False if there are attention checks.
     shows_all_alignments: bool,
 }
@@ -24,6 +26,10 @@ impl ReviewerHistory {
     ) -> Result<Self, CatalogError> {
         let answers = catalog.answers(&options.reviewer).await?.into_iter();
         let alignments = catalog.manual_alignments().await?.into_iter();
+        let checks = catalog.attention_check_answers().await?.into_iter();
+        let own_faults = checks
+            .filter(|given| given.reviewer == options.reviewer && given.check.is_fault())
+            .map(|given| given.result_hash);
         let current = alignments.filter(|stored| {
             stored.made.reviewer == options.reviewer
                 && stored.holds
@@ -36,6 +42,7 @@ impl ReviewerHistory {
             alignments: current
                 .map(|stored| (stored.made.seen, stored.made))
                 .collect(),
+            faulty_results: own_faults.collect(),
             shows_all_alignments: !options.has_attention_checks(),
         })
     }
@@ -43,6 +50,11 @@ impl ReviewerHistory {
     /// Returns whether the reviewer has not answered anything yet, in any review of the project.
     pub(super) fn is_empty(&self) -> bool {
         self.answers.is_empty()
+    }
+
+    /// Returns the results in which a fault was planted that the reviewer has answered.
+    pub(super) const fn faulty_results(&self) -> &BTreeSet<ContentHash> {
+        &self.faulty_results
     }
 
     /// Returns the answer to an item.

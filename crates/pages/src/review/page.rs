@@ -29,7 +29,6 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
         a.skip href="#viewer" { (language.translate("skip")) }
         (top(options, language))
         noscript { p.alert { (language.translate("no_script")) } }
-        p #alert .alert role="alert" hidden {}
         (modes(language))
         (practice(language))
         main {
@@ -49,7 +48,6 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
         (jump(language))
         (confirm(language))
         dialog #scan .scan-dialog aria-label=(language.translate("scan_view")) {}
-        p #live .live aria-live="polite" {}
     };
     document(language.name(), &title, &head, &html! { body { (body) } })
 }
@@ -70,7 +68,7 @@ fn top(options: &QueueOptions, language: Language) -> Markup {
             strong #fault-shortage .label hidden {}
             span.spacer {}
             span #pace {}
-            span #saved .saved role="status" { (language.translate("saved")) }
+            span #saved .saved role="status" {}
             span { (language.translate("reviewer")) ": " b { (one_line(&options.reviewer)) } }
             a #language href={ "?lang=" (other.name()) } hreflang=(other.name()) lang=(other.name()) {
                 (language.translate("other_language"))
@@ -144,6 +142,7 @@ fn toggle(action: &'static str, language: Language) -> Markup {
 fn verdict_bar(language: Language) -> Markup {
     html! {
         footer {
+            p #alert .alert role="alert" hidden {}
             div.verdicts role="group" aria-label=(language.translate("question")) {
                 span.question { (language.translate("question")) }
                 (verdict("pass", "✓", language))
@@ -171,6 +170,7 @@ fn verdict_bar(language: Language) -> Markup {
                 (button("jump", language))
                 (button("details", language))
             }
+            p #live .live aria-live="polite" {}
         }
     }
 }

@@ -42,9 +42,12 @@ impl ReviewQueue {
             None => Vec::new(),
         };
         order::sort(&mut items, options.order, &random);
+        let history = ReviewerHistory::read(catalog, options).await?;
         let mut shortage = None;
         if options.has_attention_checks() {
-            let found = check_items::fault_candidates(&items, &others, &options.rates, &random);
+            let answered = history.faulty_results();
+            let rates = &options.rates;
+            let found = check_items::fault_candidates(&items, &others, answered, rates, &random);
             let faults = planter.plant(found, &random).await?;
             shortage = faults.shortage;
             items = check_items::interleave(items, faults.items, &options.rates, &random);
@@ -52,7 +55,7 @@ impl ReviewQueue {
         let item = |item: ReviewItem| Arc::new(item.with_id(&key, &options.reviewer));
         Ok(Self {
             items: items.into_iter().map(item).collect(),
-            history: ReviewerHistory::read(catalog, options).await?,
+            history,
             shortage,
         })
     }

@@ -1,6 +1,8 @@
 //! Tests of the parsers of verdict files.
 
-use super::{RefusedLine, VerdictList, VerdictRow, check_values, refuse_unknown};
+use std::path::Path;
+
+use super::{RefusedLine, VerdictList, VerdictRow, check_values, unknown_pairs};
 use mocban_core::domain::{PairName, Reason, ThresholdMetric, Verdict};
 
 fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
@@ -113,6 +115,11 @@ fn invalid_line_is_reported_by_number() {
     let rude = error("pair,ver\u{1b}[2J\n");
     assert!(!rude.contains('\u{1b}'), "{rude}");
     assert!(error("pair,verdict\n").starts_with("line 1: column reviewer is missing"));
+    assert_eq!(
+        error("id,result,who\n"),
+        "line 1: columns verdict, reviewer are missing; columns result, who are unknown; needed are pair, verdict and \
+         reviewer, and possible metric, reason, note, at"
+    );
     assert!(error("pair,verdict,reveiwer\n").contains("did you mean \"reviewer\"?"));
     assert!(error("pair,verdict,reviewer\n1,pass\n").starts_with("line 2: 2 cells"));
     assert!(error("pair,verdict,reviewer\na/b,pass,lan\n").starts_with("line 2: id"));
@@ -182,11 +189,38 @@ fn unknown_pair_is_reported_by_line() {
     let lines = [("1", 2), ("2", 3), ("0", 4)].map(|(pair, line)| (id(pair), line));
     let unknown = ["0", "2"].map(id);
     let known = ["1", "0002", "7"].map(id);
-    let error = refuse_unknown(&lines.into(), &unknown, &known).expect_err("refused");
+    let refused = unknown_pairs(&lines.into(), &unknown, &known);
+    let refused: Vec<String> = refused.iter().map(ToString::to_string).collect();
     assert_eq!(
-        error.to_string(),
-        "line 3: there is no pair 2; did you mean \"0002\"?"
+        refused,
+        [
+            "line 3: there is no pair 2; did you mean \"0002\"?",
+            "line 4: there is no pair 0; did you mean \"0002\"?"
+        ]
     );
+}
+
+#[test]
+fn all_refused_lines_are_listed_up_to_a_limit() {
+    let file = Path::new("v.csv");
+    let refused = |lines: std::ops::Range<usize>| {
+        let lines = lines.rev().map(|line| RefusedLine::new(line, "wrong"));
+        let refusal = RefusedLine::all_in_file(lines.collect(), file, "nothing was recorded");
+        refusal.map(|refusal| refusal.to_string())
+    };
+    assert_eq!(refused(0..0), None);
+    let one = refused(2..3);
+    assert_eq!(
+        one.as_deref(),
+        Some("v.csv: line 2: wrong; nothing was recorded")
+    );
+    let two = refused(2..4);
+    assert_eq!(
+        two.as_deref(),
+        Some("v.csv: 2 lines are refused; nothing was recorded:\n  line 2: wrong\n  line 3: wrong")
+    );
+    let many = refused(2..27).expect("refused");
+    assert!(many.ends_with("line 21: wrong\n  and 5 more"), "{many}");
 }
 
 #[test]

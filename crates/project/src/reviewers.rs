@@ -1,0 +1,91 @@
+//! Names of reviewers: one person must not become two by a typing error.
+
+use std::collections::BTreeSet;
+
+use crate::error::ProjectResult;
+use crate::exit::Refusal;
+use mocban_catalog::{Catalog, ReviewRights};
+use mocban_core::domain::spelling::plain_form;
+
+/// Refuses a new reviewer whose name differs from that of another one only in case, accents, blanks or zeros. A user of
+/// PostgreSQL who judges only under the own name is never refused.
+///
+/// # Errors
+/// Returns an error that names both, or the error of the catalog.
+pub async fn refuse_similar(
+    catalog: &Catalog,
+    rights: &ReviewRights,
+    names: &BTreeSet<String>,
+) -> ProjectResult<()> {
+    if rights.only_reviewer().is_some() {
+        return Ok(());
+    }
+    let known = catalog.reviewer_names().await?;
+    match similar(known, names) {
+        Some((new, known)) => Err(Refusal::Usage(format!(
+            "the reviewers {known:?} and {new:?} have nearly the same name; if they are one person, write {known:?}, or else \
+             add --new-reviewer"
+        ))
+        .into()),
+        None => Ok(()),
+    }
+}
+
+/// Returns the first new name that is similar to a known one or to an earlier new one, and that one.
+fn similar(mut known: BTreeSet<String>, names: &BTreeSet<String>) -> Option<(String, String)> {
+    let plain = |name: &str| plain_form(name).replace(char::is_whitespace, "");
+    for new in names
+        .iter()
+        .filter(|name| !known.contains(*name))
+        .cloned()
+        .collect::<Vec<_>>()
+    {
+        let form = plain(&new);
+        if let Some(other) = known.iter().find(|other| plain(other) == form) {
+            return Some((new, other.clone()));
+        }
+        known.insert(new);
+    }
+    None
+}
+
+/// Refuses to undo the newest verdict of anyone if there are verdicts of several reviewers.
+///
+/// # Errors
+/// Returns an error that names them, or the error of the catalog.
+pub(crate) async fn refuse_several(catalog: &Catalog) -> ProjectResult<()> {
+    const MAX_NAMES: usize = 10;
+    let names = catalog.reviewers_with_verdicts().await?;
+    if names.len() < 2 {
+        return Ok(());
+    }
+    let mut shown: Vec<String> = names.iter().take(MAX_NAMES).cloned().collect();
+    if names.len() > MAX_NAMES {
+        shown.push(format!("{} more", names.len() - MAX_NAMES));
+    }
+    let shown = shown.join(", ");
+    let text = format!(
+        "there are verdicts of several reviewers ({shown}); say whose newest verdict to undo with --reviewer"
+    );
+    Err(Refusal::Usage(text).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::similar;
+
+    #[test]
+    fn a_new_name_that_looks_like_another_is_found() {
+        let found = |known: &[&str], names: &[&str]| {
+            let set = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+            similar(set(known), &set(names))
+        };
+        let both = |new: &str, known: &str| Some((new.to_owned(), known.to_owned()));
+        assert_eq!(found(&["lan"], &["Lan"]), both("Lan", "lan"));
+        assert_eq!(found(&["lan"], &["Lân"]), both("Lân", "lan"));
+        assert_eq!(found(&["Đỗ An"], &["do an"]), both("do an", "Đỗ An"));
+        assert_eq!(found(&["Lê An"], &["LêAn"]), both("LêAn", "Lê An"));
+        assert_eq!(found(&[], &["Minh", "minh"]), both("minh", "Minh"));
+        assert_eq!(found(&["lan", "Lan"], &["Lan", "lan", "minh"]), None);
+    }
+}
