@@ -201,6 +201,8 @@ fn check_page_labels(dir: &Path) {
         "boxes/pages/b1.json",
         "--name",
         "b1",
+        // The project was made in another folder, where its files are.
+        "--allow-changed-files",
     ];
     project(dir, &import).expect(0);
     let before = project(dir, &["report", "--json"]).expect(0).out;

@@ -21,7 +21,8 @@ pub(crate) fn finished_block(dir: &Path) {
     copy_of("a finished block", dir, finish_block);
 }
 
-fn finish_block(dir: &Path) {
+/// Makes the project of [`finished_block`] with its inputs in this folder.
+pub(crate) fn finish_block(dir: &Path) {
     demo_block(dir);
     few_labels(dir, &dir.join("few.json"));
     let import = [

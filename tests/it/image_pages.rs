@@ -141,6 +141,8 @@ fn a_thumbnail_or_a_mask_beside_a_full_page_is_skipped_wherever_it_is() {
         vec![thumbnail, full],
         vec![mask, thumbnail, full],
         vec![([40, 20], Some(REDUCED), Some(6))],
+        // Many programs do not mark thumbnails.
+        vec![full, ([20, 10], None, None)],
     ] {
         let picture = decode(&tiff_of(&pages), &LIMITS).expect("decodes");
         assert_eq!((size(&picture), picture.turned), ([20, 40], Some(6)));
@@ -149,7 +151,8 @@ fn a_thumbnail_or_a_mask_beside_a_full_page_is_skipped_wherever_it_is() {
 
 #[test]
 fn several_full_pages_are_refused_with_their_number() {
-    let (full, small) = (([40, 20], None, None), ([8, 4], None, None));
+    // More than half as wide as the other page, so no preview.
+    let (full, small) = (([40, 20], None, None), ([21, 4], None, None));
     let thumbnail = ([8, 4], Some(REDUCED), None);
     for (pages, count, full) in [
         (vec![small, full], 2, 2),

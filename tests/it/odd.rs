@@ -331,7 +331,7 @@ fn verdict_files_of_spreadsheets_are_read() {
             (&last["reviewer"], &last["note"]),
             (&"Trần".into(), &"1,5 px; nghiêng".into())
         );
-        at(&project, &["verdict", "undo"]).expect(0);
+        at(&project, &["verdict", "undo", "--reviewer", "Trần"]).expect(0);
     }
 }
 

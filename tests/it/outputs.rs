@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::block_view::finished_block;
+use crate::block_view::finish_block;
 use crate::browser::Browser;
 use crate::check::{at, done};
 use crate::cli::{binary, empty, mocban};
@@ -65,10 +65,14 @@ fn files_of_a_project_are_never_an_output() {
 #[test]
 fn files_of_a_block_are_never_an_output() {
     let dir = empty();
-    finished_block(dir.path());
-    for name in ["d/data/page.jpg", "d/data/block.ply", "few.json"] {
+    finish_block(dir.path());
+    for (name, reason) in [
+        ("d/data/page.jpg", "cannot be written as jpg"),
+        ("d/data/block.ply", "is an input of b1"),
+        ("few.json", "is an input of b1"),
+    ] {
         let refused = mocban(dir.path(), &["-C", "p", "report", "-o", name]).expect(2);
-        assert!(refused.err.contains("is an input of b1"), "{}", refused.err);
+        assert!(refused.err.contains(reason), "{}", refused.err);
     }
 }
 
@@ -194,6 +198,10 @@ fn the_documentation_folds_and_searches() {
     );
     tab.eval("document.querySelector('.translation a').click(), null");
     tab.wait("document.documentElement.lang === 'vi' && document.querySelector('main h1')");
-    tab.eval("document.querySelector('a[rel=next]').click(), null");
-    tab.wait("location.pathname.endsWith('thuat-ngu.html')");
+    for page in ["python", "thuat-ngu"] {
+        tab.eval("document.querySelector('a[rel=next]').click(), null");
+        tab.wait(&format!(
+            "location.pathname.endsWith('{page}.html') && document.querySelector('main h1')"
+        ));
+    }
 }

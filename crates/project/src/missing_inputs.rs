@@ -19,7 +19,7 @@ const MAX_TIME: Duration = Duration::from_secs(5);
 /// Input files that were read before and are no longer at their places.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct MissingInputs {
-    /// Number of missing files among those that were looked at.
+    /// Number of missing files among the files that were looked at.
     pub missing: usize,
     /// Number of files that were looked at.
     pub looked_at: usize,

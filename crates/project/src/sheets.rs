@@ -28,10 +28,10 @@ pub async fn contact_sheet(
     location: &Location,
     listener: &dyn Listener,
 ) -> ProjectResult<(PathBuf, ContactSheet)> {
-    files::require_png(output)?;
     let (project, catalog) = location.open_read_only().await?;
     let path = output.map_or_else(|| project.dir().join("sheet.png"), Path::to_owned);
     files::refuse_used_file(&path, &project, &catalog).await?;
+    files::require_png(output)?;
     let metric = options.metric;
     let options = ContactSheetOptions {
         pairs: selection::some_or_all(&catalog, pairs).await?,
@@ -71,11 +71,11 @@ pub async fn block_sheet(
     location: &Location,
     listener: &dyn Listener,
 ) -> ProjectResult<(PathBuf, usize)> {
-    files::require_png(output)?;
     let (project, catalog) = location.open_read_only().await?;
     let default = ["page.png", "overlay.png"][usize::from(is_overlay)];
     let path = output.map_or_else(|| project.dir().join(default), Path::to_owned);
     files::refuse_used_file(&path, &project, &catalog).await?;
+    files::require_png(output)?;
     let work = LongWork::begin(listener, "drawing the page");
     let view = block_view(block, metric, &project, &catalog, location).await?;
     let draw = move || {
