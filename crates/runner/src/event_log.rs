@@ -126,9 +126,9 @@ mod tests {
 
     /// A subscriber that keeps the levels of events.
     #[derive(Default)]
-    struct Levels(Arc<Mutex<Vec<Level>>>);
+    struct LevelRecorder(Arc<Mutex<Vec<Level>>>);
 
-    impl Subscriber for Levels {
+    impl Subscriber for LevelRecorder {
         fn enabled(&self, _: &Metadata<'_>) -> bool {
             true
         }
@@ -156,7 +156,7 @@ mod tests {
         let pair = || PairName::new("p0").expect("a name");
         let failure = || Failure::new(FailureClass::BadInput, "no faces".to_owned());
         let stage = Stage::Fit;
-        let levels = Levels::default();
+        let levels = LevelRecorder::default();
         let logged = Arc::clone(&levels.0);
         let _log = subscriber::set_default(levels);
         for (event, expected) in [

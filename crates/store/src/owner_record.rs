@@ -122,9 +122,9 @@ mod tests {
     use mocban_core::domain::CatalogIdentity;
 
     /// Paths of all catalogs, and of the catalogs that use the folder.
-    struct Known<'a>(&'a [&'a str], &'a [&'a str]);
+    struct KnownCatalogs<'a>(&'a [&'a str], &'a [&'a str]);
 
-    impl OwnerTraces for Known<'_> {
+    impl OwnerTraces for KnownCatalogs<'_> {
         fn may_exist(&self, catalog: &str) -> bool {
             self.0.contains(&catalog)
         }
@@ -158,7 +158,7 @@ mod tests {
 
     fn bucket(owner: &CatalogIdentity, me: CatalogIdentity, known: &[&str]) -> Standing {
         let owner = OwnerRecord::new(owner.clone(), None);
-        owner.standing_of(&OwnerRecord::new(me, None), &Known(known, &[]))
+        owner.standing_of(&OwnerRecord::new(me, None), &KnownCatalogs(known, &[]))
     }
 
     #[test]
@@ -224,7 +224,7 @@ mod tests {
         let owner = OwnerRecord::new(file("a", "h", "/old", "7"), Some("1".to_owned()));
         let standing = |me, folder: &str, users: &[&str]| {
             let own = OwnerRecord::new(me, Some(folder.to_owned()));
-            owner.standing_of(&own, &Known(&["/old"], users))
+            owner.standing_of(&own, &KnownCatalogs(&["/old"], users))
         };
         let copy = || file("a", "h", "/copy", "8");
         assert_eq!(standing(copy(), "2", &[]), Standing::CopiedFolder);

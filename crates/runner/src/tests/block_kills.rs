@@ -81,17 +81,14 @@ async fn content(project: &Project, catalog: &Catalog) -> BTreeMap<String, Strin
     found
 }
 
-/// Runs the project that the environment names, in a child process of another test.
-#[tokio::test]
-#[ignore = "only for child processes"]
-async fn a_child_process_runs() {
-    let dir = std::env::var_os(CHILD_PROJECT).expect("a project");
-    let fixture = RunFixture::existing(Path::new(&dir)).await;
-    fixture.run(&options(1)).await;
-}
-
 #[tokio::test]
 async fn a_process_that_is_killed_anywhere_leaves_a_block_that_another_run_finishes() {
+    // This test is also the program of the processes that it kills.
+    if let Some(dir) = std::env::var_os(CHILD_PROJECT) {
+        let fixture = RunFixture::existing(Path::new(&dir)).await;
+        fixture.run(&options(1)).await;
+        return;
+    }
     let labels = "r1 a\nr2 b";
     let whole = RunFixture::of_blocks(&["b_1"], labels).await;
     whole.run(&options(1)).await;
@@ -106,13 +103,16 @@ async fn a_process_that_is_killed_anywhere_leaves_a_block_that_another_run_finis
         }
     }
     places.push("cut:written:4".to_owned());
+    let test = concat!(
+        module_path!(),
+        "::a_process_that_is_killed_anywhere_leaves_a_block_that_another_run_finishes"
+    );
+    let (_, test) = test.split_once("::").expect("a path in the crate");
     for place in places {
         let fixture = RunFixture::of_blocks(&["b_1"], labels).await;
         let child = std::env::current_exe().expect("this program");
-        let test = format!("{}::a_child_process_runs", module_path!());
-        let (_, test) = test.split_once("::").expect("a path in the crate");
         let output = Command::new(child)
-            .args(["--ignored", "--exact", test])
+            .args(["--exact", test])
             .env(CHILD_PROJECT, fixture.project.dir())
             .env("MOCBAN_BREAK_AT", &place)
             .output()
