@@ -23,21 +23,21 @@ pub(super) struct Case {
 }
 
 impl Case {
-    /// Creates a case from tier, seed and index.
-    pub(super) const fn new(tier: Tier, seed: u64, index: u64, vertices: Option<u32>) -> Self {
+    /// Creates a case.
+    pub(super) const fn new(
+        tier: Tier,
+        seed: u64,
+        index: u64,
+        vertices: Option<u32>,
+        print_px: Option<u32>,
+    ) -> Self {
         Self {
             tier,
             seed,
             index,
             vertices,
-            print_px: None,
+            print_px,
         }
-    }
-
-    /// Sets the longest side of the print in pixels.
-    #[must_use]
-    pub(super) const fn with_print_px(self, print_px: Option<u32>) -> Self {
-        Self { print_px, ..self }
     }
 
     /// Returns the generator of the tier and seed.

@@ -113,8 +113,9 @@ impl Options {
             let count = wanted.min(tier.max_pairs().unwrap_or(u64::MAX));
             for seed in seeds {
                 let case = |index: u64| {
-                    let print_px = self.print_px.iter().cycle().nth(index as usize).copied();
-                    Case::new(*tier, *seed, index, self.vertices).with_print_px(print_px)
+                    let size = index as usize % self.print_px.len().max(1);
+                    let print_px = self.print_px.get(size).copied();
+                    Case::new(*tier, *seed, index, self.vertices, print_px)
                 };
                 cases.extend((0..count).map(case));
             }

@@ -64,8 +64,8 @@ pub fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
     ))
 }
 
-/// Depths of the carving of most blocks, mm. Deep ones have 5 mm.
-const USUAL_RELIEF_MM: std::ops::RangeInclusive<f64> = 0.01..=10.0;
+/// Depths of carving that do not contradict the unit, mm.
+const POSSIBLE_RELIEF_MM: std::ops::RangeInclusive<f64> = 0.01..=10.0;
 
 /// Least share of the z axis of the mesh in the direction of the carved face from which the face points up or down.
 const MIN_NORMAL_Z: f64 = 0.3;
@@ -73,7 +73,7 @@ const MIN_NORMAL_Z: f64 = 0.3;
 /// Returns how the result of `fit` contradicts what was said of the scan, one sentence each.
 pub fn contradictions(fit: &FitOutcome, hints: ScanHints) -> Vec<String> {
     let relief_mm = hints.unit.map(|unit| fit.relief * unit.mm());
-    let relief = relief_mm.filter(|mm| !USUAL_RELIEF_MM.contains(mm)).map(|mm| {
+    let relief = relief_mm.filter(|mm| !POSSIBLE_RELIEF_MM.contains(mm)).map(|mm| {
         format!(
             "its carving is {mm:.3} mm deep, but most blocks are carved 0.3 to 5 mm deep; if the unit is wrong, so are all lengths in mm"
         )

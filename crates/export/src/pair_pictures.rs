@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::path::PathBuf;
 
-use super::pictures::{PrintView, Rgb, eight_bits};
+use super::pictures::{PrintView, Rgb};
 use super::source_print::{SourcePrint, SourcePrintError};
 use super::stage_outcomes::StageOutcomes;
 use mocban_catalog::{MetricRecord, PairResults};
@@ -174,7 +174,7 @@ impl<'a> PairPictures<'a> {
 
     /// Returns the print in the frame of the pictures, 8 bits per channel.
     pub(super) fn print_rgb(&self) -> Result<Rgb, PictureError> {
-        let print = eight_bits(&self.source_print()?.picture);
+        let print = self.source_print()?.picture.to_rgb8();
         Ok(match self.canvas {
             None => print,
             Some((side, from_print)) => warp_rgb(&print, &from_print, side, side),

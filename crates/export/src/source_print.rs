@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-use super::pictures::{PrintView, Rgb, eight_bits};
+use super::pictures::{PrintView, Rgb};
 use mocban_catalog::PairResults;
 use mocban_core::domain::{ContentHash, FileKind, Stage, ThresholdMetric};
 use mocban_core::raster::{self, DecodeError, ImageLimits, PrintImage, png_rgb8};
@@ -84,7 +84,7 @@ impl SourcePrint {
     pub(super) fn upright_file(&self) -> Cow<'_, [u8]> {
         match self.picture.turned {
             None => Cow::Borrowed(&self.file.bytes),
-            Some(_) => Cow::Owned(png_rgb8(&eight_bits(&self.picture))),
+            Some(_) => Cow::Owned(png_rgb8(&self.picture.to_rgb8())),
         }
     }
 

@@ -95,7 +95,7 @@ impl NativePrint {
     fn rgb8<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
         let image = self.image();
         let colours = compute(py, move || image().image().to_rgb8())?;
-        Ok(PyArray1::from_vec(py, colours))
+        Ok(PyArray1::from_slice(py, colours.data().as_flattened()))
     }
 
     /// Returns the colours in 16 bits.

@@ -3,10 +3,11 @@
 use super::characters::CharacterBox;
 use super::page_ink::PageInk;
 
-/// If a larger fraction of all outlines crosses ink, the labels do not fit. Right labels have 1 to 5 %, those of another page
-/// or of the mirrored page about 20 %.
+/// If a larger fraction of all outlines crosses ink, the labels do not fit. Right labels have 1 to 5 %, those of another
+/// page or of the mirrored page about 20 %.
 const MAX_ON_INK: f64 = 0.1;
-/// The labels belong to the mirrored or turned page if their fraction there is at most this part of the fraction on the page.
+/// The labels belong to the mirrored or turned page if their fraction there is at most this part of the fraction on the
+/// page.
 const MAX_CHANGED: f64 = 0.5;
 /// Points along each side of a box.
 const POINTS: usize = 24;

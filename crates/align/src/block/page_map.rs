@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use mocban_core::domain::Affine2;
-use mocban_core::raster::Grid;
+use mocban_core::raster::{Grid, catmull_rom};
 
 /// Spacing of the nodes, mm. Paper shrinks and warps smoothly over several centimetres.
 const NODE_STEP_MM: f64 = 5.0;
@@ -107,13 +107,7 @@ impl PageMap {
         let first = (at.floor() - 1.0).clamp(0.0, count as f64 - 4.0);
         let t = at - first - 1.0;
         let weights = if (0.0..=1.0).contains(&t) {
-            let (t2, t3) = (t * t, t * t * t);
-            [
-                (-t3 + 2.0 * t2 - t) / 2.0,
-                1.5 * t3 - 2.5 * t2 + 1.0,
-                (-3.0 * t3 + 4.0 * t2 + t) / 2.0,
-                (t3 - t2) / 2.0,
-            ]
+            catmull_rom(t)
         } else if t < 0.0 {
             // Continues the line through the first two nodes.
             [-t, 1.0 + t, 0.0, 0.0]

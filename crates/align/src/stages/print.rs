@@ -46,12 +46,8 @@ impl Print {
     pub(super) fn enlargement(&self) -> u32 {
         let [width, height] = [self.picture.rgb.width(), self.picture.rgb.height()];
         let wanted = LEAST_SIDE_PX.div_ceil(width.min(height).max(1));
-        let is_small_enough = |times: &usize| {
-            let area = (width * height).checked_mul(times * times);
-            area.is_some_and(|area| area <= MOST_PX)
-        };
-        let times = (1..=wanted.min(MOST_TIMES)).rev().find(is_small_enough);
-        times.map_or(1, |times| times as u32)
+        let fitting = (MOST_PX / (width * height).max(1)).isqrt();
+        wanted.min(MOST_TIMES).min(fitting).max(1) as u32
     }
 
     /// Returns all possible interpretations as ink and background, the likeliest first. There is at least one. Their

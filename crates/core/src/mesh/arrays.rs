@@ -1,5 +1,6 @@
 //! Meshes from arrays in memory, and back.
 
+use super::missing::{CoordinateValue, are_finite};
 use super::{Mesh, Vertices};
 use crate::domain::cancel::{PollCounter, poll};
 use crate::page_vec::PageVec;
@@ -67,8 +68,14 @@ impl Mesh {
         faces: &[[u32; 3]],
     ) -> Result<Self, MeshArrayError> {
         let count = match positions {
-            PositionSlice::Single(all) => check_finite(all)?,
-            PositionSlice::Double(all) => check_finite(all)?,
+            PositionSlice::Single(all) => {
+                check_finite(all)?;
+                all.len()
+            }
+            PositionSlice::Double(all) => {
+                check_finite(all)?;
+                all.len()
+            }
         };
         if count == 0 {
             return Err(MeshArrayError::NoVertices);
@@ -116,27 +123,21 @@ fn exact_singles(all: &[[f64; 3]]) -> Option<PageVec<[f32; 3]>> {
     Some(singles)
 }
 
-/// Checks that all positions are finite, and returns their number.
-fn check_finite<T: Copy + Into<f64>>(positions: &[[T; 3]]) -> Result<usize, MeshArrayError> {
-    let mut counter = PollCounter::default();
+fn check_finite<T: CoordinateValue>(positions: &[[T; 3]]) -> Result<(), MeshArrayError> {
     for (block, part) in positions.chunks(1 << 10).enumerate() {
-        counter.add(1 << 10);
-        let values = part.as_flattened().iter();
-        if values.fold(true, |finite, value| finite & (*value).into().is_finite()) {
+        poll();
+        if are_finite(part) {
             continue;
         }
-        for (place, position) in part.iter().enumerate() {
-            let found = position
-                .map(Into::into)
-                .into_iter()
-                .find(|v| !v.is_finite());
-            if let Some(value) = found {
-                let vertex = (block << 10) + place;
-                return Err(MeshArrayError::NotFinite { vertex, value });
-            }
+        let mut values = part.as_flattened().iter().map(|value| (*value).into());
+        if let Some(at) = values.position(|value: f64| !value.is_finite()) {
+            return Err(MeshArrayError::NotFinite {
+                vertex: (block << 10) + at / 3,
+                value: part.as_flattened()[at].into(),
+            });
         }
     }
-    Ok(positions.len())
+    Ok(())
 }
 
 fn check_indices(faces: &[[u32; 3]], vertices: u32) -> Result<(), MeshArrayError> {

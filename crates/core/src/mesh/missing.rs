@@ -129,7 +129,7 @@ impl CoordinateValue for f64 {}
 
 /// Returns whether no coordinate is NaN or infinite.
 #[inline(never)] // As a loop of its own, it is vectorized.
-fn are_finite<T: CoordinateValue>(positions: &[[T; 3]]) -> bool {
+pub(super) fn are_finite<T: CoordinateValue>(positions: &[[T; 3]]) -> bool {
     let values = positions.as_flattened().iter();
     values.fold(true, |finite, value| finite & (*value).into().is_finite())
 }

@@ -35,14 +35,16 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
 
 /// Refuses a file that ends within a face of fewer than three corners. Elsewhere, such faces are ignored.
 fn check_end(bytes: &[u8]) -> Result<(), MeshError> {
-    let Some((line, words)) = text::unended_line(bytes) else {
+    let Some(last) = text::unended_line(bytes) else {
         return Ok(());
     };
-    let corners = words.iter().skip(1);
-    let corners = corners.take_while(|word| !word.starts_with(b"#")).count();
-    if words.first() != Some(&&b"f"[..]) || corners >= 3 {
+    let mut words = text::words(last);
+    let is_face = words.next() == Some(b"f");
+    let corners = words.take_while(|word| !word.starts_with(b"#")).count();
+    if !is_face || corners >= 3 {
         return Ok(());
     }
+    let line = text::lines(bytes).count() as u64;
     let noun = if corners == 1 { "corner" } else { "corners" };
     let cut_off = text::CUT_OFF;
     let reason = format!("the last line is a face with {corners} {noun}; {cut_off}");

@@ -145,14 +145,15 @@ pub(super) fn not_a_number(word: &[u8]) -> String {
 /// Ends the reasons of files that end within a line.
 pub(super) const CUT_OFF: &str = "the file seems to be cut off";
 
-/// Returns the number and the words of the last line, if the file ends within it.
-pub(super) fn unended_line(bytes: &[u8]) -> Option<(u64, Vec<&[u8]>)> {
-    let is_ended = matches!(bytes.last(), None | Some(b'\n' | b'\r'));
-    if is_ended || check_lines(bytes).is_err() {
+/// Returns the last line if the file ends within it. Lines must not be too long, see [`check_lines`].
+pub(super) fn unended_line(bytes: &[u8]) -> Option<&[u8]> {
+    if matches!(bytes.last(), None | Some(b'\n' | b'\r')) {
         return None;
     }
-    let (number, line) = lines(bytes).last()?;
-    Some((number, words(line).collect()))
+    let is_classic = is_classic_mac(bytes);
+    let is_end = |byte: &u8| *byte == b'\n' || (is_classic && *byte == b'\r');
+    let before = bytes.iter().rposition(is_end);
+    Some(&bytes[before.map_or(0, |end| end + 1)..])
 }
 
 /// Says that a file of several lines seems to be cut off if a fault lies in its last line and nothing ends this line.
@@ -161,7 +162,9 @@ pub(super) fn fault_at_end(fault: MeshError, bytes: &[u8]) -> MeshError {
         MeshError::Line { line, reason }
             if line > 1
                 && !reason.ends_with(CUT_OFF)
-                && unended_line(bytes).is_some_and(|(last, _)| last == line) =>
+                && check_lines(bytes).is_ok()
+                && unended_line(bytes).is_some()
+                && lines(bytes).count() as u64 == line =>
         {
             let reason = format!("{reason}; it is the last line, so {CUT_OFF}");
             MeshError::Line { line, reason }

@@ -49,13 +49,12 @@ impl DepthMap {
         let size = [self.levels.width(), self.levels.height()];
         let levels = Grid::from_fn(size[0], size[1], |x, y| {
             let level = self.levels.at(x, y);
+            if level == 0 {
+                return 0;
+            }
             let height = levelling.height_at([x as f64, y as f64], size);
             let moved = f64::from(level) - height / self.scale.height_per_level;
-            if level == 0 {
-                0
-            } else {
-                moved.round().clamp(1.0, 65_535.0) as u16
-            }
+            moved.round().clamp(1.0, 65_535.0) as u16
         });
         Self {
             levels,

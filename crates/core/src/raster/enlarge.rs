@@ -18,7 +18,7 @@ use crate::domain::cancel::poll;
 /// assert_eq!(row[3..5], [14_063, 25_938]);
 /// ```
 pub fn enlarge(rgb: &Grid<[u16; 3]>, times: u32) -> Grid<[u16; 3]> {
-    if times <= 1 || rgb.data().is_empty() {
+    if rgb.data().is_empty() {
         return rgb.clone();
     }
     let values = rgb.map(|colour| colour.map(f32::from));
@@ -98,14 +98,14 @@ impl Taps {
     }
 }
 
-/// Returns the weights of the pixels at -1, 0, 1 and 2 for a position 0..1.
-fn catmull_rom(t: f64) -> [f64; 4] {
+/// Returns the weights of the values at -1, 0, 1 and 2 for a position 0..1 in cubic interpolation (Catmull-Rom).
+pub fn catmull_rom(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [
-        -0.5 * t + t2 - 0.5 * t3,
-        1.0 - 2.5 * t2 + 1.5 * t3,
-        0.5 * t + 2.0 * t2 - 1.5 * t3,
-        -0.5 * t2 + 0.5 * t3,
+        (-t3 + 2.0 * t2 - t) / 2.0,
+        1.5 * t3 - 2.5 * t2 + 1.0,
+        (-3.0 * t3 + 4.0 * t2 + t) / 2.0,
+        (t3 - t2) / 2.0,
     ]
 }
 
@@ -144,10 +144,12 @@ mod tests {
     #[test]
     fn overshoot_stays_within_the_range_of_the_values() {
         let line = Grid::from_fn(8, 8, |x, _| [if x == 3 { 0 } else { u16::MAX }; 3]);
-        let row = enlarge(&line, 3);
-        assert!(
-            row.data().iter().any(|c| c[0] == 0) && row.data().iter().any(|c| c[0] == u16::MAX)
-        );
+        let found = enlarge(&line, 3);
+        // Beside the dark line, the interpolation exceeds white.
+        for x in [5, 6, 14, 15] {
+            assert_eq!(found.at(x, 12)[0], u16::MAX, "{x}");
+        }
+        assert_eq!(found.at(10, 12)[0], 0);
     }
 
     #[test]

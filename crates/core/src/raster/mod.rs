@@ -27,7 +27,9 @@ pub use encode::{
     PngError, compact_rgb8, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8,
     png_grey16, png_mask, png_rgb8,
 };
-pub use enlarge::{enlarge, enlarged_from_original, original_from_enlarged, reduce_mask};
+pub use enlarge::{
+    catmull_rom, enlarge, enlarged_from_original, original_from_enlarged, reduce_mask,
+};
 pub use grid::Grid;
 pub use mask::{Mask, MaskOverlap, PixelBox};
 pub use resample::{resample, resample_transposed};

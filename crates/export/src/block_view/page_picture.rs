@@ -1,7 +1,7 @@
 //! The image of a page, decoded, with its ink.
 
 use super::block_error::BlockViewError;
-use crate::pictures::{Rgb, eight_bits};
+use crate::pictures::Rgb;
 use crate::source_print::SourcePrint;
 use mocban_align::block::PageInk;
 use mocban_core::domain::ContentHash;
@@ -30,7 +30,7 @@ impl PagePicture {
         Ok(Self {
             hash,
             ink: PageInk::of(&image)?,
-            picture: eight_bits(&image),
+            picture: image.to_rgb8(),
         })
     }
 }

@@ -6,7 +6,6 @@ use super::single_results::{FileOfPair, ShownResult, SingleResultFormat};
 use crate::format_writer::PairView;
 use crate::mesh::{MeshPlacement, ScanFiles, ScanTitle};
 use crate::pair_pictures::PictureError;
-use crate::pictures::eight_bits;
 
 const SCAN: &str = "the scan, binary PLY in millimetres: per vertex the colour of the print, `stroke` (1 on strokes) and \
     `height` over the fitted surface";
@@ -76,7 +75,7 @@ impl SingleResultFormat for PlacedScanFormat {
         shown: ShownResult<'_>,
     ) -> Result<Vec<Vec<u8>>, PictureError> {
         let pictures = shown.pictures;
-        let print = eight_bits(&pictures.source_print()?.picture);
+        let print = pictures.source_print()?.picture.to_rgb8();
         let placement = MeshPlacement::new(
             pictures.outcomes.fit.clone(),
             shown.scale,

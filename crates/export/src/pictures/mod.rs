@@ -10,7 +10,7 @@ mod sheet_layout;
 pub(super) use marked_page::{LegendEntry, MarkedBox, PictureLegend, mark, with_legend};
 pub use overlay::PrintView;
 pub use paint::Rgb;
-pub(super) use paint::{BLUE, ORANGE, VERMILLION, eight_bits, resized};
+pub(super) use paint::{BLUE, ORANGE, VERMILLION, resized};
 pub use relief::shaded;
 pub use sheet_layout::{
     ContactSheetCell, FrameKind, NOTE_SPACE, SHEET_WIDTH, SheetLegend, contact_sheet, tile_side,

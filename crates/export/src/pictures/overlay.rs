@@ -1,6 +1,6 @@
 //! The images of a result in one frame: the print, the aligned relief, and the print with the relief's stroke edges.
 
-use super::paint::{BLUE, Rgb, VERMILLION, eight_bits, resized};
+use super::paint::{BLUE, Rgb, VERMILLION, resized};
 use super::relief::shaded;
 use mocban_core::domain::{Affine2, MetricOutcome};
 use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage, warp_depth, warp_mask};
@@ -50,7 +50,7 @@ impl PrintView {
 
     /// Draws the print.
     pub fn print(&self, print: &PrintImage) -> Rgb {
-        resized(&eight_bits(print), self.width, self.height)
+        resized(&print.to_rgb8(), self.width, self.height)
     }
 
     /// Draws the depth map aligned to the print, lit from the upper left.

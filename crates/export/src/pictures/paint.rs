@@ -1,6 +1,6 @@
 //! Drawing on colour images: copying, resizing, rectangles.
 
-use mocban_core::raster::{Grid, PrintImage};
+use mocban_core::raster::Grid;
 
 /// An 8-bit colour image.
 pub type Rgb = Grid<[u8; 3]>;
@@ -15,12 +15,6 @@ pub(crate) const ORANGE: [u8; 3] = [230, 159, 0];
 pub(super) const TEXT: [u8; 3] = [20, 20, 20];
 /// Background colour.
 pub(super) const BACKGROUND: [u8; 3] = [255, 255, 255];
-
-/// Converts a decoded print to 8 bits per channel.
-pub(crate) fn eight_bits(print: &PrintImage) -> Rgb {
-    let narrow = |wide: u16| ((u32::from(wide) + 128) / 257) as u8;
-    print.rgb.map(|colour| colour.map(narrow))
-}
 
 /// Resizes an image by averaging areas along a shrinking axis, and by nearest pixels along a growing axis.
 pub(crate) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
@@ -104,8 +98,7 @@ pub(super) fn fill(onto: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8
 
 #[cfg(test)]
 mod tests {
-    use super::{Rgb, copy, eight_bits, fill, resized};
-    use mocban_core::raster::{Grid, PrintImage};
+    use super::{Rgb, copy, fill, resized};
 
     #[test]
     fn shrinking_averages_and_growing_repeats_pixels() {
@@ -117,13 +110,6 @@ mod tests {
             [[0, 10, 100], [0, 10, 100], [200, 30, 100], [200, 30, 100]]
         );
         assert_eq!(resized(&image, 2, 1), image);
-    }
-
-    #[test]
-    fn sixteen_bits_convert_back_to_eight() {
-        let rgb = Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]);
-        let narrow = eight_bits(&PrintImage::from(rgb));
-        assert!((0..256).all(|x| narrow.at(x, 0) == [x as u8; 3]));
     }
 
     #[test]

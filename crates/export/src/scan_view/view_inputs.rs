@@ -2,7 +2,7 @@
 
 use crate::mesh::{MeshPlacement, PlacedMesh};
 use crate::pair_pictures::{PairPictures, PictureError};
-use crate::pictures::{PrintView, eight_bits};
+use crate::pictures::PrintView;
 use mocban_core::domain::{Affine2, DepthScale, MetricOutcome};
 use mocban_core::raster::{Grid, Mask, PrintImage, png_rgb8};
 
@@ -65,7 +65,7 @@ impl ViewInputs {
         scale: DepthScale,
     ) -> Result<Self, PictureError> {
         let picture = &pictures.source_print()?.picture;
-        let print = eight_bits(picture);
+        let print = picture.to_rgb8();
         let size = [print.width(), print.height()];
         let fit = pictures.outcomes.fit.clone();
         let placement = MeshPlacement::new(fit, scale, outcome, size)

@@ -63,8 +63,8 @@ impl InkPyramids {
         Some(Self(inks))
     }
 
-    /// Builds the pyramids of the part of a print inside an outline in pixels of the print. Returns `None` if the outline contains no pixel,
-    /// or if the print cannot be binarized.
+    /// Builds the pyramids of the part of a print inside an outline in pixels of the print. Returns `None` if the outline
+    /// contains no pixel, or if the print cannot be binarized.
     pub(super) fn within(print: &Print, outline: &PrintOutline) -> Option<Self> {
         let outline = outline.mapped(&enlarged_from_original(print.enlargement()));
         let read = print.hypotheses().ok()?;

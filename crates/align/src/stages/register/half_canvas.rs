@@ -30,7 +30,7 @@ impl HalfCanvas {
         canvas_px: u32,
     ) -> Self {
         let side = canvas_px as usize / 2;
-        let half_from_print = half_from_print(canvas_from_print);
+        let half_from_print = to_half(canvas_from_print);
         let half_from_depth = half_from_print.after(print_from_depth);
         let mut levels = warp_depth(depth, &half_from_depth, side, side);
         let half_from_masks = half_from_print.after(&print.print_from_masks());
@@ -104,9 +104,9 @@ impl HalfCanvas {
     }
 }
 
-/// Returns the map from print pixels to pixels of the half canvas.
-pub(super) fn half_from_print(canvas_from_print: &Affine2) -> Affine2 {
-    Affine2::scale_shift(0.5, [-0.25, -0.25]).after(canvas_from_print)
+/// Returns a map to the canvas as a map to the half canvas.
+pub(super) fn to_half(canvas_from_image: &Affine2) -> Affine2 {
+    Affine2::scale_shift(0.5, [-0.25, -0.25]).after(canvas_from_image)
 }
 
 /// Returns the mean width of the strokes with this edge, in pixels, at least 1. The mean distance to the edge of a stroke

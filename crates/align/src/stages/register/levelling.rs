@@ -5,7 +5,7 @@
 //! threshold, or ground above it. The heights of a coarse grid of nodes are then chosen so that the strokes that one
 //! threshold separates cover the most ink and the least background.
 
-use super::half_canvas::{HalfCanvas, half_from_print};
+use super::half_canvas::{HalfCanvas, to_half};
 use mocban_core::domain::{Affine2, Levelling, ReliefHeights};
 use mocban_core::raster::DepthMap;
 
@@ -18,7 +18,7 @@ const BINS: usize = (2.0 * REACH / STEP) as usize + 1;
 /// Distance between the pixels from which the heights are chosen, in pixels of the half canvas. A quarter of all pixels
 /// suffices for 16 heights.
 const SAMPLING_PX: usize = 2;
-/// Maximum number of times that all nodes are chosen, each time given the others.
+/// Number of times that all nodes are chosen, each given the others, unless the first time shows that levelling does not help.
 const ROUNDS: usize = 5;
 /// Weight of the prior in the score of a node: its height is probably that of the nodes around it.
 const SMOOTH: f64 = 0.06;
@@ -45,7 +45,7 @@ pub(super) fn fit(
     level: u16,
     spread: f64,
 ) -> Option<Levelling> {
-    let depth_from_half = half_from_print(canvas_from_depth).inverse()?;
+    let depth_from_half = to_half(canvas_from_depth).inverse()?;
     let samples = InkSamples::new(depth, canvas, &depth_from_half, relief, level, spread);
     let single = samples.best_single_agreement();
     let mut heights = [[0.0; NODES]; NODES];

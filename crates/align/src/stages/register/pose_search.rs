@@ -74,7 +74,8 @@ impl PoseSearch {
 /// Searches for poses of the relief on every interpretation of the print. Returns the poses on the best interpretation.
 ///
 /// `depths` holds, for each depth-map pixel, the depth below the tops as a fraction of the relief's depth. Poses,
-/// `expected` too, map depth-map pixels to pixels of the print's masks. If a pose is expected, it has no competitors unless one matches much better.
+/// `expected` too, map depth-map pixels to pixels of the print's masks. If a pose is expected, it has no competitors
+/// unless one matches much better.
 ///
 /// # Errors
 /// Returns an error if the relief has no data. If no interpretation matches, returns the error for the likeliest one.

@@ -1,7 +1,7 @@
 //! A refined pose with its canvas and thresholds, for the depth map as rendered or for a levelled one.
 
 use super::confidence;
-use super::half_canvas::{HalfCanvas, half_from_print};
+use super::half_canvas::{HalfCanvas, to_half};
 use super::ink_edge::InkEdge;
 use super::levelling;
 use super::metric_thresholds::{self, ChosenThreshold};
@@ -137,7 +137,7 @@ fn scatters_less(
     level: u16,
 ) -> bool {
     let (width, height) = (canvas.levels.width(), canvas.levels.height());
-    let half_from_depth = half_from_print(canvas_from_depth);
+    let half_from_depth = to_half(canvas_from_depth);
     let levels = warp_depth(levelled, &half_from_depth, width, height);
     let strokes = levels.zip_map(&canvas.levels, |found, known| known > 0 && found >= level);
     let [after, before] = [strokes, canvas.mask(level)]

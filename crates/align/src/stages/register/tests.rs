@@ -327,18 +327,14 @@ fn light_prints_of_a_surface_seen_from_its_back_are_refused() {
     assert_eq!(check(&back, &light_first, 0), Err(RegisterError::Inverted));
 }
 
-/// Returns the intersection over union of the strokes at `relief`'s threshold with the true tops, in the print's frame.
+/// Returns the intersection over union of a metric's strokes with the true tops, in the print's frame.
 fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f64 {
     let strokes = depth.stroke_mask(outcome.threshold_level);
     let map = &outcome.print_from_depth;
     let strokes = warp_mask(&strokes, map, tops.width(), tops.height());
-    let pixels = strokes.data().iter().zip(tops.data());
-    let (mut both, mut either) = (0.0, 0.0);
-    for (stroke, top) in pixels.filter(|(_, top)| **top != 128) {
-        both += f64::from(u8::from(*stroke && *top == 255));
-        either += f64::from(u8::from(*stroke || *top == 255));
-    }
-    both / either
+    // 128 marks pixels that are not compared.
+    let strokes = strokes.zip_map(tops, |stroke, top| stroke && top != 128);
+    strokes.overlap(&tops.map(|top| *top == 255)).iou
 }
 
 #[test]

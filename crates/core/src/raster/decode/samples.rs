@@ -16,71 +16,10 @@ pub enum SampleSlice<'a> {
 }
 
 impl PrintImage {
-    /// Creates an upright image from samples, as if they were read from a file. Transparent pixels are composited on white.
-    /// Returns `None` if the numbers do not fit together, or if there are no pixels.
-    ///
-    /// ```
-    /// use mocban_core::raster::{PrintImage, SampleSlice};
-    ///
-    /// let image = PrintImage::from_samples([2, 1], 1, SampleSlice::Eight(&[0, 255])).ok_or("no image")?;
-    /// assert_eq!(image.rgb.at(1, 0), [65535; 3]);
-    /// assert_eq!(image.to_rgb8(), [0, 0, 0, 255, 255, 255]);
-    /// # Ok::<(), &str>(())
-    /// ```
-    pub fn from_samples(
-        size: [usize; 2],
-        channels: usize,
-        samples: SampleSlice<'_>,
-    ) -> Option<Self> {
-        Some(CheckedSamples::new(size, channels, samples)?.image())
-    }
-
-    /// Returns the colours rounded to 8 bits, three for each pixel.
-    pub fn to_rgb8(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(3 * self.rgb.data().len());
-        for row in self.rgb.data().chunks(self.rgb.width().max(1)) {
-            poll();
-            let narrow = |wide: &u16| ((u32::from(*wide) + 128) / 257) as u8;
-            bytes.extend(row.as_flattened().iter().map(narrow));
-        }
-        bytes
-    }
-}
-
-/// Samples whose number fits the size of their image.
-struct CheckedSamples<'a> {
-    size: [usize; 2],
-    channels: usize,
-    samples: SampleSlice<'a>,
-}
-
-impl<'a> CheckedSamples<'a> {
-    fn new(size: [usize; 2], channels: usize, samples: SampleSlice<'a>) -> Option<Self> {
-        let count = match samples {
-            SampleSlice::Eight(samples) => samples.len(),
-            SampleSlice::Sixteen(samples) => samples.len(),
-        };
-        let expected = size[0].checked_mul(size[1])?.checked_mul(channels)?;
-        (count == expected && count > 0 && channels <= 4).then_some(Self {
-            size,
-            channels,
-            samples,
-        })
-    }
-
-    fn image(&self) -> PrintImage {
-        let [width, height] = self.size;
-        let mut rgb = Grid::new(width, height, [u16::MAX; 3]);
-        match self.samples {
-            SampleSlice::Eight(samples) => widen_to(&mut rgb, samples, self.channels, widen),
-            SampleSlice::Sixteen(samples) => {
-                widen_to(&mut rgb, samples, self.channels, |sample| sample);
-                if self.channels % 2 == 1 {
-                    widen_narrow(&mut rgb);
-                }
-            }
-        }
-        rgb.into()
+    /// Returns the colours rounded to 8 bits.
+    pub fn to_rgb8(&self) -> Grid<[u8; 3]> {
+        let narrow = |wide: u16| ((u32::from(wide) + 128) / 257) as u8;
+        self.rgb.map(|colour| colour.map(narrow))
     }
 }
 
@@ -99,9 +38,26 @@ enum SampleVec {
 }
 
 impl PrintSamples {
-    /// Copies samples. Returns `None` as [`PrintImage::from_samples`] does.
+    /// Copies the samples of an upright image. Returns `None` if the numbers do not fit together, or if there are no pixels.
+    ///
+    /// ```
+    /// use mocban_core::raster::{PrintSamples, SampleSlice};
+    ///
+    /// let samples = PrintSamples::copied([2, 1], 1, SampleSlice::Eight(&[0, 255])).ok_or("no image")?;
+    /// let image = samples.to_image();
+    /// assert_eq!(image.rgb.at(1, 0), [65535; 3]);
+    /// assert_eq!(image.to_rgb8().data(), [[0; 3], [255; 3]]);
+    /// # Ok::<(), &str>(())
+    /// ```
     pub fn copied(size: [usize; 2], channels: usize, samples: SampleSlice<'_>) -> Option<Self> {
-        CheckedSamples::new(size, channels, samples)?;
+        let count = match samples {
+            SampleSlice::Eight(samples) => samples.len(),
+            SampleSlice::Sixteen(samples) => samples.len(),
+        };
+        let expected = size[0].checked_mul(size[1])?.checked_mul(channels)?;
+        if count != expected || count == 0 || channels > 4 {
+            return None;
+        }
         let samples = match samples {
             SampleSlice::Eight(samples) => SampleVec::Eight(PageVec::copied(samples)),
             SampleSlice::Sixteen(samples) => SampleVec::Sixteen(PageVec::copied(samples)),
@@ -118,19 +74,20 @@ impl PrintSamples {
         self.size
     }
 
-    /// Returns the image, as [`PrintImage::from_samples`] does.
+    /// Returns the image, as if the samples were read from a file. Transparent pixels are composited on white.
     pub fn to_image(&self) -> PrintImage {
-        let samples = match &self.samples {
-            SampleVec::Eight(samples) => SampleSlice::Eight(samples),
-            SampleVec::Sixteen(samples) => SampleSlice::Sixteen(samples),
-        };
-        let (size, channels) = (self.size, self.channels);
-        CheckedSamples {
-            size,
-            channels,
-            samples,
+        let [width, height] = self.size;
+        let mut rgb = Grid::new(width, height, [u16::MAX; 3]);
+        match &self.samples {
+            SampleVec::Eight(samples) => widen_to(&mut rgb, samples, self.channels, widen),
+            SampleVec::Sixteen(samples) => {
+                widen_to(&mut rgb, samples, self.channels, |sample| sample);
+                if self.channels % 2 == 1 {
+                    widen_narrow(&mut rgb);
+                }
+            }
         }
-        .image()
+        rgb.into()
     }
 }
 
@@ -171,25 +128,30 @@ mod tests {
         let rgb = Grid::from_fn(5, 3, |x, y| [x as u8, 7 * y as u8, 200]);
         let file = decode(&png_rgb8(&rgb), &ImageLimits::SUGGESTED).expect("decodes");
         let samples = rgb.data().as_flattened();
-        let memory = PrintImage::from_samples([5, 3], 3, Eight(samples)).expect("an image");
-        assert_eq!(memory, file);
-        assert_eq!(memory.to_rgb8(), samples);
+        let memory = PrintSamples::copied([5, 3], 3, Eight(samples)).expect("samples");
+        assert_eq!(memory.to_image(), file);
+        assert_eq!(file.to_rgb8(), rgb);
         for most in [900, 65_535] {
             let grey = Grid::from_fn(5, 3, |x, y| (most / 20 * (x + y)) as u16);
             let file = decode(&png_grey16(&grey), &ImageLimits::SUGGESTED).expect("decodes");
-            let memory = PrintImage::from_samples([5, 3], 1, Sixteen(grey.data()));
-            assert_eq!(memory.expect("an image"), file, "{most}");
-            let later = PrintSamples::copied([5, 3], 1, Sixteen(grey.data())).expect("samples");
-            assert_eq!((later.to_image(), later.size()), (file, [5, 3]), "{most}");
+            let memory = PrintSamples::copied([5, 3], 1, Sixteen(grey.data())).expect("samples");
+            assert_eq!((memory.to_image(), memory.size()), (file, [5, 3]), "{most}");
         }
     }
 
     #[test]
+    fn sixteen_bits_convert_back_to_eight() {
+        let rgb = Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]);
+        let narrow = PrintImage::from(rgb).to_rgb8();
+        assert!((0..256).all(|x| narrow.at(x, 0) == [x as u8; 3]));
+    }
+
+    #[test]
     fn transparent_samples_are_white_and_wrong_numbers_give_nothing() {
-        let grey = PrintImage::from_samples([2, 1], 2, Eight(&[0, 255, 0, 0])).expect("an image");
-        assert_eq!(grey.rgb.data(), [[0; 3], [65535; 3]]);
-        let rgba = PrintImage::from_samples([1, 1], 4, Eight(&[9, 9, 9, 0])).expect("an image");
-        assert_eq!(rgba.rgb.data(), [[65535; 3]]);
+        let grey = PrintSamples::copied([2, 1], 2, Eight(&[0, 255, 0, 0])).expect("samples");
+        assert_eq!(grey.to_image().rgb.data(), [[0; 3], [65535; 3]]);
+        let rgba = PrintSamples::copied([1, 1], 4, Eight(&[9, 9, 9, 0])).expect("samples");
+        assert_eq!(rgba.to_image().rgb.data(), [[65535; 3]]);
         for (size, channels, count) in [
             ([2, 2], 1, 3),
             ([0, 2], 1, 0),
@@ -197,7 +159,6 @@ mod tests {
             ([1, 1], 0, 0),
         ] {
             let samples = vec![0; count];
-            assert!(PrintImage::from_samples(size, channels, Eight(&samples)).is_none());
             assert!(PrintSamples::copied(size, channels, Eight(&samples)).is_none());
         }
     }
