@@ -143,7 +143,7 @@ fn with_tip(mut error: clap::Error, args: &[OsString]) -> clap::Error {
     };
     let tip = match error.kind() {
         ErrorKind::InvalidSubcommand => {
-            word(ContextKind::InvalidSubcommand).and_then(|word| command_tip(&word))
+            word(ContextKind::InvalidSubcommand).and_then(|word| folder_tip(&word))
         }
         ErrorKind::UnknownArgument => {
             word(ContextKind::InvalidArg).and_then(|word| argument_tip(&word))
@@ -151,9 +151,8 @@ fn with_tip(mut error: clap::Error, args: &[OsString]) -> clap::Error {
         _ => None,
     };
     // A dash makes a value of the option, so that another word may be named in the error.
-    let words = || args.iter().skip(1).filter_map(|arg| arg.to_str());
-    let dash = words().find_map(dash_tip);
-    let tip = dash.or_else(|| two_folders_tip(words())).or(tip);
+    let dash = words(args).find_map(dash_tip);
+    let tip = dash.or_else(|| two_folders_tip(words(args))).or(tip);
     if let Some(tip) = tip {
         error.insert(
             ContextKind::Suggested,
@@ -161,6 +160,11 @@ fn with_tip(mut error: clap::Error, args: &[OsString]) -> clap::Error {
         );
     }
     error
+}
+
+/// Returns the words of a command line that are UTF-8, without the program.
+fn words(args: &[OsString]) -> impl Iterator<Item = &str> + Clone {
+    args.iter().skip(1).filter_map(|arg| arg.to_str())
 }
 
 /// Removes suggested commands that resemble the unknown one by a few letters only.
@@ -198,11 +202,6 @@ fn two_folders_tip<'a>(words: impl Iterator<Item = &'a str> + Clone) -> Option<S
     }
 }
 
-/// Returns a tip on a word that is no command.
-fn command_tip(word: &str) -> Option<String> {
-    dash_tip(word).or_else(|| folder_tip(word))
-}
-
 /// Returns a tip on an argument or option that is not expected.
 fn argument_tip(word: &str) -> Option<String> {
     if ["-c", "--C", "--directory"].contains(&word) {
@@ -211,8 +210,7 @@ fn argument_tip(word: &str) -> Option<String> {
     if word.starts_with('-') {
         return None;
     }
-    let tip = dash_tip(word).or_else(|| folder_tip(word));
-    tip.or_else(|| {
+    folder_tip(word).or_else(|| {
         Some(format!(
             "if {word} belongs to a name or path with spaces, put all of it in quotes"
         ))
@@ -246,8 +244,7 @@ fn folder_tip(word: &str) -> Option<String> {
 
 /// Counts `-v`. Only for a command line that clap has accepted: in such a line, no value starts with a dash.
 fn count_verbose(args: &[OsString]) -> u8 {
-    let words = args.iter().skip(1).filter_map(|arg| arg.to_str());
-    let words = words.take_while(|word| *word != "--");
+    let words = words(args).take_while(|word| *word != "--");
     let counts = words.map(|word| match word.strip_prefix('-') {
         Some("-verbose") => 1,
         // The rest of the word after a letter that takes a value is that value.

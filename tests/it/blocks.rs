@@ -225,6 +225,8 @@ fn boxes_that_are_left_out_are_told_by_run_and_kept_in_show() {
         );
         assert!(shown.out.contains(warning), "{}", shown.out);
     }
+    let size = " px/mm: characters of about ";
+    assert!(shown.out.contains(size), "{}", shown.out);
 }
 
 #[test]

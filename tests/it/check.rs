@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
 
 use mocban::domain::Stage;
 use mocban::store::{Project, RunLock};
@@ -11,32 +10,28 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions as _, Connection as _};
 
 use crate::cli::{Call, mocban};
-use crate::resume::{copy, pairs};
+use crate::made_once::copy_of;
+use crate::resume::pairs;
 
-/// A demo project of two small pairs, run and judged, created once. Each test works on a copy.
-static DONE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let demo = ["demo", "done", "--pairs", "2", "--no-run"];
-    let small = ["--set", "depth.longest_px=96"];
-    mocban(dir.path(), &[&demo[..], &small].concat()).expect(0);
-    let project = Project::open(&dir.path().join("done")).expect("a project");
-    at(&project, &["run"]).expect(0);
-    let set = [
-        "verdict",
-        "set",
-        "upright-0000",
-        "pass",
-        "--reviewer",
-        "lan",
-    ];
-    at(&project, &set).expect(0);
-    dir
-});
-
-/// Copies that project for a test.
+/// Copies a demo project of two small pairs, run and judged.
 pub(crate) fn done(dir: &Path) -> Project {
-    let original = Project::open(&DONE.path().join("done")).expect("a project");
-    copy(&original, &dir.join("p"))
+    copy_of("a demo that was run and judged", dir, |dir| {
+        let demo = ["demo", "p", "--pairs", "2", "--no-run"];
+        let small = ["--set", "depth.longest_px=96"];
+        mocban(dir, &[&demo[..], &small].concat()).expect(0);
+        let project = Project::open(&dir.join("p")).expect("a project");
+        at(&project, &["run"]).expect(0);
+        let set = [
+            "verdict",
+            "set",
+            "upright-0000",
+            "pass",
+            "--reviewer",
+            "lan",
+        ];
+        at(&project, &set).expect(0);
+    });
+    Project::open(&dir.join("p")).expect("a project")
 }
 
 /// Calls the binary on a project.

@@ -145,14 +145,7 @@ fn an_export_that_is_killed_keeps_the_earlier_one() {
         let mut child = (command.stdout(Stdio::null()).stderr(Stdio::null()))
             .spawn()
             .expect("the binary starts");
-        while Fault::injected(&notes) == 0 {
-            assert_eq!(
-                child.try_wait().expect("a child"),
-                None,
-                "{path} is not written"
-            );
-            crate::waiting::pause();
-        }
+        crate::waiting::until(&mut child, || Fault::injected(&notes) > 0);
         child.kill().expect("killed");
         child.wait().expect("a child");
         earlier.assert_kept(path);

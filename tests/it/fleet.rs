@@ -15,7 +15,7 @@ use crate::postgres_server::Server;
 use crate::resume::{copy_folder, project};
 use crate::test_size::size_from_env;
 use crate::uninterrupted::files;
-use crate::waiting::pause;
+use crate::waiting::{pause, until};
 
 /// Shortens leases to five seconds.
 const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "10");
@@ -287,10 +287,7 @@ fn no_result_names_files_that_were_removed_while_its_commit_waited() {
         ("MOCBAN_HOLD_FILE", file),
     ];
     let mut worker = fleet.worker_with(&hold);
-    while !held.exists() {
-        assert!(worker.try_wait().expect("a state").is_none(), "it ended");
-        pause();
-    }
+    until(&mut worker, || held.exists());
     // The time since the files were written is what matters, so there is no event to wait for.
     std::thread::sleep(WAIT);
     let artifacts = fleet.path().join("shared/artifacts");
@@ -352,15 +349,11 @@ fn pairs_of_a_killed_worker_are_taken_before_their_leases_end() {
         ("MOCBAN_HOLD_FILE", file),
     ];
     let mut victim = fleet.worker_with(&hold);
-    while !held.exists() {
-        assert!(victim.try_wait().expect("a state").is_none(), "it ended");
-        pause();
-    }
+    until(&mut victim, || held.exists());
     let mut other = fleet.worker_with(&[]);
-    while fleet.shared(&["status", "--json"]).expect(0).json()["jobs"]["done"] == 0 {
-        assert!(other.try_wait().expect("a state").is_none(), "it ended");
-        pause();
-    }
+    until(&mut other, || {
+        fleet.shared(&["status", "--json"]).expect(0).json()["jobs"]["done"] != 0
+    });
     victim.kill().expect("killed");
     victim.wait().expect("an exit code");
     let killed = Instant::now();

@@ -87,10 +87,7 @@ fn demo_stopped_while_writing_its_files_reports_that() {
     let staging = format!("d/.data.{}-0.mocban-partial", child.id());
     let meshes = dir.path().join(staging).join("new/meshes");
     let has_started = || std::fs::read_dir(&meshes).is_ok_and(|mut files| files.next().is_some());
-    while !has_started() {
-        assert_eq!(child.try_wait().expect("a child"), None);
-        crate::waiting::pause();
-    }
+    crate::waiting::until(&mut child, has_started);
     let pid = child.id().to_string();
     let sent = Command::new("kill").args(["-INT", &pid]).status();
     assert!(sent.expect("kill starts").success());

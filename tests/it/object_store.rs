@@ -276,10 +276,7 @@ fn a_stop_request_does_not_wait_until_a_request_is_given_up() {
     outage.begin_at_put();
     let mut command = remote.command(port, "cache", &["run", "-j", "2"]);
     let mut run = command.spawn().expect("the binary starts");
-    while !outage.has_begun() {
-        assert!(run.try_wait().expect("a state").is_none(), "it ended");
-        crate::waiting::pause();
-    }
+    crate::waiting::until(&mut run, || outage.has_begun());
     let asked = Instant::now();
     let id = rustix::process::Pid::from_child(&run);
     rustix::process::kill_process(id, rustix::process::Signal::INT).expect("sent");

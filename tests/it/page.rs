@@ -3,28 +3,24 @@
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};
-use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use mocban::store::Project;
 use serde_json::{Value, json};
 
 use crate::cli::{binary, call};
-use crate::resume::{copy, project, run};
+use crate::made_once::copy_of;
+use crate::resume::{project, run};
 
 /// Number of pairs of the shared project, with up to four results each.
 const PAIRS: &str = "15";
 
 /// Copies a project in which every pair has results. All tests copy the same project.
 pub(crate) fn read_project(dir: &tempfile::TempDir) -> Project {
-    static MADE: OnceLock<(tempfile::TempDir, Project)> = OnceLock::new();
-    let (_, made) = MADE.get_or_init(|| {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let made = project(dir.path(), "made", PAIRS);
-        call(&mut run(&made, &[])).expect(0);
-        (dir, made)
+    copy_of("a project with results", dir.path(), |dir| {
+        call(&mut run(&project(dir, "p", PAIRS), &[])).expect(0);
     });
-    copy(made, &dir.path().join("p"))
+    Project::open(&dir.path().join("p")).expect("a project")
 }
 
 /// Options for a queue without planted faults and duplicates.

@@ -19,10 +19,7 @@ pub(crate) fn held(project: &Project, failpoint: &str, hold: &Path) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary starts");
-    while !hold.exists() {
-        assert_eq!(child.try_wait().expect("a child"), None);
-        crate::waiting::pause();
-    }
+    crate::waiting::until(&mut child, || hold.exists());
     child
 }
 

@@ -193,14 +193,7 @@ fn a_run_killed_at_every_failpoint_and_resumed_gives_the_results_of_an_uninterru
         .stderr(Stdio::null())
         .spawn()
         .expect("the binary starts");
-    while stages_done(&killed) < 2 {
-        let ended = child.try_wait().expect("the child's state");
-        assert!(
-            ended.is_none(),
-            "the run ended before it was killed: {ended:?}"
-        );
-        crate::waiting::pause();
-    }
+    crate::waiting::until(&mut child, || stages_done(&killed) >= 2);
     child.kill().expect("killed");
     child.wait().expect("dead");
     call(&mut run(&killed, &["-j", "1"])).expect(0);

@@ -38,13 +38,18 @@ fn is_reachable(tab: &Tab<'_>, selector: &str) -> bool {
 }
 
 /// Returns the first of some elements that is not wholly in the window as it is scrolled, or that another element covers.
+/// Hidden ones do not count, but one must be shown.
 fn first_out_of_sight(tab: &Tab<'_>, selector: &str) -> Value {
     let script = format!(
-        "[...document.querySelectorAll({selector:?})].filter((element) => element.checkVisibility()).find((element) => {{
-            const box = element.getBoundingClientRect();
-            const at = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
-            return box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth || !element.contains(at);
-        }})?.outerHTML ?? null"
+        "(() => {{
+            const all = [...document.querySelectorAll({selector:?})];
+            const shown = all.filter((element) => element.checkVisibility());
+            return shown.length === 0 ? 'nothing is shown' : shown.find((element) => {{
+                const box = element.getBoundingClientRect();
+                const at = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+                return box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth || !element.contains(at);
+            }})?.outerHTML ?? null;
+        }})()"
     );
     tab.eval(&script)
 }
@@ -307,6 +312,7 @@ fn nothing_that_is_needed_is_covered_or_out_of_sight() {
             let head = "header b, header a, header button, #progress, #saved";
             is_seen("start", ".verdicts button");
             tab.eval(LONG_MESSAGE);
+            is_seen("message", "#alert");
             is_seen(
                 "message",
                 &format!("{head}, #alert, .verdicts button, .history > button"),

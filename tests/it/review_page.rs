@@ -278,7 +278,9 @@ fn another_result_takes_the_place_of_one_that_cannot_be_read() {
 #[test]
 fn a_finished_review_stays_finished_when_others_judge() {
     let (_dir, project, page) = open_review(&[]);
-    for pair in pairs_with_faults(&project, &page) {
+    let planted = pairs_with_faults(&project, &page);
+    assert!(!planted.is_empty());
+    for pair in planted {
         set(
             &project,
             &[pair.as_str(), "không đạt", "--reviewer", "binh"],
@@ -286,6 +288,7 @@ fn a_finished_review_stays_finished_when_others_judge() {
     }
     drop(page);
     let queue = Page::open(&project, "lan", &[]).queue();
+    assert!(!queue.is_empty());
     let open = queue.iter().filter(|item| item["answer"].is_null()).count();
     assert_eq!(open, 0, "of {}", queue.len());
 }

@@ -265,12 +265,13 @@ fn an_output_replaces_no_input_of_the_project() {
         let name = file.to_str().expect("UTF-8");
         for args in [&["report", "-o", name][..], &["contact-sheet", "-o", name]] {
             let refused = at(&project, args).expect(2);
-            let wanted = [
-                "is an input of upright-0001; name another file",
-                "a report cannot be written as",
-            ];
-            let is_said = wanted.map(|part| refused.err.contains(part));
-            assert!(is_said.contains(&true), "{args:?}: {}", refused.err);
+            let is_picture = [".png", ".jpg"].iter().any(|end| name.ends_with(end));
+            let wanted = if args[0] == "report" && is_picture {
+                "a report cannot be written as"
+            } else {
+                "is an input of upright-0001; name another file"
+            };
+            assert!(refused.err.contains(wanted), "{args:?}: {}", refused.err);
         }
         if !name.ends_with("link") {
             let log = at(&project, &["--log-file", name, "-v", "check"]).expect(2);

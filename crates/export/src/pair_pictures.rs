@@ -4,13 +4,14 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::path::PathBuf;
 
+use super::mesh::MeshPlacement;
 use super::pictures::{PrintView, Rgb};
 use super::source_print::{SourcePrint, SourcePrintError};
 use super::stage_outcomes::StageOutcomes;
 use mocban_catalog::{MetricRecord, PairResults};
 use mocban_core::InputLimits;
 use mocban_core::domain::artifact_role::DEPTH;
-use mocban_core::domain::{Affine2, ArtifactRef, Explained, MetricOutcome, Stage};
+use mocban_core::domain::{Affine2, ArtifactRef, DepthScale, Explained, MetricOutcome, Stage};
 use mocban_core::mesh::{self, Mesh, MeshError, MeshReadError};
 use mocban_core::raster::{
     DepthMap, Grid, Mask, png_grey16, png_rgb8, warp_depth, warp_mask, warp_rgb,
@@ -252,6 +253,22 @@ impl<'a> PairPictures<'a> {
         let view = PrintView::enlarged(print);
         let enlarged = get_or_read(&self.enlarged, || Ok(view.print(print)))?;
         Ok(view.overlay_on(enlarged.clone(), self.mask_on_print(outcome)?))
+    }
+
+    /// Places the scan under an alignment on a print of `print` pixels. Heights are those of the depth map with this scale,
+    /// over its levelling if it was levelled.
+    pub(super) fn placement(
+        &self,
+        outcome: &MetricOutcome,
+        scale: DepthScale,
+        print: [usize; 2],
+    ) -> Result<MeshPlacement, PictureError> {
+        let (map, levelling) = (&self.outcomes.depth, self.outcomes.register.levelling);
+        let placement = MeshPlacement::new(self.outcomes.fit.clone(), scale, outcome, print);
+        let none = || PictureError::Unencodable("the alignment has no inverse".to_owned());
+        Ok(placement
+            .ok_or_else(none)?
+            .levelled(levelling, [map.width, map.height]))
     }
 
     /// Reads the mesh file, and checks that it is the one that was aligned.

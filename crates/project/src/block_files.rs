@@ -4,6 +4,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use crate::exit::Refusal;
+use crate::files::listed;
 use crate::manifest_file::place_of;
 use mocban_core::domain::{FileKind, sanitize};
 use mocban_lists::manifest::{BlockRow, is_named_like_mesh, is_named_like_print};
@@ -26,13 +27,9 @@ pub(crate) fn check(rows: &[BlockRow], label: &str, project: &Project) -> Result
     if faults.is_empty() {
         return Ok(());
     }
-    let shown = faults[..faults.len().min(MAX_SHOWN)].join("\n  ");
-    let more = match faults.len().saturating_sub(MAX_SHOWN) {
-        0 => String::new(),
-        more => format!("\n  and {more} more"),
-    };
+    let shown = listed(&faults, faults.len(), MAX_SHOWN);
     Err(Refusal::Usage(format!(
-        "files of other kinds, nothing was imported:\n  {shown}{more}"
+        "files of other kinds, nothing was imported:{shown}"
     )))
 }
 
@@ -40,9 +37,9 @@ pub(crate) fn check(rows: &[BlockRow], label: &str, project: &Project) -> Result
 fn faults(row: &BlockRow, project: &Project) -> Vec<String> {
     let kind = |path: &Path| kind(&place_of(path, project));
     let (mesh, page) = (kind(&row.mesh), kind(&row.page));
-    let is_image =
+    let may_be_image =
         |kind, path: &Path| is_image(kind) || kind.is_none() && is_named_like_print(path);
-    if is_image(mesh, &row.mesh) && is_mesh(page, &row.page) {
+    if may_be_image(mesh, &row.mesh) && is_mesh(page, &row.page) {
         return vec!["mesh names an image and page names a mesh; swap the two".to_owned()];
     }
     let mut faults = Vec::new();
@@ -101,7 +98,7 @@ const fn is_no_mesh(kind: FileKind) -> bool {
     is_image(Some(kind)) || matches!(kind, FileKind::OtherMesh(_))
 }
 
-/// Returns whether a file cannot be text. What is neither text nor of a known kind may be text in another encoding.
+/// Returns whether a file is an image, a mesh or binary data. Others, such as text in UTF-16, are left to the run.
 const fn is_no_text(kind: FileKind) -> bool {
     is_image(Some(kind))
         || matches!(

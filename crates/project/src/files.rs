@@ -64,11 +64,22 @@ pub fn read_list(path: &Path, sheet: Option<&str>) -> Result<ListFile, Refusal> 
     }
 }
 
+/// Returns the first `max` of `count` lines, indented, and how many more there are.
+pub(crate) fn listed(lines: &[String], count: usize, max: usize) -> String {
+    let shown = &lines[..lines.len().min(max)];
+    let shown_lines: Vec<String> = shown.iter().map(|line| format!("\n  {line}")).collect();
+    let more = match count - shown.len() {
+        0 => String::new(),
+        more => format!("\n  and {more} more"),
+    };
+    shown_lines.concat() + &more
+}
+
 /// Returns whether a file begins like HTML, which some programs save as a file of Excel.
 fn is_html(bytes: &[u8]) -> bool {
     let head = bytes[..bytes.len().min(1024)].to_ascii_lowercase();
-    let starts = |tag: &str| head.windows(tag.len()).any(|part| part == tag.as_bytes());
-    head.trim_ascii_start().starts_with(b"<") && ["<html", "<table"].into_iter().any(starts)
+    let has = |tag: &str| head.windows(tag.len()).any(|part| part == tag.as_bytes());
+    head.trim_ascii_start().starts_with(b"<") && ["<html", "<table"].into_iter().any(has)
 }
 
 /// Returns the metadata of a file or folder, or `None` if it does not exist.
@@ -332,17 +343,10 @@ impl RefusedLine {
         if others.is_empty() {
             return Some(first.in_file(file, outcome));
         }
-        let shown = lines.iter().take(MAX_SHOWN);
-        let shown: Vec<String> = shown.map(|refused| format!("\n  {refused}")).collect();
-        let more = match lines.len().saturating_sub(MAX_SHOWN) {
-            0 => String::new(),
-            more => format!("\n  and {more} more"),
-        };
+        let shown = lines.iter().take(MAX_SHOWN).map(Self::to_string);
+        let shown = listed(&shown.collect::<Vec<_>>(), lines.len(), MAX_SHOWN);
         let (file, count) = (file.display(), lines.len());
-        let text = format!(
-            "{file}: {count} lines are refused; {outcome}:{}{more}",
-            shown.concat()
-        );
+        let text = format!("{file}: {count} lines are refused; {outcome}:{shown}");
         Some(Refusal::Usage(text))
     }
 

@@ -9,7 +9,7 @@ use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
 use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
 use super::unread_files::UnreadFiles;
 use crate::error::ProjectResult;
-use mocban_core::domain::{FileKind, LengthUnit, sanitize};
+use mocban_core::domain::{FileKind, LengthUnit, first_names, sanitize};
 use mocban_lists::manifest::{
     ListedFolder, ManifestError, ManifestRow, MisspeltColumns, ReadRows, RowIds, pair_folders,
     read_csv, read_jsonl,
@@ -243,13 +243,9 @@ fn has_scheme(path: &Path, scheme: &str) -> bool {
 /// Returns `ignored, mesh without print: a.stl, b.stl and 3 more`.
 fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {
     const MAX_NAMES: usize = 5;
-    let names = paths.iter().take(MAX_NAMES);
-    let names: Vec<String> = names.map(|path| path.display().to_string()).collect();
-    let more = match paths.len().saturating_sub(MAX_NAMES) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    (!paths.is_empty()).then(|| format!("ignored, {reason}: {}{more}", names.join(", ")))
+    let names = paths.iter().map(|path| path.display().to_string());
+    let names = first_names(&names.collect::<Vec<_>>(), MAX_NAMES);
+    (!paths.is_empty()).then(|| format!("ignored, {reason}: {names}"))
 }
 
 #[cfg(test)]

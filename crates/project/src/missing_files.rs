@@ -1,6 +1,7 @@
 //! Files of a list that do not exist.
 
 use super::exit::Refusal;
+use super::files::listed;
 
 /// Maximum number of missing files that `--json` lists.
 const MAX_MISSING: usize = 1000;
@@ -38,24 +39,19 @@ impl MissingFiles {
     /// Returns why a list with missing files is refused.
     pub fn refusal(&self) -> Refusal {
         const MAX_SHOWN: usize = 10;
-        let shown = &self.lines[..self.lines.len().min(MAX_SHOWN)];
-        let more = match self.count - shown.len() {
-            0 => String::new(),
-            more => format!("\n  and {more} more"),
-        };
+        let shown = listed(&self.lines, self.count, MAX_SHOWN);
         let missing = if self.lines.iter().any(|line| line.ends_with(IS_FOLDER)) {
             "missing or a folder"
         } else {
             "missing"
         };
         Refusal::Usage(format!(
-            "{} {missing}, nothing was imported:\n  {}{more}\ncorrect the paths, or use --allow-missing if the files are added \
+            "{} {missing}, nothing was imported:{shown}\ncorrect the paths, or use --allow-missing if the files are added \
              before the run",
             match self.count {
                 1 => "1 file is".to_owned(),
                 files => format!("{files} files are"),
             },
-            shown.join("\n  "),
         ))
     }
 }

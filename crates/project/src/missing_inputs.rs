@@ -42,8 +42,9 @@ impl std::fmt::Display for MissingInputs {
     }
 }
 
-/// Looks at the files of some of the `pairs` pairs of a project, also retired ones, and of its blocks. Files in an object
-/// store are left out. Returns `None` if no file is missing, or if the disk does not answer in time.
+/// Looks at the files of some pairs and blocks of a project. `pairs` counts the retired pairs too, because they have ids,
+/// but their files are not looked at. Returns `None` if no file is missing, if inputs may be in an object store, or if the
+/// disk does not answer in time.
 pub async fn find(
     project: &Project,
     catalog: &Catalog,

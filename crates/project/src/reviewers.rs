@@ -34,17 +34,15 @@ pub async fn refuse_similar(
 /// Returns the first new name that is similar to a known one or to an earlier new one, and that one.
 fn similar(mut known: BTreeSet<String>, names: &BTreeSet<String>) -> Option<(String, String)> {
     let plain = |name: &str| plain_form(name).replace(char::is_whitespace, "");
-    for new in names
-        .iter()
-        .filter(|name| !known.contains(*name))
-        .cloned()
-        .collect::<Vec<_>>()
-    {
-        let form = plain(&new);
-        if let Some(other) = known.iter().find(|other| plain(other) == form) {
-            return Some((new, other.clone()));
+    for new in names {
+        if known.contains(new) {
+            continue;
         }
-        known.insert(new);
+        let form = plain(new);
+        if let Some(other) = known.iter().find(|other| plain(other) == form) {
+            return Some((new.clone(), other.clone()));
+        }
+        known.insert(new.clone());
     }
     None
 }

@@ -5,30 +5,31 @@ use std::str::FromStr;
 use mocban_core::domain::{Reason, Verdict};
 use mocban_lists::columns::plain_name;
 
-/// Verdicts in other words, as [`plain_name`] writes them.
-const VERDICTS: [(&str, Verdict); 5] = [
-    ("dat", Verdict::Pass),
-    ("khong_dat", Verdict::Fail),
-    ("chua_chac", Verdict::Unsure),
-    ("khong_chac", Verdict::Unsure),
-    ("chua_ro", Verdict::Unsure),
+/// Verdicts with their other words, as [`plain_name`] writes them.
+const VERDICTS: [(Verdict, &[&str]); 3] = [
+    (Verdict::Pass, &["dat"]),
+    (Verdict::Fail, &["khong_dat"]),
+    (Verdict::Unsure, &["chua_chac", "khong_chac", "chua_ro"]),
 ];
 
-/// Reasons in other words, as [`plain_name`] writes them.
-const REASONS: [(&str, Reason); 13] = [
-    ("wrong_angle", Reason::Angle),
-    ("sai_goc", Reason::Angle),
-    ("missing_strokes", Reason::StrokesLost),
-    ("mat_net", Reason::StrokesLost),
-    ("background_included", Reason::BackgroundIn),
-    ("lan_nen", Reason::BackgroundIn),
-    ("wrong_position_or_scale", Reason::ShiftOrScale),
-    ("sai_vi_tri_hoac_ti_le", Reason::ShiftOrScale),
-    ("bi_lat_guong", Reason::Mirrored),
-    ("lat_guong", Reason::Mirrored),
-    ("wrong_pair_or_bad_input", Reason::WrongPair),
-    ("sai_cap_hoac_du_lieu_hong", Reason::WrongPair),
-    ("sai_cap", Reason::WrongPair),
+/// Reasons with their other words, as [`plain_name`] writes them.
+const REASONS: [(Reason, &[&str]); 6] = [
+    (Reason::Angle, &["wrong_angle", "sai_goc"]),
+    (Reason::StrokesLost, &["missing_strokes", "mat_net"]),
+    (Reason::BackgroundIn, &["background_included", "lan_nen"]),
+    (
+        Reason::ShiftOrScale,
+        &["wrong_position_or_scale", "sai_vi_tri_hoac_ti_le"],
+    ),
+    (Reason::Mirrored, &["bi_lat_guong", "lat_guong"]),
+    (
+        Reason::WrongPair,
+        &[
+            "wrong_pair_or_bad_input",
+            "sai_cap_hoac_du_lieu_hong",
+            "sai_cap",
+        ],
+    ),
 ];
 
 /// Parses a verdict.
@@ -48,17 +49,20 @@ pub fn reason(text: &str) -> Result<Reason, String> {
 }
 
 /// Parses a name in any case and with blanks, or one of some other words.
-pub(crate) fn word<T>(text: &str, other: &[(&str, T)]) -> Result<T, String>
+pub(crate) fn word<T>(text: &str, others: &[(T, &[&str])]) -> Result<T, String>
 where
     T: FromStr<Err: std::fmt::Display> + Copy,
 {
     let plain = plain_name(text);
-    let found = other.iter().find(|(word, _)| *word == plain);
-    let found = found.map(|(_, found)| *found);
-    found.or_else(|| plain.parse().ok()).map_or_else(
-        || text.parse().map_err(|error: T::Err| error.to_string()),
-        Ok,
-    )
+    let found = others.iter().find(|(_, words)| words.contains(&&*plain));
+    if let Some((found, _)) = found {
+        return Ok(*found);
+    }
+    let parsed = plain.parse();
+    // The error shows the text as written.
+    parsed
+        .or_else(|_: T::Err| text.parse())
+        .map_err(|error: T::Err| error.to_string())
 }
 
 #[cfg(test)]

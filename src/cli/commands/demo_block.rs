@@ -1,6 +1,5 @@
 //! `demo --block`: creates a whole block with its page, and the true alignments of the pairs that are cut from it.
 
-use std::io::IsTerminal as _;
 use std::path::Path;
 
 use serde_json::Value;
@@ -105,11 +104,10 @@ async fn replace_block(
     options: BlockOptions,
     context: &Context,
 ) -> ProjectResult<Option<BlockFiles>> {
-    if !std::io::stderr().is_terminal() {
-        // Without a terminal, nothing else shows that the command works.
-        context.info("creating a block, which takes a minute or two");
-    }
     let busy = Busy::start(context, "creating a block");
+    if !busy.is_shown() {
+        context.info("creating a block");
+    }
     let write = move |folder: &Path, stop: &Stop| {
         let is_stopped = || stop.level() != StopLevel::Go;
         write_block(folder, &options, &is_stopped)

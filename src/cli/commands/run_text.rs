@@ -7,6 +7,7 @@ use crate::cli::output::failures::failures_text;
 use crate::cli::output::table::{columns, count, pairs_and_blocks};
 use mocban_catalog::{BlockPlanEntry, Plan};
 use mocban_core::domain::JobStatus;
+use mocban_project::failures::Failures;
 use mocban_project::run::RunOutcome;
 use mocban_project::shell::shell_quoted;
 use mocban_runner::{BlockSummary, RunSummary};
@@ -88,11 +89,8 @@ pub(crate) fn next_steps(outcome: &RunOutcome) -> Vec<String> {
     if let Some(first) = failures.blocks.first_failed() {
         steps.push(format!("show {}", shell_quoted(&first)));
     }
-    if let Some(first) = failures.pairs.first().filter(|_| summary.failed_in_all > 0) {
-        steps.push(format!("show {}", shell_quoted(first.name.as_str())));
-        if failures.may_succeed_unchanged() {
-            steps.push("retry".to_owned());
-        }
+    if summary.failed_in_all > 0 {
+        steps.extend(failed_pair_steps(failures));
     }
     if jobs(JobStatus::Done) > 0 && !summary.stopped {
         if !are_results_missing {
@@ -101,6 +99,15 @@ pub(crate) fn next_steps(outcome: &RunOutcome) -> Vec<String> {
         steps.push("report".to_owned());
     }
     steps
+}
+
+/// Returns the commands that show a failed pair and let failed pairs run again.
+pub(crate) fn failed_pair_steps(failures: &Failures) -> Vec<String> {
+    let first = failures.pairs.first();
+    let show = first.map(|first| format!("show {}", shell_quoted(first.name.as_str())));
+    let may_retry = first.is_some() && failures.may_succeed_unchanged();
+    let retry = may_retry.then(|| "retry".to_owned());
+    show.into_iter().chain(retry).collect()
 }
 
 /// Returns the numbers of pairs that would run, and a line for each reason.

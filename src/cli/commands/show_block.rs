@@ -19,7 +19,8 @@ use mocban_system::time_text::{duration, local};
 /// Number of characters that are listed of each kind.
 const MAX_CHARACTERS: usize = 20;
 
-/// Characters with a shorter longest side on the page are smaller than registration needs to be sure.
+/// Below this size of the characters, a page with a higher resolution is advised. The mean confidence of right results was
+/// 0.71 at 16 px and 0.88 at 20 px (`--print-px` of the accuracy bench, tiers pose and hard, 51 pairs each).
 const SMALL_PX: f64 = 16.0;
 
 /// Significant digits of numbers that are not whole.
@@ -220,7 +221,7 @@ fn characters_text(
 }
 
 /// Says how large the characters are on the page: `2.6 px/mm: characters of about 25 px`. `None` before the page is
-/// aligned.
+/// aligned, and if there are none.
 fn resolution(detail: &BlockDetail, characters: &[StoredCharacter]) -> Option<String> {
     let align = detail
         .stages
@@ -229,9 +230,9 @@ fn resolution(detail: &BlockDetail, characters: &[StoredCharacter]) -> Option<St
     let px_per_mm = align.outcome.get("px_per_mm")?.as_f64()?;
     let longer = |[left, top, right, bottom]: [f64; 4]| (right - left).max(bottom - top);
     let mut sides: Vec<f64> = characters.iter().map(|one| longer(one.bounds)).collect();
-    let middle = sides.len() / 2;
-    let (_, side, _) = sides.select_nth_unstable_by(middle, f64::total_cmp);
-    let advice = if *side < SMALL_PX {
+    sides.sort_unstable_by(f64::total_cmp);
+    let side = *sides.get(sides.len() / 2)?;
+    let advice = if side < SMALL_PX {
         "; a page scanned at a higher resolution gives surer results"
     } else {
         ""

@@ -8,6 +8,7 @@ use clap::Args;
 use serde_json::Value;
 
 use super::review::review_step;
+use super::run_text::failed_pair_steps;
 use super::status_hosts::table_text;
 use crate::cli::output::block_status::{blocks_line, failed_blocks_text};
 use crate::cli::output::context::Context;
@@ -267,12 +268,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     if let Some(first) = status.failures.blocks.first_failed() {
         steps.push(format!("show {}", shell_quoted(&first)));
     }
-    if let Some(first) = status.failures.pairs.first() {
-        steps.push(format!("show {}", shell_quoted(first.name.as_str())));
-        if status.failures.may_succeed_unchanged() {
-            steps.push("retry".to_owned());
-        }
-    }
+    steps.extend(failed_pair_steps(&status.failures));
     if status.counts.low_confidence > 0 {
         steps.push("show --low".to_owned());
         steps.push("contact-sheet --order confidence".to_owned());

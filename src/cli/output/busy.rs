@@ -56,6 +56,11 @@ impl Busy {
         Self(bar)
     }
 
+    /// Returns whether anything is shown.
+    pub(crate) fn is_shown(&self) -> bool {
+        !self.0.is_hidden()
+    }
+
     /// Counts a pair.
     pub(crate) fn begin_pair(&self) {
         self.0.inc(1);

@@ -201,9 +201,9 @@ const DIGITS: i32 = 3;
 
 /// Returns the few numbers of a stage that show whether it succeeded. Lengths are in units of the mesh.
 fn numbers(record: &StageRecord, hints: ScanHints) -> String {
-    let unit = hints.unit.map_or("mesh units", LengthUnit::name);
+    let unit = unit_name(hints);
     let text = match record.stage {
-        Stage::Fit => record.parse().map(|fit| fit_numbers(&fit, unit, hints)),
+        Stage::Fit => record.parse().map(|fit| fit_numbers(&fit, hints)),
         Stage::Depth => record.parse().map(|depth| depth_numbers(&depth, unit)),
         Stage::Normalize => record.parse().map(|found| ink_numbers(&found)),
         Stage::Register => Ok(String::new()),
@@ -211,7 +211,12 @@ fn numbers(record: &StageRecord, hints: ScanHints) -> String {
     text.unwrap_or_else(|_| "written by another version of this program".to_owned())
 }
 
-fn fit_numbers(fit: &FitOutcome, unit: &str, hints: ScanHints) -> String {
+fn unit_name(hints: ScanHints) -> &'static str {
+    hints.unit.map_or("mesh units", LengthUnit::name)
+}
+
+fn fit_numbers(fit: &FitOutcome, hints: ScanHints) -> String {
+    let unit = unit_name(hints);
     let curvature = match fit.curvature {
         Some(_) => format!(
             ", curvature {} {unit}",

@@ -275,20 +275,16 @@ pub(crate) async fn of_pairs(
     let query = query_as(COUNTED).bind(json_array(pairs.iter().copied()));
     let query = query.bind(left_out.of(ChecksummedTable::Verdict));
     let query = query.bind(left_out.of(ChecksummedTable::VerdictUndo));
-    let found: Vec<ResultVerdict> = query.fetch_all(conn).await?;
+    let mut found: Vec<ResultVerdict> = query.fetch_all(conn).await?;
+    // Each spelling's verdicts come oldest first, but those of another spelling may be newer.
+    found.sort_unstable_by_key(|given| given.id);
     let mut counted: BTreeMap<_, Vec<ResultVerdict>> = BTreeMap::new();
-    for given in found {
-        let of_metric = counted.entry((given.pair, given.metric)).or_default();
-        let same = of_metric.iter_mut().find(|other| {
-            other.verdict.reviewer == given.verdict.reviewer
-                && other.result_hash == given.result_hash
+    for newest in found {
+        let of_metric = counted.entry((newest.pair, newest.metric)).or_default();
+        of_metric.retain(|old| {
+            old.verdict.reviewer != newest.verdict.reviewer || old.result_hash != newest.result_hash
         });
-        match same {
-            // Each spelling's verdicts come oldest first, but those of another spelling may be newer.
-            Some(other) if other.id < given.id => *other = given,
-            Some(_) => {}
-            None => of_metric.push(given),
-        }
+        of_metric.push(newest);
     }
     for of_metric in counted.values_mut() {
         of_metric.sort_by(|a, b| a.verdict.reviewer.cmp(&b.verdict.reviewer));

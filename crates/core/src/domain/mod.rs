@@ -71,7 +71,7 @@ pub use pair_name::{NO_BREAK_SPACES, PairName, PairNameError};
 pub use print_outline::PrintOutline;
 pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;
-pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};
+pub use sanitize::{first_names, is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};

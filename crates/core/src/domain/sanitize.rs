@@ -141,6 +141,15 @@ fn push_visible(shown: &mut String, c: char) {
     }
 }
 
+/// Joins names with commas. Names after the first `max` are only counted.
+pub fn first_names(names: &[String], max: usize) -> String {
+    let text = names[..names.len().min(max)].join(", ");
+    match names.len().saturating_sub(max) {
+        0 => text,
+        more => format!("{text} and {more} more"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::{one_line, sanitize, visible, visible_json};

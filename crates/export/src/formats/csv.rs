@@ -162,8 +162,8 @@ impl FormatWriter for CsvWriter {
 
     fn guide(&self) -> FormatGuide {
         let tables = [("Columns", &PAIR_FIELDS[..]), ("", &METRIC_FIELDS[..])];
-        let is_with_commas = self.folder.context.options.csv_decimal_comma;
-        let (separated, read) = if is_with_commas {
+        let has_decimal_commas = self.folder.context.options.csv_decimal_comma;
+        let (separated, read) = if has_decimal_commas {
             ("separated by semicolons, with decimal commas", "read.csv2")
         } else {
             ("comma-separated", "read.csv")
@@ -306,14 +306,13 @@ fn cell(value: &Value, has_decimal_commas: bool) -> String {
         Value::String(text) => text_cell(text),
         // Display of f64 has no exponent, unlike JSON.
         Value::Number(number) if number.is_f64() => {
-            number.as_f64().map_or_else(String::new, |number| {
-                let text = number.to_string();
-                if has_decimal_commas {
-                    text.replace('.', ",")
-                } else {
-                    text
-                }
-            })
+            let text = number.as_f64().map(|number| number.to_string());
+            let text = text.unwrap_or_default();
+            if has_decimal_commas {
+                text.replace('.', ",")
+            } else {
+                text
+            }
         }
         other => other.to_string(),
     }

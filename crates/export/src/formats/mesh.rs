@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::single_results::{FileOfPair, ShownResult, SingleResultFormat};
 use crate::format_writer::PairView;
-use crate::mesh::{MeshPlacement, ScanFiles, ScanTitle};
+use crate::mesh::{ScanFiles, ScanTitle};
 use crate::pair_pictures::PictureError;
 
 const SCAN: &str = "the scan, binary PLY in millimetres: per vertex the colour of the print, `stroke` (1 on strokes) and \
@@ -35,7 +35,7 @@ Lengths are millimetres (metres in the GLB). If the unit of the mesh is unknown,
 a mesh unit for a millimetre. Vertices that the file repeats are merged.
 
 `stroke` is 1 where `height` is at least `threshold_depth`: heights are measured over the fitted surface, which may be
-curved (see Coordinates).
+curved (see Coordinates), or over the levelling of the depth map, if it was levelled.
 
 ## Use
 
@@ -76,18 +76,8 @@ impl SingleResultFormat for PlacedScanFormat {
     ) -> Result<Vec<Vec<u8>>, PictureError> {
         let pictures = shown.pictures;
         let print = pictures.source_print()?.picture.to_rgb8();
-        let placement = MeshPlacement::new(
-            pictures.outcomes.fit.clone(),
-            shown.scale,
-            &shown.record.outcome,
-            [print.width(), print.height()],
-        )
-        .ok_or_else(|| PictureError::Unencodable("the alignment has no inverse".to_owned()))?;
-        let (levelling, map) = (
-            pictures.outcomes.register.levelling,
-            &pictures.outcomes.depth,
-        );
-        let placement = placement.levelled(levelling, [map.width, map.height]);
+        let size = [print.width(), print.height()];
+        let placement = pictures.placement(&shown.record.outcome, shown.scale, size)?;
         let title = ScanTitle {
             pair: &view.record.pair.id,
             metric: shown.fields.metric,

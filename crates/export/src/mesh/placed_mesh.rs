@@ -14,7 +14,7 @@ pub(crate) struct PlacedMesh {
     pub(crate) pixels: Vec<[f32; 2]>,
     /// Colours of the print; `None` outside of it.
     pub(super) colours: Vec<Option<[u8; 3]>>,
-    /// Heights over the fitted surface, in the unit of the positions.
+    /// Heights over the fitted surface, or over its levelling, in the unit of the positions.
     pub(crate) heights: Vec<f32>,
     /// Whether a vertex belongs to a stroke and lies over the print.
     pub(super) strokes: Vec<bool>,

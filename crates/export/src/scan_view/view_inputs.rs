@@ -67,14 +67,7 @@ impl ViewInputs {
         let picture = &pictures.source_print()?.picture;
         let print = picture.to_rgb8();
         let size = [print.width(), print.height()];
-        let fit = pictures.outcomes.fit.clone();
-        let placement = MeshPlacement::new(fit, scale, outcome, size)
-            .ok_or_else(|| PictureError::Unencodable("the alignment has no inverse".to_owned()))?;
-        let (levelling, map) = (
-            pictures.outcomes.register.levelling,
-            &pictures.outcomes.depth,
-        );
-        let placement = placement.levelled(levelling, [map.width, map.height]);
+        let placement = pictures.placement(outcome, scale, size)?;
         let strokes = pictures.mask_on_print(outcome)?;
         let textures = ViewTextures::new(picture, strokes, pictures.source_mask()?);
         let mesh = pictures.mesh()?.welded();

@@ -1,6 +1,6 @@
 //! Parts of sentences about labels.
 
-use mocban_core::domain::sanitize;
+use mocban_core::domain::{first_names, sanitize};
 
 /// Maximum number of characters of a text from a file that a message shows.
 const MAX_SHOWN: usize = 60;
@@ -14,12 +14,7 @@ pub(super) fn quoted(text: &str) -> String {
 
 /// Joins names with commas. Names after the first few are only counted.
 pub(super) fn list(names: &[String]) -> String {
-    let shown = names.iter().take(MAX_NAMED).map(String::as_str);
-    let text = shown.collect::<Vec<_>>().join(", ");
-    match names.len().saturating_sub(MAX_NAMED) {
-        0 => text,
-        more => format!("{text} and {more} more"),
-    }
+    first_names(names, MAX_NAMED)
 }
 
 /// Returns the line, from 1, of the byte at a position in a text.

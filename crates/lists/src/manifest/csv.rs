@@ -9,6 +9,7 @@ use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::{HeaderColumns, SameColumn};
 use crate::quotes::check_quotes;
+use mocban_core::domain::first_names;
 
 /// Parses a CSV list with a header line. Columns may be in any order, and their names in any case. Blank lines are
 /// ignored.
@@ -136,19 +137,9 @@ fn not_utf8(columns: &[usize]) -> Option<String> {
         [] => None,
         [column] => Some(format!("the name of column {column} is not UTF-8")),
         columns => {
-            let shown: Vec<String> = columns
-                .iter()
-                .take(MAX_COLUMNS_SHOWN)
-                .map(usize::to_string)
-                .collect();
-            let more = match columns.len().saturating_sub(MAX_COLUMNS_SHOWN) {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            Some(format!(
-                "the names of columns {}{more} are not UTF-8",
-                shown.join(", ")
-            ))
+            let columns: Vec<String> = columns.iter().map(usize::to_string).collect();
+            let names = first_names(&columns, MAX_COLUMNS_SHOWN);
+            Some(format!("the names of columns {names} are not UTF-8"))
         }
     }
 }
@@ -159,25 +150,26 @@ const MAX_COLUMNS_SHOWN: usize = 12;
 /// Number of lines in which a header below a title is searched.
 const MAX_TITLE_LINES: usize = 20;
 
-/// Says which of the first lines has the required columns, if a title stands above it. Its separator may be another one.
-fn later_header(list: &[u8], delimiter: u8) -> Option<Problem> {
-    let lines = list.split(|byte| *byte == b'\n').take(MAX_TITLE_LINES);
-    let has_columns = |line: &&[u8]| {
-        let is_header = |delimiter: u8| {
-            let Ok(text) = std::str::from_utf8(line) else {
-                return false;
-            };
-            let unquoted = |name: &str| trimmed(trimmed(name).trim_matches('"')).to_owned();
-            let names: Vec<String> = text.split(char::from(delimiter)).map(unquoted).collect();
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            COLUMNS.assign(&names).is_ok_and(|found| {
-                let is_there = |name: &&str| found.columns.contains(&Some(*name));
-                REQUIRED.iter().all(is_there)
-            })
-        };
-        line.len() <= MAX_ROW_BYTES && [delimiter, b',', b';', b'\t'].into_iter().any(is_header)
+/// Says which of the lines below the first `above` ones has the required columns, if a title stands above it. Its
+/// separator may be another one.
+fn later_header(list: &[u8], delimiter: u8, above: usize) -> Option<Problem> {
+    let has_columns = |text: &str, delimiter: u8| {
+        let cells = text.split(char::from(delimiter));
+        let unquoted = |cell| trimmed(trimmed(cell).trim_matches('"'));
+        let names: Vec<&str> = cells.map(unquoted).collect();
+        COLUMNS.assign(&names).is_ok_and(|found| {
+            let mut required = REQUIRED.iter();
+            required.all(|name| found.columns.contains(&Some(*name)))
+        })
     };
-    let (number, _) = (1..).zip(lines).find(|(_, line)| has_columns(line))?;
+    let lines = list.split(|byte| *byte == b'\n').take(MAX_TITLE_LINES);
+    let lines = (1..).zip(lines).skip(above);
+    let mut short = lines.filter(|(_, line)| line.len() <= MAX_ROW_BYTES);
+    let (number, _) = short.find(|(_, line)| {
+        let mut delimiters = [delimiter, b',', b';', b'\t'].into_iter();
+        std::str::from_utf8(line)
+            .is_ok_and(|text| delimiters.any(|delimiter| has_columns(text, delimiter)))
+    })?;
     let text = format!("line {number} has these columns; remove the lines above it");
     Some(of_list(&text))
 }
@@ -221,7 +213,7 @@ impl CsvHeader {
             .filter(|name| !columns.contains(&Some(**name)));
         problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
         if let Err(mut problems) = problems.check(false) {
-            problems.extend(later_header(list, delimiter));
+            problems.extend(later_header(list, delimiter, line));
             return Err(problems);
         }
         let names = names.into_iter().map(str::to_owned);

@@ -100,7 +100,7 @@ pub fn pair_folders(
     let roots = [&meshes.root, &prints.root];
     let (meshes, other_meshes) = by_id(meshes, is_named_like_mesh, "meshes", &mut problems);
     let (mut prints, other_prints) = by_id(prints, is_named_like_print, "prints", &mut problems);
-    let without = without_files(roots, [meshes.is_empty(), prints.is_empty()]);
+    let are_empty = [meshes.is_empty(), prints.is_empty()];
     let (mut pairs, mut meshes_alone) = (Vec::new(), Vec::new());
     for (id, mesh) in meshes {
         match prints.remove(&id) {
@@ -123,6 +123,7 @@ pub fn pair_folders(
     let similar = similar(&meshes_alone, &prints_alone);
     if rows.is_empty() {
         let is_swapped = is_swapped && meshes_alone.is_empty();
+        let without = without_files(roots, are_empty);
         return Err(of_list(&no_pair(is_swapped, without, &similar)).into());
     }
     for alone in [&mut meshes_alone, &mut prints_alone] {
@@ -143,7 +144,7 @@ pub fn pair_folders(
     })
 }
 
-/// Says which of the folders of meshes and of prints have none, such as `scans holds no meshes`.
+/// Says which folder has no files of its kind, such as `scans holds no meshes`.
 fn without_files(roots: [&PathBuf; 2], are_empty: [bool; 2]) -> Option<String> {
     let [meshes, prints] = roots.map(|root| root.display());
     match are_empty {

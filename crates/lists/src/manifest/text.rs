@@ -142,8 +142,8 @@ const VIETNAMESE_TONES: [u8; 5] = [0xcc, 0xd2, 0xde, 0xec, 0xf2];
 /// Bytes of Đ, Ơ and Ư and their small letters in Windows-1258. In Windows-1252 they are Ð, Õ and Ý.
 const VIETNAMESE_LETTERS: [u8; 6] = [0xd0, 0xf0, 0xd5, 0xf5, 0xdd, 0xfd];
 
-/// Returns what to do about a list that is not UTF-8, with its likely encoding: Windows-1258 or Windows-1252, in which
-/// spreadsheet programs save CSV files in Vietnam and in western countries. Only lines that are not UTF-8 are considered.
+/// Returns what to do about a list that is not UTF-8, with its likely encoding: GB 18030, or Windows-1258 or Windows-1252,
+/// in which spreadsheet programs save CSV files in Vietnam and in western countries. Only lines that are not UTF-8 are considered.
 /// Returns nothing if one of them is not text.
 pub(super) fn encoding_hint(list: &[u8]) -> String {
     let lines = list.split(|byte| *byte == b'\n');
@@ -151,7 +151,7 @@ pub(super) fn encoding_hint(list: &[u8]) -> String {
         .filter(|line| std::str::from_utf8(line).is_err())
         .collect();
     let is_text = |byte: &u8| *byte >= 0x20 || byte.is_ascii_whitespace();
-    // In both encodings, words mix ASCII letters with bytes above 0xc0.
+    // In all of them, lists mix ASCII letters with bytes above ASCII.
     let is_words =
         |line: &&[u8]| line.iter().all(is_text) && line.iter().any(u8::is_ascii_alphabetic);
     if !lines.iter().all(is_words) {

@@ -1,6 +1,6 @@
 //! Why a workbook cannot be read.
 
-use mocban_core::domain::sanitize;
+use mocban_core::domain::{first_names, sanitize};
 
 /// Longest text of a workbook in a message, in characters.
 const MAX_SHOWN: usize = 100;
@@ -74,11 +74,7 @@ pub enum WorkbookError {
 
 /// Returns the first names of sheets in quotation marks.
 pub(super) fn list(sheets: &[String]) -> String {
-    let shown = sheets.iter().take(MAX_SHEETS);
-    let shown = shown.map(|name| format!("\"{}\"", sanitize(name, MAX_SHOWN)));
-    let text = shown.collect::<Vec<_>>().join(", ");
-    match sheets.len().saturating_sub(MAX_SHEETS) {
-        0 => text,
-        more => format!("{text} and {more} more"),
-    }
+    let quoted = sheets.iter();
+    let quoted = quoted.map(|name| format!("\"{}\"", sanitize(name, MAX_SHOWN)));
+    first_names(&quoted.collect::<Vec<_>>(), MAX_SHEETS)
 }

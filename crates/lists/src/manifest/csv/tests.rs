@@ -270,6 +270,9 @@ fn a_header_below_a_title_and_other_separators_are_named() {
     );
     let title = refusal("Block 4\nid;mesh;print\n1;a.stl;a.png\n");
     assert!(title.contains("line 2 has these columns"), "{title}");
+    // The refused line itself is no advice, even if another separator would give it the columns.
+    let tied = refusal("id;mesh;print;a,b,c,d\n1;a.stl;a.png;x\n");
+    assert!(!tied.contains("has these columns"), "{tied}");
     let pipes = refusal("id|mesh|print\n1|a.stl|a.png\n");
     assert_eq!(
         pipes.lines().next(),
