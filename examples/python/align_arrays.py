@@ -1,6 +1,8 @@
 """Aligns a scan that trimesh has read, and compares the height of the strokes with the print's grey.
 
-    pip install mocban trimesh pillow
+Install the wheel of a release, then:
+
+    pip install trimesh pillow
     python align_arrays.py scan.stl print.png
 """
 
@@ -19,7 +21,7 @@ if found.status == "refused":
     sys.exit(f"not aligned: {found.refusal.message}")
 print(found)
 
-# Print pixel of every vertex, and its height over the strokes.
+# Print pixel of every vertex, and its height over the plane. On a flat block, the threshold is at one such height.
 x, y, height = found.project(scan.vertices).T
 inside = (x >= 0) & (y >= 0) & (x < image.shape[1] - 1) & (y < image.shape[0] - 1)
 grey = image.mean(axis=2)[np.rint(y[inside]).astype(int), np.rint(x[inside]).astype(int)]

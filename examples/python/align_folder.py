@@ -1,6 +1,8 @@
 """Aligns all pairs of two folders on all processors, and draws confidence against IoU.
 
-    pip install mocban matplotlib
+Install the wheel of a release, then:
+
+    pip install matplotlib
     python align_folder.py meshes prints
 """
 

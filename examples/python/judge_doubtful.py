@@ -1,6 +1,8 @@
 """Looks for doubtful results of a project, saves their overlays and records verdicts on them.
 
-    pip install "mocban[arrow]" polars pillow
+Install the wheel of a release, then:
+
+    pip install pyarrow polars pillow
     python judge_doubtful.py demo Lan
 """
 

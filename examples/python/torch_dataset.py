@@ -1,6 +1,8 @@
-"""A PyTorch dataset of the aligned pairs of a project: depth map and ink in the frame of the print.
+"""A PyTorch dataset of the aligned pairs of a project: strokes and ink in the frame of the print.
 
-    pip install "mocban[arrow]" torch
+Install the wheel of a release, then:
+
+    pip install pyarrow torch
     python torch_dataset.py demo
 """
 

@@ -54,7 +54,7 @@ class MetricResult(Frozen):
     ssim, nl_ssim, iou, iou_box, dice : float
         Agreement of the strokes of the scan with the ink of the print.
     confidence : float or None
-        Probability that the alignment is correct; None under the paper's method.
+        Calibrated probability that the result is right, as in `Alignment`; None under the paper's method.
     """
 
     __slots__ = ("metric", "threshold_depth", "ssim", "nl_ssim", "iou", "iou_box", "dice", "confidence", "_native")
@@ -132,8 +132,8 @@ class Alignment(Frozen):
     status : {"aligned", "refused"}
     refusal : Refusal or None
     confidence : float or None
-        Probability that the alignment is correct: at most 5 degrees and 5 % of the character's height off. Look at
-        results below 0.5 before you use them.
+        Calibrated probability that the result is right: at most 5 degrees and 5 % of the character's height off, and an
+        intersection over union of at least 0.7 with the true stroke tops. Look at results below 0.5 before you use them.
     rotation_deg : float or None
         How far the depth map is turned to lie on the print, in (-180, 180], positive clockwise.
     scale : float or None
@@ -277,9 +277,17 @@ class Alignment(Frozen):
         scale = json.loads(native.outcomes())["scale"]
         return heights_of(flat.reshape(height, width), scale, np)
 
-    def overlay(self, metric: str = "relief") -> NDArray[np.uint8]:
-        """Return the print with the edges of the strokes, of shape (H, W, 3); small prints are enlarged."""
-        width, height, flat = self._aligned().overlay(metric)
+    def overlay(self, metric: str | None = None) -> NDArray[np.uint8]:
+        """Return the print with the edges of the strokes, of shape (H, W, 3); small prints are enlarged.
+
+        Parameters
+        ----------
+        metric : str, optional
+            That of the pose by default.
+        """
+        native = self._aligned()
+        assert self._first is not None
+        width, height, flat = native.overlay(metric or self._first)
         return flat.reshape(height, width, 3)
 
     def save(self, dir: str | os.PathLike[str]) -> None:

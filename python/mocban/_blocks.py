@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._alignment import Alignment
-from ._errors import ImageError, InputError, MeshError, ProjectError, Refused
+from ._errors import ImageError, InputError, ProjectError, Refused
 from ._frozen import Frozen
-from ._inputs import Mesh, Print
+from ._inputs import Mesh, Print, mesh_of
+from ._settings import settings_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -86,8 +87,10 @@ class BlockCharacter(Frozen):
 
         Raises
         ------
+        Refused
+            If the character was not cut.
         ProjectError
-            If the character is no pair, or its pair is not aligned.
+            If its pair is not aligned.
         """
         if not self._found:
             if self.pair is None:
@@ -127,7 +130,7 @@ class BlockAlignment(Frozen):
         The project that holds the block and its pairs.
     """
 
-    __slots__ = ("id", "status", "error", "agreement", "characters", "project", "_stored", "_temporary")
+    __slots__ = ("id", "status", "error", "agreement", "characters", "project", "_stored")
     id: str
     status: str
     error: str | None
@@ -135,9 +138,8 @@ class BlockAlignment(Frozen):
     characters: tuple[BlockCharacter, ...]
     project: Project
     _stored: Mapping[str, Any]
-    _temporary: Any
 
-    def __init__(self, stored: Mapping[str, Any], project: Project, temporary: Any = None) -> None:
+    def __init__(self, stored: Mapping[str, Any], project: Project) -> None:
         failure = stored["failure"]
         outcomes = {stage["stage"]: stage["outcome"] for stage in stored["stages"]}
         aligned = outcomes.get("align")
@@ -149,11 +151,10 @@ class BlockAlignment(Frozen):
             characters=tuple(BlockCharacter(one, project) for one in stored["character_list"]),
             project=project,
             _stored=stored,
-            _temporary=temporary,
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        if self._temporary is not None:
+        if self.project._temporary is not None:
             raise TypeError("the project of this block is in a temporary folder; give align_block a folder to pickle it")
         return BlockAlignment, (self._stored, self.project)
 
@@ -197,7 +198,8 @@ def align_block(
     side : {"front", "back"}, optional
         The side of the block that the page shows; found by default.
     folder : path-like, optional
-        Folder of the project that is made for the block. By default a temporary one, removed with the result.
+        Folder of the project that is made for the block. By default a temporary one, which is removed with the last object
+        that refers to its project.
     workers : int, optional
         Characters aligned at the same time.
     progress : callable, optional
@@ -234,19 +236,19 @@ def align_block(
     if temporary is None:
         _require_own(place)
     made = place / "inputs"
-    if isinstance(mesh, Mesh):
-        unit = mesh.unit
-        mesh = _written(made / "block.ply", _ply(mesh))
-    elif not isinstance(mesh, (str, os.PathLike)):
-        raise MeshError(f"the mesh is a {type(mesh).__name__}; give a mocban.Mesh or a path", "bad_input")
+    if not isinstance(mesh, (str, os.PathLike)):
+        given = mesh_of(mesh, settings_of(None), unit)
+        unit = given.unit
+        mesh = _written(made / "block.ply", _ply(given))
     if not isinstance(page, (str, os.PathLike)):
         page = _written(made / "page.png", _png(page if isinstance(page, Print) else Print(page)))
     if labels is not None and not isinstance(labels, (str, os.PathLike)):
         labels = _written(made / "labels.json", json.dumps([_box(one) for one in labels], ensure_ascii=False).encode())
     project = Project.create(place)
+    project._temporary = temporary
     project.import_block(mesh, page, labels=labels, id="block", unit=unit, side=side)
     project.run(workers=workers, progress=progress, stop_at_once=True)
-    found = BlockAlignment(project._block("block"), project, temporary)
+    found = BlockAlignment(project._block("block"), project)
     if strict and found.error is not None:
         raise Refused(f"the block is not aligned: {found.error}", "no_solution", os.fspath(mesh))
     return found

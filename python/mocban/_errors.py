@@ -98,4 +98,4 @@ class Cancelled(Error):
 
 
 class Refused(Error):
-    """A pair that is not aligned, raised only if ``strict=True``."""
+    """A pair or block that is not aligned: with ``strict=True``, or when something is asked of a refused result."""

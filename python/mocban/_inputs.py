@@ -189,8 +189,14 @@ class Mesh(Frozen):
         return f"<mocban.Mesh: {', '.join(parts)}>"
 
 
+_DEFAULT_MAX_PIXELS: list[int] = []
+
+
 def _max_pixels() -> int:
-    return int(settings()["limits.image.max_pixels"])
+    """Return the default of ``limits.image.max_pixels``, which is read once."""
+    if not _DEFAULT_MAX_PIXELS:
+        _DEFAULT_MAX_PIXELS.append(int(settings()["limits.image.max_pixels"]))
+    return _DEFAULT_MAX_PIXELS[0]
 
 
 def _mesh(vertices: Any, faces: Any, unit: str | None) -> Mesh:
@@ -259,7 +265,7 @@ class Print(Frozen):
     Raises
     ------
     ImageError
-        If the array has another shape or type, or more pixels than the setting ``limits.image.max_pixels``.
+        If the array has another shape or type, or more pixels than the default of ``limits.image.max_pixels``.
 
     Examples
     --------
@@ -272,6 +278,9 @@ class Print(Frozen):
     _native: _rust.NativePrint
 
     def __init__(self, image: ArrayLike) -> None:
+        self._fill(image, _max_pixels())
+
+    def _fill(self, image: ArrayLike, most: int) -> None:
         import numpy as np
 
         mode = getattr(image, "mode", None) if type(image).__module__.startswith("PIL.") else None
@@ -292,7 +301,6 @@ class Print(Frozen):
             text = f"the image has the shape {pixels.shape}; give an array of shape (H, W) or (H, W, 1 to 4)"
             raise ImageError(text, "bad_input")
         height, width, channels = pixels.shape
-        most = _max_pixels()
         if height * width > most:
             text = f"the image has {height * width} pixels, more than limits.image.max_pixels ({most}); make it smaller"
             raise ImageError(text, "bad_input")
@@ -439,4 +447,6 @@ def print_of(image: Print | str | os.PathLike[str] | ArrayLike, chosen: Settings
         return image
     if isinstance(image, (str, os.PathLike)):
         return _logged(Print._of(_rust.read_print(os.fspath(image), chosen._native)))
-    return Print(image)
+    found = Print.__new__(Print)
+    found._fill(image, int(chosen["limits.image.max_pixels"]))
+    return found

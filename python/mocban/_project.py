@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import os
+import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     import numpy as np
     import pyarrow as _pyarrow
     from numpy.typing import NDArray
+
+_LOG = logging.getLogger("mocban")
 
 
 class Pair(Frozen):
@@ -88,15 +92,16 @@ class Pair(Frozen):
         """Return the depth map: heights over the fitted surface; NaN without data."""
         return self.alignment.depth()
 
-    def mask(self, metric: str = "relief") -> NDArray[np.bool_]:
-        """Return the strokes of a metric in the frame of the print."""
+    def mask(self, metric: str | None = None) -> NDArray[np.bool_]:
+        """Return the strokes of a metric in the frame of the print; of the one that is shown first by default."""
         results = self.alignment.results
-        if metric not in results:
+        metric = metric or self.alignment._first
+        if metric is None or metric not in results:
             raise InputError(f"there is no metric {metric!r}, only {', '.join(results)}", "usage")
         return results[metric].aligned_mask()
 
-    def overlay(self, metric: str = "relief") -> NDArray[np.uint8]:
-        """Return the print with the edges of the strokes."""
+    def overlay(self, metric: str | None = None) -> NDArray[np.uint8]:
+        """Return the print with the edges of the strokes of a metric; of the one that is shown first by default."""
         return self.alignment.overlay(metric)
 
     def history(self) -> list[dict[str, Any]]:
@@ -125,6 +130,8 @@ class Project:
     def __init__(self, folder: str | os.PathLike[str], catalog: str | None, readonly: bool) -> None:
         self._folder, self._catalog, self._readonly = Path(folder), catalog, readonly
         self._native = _rust.NativeProject(os.fspath(folder), catalog)
+        # A folder that is removed with this object.
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
 
     @classmethod
     def create(cls, folder: str | os.PathLike[str], catalog: str | None = None) -> Project:
@@ -226,8 +233,6 @@ class Project:
         metrics: list[str] = list(METRICS) if metric is None else [metric]
         if self.settings["pipeline"]["method"] == "paper":
             metrics = [name for name in metrics if name != "relief"] or ["ensemble"]
-        import tempfile
-
         with tempfile.TemporaryDirectory(prefix="mocban-") as folder:
             table = Path(folder) / "table"
             self._native.export(os.fspath(table), ["parquet"], metrics, "all", False)
@@ -349,7 +354,7 @@ class Project:
             project.import_pairs(os.fspath(file), rows_json, allow_missing, allow_changed_files, replace)
         )
         for warning in outcome.pop("warnings"):
-            _warn(warning)
+            _LOG.warning("%s", warning)
         return outcome
 
     def import_block(
@@ -422,7 +427,7 @@ class Project:
             If ``progress`` returned False.
         """
         if workers is not None and workers < 1:
-            raise ValueError(f"workers is {workers}; give a number of at least 1")
+            raise InputError(f"workers is {workers}; give a number of at least 1", "usage")
         names = [] if ids is None else [ids] if isinstance(ids, str) else list(ids)
         if ids is not None and not names:
             raise Error("ids is empty; leave it out to run all pairs", "nothing_selected")
@@ -467,12 +472,6 @@ class Project:
         if not chosen:
             raise InputError("formats is empty; give one such as 'csv'", "usage")
         return json.loads(self._native.export(os.fspath(dir), chosen, list(metrics or ()), only, False))
-
-
-def _warn(text: str) -> None:
-    import logging
-
-    logging.getLogger("mocban").warning("%s", text)
 
 
 def _records(rows: Any) -> Iterable[Mapping[str, Any]]:

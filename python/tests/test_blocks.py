@@ -66,6 +66,12 @@ def test_arrays_give_the_result_of_their_files(aligned: mocban.BlockAlignment, b
     assert not folder.exists()
 
 
+def test_a_character_keeps_the_temporary_project(block: Path) -> None:
+    labels = block / "labels.json"
+    first = mocban.align_block(block / "block.ply", block / "page.jpg", labels=labels).characters[0]
+    assert first.alignment.status == "aligned"
+
+
 def test_wrong_files_are_named(block: Path, demo: Path, tmp_path: Path) -> None:
     with pytest.raises(mocban.ProjectError, match="no.ply"):
         mocban.align_block(tmp_path / "no.ply", block / "page.jpg")

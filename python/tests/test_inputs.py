@@ -207,6 +207,9 @@ def test_inputs_that_are_no_arrays_have_a_sentence() -> None:
     for sentence, image in wrong:
         with pytest.raises(mocban.ImageError, match=sentence):
             mocban.Print(image)  # type: ignore[arg-type]
+    few = mocban.settings(limits__image__max_pixels=100)
+    with pytest.raises(mocban.ImageError, match=r"limits.image.max_pixels \(100\)"):
+        mocban.align(mocban.Mesh(CORNERS, FACES), np.zeros((20, 20), dtype=np.uint8), settings=few)
     assert mocban.Print([[0, 255]] * 2) == mocban.Print(np.array([[0, 255]] * 2, dtype=np.uint8))
     mesh = mocban.Mesh(CORNERS, FACES)
     with pytest.raises(mocban.MeshError, match="give its arrays"):

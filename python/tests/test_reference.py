@@ -15,7 +15,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "python.md"
 def call_of(value: Callable[..., object]) -> str:
     """Return the parameters with their defaults."""
     signature = inspect.signature(value)
-    bare = [p.replace(annotation=inspect.Parameter.empty) for p in signature.parameters.values() if p.name != "self"]
+    bare = [p.replace(annotation=inspect.Parameter.empty) for p in signature.parameters.values() if p.name not in ("self", "cls")]
     return str(signature.replace(parameters=bare, return_annotation=inspect.Signature.empty))
 
 

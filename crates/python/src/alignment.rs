@@ -64,7 +64,8 @@ impl NativeAlignment {
     /// Restores an alignment from its state.
     #[new]
     fn restored(py: Python<'_>, numbers: &str, images: &[u8]) -> PyResult<Self> {
-        let (pair, print) = state::restore(numbers, images).ok_or_else(|| {
+        let restored = py.detach(|| state::restore(numbers, images));
+        let (pair, print) = restored.ok_or_else(|| {
             raise(
                 py,
                 "Error",
@@ -81,7 +82,7 @@ impl NativeAlignment {
 
     /// Returns the numbers and the images.
     fn state<'py>(&self, py: Python<'py>) -> (String, Bound<'py, PyBytes>) {
-        let (numbers, images) = state::save(&self.pair, &self.print);
+        let (numbers, images) = py.detach(|| state::save(&self.pair, &self.print));
         (numbers, PyBytes::new(py, &images))
     }
 
@@ -128,7 +129,7 @@ impl NativeAlignment {
     /// Returns the stroke mask of a metric in the frame of the depth map.
     fn mask<'py>(&self, py: Python<'py>, metric: &str) -> PyResult<PyMask<'py>> {
         let (_, outcome) = self.outcome(py, metric)?;
-        let mask = self.pair.depth.stroke_mask(outcome.threshold_level);
+        let mask = py.detach(|| self.pair.depth.stroke_mask(outcome.threshold_level));
         Ok(PyArray1::from_slice(py, mask.data()))
     }
 

@@ -36,6 +36,17 @@ pub(crate) fn forward(py: Python<'_>) -> PyResult<()> {
     if messages.is_empty() {
         return Ok(());
     }
+    write(py, messages)
+}
+
+/// Level of a warning in Python's `logging`.
+pub(crate) const WARNING: u32 = 30;
+
+/// Passes messages with their levels to the logger `mocban`.
+pub(crate) fn write(
+    py: Python<'_>,
+    messages: impl IntoIterator<Item = (u32, String)>,
+) -> PyResult<()> {
     let logger = py
         .import("logging")?
         .call_method1("getLogger", ("mocban",))?;

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::alignment::NativeAlignment;
 use crate::compute::{EventSender, compute_with_events};
 use crate::failure::{project_failure, raise};
-use crate::{stored_block, stored_pair};
+use crate::{log, stored_block, stored_pair};
 use mocban_catalog::{NewVerdict, ReviewContext};
 use mocban_core::domain::ContentHash;
 use mocban_export::{ExportFormat, ExportOptions};
@@ -52,14 +52,6 @@ impl Listener for Hearing {
     }
 }
 
-fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
-    let logger = py
-        .import("logging")?
-        .call_method1("getLogger", ("mocban",))?;
-    logger.call_method1("warning", ("%s", text))?;
-    Ok(())
-}
-
 /// Parses a name, such as that of a metric.
 fn parsed<T: std::str::FromStr>(name: &str) -> ProjectResult<T>
 where
@@ -87,7 +79,7 @@ impl NativeProject {
         };
         let hear = |heard| match heard {
             Heard::Run(event) => on_event(&event),
-            Heard::Warning(text) => warn(py, &text),
+            Heard::Warning(text) => log::write(py, [(log::WARNING, text)]),
         };
         let result = compute_with_events(py, body, hear, || {
             stop.escalate();

@@ -75,7 +75,8 @@ fn assembled(
         .into_iter()
         .collect();
     register.ink = 0;
-    let maps = register.metrics.iter().filter_map(|metric| {
+    // All metrics have maps, or none. A map belongs to the metric at its place.
+    let maps = register.metrics.iter().map_while(|metric| {
         let role = stroke_map(metric.metric);
         artifacts.artifact(Stage::Register, &role).ok()?;
         Some(artifacts.grey(Stage::Register, &role))
