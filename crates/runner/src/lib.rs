@@ -9,7 +9,7 @@
 //! Every call fails if the catalog, an input or an artifact cannot be read or written. `# Errors` names other reasons.
 //!
 //! **Invariant:** a kill at any moment costs at most the stages in progress, and a worker whose lease was lost stores no
-//! row. Files that it wrote before stay; without a row, `check` may remove them.
+//! row. Files that it wrote before stay, until `check --repair` or `check --collect` removes those without a row.
 //!
 //! # A lost lease
 //!
