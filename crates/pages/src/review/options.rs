@@ -1,7 +1,6 @@
-//! Options of the review page: the reviewer, the order of the queue, the attention checks, and the server's address.
+//! Options of the review page: the reviewer, the order of the queue, and the attention checks.
 
 use std::collections::BTreeMap;
-use std::net::SocketAddr;
 use std::path::Path;
 
 use super::check_items::CheckRates;
@@ -59,7 +58,7 @@ impl QueueOptions {
     }
 }
 
-/// Options of the server.
+/// Options of the pages.
 #[derive(Debug, Clone)]
 pub struct ReviewOptions {
     /// Whose queue is served, and what it contains.
@@ -74,9 +73,6 @@ pub struct ReviewOptions {
     pub min_view_ms: u64,
     /// Whether the page opens the guide when a reviewer starts for the first time.
     pub opens_guide: bool,
-    /// Address to listen on. Port 0 selects a fixed port for the project and reviewer. If the fixed port is taken, any
-    /// free port is used.
-    pub listen: SocketAddr,
     /// Limits on the input files.
     pub limits: InputLimits,
     /// Returns the sentence that explains an error of the catalog of the project in a folder.
