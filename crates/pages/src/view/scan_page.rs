@@ -43,7 +43,8 @@ async fn index(State(shown): State<Arc<ShownScan>>) -> Html<String> {
     Html(page::view(&shown.pair, shown.language))
 }
 
-async fn asset(Path(name): Path<String>) -> Response {
+/// Responds with a script or style of the page.
+pub(crate) async fn asset(Path(name): Path<String>) -> Response {
     let own = (name == "view.js").then_some(("text/javascript; charset=utf-8", SCRIPT));
     match own.or_else(|| assets::find(&name)) {
         Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
