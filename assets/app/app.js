@@ -112,4 +112,14 @@ if (live) {
   setTimeout(next, interval);
 }
 
+/** Loads the parts of a page that take long. */
+for (const part of document.querySelectorAll("[data-load]")) {
+  const response = await fetch(part.dataset.load).catch(() => null);
+  const text = await response?.text();
+  const page = new DOMParser().parseFromString(text ?? "", "text/html");
+  const shown = response?.ok ? page.body : page.querySelector("main") ?? page.body;
+  part.replaceChildren(...shown.childNodes);
+  part.dataset.loaded = "true";
+}
+
 document.body.dataset.ready = "true";

@@ -15,7 +15,7 @@ use mocban_core::domain::{
 };
 
 /// Maximum number of pairs that are looked at for one page.
-const MAX_SCANNED: usize = 10_000;
+const MAX_SCANNED: usize = 4000;
 /// How many attempts are searched for the latest results.
 const RECENT_ATTEMPTS: usize = 2000;
 

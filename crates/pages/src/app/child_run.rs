@@ -1,5 +1,6 @@
 //! Runs as processes of their own, which go on when the app ends, and their stop.
 
+use std::ffi::OsStr;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
@@ -57,6 +58,28 @@ pub(super) async fn start(program: &Path, dir: &Path, args: &[String]) -> AppRes
         .and_then(|_| messages.take(MESSAGE_BYTES).read_to_string(&mut text));
     read.map_err(failed)?;
     Err(AppFailure::refused(last_error(&text)))
+}
+
+/// Runs a command to its end.
+///
+/// # Errors
+/// Returns its last message if it ended with an error.
+pub(super) async fn finish(program: &Path, args: &[&OsStr]) -> AppResult<()> {
+    let mut command = Command::new(program);
+    command
+        .args(["--color", "never", "--progress", "none"])
+        .args(args);
+    command.stdin(Stdio::null());
+    let ended = tokio::task::spawn_blocking(move || command.output()).await;
+    let failed = |error: String| AppFailure::refused(format!("the command cannot start: {error}"));
+    let output = ended.map_err(|error| failed(error.to_string()))?;
+    let output = output.map_err(|error| failed(error.to_string()))?;
+    if is_success(output.status) {
+        return Ok(());
+    }
+    Err(AppFailure::refused(last_error(&String::from_utf8_lossy(
+        &output.stderr,
+    ))))
 }
 
 /// Returns whether a run did its work, also if pairs failed.

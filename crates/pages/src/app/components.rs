@@ -3,6 +3,7 @@
 use axum::response::Html;
 use maud::{Markup, html};
 
+use super::address::encoded;
 use super::visit::Visit;
 use crate::local_server::document;
 use crate::review::Language;
@@ -19,13 +20,27 @@ pub(super) enum NavSection {
     Pairs,
     /// Reviews.
     Review,
+    /// The report.
+    Report,
+    /// Exports.
+    Export,
+    /// Import of pairs.
+    Import,
+    /// Settings.
+    Settings,
+    /// Check and backup.
+    Health,
 }
 
 /// Address, and name in English and Vietnamese, of the pages in the navigation.
-const SECTIONS: [(NavSection, &str, [&str; 2]); 3] = [
+const SECTIONS: [(NavSection, &str, [&str; 2]); 7] = [
     (NavSection::Run, "", ["Run", "Căn chỉnh"]),
     (NavSection::Pairs, "pairs", ["Pairs", "Các cặp"]),
     (NavSection::Review, "review", ["Review", "Đánh giá"]),
+    (NavSection::Report, "report", ["Report", "Báo cáo"]),
+    (NavSection::Export, "export", ["Export", "Xuất dữ liệu"]),
+    (NavSection::Settings, "settings", ["Settings", "Cài đặt"]),
+    (NavSection::Health, "health", ["Health", "Tình trạng"]),
 ];
 
 /// Returns a whole page. `project` is the name of the project that it belongs to.
@@ -58,6 +73,9 @@ pub(super) fn frame(
                                 (visit.t(names[0], names[1]))
                             }
                         }
+                        a href={ (root) "import?project=" (encoded(project)) } aria-current=[(section == NavSection::Import).then_some("page")] {
+                            (visit.t("Import", "Nhập dữ liệu"))
+                        }
                     }
                 }
                 span.spacer {}
@@ -82,7 +100,7 @@ pub(super) fn frame(
 /// Returns a form that posts its fields as JSON to an action and shows what the action replies.
 pub(super) fn action_form(action: &str, class: &str, content: &Markup) -> Markup {
     html! {
-        form.action class=(class) data-post=(action) {
+        form class={ "action " (class) } data-post=(action) {
             (content)
             p.problem role="alert" hidden {}
         }
@@ -101,8 +119,8 @@ pub(super) fn figure(number: u64, name: &str, href: Option<&str>, tone: &str) ->
     let content = html! { b { (grouped(number)) } span { (name) } };
     html! {
         @match href {
-            Some(href) if number > 0 => a.figure class=(tone) href=(href) { (content) },
-            _ => span.figure class=(tone) { (content) },
+            Some(href) if number > 0 => a class={ "figure " (tone) } href=(href) { (content) },
+            _ => span class={ "figure " (tone) } { (content) },
         }
     }
 }

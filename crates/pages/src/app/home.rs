@@ -6,7 +6,7 @@ use axum::extract::State;
 use axum::response::Html;
 use maud::{Markup, html};
 
-use super::components::{NavSection, empty, frame, grouped};
+use super::components::{NavSection, action_form, empty, frame, grouped};
 use super::failure::AppResult;
 use super::projects::find;
 use super::state::AppState;
@@ -45,9 +45,16 @@ pub(super) async fn page(
             @if let Some(free) = free { " · " (free_space(&visit, free)) }
         }
         @if projects.is_empty() {
-            (empty(visit.t("There is no project in this folder yet.", "Chưa có dự án nào trong thư mục này."), &html! {}))
+            (empty(visit.t("There is no project in this folder yet.", "Chưa có dự án nào trong thư mục này."), &html! {
+                p { a.button.primary href="import" { (visit.t("Import scans and prints", "Nhập bản quét và bản in")) } }
+                (demo_form(&visit))
+            }))
         } @else {
             div.cards { @for project in &projects { (card(&visit, project)) } }
+            div.row {
+                a.button href="import" { (visit.t("Import into a new project", "Nhập vào dự án mới")) }
+                @if projects.iter().all(|project| project.key != "mocban-demo") { (demo_form(&visit)) }
+            }
         }
     };
     let title = visit.t("Projects", "Các dự án");
@@ -88,6 +95,16 @@ pub(super) fn free_space(visit: &Visit, bytes: u64) -> String {
         crate::review::Language::English => format!("{gigabytes:.1} GB free on this disk"),
         crate::review::Language::Vietnamese => format!("đĩa còn trống {gigabytes:.1} GB"),
     }
+}
+
+fn demo_form(visit: &Visit) -> Markup {
+    action_form(
+        "actions/demo",
+        "inline",
+        &html! {
+            button #demo { (visit.t("Try it with 24 generated pairs", "Thử với 24 cặp được tạo sẵn")) }
+        },
+    )
 }
 
 fn card(visit: &Visit, project: &Overview) -> Markup {

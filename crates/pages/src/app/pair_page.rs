@@ -35,6 +35,9 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
+    if pair.parse::<PairName>().is_err() {
+        return Err(super::failure::AppFailure::not_found());
+    }
     let found = details::read(&pair, &open.catalog, &open.location()).await?;
     let Details::Pair(overview) = found else {
         return Err(super::failure::AppFailure::not_found());
@@ -104,7 +107,7 @@ fn state_line(visit: &Visit, overview: &PairOverview) -> Markup {
     let results = &overview.detail.results;
     html! {
         p {
-            span.state class=(results.status.name()) { (visit.status(results.status)) }
+            span.state.(results.status.name()) { (visit.status(results.status)) }
             @if let Some(block) = &results.attributes.block { " · " (visit.t("block", "ván")) " " (one_line(block)) }
             @if results.status == JobStatus::Done && overview.next_run.is_some() {
                 " · " span.warn { (visit.t("settings or files have changed; the next run computes it again", "cài đặt hoặc tệp đã đổi; lần chạy sau sẽ tính lại")) }
@@ -232,7 +235,7 @@ fn numbers(visit: &Visit, record: &MetricRecord) -> Markup {
             }
             @for given in &record.verdicts {
                 p {
-                    span.verdict class=(given.verdict.name()) { (visit.verdict(given.verdict)) }
+                    span.verdict.(given.verdict.name()) { (visit.verdict(given.verdict)) }
                     " " (one_line(&given.reviewer))
                     @if let Some(reason) = given.reason { ": " (visit.reason(reason)) }
                 }

@@ -31,17 +31,21 @@ impl PairQuery {
         let state = query.get("state");
         let statuses = STATES.iter().find(|(name, _)| Some(*name) == state);
         let verdict = query.get("verdict");
+        let class = query.parsed("class");
+        // Pairs without a result have no score by which they could be sorted.
+        let has_results = class.is_none() && statuses.is_none_or(|(name, _)| *name == "aligned");
+        let order = query.parsed("sort").filter(|_| has_results);
         Self {
             filter: PairFilter {
                 statuses: statuses.map_or_else(Vec::new, |(_, statuses)| statuses.to_vec()),
-                class: query.parsed("class"),
+                class,
                 verdict: verdict.and_then(|name| name.parse::<Verdict>().ok()),
                 is_unjudged: verdict == Some("none"),
                 is_low_confidence: query.get("confidence") == Some("low"),
                 block: query.get("block").map(str::to_owned),
                 character: query.get("character").map(str::to_owned),
             },
-            order: query.parsed("sort").unwrap_or_default(),
+            order: order.unwrap_or_default(),
             metric: query.parsed("metric").unwrap_or(ThresholdMetric::DEFAULT),
             is_table: query.get("view") == Some("table"),
             after: query.get("after").and_then(cursor),
@@ -78,19 +82,21 @@ mod tests {
         let of = |text| PairQuery::of(&PageQuery::parse(text));
         let after = PairCursor { key: -0.1, id: 7 };
         let text = format!(
-            "state=waiting&class=io&verdict=none&sort=iou-down&metric=relief&view=table&after={}",
+            "verdict=none&sort=iou-down&metric=relief&view=table&after={}",
             cursor_text(after)
         );
         let query = of(&text);
         assert_eq!(query.after, Some(after));
         assert_eq!(query.order, PairOrder::HighestIou);
         assert_eq!(query.metric, ThresholdMetric::Relief);
-        assert_eq!(query.filter.class, Some(FailureClass::Io));
+        assert!(query.filter.is_unjudged && query.is_table);
+        let failed = of("class=io&state=waiting&sort=iou");
+        assert_eq!(failed.filter.class, Some(FailureClass::Io));
         assert_eq!(
-            query.filter.statuses,
+            failed.filter.statuses,
             [JobStatus::Ready, JobStatus::Backoff]
         );
-        assert!(query.filter.is_unjudged && query.is_table);
+        assert_eq!(failed.order, PairOrder::Imported, "no scores to sort by");
         let plain = of("");
         for bad in [
             "state=x",

@@ -18,6 +18,8 @@ use mocban_core::domain::{
     FailureClass, JobStatus, MetricOutcome, PairName, ThresholdMetric, Verdict, one_line,
 };
 
+/// Columns of the table that hold scores.
+const NUMBER_COLUMNS: std::ops::Range<usize> = 4..8;
 /// Most blocks that the filter suggests.
 const SUGGESTED_BLOCKS: usize = 200;
 /// Most ids that are suggested for one that does not exist.
@@ -188,10 +190,10 @@ pub(super) fn pair_card(
             img src={ (path) "picture/thumb-" (metric) } alt="" loading="lazy" width="180" height="180";
             span.name { (one_line(name)) @if let Some(character) = &pair.attributes.character { " " span.character { (one_line(character)) } } }
             @match outcome {
-                Some(outcome) => span.muted class=[is_low.then_some("warn")] {
+                Some(outcome) => span.muted.warn[is_low] {
                     (visit.t("confidence", "độ tin cậy")) " " (score(outcome.confidence))
                 },
-                None => span.state class=(pair.status.name()) { (visit.status(pair.status)) },
+                None => span.state.(pair.status.name()) { (visit.status(pair.status)) },
             }
             (verdict_marks(visit, pair, metric))
         }
@@ -206,7 +208,7 @@ fn verdict_marks(visit: &Visit, pair: &PairResults, metric: ThresholdMetric) -> 
     html! {
         @if !verdicts.is_empty() {
             span.verdicts { @for given in verdicts {
-                span.verdict class=(given.verdict.name()) { (visit.verdict(given.verdict)) } " "
+                span.verdict.(given.verdict.name()) { (visit.verdict(given.verdict)) } " "
             } }
         }
     }
@@ -217,11 +219,11 @@ fn table(visit: &Visit, query: &PairQuery, pairs: &[PairResults]) -> Markup {
         div.scroll tabindex="0" role="region" aria-label=(visit.t("Pairs", "Các cặp")) {
             table {
                 thead { tr {
-                    @for title in [
+                    @for (index, title) in [
                         visit.t("Id", "Mã"), visit.t("Character", "Chữ"), visit.t("Block", "Ván"), visit.t("State", "Trạng thái"),
                         visit.t("Confidence", "Độ tin cậy"), "IoU", "SSIM", "Dice", visit.t("Verdict", "Đánh giá"),
                         visit.t("Why failed", "Lý do lỗi"),
-                    ] { th scope="col" { (title) } }
+                    ].into_iter().enumerate() { th.number[NUMBER_COLUMNS.contains(&index)] scope="col" { (title) } }
                 } }
                 tbody { @for pair in pairs { (table_row(visit, query, pair)) } }
             }
@@ -239,7 +241,7 @@ fn table_row(visit: &Visit, query: &PairQuery, pair: &PairResults) -> Markup {
             th scope="row" { a href={ "pair/" (encoded(name)) "/" } { (one_line(name)) } }
             td { (pair.attributes.character.as_deref().map(one_line).unwrap_or_default()) }
             td { (pair.attributes.block.as_deref().map(one_line).unwrap_or_default()) }
-            td { span.state class=(pair.status.name()) { (visit.status(pair.status)) } }
+            td { span.state.(pair.status.name()) { (visit.status(pair.status)) } }
             td.number { (score(outcome.and_then(|outcome| outcome.confidence))) }
             td.number { (score(scores.map(|scores| scores.iou))) }
             td.number { (score(scores.map(|scores| scores.ssim))) }

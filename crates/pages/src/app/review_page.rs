@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use axum::Json;
 use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, Request, State};
+use axum::http::Extensions;
 use axum::response::{Html, IntoResponse as _, Response};
+use axum::{Extension, Json};
 use hyper::service::Service as _;
 use hyper_util::service::TowerToHyperService;
 use maud::{Markup, html};
@@ -20,6 +21,7 @@ use super::on_thread::on_thread;
 use super::projects::OpenProject;
 use super::state::AppState;
 use super::visit::Visit;
+use crate::local_server::AccessControl;
 use crate::review::{CheckRates, Language, QueueOptions, ReviewOptions, ReviewPages, key_map};
 use mocban_catalog::reviewer_name;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict, one_line};
@@ -151,21 +153,26 @@ pub(super) async fn start(
 pub(super) async fn pages(
     State(state): State<Arc<AppState>>,
     Path(parts): Path<Vec<String>>,
-    mut request: Request,
+    Extension(access): Extension<Arc<AccessControl>>,
+    request: Request,
 ) -> AppResult<Response> {
     let [key, reviewer, choice, ..] = parts.as_slice() else {
         return Err(AppFailure::not_found());
     };
     let open = state.open(key).await?;
     let router = review(&state, &open, reviewer, choice).await?;
+    let (mut head, body) = request.into_parts();
     // The path below the review is everything after the fifth segment.
-    let uri = request.uri();
-    let rest = uri.path().splitn(7, '/').nth(6).unwrap_or_default();
-    let target = match uri.query() {
+    let rest = head.uri.path().splitn(7, '/').nth(6).unwrap_or_default();
+    let target = match head.uri.query() {
         Some(query) => format!("/{rest}?{query}"),
         None => format!("/{rest}"),
     };
-    *request.uri_mut() = target.parse().map_err(|_| AppFailure::not_found())?;
+    head.uri = target.parse().map_err(|_| AppFailure::not_found())?;
+    // The parameters of this address are not those of the page.
+    head.extensions = Extensions::new();
+    head.extensions.insert(access);
+    let request = Request::from_parts(head, body);
     let Ok(response) = TowerToHyperService::new(router).call(request).await;
     Ok(response.into_response())
 }

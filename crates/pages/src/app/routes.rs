@@ -7,7 +7,8 @@ use axum::{Router, middleware};
 
 use super::state::{AppOptions, AppState};
 use super::{
-    assets, failure, home, pair_page, pairs_page, pictures, review_page, run_actions, run_page,
+    assets, export_page, failure, health_page, home, import_page, pair_page, pairs_page, pictures,
+    report_page, review_page, run_actions, run_page, settings_page,
 };
 use crate::view::scan_asset;
 
@@ -27,6 +28,30 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route(&format!("{pair}/3d/scan"), get(pictures::scan))
         .route(&format!("{pair}/3d/assets/{{name}}"), get(scan_asset))
         .route("/p/{project}/review", get(review_page::page))
+        .route("/import", get(import_page::page))
+        .route("/actions/import", post(import_page::import))
+        .route("/actions/demo", post(run_actions::demo))
+        .route("/p/{project}/report", get(report_page::page))
+        .route("/p/{project}/report/numbers", get(report_page::numbers))
+        .route(
+            "/p/{project}/report/file/{file}",
+            get(report_page::download),
+        )
+        .route("/p/{project}/export", get(export_page::page))
+        .route("/p/{project}/actions/export", post(export_page::start))
+        .route(
+            "/p/{project}/exports/{name}/{file}",
+            get(export_page::download),
+        )
+        .route("/p/{project}/settings", get(settings_page::page))
+        .route("/p/{project}/actions/setting", post(settings_page::store))
+        .route("/p/{project}/health", get(health_page::page))
+        .route("/p/{project}/actions/check", post(health_page::start_check))
+        .route(
+            "/p/{project}/actions/backup",
+            post(health_page::start_backup),
+        )
+        .route("/p/{project}/backup.sqlite", get(health_page::download))
         .route("/p/{project}/actions/run", post(run_actions::run))
         .route("/p/{project}/actions/stop", post(run_actions::stop))
         .route("/p/{project}/actions/retry", post(run_actions::retry))

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::child_run;
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
-use super::projects::OpenProject;
+use super::projects::{OpenProject, find};
 use super::state::AppState;
 use mocban_core::domain::FailureClass;
 use mocban_project::location::now;
@@ -19,6 +19,8 @@ use mocban_project::retire::retire as retire_pairs;
 use mocban_project::retry::{RetryRequest, retry as retry_pairs};
 use mocban_runner::is_running;
 
+/// Name of the project that is made of the built-in dataset.
+const DEMO: &str = "mocban-demo";
 /// Largest number of pairs at the same time.
 const MAX_JOBS: u16 = 1024;
 
@@ -79,6 +81,21 @@ pub(super) async fn run(
     }
     child_run::start(&state.options.program, &open.dir, &args).await?;
     Ok(reload())
+}
+
+/// Makes a project of the built-in dataset, which waits for its run.
+pub(super) async fn demo(State(state): State<Arc<AppState>>) -> AppResult<Json<Value>> {
+    let folder = &state.options.folder;
+    if find(folder).iter().any(|found| found.dir == *folder) {
+        return Err(AppFailure::refused("this folder is a project itself"));
+    }
+    let dir = folder.join(DEMO);
+    child_run::finish(
+        &state.options.program,
+        &["demo".as_ref(), dir.as_os_str(), "--no-run".as_ref()],
+    )
+    .await?;
+    Ok(Json(json!({ "go": format!("p/{DEMO}/") })))
 }
 
 /// Stops the run on this computer.

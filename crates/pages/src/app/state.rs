@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use axum::Router;
 
 use super::projects::OpenProject;
+use super::tasks::AppTasks;
 use crate::local_server::WorkThread;
 use crate::review::Language;
 
@@ -31,6 +32,8 @@ pub(super) struct AppState {
     projects: tokio::sync::Mutex<BTreeMap<String, Arc<OpenProject>>>,
     /// The reviews that are open, by project, reviewer and what they show.
     pub(super) reviews: tokio::sync::Mutex<BTreeMap<[String; 3], Router>>,
+    /// Exports, checks and backups.
+    pub(super) tasks: AppTasks,
     /// Draws pictures.
     pub(super) work: WorkThread,
 }
@@ -42,6 +45,7 @@ impl AppState {
             options,
             projects: tokio::sync::Mutex::default(),
             reviews: tokio::sync::Mutex::default(),
+            tasks: AppTasks::default(),
             work: WorkThread::default(),
         }
     }
