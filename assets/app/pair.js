@@ -19,7 +19,7 @@ function layerNamed(name) {
 function stopBlinking() {
   clearInterval(timer);
   timer = 0;
-  blink.setAttribute("aria-pressed", "false");
+  blink?.setAttribute("aria-pressed", "false");
 }
 
 function toggleBlinking() {
@@ -43,11 +43,11 @@ for (const button of layers) {
     show(button);
   });
 }
-blink.addEventListener("click", toggleBlinking);
+blink?.addEventListener("click", toggleBlinking);
 
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("input, select, textarea")) return;
-  if (event.code === "KeyB") toggleBlinking();
+  if (event.code === "KeyB" && blink) toggleBlinking();
   const rel = { ArrowLeft: "prev", ArrowRight: "next" }[event.code];
   const link = rel && document.querySelector(`a[rel="${rel}"]`);
   if (link && !event.shiftKey) location.assign(link.href);

@@ -129,6 +129,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
             .command("")
             .trim_end()
             .to_owned(),
+        project_page: None,
         language,
         keys,
         min_view_ms: args.min_view_ms,

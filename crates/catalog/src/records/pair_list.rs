@@ -101,7 +101,8 @@ struct ListedRow {
 
 from_row! { ListedRow { id, confidence, iou, passes } }
 
-/// Selects pairs from a source with columns `id`, of which `?4` rows are read, and says whether they pass the filter.
+/// Selects pairs from a source with a column `id`, of which `?4` rows are read, and says whether they pass the filter.
+/// Retired pairs, which have no job, never do.
 /// Sources use `?2` and `?3`, the key and the row id of the last pair of the page before; `?5` is the metric.
 macro_rules! listed {
     ($source:literal) => {
@@ -114,12 +115,12 @@ macro_rules! listed {
         AND (?11 = 0 OR NOT EXISTS (SELECT 1 ",
             from_current_verdicts!(),
             " AND v.pair = c.id))
-        AND (?12 = 0 OR j.status = 3 AND j.low_confidence = 1) THEN 1 ELSE 0 END AS passes
+        AND (?12 = 0 OR j.status = 3 AND j.low_confidence = 1) AND (?13 = 0 OR j.status = 3) THEN 1 ELSE 0 END AS passes
 FROM (",
             $source,
-            " LIMIT ?4) AS c CROSS JOIN job AS j ON j.pair = c.id CROSS JOIN pair AS p ON p.id = c.id
+            " LIMIT ?4) AS c CROSS JOIN pair AS p ON p.id = c.id LEFT JOIN job AS j ON j.pair = c.id
     LEFT JOIN failure AS f ON f.pair = c.id AND j.status = 4
-    LEFT JOIN metric_result AS m ON m.pair = c.id AND m.metric = ?5 AND j.status = 3"
+    LEFT JOIN metric_result AS m ON m.pair = c.id AND m.metric = ?5"
         )
     };
 }
@@ -271,7 +272,9 @@ impl ListReader<'_> {
             .bind(filter.class.map(FailureClass::name))
             .bind(verdict)
             .bind(i64::from(filter.is_unjudged))
-            .bind(i64::from(filter.is_low_confidence));
+            .bind(i64::from(filter.is_low_confidence))
+            // The scores of a pair that runs again are those of its last result.
+            .bind(i64::from(self.order != PairOrder::Imported));
         query.fetch_all(conn).await
     }
 

@@ -94,7 +94,7 @@ impl Catalog {
         }))
     }
 
-    /// Returns the pairs with these row ids, in this order. Leaves out those that are retired.
+    /// Returns the pairs with these row ids, in this order, without retired pairs.
     pub(crate) async fn results_of(
         &self,
         conn: &mut Conn,

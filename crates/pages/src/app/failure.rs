@@ -1,19 +1,10 @@
-//! Why a page or an action fails, and the page that says so.
+//! Why a page or an action fails.
 
 use std::path::Path;
-use std::sync::Arc;
 
-use axum::Json;
-use axum::extract::{FromRequestParts as _, Request, State};
-use axum::http::{Method, StatusCode};
-use axum::middleware::Next;
+use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use maud::html;
-use serde_json::json;
 
-use super::components::{NavSection, frame};
-use super::state::AppState;
-use super::visit::Visit;
 use crate::local_server::WorkFailed;
 use mocban_catalog::CatalogError;
 use mocban_core::domain::ErrorCode;
@@ -64,7 +55,12 @@ impl AppFailure {
 }
 
 impl AppFailure {
-    /// Returns what failed.
+    /// Returns the status of the response.
+    pub(super) const fn status(&self) -> StatusCode {
+        self.status
+    }
+
+    /// Returns what failed. Empty if there is no such page.
     pub(super) fn text(self) -> String {
         self.text
     }
@@ -97,41 +93,4 @@ impl IntoResponse for AppFailure {
         response.extensions_mut().insert(self);
         response
     }
-}
-
-/// Makes a page of a failure, or JSON if the request was an action.
-pub(super) async fn explain(
-    State(state): State<Arc<AppState>>,
-    request: Request,
-    next: Next,
-) -> Response {
-    let is_page = request.method() == Method::GET;
-    let (mut head, body) = request.into_parts();
-    let visit = Visit::from_request_parts(&mut head, &state).await;
-    let response = next.run(Request::from_parts(head, body)).await;
-    let Some(failure) = response.extensions().get::<AppFailure>().cloned() else {
-        return response;
-    };
-    if !is_page {
-        let error = json!({ "error": failure.text });
-        return (failure.status, Json(error)).into_response();
-    }
-    let Ok(visit) = visit;
-    let text = if failure.text.is_empty() {
-        visit
-            .t("There is no such page.", "Không có trang này.")
-            .to_owned()
-    } else {
-        failure.text
-    };
-    let title = visit.t("This did not work", "Không thực hiện được");
-    let body = html! {
-        p.notice.bad role="alert" { (text) }
-        p {
-            a.button href=(visit.here) { (visit.t("Try again", "Thử lại")) } " "
-            a.button href=(visit.root) { (visit.t("All projects", "Tất cả dự án")) }
-        }
-    };
-    let page = frame(&visit, title, None, NavSection::None, &body);
-    (failure.status, page).into_response()
 }

@@ -7,7 +7,7 @@ use axum::response::Html;
 use maud::{Markup, html};
 
 use super::components::{NavSection, action_form, empty, frame, grouped};
-use super::failure::AppResult;
+use super::failure::{AppFailure, AppResult};
 use super::projects::find;
 use super::state::AppState;
 use super::visit::Visit;
@@ -62,8 +62,10 @@ pub(super) async fn page(
 }
 
 async fn read(state: &AppState, key: String) -> Overview {
+    let mut last_change = None;
     let counts = async {
-        let open = state.open(&key).await.map_err(|failure| failure.text())?;
+        let open = state.open(&key).await.map_err(AppFailure::text)?;
+        last_change = open.catalog.last_activity().await.ok().flatten();
         let read = async {
             let settings = open.location().settings()?;
             let running = is_running(&open.project, &open.catalog, now()).await?;
@@ -74,13 +76,6 @@ async fn read(state: &AppState, key: String) -> Overview {
         read.await.map_err(|error| error.text(&open.dir))
     };
     let counts = counts.await;
-    let projects = state.projects().await;
-    let open = projects.get(&key).cloned();
-    drop(projects);
-    let last_change = match open {
-        Some(open) => open.catalog.last_activity().await.ok().flatten(),
-        None => None,
-    };
     Overview {
         state: counts,
         key,

@@ -10,6 +10,7 @@ mod child_run;
 mod components;
 mod export_page;
 mod failure;
+mod failure_page;
 mod folder_picker;
 mod health_page;
 mod home;
@@ -27,7 +28,9 @@ mod run_actions;
 mod run_page;
 mod settings_page;
 mod state;
+mod task_part;
 mod tasks;
+mod thumb_cache;
 mod visit;
 mod words;
 

@@ -55,10 +55,10 @@ pub(super) async fn page(
         (state_line(&visit, &overview))
         @if let Some(record) = record {
             (metric_links(&visit, &overview.detail, record.outcome.metric))
-            (pictures(&visit, record.outcome.metric))
+            (pictures(&visit, record.outcome.metric, true))
             (numbers(&visit, record))
         } @else {
-            (pictures(&visit, chosen))
+            (pictures(&visit, chosen, false))
         }
         (files(&visit, &overview.detail))
         (history(&visit, &overview.detail))
@@ -136,24 +136,46 @@ fn metric_links(visit: &Visit, detail: &PairDetail, shown: ThresholdMetric) -> M
     }
 }
 
-fn pictures(visit: &Visit, metric: ThresholdMetric) -> Markup {
+/// Returns the pictures. A pair without a result has only its print.
+fn pictures(visit: &Visit, metric: ThresholdMetric, has_result: bool) -> Markup {
+    let (shown, alt) = if has_result {
+        let alt = visit.t(
+            "Print with the outline of the aligned relief",
+            "Bản in và đường viền của mặt nổi đã căn chỉnh",
+        );
+        ("overlay", alt)
+    } else {
+        ("print", visit.t("Print", "Bản in"))
+    };
+    let layers = &LAYERS[..if has_result { LAYERS.len() } else { 1 }];
     html! {
         section.viewer #viewer aria-label=(visit.t("Pictures", "Hình ảnh")) {
-            div.stage {
-                img #stage src={ "picture/overlay-" (metric) } alt=(visit.t("Print with the outline of the aligned relief", "Bản in và đường viền của mặt nổi đã căn chỉnh")) width="640" height="640";
-            }
+            div.stage { img #stage src={ "picture/" (shown) "-" (metric) } alt=(alt) width="640" height="640"; }
             div.controls {
-                button #blink type="button" aria-pressed="false" { (visit.t("Blink print and relief", "Nháy bản in và mặt nổi")) " " kbd { "B" } }
-                a.button href="3d/" { (visit.t("3D view", "Xem 3D")) }
-                @for (layer, names) in LAYERS {
-                    figure {
-                        button.layer type="button" data-layer=(layer) data-src={ "picture/" (layer) "-" (metric) }
-                            aria-pressed=(if layer == "overlay" { "true" } else { "false" }) {
-                            img src={ "picture/" (layer) "-" (metric) } alt="" loading="lazy" width="150" height="150";
-                            span { (visit.t(names[0], names[1])) }
-                        }
-                    }
+                @if has_result {
+                    button #blink type="button" aria-pressed="false" { (visit.t("Blink print and relief", "Nháy bản in và mặt nổi")) " " kbd { "B" } }
+                    a.button href="3d/" { (visit.t("3D view", "Xem 3D")) }
                 }
+                @for (layer, names) in layers { (layer_button(visit, layer, names, metric, *layer == shown)) }
+            }
+        }
+    }
+}
+
+/// Returns a small picture that is shown large when it is pressed.
+fn layer_button(
+    visit: &Visit,
+    layer: &str,
+    names: &[&str; 2],
+    metric: ThresholdMetric,
+    is_shown: bool,
+) -> Markup {
+    let picture = format!("picture/{layer}-{metric}");
+    html! {
+        figure {
+            button.layer type="button" data-layer=(layer) data-src=(picture) aria-pressed=(is_shown.to_string()) {
+                img src=(picture) alt="" loading="lazy" width="150" height="150";
+                span { (names[visit.index()]) }
             }
         }
     }

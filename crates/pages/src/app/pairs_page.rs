@@ -7,7 +7,7 @@ use axum::response::{IntoResponse as _, Redirect, Response};
 use maud::{Markup, html};
 
 use super::address::encoded;
-use super::components::{NavSection, choice, empty, frame, grouped, score};
+use super::components::{NavSection, action_form, choice, empty, frame, grouped, score};
 use super::failure::AppResult;
 use super::pair_query::{PairQuery, cursor_text};
 use super::projects::OpenProject;
@@ -58,9 +58,29 @@ pub(super) async fn page(
             div.gallery { @for pair in &list.pairs { (pair_card(&visit, &visit.project_page(&key, ""), pair, query.metric)) } }
         }
         (pager(&visit, &query, &list))
+        @if !list.pairs.is_empty() && has_outstanding(&list.pairs) { (run_form(&visit)) }
     };
     let title = visit.t("Pairs", "Các cặp");
     Ok(frame(&visit, title, Some(&key), NavSection::Pairs, &body).into_response())
+}
+
+/// Returns whether a run would do something with one of these pairs.
+fn has_outstanding(pairs: &[PairResults]) -> bool {
+    let mut pairs = pairs.iter();
+    pairs.any(|pair| !matches!(pair.status, JobStatus::Done | JobStatus::Leased))
+}
+
+/// Returns the form that runs the pairs of the list.
+fn run_form(visit: &Visit) -> Markup {
+    let list = visit.query.with("after", "").text();
+    action_form(
+        "actions/run-list",
+        "inline",
+        &html! {
+            input type="hidden" name="list" value=(list.trim_start_matches('?'));
+            button #run-list { (visit.t("Run the waiting and failed pairs of this list", "Chạy các cặp đang chờ và bị lỗi trong danh sách này")) }
+        },
+    )
 }
 
 /// Opens the page of a pair, or lists similar ids.

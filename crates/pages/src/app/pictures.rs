@@ -23,6 +23,7 @@ use mocban_results::pair_artifacts::PairArtifacts;
 const THUMB_SIDE: usize = 180;
 /// Longer side of a picture on the page of a pair, pixels.
 const PICTURE_SIDE: usize = 640;
+const JPEG: &str = "image/jpeg";
 /// JPEG quality of pictures.
 const QUALITY: u8 = 85;
 
@@ -63,10 +64,22 @@ pub(super) async fn picture(
     let open = state.open(&key).await?;
     let results = results(&open, &pair).await?;
     let limits = limits(&open)?;
+    let shown = results
+        .metric(metric)
+        .map(|record| record.result_hash.to_hex());
+    let cached = shown
+        .filter(|_| picture == PairPicture::Thumb)
+        .map(|hash| format!("{key}\0{pair}\0{hash}"));
+    if let Some(jpeg) = cached.as_ref().and_then(|id| state.thumbs.get(id)) {
+        return Ok(([(header::CONTENT_TYPE, JPEG)], jpeg).into_response());
+    }
     let drawn = state
         .work
         .call(move || draw(&open, &results, metric, picture, limits))
         .await?;
+    if let (Some(id), Some((JPEG, bytes))) = (cached, &drawn) {
+        state.thumbs.add(id, bytes.clone().into());
+    }
     let (kind, bytes) = drawn.unwrap_or_else(placeholder);
     Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
 }
@@ -128,7 +141,7 @@ fn draw(
     let artifacts = PairArtifacts::new(&open.project, pair);
     let record = pair.metric(metric).map(|record| &record.outcome);
     match (picture, record) {
-        (PairPicture::Print, _) | (PairPicture::Thumb, None) => print(),
+        (PairPicture::Print, _) | (PairPicture::Thumb | PairPicture::Overlay, None) => print(),
         (PairPicture::PrintMask, _) => {
             let ink = artifacts.print_mask().ok()?;
             Some(mask(&view.mask(&ink, &Affine2::IDENTITY)))
@@ -150,7 +163,7 @@ fn draw(
 }
 
 fn jpeg(picture: &Grid<[u8; 3]>) -> Encoded {
-    ("image/jpeg", jpeg_rgb8(picture, QUALITY))
+    (JPEG, jpeg_rgb8(picture, QUALITY))
 }
 
 fn mask(mask: &Mask) -> Encoded {

@@ -1,11 +1,10 @@
-//! The projects of a folder, and those that are open.
+//! The projects of a folder.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
-use super::state::AppState;
 use mocban_catalog::Catalog;
 use mocban_project::location::Location;
 use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};
@@ -91,36 +90,27 @@ fn search(folder: &Path, prefix: &str, depth: usize, found: &mut Vec<FoundProjec
     }
 }
 
-impl AppState {
-    /// Returns an open project by its name. Only projects of the folder have names, so no address leads elsewhere.
-    pub(super) async fn open(&self, key: &str) -> AppResult<Arc<OpenProject>> {
-        let mut projects = self.projects().await;
-        let folder = self.options.folder.clone();
-        let found = tokio::task::spawn_blocking(move || find(&folder)).await;
-        let found = found.unwrap_or_default().into_iter();
-        let Some(found) = found.into_iter().find(|found| found.key == key) else {
-            projects.remove(key);
-            return Err(AppFailure::not_found());
-        };
+impl OpenProject {
+    /// Opens a project that was found, unless `earlier` is the same one.
+    pub(super) async fn open(
+        found: FoundProject,
+        earlier: Option<&Arc<Self>>,
+    ) -> AppResult<Arc<Self>> {
         let file = platform::stat(&found.dir.join(CATALOG_FILE));
         let file = file.ok().map(|stat| stat.id);
-        if let Some(open) = projects.get(key)
-            && open.file == file
-        {
-            return Ok(Arc::clone(open));
+        if let Some(earlier) = earlier.filter(|earlier| earlier.file == file) {
+            return Ok(Arc::clone(earlier));
         }
         let dir = found.dir.clone();
         let opened = on_thread(async move || Location::new(dir).open_read_only().await).await;
         let (project, catalog) = opened.map_err(|error| AppFailure::of(error, &found.dir))?;
-        let open = Arc::new(OpenProject {
+        Ok(Arc::new(Self {
             key: found.key,
             dir: found.dir,
             project,
             catalog,
             file,
-        });
-        projects.insert(key.to_owned(), Arc::clone(&open));
-        Ok(open)
+        }))
     }
 }
 

@@ -32,7 +32,7 @@ use mocban_project::{ProjectResult, Refusal};
 
 /// Size of the sample that the page suggests.
 const SAMPLE: usize = 50;
-/// Share of results with a planted error, and of those that are shown twice, as in `review`.
+/// Share of results with a planted error, and of results that are shown twice, as in `review`.
 const RATES: CheckRates = CheckRates {
     faults: 0.04,
     duplicates: 0.05,
@@ -89,7 +89,7 @@ fn start_form(visit: &Visit) -> Markup {
             label { span { (visit.t("Results of", "Kết quả của")) }
                 select name="metric" {
                     @for (value, text) in metrics { (choice(value, text, Some(ThresholdMetric::DEFAULT.name()))) }
-                    (choice("", visit.t("all metrics", "mọi độ đo"), None))
+                    (choice("", visit.t("all metrics", "mọi độ đo"), Some(ThresholdMetric::DEFAULT.name())))
                 }
             }
             label { span { (visit.t("How many results (empty: all)", "Bao nhiêu kết quả (để trống: tất cả)")) }
@@ -235,6 +235,7 @@ async fn review_pages(
             "mocban -C {}",
             shell_quoted(&location.dir.to_string_lossy())
         ),
+        project_page: Some("../../../"),
         language,
         keys,
         min_view_ms: MIN_VIEW_MS,

@@ -7,8 +7,8 @@ use axum::{Router, middleware};
 
 use super::state::{AppOptions, AppState};
 use super::{
-    assets, export_page, failure, health_page, home, import_page, pair_page, pairs_page, pictures,
-    report_page, review_page, run_actions, run_page, settings_page,
+    assets, export_page, failure_page, health_page, home, import_page, pair_page, pairs_page,
+    pictures, report_page, review_page, run_actions, run_page, settings_page,
 };
 use crate::view::scan_asset;
 
@@ -53,13 +53,14 @@ pub fn app_pages(options: AppOptions) -> Router {
         )
         .route("/p/{project}/backup.sqlite", get(health_page::download))
         .route("/p/{project}/actions/run", post(run_actions::run))
+        .route("/p/{project}/actions/run-list", post(run_actions::run_list))
         .route("/p/{project}/actions/stop", post(run_actions::stop))
         .route("/p/{project}/actions/retry", post(run_actions::retry))
         .route("/p/{project}/actions/retire", post(run_actions::retire))
         .route("/p/{project}/actions/review", post(review_page::start))
         .layer(middleware::from_fn_with_state(
             Arc::clone(&state),
-            failure::explain,
+            failure_page::explain,
         ))
         // The pages of a review explain their failures themselves.
         .route(&format!("{review}/"), any(review_page::pages))

@@ -158,13 +158,29 @@ fn progress(visit: &Visit, run: &RunState) -> Markup {
         p.muted {
             (grouped(settled)) " / " (grouped(run.counts.pairs))
             @if let Some(rate) = rate {
-                " · " (format!("{rate:.1}")) " " (visit.t("pairs a second", "cặp mỗi giây"))
+                " · " (rate_text(visit, rate))
                 " · " (visit.t("time left", "còn lại")) " " (duration(visit, run.outstanding() as f64 / rate))
             }
             @if run.is_running {
                 @for worker in &run.workers { " · " (one_line(&worker.host)) ", " (visit.t("process", "tiến trình")) " " (worker.pid) }
             }
         }
+    }
+}
+
+/// Returns a number of pairs a second, or a minute if they are few.
+fn rate_text(visit: &Visit, per_second: f64) -> String {
+    if per_second < 1.0 {
+        let per_minute = 60.0 * per_second;
+        format!(
+            "{per_minute:.1} {}",
+            visit.t("pairs a minute", "cặp mỗi phút")
+        )
+    } else {
+        format!(
+            "{per_second:.1} {}",
+            visit.t("pairs a second", "cặp mỗi giây")
+        )
     }
 }
 

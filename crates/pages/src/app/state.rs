@@ -6,8 +6,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::Router;
 
-use super::projects::OpenProject;
+use super::failure::{AppFailure, AppResult};
+use super::projects::{OpenProject, find};
 use super::tasks::AppTasks;
+use super::thumb_cache::ThumbCache;
 use crate::local_server::WorkThread;
 use crate::review::Language;
 
@@ -34,6 +36,7 @@ pub(super) struct AppState {
     pub(super) reviews: tokio::sync::Mutex<BTreeMap<[String; 3], Router>>,
     /// Exports, checks and backups.
     pub(super) tasks: AppTasks,
+    pub(super) thumbs: ThumbCache,
     /// Draws pictures.
     pub(super) work: WorkThread,
 }
@@ -46,6 +49,7 @@ impl AppState {
             projects: tokio::sync::Mutex::default(),
             reviews: tokio::sync::Mutex::default(),
             tasks: AppTasks::default(),
+            thumbs: ThumbCache::default(),
             work: WorkThread::default(),
         }
     }
@@ -65,10 +69,18 @@ impl AppState {
         self.language.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the open projects.
-    pub(super) async fn projects(
-        &self,
-    ) -> tokio::sync::MutexGuard<'_, BTreeMap<String, Arc<OpenProject>>> {
-        self.projects.lock().await
+    /// Returns an open project by its name. Only projects of the folder have names, so no address leads elsewhere.
+    pub(super) async fn open(&self, key: &str) -> AppResult<Arc<OpenProject>> {
+        let mut projects = self.projects.lock().await;
+        let folder = self.options.folder.clone();
+        let found = tokio::task::spawn_blocking(move || find(&folder)).await;
+        let mut found = found.unwrap_or_default().into_iter();
+        let Some(found) = found.find(|found| found.key == key) else {
+            projects.remove(key);
+            return Err(AppFailure::not_found());
+        };
+        let open = OpenProject::open(found, projects.get(key)).await?;
+        projects.insert(key.to_owned(), Arc::clone(&open));
+        Ok(open)
     }
 }

@@ -3,13 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use maud::{Markup, html};
-
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
 use super::projects::OpenProject;
-use super::visit::Visit;
-use mocban_core::domain::one_line;
 use mocban_project::ProjectResult;
 use mocban_project::location::Location;
 
@@ -79,22 +75,5 @@ impl AppTasks {
     fn lock(&self) -> MutexGuard<'_, BTreeMap<(String, TaskKind), TaskState>> {
         // Each change is a single insertion.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Returns what a page shows of a task.
-pub(super) fn task_part(visit: &Visit, state: Option<&TaskState>) -> Markup {
-    html! {
-        @match state {
-            None => {},
-            Some(TaskState::Running) => div.notice role="status" data-task="running" {
-                p { (visit.t("Working…", "Đang làm…")) }
-                progress aria-label=(visit.t("Working", "Đang làm")) {}
-            },
-            Some(TaskState::Done(lines)) => div.notice.good role="status" data-task="done" {
-                @for line in lines { p { (one_line(&line[visit.index()])) } }
-            },
-            Some(TaskState::Failed(text)) => div.notice.bad role="alert" data-task="failed" { p { (text) } },
-        }
     }
 }

@@ -98,3 +98,33 @@ impl Visit {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Visit;
+    use crate::app::address::PageQuery;
+    use crate::review::Language;
+    use mocban_core::domain::FailureClass;
+
+    #[test]
+    fn reasons_and_remedies_in_both_languages() {
+        let mut lines = Vec::new();
+        for language in Language::ALL {
+            let visit = Visit {
+                language,
+                root: "./".to_owned(),
+                here: "./".to_owned(),
+                query: PageQuery::default(),
+                csrf_token: String::new(),
+            };
+            for class in FailureClass::ALL {
+                lines.push(format!(
+                    "{class}: {}\n  {}",
+                    visit.class(class),
+                    visit.remedy(class)
+                ));
+            }
+        }
+        insta::assert_snapshot!(lines.join("\n"));
+    }
+}

@@ -65,6 +65,9 @@ pub struct ReviewOptions {
     pub queue: QueueOptions,
     /// The command line that names this project, such as `mocban -C blocks`. The last page shows the next commands.
     pub command: String,
+    /// Relative address of the pages of the project in the app, if the review is part of it. The last page then links there
+    /// instead of showing commands.
+    pub project_page: Option<&'static str>,
     /// Language of the page; `None` for that of the browser.
     pub language: Option<Language>,
     /// Map of physical keys to actions, from [`key_map`](super::key_map).

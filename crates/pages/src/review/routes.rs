@@ -60,7 +60,8 @@ async fn index(
     let query = query.as_deref();
     let requested = query.and_then(|query| query.strip_prefix("lang=")?.parse().ok());
     let language = requested.unwrap_or_else(|| language(&state, &headers));
-    Html(page::review(&state.options.queue, language).into_string())
+    let options = &state.options;
+    Html(page::review(&options.queue, options.project_page, language).into_string())
 }
 
 /// Returns the language of the options, or else that of the browser.
