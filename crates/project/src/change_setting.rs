@@ -57,7 +57,7 @@ pub fn save(change: &SettingChange, location: &Location) -> ProjectResult<()> {
     let _lock = TargetLock::acquire(&file).with_context(failed)?;
     let text = files::small(&file)?.unwrap_or_default();
     let text = String::from_utf8(text)
-        .map_err(|_| ProjectError::unexpected(format!("{} is not UTF-8", file.display())))?;
+        .map_err(|_invalid| ProjectError::unexpected(format!("{} is not UTF-8", file.display())))?;
     let origin = Origin::File(file.clone());
     let text = with_setting(&text, &change.after.key, &change.after.value, &origin)?;
     write_atomic(&file, text.as_bytes()).with_context(failed)?;

@@ -158,7 +158,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     let _file = announce(&server, &pages, &args, context)?;
     let drain = stop.clone();
     let served = server.serve(pages.routes(), async move {
-        drain.reached(StopLevel::Drain).await
+        drain.reached(StopLevel::Drain).await;
     });
     let waits = tokio::spawn(stop_waiting(catalog.clone(), stop.clone()));
     let kept = tokio::select! {

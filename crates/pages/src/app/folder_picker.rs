@@ -75,7 +75,8 @@ impl PickerRoots {
     pub(super) fn allowed(&self, path: &Path) -> AppResult<PathBuf> {
         let shown = path.display();
         let whole = path.canonicalize();
-        let whole = whole.map_err(|_| AppFailure::refused(format!("{shown} cannot be opened")))?;
+        let whole =
+            whole.map_err(|_invalid| AppFailure::refused(format!("{shown} cannot be opened")))?;
         if self.has(&whole) {
             return Ok(whole);
         }

@@ -59,7 +59,7 @@ pub(super) async fn picture(
     let (picture, metric) = name.split_once('-').unwrap_or((&name, ""));
     let picture: PairPicture = picture
         .parse()
-        .map_err(|_: String| AppFailure::not_found())?;
+        .map_err(|_unknown: String| AppFailure::not_found())?;
     let metric = metric.parse().unwrap_or(ThresholdMetric::DEFAULT);
     let open = state.open(&key).await?;
     let results = results(&open, &pair).await?;
@@ -112,7 +112,7 @@ pub(super) async fn scan(
 
 /// Reads a pair by its name in an address.
 pub(super) async fn results(open: &OpenProject, pair: &str) -> AppResult<PairResults> {
-    let name: PairName = pair.parse().map_err(|_| AppFailure::not_found())?;
+    let name: PairName = pair.parse().map_err(|_invalid| AppFailure::not_found())?;
     let detail = open.catalog.pair(&name).await?;
     Ok(detail.ok_or_else(AppFailure::not_found)?.results)
 }

@@ -99,7 +99,7 @@ fn without_commands(sentence: &str) -> String {
         let (inside, behind) = after.split_once(')').unwrap_or((after, ""));
         text.push_str(before);
         if !inside.contains('`') {
-            text.push_str(&format!(" ({inside})"));
+            text.extend([" (", inside, ")"]);
         }
         rest = behind;
     }

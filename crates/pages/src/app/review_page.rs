@@ -168,7 +168,7 @@ pub(super) async fn pages(
         Some(query) => format!("/{rest}?{query}"),
         None => format!("/{rest}"),
     };
-    head.uri = target.parse().map_err(|_| AppFailure::not_found())?;
+    head.uri = target.parse().map_err(|_invalid| AppFailure::not_found())?;
     // The parameters of this address are not those of the page.
     head.extensions = Extensions::new();
     head.extensions.insert(access);
