@@ -34,7 +34,18 @@ pub(super) struct OpenProject {
     file: Option<platform::FileId>,
 }
 
+/// Returns the identity of the catalog's file.
+fn catalog_file(dir: &Path) -> Option<platform::FileId> {
+    let file = platform::stat(&dir.join(CATALOG_FILE));
+    file.ok().map(|stat| stat.id)
+}
+
 impl OpenProject {
+    /// Returns whether the project still has the catalog that was opened.
+    pub(super) fn is_current(&self) -> bool {
+        catalog_file(&self.dir) == self.file
+    }
+
     /// Returns the folder with its current settings, which are read again for each use.
     pub(super) fn location(&self) -> Location {
         Location::new(&self.dir)
@@ -91,16 +102,9 @@ fn search(folder: &Path, prefix: &str, depth: usize, found: &mut Vec<FoundProjec
 }
 
 impl OpenProject {
-    /// Opens a project that was found, unless `earlier` is the same one.
-    pub(super) async fn open(
-        found: FoundProject,
-        earlier: Option<&Arc<Self>>,
-    ) -> AppResult<Arc<Self>> {
-        let file = platform::stat(&found.dir.join(CATALOG_FILE));
-        let file = file.ok().map(|stat| stat.id);
-        if let Some(earlier) = earlier.filter(|earlier| earlier.file == file) {
-            return Ok(Arc::clone(earlier));
-        }
+    /// Opens a project that was found.
+    pub(super) async fn open(found: FoundProject) -> AppResult<Arc<Self>> {
+        let file = catalog_file(&found.dir);
         let dir = found.dir.clone();
         let opened = on_thread(async move || Location::new(dir).open_read_only().await).await;
         let (project, catalog) = opened.map_err(|error| AppFailure::of(error, &found.dir))?;

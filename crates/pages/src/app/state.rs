@@ -72,6 +72,9 @@ impl AppState {
     /// Returns an open project by its name. Only projects of the folder have names, so no address leads elsewhere.
     pub(super) async fn open(&self, key: &str) -> AppResult<Arc<OpenProject>> {
         let mut projects = self.projects.lock().await;
+        if let Some(open) = projects.get(key).filter(|open| open.is_current()) {
+            return Ok(Arc::clone(open));
+        }
         let folder = self.options.folder.clone();
         let found = tokio::task::spawn_blocking(move || find(&folder)).await;
         let mut found = found.unwrap_or_default().into_iter();
@@ -79,7 +82,7 @@ impl AppState {
             projects.remove(key);
             return Err(AppFailure::not_found());
         };
-        let open = OpenProject::open(found, projects.get(key)).await?;
+        let open = OpenProject::open(found).await?;
         projects.insert(key.to_owned(), Arc::clone(&open));
         Ok(open)
     }
