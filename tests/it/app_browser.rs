@@ -6,7 +6,7 @@ use crate::app::app;
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
-use crate::review_browser::judge;
+use crate::review_browser::{judge, saved};
 
 /// Opens the app in a tab and returns the address of its home page.
 fn enter<'b>(browser: &'b Browser, page: &Page, size: [u32; 2]) -> (Tab<'b>, String) {
@@ -57,10 +57,9 @@ fn the_demo_comes_to_its_report_without_a_typed_command() {
         tab.wait("Date.now() - window.since > 400");
         judge(&tab, "KeyP");
     }
+    saved(&tab);
     let status = || mocban(&dir.path().join("mocban-demo"), &["status", "--json"]).expect(0);
-    tab.wait("document.getElementById('saved').textContent !== ''");
-    tab.eval("history.go(-1), null");
-    tab.wait(&on_page("/review"));
+    click(&tab, "header a", &on_page("/p/mocban-demo/"));
     click(&tab, "nav a[href$='/report']", &on_page("/report"));
     tab.wait("document.querySelector('#numbers table')");
     tab.screenshot("app_report");
@@ -160,7 +159,12 @@ fn a_pair_is_found_and_seen_with_the_keyboard_alone() {
     tab.wait(&on_page("/pair/upright-0004/"));
     tab.key("ArrowLeft");
     tab.wait(&on_page("/pair/upright-0003/"));
-    // Every control can be reached, and the focus is visible.
+    let address = tab.eval("location.href");
+    tab.open(&format!("{}3d/", address.as_str().expect("a URL")));
+    tab.wait("document.querySelector('.scan-canvas canvas')");
+    tab.eval("history.back(), null");
+    tab.wait(&on_page("/pair/upright-0003/"));
+    // Every control can be reached.
     let unreachable = tab.eval(
         "[...document.querySelectorAll('a[href], button, input, select')].filter((one) => one.tabIndex < 0).length",
     );

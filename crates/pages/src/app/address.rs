@@ -59,11 +59,11 @@ impl PageQuery {
         Self(pairs)
     }
 
-    /// Returns the query as text that begins with `?`.
+    /// Returns the query as text that begins with `?`, or nothing if it is empty.
     pub(super) fn text(&self) -> String {
-        let mut text = String::from("?");
+        let mut text = String::new();
         for (index, (name, value)) in self.0.iter().enumerate() {
-            let join = if index > 0 { "&" } else { "" };
+            let join = if index > 0 { '&' } else { '?' };
             // Writing to a string never fails.
             let _ = write!(text, "{join}{}={}", encoded(name), encoded(value));
         }
@@ -85,6 +85,7 @@ mod tests {
         let other = query.with("block", "").with("page", "1/2");
         assert_eq!(other.get("block"), None);
         assert_eq!(PageQuery::parse(&other.text()[1..]), other);
+        assert_eq!(PageQuery::default().text(), "");
         assert_eq!(encoded("chữ số/1"), "ch%E1%BB%AF%20s%E1%BB%91%2F1");
     }
 }

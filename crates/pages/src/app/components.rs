@@ -39,7 +39,7 @@ const SECTIONS: [(NavSection, &str, [&str; 2]); 7] = [
     (NavSection::Review, "review", ["Review", "Đánh giá"]),
     (NavSection::Report, "report", ["Report", "Báo cáo"]),
     (NavSection::Export, "export", ["Export", "Xuất dữ liệu"]),
-    (NavSection::Settings, "settings", ["Settings", "Cài đặt"]),
+    (NavSection::Settings, "settings", ["Settings", "Thiết lập"]),
     (NavSection::Health, "health", ["Health", "Tình trạng"]),
 ];
 

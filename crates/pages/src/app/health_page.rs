@@ -53,7 +53,7 @@ pub(super) async fn page(
             }
             section.card {
                 h2 { (visit.t("Backup", "Sao lưu")) }
-                p { (visit.t("One file with pairs, results, verdicts and settings, also during a run. Scans, prints and pictures are not in it. Copy it to another disk.", "Một tệp gồm các cặp, kết quả, đánh giá và cài đặt, kể cả khi đang chạy. Không gồm bản quét, bản in và hình ảnh. Hãy chép sang ổ đĩa khác.")) }
+                p { (visit.t("One file with pairs, results, verdicts and settings, also during a run. Scans, prints and pictures are not in it. Copy it to another disk.", "Một tệp gồm các cặp, kết quả, đánh giá và thiết lập, kể cả khi đang chạy. Không gồm bản quét, bản in và hình ảnh. Hãy chép sang ổ đĩa khác.")) }
                 (action_form("actions/backup", "inline", &html! { button #backup { (visit.t("Back up now", "Sao lưu ngay")) } }))
                 (task_part(&visit, stored.as_ref()))
                 @if let Some(meta) = meta {

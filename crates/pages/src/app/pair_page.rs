@@ -11,7 +11,7 @@ use super::components::{NavSection, action_form, frame, score};
 use super::failure::AppResult;
 use super::state::AppState;
 use super::visit::Visit;
-use crate::view::page as scan_page;
+use crate::view::{page as scan_page, scan_asset};
 use mocban_catalog::{MetricRecord, PairDetail};
 use mocban_core::domain::{FailureClass, JobStatus, PairName, ThresholdMetric, one_line};
 use mocban_project::details::{self, Details, PairOverview};
@@ -20,9 +20,9 @@ use mocban_system::time_text::local;
 /// Pictures that can be chosen, with their keys and names.
 const LAYERS: [(&str, [&str; 2]); 5] = [
     ("print", ["Print", "Bản in"]),
-    ("relief", ["Relief (depth)", "Mặt nổi (độ sâu)"]),
+    ("relief", ["Relief (depth)", "Mặt khắc (độ sâu)"]),
     ("print_mask", ["Ink of the print", "Mực của bản in"]),
-    ("depth_mask", ["Strokes of the relief", "Nét của mặt nổi"]),
+    ("depth_mask", ["Strokes of the relief", "Nét của mặt khắc"]),
     ("overlay", ["Print with outline", "Bản in và đường viền"]),
 ];
 
@@ -85,6 +85,13 @@ pub(super) async fn scan_view(
     Ok(Html(page).into_response())
 }
 
+/// Responds with a script or style of the 3D view.
+pub(super) async fn scan_view_asset(
+    Path((_, _, name)): Path<(String, String, String)>,
+) -> Response {
+    scan_asset(Path(name)).await
+}
+
 fn neighbour_links(visit: &Visit, neighbours: &[Option<PairName>; 2]) -> Markup {
     let [before, after] = neighbours;
     let link = |name: &Option<PairName>, rel: &str, text: &str| {
@@ -110,7 +117,7 @@ fn state_line(visit: &Visit, overview: &PairOverview) -> Markup {
             span.state.(results.status.name()) { (visit.status(results.status)) }
             @if let Some(block) = &results.attributes.block { " · " (visit.t("block", "ván")) " " (one_line(block)) }
             @if results.status == JobStatus::Done && overview.next_run.is_some() {
-                " · " span.warn { (visit.t("settings or files have changed; the next run computes it again", "cài đặt hoặc tệp đã đổi; lần chạy sau sẽ tính lại")) }
+                " · " span.warn { (visit.t("settings or files have changed; the next run computes it again", "thiết lập hoặc tệp đã đổi; lần chạy sau sẽ tính lại")) }
             }
         }
         @if let Some(stored) = &results.failure {
@@ -141,7 +148,7 @@ fn pictures(visit: &Visit, metric: ThresholdMetric, has_result: bool) -> Markup 
     let (shown, alt) = if has_result {
         let alt = visit.t(
             "Print with the outline of the aligned relief",
-            "Bản in và đường viền của mặt nổi đã căn chỉnh",
+            "Bản in và đường viền của mặt khắc đã căn chỉnh",
         );
         ("overlay", alt)
     } else {
@@ -153,7 +160,7 @@ fn pictures(visit: &Visit, metric: ThresholdMetric, has_result: bool) -> Markup 
             div.stage { img #stage src={ "picture/" (shown) "-" (metric) } alt=(alt) width="640" height="640"; }
             div.controls {
                 @if has_result {
-                    button #blink type="button" aria-pressed="false" { (visit.t("Blink print and relief", "Nháy bản in và mặt nổi")) " " kbd { "B" } }
+                    button #blink type="button" aria-pressed="false" { (visit.t("Blink print and relief", "Nháy bản in và mặt khắc")) " " kbd { "B" } }
                     a.button href="3d/" { (visit.t("3D view", "Xem 3D")) }
                 }
                 @for (layer, names) in layers { (layer_button(visit, layer, names, metric, *layer == shown)) }
@@ -230,7 +237,7 @@ const MEANINGS: [[&str; 2]; 7] = [
     ],
     [
         "How far the relief is turned to lie on the print, clockwise.",
-        "Mặt nổi được xoay bao nhiêu để khớp bản in, theo chiều kim đồng hồ.",
+        "Mặt khắc được xoay bao nhiêu để khớp bản in, theo chiều kim đồng hồ.",
     ],
     [
         "Pixels of the print per pixel of the depth map.",

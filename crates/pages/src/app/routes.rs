@@ -10,7 +10,6 @@ use super::{
     assets, export_page, failure_page, health_page, home, import_page, pair_page, pairs_page,
     pictures, report_page, review_page, run_actions, run_page, settings_page,
 };
-use crate::view::scan_asset;
 
 /// Returns the routes of the app, for a server.
 pub fn app_pages(options: AppOptions) -> Router {
@@ -26,7 +25,10 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route(&format!("{pair}/picture/{{name}}"), get(pictures::picture))
         .route(&format!("{pair}/3d/"), get(pair_page::scan_view))
         .route(&format!("{pair}/3d/scan"), get(pictures::scan))
-        .route(&format!("{pair}/3d/assets/{{name}}"), get(scan_asset))
+        .route(
+            &format!("{pair}/3d/assets/{{name}}"),
+            get(pair_page::scan_view_asset),
+        )
         .route("/p/{project}/review", get(review_page::page))
         .route("/import", get(import_page::page))
         .route("/actions/import", post(import_page::import))

@@ -201,7 +201,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
         } else {
             visit.t(
                 "Stop after the stages in progress",
-                "Dừng sau các bước đang làm",
+                "Dừng sau các giai đoạn đang làm",
             )
         };
         return html! {
@@ -215,7 +215,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
     let failed = run.jobs(JobStatus::Quarantined);
     html! {
         @if run.counts.stale > 0 {
-            p.notice { (grouped(run.counts.stale)) " " (visit.t("pairs were computed with other settings or files; a run updates them.", "cặp được tính với cài đặt hoặc tệp khác; lần chạy sẽ cập nhật.")) }
+            p.notice { (grouped(run.counts.stale)) " " (visit.t("pairs were computed with other settings or files; a run updates them.", "cặp được tính với thiết lập hoặc tệp khác; lần chạy sẽ cập nhật.")) }
         }
         (action_form("actions/run", "inline run-form", &html! {
             label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "

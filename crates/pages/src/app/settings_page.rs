@@ -55,7 +55,7 @@ pub(super) async fn page(
     let body = html! {
         p { (visit.t(
             "A change is saved in the settings file of the project. You see how many pairs it concerns before it is saved; the next run computes them again.",
-            "Thay đổi được lưu trong tệp cài đặt của dự án. Trước khi lưu, bạn thấy thay đổi liên quan đến bao nhiêu cặp; lần chạy sau sẽ tính lại chúng.",
+            "Thay đổi được lưu trong tệp thiết lập của dự án. Trước khi lưu, bạn thấy thay đổi liên quan đến bao nhiêu cặp; lần chạy sau sẽ tính lại chúng.",
         )) }
         @match &change {
             None => {},
@@ -64,7 +64,7 @@ pub(super) async fn page(
         }
         (sections(&visit, &settings.tree.settings()))
     };
-    let title = visit.t("Settings", "Cài đặt");
+    let title = visit.t("Settings", "Thiết lập");
     Ok(frame(
         &visit,
         title,

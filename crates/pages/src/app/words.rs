@@ -20,20 +20,13 @@ impl Visit {
         match verdict {
             Verdict::Pass => self.t("passed", "đạt"),
             Verdict::Fail => self.t("failed", "không đạt"),
-            Verdict::Unsure => self.t("unsure", "không chắc"),
+            Verdict::Unsure => self.t("unsure", "chưa chắc"),
         }
     }
 
-    /// Returns a reason to fail a result, in words.
-    pub(super) const fn reason(&self, reason: Reason) -> &'static str {
-        match reason {
-            Reason::Angle => self.t("rotated", "lệch góc"),
-            Reason::StrokesLost => self.t("strokes lost", "mất nét"),
-            Reason::BackgroundIn => self.t("background included", "lẫn nền"),
-            Reason::ShiftOrScale => self.t("shifted or scaled", "lệch vị trí hoặc tỉ lệ"),
-            Reason::Mirrored => self.t("mirrored", "bị lật"),
-            Reason::WrongPair => self.t("wrong pair", "sai cặp"),
-        }
+    /// Returns a reason to fail a result, as the review page names it.
+    pub(super) fn reason(&self, reason: Reason) -> &'static str {
+        self.language.translate(reason.name())
     }
 
     /// Returns the name of a stage.
@@ -52,7 +45,7 @@ impl Visit {
             ThresholdMetric::NlSsim => self.t("Non-luminous SSIM", "SSIM không độ sáng"),
             ThresholdMetric::Density => self.t("Pixel density", "Mật độ điểm ảnh"),
             ThresholdMetric::Ensemble => self.t("Ensemble", "Kết hợp"),
-            ThresholdMetric::Relief => self.t("Relief", "Mặt nổi"),
+            ThresholdMetric::Relief => self.t("Relief", "Mặt khắc"),
         }
     }
 

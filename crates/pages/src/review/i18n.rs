@@ -41,7 +41,7 @@ impl Language {
     }
 
     /// Returns the message for a key, or the key itself if there is no message. A test checks that all messages exist.
-    pub(super) fn translate(self, key: &'static str) -> &'static str {
+    pub(crate) fn translate(self, key: &'static str) -> &'static str {
         MESSAGES.get(key).map_or(key, |texts| texts[self.name()])
     }
 
