@@ -47,6 +47,8 @@ const PAGES: &[(&str, &str)] = of_docs! {
 /// The pictures of the pages.
 const PICTURES: &[(&str, &[u8])] = of_docs! {
     include_bytes:
+    "pictures/app-vi.jpg",
+    "pictures/app.jpg",
     "pictures/block-overlay.jpg",
     "pictures/block.jpg",
     "pictures/guide-vi.jpg",
