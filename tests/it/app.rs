@@ -1,6 +1,7 @@
 //! `mocban app` by raw requests: its guard, its addresses, its actions and its pages without a browser.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
@@ -224,6 +225,86 @@ fn folders_are_planned_before_and_stored_after_a_click() {
     let status = mocban(&dir.path().join("new"), &["status", "--json"]).expect(0);
     assert_eq!(status.json()["pairs"], 15);
     assert_eq!(page.get("/p/new/").status, 200);
+}
+
+#[test]
+fn a_kill_during_an_import_leaves_nothing_half_done() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let data = dir.path().join("p/data");
+    let folder = |name: &str| data.join(name).display().to_string();
+    let chosen = json!({"project": "new", "meshes": folder("meshes"), "prints": folder("prints")});
+    let hold = dir.path().join("hold");
+    let mut held = app(dir.path());
+    held.args(["--lang", "en"]);
+    held.env("MOCBAN_HOLD_AT", "import:computed:5");
+    held.env("MOCBAN_HOLD_FILE", &hold);
+    let mut page = Page::of(&mut held).entered();
+    let deadline = Instant::now() + Duration::from_mins(1);
+    std::thread::scope(|scope| {
+        let site = &page;
+        let (body, csrf) = (chosen.to_string(), token(site));
+        let request = scope.spawn(move || {
+            let mut headers = site.headers();
+            headers.retain(|(name, _)| *name != "x-csrf-token");
+            headers.push(("x-csrf-token", csrf));
+            let path = format!("{}/actions/import", site.session);
+            send(site.address(), "POST", &path, &headers, body.as_bytes()).is_err()
+        });
+        while !hold.exists() {
+            assert!(Instant::now() < deadline, "the import is not held");
+            crate::waiting::pause();
+        }
+        rustix::process::kill_process(site.pid(), rustix::process::Signal::KILL).expect("killed");
+        assert!(request.join().expect("no panic"), "there is no reply");
+    });
+    page.kill();
+    let catalog = dir.path().join("new/catalog.sqlite");
+    assert!(!catalog.exists(), "nothing is imported");
+    let next = open_app(dir.path());
+    let reply = act(&next, "/actions/import", &chosen, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    let status = mocban(&dir.path().join("new"), &["status", "--json"]).expect(0);
+    assert_eq!(status.json()["pairs"], 15);
+}
+
+#[test]
+fn a_reviewer_with_a_similar_name_is_asked_for() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    let set = [
+        "verdict",
+        "set",
+        "upright-0000",
+        "pass",
+        "--reviewer",
+        "Lan",
+    ];
+    mocban(&project, &set).expect(0);
+    let mut form =
+        json!({"reviewer": "lân", "metric": "ensemble", "sample": "3", "order": "random"});
+    let path = "/p/p/actions/review";
+    let refused = act(&page, path, &form, |_| {});
+    assert_eq!(refused.status, 422);
+    assert!(
+        text(&refused).contains("nearly the same name"),
+        "{}",
+        text(&refused)
+    );
+    form["is_new"] = json!("yes");
+    let reply = act(&page, path, &form, |_| {}).json();
+    let go = reply["go"].as_str().expect("an address").to_owned();
+    let queue = page.get(&format!("/p/p/{go}api/queue"));
+    assert!(
+        queue.json()["items"]
+            .as_array()
+            .is_some_and(|items| items.len() >= 3)
+    );
+    let judged = text(&page.get("/p/p/pairs?verdict=pass&metric=ensemble"));
+    assert!(
+        judged.contains("upright-0000") && !judged.contains("upright-0001"),
+        "{judged}"
+    );
 }
 
 #[test]

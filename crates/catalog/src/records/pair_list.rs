@@ -58,9 +58,9 @@ pub struct PairFilter {
     pub statuses: Vec<JobStatus>,
     /// Class of the failure of a quarantined pair.
     pub class: Option<FailureClass>,
-    /// A verdict on a current result by a reviewer.
+    /// A verdict of a reviewer on the current result of the metric.
     pub verdict: Option<Verdict>,
-    /// Whether a current result must have no verdict.
+    /// Whether the current result of the metric must have no verdict.
     pub is_unjudged: bool,
     /// Whether the result of the default metric must have a low confidence.
     pub is_low_confidence: bool,
@@ -111,10 +111,10 @@ macro_rules! listed {
         AND (?8 >> CAST(j.status AS integer)) % 2 = 1 AND (?9 IS NULL OR f.class = ?9)
         AND (?10 IS NULL OR EXISTS (SELECT 1 ",
             from_current_verdicts!(),
-            " AND v.pair = c.id AND v.verdict = ?10))
+            " AND v.pair = c.id AND v.metric = ?5 AND v.verdict = ?10))
         AND (?11 = 0 OR NOT EXISTS (SELECT 1 ",
             from_current_verdicts!(),
-            " AND v.pair = c.id))
+            " AND v.pair = c.id AND v.metric = ?5))
         AND (?12 = 0 OR j.status = 3 AND j.low_confidence = 1) AND (?13 = 0 OR j.status = 3) THEN 1 ELSE 0 END AS passes
 FROM (",
             $source,

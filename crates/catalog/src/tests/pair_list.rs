@@ -132,6 +132,7 @@ async fn retired_pairs_are_in_no_list_and_verdicts_are_found() {
         .expect("retired");
     let given = NewVerdict {
         pair,
+        metric: Some(ThresholdMetric::Ensemble),
         ..super::verdicts::verdict("ana", Verdict::Fail)
     };
     let stored = world.catalog.verdict_set(vec![given], 9).await;
@@ -146,6 +147,14 @@ async fn retired_pairs_are_in_no_list_and_verdicts_are_found() {
         ..PairFilter::default()
     };
     assert_eq!(listed(&world, &failed, PairOrder::Imported, 3).await, [4]);
+    let of_relief = world.catalog.pair_list(
+        &failed,
+        PairOrder::Imported,
+        ThresholdMetric::Relief,
+        None,
+        3,
+    );
+    assert!(of_relief.await.expect("a page").pairs.is_empty());
     let passed = PairFilter {
         verdict: Some(Verdict::Pass),
         ..PairFilter::default()

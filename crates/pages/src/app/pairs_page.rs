@@ -136,7 +136,7 @@ fn filter_form(visit: &Visit, blocks: &[String]) -> Markup {
     let mut classes = classes.to_vec();
     classes.insert(0, ("", any));
     let mut verdicts = Verdict::ALL
-        .map(|one| (one.name(), visit.verdict(one)))
+        .map(|one| (one.name(), visit.given_by_somebody(one)))
         .to_vec();
     verdicts.insert(0, ("", any));
     verdicts.push(("none", visit.t("not judged", "chưa đánh giá")));

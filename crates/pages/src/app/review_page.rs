@@ -1,6 +1,6 @@
 //! Reviews: who has judged what, and the start of a review.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use axum::extract::rejection::JsonRejection;
@@ -27,6 +27,7 @@ use mocban_catalog::reviewer_name;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict, one_line};
 use mocban_project::error::explanation;
 use mocban_project::location::{Location, now};
+use mocban_project::reviewers::similar_names;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ProjectResult, Refusal};
 
@@ -50,6 +51,9 @@ pub(super) struct StartBody {
     metric: String,
     sample: String,
     order: String,
+    /// Whether a name that looks like another is that of another person.
+    #[serde(default)]
+    is_new: String,
 }
 
 /// Shows the reviewers and the form that starts a review.
@@ -102,6 +106,7 @@ fn start_form(visit: &Visit) -> Markup {
                     (choice(ReviewOrder::Adjudicate.name(), visit.t("disagreements of two others", "chỗ hai người khác bất đồng"), None))
                 }
             }
+            label.check { input type="checkbox" name="is_new" value="yes"; " " (visit.t("another person with a similar name", "người khác có tên gần giống")) }
             button.primary { (visit.t("Start or continue", "Bắt đầu hoặc tiếp tục")) }
         },
     )
@@ -131,12 +136,16 @@ fn reviewer_table(visit: &Visit, reviewers: &BTreeMap<String, BTreeMap<Verdict, 
 pub(super) async fn start(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
+    visit: Visit,
     body: Result<Json<StartBody>, JsonRejection>,
 ) -> AppResult<Json<Value>> {
     let Json(body) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
     let open = state.open(&key).await?;
     let reviewer = reviewer_name(&body.reviewer);
     let reviewer = reviewer.map_err(|error| AppFailure::refused(error.to_string()))?;
+    if body.is_new.is_empty() {
+        refuse_similar(&open, &reviewer, &visit).await?;
+    }
     let query = PageQuery::default()
         .with("metric", &body.metric)
         .with("sample", &body.sample)
@@ -147,6 +156,25 @@ pub(super) async fn start(
     let _router = review(&state, &open, &reviewer, choice).await?;
     let go = format!("review/{}/{}/", encoded(&reviewer), encoded(choice));
     Ok(Json(json!({ "go": go })))
+}
+
+/// Refuses a new reviewer whose name looks like another.
+async fn refuse_similar(open: &OpenProject, reviewer: &str, visit: &Visit) -> AppResult<()> {
+    let rights = open.catalog.review_rights().await?;
+    let names = BTreeSet::from([reviewer.to_owned()]);
+    let similar = similar_names(&open.catalog, &rights, &names).await;
+    let similar = similar.map_err(|error| AppFailure::of(error, &open.dir))?;
+    let Some((new, known)) = similar else {
+        return Ok(());
+    };
+    Err(AppFailure::refused(match visit.language {
+        Language::English => format!(
+            "{known:?} and {new:?} are nearly the same name: if they are one person, write {known:?}, or else tick \"another person\""
+        ),
+        Language::Vietnamese => format!(
+            "{known:?} và {new:?} gần như cùng một tên: nếu là một người, hãy viết {known:?}, nếu không hãy chọn \"người khác\""
+        ),
+    }))
 }
 
 /// Passes a request on to the pages of a reviewer.

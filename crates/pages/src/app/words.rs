@@ -24,6 +24,15 @@ impl Visit {
         }
     }
 
+    /// Says that at least one reviewer gave a verdict, whatever others gave.
+    pub(super) const fn given_by_somebody(&self, verdict: Verdict) -> &'static str {
+        match verdict {
+            Verdict::Pass => self.t("passed by somebody", "có người cho đạt"),
+            Verdict::Fail => self.t("failed by somebody", "có người cho không đạt"),
+            Verdict::Unsure => self.t("somebody was unsure", "có người chưa chắc"),
+        }
+    }
+
     /// Returns a reason to fail a result, as the review page names it.
     pub(super) fn reason(&self, reason: Reason) -> &'static str {
         self.language.translate(reason.name())
