@@ -52,3 +52,5 @@ document.addEventListener("keydown", (event) => {
   const link = rel && document.querySelector(`a[rel="${rel}"]`);
   if (link && !event.shiftKey) location.assign(link.href);
 });
+
+stage.dataset.ready = "true";

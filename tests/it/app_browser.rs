@@ -29,6 +29,14 @@ fn on_page(section: &str) -> String {
     format!("document.body?.dataset.ready && location.pathname.endsWith('{section}')")
 }
 
+/// The page of a pair is shown, and its keys work.
+fn on_pair(name: &str) -> String {
+    format!(
+        "{} && document.getElementById('stage')?.dataset.ready",
+        on_page(&format!("/pair/{name}/"))
+    )
+}
+
 #[test]
 fn the_demo_comes_to_its_report_without_a_typed_command() {
     let Some(browser) = Browser::start() else {
@@ -150,20 +158,20 @@ fn a_pair_is_found_and_seen_with_the_keyboard_alone() {
     tab.eval("document.querySelector('#jump-id').focus(), null");
     tab.text("upright-0003");
     tab.eval("document.querySelector('#jump-id').form.requestSubmit(), null");
-    tab.wait(&on_page("/pair/upright-0003/"));
+    tab.wait(&on_pair("upright-0003"));
     tab.key("KeyB");
     tab.wait("document.querySelector('#blink').getAttribute('aria-pressed') === 'true'");
     tab.wait("document.querySelector('#stage').src.includes('relief')");
     tab.key("KeyB");
     tab.key("ArrowRight");
-    tab.wait(&on_page("/pair/upright-0004/"));
+    tab.wait(&on_pair("upright-0004"));
     tab.key("ArrowLeft");
-    tab.wait(&on_page("/pair/upright-0003/"));
+    tab.wait(&on_pair("upright-0003"));
     let address = tab.eval("location.href");
     tab.open(&format!("{}3d/", address.as_str().expect("a URL")));
     tab.wait("document.querySelector('.scan-canvas canvas')");
     tab.eval("history.back(), null");
-    tab.wait(&on_page("/pair/upright-0003/"));
+    tab.wait(&on_pair("upright-0003"));
     // Every control can be reached.
     let unreachable = tab.eval(
         "[...document.querySelectorAll('a[href], button, input, select')].filter((one) => one.tabIndex < 0).length",
