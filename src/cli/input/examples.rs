@@ -3,7 +3,8 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 31] = [
+const EXAMPLES: [(&str, &str); 32] = [
+    ("app", "mocban app\nmocban app blocks"),
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100\nmocban demo whole --block",
