@@ -71,6 +71,7 @@ fn every_page_is_shown_and_links_only_to_this_server() {
         "/p/p/review",
         "/p/p/report",
         "/p/p/report/numbers",
+        "/p/p/review/agreement",
         "/p/p/export",
         "/p/p/settings",
         "/p/p/settings?key=run.workers&value=3",
@@ -81,7 +82,9 @@ fn every_page_is_shown_and_links_only_to_this_server() {
             let reply = page.get(&format!("{path}{join}language={language}"));
             let html = text(&reply);
             assert_eq!(reply.status, 200, "{path}: {html}");
-            let is_part = path.ends_with("numbers");
+            let is_part = ["numbers", "agreement"]
+                .iter()
+                .any(|end| path.ends_with(end));
             assert!(
                 is_part || html.contains(&format!("<html lang=\"{language}\"")),
                 "{path}"
@@ -299,6 +302,11 @@ fn a_reviewer_with_a_similar_name_is_asked_for() {
         queue.json()["items"]
             .as_array()
             .is_some_and(|items| items.len() >= 3)
+    );
+    let reviewers = text(&page.get("/p/p/review/agreement"));
+    assert!(
+        reviewers.contains("<th scope=\"row\">Lan</th>"),
+        "{reviewers}"
     );
     let judged = text(&page.get("/p/p/pairs?verdict=pass&metric=ensemble"));
     assert!(

@@ -4,10 +4,9 @@ use std::fs::File;
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
-use crate::error::{ProjectError, ProjectResult, WithContext as _};
-
 use super::exit::Refusal;
 use super::input_paths::in_existing_form;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use mocban_catalog::Catalog;
 use mocban_core::domain::{ErrorCode, sanitize};
 use mocban_export::EXPORT_MANIFEST;

@@ -22,6 +22,7 @@ mod pairs_page;
 mod pictures;
 mod projects;
 mod report_page;
+mod review_agreement;
 mod review_page;
 mod routes;
 mod run_actions;

@@ -1,6 +1,6 @@
-//! Reviews: who has judged what, and the start of a review.
+//! The start of a review, and the pages of reviewers.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use axum::extract::rejection::JsonRejection;
@@ -15,7 +15,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::address::{PageQuery, encoded};
-use super::components::{NavSection, action_form, choice, frame, grouped};
+use super::components::{NavSection, action_form, choice, frame};
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
 use super::projects::OpenProject;
@@ -24,7 +24,7 @@ use super::visit::Visit;
 use crate::local_server::AccessControl;
 use crate::review::{CheckRates, Language, QueueOptions, ReviewOptions, ReviewPages, key_map};
 use mocban_catalog::reviewer_name;
-use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict, one_line};
+use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_project::error::explanation;
 use mocban_project::location::{Location, now};
 use mocban_project::reviewers::similar_names;
@@ -56,26 +56,20 @@ pub(super) struct StartBody {
     is_new: String,
 }
 
-/// Shows the reviewers and the form that starts a review.
+/// Shows the form that starts a review; a script then asks for the reviewers.
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
     visit: Visit,
 ) -> AppResult<Html<String>> {
-    let open = state.open(&key).await?;
-    let log = open.catalog.verdict_log(None).await?;
-    let mut reviewers: BTreeMap<String, BTreeMap<Verdict, u64>> = BTreeMap::new();
-    for event in log.iter().filter(|event| event.undone_at.is_none()) {
-        let counts = reviewers.entry(event.reviewer.clone()).or_default();
-        *counts.entry(event.verdict).or_default() += 1;
-    }
+    state.open(&key).await?;
     let body = html! {
         p { (visit.t(
             "The question is always the same: is the rotation within 5 degrees, and is the whole character there? Results come in random order, without scores, and each answer is stored at once.",
             "Câu hỏi luôn như nhau: góc xoay có lệch không quá 5 độ, và chữ có đủ không? Kết quả xuất hiện theo thứ tự ngẫu nhiên, không kèm điểm, và mỗi câu trả lời được lưu ngay.",
         )) }
         (start_form(&visit))
-        @if !reviewers.is_empty() { (reviewer_table(&visit, &reviewers)) }
+        div #reviewers data-load="review/agreement" aria-live="polite" {}
     };
     let title = visit.t("Review", "Đánh giá");
     Ok(frame(&visit, title, Some(&key), NavSection::Review, &body))
@@ -110,26 +104,6 @@ fn start_form(visit: &Visit) -> Markup {
             button.primary { (visit.t("Start or continue", "Bắt đầu hoặc tiếp tục")) }
         },
     )
-}
-
-fn reviewer_table(visit: &Visit, reviewers: &BTreeMap<String, BTreeMap<Verdict, u64>>) -> Markup {
-    html! {
-        h2 { (visit.t("Reviewers", "Người đánh giá")) }
-        div.scroll tabindex="0" role="region" aria-label=(visit.t("Reviewers", "Người đánh giá")) {
-            table {
-                thead { tr {
-                    th scope="col" { (visit.t("Name", "Tên")) }
-                    @for verdict in Verdict::ALL { th scope="col" { (visit.verdict(verdict)) } }
-                } }
-                tbody { @for (name, counts) in reviewers {
-                    tr {
-                        th scope="row" { (one_line(name)) }
-                        @for verdict in Verdict::ALL { td.number { (grouped(counts.get(&verdict).copied().unwrap_or(0))) } }
-                    }
-                } }
-            }
-        }
-    }
 }
 
 /// Checks the fields of a review and replies with its address.

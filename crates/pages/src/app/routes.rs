@@ -8,7 +8,7 @@ use axum::{Router, middleware};
 use super::state::{AppOptions, AppState};
 use super::{
     assets, export_page, failure_page, health_page, home, import_page, pair_page, pairs_page,
-    pictures, report_page, review_page, run_actions, run_page, settings_page,
+    pictures, report_page, review_agreement, review_page, run_actions, run_page, settings_page,
 };
 
 /// Returns the routes of the app, for a server.
@@ -30,6 +30,7 @@ pub fn app_pages(options: AppOptions) -> Router {
             get(pair_page::scan_view_asset),
         )
         .route("/p/{project}/review", get(review_page::page))
+        .route("/p/{project}/review/agreement", get(review_agreement::part))
         .route("/import", get(import_page::page))
         .route("/actions/import", post(import_page::import))
         .route("/actions/demo", post(run_actions::demo))

@@ -1,0 +1,115 @@
+//! The reviewers of a project: how much each has judged, and how far they agree.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, State};
+use axum::response::Html;
+use maud::{Markup, html};
+
+use super::components::{grouped, score};
+use super::failure::AppResult;
+use super::state::AppState;
+use super::visit::Visit;
+use mocban_core::domain::one_line;
+use mocban_results::{Rate, ReviewerAgreement, ReviewerPair, ReviewerRecord, agreement};
+
+/// Responds with a part of the page of reviews. It reads all results, so the page loads it afterwards.
+pub(super) async fn part(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let found = agreement(&open.catalog).await?;
+    Ok(Html(agreement_part(&visit, &found).into_string()))
+}
+
+fn agreement_part(visit: &Visit, found: &ReviewerAgreement) -> Markup {
+    html! {
+        h2 { (visit.t("Reviewers", "Người đánh giá")) }
+        @if found.reviewers.is_empty() {
+            p.muted { (visit.t("Nobody has judged a result yet.", "Chưa ai đánh giá kết quả nào.")) }
+        } @else {
+            (reviewer_table(visit, &found.reviewers))
+            h2 { (visit.t("Agreement", "Mức độ thống nhất")) }
+            @if found.reviewer_pairs.is_empty() {
+                p.muted { (visit.t(
+                    "No two reviewers have judged the same result yet. A second person who starts with the same choices gets the same results.",
+                    "Chưa có hai người nào đánh giá cùng một kết quả. Người thứ hai bắt đầu với cùng các lựa chọn sẽ nhận cùng các kết quả.",
+                )) }
+            } @else {
+                (pair_table(visit, &found.reviewer_pairs))
+            }
+            @if found.conflicts > 0 {
+                p.notice { b { (grouped(found.conflicts)) } " " (visit.t(
+                    "results on which reviewers disagree wait for a third person: choose the order \"disagreements of two others\".",
+                    "kết quả có bất đồng đang chờ người thứ ba: hãy chọn thứ tự \"chỗ hai người khác bất đồng\".",
+                )) }
+            }
+        }
+    }
+}
+
+fn reviewer_table(visit: &Visit, reviewers: &[ReviewerRecord]) -> Markup {
+    let titles = [
+        visit.t("Name", "Tên"),
+        visit.t("results judged", "kết quả đã đánh giá"),
+        visit.t("planted errors caught", "lỗi cài sẵn được phát hiện"),
+        visit.t(
+            "same answer when shown twice",
+            "trả lời giống nhau khi xem lại",
+        ),
+    ];
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(visit.t("Reviewers", "Người đánh giá")) {
+            table {
+                thead { tr { @for (index, title) in titles.into_iter().enumerate() { th.number[index > 0] scope="col" { (title) } } } }
+                tbody { @for record in reviewers {
+                    tr {
+                        th scope="row" { (one_line(&record.reviewer)) }
+                        td.number { (grouped(record.judged)) }
+                        td.number { (rate(record.attention_checks.all)) }
+                        td.number { (rate(record.duplicates)) }
+                    }
+                } }
+            }
+        }
+    }
+}
+
+fn pair_table(visit: &Visit, pairs: &[ReviewerPair]) -> Markup {
+    let titles = [
+        visit.t("Reviewers", "Người đánh giá"),
+        visit.t("same results", "kết quả chung"),
+        visit.t("agreed", "thống nhất"),
+        "kappa",
+        "AC1",
+    ];
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(visit.t("Agreement", "Mức độ thống nhất")) {
+            table {
+                thead { tr { @for (index, title) in titles.into_iter().enumerate() { th.number[index > 0] scope="col" { (title) } } } }
+                tbody { @for pair in pairs {
+                    @let agreement = &pair.agreement;
+                    @let value = |value: Option<f64>| score(value.filter(|_| agreement.sufficient));
+                    tr {
+                        th scope="row" { (one_line(&pair.a)) ", " (one_line(&pair.b)) }
+                        td.number { (grouped(agreement.n)) }
+                        td.number { (grouped(agreement.agreed)) }
+                        td.number { (value(agreement.kappa)) }
+                        td.number { (value(agreement.ac1)) }
+                    }
+                } }
+            }
+        }
+        p.muted { (visit.t("Kappa and AC1 are shown from 30 results on.", "Kappa và AC1 chỉ hiện từ 30 kết quả trở lên.")) }
+    }
+}
+
+/// Returns a rate as a count of a count.
+fn rate(rate: Rate) -> String {
+    match rate.n {
+        0 => "–".to_owned(),
+        n => format!("{} / {n}", rate.count),
+    }
+}
