@@ -1,7 +1,7 @@
 //! `mocban` aligns 3D scans of carved woodblock characters with images of their prints.
 //!
 //! [`docs/architecture.md`](https://github.com/mocban/mocban/blob/main/docs/architecture.md) is the entrance to the code: a
-//! picture, five nouns, one line for each crate, and the way of a pair, a block, a verdict and an export.
+//! picture, six nouns, one line for each crate, and the way of a pair, a block, a verdict and an export.
 //!
 //! This package is the program. [`cli`] has one file per command, [`documentation`] the pages of `docs/`. Everything else is
 //! in the libraries below `crates/`, which are re-exported here under the names of their topics.

@@ -4,10 +4,10 @@
 //!   `audit`: checks and repairs; `transfer`: copies to another catalog; `db`: connections, statements, errors
 //! - A process has one write connection, which a task owns. It commits the requests of several pairs together, each at most
 //!   250 ms after it arrived. Reads use other connections and go on during a run. Callers pass the current time.
-//! - A statement has one text for both databases, which `db/dialect.rs` translates; claims and checkpoints have one for each.
-//!   In SQLite, a group of them is one transaction. In PostgreSQL, each is one statement that commits by itself, with one
-//!   array per column, and claims begin behind the last claimed pair, because a snapshot that another session holds would
-//!   keep dead rows in the way.
+//! - A statement has one text for both databases, which `db/dialect.rs` translates; claims, and checkpoints of pairs, have
+//!   one for each. In SQLite, a group of these of pairs is one transaction. In PostgreSQL, each is one statement that commits
+//!   by itself, with one array per column, and claims begin behind the last claimed pair, because a snapshot that another
+//!   session holds would keep dead rows in the way. For blocks, each is a transaction of its own.
 //! - If the server is unavailable, the writer reconnects and repeats its commit; the fencing token shows whether an earlier
 //!   attempt was stored. The write connection of a worker holds a lock, by which others see that it is gone.
 //! - Rows that no run can compute again, such as verdicts, have checksums (`records/checksums.rs`).

@@ -104,8 +104,6 @@ impl ListedItems {
 fn refuse_input(file: &Path, bytes: &[u8]) -> Result<(), Refusal> {
     let head = &bytes[..bytes.len().min(HEAD_BYTES)];
     let what = match FileKind::of(head) {
-        // The marks of other images are few letters, which a list may begin with.
-        FileKind::OtherImage(_) if head.is_ascii() => return Ok(()),
         kind @ (FileKind::Ply
         | FileKind::OtherMesh(_)
         | FileKind::Png

@@ -8,8 +8,8 @@
 //!
 //! Every call fails if the catalog, an input or an artifact cannot be read or written. `# Errors` names other reasons.
 //!
-//! **Invariant:** a kill at any moment costs at most the stages in progress, and a worker whose lease was lost stores
-//! nothing.
+//! **Invariant:** a kill at any moment costs at most the stages in progress, and a worker whose lease was lost stores no
+//! row. Files that it wrote before stay, until `check --repair` or `check --collect` removes those without a row.
 //!
 //! # A lost lease
 //!
@@ -17,36 +17,42 @@
 //!             claim                    checkpoint of the last stage
 //!   ready ------------> leased ------------------------------------> done
 //!     ^                  |  ^ |
-//!     |   release        |  | | checkpoint, heartbeat: the lease is renewed
+//!     |   release        |  | | checkpoint: the deadline of the next stage; heartbeat of the worker: its leases stay valid
 //!     +------------------+  +-+
 //!     |                  |
-//!     |                  | the worker sends no heartbeat for a lease (PostgreSQL: 7 s without its lock), or its stage is
-//!     |                  | overdue: recovery; or a repair or a new cut of its block resets the job
+//!     |                  | the worker sends no heartbeat for 50 s (PostgreSQL: 7 s without its lock; SQLite: at once, if
+//!     |                  | a run starts alone), or its stage is overdue: recovery; or a repair or a new cut of its block
+//!     |                  | resets the job
 //!     |   a new fencing token
 //!     +------------------+------------> quarantined, if the job has crashed too many workers
 //! ```
 //!
-//! | who finds out | by | what happens |
-//! |---|---|---|
-//! | `checkpointer.rs` | a checkpoint of a pair is refused | this and later results are dropped; the stage that runs is cancelled |
-//! | `block/checkpoint.rs`, `block/task.rs` | a checkpoint of a block, or the versions of its files, are refused | the task ends; no stage runs meanwhile |
-//! | `pair_failure.rs`, `block/checkpoint.rs` | a failure is refused | the failure is not stored |
-//! | `worker_session.rs` | a heartbeat is refused | all stages that run are cancelled (`scheduler.rs`, `prefetch.rs`); the process releases what it has not started, registers as a new worker, and recovers the jobs of its old id |
-//! | `checkpointer.rs`, `block/checkpoint.rs` | files were written more than 30 minutes ago (pairs on a server, blocks) | nothing is stored; the job stays leased to this worker, which claims it again |
-//! | `checkpointer.rs` | a release is refused | the pair ends as `LeaseLost`; a block ends as released |
+//! A lease is valid while the last heartbeat of its worker is at most 50 s old (`RunContext::alive_since`) and its job has its
+//! token. A checkpoint does not renew it. A passed deadline ends nothing by itself: another worker recovers the job if a
+//! heartbeat comes more than 60 s after the deadline.
 //!
-//! The pair or block ends as `LeaseLost`, which counts neither as done nor as failed. Stages stored before stay. The job of a
-//! retired pair is removed, which ends its lease too. A pair that another worker recovered runs alone until its next stage
-//! is stored, because it may have killed the worker. `liveness.rs` decides
-//! when a worker counts as dead, `timing.rs` has the times, and the statements are in
-//! `crates/catalog/src/queue`. If heartbeats fail with an error for as long as a lease lasts, the run finishes the stages in
-//! progress and ends with that error.
+//! | who finds out | by | refused by (in `crates/catalog/src`) | what happens |
+//! |---|---|---|---|
+//! | `checkpointer.rs` | a checkpoint of a pair is refused | SQLite: `ADVANCE` in `queue/checkpoint.rs`; PostgreSQL: `queue/server_checkpoint.rs` | this and later results are dropped; the stage that runs is cancelled |
+//! | `block/checkpoint.rs` | a checkpoint of a block is refused | `ADVANCE`; then `IS_DONE` in `blocks/cut.rs` finds a cut that was stored without a reply | the task ends; no stage runs meanwhile |
+//! | `block/task.rs` | the versions of the files of a block are refused | `LEASED` in `blocks/queue.rs` | the same |
+//! | `pair_failure.rs`, `block/checkpoint.rs` | a failure is refused | `FAIL` in `queue/fail.rs` | the failure is not stored |
+//! | `worker_session.rs` | a heartbeat is refused | `HEARTBEAT` in `queue/claim.rs` | `prefetch.rs` releases what has not started; the process registers as a new worker, and recovers the jobs of its old id. The new id ends the waits for `RunContext::expired`, which cancels the stages that run: in `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of `block/task.rs` |
+//! | the catalog | files were written more than 30 minutes ago | pairs on PostgreSQL: `is_late` in `queue/commit/server_commit.rs`; blocks: `store` in `queue/checkpoint.rs`; pairs on SQLite: not checked | nothing is stored; the job stays leased to this worker, which claims it again. Here it looks like a refused checkpoint, and the log says that another worker may have the pair |
+//! | `checkpointer.rs`, `block/task.rs` | a release is refused | `RELEASE` in `queue/claim.rs` | the pair ends as `LeaseLost`, the block as `Released` |
+//!
+//! Except for this block, a pair or block that ran ends as `LeaseLost`, which counts neither as done nor as failed. Stages
+//! stored before stay. On PostgreSQL, `queue/commit/known_leases.rs` finds refused writes of pairs that an earlier commit
+//! without a reply has stored. The job of a retired pair is removed, which ends its lease too. A pair that another worker
+//! recovered runs alone until its next stage is stored, because it may have killed the worker. `liveness.rs` decides when a
+//! worker counts as dead, and `timing.rs` has the times. If heartbeats fail with an error for as long as a lease lasts, the
+//! run finishes the stages in progress and ends with that error.
 //!
 //! # Cancellation
 //!
-//! A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled: inner loops poll the token of their thread
-//! ([`mocban_core::domain::cancel`]) and unwind to `compute_thread.rs`, which waits for the end of the thread before its
-//! memory is given to others. Work on other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
+//! A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled: inner loops poll the
+//! token of their thread ([`mocban_core::domain::cancel`]) and unwind to `compute_thread.rs` (`block/task.rs`), which waits
+//! for the end of the thread before its memory is given to others. Work on other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
 
 mod artifacts_owner;
 mod block;

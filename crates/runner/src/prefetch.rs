@@ -1,5 +1,5 @@
-//! The pairs that this process has leased: running pairs, and a queue of pairs that start when a slot becomes free.
-//! With the queue, no core waits for a claim.
+//! Claims pairs, queues them, and limits the memory of pairs and blocks. Holds the pairs that this process has leased:
+//! running pairs, and a queue of pairs that start when a slot becomes free. With the queue, no core waits for a claim.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;

@@ -86,14 +86,16 @@ impl RunContext {
         *self.worker.borrow()
     }
 
-    /// Waits until this process works under another id than `worker`, whose leases have expired.
+    /// Waits until this process works under another id than `worker`, whose leases have expired. The scheduler changes the id
+    /// after a refused heartbeat; what waits here is cancelled: stages of pairs by `Checkpointer::closed`, and those of blocks
+    /// by `on_thread` in `block/task.rs`.
     pub(super) async fn expired(&self, worker: WorkerId) {
         let mut now = self.worker.subscribe();
         // The sender lives in `self`, so the channel cannot close while this waits.
         let _ = now.wait_for(|now| *now != worker).await;
     }
 
-    /// Returns when a stage that begins now has to be finished.
+    /// Returns when a stage that begins now has to be finished: the `deadline` of its lease, which is used only to recover it.
     pub(super) fn deadline(&self) -> UnixMillis {
         self.clock.now() + self.stage_timeout.as_millis() as i64
     }

@@ -13,11 +13,13 @@ use mocban_core::domain::{
 };
 use mocban_system::failpoint;
 
-/// The right to run stages of one pair or block. A claim creates the lease, and a checkpoint continues it. Results and
-/// failures of stages are stored only under a valid lease.
+/// The right to run stages of one pair or block. A claim creates the lease, and a checkpoint continues it with the next
+/// stage. Results and failures of stages are stored only under a valid lease: the worker has not ended, its last heartbeat is
+/// recent, and the job has the token of the lease. The deadline in the row of the job is used only to recover it.
 ///
-/// `token` is the fencing token: the number of the job's owner. A claim, a recovery, a repair and a new cut increase the
-/// token in the row of the job. A write names the token of its lease, and is refused if the row has another.
+/// `token` is the fencing token: the number of the job's owner. A claim, a recovery, a repair, a new cut and the return of a
+/// retired pair increase the token in the row of the job. A write names the token of its lease, and is refused if the row
+/// has another.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Lease<K: JobKind = PairJob> {
     pub(crate) unit: K::Unit,

@@ -134,7 +134,7 @@ impl FileKind {
         }
         let found = SIGNATURES
             .iter()
-            .find(|(signature, _)| bytes.starts_with(signature))
+            .find(|(signature, kind)| bytes.starts_with(signature) && !is_text(kind, bytes))
             .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind);
         Self::scene_within(found, bytes).unwrap_or(found)
     }
@@ -153,7 +153,7 @@ impl FileKind {
             Self::Other("XML or HTML text") if has("<X3D") => "an X3D scene",
             Self::Text if is_off(head) => "an OFF mesh",
             Self::Text if head.trim_ascii_start().starts_with(b"{") => {
-                return (has("\"asset\"") && has("\"version\"")).then_some(GLTF);
+                return (has_gltf_asset(head) || has_gltf_asset(tail)).then_some(GLTF);
             }
             _ => return None,
         };
@@ -234,6 +234,28 @@ impl FileKind {
         let name = text.strip_prefix("a ").or(text.strip_prefix("an "));
         name.unwrap_or(text)
     }
+}
+
+/// Returns whether a text only begins like an image: the signatures of some images are few letters.
+fn is_text(kind: &FileKind, bytes: &[u8]) -> bool {
+    matches!(kind, FileKind::OtherImage(_)) && FileKind::without_signature(bytes) == FileKind::Text
+}
+
+/// Returns whether a part of a JSON file has the member that each glTF scene has, an object `asset` with a `version`.
+/// Labels of images and lists of pairs may have members of these names with other values.
+fn has_gltf_asset(json: &[u8]) -> bool {
+    const NAME: &[u8] = b"\"asset\"";
+    let mut places = json.windows(NAME.len()).enumerate();
+    places.any(|(at, name)| {
+        let value = json[at + NAME.len()..].trim_ascii_start();
+        let value = value.strip_prefix(b":").unwrap_or_default();
+        let Some(members) = value.trim_ascii_start().strip_prefix(b"{") else {
+            return false;
+        };
+        let members = members.split(|byte| *byte == b'}').next();
+        let mut words = members.unwrap_or_default().windows(9);
+        name == NAME && words.any(|word| word == b"\"version\"")
+    })
 }
 
 /// Returns whether the first word of a text, which comments may precede, is `OFF` or names one of its variants.
@@ -353,6 +375,10 @@ mod tests {
                     "off we go",
                     "{\"images\": []}",
                     "# OFF\n1 2 3\n",
+                    "BM,mesh,print\nvạn,a.stl,a.png\n",
+                    "GIF8,mesh\n",
+                    "{\"asset\": \"a1\", \"mesh\": \"a.stl\", \"version\": 2}\n",
+                    "{\"asset\": {\"name\": \"p1.jpg\"}, \"regions\": [], \"version\": \"2.1\"}",
                 ]
                 .map(|text| text.as_bytes().to_vec())
                 .to_vec(),

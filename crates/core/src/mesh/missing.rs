@@ -56,9 +56,8 @@ impl PositionCheck {
     /// Checks some more vertices.
     #[inline]
     pub(super) fn add<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
-        let values = positions.as_flattened().iter().map(|value| (*value).into());
-        let is_usual = |value: f64| (value.abs() > 0.0) & (value.abs() < f64::INFINITY);
-        if !values.fold(true, |usual, value| usual & is_usual(value)) {
+        let values = positions.as_flattened().iter();
+        if !values.fold(true, |usual, value| usual & value.is_usual()) {
             self.is_finite &= are_finite(positions);
             self.origins += origins(positions);
         }
@@ -122,10 +121,24 @@ impl PositionCheck {
 }
 
 /// A coordinate of 32 or 64 bits, which is 0 by default.
-pub(super) trait CoordinateValue: Copy + Into<f64> + PartialEq + Default {}
+pub(super) trait CoordinateValue: Copy + Into<f64> + PartialEq + Default {
+    /// Returns whether a value is neither 0 nor NaN nor infinite.
+    fn is_usual(self) -> bool;
+}
 
-impl CoordinateValue for f32 {}
-impl CoordinateValue for f64 {}
+impl CoordinateValue for f32 {
+    #[inline]
+    fn is_usual(self) -> bool {
+        (self.abs() > 0.0) & (self.abs() < Self::INFINITY)
+    }
+}
+
+impl CoordinateValue for f64 {
+    #[inline]
+    fn is_usual(self) -> bool {
+        (self.abs() > 0.0) & (self.abs() < Self::INFINITY)
+    }
+}
 
 /// Returns whether no coordinate is NaN or infinite.
 #[inline(never)] // As a loop of its own, it is vectorized.

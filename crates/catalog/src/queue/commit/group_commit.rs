@@ -1,4 +1,5 @@
-//! Group commit: stores a batch of requests in one transaction. On a server, only the rarer requests share one.
+//! Group commit: stores a batch of requests in one transaction. On a server, only the rarer requests share one. Requests for
+//! blocks are not grouped.
 
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! The layout of an XYZ file: its title, its columns, and what its commas mean.
 
 use crate::mesh::MeshError;
-use crate::mesh::text;
+use crate::mesh::{decimal, text};
 
 /// Most cells of a title that are read.
 const MAX_NAMES: usize = 64;
@@ -95,7 +95,7 @@ impl PointLayout {
     /// Parses the coordinates of a point; the error is a message.
     pub(super) fn position(&self, line: &[u8]) -> Result<[f64; 3], String> {
         if self.commas == CommaUse::Separator && self.columns == [0, 1, 2] {
-            return text::position(cells(line));
+            return plain_position(line).map_or_else(|| text::position(cells(line)), Ok);
         }
         if self.commas == CommaUse::Unclear && line.contains(&b',') {
             let reason =
@@ -136,6 +136,25 @@ impl PointLayout {
             CommaUse::Separator | CommaUse::Unclear => cells.next(),
         })
     }
+}
+
+/// Parses three short numbers with simple separators, as in almost every line. Returns `None` for all other lines.
+#[inline]
+fn plain_position(line: &[u8]) -> Option<[f64; 3]> {
+    let mut position = [0.0; 3];
+    let mut rest = line;
+    for value in &mut position {
+        while let [b' ' | b'\t', next @ ..] = rest {
+            rest = next;
+        }
+        (*value, rest) = decimal::parse(rest)?;
+        rest = match rest {
+            [] | [b' ' | b'\t', ..] => rest,
+            [b',' | b';', next @ ..] => next,
+            _ => return None,
+        };
+    }
+    Some(position)
 }
 
 /// Returns whether a file that begins with this line may be a point set.
@@ -301,4 +320,48 @@ fn cells(line: &[u8]) -> impl Iterator<Item = &[u8]> {
             &line[start..end]
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{cells, plain_position};
+    use crate::mesh::text;
+
+    #[test]
+    fn plain_lines_have_the_numbers_of_their_cells() {
+        let numbers = [
+            "1",
+            "-2.5",
+            "0.1234567",
+            "1e3",
+            "",
+            "nan",
+            "+4",
+            "12345678901234567890",
+            "x",
+        ];
+        let separators = [" ", ",", ";", "\t", " , ", ", ", "  ", ";;", ""];
+        let (mut plain, mut other) = (0, 0);
+        for code in 0..9_usize.pow(5) {
+            let choice = |place: u32| code / 9_usize.pow(place) % 9;
+            let [a, b, c] = [0, 1, 2].map(|place| numbers[choice(place)]);
+            let (first, second) = (separators[choice(3)], separators[choice(4)]);
+            let line = format!("{a}{first}{b}{second}{c}{}", ["", " 7", ",9"][code % 3]);
+            match plain_position(line.trim_ascii_start().as_bytes()) {
+                Some(position) => {
+                    plain += 1;
+                    assert_eq!(
+                        Ok(position),
+                        text::position(cells(line.as_bytes())),
+                        "{line}"
+                    );
+                }
+                None => other += 1,
+            }
+        }
+        assert!(
+            plain > 1000 && other > 1000,
+            "{plain} plain lines, {other} others"
+        );
+    }
 }

@@ -290,7 +290,7 @@ mod tests {
         );
         for (bytes, says) in [
             (
-                &b"GIF89a......"[..],
+                &b"GIF89a\x01\0\x01\0\x80.."[..],
                 "the file is a GIF image; PNG, JPEG and TIFF images are read: convert them, such as \
                 with ImageMagick: `magick mogrify -format png *.gif`",
             ),
