@@ -8,7 +8,7 @@ use super::page_ink::PageInk;
 const MAX_ON_OUTLINE: f64 = 0.35;
 /// The labels belong to the mirrored or turned page if the part is smaller there: at most this fraction, and by this
 /// difference, which right labels of a page that is nearly symmetric do not reach.
-const MAX_CHANGED: f64 = 0.5;
+const MAX_CHANGED: f64 = 0.65;
 const MIN_DIFFERENCE: f64 = 0.05;
 /// Points along each side of a box, and along each side of the grid inside it.
 const POINTS: usize = 24;

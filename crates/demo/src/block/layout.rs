@@ -377,13 +377,20 @@ mod tests {
         assert!(count(BlockKind::Sparse).0 * 3 < plain);
         assert!(count(BlockKind::BrokenRules).1 > 3 * rules);
         let text = |page: &PageLayout| {
-            let full = page.cells.iter().filter(|cell| !cell.is_note && !cell.is_strip);
+            let full = page
+                .cells
+                .iter()
+                .filter(|cell| !cell.is_note && !cell.is_strip);
             full.map(|cell| cell.em_mm).fold(0.0, f64::max)
         };
         for page in layouts(BlockKind::TallNotes) {
             let usual = text(&page);
             for note in page.cells.iter().filter(|cell| cell.is_note) {
-                assert!(note.em_mm > 0.55 * usual && note.stretch <= 1.0, "{}", note.name);
+                assert!(
+                    note.em_mm > 0.55 * usual && note.stretch <= 1.0,
+                    "{}",
+                    note.name
+                );
             }
         }
     }

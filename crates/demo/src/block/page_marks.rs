@@ -213,7 +213,8 @@ mod tests {
         };
         let covered = |kind: BlockKind, seed: u64| {
             let marks = PageMarks::draw(&kind.ranges().looks, text, &mut part_rng(seed, 0));
-            let points = (-140..140).flat_map(|u| (-100..100).map(move |v| [f64::from(u), f64::from(v)]));
+            let points =
+                (-140..140).flat_map(|u| (-100..100).map(move |v| [f64::from(u), f64::from(v)]));
             points.filter(|point| marks.at(*point).is_some()).count()
         };
         for seed in 0..6 {

@@ -36,7 +36,7 @@ const MIN_SIDE: f64 = 0.25;
 const STRIP_WIDTH: f64 = 0.9;
 /// Largest thickness of a piece of a rule, and largest length of one along the rows, in pitches.
 const THIN: f64 = 0.14;
-const LEVEL_STROKE: f64 = 0.5;
+const LEVEL_STROKE: f64 = 0.6;
 /// Least mean relief below the ink of a character.
 const MIN_SUPPORT: f64 = 0.08;
 /// Largest fraction of a character's strokes where the page does not show the block.
