@@ -173,7 +173,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
         let (depth, level, map) = relief(dir, &pair, fault).await?;
         let artifacts = PairArtifacts::new(&pair.project, &pair.pair);
         let print = SourcePrint::read(&pair.project, &pair.pair, &ImageLimits::SUGGESTED)?.picture;
-        let masks = PrintMasks::from_grey(&artifacts.print_grey()?, artifacts.print_enlargement()?);
+        let masks = PrintMasks::from_grey(&artifacts.print_grey()?, artifacts.mask_scale()?);
         let view = PrintView::of_side(&print, SIDE);
         let folder = target.join(name);
         std::fs::create_dir_all(&folder)?;

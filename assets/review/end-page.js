@@ -36,12 +36,21 @@ export async function showEnd(heading, hasItems) {
   if (!response?.ok || element.hidden) return;
   const summary = await response.json();
   const command = (text) => create("code", `${summary.command} ${text}`);
+  const page = (name, text) => {
+    const link = create("a", text);
+    link.href = `${summary.project_page}${name}`;
+    return create("p", "", link);
+  };
   element.replaceChildren(
     create("h2", translate("summary")),
     create("ul", "", ...lines(summary).map((text) => create("li", text))),
     create("h3", translate("next_steps")),
-    create("p", `${translate("next_report")} `, command("report -o report.html")),
-    create("p", `${translate("next_reviewer")} `, command(summary.next_reviewer)),
+    ...(summary.project_page
+      ? [page("report", translate("open_report")), page("review", translate("open_review"))]
+      : [
+        create("p", `${translate("next_report")} `, command("report -o report.html")),
+        create("p", `${translate("next_reviewer")} `, command(summary.next_reviewer)),
+      ]),
   );
   element.dataset.ready = "true";
 }

@@ -7,11 +7,13 @@ const STORAGE_KEY = "mocban-pending";
 export const MAX_PENDING = 3;
 const FIRST_DELAY_MS = 300;
 const MAX_DELAY_MS = 4000;
+/** Path of the review below that of the session: empty, or that of a project in the app. */
+const PLACE = location.pathname.replace(/^\/s\/[0-9a-f]{64}\//, "");
 
 export class RetryQueue {
   /** Calls `onChange(pendingCount, problem)` when either changes, and `onReject(request, why)` if the server refuses. */
   constructor(reviewer, onChange, onReject) {
-    this.storageKey = `${STORAGE_KEY}:${reviewer}`;
+    this.storageKey = [STORAGE_KEY, reviewer, PLACE].filter(Boolean).join(":");
     this.onChange = onChange;
     this.onReject = onReject;
     this.requests = this.restore();
@@ -99,7 +101,7 @@ export class RetryQueue {
     const session = localStorage.getItem("mocban-session");
     if (!session || location.pathname.startsWith(session)) return;
     this.isMoving = true;
-    location.replace(session);
+    location.replace(session + PLACE);
   }
 
   wait(ms) {

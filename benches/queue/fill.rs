@@ -11,7 +11,8 @@ const COPIES: [&str; 5] = [
     SELECT j.pair, r.stage, r.fingerprint, r.mesh_hash, r.print_hash, r.attributes, r.outcome, r.files, r.result_hash, r.ms,
         r.worker, r.at
     FROM job AS j CROSS JOIN stage_result AS r ON r.pair = 1 WHERE j.pair > ?1 AND j.pair <= ?2",
-    "INSERT INTO metric_result (pair, metric, result_hash) SELECT j.pair, m.metric, m.result_hash
+    "INSERT INTO metric_result (pair, metric, result_hash, confidence, iou)
+    SELECT j.pair, m.metric, m.result_hash, (j.pair * 7919 % 100000) / 100000.0, (j.pair * 104729 % 100000) / 100000.0
     FROM job AS j CROSS JOIN metric_result AS m ON m.pair = 1 WHERE j.pair > ?1 AND j.pair <= ?2",
     "INSERT INTO attempt (pair, stage, worker, ms, at)
     SELECT j.pair, a.stage, a.worker, a.ms, a.at

@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`. In SQLite before 3.45, `json_valid(NULL)` is 0, so checks of columns that may be NULL ask for NULL first.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 14;
+PRAGMA user_version = 15;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -50,6 +50,8 @@ CREATE TABLE pair (
     print_stat TEXT,
     imported INTEGER NOT NULL
 ) STRICT;
+CREATE INDEX pair_block ON pair (block) WHERE block IS NOT NULL;
+CREATE INDEX pair_character ON pair (character) WHERE character IS NOT NULL;
 
 -- One hot row per pair: a cursor over the four stages. `fingerprint` is that of the result before the cursor;
 -- `dirty` marks a job whose results may not agree with that fingerprint's chain or with the pair's inputs.
@@ -92,6 +94,7 @@ CREATE TABLE failure (
     attributes TEXT,
     at INTEGER NOT NULL
 ) STRICT;
+CREATE INDEX failure_class ON failure (class);
 
 -- Every attempt of every stage; old ones are pruned when a pair fails often.
 CREATE TABLE attempt (
@@ -126,13 +129,17 @@ CREATE TABLE stage_result (
 ) STRICT;
 
 -- The hash of the current result of each threshold metric, by which verdicts refer to it. The scores are in the outcome of
--- the last stage.
+-- the last stage; those by which lists are sorted are here too.
 CREATE TABLE metric_result (
     pair INTEGER NOT NULL REFERENCES pair (id),
     metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),
     result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
+    confidence REAL,
+    iou REAL,
     PRIMARY KEY (pair, metric)
 ) STRICT;
+CREATE INDEX metric_result_confidence ON metric_result (metric, confidence, pair);
+CREATE INDEX metric_result_iou ON metric_result (metric, iou, pair);
 
 -- Actions of reviewers. Each belongs to one reviewer, and so does all that refers to it.
 CREATE TABLE review_act (
@@ -164,6 +171,7 @@ CREATE TABLE verdict (
 ) STRICT;
 CREATE INDEX verdict_pair ON verdict (pair, metric, reviewer, id);
 CREATE INDEX verdict_act ON verdict (act);
+CREATE INDEX verdict_value ON verdict (verdict, pair);
 CREATE UNIQUE INDEX verdict_event ON verdict (event, metric) WHERE event IS NOT NULL;
 CREATE TABLE verdict_undo (
     act INTEGER PRIMARY KEY,

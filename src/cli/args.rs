@@ -8,8 +8,8 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use super::commands::{
-    align, backup, check, completions, config, contact_sheet, copy, db, demo, docs, export, import,
-    man, report, restore, retire, retry, review, run, show, status, verdict, view, worker,
+    align, app, backup, check, completions, config, contact_sheet, copy, db, demo, docs, export,
+    import, man, report, restore, retire, retry, review, run, show, status, verdict, view, worker,
 };
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
@@ -70,6 +70,8 @@ pub(super) enum Command {
     /// Record and list people's verdicts on the results
     #[command(subcommand)]
     Verdict(verdict::VerdictCommand),
+    /// Open the projects of a folder in the browser: runs, pairs, reviews
+    App(app::AppArgs),
     /// Judge results in the browser with the keyboard, and align pairs manually
     Review(review::ReviewArgs),
     /// Show a scan in 3D with its print on it, or the page of a block, in the browser

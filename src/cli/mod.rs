@@ -13,7 +13,7 @@ use tokio::runtime::{Builder, Runtime};
 
 use args::Command;
 use commands::{
-    agreement, align, backup, check, completions, config, contact_sheet, copy, db, demo, docs,
+    agreement, align, app, backup, check, completions, config, contact_sheet, copy, db, demo, docs,
     export, import, man, report, restore, retire, retry, review, run, show, status, verdict, view,
     worker,
 };
@@ -95,6 +95,7 @@ async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode
         Command::Db(command) => db::db(command, context).await,
         Command::Restore(args) => restore::restore(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
+        Command::App(args) => app::app(args, context).await,
         Command::Review(args) => review::review(args, context).await,
         Command::View(args) => view::view(args, context).await,
         Command::Agreement => agreement::agreement(context).await,

@@ -20,6 +20,7 @@ const PAGES: &[(&str, &str)] = of_docs! {
     "explanation/benchmarks.md",
     "explanation/method.md",
     "explanation/queue.md",
+    "guides/app.md",
     "guides/blocks.md",
     "guides/cluster.md",
     "guides/demo.md",
@@ -40,11 +41,14 @@ const PAGES: &[(&str, &str)] = of_docs! {
     "vi/gio-dau-tien.md",
     "vi/python.md",
     "vi/thuat-ngu.md",
+    "vi/ung-dung.md",
 };
 
 /// The pictures of the pages.
 const PICTURES: &[(&str, &[u8])] = of_docs! {
     include_bytes:
+    "pictures/app-vi.jpg",
+    "pictures/app.jpg",
     "pictures/block-overlay.jpg",
     "pictures/block.jpg",
     "pictures/guide-vi.jpg",

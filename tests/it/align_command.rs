@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use image::imageops::FilterType;
 use mocban::export::ALIGNMENT_FILES;
 use serde_json::Value;
 
@@ -109,6 +110,47 @@ fn levelled_pairs_that_equal_a_project(tier: &str) -> usize {
     }
     assert_eq!(compared, 4);
     levelled
+}
+
+#[test]
+fn a_large_print_is_aligned_like_a_small_one() {
+    const TIMES: u32 = 7;
+    let dir = empty();
+    let demo = ["demo", "d", "--tier", "pose", "--pairs", "1", "--no-run"];
+    mocban(dir.path(), &demo).expect(0);
+    let (mesh, small) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0000.png");
+    let print = image::open(dir.path().join(small))
+        .expect("a print")
+        .to_luma8();
+    let [width, height] = [print.width(), print.height()].map(|side| side * TIMES);
+    assert!(width * height > 2000 * 2000, "{width} x {height}");
+    let large = image::imageops::resize(&print, width, height, FilterType::CatmullRom);
+    large.save(dir.path().join("large.png")).expect("written");
+    let align = |print: &str, to: &str| {
+        let args = ["align", mesh, print, "--json", "-o", to];
+        mocban(dir.path(), &args).expect(0).json()
+    };
+    let (one, other) = (align(small, "one"), align("large.png", "other"));
+    let number = |found: &Value, name: &str| found[name].as_f64().expect("a number");
+    let scales = number(&other, "scale") / number(&one, "scale");
+    assert!((scales / f64::from(TIMES) - 1.0).abs() < 0.005, "{scales}");
+    let turned = number(&other, "rotation_deg") - number(&one, "rotation_deg");
+    assert!(turned.abs() < 0.3, "{turned}");
+    // The stored masks are smaller than the print; the written ones are not.
+    let mask = |of: &str| {
+        let path = dir.path().join(of).join("print_mask.png");
+        image::open(path).expect("a mask").to_luma8()
+    };
+    let (one, other) = (mask("one"), mask("other"));
+    assert_eq!([other.width(), other.height()], [width, height]);
+    let enlarged = image::imageops::resize(&one, width, height, FilterType::Nearest);
+    let pixels = other.pixels().zip(enlarged.pixels());
+    let (mut both, mut any) = (0, 0);
+    for (a, b) in pixels {
+        both += u32::from(a[0] > 127 && b[0] > 127);
+        any += u32::from(a[0] > 127 || b[0] > 127);
+    }
+    assert!(f64::from(both) > 0.93 * f64::from(any), "{both} of {any}");
 }
 
 #[test]

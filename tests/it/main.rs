@@ -4,6 +4,8 @@ mod accessible;
 mod agreement;
 mod align_command;
 mod all_pages;
+mod app;
+mod app_browser;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;

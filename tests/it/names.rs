@@ -177,3 +177,27 @@ fn a_misspelt_column_is_named() {
         refused.err
     );
 }
+
+#[test]
+fn folders_and_files_of_the_command_line_are_found_in_any_form() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    mocban(dir.path(), &["demo", "d", "--pairs", "1", "--no-run"]).expect(0);
+    let on_disk = |name: &str| dir.path().join(name.nfd().collect::<String>());
+    for (from, to) in [("meshes", "lưới"), ("prints", "bản in")] {
+        fs::rename(dir.path().join("d/data").join(from), on_disk(to)).expect("renamed");
+    }
+    let import = [
+        "-C", "p", "import", "--meshes", "lưới", "--prints", "bản in",
+    ];
+    let outcome = mocban(dir.path(), &[&import[..], &["--json"]].concat());
+    assert_eq!(outcome.expect(0).json()["added"], 1);
+    fs::write(
+        on_disk("danh sách.csv"),
+        "id,mesh,print\nmột,lưới/upright-0000.ply,bản in/upright-0000.jpg\n",
+    )
+    .expect("written");
+    let list = ["-C", "q", "import", "danh sách.csv", "--json"];
+    assert_eq!(mocban(dir.path(), &list).expect(0).json()["added"], 1);
+    let files = ["lưới/upright-0000.ply", "bản in/upright-0000.jpg"];
+    mocban(dir.path(), &[&["align"], &files[..]].concat()).expect(0);
+}

@@ -97,6 +97,7 @@ pub use records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageCounts,
     StageRecord, StatusCounts, StoredFailure,
 };
+pub use records::pair_list::{PairCursor, PairFilter, PairListPage, PairOrder};
 pub use records::pair_results::ResultPages;
 pub use records::pair_work::{KnownInputs, PairWork};
 pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};

@@ -15,6 +15,7 @@ use crate::queue::recovery;
 use crate::queue::requeue;
 use crate::queue::staleness;
 use crate::queue::workers;
+use crate::records::pair_list;
 use crate::records::pair_results;
 use crate::records::pair_work;
 use crate::records::stage_results;
@@ -199,6 +200,16 @@ async fn pages_of_results_are_searched_by_key() {
     ] {
         let plan = plan(sql).await;
         assert_only(&plan, &["VIRTUAL TABLE"]);
+    }
+}
+
+#[tokio::test]
+async fn lists_of_pairs_read_part_of_an_index_in_its_order() {
+    for (name, sql) in pair_list::statements() {
+        let plan = plan(sql).await;
+        assert_only(&plan, &["SCAN c", "VIRTUAL TABLE"]);
+        let sorts = plan.iter().any(|line| line.contains("TEMP B-TREE"));
+        assert!(!sorts, "{name}: {plan:?}");
     }
 }
 

@@ -6,6 +6,7 @@
 //! **Invariant:** every value has a type, a range and an origin, and no password is in any layer.
 
 mod document;
+mod edit;
 mod error;
 mod local;
 mod passwords;
@@ -14,6 +15,7 @@ mod sources;
 mod tree;
 
 pub use document::{Config, ReviewSettings, RunSettings, StorageSettings};
+pub use edit::with_setting;
 pub use error::{ConfigError, Origin};
 pub use local::{LocalSettings, make_local};
 pub use sources::{BaseLayer, Preset, Sources, explanation};

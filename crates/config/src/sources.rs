@@ -266,7 +266,7 @@ fn find_preset(name: &Value, origin: &Origin) -> Result<Preset, ConfigError> {
     })
 }
 
-fn parse(text: &str, origin: &Origin) -> Result<Table, ConfigError> {
+pub(super) fn parse(text: &str, origin: &Origin) -> Result<Table, ConfigError> {
     text.parse::<Table>().map_err(|error| {
         let before = error
             .span()

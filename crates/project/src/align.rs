@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 use crate::error::{ProjectResult, TaskStopped};
 use crate::exit::Refusal;
 use crate::generated_folder::GeneratedFolder;
+use crate::input_paths::in_existing_form;
 use crate::location::Location;
 use mocban_align::scan_size;
 use mocban_align::stages::{AlignedPair, Print, Scan, ScanHints, Settings};
@@ -131,7 +132,7 @@ pub fn align_pair(
 
 /// Reads a mesh. The inner error is that of its content.
 pub fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failure>, Refusal> {
-    let input = Input::file(path.to_owned());
+    let input = Input::file(in_existing_form(path));
     let opened = open_input(&input, limits.mesh.max_bytes, "limits.mesh.max_bytes");
     let mut file = opened.map_err(|error| unreadable(&error))?;
     let (size, name) = (file.size(), path.to_string_lossy());
@@ -146,7 +147,7 @@ pub fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failu
 
 /// Reads a print. The inner error is that of its content.
 pub fn read_print(path: &Path, limits: &InputLimits) -> Result<Result<Print, Failure>, Refusal> {
-    let input = Input::file(path.to_owned());
+    let input = Input::file(in_existing_form(path));
     let read = read_input(&input, limits.image.max_bytes, "limits.image.max_bytes");
     let file = read.map_err(|error| unreadable(&error))?;
     let decoded = raster::decode(&file.bytes, &limits.image);

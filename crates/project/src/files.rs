@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use super::exit::Refusal;
+use super::input_paths::in_existing_form;
 use mocban_catalog::Catalog;
 use mocban_core::domain::{ErrorCode, sanitize};
 use mocban_export::EXPORT_MANIFEST;
@@ -21,7 +22,7 @@ const MAX_LIST_BYTES: u64 = 512 << 20;
 
 /// Reads a list that is named on the command line, from a file or a pipe.
 pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
-    read_file_or_pipe(path, MAX_LIST_BYTES)
+    read_file_or_pipe(&in_existing_form(path), MAX_LIST_BYTES)
         .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))
 }
 

@@ -8,7 +8,7 @@ use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, ListFile};
 use crate::import_pairs::{AllowedChanges, PairSource};
-use crate::input_paths::SimilarFiles;
+use crate::input_paths::{SimilarFiles, in_existing_form};
 use crate::location::{Location, now};
 use crate::manifest_file::{locate_file, refuse};
 use crate::missing_files::MissingFiles;
@@ -78,6 +78,7 @@ impl ListedItems {
     /// Reads a list, or a sheet of a workbook, and decides from its header what it names. Returns a warning about other
     /// sheets, too.
     pub fn of(file: &Path, sheet: Option<&str>) -> ProjectResult<(Self, Option<String>)> {
+        let file = &*in_existing_form(file);
         let pairs = |bytes| PairSource::List {
             file: file.to_owned(),
             bytes,

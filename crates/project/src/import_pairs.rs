@@ -176,7 +176,8 @@ fn spool(
     Ok((spool, missing))
 }
 
-fn listing(source: PairSource) -> ProjectResult<Listing> {
+/// Reads what a source names.
+pub(crate) fn listing(source: PairSource) -> ProjectResult<Listing> {
     match source {
         PairSource::List {
             file,

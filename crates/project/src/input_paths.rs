@@ -41,8 +41,15 @@ fn written_differently(path: &Path) -> Option<PathBuf> {
     written.iter().find_map(|text| in_any_form(Path::new(text)))
 }
 
+/// Returns the path of an existing file or folder whose name has another Unicode form, or the path itself.
+pub(crate) fn in_existing_form(path: &Path) -> PathBuf {
+    let is_missing = matches!(path.try_exists(), Ok(false));
+    let found = is_missing.then(|| in_any_form(path)).flatten();
+    found.unwrap_or_else(|| path.to_owned())
+}
+
 /// Returns the existing path whose parts are those of a path, as written, composed or decomposed.
-pub(crate) fn in_any_form(path: &Path) -> Option<PathBuf> {
+fn in_any_form(path: &Path) -> Option<PathBuf> {
     let mut found = PathBuf::new();
     for part in path.components() {
         let Component::Normal(name) = part else {

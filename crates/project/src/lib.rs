@@ -3,11 +3,13 @@
 //! - [`location`]: a project folder with the settings that say where its catalog and its files are; opens both
 //! - [`align`]: one scan with one print, without a project
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
+//! - [`import_plan`]: what an import of pairs would store
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
 //! - [`retire`]: takes pairs out of every count, and brings them back
 //! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
 //!   block, and whether files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
+//! - [`change_setting`]: changes a setting, after saying what that costs
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
@@ -28,6 +30,7 @@ pub mod align;
 pub mod backup;
 mod block_files;
 pub mod block_status;
+pub mod change_setting;
 pub mod check;
 pub mod closing;
 pub mod copy;
@@ -43,6 +46,7 @@ pub mod generated_folder;
 pub mod hosts;
 pub mod import_blocks;
 pub mod import_pairs;
+pub mod import_plan;
 pub mod input_paths;
 pub mod location;
 pub mod manifest_file;

@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use crate::input_paths::in_any_form;
+use crate::input_paths::in_existing_form;
 use mocban_catalog::Catalog;
 use mocban_config::{BaseLayer, ConfigError, Loaded, Sources, load};
 use mocban_core::domain::{UnixMillis, has_password};
@@ -32,7 +32,7 @@ impl Location {
     /// Unicode form of accented letters is the same folder.
     pub fn new(dir: impl Into<PathBuf>) -> Self {
         Self {
-            dir: in_existing_form(dir.into()),
+            dir: in_existing_form(&dir.into()),
             catalog: None,
             config: None,
             sets: Vec::new(),
@@ -44,7 +44,7 @@ impl Location {
     #[must_use]
     pub fn at(&self, dir: &Path) -> Self {
         Self {
-            dir: in_existing_form(dir.to_owned()),
+            dir: in_existing_form(dir),
             settings: OnceLock::new(),
             ..self.clone()
         }
@@ -199,14 +199,6 @@ impl Location {
     /// the project's folder instead.
     fn may_name_places(&self, error: &ConfigError) -> bool {
         matches!(error, ConfigError::Read { .. }) || self.sources().may_set("storage")
-    }
-}
-
-/// Returns the path of an existing folder whose name has another Unicode form, or the path itself.
-fn in_existing_form(dir: PathBuf) -> PathBuf {
-    match dir.try_exists() {
-        Ok(false) => in_any_form(&dir).unwrap_or(dir),
-        _ => dir,
     }
 }
 

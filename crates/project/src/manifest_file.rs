@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
+use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form, is_windows_path};
 use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
 use super::unread_files::UnreadFiles;
 use crate::error::ProjectResult;
@@ -104,7 +104,7 @@ impl Listing {
         unit: Option<LengthUnit>,
     ) -> ProjectResult<Self> {
         let listed = |root: &Path| {
-            let root = root.to_owned();
+            let root = in_existing_form(root);
             files::list_below(&root).map(|files| ListedFolder { root, files })
         };
         let (mesh_folder, print_folder) = (listed(meshes)?, listed(prints)?);

@@ -7,8 +7,7 @@ use crate::exit::Refusal;
 use mocban_catalog::{Catalog, ReviewRights};
 use mocban_core::domain::spelling::plain_form;
 
-/// Refuses a new reviewer whose name differs from that of another one only in case, accents, blanks or zeros. A user of
-/// PostgreSQL who judges only under the own name is never refused.
+/// Refuses a new reviewer who has one of [`similar_names`].
 ///
 /// # Errors
 /// Returns an error that names both, or the error of the catalog.
@@ -17,11 +16,7 @@ pub async fn refuse_similar(
     rights: &ReviewRights,
     names: &BTreeSet<String>,
 ) -> ProjectResult<()> {
-    if rights.only_reviewer().is_some() {
-        return Ok(());
-    }
-    let known = catalog.reviewer_names().await?;
-    match similar(known, names) {
+    match similar_names(catalog, rights, names).await? {
         Some((new, known)) => Err(Refusal::Usage(format!(
             "the reviewers {known:?} and {new:?} have nearly the same name; if they are one person, write {known:?}, or else \
              add --new-reviewer"
@@ -29,6 +24,19 @@ pub async fn refuse_similar(
         .into()),
         None => Ok(()),
     }
+}
+
+/// Returns the first new name that differs from a known one only in case, accents, blanks or zeros, and that one. A user of
+/// PostgreSQL who judges only under the own name has none.
+pub async fn similar_names(
+    catalog: &Catalog,
+    rights: &ReviewRights,
+    names: &BTreeSet<String>,
+) -> ProjectResult<Option<(String, String)>> {
+    if rights.only_reviewer().is_some() {
+        return Ok(None);
+    }
+    Ok(similar(catalog.reviewer_names().await?, names))
 }
 
 /// Returns the first new name that is similar to a known one or to an earlier new one, and that one.

@@ -90,9 +90,8 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
     let levels = images.sixteen(numbers.depth_size, 1)?;
     let levels = Grid::from_vec(numbers.depth_size[0], numbers.depth_size[1], levels)?;
     let [width, height] = numbers.print_size;
-    let enlargement = numbers.normalize.enlargement();
-    let mask_side = |side: usize| side.checked_mul(enlargement as usize);
-    let mask_size = [mask_side(width)?, mask_side(height)?];
+    let scale = numbers.normalize.mask_scale();
+    let mask_size = scale.mask_size(numbers.print_size)?;
     let masks = Grid::from_vec(mask_size[0], mask_size[1], images.eight(mask_size)?)?;
     let samples = images.sixteen(numbers.print_size, 3)?;
     let rgb = Grid::from_vec(width, height, samples.as_chunks::<3>().0.to_vec())?;
@@ -116,7 +115,7 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
         },
         normalized: Normalized {
             outcome: numbers.normalize,
-            prints: vec![PrintMasks::from_grey(&masks, enlargement)],
+            prints: vec![PrintMasks::from_grey(&masks, scale)],
         },
         registered: Registered {
             outcome: numbers.register,

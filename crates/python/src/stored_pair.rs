@@ -66,7 +66,7 @@ fn assembled(
     let mut register: RegisterOutcome = artifacts.outcome(Stage::Register).map_err(unreadable)?;
     let masks = PrintMasks::from_grey(
         &artifacts.print_grey().map_err(unreadable)?,
-        normalize.enlargement(),
+        normalize.mask_scale(),
     );
     normalize.inks = normalize
         .inks

@@ -5,11 +5,11 @@ use serde::de::DeserializeOwned;
 use mocban_catalog::{MetricRecord, PairResults, StageRecord};
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, print_mask};
 use mocban_core::domain::{
-    Affine2, ArtifactRef, DepthOutcome, FitOutcome, Levelling, MetricOutcome, NormalizeOutcome,
-    PrintFromMesh, RegisterOutcome, Stage,
+    Affine2, ArtifactRef, DepthOutcome, FitOutcome, Levelling, MaskScale, MetricOutcome,
+    NormalizeOutcome, PrintFromMesh, RegisterOutcome, Stage,
 };
 use mocban_core::raster::{
-    DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16, reduce_mask,
+    DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16, mask_of_print,
 };
 use mocban_store::Project;
 
@@ -148,10 +148,11 @@ impl<'a> PairArtifacts<'a> {
     /// Returns an error if the mask cannot be read.
     pub fn print_mask(&self) -> Result<Mask, PairArtifactsError> {
         let ink = self.print_grey()?.map(|value| *value == INK);
-        Ok(reduce_mask(&ink, self.print_enlargement()?))
+        Ok(mask_of_print(&ink, self.mask_scale()?))
     }
 
-    /// Reads the stored image of the masks of the print, which is enlarged if the print is small. For its values, see
+    /// Reads the stored image of the masks of the print, which is enlarged if the print is small and reduced if it is large.
+    /// For its values, see
     /// [`print_mask`].
     ///
     /// # Errors
@@ -162,14 +163,14 @@ impl<'a> PairArtifacts<'a> {
         self.grey(Stage::Normalize, &print_mask(ink))
     }
 
-    /// Returns how many times the image of [`Self::print_grey`] is larger than the print, on each side.
+    /// Returns the size of the image of [`Self::print_grey`] relative to the print.
     ///
     /// # Errors
     /// Returns an error if the result of the normalize stage cannot be read.
-    pub fn print_enlargement(&self) -> Result<u32, PairArtifactsError> {
+    pub fn mask_scale(&self) -> Result<MaskScale, PairArtifactsError> {
         Ok(self
             .outcome::<NormalizeOutcome>(Stage::Normalize)?
-            .enlargement())
+            .mask_scale())
     }
 
     /// Returns the map from print pixels to pixels of the canvas on which scores are computed.

@@ -93,7 +93,7 @@ impl StageInputs {
         for ink in 0..outcome.inks.len() {
             let bytes = self.artifact(pair, Stage::Normalize, &print_mask(ink))?;
             let grey = raster::decode_grey8(&bytes).ok().ok_or_else(rerun)?;
-            prints.push(PrintMasks::from_grey(&grey, outcome.enlargement()));
+            prints.push(PrintMasks::from_grey(&grey, outcome.mask_scale()));
         }
         Ok(Normalized { outcome, prints })
     }

@@ -7,18 +7,19 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::json;
 
-use crate::cli::input::browser::open;
 use crate::cli::input::language::language_of_system;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
+use crate::cli::output::page_address::{open_page, print_address};
 use crate::cli::output::streams;
 use crate::cli::output::table::count;
 use mocban_catalog::{Catalog, SetApart, StatusCounts, reviewer_name};
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
+use mocban_pages::local_server::LocalServer;
 use mocban_pages::review::{
     self, CheckRates, FaultShortage, Language, QueueCounts, QueueOptions, ReviewOptions,
-    ReviewServer,
+    ReviewPages,
 };
 use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::error::explanation;
@@ -123,15 +124,12 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     context.warn_about_set_apart(&SetApart::of(&damaged));
     let language = args.lang.or_else(language_of_system);
     let options = ReviewOptions {
-        listen: SocketAddr::new(
-            args.listen.unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST)),
-            args.port,
-        ),
         command: context
             .without_setting_flags()
             .command("")
             .trim_end()
             .to_owned(),
+        project_page: None,
         language,
         keys,
         min_view_ms: args.min_view_ms,
@@ -141,9 +139,12 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
         now,
         queue: queue_options(&args),
     };
-    let page = review::bind(catalog.clone(), project, options).await?;
-    if page.counts().items == 0 {
-        drop(page);
+    let ip = args.listen.unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST));
+    let name = review::origin_name(&project, &args.reviewer);
+    let server = LocalServer::bind(SocketAddr::new(ip, args.port), &name, "review").await?;
+    let pages = ReviewPages::open(catalog.clone(), project, options).await?;
+    if pages.counts().items == 0 {
+        drop(pages);
         catalog.close().await;
         if args.adjudicate {
             return no_conflict(&args, context);
@@ -154,12 +155,14 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     }
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
-    let _file = announce(&page, &args, context)?;
+    let _file = announce(&server, &pages, &args, context)?;
     let drain = stop.clone();
-    let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
+    let served = server.serve(pages.routes(), async move {
+        drain.reached(StopLevel::Drain).await;
+    });
     let waits = tokio::spawn(stop_waiting(catalog.clone(), stop.clone()));
     let kept = tokio::select! {
-        kept = served => kept,
+        cut_off = served => cut_off + pages.unstored(),
         // After a second signal, do not wait for open connections. Acknowledged answers are already stored.
         () = stop.reached(StopLevel::Now) => 1,
     };
@@ -238,28 +241,24 @@ fn progress(reviewer: &str, counts: QueueCounts) -> String {
     }
 }
 
-/// Prints the page's address and opens the page in a browser. Returns a temporary file that redirects to the page. The
-/// file must exist until the browser has read it.
+/// Prints the page's address and opens the page in a browser. Returns the file of [`open_page`].
 fn announce(
-    page: &ReviewServer,
+    server: &LocalServer,
+    pages: &ReviewPages,
     args: &ReviewArgs,
     context: &Context,
 ) -> ProjectResult<Option<tempfile::NamedTempFile>> {
-    let (url, address) = (page.url(), page.address());
-    if context.global.json {
-        streams::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;
-    } else {
-        streams::print(&url)?;
-    }
+    let (url, address) = (server.url(), server.address());
+    print_address(&url, context)?;
     context.info(&format!(
         "{}; press Ctrl-C to end",
-        progress(&args.reviewer, page.counts())
+        progress(&args.reviewer, pages.counts())
     ));
     if let Some(FaultShortage {
         wanted,
         planted,
         example,
-    }) = page.shortage()
+    }) = pages.shortage()
     {
         context.warn(&format!(
             "only {planted} of {wanted} attention checks could be planted, because files of results cannot be read ({example}); `check` lists them"
@@ -276,8 +275,7 @@ fn announce(
             "the page listens on {address}, which other machines can reach, and its traffic is not encrypted"
         ));
     }
-    let is_for_script = args.no_open || context.global.json || context.global.quiet;
-    Ok(if is_for_script { None } else { open(&url) })
+    Ok(open_page(&url, args.no_open, context))
 }
 
 /// Returns the `review` command as a next step, or `None` if there are verdicts.

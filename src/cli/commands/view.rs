@@ -2,21 +2,21 @@
 
 use std::net::{Ipv4Addr, SocketAddr};
 
+use axum::Router;
 use clap::Args;
-use serde_json::json;
 
 use super::block_points::BlockPoints;
-use crate::cli::input::browser::open;
 use crate::cli::input::language::language_of_system;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
-use crate::cli::output::streams;
+use crate::cli::output::page_address::{open_page, print_address};
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_export::scan_view::ScanView;
+use mocban_pages::local_server::LocalServer;
 use mocban_pages::review::Language;
-use mocban_pages::view::{self, ViewServer};
+use mocban_pages::view;
 use mocban_project::error::TaskStopped;
 use mocban_project::selection;
 use mocban_project::sheets::block_view;
@@ -54,11 +54,10 @@ impl ViewArgs {
 pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
     let (project, catalog) = context.location.open_read_only().await?;
-    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
-    if selection::block(&catalog, &args.pair).await?.is_some() {
-        let page = block_page(address, &args, &project, &catalog, context).await;
+    if let Some(block) = selection::block(&catalog, &args.pair).await? {
+        let page = block_page(&block, &args, &project, &catalog, context).await;
         catalog.close().await;
-        return serve(page?, &args, context).await;
+        return serve(block.as_str(), page?, &args, context).await;
     }
     let limits = context.location.settings()?.config.limits;
     let name = selection::pair(&catalog, &args.pair).await?;
@@ -86,24 +85,23 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<Exi
         let text = format!("pair {name} has no result{of} to show; see: {command}");
         return Err(Refusal::NothingSelected(text).into());
     };
-    let page = view::bind(address, name.as_str(), &scan, args.language()).await?;
-    serve(page, &args, context).await
+    let page = view::scan_page(name.as_str(), &scan, args.language());
+    serve(name.as_str(), page, &args, context).await
 }
 
-/// Binds the page of a block. If its page was refused, only its correction is shown.
+/// Returns the routes of the page of a block. If its page was refused, only its correction is shown.
 async fn block_page(
-    address: SocketAddr,
+    name: &BlockName,
     args: &ViewArgs,
     project: &Project,
     catalog: &Catalog,
     context: &Context,
-) -> ProjectResult<ViewServer> {
-    let name = selection::existing_block(catalog, &args.pair).await?;
+) -> ProjectResult<Router> {
     let view = match block_view(&args.pair, args.metric, project, catalog, &context.location).await
     {
         Ok(view) => Some(view),
         Err(error) => {
-            let Some(why) = refusal(catalog, &name).await? else {
+            let Some(why) = refusal(catalog, name).await? else {
                 return Err(error);
             };
             context.warn(&format!("block {name} is not aligned: {why}"));
@@ -111,8 +109,8 @@ async fn block_page(
             None
         }
     };
-    let store = BlockPoints::new(context, &name);
-    Ok(view::bind_block(address, &name, view, store, args.language()).await?)
+    let store = BlockPoints::new(context, name);
+    Ok(view::block_page(name, view, store, args.language()))
 }
 
 /// Returns why the page of a block was refused, if it was.
@@ -125,32 +123,26 @@ async fn refusal(catalog: &Catalog, name: &BlockName) -> ProjectResult<Option<St
     Ok(refused.map(|stored| stored.failure.message))
 }
 
-/// Announces a page and serves it until the user ends it.
-async fn serve(page: ViewServer, args: &ViewArgs, context: &Context) -> ProjectResult<ExitCode> {
+/// Announces the page of a pair or block and serves it until the user ends it.
+async fn serve(
+    name: &str,
+    page: Router,
+    args: &ViewArgs,
+    context: &Context,
+) -> ProjectResult<ExitCode> {
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
+    let server = LocalServer::bind(address, name, "view").await?;
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
-    let _file = announce(&page.url(), args, context)?;
+    let url = server.url();
+    print_address(&url, context)?;
+    context.info("the address works once, in one browser; press Ctrl-C to end");
+    let _file = open_page(&url, args.no_open, context);
     let drain = stop.clone();
     tokio::select! {
-        () = page.serve(async move { drain.reached(StopLevel::Drain).await }) => {}
+        _ = server.serve(page, async move { drain.reached(StopLevel::Drain).await }) => {}
         () = stop.reached(StopLevel::Now) => {}
     }
     signals.abort();
     Ok(ExitCode::Done)
-}
-
-/// Prints the page's address and opens the page in a browser. Returns a temporary file that redirects to the page.
-fn announce(
-    url: &str,
-    args: &ViewArgs,
-    context: &Context,
-) -> ProjectResult<Option<tempfile::NamedTempFile>> {
-    if context.global.json {
-        streams::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;
-    } else {
-        streams::print(url)?;
-    }
-    context.info("the address works once, in one browser; press Ctrl-C to end");
-    let is_for_script = args.no_open || context.global.json || context.global.quiet;
-    Ok(if is_for_script { None } else { open(url) })
 }

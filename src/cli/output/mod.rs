@@ -10,6 +10,7 @@ pub(crate) mod equal_warnings;
 pub(crate) mod failures;
 pub(crate) mod logging;
 pub(crate) mod missing_results;
+pub(crate) mod page_address;
 pub(crate) mod pair_table;
 pub(crate) mod panics;
 pub(crate) mod progress;

@@ -1,10 +1,11 @@
 //! A print and its binarizations, which fit and normalize share.
 
+use std::num::NonZeroU32;
 use std::sync::OnceLock;
 
 use super::binarize::{BinarizeError, InkMask, hypotheses, hypotheses_within, require_strokes};
-use mocban_core::domain::PrintOutline;
-use mocban_core::raster::{PrintImage, enlarge, enlarged_from_original};
+use mocban_core::domain::{MaskReduction, MaskScale, PrintOutline};
+use mocban_core::raster::{PrintImage, enlarge, reduce};
 
 /// A print whose shorter side has fewer pixels is enlarged before its ink is found: strokes of one or two pixels have no
 /// shape of their own.
@@ -13,6 +14,11 @@ const LEAST_SIDE_PX: usize = 64;
 const MOST_TIMES: usize = 8;
 /// Largest number of pixels of an enlarged print.
 const MOST_PX: usize = 1 << 20;
+/// A print is reduced a whole number of times to at least this many pixels. They show the strokes of a character as well
+/// as more pixels do, and the time that all stages take is in proportion to their number.
+const ENOUGH_PX: usize = 1_000 * 1_000;
+/// Pixels that the shorter side of a reduced print has at least.
+const REDUCED_SIDE_PX: usize = 500;
 
 /// A decoded image of a print, and its binarizations, which are computed on first use.
 #[derive(Debug, Clone)]
@@ -41,38 +47,47 @@ impl Print {
         }
     }
 
-    /// Returns how many times the masks of [`Self::hypotheses`] are larger than the print, on each side: 1 unless the
-    /// print is small.
-    pub(super) fn enlargement(&self) -> u32 {
+    /// Returns the size of the masks of [`Self::hypotheses`] relative to the print.
+    pub(super) fn mask_scale(&self) -> MaskScale {
         let [width, height] = [self.picture.rgb.width(), self.picture.rgb.height()];
-        let wanted = LEAST_SIDE_PX.div_ceil(width.min(height).max(1));
-        let fitting = (MOST_PX / (width * height).max(1)).isqrt();
-        wanted.min(MOST_TIMES).min(fitting).max(1) as u32
+        let [shorter, pixels] = [width.min(height).max(1), (width * height).max(1)];
+        let times = (pixels / ENOUGH_PX).isqrt().min(shorter / REDUCED_SIDE_PX);
+        if times > 1 {
+            // A side of more pixels would not fit into memory.
+            let px = |side| u32::try_from(side).unwrap_or(u32::MAX);
+            let times = NonZeroU32::new(px(times)).unwrap_or(NonZeroU32::MIN);
+            return MaskScale::Reduced(MaskReduction {
+                times,
+                print_px: [px(width), px(height)],
+            });
+        }
+        let wanted = LEAST_SIDE_PX.div_ceil(shorter);
+        let fitting = (MOST_PX / pixels).isqrt();
+        MaskScale::enlarged(wanted.min(MOST_TIMES).min(fitting) as u32)
     }
 
     /// Returns all possible interpretations as ink and background, the likeliest first. There is at least one. Their
-    /// masks are [`Self::enlargement`] times as large as the print.
+    /// masks have the size of [`Self::mask_scale`].
     pub(super) fn hypotheses(&self) -> Result<&[InkMask], BinarizeError> {
         let read = self.hypotheses.get_or_init(|| self.find_ink());
         read.as_deref().map_err(|error| *error)
     }
 
     fn find_ink(&self) -> Result<Vec<InkMask>, BinarizeError> {
-        let times = self.enlargement();
-        let enlarged = (times > 1).then(|| PrintImage {
-            rgb: enlarge(&self.picture.rgb, times),
-            turned: self.picture.turned,
-            ignored_profile: None,
-        });
-        let picture = enlarged.as_ref().unwrap_or(&self.picture);
+        let scale = self.mask_scale();
+        let rgb = match scale {
+            MaskScale::Same => None,
+            MaskScale::Enlarged(times) => Some(enlarge(&self.picture.rgb, times.get())),
+            MaskScale::Reduced(reduction) => Some(reduce(&self.picture.rgb, reduction.times.get())),
+        };
+        let resized = rgb.map(PrintImage::from);
+        let picture = resized.as_ref().unwrap_or(&self.picture);
         let inks = match &self.outline {
-            Some(outline) => {
-                hypotheses_within(picture, &outline.mapped(&enlarged_from_original(times)))
-            }
+            Some(outline) => hypotheses_within(picture, &outline.mapped(&scale.masks_from_print())),
             None => hypotheses(picture),
         }?;
-        if times > 1 {
-            require_strokes(&inks, times)?;
+        if let MaskScale::Enlarged(times) = scale {
+            require_strokes(&inks, times.get())?;
         }
         Ok(inks)
     }
@@ -91,7 +106,8 @@ impl From<PrintImage> for Print {
 #[cfg(test)]
 mod tests {
     use super::Print;
-    use mocban_core::raster::{Grid, Mask, PrintImage, reduce_mask};
+    use mocban_core::domain::MaskScale;
+    use mocban_core::raster::{Grid, Mask, PrintImage, mask_of_print};
 
     fn print(width: usize, height: usize, is_ink: impl Fn(usize, usize) -> bool) -> Print {
         let grey = |x, y| if is_ink(x, y) { 9_000 } else { 50_000 };
@@ -99,13 +115,43 @@ mod tests {
     }
 
     #[test]
-    fn only_small_prints_are_enlarged_and_never_beyond_a_limit() {
-        let times = |width, height| print(width, height, |_, _| false).enlargement();
-        assert_eq!(times(64, 80), 1);
-        assert_eq!(times(63, 80), 2);
-        assert_eq!(times(12, 11), 6);
-        assert_eq!(times(1, 1), 8);
-        assert_eq!(times(300_000, 3), 1);
+    fn only_small_and_large_prints_are_resized_and_never_beyond_a_limit() {
+        let scale = |width, height| print(width, height, |_, _| false).mask_scale();
+        assert_eq!(scale(64, 80), MaskScale::Same);
+        assert_eq!(scale(63, 80), MaskScale::enlarged(2));
+        assert_eq!(scale(12, 11), MaskScale::enlarged(6));
+        assert_eq!(scale(1, 1), MaskScale::enlarged(8));
+        assert_eq!(scale(300_000, 3), MaskScale::Same);
+        assert_eq!(scale(1999, 1999), MaskScale::Same);
+        assert_eq!(scale(8000, 900), MaskScale::Same);
+        let masks = |width, height| {
+            let scale = scale(width, height);
+            assert!(matches!(scale, MaskScale::Reduced(_)), "{scale:?}");
+            scale.mask_size([width, height])
+        };
+        assert_eq!(masks(2000, 2000), Some([1000, 1000]));
+        assert_eq!(masks(2999, 3001), Some([1500, 1501]));
+        assert_eq!(masks(8000, 1000), Some([4000, 500]));
+    }
+
+    #[test]
+    fn ink_of_a_large_print_lies_where_the_print_shows_it() {
+        // A cross with a thin stroke.
+        let is_ink = |x: usize, y: usize| {
+            (600..1500).contains(&x) && y.abs_diff(900) < 60
+                || x.abs_diff(1003) < 9 && (300..1700).contains(&y)
+        };
+        let large = print(2003, 2101, is_ink);
+        let mask = mask_of_print(
+            &large.hypotheses().expect("ink")[0].mask,
+            large.mask_scale(),
+        );
+        assert_eq!([mask.width(), mask.height()], [2003, 2101]);
+        let wanted = Mask::from_fn(2003, 2101, is_ink);
+        let wrong = mask
+            .zip_map(&wanted, |found, wanted| found != wanted)
+            .count();
+        assert!(50 * wrong < wanted.count(), "{wrong} of {}", wanted.count());
     }
 
     #[test]
@@ -128,6 +174,9 @@ mod tests {
         let inks = small.hypotheses().expect("ink");
         let mask = &inks[0].mask;
         assert_eq!([mask.width(), mask.height()], [72, 72]);
-        assert_eq!(reduce_mask(mask, 4), Mask::from_fn(18, 18, is_ink));
+        assert_eq!(
+            mask_of_print(mask, small.mask_scale()),
+            Mask::from_fn(18, 18, is_ink)
+        );
     }
 }

@@ -51,10 +51,10 @@ ON CONFLICT ({unit}, stage) DO UPDATE SET {provenance_updates}, outcome = exclud
 const CLEAR_METRICS: &str = "
 DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
-/// Items: pair, metric, hash of its result.
+/// Items: pair, metric, hash of its result, confidence, intersection over union.
 const METRICS: &str = "
-INSERT INTO metric_result (pair, metric, result_hash)
-SELECT value ->> 0, value ->> 1, unhex(value ->> 2) FROM jsonb_each(?)";
+INSERT INTO metric_result (pair, metric, result_hash, confidence, iou)
+SELECT value ->> 0, value ->> 1, unhex(value ->> 2), value ->> 3, value ->> 4 FROM jsonb_each(?)";
 
 /// Items: unit, index of the stage, worker, milliseconds, time.
 static ATTEMPT: Template = Template::new(
@@ -141,7 +141,12 @@ pub(crate) fn add_results<K: StoredKind>(
     let metrics = || {
         each().flat_map(|(lease, one)| {
             let metrics = one.metrics.iter();
-            metrics.map(|result| (lease.id(), result.outcome.metric.name(), result.result_hash))
+            metrics.map(|result| {
+                let outcome = &result.outcome;
+                let (confidence, iou) = (outcome.confidence, outcome.scores.iou);
+                let metric = outcome.metric.name();
+                (lease.id(), metric, result.result_hash, confidence, iou)
+            })
         })
     };
     script.execute_over(CLEAR_METRICS, metrics().map(|(pair, ..)| [pair]))?;

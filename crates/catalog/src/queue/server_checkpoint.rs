@@ -69,14 +69,16 @@ column_arrays! {
 }
 
 column_arrays! {
-    /// The hash of a metric's result.
+    /// The hash of a metric's result, and the numbers by which lists are sorted.
     MetricRow,
-    /// Hashes of metrics' results.
+    /// Rows of metrics.
     MetricRows<'i>:
     position: "bigint" = i64,
     pair: "bigint" = i64,
     metric: "text" = &'static str,
     result_hash: "bytea" = &'i [u8],
+    confidence: "double precision" = Option<f64>,
+    iou: "double precision" = f64,
 }
 
 /// Columns of an attempt.
@@ -339,5 +341,7 @@ fn metric_row(position: i64, pair: i64, result: &MetricResult) -> MetricRow<'_> 
         pair,
         metric: result.outcome.metric.name(),
         result_hash: result.result_hash.as_bytes(),
+        confidence: result.outcome.confidence,
+        iou: result.outcome.scores.iou,
     }
 }

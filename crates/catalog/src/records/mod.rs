@@ -11,6 +11,7 @@ pub(crate) mod left_out;
 pub(crate) mod manual_alignments;
 pub(crate) mod model;
 pub(crate) mod pair_groups;
+pub(crate) mod pair_list;
 pub(crate) mod pair_results;
 pub(crate) mod pair_work;
 pub(crate) mod review_answers;

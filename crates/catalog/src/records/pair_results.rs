@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::db::conn::Conn;
 use crate::db::query::{Query, query, query_as};
 use crate::db::row::{FromRow as _, Row};
+use crate::db::rows::json_array;
 use crate::db::value::Json;
 use crate::queue::counters::Cursor;
 use crate::records::checksums::ChecksummedTable;
@@ -42,6 +43,8 @@ WHERE ",
 
 pub(crate) const PAGE: &str = select_pairs!("p.name > ?1 ORDER BY p.name LIMIT ?4");
 const ONE: &str = select_pairs!("p.name = ?1");
+pub(crate) const BY_IDS: &str =
+    select_pairs!("p.id IN (SELECT CAST(wanted.atom AS bigint) FROM json_each(?1) AS wanted)");
 
 pub(crate) const FAILED: &str = "
 SELECT p.name, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at
@@ -91,7 +94,24 @@ impl Catalog {
         }))
     }
 
-    /// Binds the parameters `?2` and `?3` of [`PAGE`] and [`ONE`].
+    /// Returns the pairs with these row ids, in this order, without retired pairs.
+    pub(crate) async fn results_of(
+        &self,
+        conn: &mut Conn,
+        ids: &[i64],
+    ) -> Result<Vec<PairResults>> {
+        let wanted = json_array(ids.iter().copied());
+        let found = self.bind_left_out(query(BY_IDS).bind(wanted));
+        let found = found.fetch_all(conn).await?;
+        let pairs = assemble(conn, &found, &self.left_out).await?;
+        let mut by_id = BTreeMap::new();
+        for (row, pair) in found.iter().zip(pairs) {
+            by_id.insert(row.get::<i64>("id")?, pair);
+        }
+        Ok(ids.iter().filter_map(|id| by_id.remove(id)).collect())
+    }
+
+    /// Binds the parameters `?2` and `?3` of [`PAGE`], [`ONE`] and [`BY_IDS`].
     fn bind_left_out<R>(&self, query: Query<R>) -> Query<R> {
         let query = query.bind(self.left_out.of(ChecksummedTable::Pair));
         query.bind(self.left_out.of(ChecksummedTable::Truth))

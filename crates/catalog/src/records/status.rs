@@ -25,23 +25,35 @@ macro_rules! person {
     };
 }
 
-/// Counts verdicts on current results. Only the newest verdict of each reviewer on a result counts. Leaves out the verdicts
-/// that the owner has set apart; damaged ones that nobody knows of yet are found by a check or a report.
+/// Selects verdicts `v` on current results. Only the newest verdict of each reviewer on a result counts. Leaves out the
+/// verdicts that the owner has set apart; damaged ones that nobody knows of yet are found by a check or a report.
 ///
 /// `?1` has the stored spellings of names that are not the spelling of the name.
-const VERDICTS: &str = concat!(
-    "
-SELECT v.verdict, count(*) FROM verdict AS v
+macro_rules! from_current_verdicts {
+    () => {
+        concat!(
+            "FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
 WHERE v.id = (
     SELECT max(n.id) FROM verdict AS n
     WHERE n.pair = v.pair AND n.metric = v.metric AND ",
-    person!("n"),
-    " = ",
-    person!("v"),
-    " AND n.result_hash = v.result_hash
+            person!("n"),
+            " = ",
+            person!("v"),
+            " AND n.result_hash = v.result_hash
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act)
-        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))
+        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))"
+        )
+    };
+}
+pub(crate) use {from_current_verdicts, person};
+
+/// Counts verdicts on current results.
+const VERDICTS: &str = concat!(
+    "
+SELECT v.verdict, count(*) ",
+    from_current_verdicts!(),
+    "
     AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = v.pair)
 GROUP BY v.verdict"
 );

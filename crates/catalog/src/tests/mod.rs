@@ -12,6 +12,7 @@ mod histories;
 mod identity;
 mod import;
 mod model;
+mod pair_list;
 mod place;
 mod protocol;
 mod recovery;

@@ -33,7 +33,7 @@ async fn check_constraints_and_enums_agree() {
     let answered_metric = "INSERT INTO attention_check_answer
         (event, pair, metric, result_hash, kind, attention_check, seen, verdict, reviewer, at)
         VALUES ('1', 1, ?1, unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'mirrored', '{}', unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'fail', 'me', 1)";
-    let scored_metric = "INSERT INTO metric_result VALUES
+    let scored_metric = "INSERT INTO metric_result (pair, metric, result_hash) VALUES
         (1, ?1, unhex('0000000000000000000000000000000000000000000000000000000000000000'))";
     let queue =
         "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at, review_order)

@@ -11,7 +11,7 @@ use mocban_core::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 /// Number of metrics with a result, of a pair that is done.
 const METRICS: usize = ThresholdMetric::ALL.len();
 
-fn verdict(reviewer: &str, verdict: Verdict) -> NewVerdict {
+pub(super) fn verdict(reviewer: &str, verdict: Verdict) -> NewVerdict {
     NewVerdict {
         pair: name("p0"),
         metric: None,

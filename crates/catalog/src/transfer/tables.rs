@@ -135,7 +135,7 @@ pub(super) const TABLES: [CopyTable; 26] = [
         "worker",
         "at"; false
     ),
-    table_by_two!("metric_result", 3, "pair", "metric", "result_hash"; true),
+    table_by_two!("metric_result", 5, "pair", "metric", "result_hash", "confidence", "iou"; true),
     table!("review_act", 2, "id", "reviewer"; numbered),
     table!("verdict", 15, "id", "act", "pair", "metric", "result_hash", "verdict", "reviewer", "reason", "note", "at", "event",
         "seen", "shown_ms", "angle_read_deg", "review_order"; numbered),

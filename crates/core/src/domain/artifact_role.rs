@@ -8,7 +8,7 @@ pub const DEPTH: &str = "depth.png";
 pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
 
 /// Returns the role of the ink mask for interpretation `ink` of the print, counted from 0. Normalize writes the mask in
-/// the frame of the print, enlarged `NormalizeOutcome::enlargement` times if the print is small: 255 is ink, 64 is a
+/// the frame of the print, in the size of `NormalizeOutcome::mask_scale`: 255 is ink, 64 is a
 /// speck, 0 is background and 128 is unknown. Register stores the interpretation that it selects in
 /// `RegisterOutcome::ink`.
 pub fn print_mask(ink: usize) -> String {

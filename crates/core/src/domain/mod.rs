@@ -22,6 +22,7 @@ mod ids;
 mod input_version;
 mod job;
 mod levelling;
+mod mask_scale;
 mod metric;
 mod outcome;
 mod pair_name;
@@ -63,6 +64,7 @@ pub use ids::{PairId, WorkerId};
 pub use input_version::InputVersion;
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use levelling::Levelling;
+pub use mask_scale::{MaskReduction, MaskScale};
 pub use metric::ThresholdMetric;
 pub use outcome::{
     Curvature, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,

@@ -6,7 +6,9 @@ use std::num::{NonZeroU32, NonZeroU64};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Affine2, LengthUnit, Levelling, PrintOutline, Rigid3, ThresholdMetric};
+use super::{
+    Affine2, LengthUnit, Levelling, MaskReduction, MaskScale, PrintOutline, Rigid3, ThresholdMetric,
+};
 
 /// The curved surface of the stroke tops. All lengths are in mesh units.
 ///
@@ -230,16 +232,22 @@ pub struct NormalizeOutcome {
         skip_serializing_if = "Option::is_none"
     )]
     pub print_orientation: Option<u8>,
-    /// How many times the masks of a small print are larger than the print, on each side. `None` if they have the size
-    /// of the print.
+    /// How many times the masks of a small print are larger than the print, on each side. `None` if they are not larger.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub print_enlargement: Option<NonZeroU32>,
+    /// How the masks of a large print are reduced. `None` if they are not smaller than the print.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub print_reduction: Option<MaskReduction>,
 }
 
 impl NormalizeOutcome {
-    /// Returns how many times the masks of the print are larger than the print, on each side.
-    pub fn enlargement(&self) -> u32 {
-        self.print_enlargement.map_or(1, NonZeroU32::get)
+    /// Returns the size of the masks relative to the print.
+    pub fn mask_scale(&self) -> MaskScale {
+        match (self.print_reduction, self.print_enlargement) {
+            (Some(reduction), _) => MaskScale::Reduced(reduction),
+            (None, Some(times)) => MaskScale::enlarged(times.get()),
+            (None, None) => MaskScale::Same,
+        }
     }
 }
 

@@ -5,13 +5,13 @@ pub mod components;
 mod decode;
 mod depth_map;
 pub mod encode;
-mod enlarge;
 pub mod fonts;
 mod grid;
 mod mask;
 mod minmax_pyramid;
 pub mod otsu;
 mod resample;
+mod resize;
 mod supersample;
 #[cfg(any(test, feature = "test-helpers"))]
 pub mod test_profiles;
@@ -27,12 +27,10 @@ pub use encode::{
     PngError, compact_rgb8, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8,
     png_grey16, png_mask, png_rgb8,
 };
-pub use enlarge::{
-    catmull_rom, enlarge, enlarged_from_original, original_from_enlarged, reduce_mask,
-};
 pub use grid::Grid;
 pub use mask::{Mask, MaskOverlap, PixelBox};
 pub use resample::{resample, resample_transposed};
+pub use resize::{catmull_rom, enlarge, mask_of_print, reduce};
 pub use warp_depth::warp_depth;
 pub use warp_mask::warp_mask;
 pub use warp_rgb::warp_rgb;

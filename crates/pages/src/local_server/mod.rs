@@ -1,8 +1,8 @@
 //! A web server for one user's browser on this machine: checked requests, limited connections, and one session.
 //!
-//! A page binds its port with [`listen`], wraps its routes with [`AccessControl::guarded`], and serves them with
-//! [`serve`]. The session opens at the start address, which works once; its pages are below a secret path. A server
-//! without a session, such as that of the metrics, wraps its routes with [`ServedNames::guarded`].
+//! [`LocalServer`] binds a port and serves the routes of pages behind the guard of a session. The session opens
+//! at the start address, which works once; its pages are below a secret path. A server without a session, such as that of the
+//! metrics, wraps its routes with [`ServedNames::guarded`].
 
 mod access_control;
 mod address;
@@ -12,6 +12,7 @@ mod guard;
 mod guarded_pages;
 mod host_check;
 mod page_frame;
+mod server;
 mod session;
 mod work_thread;
 
@@ -21,4 +22,5 @@ pub use connection::ConnectionLimits;
 pub use connections::serve;
 pub use host_check::ServedNames;
 pub use page_frame::document;
+pub use server::{LocalServer, ServerError};
 pub use work_thread::{WorkFailed, WorkThread};

@@ -23,7 +23,7 @@ pub enum Language {
 impl Language {
     /// Returns the first supported language of an `Accept-Language` header, such as `vi-VN,vi;q=0.9,en;q=0.8`. Browsers list
     /// the preferred language first.
-    pub(super) fn accepted(header: &str) -> Option<Self> {
+    pub(crate) fn accepted(header: &str) -> Option<Self> {
         let mut tags = header.split(',').map(str::trim);
         tags.find_map(|tag| {
             let end = tag.find(['-', ';']).unwrap_or(tag.len());
@@ -33,7 +33,7 @@ impl Language {
 
     /// Returns the other language.
     #[must_use]
-    pub(super) const fn other(self) -> Self {
+    pub(crate) const fn other(self) -> Self {
         match self {
             Self::English => Self::Vietnamese,
             Self::Vietnamese => Self::English,
@@ -41,7 +41,7 @@ impl Language {
     }
 
     /// Returns the message for a key, or the key itself if there is no message. A test checks that all messages exist.
-    pub(super) fn translate(self, key: &'static str) -> &'static str {
+    pub(crate) fn translate(self, key: &'static str) -> &'static str {
         MESSAGES.get(key).map_or(key, |texts| texts[self.name()])
     }
 

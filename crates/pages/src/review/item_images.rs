@@ -82,7 +82,7 @@ impl ItemImages {
             (view, png_rgb8(&view.print(&source.picture)))
         };
         let print_from_depth = &item.view.print_from_depth;
-        let masks = PrintMasks::from_grey(&aligned.print_grey()?, aligned.print_enlargement()?);
+        let masks = PrintMasks::from_grey(&aligned.print_grey()?, aligned.mask_scale()?);
         let print_mask = view.mask(&masks.ink_of_print(), &Affine2::IDENTITY);
         Ok(Self {
             view,

@@ -1,7 +1,7 @@
-//! The review page: a local web server on which one reviewer judges results and aligns reliefs manually.
+//! The review page, on which one reviewer judges results and aligns reliefs manually.
 //!
-//! [`bind`] binds the port and reads the queue. [`ReviewServer::serve`] serves until it is stopped. An answer is
-//! acknowledged only after it is on the disk. Attention checks are served like results, so they cannot be recognized.
+//! [`ReviewPages`] reads the queue and gives the routes for a server. An answer is acknowledged only after it is
+//! on the disk. Attention checks are served like results, so they cannot be recognized.
 
 mod alignment_editor;
 mod alignment_inputs;
@@ -22,9 +22,9 @@ mod order;
 mod page;
 mod page_dialogs;
 mod planted_faults;
+mod review_pages;
 mod review_queue;
 mod routes;
-mod server;
 mod state;
 mod summary;
 mod unstored;
@@ -34,4 +34,4 @@ pub use i18n::Language;
 pub use keys::{KeyError, key_map};
 pub use options::{QueueOptions, ReviewOptions};
 pub use planted_faults::FaultShortage;
-pub use server::{QueueCounts, ReviewError, ReviewServer, bind};
+pub use review_pages::{QueueCounts, ReviewError, ReviewPages, origin_name};

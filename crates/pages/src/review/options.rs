@@ -1,7 +1,6 @@
-//! Options of the review page: the reviewer, the order of the queue, the attention checks, and the server's address.
+//! Options of the review page: the reviewer, the order of the queue, and the attention checks.
 
 use std::collections::BTreeMap;
-use std::net::SocketAddr;
 use std::path::Path;
 
 use super::check_items::CheckRates;
@@ -59,13 +58,16 @@ impl QueueOptions {
     }
 }
 
-/// Options of the server.
+/// Options of the pages.
 #[derive(Debug, Clone)]
 pub struct ReviewOptions {
     /// Whose queue is served, and what it contains.
     pub queue: QueueOptions,
     /// The command line that names this project, such as `mocban -C blocks`. The last page shows the next commands.
     pub command: String,
+    /// Relative address of the pages of the project in the app, if the review is part of it. The last page then links there
+    /// instead of showing commands.
+    pub project_page: Option<&'static str>,
     /// Language of the page; `None` for that of the browser.
     pub language: Option<Language>,
     /// Map of physical keys to actions, from [`key_map`](super::key_map).
@@ -74,9 +76,6 @@ pub struct ReviewOptions {
     pub min_view_ms: u64,
     /// Whether the page opens the guide when a reviewer starts for the first time.
     pub opens_guide: bool,
-    /// Address to listen on. Port 0 selects a fixed port for the project and reviewer. If the fixed port is taken, any
-    /// free port is used.
-    pub listen: SocketAddr,
     /// Limits on the input files.
     pub limits: InputLimits,
     /// Returns the sentence that explains an error of the catalog of the project in a folder.

@@ -13,8 +13,12 @@ const MODES: &str = "two_up overlay edges onion checker difference reveal";
 /// Switches that work in every display mode.
 const SWITCHES: &str = "auto_flicker angle_guides stroke_map zoom align";
 
-/// Returns the review page.
-pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
+/// Returns the review page. With `project_page`, it links to the project in the app.
+pub(super) fn review(
+    options: &QueueOptions,
+    project_page: Option<&str>,
+    language: Language,
+) -> Markup {
     let title = format!(
         "{} · {}",
         language.translate("title"),
@@ -27,7 +31,7 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
     };
     let body = html! {
         a.skip href="#viewer" { (language.translate("skip")) }
-        (top(options, language))
+        (top(options, project_page, language))
         noscript { p.alert { (language.translate("no_script")) } }
         (modes(language))
         (practice(language))
@@ -52,7 +56,7 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
     document(language.name(), &title, &head, &html! { body { (body) } })
 }
 
-fn top(options: &QueueOptions, language: Language) -> Markup {
+fn top(options: &QueueOptions, project_page: Option<&str>, language: Language) -> Markup {
     let other = language.other();
     let label = match options.order {
         ReviewOrder::Random => None,
@@ -61,6 +65,7 @@ fn top(options: &QueueOptions, language: Language) -> Markup {
     };
     html! {
         header {
+            @if let Some(page) = project_page { a href=(page) { (language.translate("to_project")) } }
             h1 #pair { (language.translate("loading")) }
             span #progress {}
             progress #bar value="0" max="1" aria-label=(language.translate("progress_bar")) {}
@@ -241,22 +246,30 @@ mod tests {
 
     #[test]
     fn page_in_english() {
-        let page = review(&options(ReviewOrder::Random, 0.04), Language::English);
+        let page = review(&options(ReviewOrder::Random, 0.04), None, Language::English);
         insta::assert_snapshot!(lines(&page.into_string()));
     }
 
     #[test]
     fn page_in_vietnamese() {
         let options = options(ReviewOrder::LeastConfident, 0.0);
-        let page = review(&options, Language::Vietnamese);
+        let page = review(&options, None, Language::Vietnamese);
         insta::assert_snapshot!(lines(&page.into_string()));
     }
 
     #[test]
     fn conflicts_are_labelled() {
-        let page = review(&options(ReviewOrder::Adjudicate, 0.04), Language::English);
+        let page = review(
+            &options(ReviewOrder::Adjudicate, 0.04),
+            Some("../../../"),
+            Language::English,
+        );
         let page = page.into_string();
         assert!(page.contains("Disagreements of other reviewers"), "{page}");
         assert!(!page.contains("attention checks"), "{page}");
+        assert!(
+            page.contains("<a href=\"../../../\">← Project</a>"),
+            "{page}"
+        );
     }
 }

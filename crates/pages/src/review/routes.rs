@@ -8,7 +8,7 @@ use axum::extract::{Path, RawQuery, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
-use axum::{Json, Router, middleware};
+use axum::{Extension, Json, Router, middleware};
 use serde_json::{Value, json};
 
 use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
@@ -23,12 +23,13 @@ use super::state::ServerState;
 use super::summary::ReviewSummary;
 use super::unstored::confirmation_limit;
 use super::{assets, examples};
+use crate::local_server::AccessControl;
 use mocban_catalog::{CatalogError, ManualAlignment};
 use mocban_core::domain::{PairName, ReviewOrder, one_line};
 
-/// Returns the router with all routes behind the guard.
+/// Returns all routes.
 pub(super) fn router(state: &Arc<ServerState>) -> Router {
-    let pages = Router::new()
+    Router::new()
         .route("/", get(index))
         .route("/assets/{name}", get(asset))
         .route("/image/{id}/{layer}", get(image))
@@ -46,8 +47,7 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
             Arc::clone(state),
             api_error::explain,
         ))
-        .with_state(Arc::clone(state));
-    state.access.guarded(pages)
+        .with_state(Arc::clone(state))
 }
 
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
@@ -60,7 +60,8 @@ async fn index(
     let query = query.as_deref();
     let requested = query.and_then(|query| query.strip_prefix("lang=")?.parse().ok());
     let language = requested.unwrap_or_else(|| language(&state, &headers));
-    Html(page::review(&state.options.queue, language).into_string())
+    let options = &state.options;
+    Html(page::review(&options.queue, options.project_page, language).into_string())
 }
 
 /// Returns the language of the options, or else that of the browser.
@@ -79,10 +80,13 @@ async fn asset(Path(name): Path<String>) -> Response {
 }
 
 /// Returns the values that the script needs at the start, such as the CSRF token, the key bindings and the messages.
-async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
+async fn config(
+    State(state): State<Arc<ServerState>>,
+    Extension(access): Extension<Arc<AccessControl>>,
+) -> Json<Value> {
     let messages = Language::ALL.map(|language| (language.name(), language.messages()));
     Json(json!({
-        "csrf_token": state.access.csrf_token(),
+        "csrf_token": access.csrf_token(),
         "keys": state.options.keys,
         "review_order": state.options.queue.order,
         "min_view_ms": state.options.min_view_ms,

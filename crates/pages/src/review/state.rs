@@ -1,4 +1,4 @@
-//! Server state shared by the request handlers: the catalog, the reviewer's options, and the items served so far.
+//! State shared by the request handlers: the catalog, the reviewer's options, and the items served so far.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,17 +9,15 @@ use super::options::ReviewOptions;
 use super::planted_faults::{FaultPlanter, QueueError};
 use super::review_queue::ReviewQueue;
 use super::unstored::UnstoredEvents;
-use crate::local_server::AccessControl;
 use mocban_catalog::Catalog;
 use mocban_store::Project;
 
-/// State of one reviewer's server.
+/// State of one reviewer's pages.
 #[derive(Debug)]
 pub(super) struct ServerState {
     pub(super) catalog: Catalog,
     pub(super) project: Project,
     pub(super) options: ReviewOptions,
-    pub(super) access: Arc<AccessControl>,
     pub(super) images: ImageCache,
     pub(super) planter: FaultPlanter,
     pub(super) unstored: UnstoredEvents,

@@ -21,6 +21,8 @@ pub(super) struct ReviewSummary {
     others: Vec<ReviewerPair>,
     /// The command line that names this project, for the next commands.
     command: String,
+    /// Relative address of the project in the app, if the review is part of it.
+    project_page: Option<&'static str>,
     /// The rest of the command with which another person judges the same results.
     next_reviewer: String,
 }
@@ -75,6 +77,7 @@ impl ReviewSummary {
             reviewer,
             others,
             command: state.options.command.clone(),
+            project_page: state.options.project_page,
             next_reviewer: state.options.queue.for_another_reviewer(),
         }))
     }

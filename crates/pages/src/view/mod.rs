@@ -1,10 +1,11 @@
-//! The pages of `mocban view`: a local web server that shows one scan on its print in 3D, or a whole block.
+//! The pages of `mocban view`: one scan on its print in 3D, or a whole block.
 
-mod block_server;
-mod correction_server;
-mod page;
-mod server;
+mod block_page;
+mod correction_page;
+pub(crate) mod page;
+mod scan_page;
 
-pub use block_server::bind_block;
-pub use correction_server::{CorrectionStore, PointsSaved};
-pub use server::{ViewError, ViewServer, bind};
+pub use block_page::block_page;
+pub use correction_page::{CorrectionStore, PointsSaved};
+pub(crate) use scan_page::asset as scan_asset;
+pub use scan_page::scan_page;

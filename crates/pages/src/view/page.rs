@@ -14,7 +14,7 @@ fn chosen(language: Option<Language>) -> Markup {
 }
 
 /// Returns the page of a pair. Its script loads the data and creates the controls.
-pub(super) fn view(pair: &str, language: Option<Language>) -> String {
+pub(crate) fn view(pair: &str, language: Option<Language>) -> String {
     let head = html! {
         (chosen(language))
         link rel="stylesheet" href="assets/scan-viewer.css";

@@ -89,6 +89,33 @@ pub fn is_disk_full(folder: &Path) -> bool {
     })
 }
 
+/// Returns how many bytes a user can still store on the disk of a folder.
+pub fn free_bytes(folder: &Path) -> Option<u64> {
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    disk.f_bavail.checked_mul(disk.f_frsize)
+}
+
+/// Makes a command start a process that signals of this terminal do not reach.
+pub fn detach(command: &mut std::process::Command) {
+    use std::os::unix::process::CommandExt as _;
+    command.process_group(0);
+}
+
+/// Sends a process of this computer what Ctrl-C sends.
+///
+/// # Errors
+/// Returns an error if there is no such process, or it belongs to another user.
+pub fn interrupt(pid: u32) -> io::Result<()> {
+    let pid = i32::try_from(pid)
+        .ok()
+        .and_then(rustix::process::Pid::from_raw);
+    let pid = pid.ok_or(io::ErrorKind::NotFound)?;
+    Ok(rustix::process::kill_process(
+        pid,
+        rustix::process::Signal::INT,
+    )?)
+}
+
 /// Returns `false`: only Windows names the shares of other machines in paths.
 pub const fn is_share(_folder: &Path) -> bool {
     false

@@ -77,6 +77,26 @@ pub const fn file_system_magic(_folder: &Path) -> Option<u64> {
     None
 }
 
+/// Returns `None`: the free space is not asked for on Windows.
+pub const fn free_bytes(_folder: &Path) -> Option<u64> {
+    None
+}
+
+/// Makes a command start a process that Ctrl-C in this terminal does not reach.
+pub fn detach(command: &mut std::process::Command) {
+    use std::os::windows::process::CommandExt as _;
+    const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
+    command.creation_flags(CREATE_NEW_PROCESS_GROUP);
+}
+
+/// Returns an error: Windows sends Ctrl-C only to processes of the same terminal.
+///
+/// # Errors
+/// Always.
+pub fn interrupt(_pid: u32) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
 /// Returns whether a folder is on a share of another machine, as in `\\server\share`. The resolved path of a drive letter
 /// that stands for a share names the share.
 pub fn is_share(folder: &Path) -> bool {

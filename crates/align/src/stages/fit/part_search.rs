@@ -10,7 +10,6 @@ use super::wider_search::{FoundSide, LEAST, evidence};
 use crate::stages::print::Print;
 use crate::stages::zbuffer::IndexedSurface;
 use mocban_core::domain::{PrintOutline, Rigid3};
-use mocban_core::raster::original_from_enlarged;
 
 /// Compares both sides of `start`'s plane with the parts of the print. Returns the side that resembles a part best,
 /// with the outline of the part. Returns `None` if no agreement reaches [`LEAST`], or if the finer fit of the side
@@ -22,7 +21,7 @@ pub(super) fn search(
     params: &FitParams,
 ) -> Option<FoundSide> {
     let inks = print.hypotheses().ok()?;
-    let print_from_mask = original_from_enlarged(print.enlargement());
+    let print_from_mask = print.mask_scale().print_from_masks();
     let mut parts: Vec<PrintOutline> = inks
         .iter()
         .flat_map(|ink| print_parts(&ink.mask))

@@ -7,7 +7,6 @@ use crate::stages::pose::{
 };
 use crate::stages::print::Print;
 use mocban_core::domain::PrintOutline;
-use mocban_core::raster::enlarged_from_original;
 
 /// Lower bound of the agreement.
 const LEAST_AGREEMENT: f64 = 0.02;
@@ -66,7 +65,7 @@ impl InkPyramids {
     /// Builds the pyramids of the part of a print inside an outline in pixels of the print. Returns `None` if the outline
     /// contains no pixel, or if the print cannot be binarized.
     pub(super) fn within(print: &Print, outline: &PrintOutline) -> Option<Self> {
-        let outline = outline.mapped(&enlarged_from_original(print.enlargement()));
+        let outline = outline.mapped(&print.mask_scale().masks_from_print());
         let read = print.hypotheses().ok()?;
         let known = &read.first()?.soft.known;
         let inside = inside(&outline, [known.width(), known.height()]);

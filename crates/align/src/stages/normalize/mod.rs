@@ -16,10 +16,10 @@ pub use params::{NormalizeError, NormalizeParams};
 pub(super) use relief::{relative_depths, relief_heights, soft_stroke};
 
 use super::print::Print;
-use mocban_core::raster::{DepthMap, Mask, reduce_mask};
+use mocban_core::raster::{DepthMap, Mask, mask_of_print};
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 17;
+pub const REVISION: u32 = 18;
 
 /// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///
@@ -35,7 +35,7 @@ pub fn normalize(
 ) -> Result<Normalized, NormalizeError> {
     let inks = print.hypotheses()?;
     let relief = relief::relief_heights(depth).ok_or(NormalizeError::NoStrokes)?;
-    Normalized::new(inks, print.enlargement(), Some(relief), params)
+    Normalized::new(inks, print.mask_scale(), Some(relief), params)
 }
 
 /// Returns the pixels of a print that are ink in the likeliest interpretation, for use without a scan. Registration may
@@ -45,8 +45,8 @@ pub fn normalize(
 /// Returns an error if the print shows no ink.
 pub fn likeliest_ink(print: &Print) -> Result<Mask, NormalizeError> {
     // There is at least one interpretation.
-    Ok(reduce_mask(
+    Ok(mask_of_print(
         &print.hypotheses()?[0].mask,
-        print.enlargement(),
+        print.mask_scale(),
     ))
 }

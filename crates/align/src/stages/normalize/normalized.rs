@@ -1,17 +1,13 @@
 //! Result of the normalize stage, and the map from an image to the canvas on which masks are compared.
 
-use std::num::NonZeroU32;
-
 use super::params::{NormalizeError, NormalizeParams};
 use crate::stages::binarize::InkMask;
 use crate::stages::pose::SoftMask;
-use mocban_core::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights};
-use mocban_core::raster::{
-    Grid, Mask, enlarged_from_original, original_from_enlarged, reduce_mask,
-};
+use mocban_core::domain::{Affine2, InkHypothesis, MaskScale, NormalizeOutcome, ReliefHeights};
+use mocban_core::raster::{Grid, Mask, mask_of_print};
 
-/// Masks of one interpretation of the print, in the print image's frame. They are larger than a small print, because its
-/// strokes are narrower than a pixel.
+/// Masks of one interpretation of the print, in the print image's frame. They are larger than a small print and smaller
+/// than a large one, see [`MaskScale`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintMasks {
     /// Pixels that are ink.
@@ -20,8 +16,8 @@ pub struct PrintMasks {
     pub specks: Mask,
     /// Pixels that are ink or background. All other pixels are the white around the print.
     pub known: Mask,
-    /// How many times the masks are larger than the print, on each side.
-    pub enlargement: u32,
+    /// The size of the masks relative to the print.
+    pub scale: MaskScale,
 }
 
 impl PrintMasks {
@@ -45,35 +41,35 @@ impl PrintMasks {
         })
     }
 
-    /// Decodes a stored mask: 255 is ink, 64 is a speck, 0 is background and 128 is unknown. `enlargement` is that of
-    /// [`NormalizeOutcome::enlargement`].
-    pub fn from_grey(grey: &Grid<u8>, enlargement: u32) -> Self {
+    /// Decodes a stored mask: 255 is ink, 64 is a speck, 0 is background and 128 is unknown. `scale` is that of
+    /// [`NormalizeOutcome::mask_scale`].
+    pub fn from_grey(grey: &Grid<u8>, scale: MaskScale) -> Self {
         Self {
             ink: grey.map(|grey| *grey == Self::INK),
             specks: grey.map(|grey| *grey == Self::SPECK),
             known: grey.map(|grey| *grey != Self::UNKNOWN),
-            enlargement,
+            scale,
         }
     }
 
-    /// Returns the pixels of the print that are ink: those of which at least half is.
+    /// Returns the pixels of the print that are ink.
     pub fn ink_of_print(&self) -> Mask {
-        reduce_mask(&self.ink, self.enlargement)
+        mask_of_print(&self.ink, self.scale)
     }
 
     /// Returns width and height of the print.
     pub(crate) fn print_size(&self) -> [usize; 2] {
-        [self.ink.width(), self.ink.height()].map(|side| side / self.enlargement.max(1) as usize)
+        self.scale.print_size([self.ink.width(), self.ink.height()])
     }
 
     /// Returns the map from pixels of the masks to pixels of the print.
     pub(crate) fn print_from_masks(&self) -> Affine2 {
-        original_from_enlarged(self.enlargement)
+        self.scale.print_from_masks()
     }
 
     /// Returns the map from pixels of the print to pixels of the masks.
     pub(crate) fn masks_from_print(&self) -> Affine2 {
-        enlarged_from_original(self.enlargement)
+        self.scale.masks_from_print()
     }
 
     /// Returns the ink mask as a soft mask of zeros and ones.
@@ -95,17 +91,17 @@ pub struct Normalized {
 }
 
 impl Normalized {
-    /// Collects the interpretations of a print, each with its map to the canvas. `enlargement` is that of the masks.
+    /// Collects the interpretations of a print, each with its map to the canvas. `scale` is that of the masks.
     ///
     /// # Errors
     /// Returns an error if no interpretation has ink.
     pub(crate) fn new(
         inks: &[InkMask],
-        enlargement: u32,
+        scale: MaskScale,
         relief: Option<ReliefHeights>,
         params: &NormalizeParams,
     ) -> Result<Self, NormalizeError> {
-        let masks_from_print = enlarged_from_original(enlargement);
+        let masks_from_print = scale.masks_from_print();
         let interpretation = |ink: &InkMask| {
             let hypothesis = InkHypothesis {
                 threshold_print: ink.threshold * 65_535.0,
@@ -116,13 +112,10 @@ impl Normalized {
                 ink: ink.mask.clone(),
                 specks: ink.specks.clone(),
                 known: ink.soft.known.clone(),
-                enlargement,
+                scale,
             };
             // As a resumed run reads them: ink is known, and specks are neither ink nor unknown.
-            Some((
-                hypothesis,
-                PrintMasks::from_grey(&masks.to_grey(), enlargement),
-            ))
+            Some((hypothesis, PrintMasks::from_grey(&masks.to_grey(), scale)))
         };
         let (hypotheses, prints): (Vec<_>, Vec<_>) = inks.iter().filter_map(interpretation).unzip();
         if prints.is_empty() {
@@ -135,7 +128,8 @@ impl Normalized {
                 relief,
                 thresholds: Vec::new(),
                 print_orientation: None,
-                print_enlargement: NonZeroU32::new(enlargement).filter(|times| times.get() > 1),
+                print_enlargement: scale.enlargement(),
+                print_reduction: scale.reduction(),
             },
             prints,
         })
@@ -159,6 +153,7 @@ pub(crate) fn box_wrap(mask: &Mask, params: &NormalizeParams) -> Option<Affine2>
 #[cfg(test)]
 mod tests {
     use super::PrintMasks;
+    use mocban_core::domain::MaskScale;
     use mocban_core::raster::Mask;
 
     #[test]
@@ -167,12 +162,12 @@ mod tests {
             ink: Mask::from_fn(4, 1, |x, _| x == 0),
             specks: Mask::from_fn(4, 1, |x, _| x == 3),
             known: Mask::from_fn(4, 1, |x, _| x == 1 || x == 3),
-            enlargement: 1,
+            scale: MaskScale::Same,
         };
         let grey = masks.to_grey();
         // Ink, background, unknown, speck; the values are documented at `artifact_role::print_mask`.
         assert_eq!(grey.data(), [255, 0, 128, 64]);
-        let back = PrintMasks::from_grey(&grey, 1);
+        let back = PrintMasks::from_grey(&grey, MaskScale::Same);
         assert_eq!((back.ink, back.specks), (masks.ink, masks.specks));
     }
 }

@@ -8,7 +8,7 @@ use crate::stages::binarize::{self, InkMask};
 use crate::stages::normalize::{NormalizeError, NormalizeParams, Normalized, box_wrap};
 use crate::stages::print::Print;
 use crate::stages::score::SsimReference;
-use mocban_core::domain::{Affine2, ThresholdChoice, ThresholdMetric};
+use mocban_core::domain::{Affine2, MaskScale, ThresholdChoice, ThresholdMetric};
 use mocban_core::raster::components::remove_specks;
 use mocban_core::raster::{DepthMap, Mask, warp_mask};
 
@@ -69,7 +69,8 @@ pub(crate) fn normalize(
     params: &NormalizeParams,
 ) -> Result<Normalized, NormalizeError> {
     let ink = binarize::fixed(print.image(), params.print_grey)?;
-    let mut normalized = Normalized::new(std::slice::from_ref(&ink), 1, None, params)?;
+    let mut normalized =
+        Normalized::new(std::slice::from_ref(&ink), MaskScale::Same, None, params)?;
     let canvas_from_print = normalized.outcome.inks[0].canvas_from_print;
     normalized.outcome.thresholds = choose(depth, &ink, &canvas_from_print, params)?;
     Ok(normalized)

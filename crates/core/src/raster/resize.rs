@@ -1,11 +1,11 @@
-//! Enlarges colours a whole number of times, and reduces masks of the enlarged size again.
+//! Enlarges or reduces colours a whole number of times, and brings masks of that size back to the size of the print.
 
-use super::{Grid, Mask};
-use crate::domain::Affine2;
+use super::{Grid, Mask, resample};
+use crate::domain::MaskScale;
 use crate::domain::cancel::poll;
 
 /// Enlarges colours `times` times by cubic interpolation (Catmull-Rom). Beyond the border, the colours of the border
-/// continue. For the map of the pixels, see [`original_from_enlarged`].
+/// continue. For the map of the pixels, see [`MaskScale`].
 ///
 /// ```
 /// use mocban_core::raster::{Grid, enlarge};
@@ -35,26 +35,61 @@ pub fn enlarge(rgb: &Grid<[u16; 3]>, times: u32) -> Grid<[u16; 3]> {
     })
 }
 
-/// Returns the map from pixels of an image that was enlarged `times` times to pixels of the original. Pixel centres have
-/// whole coordinates.
-pub fn original_from_enlarged(times: u32) -> Affine2 {
-    let times = f64::from(times);
-    Affine2::scale_shift(1.0 / times, [(1.0 - times) / (2.0 * times); 2])
-}
-
-/// Returns the map from pixels of an image to pixels of the same image enlarged `times` times.
-pub fn enlarged_from_original(times: u32) -> Affine2 {
-    let times = f64::from(times);
-    Affine2::scale_shift(times, [(times - 1.0) / 2.0; 2])
-}
-
-/// Reduces a mask of an image that was enlarged `times` times to the size of the original: pixels are set if at least
-/// half of their area is.
-pub fn reduce_mask(mask: &Mask, times: u32) -> Mask {
+/// Reduces colours to the means of squares of `times` by `times` pixels. The last column and row may show fewer pixels.
+///
+/// ```
+/// use mocban_core::raster::{Grid, reduce};
+///
+/// let ramp = Grid::from_fn(5, 2, |x, _| [100 * x as u16; 3]);
+/// let found = reduce(&ramp, 2);
+/// assert_eq!([found.width(), found.height()], [3, 1]);
+/// assert_eq!(found.data(), [[50; 3], [250; 3], [400; 3]]);
+/// ```
+pub fn reduce(rgb: &Grid<[u16; 3]>, times: u32) -> Grid<[u16; 3]> {
     let side = times.max(1) as usize;
-    if side == 1 {
-        return mask.clone();
+    let [columns, rows] = [rgb.width(), rgb.height()].map(|length| length.div_ceil(side));
+    let mut colours = Vec::with_capacity(columns * rows);
+    let mut sums = vec![[0_u64; 3]; columns];
+    for top in (0..rgb.height()).step_by(side) {
+        poll();
+        sums.fill([0; 3]);
+        let rows = top..rgb.height().min(top + side);
+        for y in rows.clone() {
+            for (sum, square) in sums.iter_mut().zip(rgb.row(y).chunks(side)) {
+                for colour in square {
+                    for (sum, value) in sum.iter_mut().zip(colour) {
+                        *sum += u64::from(*value);
+                    }
+                }
+            }
+        }
+        colours.extend(sums.iter().enumerate().map(|(x, sum)| {
+            let width = side.min(rgb.width() - x * side);
+            let pixels = (width * rows.len()) as u64;
+            sum.map(|sum| ((sum + pixels / 2) / pixels) as u16)
+        }));
     }
+    // A square for each column and row.
+    Grid::from_vec(columns, rows, colours).expect("one colour for each square")
+}
+
+/// Returns the pixels of a print that are set in its mask: of an enlarged mask those of which at least half is set, of a
+/// reduced one those where the interpolated mask is at least one half.
+pub fn mask_of_print(mask: &Mask, scale: MaskScale) -> Mask {
+    match scale {
+        MaskScale::Same => mask.clone(),
+        MaskScale::Enlarged(times) => majorities(mask, times.get() as usize),
+        MaskScale::Reduced(reduction) => {
+            let times = f64::from(reduction.times.get());
+            let print_px = reduction.print_px.map(|side| side as usize);
+            let shift = [(times - 1.0) / 2.0; 2];
+            resample(&mask.to_weights(), times, shift, print_px).map(|set| *set >= 0.5)
+        }
+    }
+}
+
+/// Returns whether at least half is set of each square of a mask.
+fn majorities(mask: &Mask, side: usize) -> Mask {
     Mask::from_fn(mask.width() / side, mask.height() / side, |x, y| {
         let rows = (y * side..).take(side);
         let set = rows
@@ -111,8 +146,10 @@ pub fn catmull_rom(t: f64) -> [f64; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::{enlarge, enlarged_from_original, original_from_enlarged, reduce_mask};
+    use super::{enlarge, mask_of_print, reduce};
+    use crate::domain::{MaskReduction, MaskScale};
     use crate::raster::{Grid, Mask};
+    use std::num::NonZeroU32;
 
     #[test]
     fn enlarged_ramps_are_ramps_in_the_frame_of_the_maps() {
@@ -123,13 +160,11 @@ mod tests {
                 [found.width(), found.height()],
                 [9, 7].map(|side| side * times as usize)
             );
-            let map = original_from_enlarged(times);
+            let map = MaskScale::enlarged(times).print_from_masks();
             let inner = |side: u32| 2 * times..(side - 2) * times;
             for (x, y) in inner(9).flat_map(|x| inner(7).map(move |y| (x, y))) {
                 let place = [x, y].map(f64::from);
                 let [u, v] = map.apply(place);
-                let back = enlarged_from_original(times).apply([u, v]);
-                assert!((back[0] - place[0]).abs() < 1e-9 && (back[1] - place[1]).abs() < 1e-9);
                 let [red, green, blue] = found.at(x as usize, y as usize);
                 assert!((f64::from(red) - 1000.0 * u).abs() <= 1.0, "{red} at {u}");
                 assert!(
@@ -155,11 +190,31 @@ mod tests {
     #[test]
     fn reduced_masks_have_the_majority_of_each_square() {
         let wide = Mask::from_fn(9, 6, |x, y| x < 4 || (x == 5 && y > 2));
-        let reduced = reduce_mask(&wide, 3);
+        let reduced = mask_of_print(&wide, MaskScale::enlarged(3));
         assert_eq!(
             reduced,
             Mask::from_fn(3, 2, |x, y| x == 0 || (x == 1 && y == 1))
         );
-        assert_eq!(reduce_mask(&wide, 1), wide);
+        assert_eq!(mask_of_print(&wide, MaskScale::Same), wide);
+    }
+
+    #[test]
+    fn a_mask_of_a_reduced_print_covers_its_strokes() {
+        let is_ink = |x: usize, y: usize| (30..85).contains(&x) && x.abs_diff(y) < 14;
+        let print = Grid::from_fn(119, 121, |x, y| [u16::from(!is_ink(x, y)) * 60_000; 3]);
+        let reduced = reduce(&print, 4);
+        assert_eq!([reduced.width(), reduced.height()], [30, 31]);
+        let scale = MaskScale::Reduced(MaskReduction {
+            times: NonZeroU32::new(4).expect("not zero"),
+            print_px: [119, 121],
+        });
+        let mask = reduced.map(|colour| colour[0] < 30_000);
+        let found = mask_of_print(&mask, scale);
+        let wanted = Mask::from_fn(119, 121, is_ink);
+        let wrong = found.zip_map(&wanted, |found, wanted| found != wanted);
+        let (wrong, ink) = (wrong.count(), wanted.count());
+        assert!(10 * wrong < ink, "{wrong} of {ink}");
+        let full = Mask::new(30, 31, true);
+        assert_eq!(mask_of_print(&full, scale), Mask::new(119, 121, true));
     }
 }

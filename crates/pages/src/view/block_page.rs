@@ -1,6 +1,5 @@
 //! The page of a block: its layers as images, its characters, and the 3D views of their pairs.
 
-use std::net::SocketAddr;
 use std::sync::{Arc, OnceLock};
 
 use axum::Router;
@@ -10,9 +9,9 @@ use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse as _, Redirect, Response};
 use axum::routing::get;
 
-use super::correction_server::{self, CorrectionStore};
+use super::correction_page::{self, CorrectionStore};
 use super::page;
-use super::server::{ViewError, ViewServer, jpeg};
+use super::scan_page::jpeg;
 use crate::local_server::WorkThread;
 use crate::review::Language;
 use mocban_core::domain::BlockName;
@@ -62,32 +61,27 @@ struct ShownBlock {
     overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
 }
 
-/// Binds the address for the page of a block, and for its correction. Without `view`, only the correction is shown. Port
-/// 0 chooses the same port for equal names of blocks, if it is free. Without a language, the browser decides.
-///
-/// # Errors
-/// Returns an error if the address cannot be bound or the system provides no randomness.
-pub async fn bind_block(
-    address: SocketAddr,
+/// Returns the routes of the page of a block, and of its correction. Without `view`, only the correction is shown. Without a
+/// language, the browser decides.
+pub fn block_page(
     block: &BlockName,
     view: Option<BlockView>,
     store: impl CorrectionStore,
     language: Option<Language>,
-) -> Result<ViewServer, ViewError> {
+) -> Router {
     let work = Arc::new(WorkThread::default());
     let pages = match view {
         Some(view) => page_routes(view, language, Arc::clone(&work)),
         None => Router::new().route("/", get(async || Redirect::to("correct"))),
     };
-    let pages = pages
+    pages
         .route("/assets/{name}", get(asset))
-        .merge(correction_server::routes(
+        .merge(correction_page::routes(
             block.clone(),
             store,
             work,
             language,
-        ));
-    ViewServer::open(address, block.as_str(), pages).await
+        ))
 }
 
 /// Returns the routes of the page of a block that is aligned.

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::page;
-use super::server::jpeg;
+use super::scan_page::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
 use crate::review::Language;
 use mocban_core::domain::{BlockName, BlockSide, ContentHash, ControlPoints};

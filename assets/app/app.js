@@ -1,0 +1,125 @@
+// Actions, and parts of pages that are read again while they are shown.
+
+const token = document.querySelector('meta[name="csrf-token"]').content;
+const status = document.getElementById("status");
+
+/** Returns the fields of a form, with the button that sent it. A name that occurs twice has a list. */
+function fields(form, button) {
+  const data = new FormData(form, button);
+  const names = new Set(data.keys());
+  return Object.fromEntries([...names].map((name) => {
+    const values = data.getAll(name);
+    return [name, values.length > 1 ? values : values[0]];
+  }));
+}
+
+function showProblem(form, text) {
+  const problem = form.querySelector(".problem");
+  problem.textContent = text;
+  problem.hidden = !text;
+}
+
+/** Sends an action. Its reply says which page follows. */
+async function send(form, button) {
+  const response = await fetch(form.dataset.post, {
+    method: "POST",
+    headers: { "content-type": "application/json", "x-csrf-token": token },
+    body: JSON.stringify(fields(form, button)),
+  });
+  const text = await response.text();
+  let reply = {};
+  try {
+    reply = JSON.parse(text);
+  } catch {
+    reply = { error: text };
+  }
+  if (!response.ok) throw new Error(reply.error || text || response.statusText);
+  return reply;
+}
+
+document.addEventListener("submit", async (event) => {
+  const form = event.target;
+  if (!form.dataset.post) return;
+  event.preventDefault();
+  const question = event.submitter?.dataset.confirm;
+  if (question && !window.confirm(question)) return;
+  if (form.getAttribute("aria-busy") === "true") return;
+  form.setAttribute("aria-busy", "true");
+  showProblem(form, "");
+  try {
+    const reply = await send(form, event.submitter);
+    if (reply.text) status.textContent = reply.text;
+    if (reply.go) location.assign(reply.go);
+    else if (reply.reload) await refresh(true);
+  } catch (error) {
+    showProblem(form, error.message);
+  } finally {
+    form.removeAttribute("aria-busy");
+  }
+});
+
+/** Returns whether a part can be replaced without taking something away from the user. */
+function isInUse(part) {
+  const active = document.activeElement;
+  const isTyping = active && part.contains(active) && active.matches("input, select, textarea");
+  return isTyping || part.querySelector('[aria-busy="true"]') !== null;
+}
+
+/** Moves the focus to the element in the place of the one that had it. */
+function withFocus(part, change) {
+  const active = document.activeElement;
+  const all = (root) => [...root.querySelectorAll("a[href], button, input, select, summary")];
+  const index = part.contains(active) ? all(part).indexOf(active) : -1;
+  change();
+  if (index >= 0) all(part)[index]?.focus({ preventScroll: true });
+}
+
+/** Keeps the pictures that are shown, so that they do not flicker. */
+function update(part, fresh) {
+  const shown = new Map([...part.querySelectorAll("img")].map((image) => [image.getAttribute("src"), image]));
+  for (const image of fresh.querySelectorAll("img")) {
+    const known = shown.get(image.getAttribute("src"));
+    if (known) image.replaceWith(known);
+  }
+  withFocus(part, () => part.replaceChildren(...fresh.childNodes));
+}
+
+/** Reads the page again and replaces its moving part. Without one, loads the page. */
+async function refresh(mustReload) {
+  const part = document.querySelector("[data-live]");
+  if (!part) {
+    if (mustReload) location.reload();
+    return;
+  }
+  if (!mustReload && isInUse(part)) return;
+  const response = await fetch(location.href).catch(() => null);
+  if (!response?.ok) return;
+  const page = new DOMParser().parseFromString(await response.text(), "text/html");
+  const fresh = page.querySelector("[data-live]");
+  if (!fresh || fresh.dataset.seen === part.dataset.seen && fresh.innerHTML === part.dataset.html) return;
+  part.dataset.html = fresh.innerHTML;
+  update(part, fresh);
+}
+
+const live = document.querySelector("[data-live]");
+if (live) {
+  live.dataset.html = live.innerHTML;
+  const interval = Number(live.dataset.live);
+  const next = async () => {
+    if (!document.hidden) await refresh(false);
+    setTimeout(next, interval);
+  };
+  setTimeout(next, interval);
+}
+
+/** Loads the parts of a page that take long. */
+for (const part of document.querySelectorAll("[data-load]")) {
+  const response = await fetch(part.dataset.load).catch(() => null);
+  const text = await response?.text();
+  const page = new DOMParser().parseFromString(text ?? "", "text/html");
+  const shown = response?.ok ? page.body : page.querySelector("main") ?? page.body;
+  part.replaceChildren(...shown.childNodes);
+  part.dataset.loaded = "true";
+}
+
+document.body.dataset.ready = "true";

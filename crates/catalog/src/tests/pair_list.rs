@@ -1,0 +1,186 @@
+//! Lists of pairs: filters, orders and pages.
+
+use super::{Place, World, done, name, row};
+use crate::{
+    CheckpointOutcome, ImportRow, NewVerdict, PairCursor, PairFilter, PairOrder, StageCheckpoint,
+};
+use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict};
+
+/// Imports `count` pairs of two blocks and gives the first `done` of them results whose confidence falls and then rises.
+async fn world(count: usize, finished: usize) -> World {
+    let world = World::at(Place::new(), 0).await;
+    let rows = (0..count).map(|n| ImportRow {
+        block: Some(format!("b{}", n % 2)),
+        character: Some(["明", "堂", "木"][n % 3].to_owned()),
+        ..row(&format!("p{n:03}"))
+    });
+    let rows = rows.collect();
+    world.catalog.import(rows, 1).await.expect("imported");
+    for n in 0..finished {
+        let mut lease = world.claim(1).await.pop().expect("a ready pair");
+        loop {
+            let stage = lease.cursor();
+            let checkpoint = with_scores(done(world.fingerprints, stage), n);
+            match world.catalog.checkpoint_now(lease, checkpoint).await {
+                Ok(CheckpointOutcome::Lease(next)) => lease = next,
+                Ok(CheckpointOutcome::Done) => break,
+                other => panic!("the checkpoint was not stored: {other:?}"),
+            }
+        }
+    }
+    world
+}
+
+fn confidence(n: usize) -> f64 {
+    ((n as f64) - 5.0).abs() / 10.0
+}
+
+fn with_scores(mut checkpoint: StageCheckpoint, n: usize) -> StageCheckpoint {
+    for metric in &mut checkpoint.metrics {
+        metric.outcome.confidence = Some(confidence(n));
+        metric.outcome.scores.iou = n as f64 / 100.0;
+    }
+    checkpoint
+}
+
+/// Reads a whole list in pages and returns the numbers of its pairs.
+async fn listed(world: &World, filter: &PairFilter, order: PairOrder, size: usize) -> Vec<usize> {
+    let (mut after, mut found): (Option<PairCursor>, Vec<usize>) = (None, Vec::new());
+    loop {
+        let page = world
+            .catalog
+            .pair_list(filter, order, ThresholdMetric::Ensemble, after, size)
+            .await
+            .expect("a page");
+        assert!(page.pairs.len() <= size);
+        let names = page.pairs.iter().map(|pair| pair.attributes.name.as_str());
+        found.extend(names.map(|name| name[1..].parse::<usize>().expect("a number")));
+        match page.next {
+            Some(next) => after = Some(next),
+            None => return found,
+        }
+    }
+}
+
+#[tokio::test]
+async fn every_order_has_each_pair_once_whatever_the_size_of_its_pages() {
+    let world = world(14, 11).await;
+    let all = PairFilter::default();
+    for size in [1, 3, 50] {
+        let imported = listed(&world, &all, PairOrder::Imported, size).await;
+        assert_eq!(imported, (0..14).collect::<Vec<_>>(), "{size}");
+        let mut least: Vec<usize> = (0..11).collect();
+        least.sort_by(|a, b| confidence(*a).total_cmp(&confidence(*b)));
+        let found = listed(&world, &all, PairOrder::LeastConfident, size).await;
+        assert_eq!(found, least, "{size}");
+        least.reverse();
+        let found = listed(&world, &all, PairOrder::MostConfident, size).await;
+        assert_eq!(found, least, "{size}");
+        let found = listed(&world, &all, PairOrder::LowestIou, size).await;
+        assert_eq!(found, (0..11).collect::<Vec<_>>(), "{size}");
+        let found = listed(&world, &all, PairOrder::HighestIou, size).await;
+        assert_eq!(found, (0..11).rev().collect::<Vec<_>>(), "{size}");
+    }
+}
+
+#[tokio::test]
+async fn filters_hold_together_in_every_order() {
+    let world = world(14, 11).await;
+    let filter = PairFilter {
+        block: Some("b1".to_owned()),
+        statuses: vec![JobStatus::Done],
+        ..PairFilter::default()
+    };
+    for size in [2, 50] {
+        let found = listed(&world, &filter, PairOrder::Imported, size).await;
+        assert_eq!(found, [1, 3, 5, 7, 9]);
+        let found = listed(&world, &filter, PairOrder::HighestIou, size).await;
+        assert_eq!(found, [9, 7, 5, 3, 1]);
+        let found = listed(&world, &filter, PairOrder::LeastConfident, size).await;
+        assert_eq!(found, [5, 3, 7, 1, 9]);
+    }
+    let both = PairFilter {
+        character: Some("明".to_owned()),
+        ..filter.clone()
+    };
+    assert_eq!(listed(&world, &both, PairOrder::Imported, 1).await, [3, 9]);
+    let waiting = PairFilter {
+        statuses: vec![JobStatus::Ready, JobStatus::Backoff],
+        ..PairFilter::default()
+    };
+    let found = listed(&world, &waiting, PairOrder::Imported, 2).await;
+    assert_eq!(found, [11, 12, 13]);
+    let none = PairFilter {
+        class: Some(FailureClass::Io),
+        ..PairFilter::default()
+    };
+    assert!(
+        listed(&world, &none, PairOrder::Imported, 2)
+            .await
+            .is_empty()
+    );
+}
+
+#[tokio::test]
+async fn retired_pairs_are_in_no_list_and_verdicts_are_found() {
+    let world = world(8, 8).await;
+    let [retired, pair] = ["p002", "p004"].map(name);
+    world
+        .catalog
+        .retire_pairs(&[retired], 9)
+        .await
+        .expect("retired");
+    let given = NewVerdict {
+        pair,
+        metric: Some(ThresholdMetric::Ensemble),
+        ..super::verdicts::verdict("ana", Verdict::Fail)
+    };
+    let stored = world.catalog.verdict_set(vec![given], 9).await;
+    stored.expect("a verdict");
+    let all = PairFilter::default();
+    let found = listed(&world, &all, PairOrder::Imported, 3).await;
+    assert_eq!(found, [0, 1, 3, 4, 5, 6, 7]);
+    let found = listed(&world, &all, PairOrder::LowestIou, 3).await;
+    assert_eq!(found, [0, 1, 3, 4, 5, 6, 7]);
+    let failed = PairFilter {
+        verdict: Some(Verdict::Fail),
+        ..PairFilter::default()
+    };
+    assert_eq!(listed(&world, &failed, PairOrder::Imported, 3).await, [4]);
+    let of_relief = world.catalog.pair_list(
+        &failed,
+        PairOrder::Imported,
+        ThresholdMetric::Relief,
+        None,
+        3,
+    );
+    assert!(of_relief.await.expect("a page").pairs.is_empty());
+    let passed = PairFilter {
+        verdict: Some(Verdict::Pass),
+        ..PairFilter::default()
+    };
+    assert!(
+        listed(&world, &passed, PairOrder::LowestIou, 3)
+            .await
+            .is_empty()
+    );
+    let unjudged = PairFilter {
+        is_unjudged: true,
+        ..PairFilter::default()
+    };
+    let found = listed(&world, &unjudged, PairOrder::Imported, 2).await;
+    assert_eq!(found, [0, 1, 3, 5, 6, 7]);
+}
+
+#[tokio::test]
+async fn the_latest_results_come_first() {
+    let world = world(6, 4).await;
+    let recent = world.catalog.recent_results(3).await.expect("pairs");
+    let names: Vec<_> = recent
+        .iter()
+        .map(|pair| pair.attributes.name.as_str())
+        .collect();
+    assert_eq!(names, ["p003", "p002", "p001"]);
+    let blocks = world.catalog.first_listed_blocks(9).await.expect("blocks");
+    assert_eq!(blocks, ["b0", "b1"]);
+}

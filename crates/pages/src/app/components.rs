@@ -1,0 +1,164 @@
+//! The parts that pages are made of: the frame with its navigation, notices, progress, tables and fields.
+
+use axum::response::Html;
+use maud::{Markup, html};
+
+use super::address::encoded;
+use super::visit::Visit;
+use crate::local_server::document;
+use crate::review::Language;
+use mocban_core::domain::one_line;
+
+/// A page in the navigation of a project.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum NavSection {
+    /// A page that is not in the navigation.
+    None,
+    /// Run, and the state of the project.
+    Run,
+    /// The list of pairs.
+    Pairs,
+    /// Reviews.
+    Review,
+    /// The report.
+    Report,
+    /// Exports.
+    Export,
+    /// Import of pairs.
+    Import,
+    /// Settings.
+    Settings,
+    /// Check and backup.
+    Health,
+}
+
+/// Address, and name in English and Vietnamese, of the pages in the navigation.
+const SECTIONS: [(NavSection, &str, [&str; 2]); 7] = [
+    (NavSection::Run, "", ["Run", "Căn chỉnh"]),
+    (NavSection::Pairs, "pairs", ["Pairs", "Các cặp"]),
+    (NavSection::Review, "review", ["Review", "Đánh giá"]),
+    (NavSection::Report, "report", ["Report", "Báo cáo"]),
+    (NavSection::Export, "export", ["Export", "Xuất dữ liệu"]),
+    (NavSection::Settings, "settings", ["Settings", "Thiết lập"]),
+    (NavSection::Health, "health", ["Health", "Tình trạng"]),
+];
+
+/// Returns a whole page. `project` is the name of the project that it belongs to.
+pub(super) fn frame(
+    visit: &Visit,
+    title: &str,
+    project: Option<&str>,
+    section: NavSection,
+    body: &Markup,
+) -> Html<String> {
+    let root = &visit.root;
+    let other = visit.language.other();
+    let change = visit.query.with("language", other.name()).text();
+    let head = html! {
+        meta name="csrf-token" content=(visit.csrf_token);
+        link rel="stylesheet" href={ (root) "assets/tokens.css" };
+        link rel="stylesheet" href={ (root) "assets/app.css" };
+        script type="module" src={ (root) "assets/app.js" } {}
+    };
+    let body = html! {
+        body {
+            a.skip href="#main" { (visit.t("To the content", "Đến nội dung")) }
+            header.bar {
+                a.brand href=(root) { "mocban" }
+                @if let Some(project) = project {
+                    nav aria-label=(visit.t("Pages of the project", "Các trang của dự án")) {
+                        span.project title=(one_line(project)) { (one_line(project)) }
+                        @for (known, page, names) in SECTIONS {
+                            a href=(visit.project_page(project, page)) aria-current=[(known == section).then_some("page")] {
+                                (visit.t(names[0], names[1]))
+                            }
+                        }
+                        a href={ (root) "import?project=" (encoded(project)) } aria-current=[(section == NavSection::Import).then_some("page")] {
+                            (visit.t("Import", "Nhập dữ liệu"))
+                        }
+                    }
+                }
+                span.spacer {}
+                a href={ (visit.here) (change) } hreflang=(other.name()) lang=(other.name()) {
+                    (match other { Language::English => "English", Language::Vietnamese => "Tiếng Việt" })
+                }
+            }
+            main #main tabindex="-1" {
+                h1 { (title) }
+                (body)
+            }
+            p #status.visually-hidden role="status" {}
+        }
+    };
+    let title = match project {
+        Some(project) => format!("{title} · {}", one_line(project)),
+        None => format!("{title} · mocban"),
+    };
+    Html(document(visit.language.name(), &title, &head, &body).into_string())
+}
+
+/// Returns a form that posts its fields as JSON to an action and shows what the action replies.
+pub(super) fn action_form(action: &str, class: &str, content: &Markup) -> Markup {
+    html! {
+        form class={ "action " (class) } data-post=(action) {
+            (content)
+            p.problem role="alert" hidden {}
+        }
+    }
+}
+
+/// Returns the part of a page that is shown while there is nothing yet.
+pub(super) fn empty(text: &str, next: &Markup) -> Markup {
+    html! {
+        div.empty { p { (text) } (next) }
+    }
+}
+
+/// Returns a number with its name below it, and a link to what is counted.
+pub(super) fn figure(number: u64, name: &str, href: Option<&str>, tone: &str) -> Markup {
+    let content = html! { b { (grouped(number)) } span { (name) } };
+    html! {
+        @match href {
+            Some(href) if number > 0 => a class={ "figure " (tone) } href=(href) { (content) },
+            _ => span class={ "figure " (tone) } { (content) },
+        }
+    }
+}
+
+/// Returns a number with a thin space between groups of three digits.
+pub(super) fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Returns a score with three digits, or a dash.
+pub(super) fn score(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.3}"))
+}
+
+/// Returns an option of a choice.
+pub(super) fn choice(value: &str, text: &str, selected: Option<&str>) -> Markup {
+    html! {
+        option value=(value) selected[selected.unwrap_or_default() == value] { (text) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{grouped, score};
+
+    #[test]
+    fn numbers_are_grouped() {
+        assert_eq!(grouped(7), "7");
+        assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
+        assert_eq!(score(Some(0.98765)), "0.988");
+        assert_eq!(score(None), "–");
+    }
+}

@@ -1,0 +1,327 @@
+//! Exports: a question instead of a format, and the files of the last export.
+
+use std::path::{Path as FilePath, PathBuf};
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{Path, State};
+use axum::http::header;
+use axum::response::{Html, IntoResponse as _, Response};
+use maud::{Markup, html};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::address::encoded;
+use super::components::{NavSection, action_form, choice, frame};
+use super::failure::{AppFailure, AppResult};
+use super::state::AppState;
+use super::task_part::task_part;
+use super::tasks::{TaskKind, TaskLines};
+use super::visit::Visit;
+use mocban_core::domain::{ThresholdMetric, one_line};
+use mocban_export::{ExportFormat, ExportOptions, ResultFilter};
+use mocban_project::ProjectResult;
+use mocban_project::export::export;
+use mocban_project::location::Location;
+
+/// Folder of exports in a project.
+const FOLDER: &str = "exports";
+/// Side of the pictures of a dataset for training, pixels.
+const CANVAS_PX: u32 = 256;
+/// Most files of an export that are listed.
+const SHOWN_FILES: usize = 100;
+/// Largest file that is offered for download, bytes. Larger ones are in the folder.
+const DOWNLOAD_BYTES: u64 = 64 << 20;
+
+/// A purpose: its name, its format, and the question in both languages.
+type Purpose = (&'static str, ExportFormat, [&'static str; 2]);
+
+const PURPOSES: [Purpose; 8] = [
+    (
+        "excel",
+        ExportFormat::Csv,
+        ["a table for Excel", "bảng cho Excel"],
+    ),
+    (
+        "excel-comma",
+        ExportFormat::Csv,
+        [
+            "a table for Excel with decimal commas",
+            "bảng cho Excel dùng dấu phẩy thập phân",
+        ],
+    ),
+    (
+        "table",
+        ExportFormat::Parquet,
+        ["a table for R or Python", "bảng cho R hoặc Python"],
+    ),
+    (
+        "training",
+        ExportFormat::HuggingFace,
+        [
+            "a dataset for training, 256 x 256 pixels",
+            "bộ dữ liệu để huấn luyện, 256 x 256 điểm ảnh",
+        ],
+    ),
+    (
+        "mesh",
+        ExportFormat::Mesh,
+        [
+            "scans with their prints for MeshLab or CloudCompare",
+            "bản quét kèm bản in cho MeshLab hoặc CloudCompare",
+        ],
+    ),
+    (
+        "fiji",
+        ExportFormat::Fiji,
+        [
+            "calibrated images for ImageJ or Fiji",
+            "ảnh đã hiệu chuẩn cho ImageJ hoặc Fiji",
+        ],
+    ),
+    (
+        "web",
+        ExportFormat::Viewer,
+        ["3D pages for a web site", "trang 3D cho website"],
+    ),
+    (
+        "all",
+        ExportFormat::Jsonl,
+        [
+            "all numbers, and pictures as files",
+            "mọi con số, hình ảnh thành tệp",
+        ],
+    ),
+];
+
+/// The fields of the form.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ExportBody {
+    purpose: String,
+    only: String,
+    metric: String,
+}
+
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let task = state.tasks.state(TaskKind::Export, &open);
+    let folders = exported(&open.dir);
+    let body = html! {
+        (form(&visit))
+        div #live data-live="1500" {
+            (task_part(&visit, task.as_ref()))
+            @for (name, files) in &folders { (folder_part(&visit, &open.dir, name, files)) }
+        }
+    };
+    let title = visit.t("Export", "Xuất dữ liệu");
+    Ok(frame(&visit, title, Some(&key), NavSection::Export, &body))
+}
+
+fn form(visit: &Visit) -> Markup {
+    let metrics = ThresholdMetric::ALL.map(|metric| (metric.name(), visit.metric(metric)));
+    action_form(
+        "actions/export",
+        "card fields",
+        &html! {
+            label { span { (visit.t("I need", "Tôi cần")) }
+                select #purpose name="purpose" { @for (name, _, texts) in PURPOSES { (choice(name, texts[visit.index()], None)) } }
+            }
+            label { span { (visit.t("Which results", "Kết quả nào")) }
+                select name="only" {
+                    (choice(ResultFilter::All.name(), visit.t("all pairs", "tất cả các cặp"), None))
+                    (choice(ResultFilter::Confident.name(), visit.t("without low confidence", "trừ độ tin cậy thấp"), None))
+                    (choice(ResultFilter::Passed.name(), visit.t("passed by reviewers", "được người đánh giá cho đạt"), None))
+                }
+            }
+            label { span { (visit.t("Metric", "Độ đo")) }
+                select name="metric" {
+                    (choice("", visit.t("all metrics", "mọi độ đo"), None))
+                    @for (value, text) in metrics { (choice(value, text, None)) }
+                }
+            }
+            button.primary #export { (visit.t("Export", "Xuất")) }
+        },
+    )
+}
+
+/// Returns the exports of a project with their files and sizes. An earlier export is replaced as a whole.
+fn exported(dir: &FilePath) -> Vec<(String, Vec<(String, u64)>)> {
+    let entries = std::fs::read_dir(dir.join(FOLDER)).into_iter().flatten();
+    let mut found: Vec<_> = entries
+        .flatten()
+        .filter_map(|entry| {
+            let name = entry.file_name().into_string().ok()?;
+            let is_known = PURPOSES.iter().any(|(known, ..)| *known == name);
+            is_known.then(|| (name, files(&entry.path())))
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+/// Returns the files of a folder, without those of folders in it, with their sizes.
+fn files(folder: &FilePath) -> Vec<(String, u64)> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<_> = entries
+        .filter_map(|entry| {
+            let meta = entry.metadata().ok().filter(std::fs::Metadata::is_file)?;
+            let name = entry.file_name().into_string().ok()?;
+            (!name.starts_with('.')).then_some((name, meta.len()))
+        })
+        .take(SHOWN_FILES)
+        .collect();
+    files.sort();
+    files
+}
+
+fn folder_part(visit: &Visit, dir: &FilePath, name: &str, files: &[(String, u64)]) -> Markup {
+    let purpose = PURPOSES.iter().find(|(known, ..)| *known == name);
+    let title = purpose.map_or(name, |(.., texts)| texts[visit.index()]);
+    let folder = dir.join(FOLDER).join(name);
+    let folder = std::path::absolute(&folder).unwrap_or(folder);
+    html! {
+        section.card {
+            h3 { (title) }
+            p.muted { (visit.t("Folder", "Thư mục")) ": " code { (one_line(&folder.to_string_lossy())) } }
+            ul { @for (file, bytes) in files {
+                li {
+                    @if *bytes <= DOWNLOAD_BYTES {
+                        a href={ "exports/" (name) "/" (encoded(file)) } download { (one_line(file)) }
+                    } @else { (one_line(file)) }
+                    " " span.muted { (size(*bytes)) }
+                }
+            } }
+        }
+    }
+}
+
+/// Returns a number of bytes as a person reads it.
+pub(super) fn size(bytes: u64) -> String {
+    match bytes {
+        0..=9_999 => format!("{bytes} B"),
+        10_000..=999_999 => format!("{} kB", bytes / 1000),
+        _ => format!("{:.1} MB", bytes as f64 / 1e6),
+    }
+}
+
+/// Starts an export.
+pub(super) async fn start(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    body: Result<Json<ExportBody>, JsonRejection>,
+) -> AppResult<Json<Value>> {
+    let Json(body) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
+    let open = state.open(&key).await?;
+    let purpose = PURPOSES.iter().find(|(name, ..)| *name == body.purpose);
+    let purpose = *purpose.ok_or_else(AppFailure::not_found)?;
+    let only: ResultFilter = body
+        .only
+        .parse()
+        .map_err(|text: String| AppFailure::refused(text))?;
+    let metric = body.metric.parse::<ThresholdMetric>().ok();
+    let work = move |location| run(purpose, only, metric, location);
+    state.tasks.start(TaskKind::Export, &open, work)?;
+    Ok(Json(json!({ "reload": true })))
+}
+
+async fn run(
+    (name, format, _): Purpose,
+    only: ResultFilter,
+    metric: Option<ThresholdMetric>,
+    location: Location,
+) -> ProjectResult<TaskLines> {
+    let limits = location.settings()?.config.limits;
+    let metrics: Vec<ThresholdMetric> = metric.into_iter().collect();
+    let options = ExportOptions {
+        only,
+        csv_bom: format == ExportFormat::Csv,
+        csv_decimal_comma: name == "excel-comma",
+        canvas_px: (name == "training").then_some(CANVAS_PX),
+        ..ExportOptions::all_of(&metrics, limits)
+    };
+    let output: PathBuf = location.dir.join(FOLDER).join(name);
+    let summary = export(&output, &[format], options, &location, &()).await?;
+    let done = summary.pairs.done;
+    let mut lines = vec![[
+        format!("{done} pairs were exported."),
+        format!("Đã xuất {done} cặp."),
+    ]];
+    if summary.kept_earlier {
+        lines.push([
+            "The earlier export was kept, because files of results are missing; check the project first.".to_owned(),
+            "Bản xuất trước được giữ lại vì thiếu tệp kết quả; hãy kiểm tra dự án trước.".to_owned(),
+        ]);
+    }
+    for (pair, why) in summary.unreadable.iter().take(3) {
+        let line = format!("{pair}: {why}");
+        lines.push([line.clone(), line]);
+    }
+    Ok(lines)
+}
+
+/// Responds with a file of an export. Only files that the page lists are found.
+pub(super) async fn download(
+    State(state): State<Arc<AppState>>,
+    Path((key, name, file)): Path<(String, String, String)>,
+) -> AppResult<Response> {
+    let open = state.open(&key).await?;
+    let known = exported(&open.dir)
+        .into_iter()
+        .find(|(known, _)| *known == name);
+    let (_, files) = known.ok_or_else(AppFailure::not_found)?;
+    let is_listed = |(known, bytes): &(String, u64)| *known == file && *bytes <= DOWNLOAD_BYTES;
+    if !files.iter().any(is_listed) {
+        return Err(AppFailure::not_found());
+    }
+    let path = open.dir.join(FOLDER).join(&name).join(&file);
+    let read = tokio::task::spawn_blocking(move || std::fs::read(path)).await;
+    let bytes = read
+        .ok()
+        .and_then(Result::ok)
+        .ok_or_else(AppFailure::not_found)?;
+    Ok(attachment(&file, "application/octet-stream", bytes))
+}
+
+/// Returns a response that a browser saves as a file.
+pub(super) fn attachment(file: &str, kind: &'static str, bytes: Vec<u8>) -> Response {
+    let disposition = format!("attachment; filename*=UTF-8''{}", encoded(file));
+    let headers = [
+        (header::CONTENT_TYPE, kind.to_owned()),
+        (header::CONTENT_DISPOSITION, disposition),
+    ];
+    (headers, bytes).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{exported, size};
+
+    #[test]
+    fn only_plain_files_of_known_exports_are_listed() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        for folder in ["exports/excel/inner", "exports/other"] {
+            std::fs::create_dir_all(dir.path().join(folder)).expect("a folder");
+        }
+        for file in [
+            "excel/pairs.csv",
+            "excel/.hidden",
+            "excel/inner/x",
+            "other/y",
+        ] {
+            std::fs::write(dir.path().join("exports").join(file), "abc").expect("written");
+        }
+        let found = exported(dir.path());
+        assert_eq!(
+            found,
+            [("excel".to_owned(), vec![("pairs.csv".to_owned(), 3)])]
+        );
+        assert_eq!(size(12_345), "12 kB");
+        assert_eq!(size(2_500_000), "2.5 MB");
+    }
+}

@@ -1,0 +1,96 @@
+//! Why a page or an action fails.
+
+use std::path::Path;
+
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+
+use crate::local_server::WorkFailed;
+use mocban_catalog::CatalogError;
+use mocban_core::domain::ErrorCode;
+use mocban_project::ProjectError;
+
+/// Result of a handler.
+pub(super) type AppResult<T> = Result<T, AppFailure>;
+
+/// Why a page or an action fails.
+#[derive(Debug, Clone)]
+pub(super) struct AppFailure {
+    status: StatusCode,
+    /// One sentence. Empty if there is no such page.
+    text: String,
+}
+
+impl AppFailure {
+    /// There is no such page, project or pair.
+    pub(super) const fn not_found() -> Self {
+        Self {
+            status: StatusCode::NOT_FOUND,
+            text: String::new(),
+        }
+    }
+
+    /// A request that cannot be done as asked.
+    pub(super) fn refused(text: impl Into<String>) -> Self {
+        Self {
+            status: StatusCode::UNPROCESSABLE_ENTITY,
+            text: text.into(),
+        }
+    }
+
+    /// Explains an error of the project in a folder.
+    pub(super) fn of(error: impl Into<ProjectError>, dir: &Path) -> Self {
+        let error = error.into();
+        let status = match error.code() {
+            ErrorCode::Usage | ErrorCode::NothingSelected | ErrorCode::ProjectInUse => {
+                StatusCode::UNPROCESSABLE_ENTITY
+            }
+            _ => StatusCode::SERVICE_UNAVAILABLE,
+        };
+        Self {
+            status,
+            text: error.text(dir),
+        }
+    }
+}
+
+impl AppFailure {
+    /// Returns the status of the response.
+    pub(super) const fn status(&self) -> StatusCode {
+        self.status
+    }
+
+    /// Returns what failed. Empty if there is no such page.
+    pub(super) fn text(self) -> String {
+        self.text
+    }
+}
+
+impl From<ProjectError> for AppFailure {
+    fn from(error: ProjectError) -> Self {
+        Self::of(error, Path::new("."))
+    }
+}
+
+impl From<CatalogError> for AppFailure {
+    fn from(error: CatalogError) -> Self {
+        ProjectError::from(error).into()
+    }
+}
+
+impl From<WorkFailed> for AppFailure {
+    fn from(error: WorkFailed) -> Self {
+        Self {
+            status: StatusCode::INTERNAL_SERVER_ERROR,
+            text: error.to_string(),
+        }
+    }
+}
+
+impl IntoResponse for AppFailure {
+    fn into_response(self) -> Response {
+        let mut response = self.status.into_response();
+        response.extensions_mut().insert(self);
+        response
+    }
+}

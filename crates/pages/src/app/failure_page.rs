@@ -1,0 +1,50 @@
+//! The page that says why a page or an action fails.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{FromRequestParts as _, Request, State};
+use axum::http::Method;
+use axum::middleware::Next;
+use axum::response::{IntoResponse as _, Response};
+use maud::html;
+use serde_json::json;
+
+use super::components::{NavSection, frame};
+use super::failure::AppFailure;
+use super::state::AppState;
+use super::visit::Visit;
+
+/// Makes a page of a failure, or JSON if the request was an action.
+pub(super) async fn explain(
+    State(state): State<Arc<AppState>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let is_page = request.method() == Method::GET;
+    let (mut head, body) = request.into_parts();
+    let Ok(visit) = Visit::from_request_parts(&mut head, &state).await;
+    let response = next.run(Request::from_parts(head, body)).await;
+    let Some(failure) = response.extensions().get::<AppFailure>().cloned() else {
+        return response;
+    };
+    let (status, text) = (failure.status(), failure.text());
+    let text = if text.is_empty() {
+        visit.t("There is no such page.", "Không có trang này.")
+    } else {
+        &text
+    };
+    if !is_page {
+        return (status, Json(json!({ "error": text }))).into_response();
+    }
+    let title = visit.t("This did not work", "Không thực hiện được");
+    let body = html! {
+        p.notice.bad role="alert" { (text) }
+        p {
+            a.button href=(visit.here) { (visit.t("Try again", "Thử lại")) } " "
+            a.button href=(visit.root) { (visit.t("All projects", "Tất cả dự án")) }
+        }
+    };
+    let page = frame(&visit, title, None, NavSection::None, &body);
+    (status, page).into_response()
+}

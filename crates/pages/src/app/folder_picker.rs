@@ -1,0 +1,237 @@
+//! Folders of this computer, from which a user chooses: what is in them, and how much of it can be imported.
+
+use std::path::{Path, PathBuf};
+
+use super::failure::{AppFailure, AppResult};
+use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
+
+/// Most entries of all folders that are counted for one page.
+const COUNTED: usize = 20_000;
+/// Most folders and lists that a page shows.
+const SHOWN: usize = 500;
+/// Extensions of lists.
+const LISTS: [&str; 4] = ["csv", "xlsx", "jsonl", "tsv"];
+/// Folders in which other disks appear.
+const DISKS: [&str; 4] = ["/media", "/mnt", "/run/media", "/Volumes"];
+
+/// The folders that may be looked at: that of the app, that of the user, and other disks.
+#[derive(Debug, Clone)]
+pub(super) struct PickerRoots(Vec<PathBuf>);
+
+/// Numbers of files in a folder and the folders in it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct FileCounts {
+    pub(super) meshes: u64,
+    pub(super) prints: u64,
+    pub(super) lists: u64,
+    /// Whether there were too many entries to count all.
+    pub(super) is_partial: bool,
+}
+
+/// A folder as the picker shows it.
+#[derive(Debug, Clone)]
+pub(super) struct PickedFolder {
+    pub(super) path: PathBuf,
+    /// The folder above, if it may be looked at.
+    pub(super) parent: Option<PathBuf>,
+    pub(super) counts: FileCounts,
+    pub(super) folders: Vec<(String, FileCounts)>,
+    pub(super) lists: Vec<String>,
+}
+
+impl PickerRoots {
+    /// Returns the roots for an app of a folder.
+    pub(super) fn new(folder: &Path) -> Self {
+        let home = ["HOME", "USERPROFILE"].map(std::env::var_os);
+        let home = home.into_iter().flatten().next().map(PathBuf::from);
+        let disks = DISKS.map(PathBuf::from);
+        let roots = std::iter::once(folder.to_owned()).chain(home).chain(disks);
+        Self::of(roots)
+    }
+
+    fn of(roots: impl IntoIterator<Item = PathBuf>) -> Self {
+        let mut whole: Vec<PathBuf> = Vec::new();
+        for root in roots
+            .into_iter()
+            .filter_map(|root| root.canonicalize().ok())
+        {
+            // The root of the file system would allow everything.
+            if root.parent().is_some() && !whole.contains(&root) {
+                whole.push(root);
+            }
+        }
+        Self(whole)
+    }
+
+    /// Returns the roots.
+    pub(super) fn all(&self) -> &[PathBuf] {
+        &self.0
+    }
+
+    /// Returns the path of a file or folder with all links resolved.
+    ///
+    /// # Errors
+    /// Refuses a path that does not exist or leads out of the roots.
+    pub(super) fn allowed(&self, path: &Path) -> AppResult<PathBuf> {
+        let shown = path.display();
+        let whole = path.canonicalize();
+        let whole =
+            whole.map_err(|_invalid| AppFailure::refused(format!("{shown} cannot be opened")))?;
+        if self.has(&whole) {
+            return Ok(whole);
+        }
+        Err(AppFailure::refused(format!(
+            "{shown} is outside your folders and disks; move or copy the files to one of them"
+        )))
+    }
+
+    fn has(&self, whole: &Path) -> bool {
+        self.0.iter().any(|root| whole.starts_with(root))
+    }
+
+    /// Reads a folder.
+    ///
+    /// # Errors
+    /// Refuses a folder that cannot be read or is outside the roots.
+    pub(super) fn read(&self, path: &Path) -> AppResult<PickedFolder> {
+        let path = self.allowed(path)?;
+        let shown = path.display().to_string();
+        let failed = |error| AppFailure::refused(format!("{shown} cannot be read: {error}"));
+        let mut budget = COUNTED;
+        let (mut folders, mut lists) = (Vec::new(), Vec::new());
+        let mut counts = FileCounts::default();
+        for entry in std::fs::read_dir(&path).map_err(failed)?.flatten() {
+            let Ok(name) = entry.file_name().into_string() else {
+                continue;
+            };
+            if name.starts_with('.') {
+                continue;
+            }
+            let entry = entry.path();
+            if entry.is_dir() {
+                if folders.len() < SHOWN && entry.canonicalize().is_ok_and(|path| self.has(&path)) {
+                    folders.push((name, FileCounts::below(&entry, &mut budget)));
+                }
+                continue;
+            }
+            counts.add(&entry);
+            if is_list(&entry) && lists.len() < SHOWN {
+                lists.push(name);
+            }
+        }
+        for (_, below) in &folders {
+            counts.meshes += below.meshes;
+            counts.prints += below.prints;
+            counts.lists += below.lists;
+            counts.is_partial |= below.is_partial;
+        }
+        folders.sort_by(|(a, _), (b, _)| a.cmp(b));
+        lists.sort();
+        let parent = path.parent().filter(|parent| self.has(parent));
+        Ok(PickedFolder {
+            parent: parent.map(Path::to_owned),
+            path,
+            counts,
+            folders,
+            lists,
+        })
+    }
+}
+
+impl FileCounts {
+    /// Counts the files below a folder, without following links, while `budget` lasts.
+    fn below(folder: &Path, budget: &mut usize) -> Self {
+        let (mut counts, mut open) = (Self::default(), vec![folder.to_owned()]);
+        while let Some(folder) = open.pop() {
+            for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
+                if *budget == 0 {
+                    counts.is_partial = true;
+                    return counts;
+                }
+                *budget -= 1;
+                let is_hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
+                match entry.file_type() {
+                    _ if is_hidden => {}
+                    Ok(kind) if kind.is_dir() => open.push(entry.path()),
+                    Ok(_) => counts.add(&entry.path()),
+                    Err(_) => {}
+                }
+            }
+        }
+        counts
+    }
+
+    fn add(&mut self, file: &Path) {
+        if is_named_like_mesh(file) {
+            self.meshes += 1;
+        } else if is_named_like_print(file) {
+            self.prints += 1;
+        } else if is_list(file) {
+            self.lists += 1;
+        }
+    }
+}
+
+fn is_list(file: &Path) -> bool {
+    let extension = file.extension().and_then(|extension| extension.to_str());
+    extension.is_some_and(|extension| LISTS.contains(&extension.to_ascii_lowercase().as_str()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FileCounts, PickerRoots};
+
+    #[test]
+    fn a_folder_is_counted_and_nothing_outside_the_roots_is_read() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let root = dir.path().join("allowed");
+        for folder in ["allowed/scans/b1", "allowed/.hidden", "secret"] {
+            std::fs::create_dir_all(dir.path().join(folder)).expect("a folder");
+        }
+        for file in [
+            "scans/b1/1.stl",
+            "scans/2.ply",
+            "3.png",
+            "pairs.csv",
+            "x.txt",
+            ".hidden/4.stl",
+        ] {
+            std::fs::write(root.join(file), "x").expect("written");
+        }
+        std::fs::write(dir.path().join("secret/5.stl"), "x").expect("written");
+        let roots = PickerRoots::of([root.clone()]);
+        let read = roots.read(&root).expect("a folder");
+        assert_eq!(
+            (read.counts.meshes, read.counts.prints, read.counts.lists),
+            (2, 1, 1)
+        );
+        assert_eq!(read.folders.len(), 1);
+        assert_eq!(
+            read.folders[0].1,
+            FileCounts {
+                meshes: 2,
+                ..FileCounts::default()
+            }
+        );
+        assert_eq!(read.lists, ["pairs.csv"]);
+        assert_eq!(read.parent, None);
+        for path in [
+            "../secret",
+            "scans/../../secret",
+            "scans/b1/../../../secret/5.stl",
+        ] {
+            roots.allowed(&root.join(path)).expect_err("outside");
+        }
+        #[cfg(unix)]
+        {
+            let link = root.join("link");
+            std::os::unix::fs::symlink(dir.path().join("secret"), &link).expect("a link");
+            roots.read(&link).expect_err("a link that leads outside");
+            assert_eq!(roots.read(&root).expect("a folder").folders.len(), 1);
+        }
+        roots
+            .allowed(std::path::Path::new("/etc/passwd"))
+            .expect_err("outside");
+        assert!(PickerRoots::of(["/".into()]).all().is_empty());
+    }
+}

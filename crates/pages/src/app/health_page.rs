@@ -1,0 +1,165 @@
+//! The health of a project: whether files and rows are sound, and a backup.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::response::{Html, Response};
+use maud::html;
+use serde_json::{Value, json};
+
+use super::components::{NavSection, action_form, frame};
+use super::export_page::{attachment, size};
+use super::failure::{AppFailure, AppResult};
+use super::home::free_space;
+use super::state::AppState;
+use super::task_part::task_part;
+use super::tasks::{TaskKind, TaskLines};
+use super::visit::Visit;
+use mocban_core::domain::one_line;
+use mocban_project::ProjectResult;
+use mocban_project::backup::backup;
+use mocban_project::check::check;
+use mocban_project::location::Location;
+use mocban_runner::check::CheckOptions;
+use mocban_system::platform;
+
+/// Path of the backup in a project.
+const BACKUP: &str = "backups/backup.sqlite";
+/// Largest backup that is offered for download, bytes.
+const DOWNLOAD_BYTES: u64 = 256 << 20;
+/// Most findings of each kind that are shown.
+const SHOWN: usize = 3;
+
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let checked = state.tasks.state(TaskKind::Check, &open);
+    let stored = state.tasks.state(TaskKind::Backup, &open);
+    let file = open.dir.join(BACKUP);
+    let meta = std::fs::metadata(&file).ok();
+    let shown = std::path::absolute(&file).unwrap_or(file);
+    let body = html! {
+        div #live data-live="1500" {
+            @if let Some(free) = platform::free_bytes(&open.dir) { p.muted { (free_space(&visit, free)) } }
+            section.card {
+                h2 { (visit.t("Check", "Kiểm tra")) }
+                p { (visit.t("Reads every file of results and compares it with the catalog. Nothing is changed, and a run may go on.", "Đọc mọi tệp kết quả và so với danh mục. Không thay đổi gì, và vẫn có thể chạy.")) }
+                (action_form("actions/check", "inline", &html! { button.primary #check { (visit.t("Check now", "Kiểm tra ngay")) } }))
+                (task_part(&visit, checked.as_ref()))
+            }
+            section.card {
+                h2 { (visit.t("Backup", "Sao lưu")) }
+                p { (visit.t("One file with pairs, results, verdicts and settings, also during a run. Scans, prints and pictures are not in it. Copy it to another disk.", "Một tệp gồm các cặp, kết quả, đánh giá và thiết lập, kể cả khi đang chạy. Không gồm bản quét, bản in và hình ảnh. Hãy chép sang ổ đĩa khác.")) }
+                (action_form("actions/backup", "inline", &html! { button #backup { (visit.t("Back up now", "Sao lưu ngay")) } }))
+                (task_part(&visit, stored.as_ref()))
+                @if let Some(meta) = meta {
+                    p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (size(meta.len())) } " "
+                        @if meta.len() <= DOWNLOAD_BYTES { a.button href="backup.sqlite" download { (visit.t("Save a copy", "Lưu một bản")) } }
+                    }
+                }
+            }
+        }
+    };
+    let title = visit.t("Health", "Tình trạng");
+    Ok(frame(&visit, title, Some(&key), NavSection::Health, &body))
+}
+
+/// Starts a check.
+pub(super) async fn start_check(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+) -> AppResult<Json<Value>> {
+    let open = state.open(&key).await?;
+    state.tasks.start(TaskKind::Check, &open, check_lines)?;
+    Ok(Json(json!({ "reload": true })))
+}
+
+async fn check_lines(location: Location) -> ProjectResult<TaskLines> {
+    let summary = check(CheckOptions::default(), &location, &()).await?;
+    let (pairs, files) = (summary.pairs, summary.files);
+    let mut lines = vec![if summary.left() == 0 {
+        [
+            format!("{pairs} pairs and {files} files were checked, and all are sound."),
+            format!("Đã kiểm tra {pairs} cặp và {files} tệp, tất cả đều tốt."),
+        ]
+    } else {
+        [
+            format!(
+                "{pairs} pairs and {files} files were checked. Damage was found; `mocban check --repair` mends what can be mended:"
+            ),
+            format!(
+                "Đã kiểm tra {pairs} cặp và {files} tệp. Có hư hỏng; `mocban check --repair` sửa những gì sửa được:"
+            ),
+        ]
+    }];
+    for (kind, found) in &summary.damage {
+        let line = format!("{}: {}", kind.heading(), found.found);
+        lines.push([line.clone(), line]);
+    }
+    for (what, notes) in [
+        (
+            ["missing input files", "tệp đầu vào bị thiếu"],
+            &summary.inputs_missing,
+        ),
+        (
+            ["changed input files", "tệp đầu vào đã đổi"],
+            &summary.inputs_changed,
+        ),
+        (
+            ["unreadable input files", "tệp đầu vào không đọc được"],
+            &summary.inputs_unreadable,
+        ),
+    ] {
+        if notes.count > 0 {
+            let first: Vec<String> = notes
+                .first
+                .iter()
+                .take(SHOWN)
+                .map(ToString::to_string)
+                .collect();
+            let first = first.join(", ");
+            lines.push(what.map(|what| format!("{} {what}: {first}", notes.count)));
+        }
+    }
+    Ok(lines)
+}
+
+/// Starts a backup.
+pub(super) async fn start_backup(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+) -> AppResult<Json<Value>> {
+    let open = state.open(&key).await?;
+    state.tasks.start(TaskKind::Backup, &open, backup_lines)?;
+    Ok(Json(json!({ "reload": true })))
+}
+
+async fn backup_lines(location: Location) -> ProjectResult<TaskLines> {
+    let stored = backup(&location.dir.join(BACKUP), &location, &()).await?;
+    let (pairs, verdicts, bytes) = (stored.pairs, stored.verdicts, size(stored.bytes));
+    Ok(vec![[
+        format!("{pairs} pairs and {verdicts} verdicts are in the backup ({bytes})."),
+        format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({bytes})."),
+    ]])
+}
+
+/// Responds with the backup.
+pub(super) async fn download(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+) -> AppResult<Response> {
+    let open = state.open(&key).await?;
+    let file = open.dir.join(BACKUP);
+    let read = move || {
+        let length = std::fs::metadata(&file).ok()?.len();
+        (length <= DOWNLOAD_BYTES).then(|| std::fs::read(&file).ok())?
+    };
+    let read = tokio::task::spawn_blocking(read).await.ok().flatten();
+    let bytes = read.ok_or_else(AppFailure::not_found)?;
+    let name = format!("{}.sqlite", key.replace('/', "-"));
+    Ok(attachment(&name, "application/vnd.sqlite3", bytes))
+}

@@ -1,0 +1,152 @@
+//! The home page: the projects of the folder, and what each needs next.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::response::Html;
+use maud::{Markup, html};
+
+use super::components::{NavSection, action_form, empty, frame, grouped};
+use super::failure::{AppFailure, AppResult};
+use super::projects::find;
+use super::state::AppState;
+use super::visit::Visit;
+use mocban_catalog::StatusCounts;
+use mocban_core::domain::{JobStatus, one_line};
+use mocban_project::location::now;
+use mocban_runner::{fingerprints, is_running};
+use mocban_system::platform;
+use mocban_system::time_text::local;
+
+/// What the home page says of a project.
+struct Overview {
+    key: String,
+    /// Counts and whether a run is active, or why they cannot be read.
+    state: Result<(StatusCounts, bool), String>,
+    last_change: Option<i64>,
+}
+
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let folder = state.options.folder.clone();
+    let found = tokio::task::spawn_blocking(move || find(&folder)).await;
+    let mut projects = Vec::new();
+    for found in found.unwrap_or_default() {
+        projects.push(read(&state, found.key).await);
+    }
+    let shown = state.options.folder.canonicalize();
+    let shown = shown.unwrap_or_else(|_| state.options.folder.clone());
+    let free = platform::free_bytes(&state.options.folder);
+    let body = html! {
+        p.muted {
+            (visit.t("Folder", "Thư mục")) ": " (one_line(&shown.display().to_string()))
+            @if let Some(free) = free { " · " (free_space(&visit, free)) }
+        }
+        @if projects.is_empty() {
+            (empty(visit.t("There is no project in this folder yet.", "Chưa có dự án nào trong thư mục này."), &html! {
+                p { a.button.primary href="import" { (visit.t("Import scans and prints", "Nhập bản quét và bản in")) } }
+                (demo_form(&visit))
+            }))
+        } @else {
+            div.cards { @for project in &projects { (card(&visit, project)) } }
+            div.row {
+                a.button href="import" { (visit.t("Import into a new project", "Nhập vào dự án mới")) }
+                @if projects.iter().all(|project| project.key != "mocban-demo") { (demo_form(&visit)) }
+            }
+        }
+    };
+    let title = visit.t("Projects", "Các dự án");
+    Ok(frame(&visit, title, None, NavSection::None, &body))
+}
+
+async fn read(state: &AppState, key: String) -> Overview {
+    let mut last_change = None;
+    let counts = async {
+        let open = state.open(&key).await.map_err(AppFailure::text)?;
+        last_change = open.catalog.last_activity().await.ok().flatten();
+        let read = async {
+            let settings = open.location().settings()?;
+            let running = is_running(&open.project, &open.catalog, now()).await?;
+            let fingerprints = fingerprints(&settings.config.stages);
+            let counts = open.catalog.status(&fingerprints).await?;
+            Ok::<_, mocban_project::ProjectError>((counts, running))
+        };
+        read.await.map_err(|error| error.text(&open.dir))
+    };
+    let counts = counts.await;
+    Overview {
+        state: counts,
+        key,
+        last_change,
+    }
+}
+
+/// Says how much space is left on the disk.
+pub(super) fn free_space(visit: &Visit, bytes: u64) -> String {
+    let gigabytes = bytes as f64 / 1e9;
+    match visit.language {
+        crate::review::Language::English => format!("{gigabytes:.1} GB free on this disk"),
+        crate::review::Language::Vietnamese => format!("đĩa còn trống {gigabytes:.1} GB"),
+    }
+}
+
+fn demo_form(visit: &Visit) -> Markup {
+    action_form(
+        "actions/demo",
+        "inline",
+        &html! {
+            button #demo { (visit.t("Try it with 24 generated pairs", "Thử với 24 cặp được tạo sẵn")) }
+        },
+    )
+}
+
+fn card(visit: &Visit, project: &Overview) -> Markup {
+    let href = visit.project_page(&project.key, "");
+    html! {
+        article.card {
+            h2 { a href=(href) { (one_line(&project.key)) } }
+            @match &project.state {
+                Err(text) => p.notice.bad { (text) },
+                Ok((counts, running)) => {
+                    (summary(visit, counts, *running))
+                    @if let Some(time) = project.last_change {
+                        p.muted { (visit.t("Last result", "Kết quả mới nhất")) ": " (local(time)) }
+                    }
+                    p { a.button href=(href) { (next_step(visit, counts, *running)) } }
+                }
+            }
+        }
+    }
+}
+
+fn summary(visit: &Visit, counts: &StatusCounts, running: bool) -> Markup {
+    let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
+    let (done, failed) = (jobs(JobStatus::Done), jobs(JobStatus::Quarantined));
+    let judged: u64 = counts.verdicts.values().sum();
+    html! {
+        p {
+            b { (grouped(counts.pairs)) } " " (visit.t("pairs", "cặp")) " · "
+            (grouped(done)) " " (visit.t("aligned", "đã căn chỉnh")) " · "
+            (grouped(failed)) " " (visit.t("failed", "lỗi")) " · "
+            (grouped(judged)) " " (visit.t("verdicts", "đánh giá"))
+        }
+        progress value=(done + failed) max=(counts.pairs.max(1)) aria-label=(visit.t("Progress", "Tiến độ")) {}
+        @if running { p.good { (visit.t("A run is in progress.", "Đang chạy.")) } }
+    }
+}
+
+/// Names what a project needs next.
+fn next_step(visit: &Visit, counts: &StatusCounts, running: bool) -> &'static str {
+    let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
+    if running {
+        visit.t("Watch the run", "Xem tiến trình")
+    } else if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) + counts.stale > 0 {
+        visit.t("Align the pairs", "Căn chỉnh các cặp")
+    } else if jobs(JobStatus::Quarantined) > 0 {
+        visit.t("See what failed", "Xem các cặp lỗi")
+    } else {
+        visit.t("Open", "Mở")
+    }
+}

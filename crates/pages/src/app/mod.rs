@@ -1,0 +1,38 @@
+//! The app: the projects of a folder in the browser, from their import to their report.
+//!
+//! [`app_pages`] returns the routes for a server. The pages show the catalog and start commands, so a run that was started in
+//! a terminal or on another computer looks the same. A run is a process of its own, which goes on when the page or the app
+//! is closed.
+
+mod address;
+mod assets;
+mod child_run;
+mod components;
+mod export_page;
+mod failure;
+mod failure_page;
+mod folder_picker;
+mod health_page;
+mod home;
+mod import_page;
+mod on_thread;
+mod pair_page;
+mod pair_query;
+mod pairs_page;
+mod pictures;
+mod projects;
+mod report_page;
+mod review_page;
+mod routes;
+mod run_actions;
+mod run_page;
+mod settings_page;
+mod state;
+mod task_part;
+mod tasks;
+mod thumb_cache;
+mod visit;
+mod words;
+
+pub use routes::app_pages;
+pub use state::AppOptions;

@@ -1,0 +1,111 @@
+//! The address of a list of pairs: its filter, its order and where its page begins.
+
+use super::address::PageQuery;
+use mocban_catalog::{PairCursor, PairFilter, PairOrder};
+use mocban_core::domain::{JobStatus, ThresholdMetric, Verdict};
+
+/// States that a list can be filtered by, with the statuses of their jobs.
+const STATES: [(&str, &[JobStatus]); 4] = [
+    ("aligned", &[JobStatus::Done]),
+    ("failed", &[JobStatus::Quarantined]),
+    ("waiting", &[JobStatus::Ready, JobStatus::Backoff]),
+    ("running", &[JobStatus::Leased]),
+];
+
+/// Number of cards on a page, and of rows.
+const PAGE_SIZES: [usize; 2] = [48, 100];
+
+/// A list of pairs as its address names it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PairQuery {
+    pub(super) filter: PairFilter,
+    pub(super) order: PairOrder,
+    pub(super) metric: ThresholdMetric,
+    pub(super) is_table: bool,
+    pub(super) after: Option<PairCursor>,
+}
+
+impl PairQuery {
+    /// Reads an address. Values that are not valid are ignored.
+    pub(super) fn of(query: &PageQuery) -> Self {
+        let state = query.get("state");
+        let statuses = STATES.iter().find(|(name, _)| Some(*name) == state);
+        let verdict = query.get("verdict");
+        let class = query.parsed("class");
+        // Pairs without a result have no score by which they could be sorted.
+        let has_results = class.is_none() && statuses.is_none_or(|(name, _)| *name == "aligned");
+        let order = query.parsed("sort").filter(|_| has_results);
+        Self {
+            filter: PairFilter {
+                statuses: statuses.map_or_else(Vec::new, |(_, statuses)| statuses.to_vec()),
+                class,
+                verdict: verdict.and_then(|name| name.parse::<Verdict>().ok()),
+                is_unjudged: verdict == Some("none"),
+                is_low_confidence: query.get("confidence") == Some("low"),
+                block: query.get("block").map(str::to_owned),
+                character: query.get("character").map(str::to_owned),
+            },
+            order: order.unwrap_or_default(),
+            metric: query.parsed("metric").unwrap_or(ThresholdMetric::DEFAULT),
+            is_table: query.get("view") == Some("table"),
+            after: query.get("after").and_then(cursor),
+        }
+    }
+
+    /// Returns how many pairs a page has.
+    pub(super) const fn page_size(&self) -> usize {
+        PAGE_SIZES[self.is_table as usize]
+    }
+}
+
+/// Parses where a page begins, such as `-0.97,118`.
+fn cursor(text: &str) -> Option<PairCursor> {
+    let (key, id) = text.split_once(',')?;
+    let (key, id) = (key.parse::<f64>().ok()?, id.parse::<i64>().ok()?);
+    (key.is_finite() && id > 0).then_some(PairCursor { key, id })
+}
+
+/// Returns where a page begins as text.
+pub(super) fn cursor_text(cursor: PairCursor) -> String {
+    format!("{},{}", cursor.key, cursor.id)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PairQuery, cursor_text};
+    use crate::app::address::PageQuery;
+    use mocban_catalog::{PairCursor, PairOrder};
+    use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric};
+
+    #[test]
+    fn an_address_names_a_list() {
+        let of = |text| PairQuery::of(&PageQuery::parse(text));
+        let after = PairCursor { key: -0.1, id: 7 };
+        let text = format!(
+            "verdict=none&sort=iou-down&metric=relief&view=table&after={}",
+            cursor_text(after)
+        );
+        let query = of(&text);
+        assert_eq!(query.after, Some(after));
+        assert_eq!(query.order, PairOrder::HighestIou);
+        assert_eq!(query.metric, ThresholdMetric::Relief);
+        assert!(query.filter.is_unjudged && query.is_table);
+        let failed = of("class=io&state=waiting&sort=iou");
+        assert_eq!(failed.filter.class, Some(FailureClass::Io));
+        assert_eq!(
+            failed.filter.statuses,
+            [JobStatus::Ready, JobStatus::Backoff]
+        );
+        assert_eq!(failed.order, PairOrder::Imported, "no scores to sort by");
+        let plain = of("");
+        for bad in [
+            "state=x",
+            "class=1",
+            "sort=a&after=NaN,1",
+            "after=1,-2",
+            "after=1",
+        ] {
+            assert_eq!(of(bad), plain, "{bad}");
+        }
+    }
+}

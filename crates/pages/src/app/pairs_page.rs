@@ -1,0 +1,295 @@
+//! The list of pairs of a project, as a gallery or a table.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, State};
+use axum::response::{IntoResponse as _, Redirect, Response};
+use maud::{Markup, html};
+
+use super::address::encoded;
+use super::components::{NavSection, action_form, choice, empty, frame, grouped, score};
+use super::failure::AppResult;
+use super::pair_query::{PairQuery, cursor_text};
+use super::projects::OpenProject;
+use super::state::AppState;
+use super::visit::Visit;
+use mocban_catalog::{PairListPage, PairOrder, PairResults};
+use mocban_core::domain::{
+    FailureClass, JobStatus, MetricOutcome, PairName, ThresholdMetric, Verdict, one_line,
+};
+
+/// Columns of the table that hold scores.
+const NUMBER_COLUMNS: std::ops::Range<usize> = 4..8;
+/// Most blocks that the filter suggests.
+const SUGGESTED_BLOCKS: usize = 200;
+/// Most ids that are suggested for one that does not exist.
+const SUGGESTED_IDS: usize = 20;
+
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Response> {
+    let open = state.open(&key).await?;
+    if let Some(typed) = visit.query.get("id") {
+        return jump(&visit, &open, typed.trim()).await;
+    }
+    let query = PairQuery::of(&visit.query);
+    let list = open.catalog.pair_list(
+        &query.filter,
+        query.order,
+        query.metric,
+        query.after,
+        query.page_size(),
+    );
+    let list = list.await?;
+    let blocks = open.catalog.first_listed_blocks(SUGGESTED_BLOCKS).await?;
+    let body = html! {
+        (jump_form(&visit))
+        (filter_form(&visit, &blocks))
+        (views(&visit, &query))
+        @if list.pairs.is_empty() {
+            (empty(visit.t("No pair matches.", "Không có cặp nào phù hợp."), &html! {
+                p { a.button href=(visit.here) { (visit.t("Show all pairs", "Hiện tất cả các cặp")) } }
+            }))
+        } @else if query.is_table {
+            (table(&visit, &query, &list.pairs))
+        } @else {
+            div.gallery { @for pair in &list.pairs { (pair_card(&visit, &visit.project_page(&key, ""), pair, query.metric)) } }
+        }
+        (pager(&visit, &query, &list))
+        @if !list.pairs.is_empty() && has_outstanding(&list.pairs) { (run_form(&visit)) }
+    };
+    let title = visit.t("Pairs", "Các cặp");
+    Ok(frame(&visit, title, Some(&key), NavSection::Pairs, &body).into_response())
+}
+
+/// Returns whether a run would do something with one of these pairs.
+fn has_outstanding(pairs: &[PairResults]) -> bool {
+    let mut pairs = pairs.iter();
+    pairs.any(|pair| !matches!(pair.status, JobStatus::Done | JobStatus::Leased))
+}
+
+/// Returns the form that runs the pairs of the list.
+fn run_form(visit: &Visit) -> Markup {
+    let list = visit.query.with("after", "").text();
+    action_form(
+        "actions/run-list",
+        "inline",
+        &html! {
+            input type="hidden" name="list" value=(list.trim_start_matches('?'));
+            button #run-list { (visit.t("Run the waiting and failed pairs of this list", "Chạy các cặp đang chờ và bị lỗi trong danh sách này")) }
+        },
+    )
+}
+
+/// Opens the page of a pair, or lists similar ids.
+async fn jump(visit: &Visit, open: &OpenProject, typed: &str) -> AppResult<Response> {
+    if let Ok(name) = typed.parse::<PairName>()
+        && open.catalog.pair(&name).await?.is_some()
+    {
+        let page = format!("pair/{}/", encoded(name.as_str()));
+        return Ok(Redirect::to(&page).into_response());
+    }
+    let similar = open
+        .catalog
+        .pair_names_with_prefix(typed, SUGGESTED_IDS)
+        .await?;
+    let body = html! {
+        (jump_form(visit))
+        p.notice role="alert" { (visit.t("There is no pair with this id: ", "Không có cặp nào có mã này: ")) b { (one_line(typed)) } }
+        @if !similar.is_empty() {
+            p { (visit.t("Ids that begin like this:", "Các mã bắt đầu như vậy:")) }
+            ul { @for name in &similar {
+                li { a href={ "pair/" (encoded(name.as_str())) "/" } { (name) } }
+            } }
+        }
+        p { a.button href=(visit.here) { (visit.t("Show all pairs", "Hiện tất cả các cặp")) } }
+    };
+    let title = visit.t("Pairs", "Các cặp");
+    Ok(frame(visit, title, Some(&open.key), NavSection::Pairs, &body).into_response())
+}
+
+fn jump_form(visit: &Visit) -> Markup {
+    html! {
+        form.inline method="get" action=(visit.here) role="search" {
+            label for="jump-id" { (visit.t("Go to id", "Đến mã")) }
+            input #jump-id name="id" autocomplete="off" required;
+            button { (visit.t("Go", "Đến")) }
+        }
+    }
+}
+
+/// Returns a choice of the filter with its label.
+fn field(visit: &Visit, name: &str, label: &str, options: &[(&str, &str)]) -> Markup {
+    let chosen = visit.query.get(name);
+    html! {
+        label { span { (label) }
+            select name=(name) { @for (value, text) in options { (choice(value, text, chosen)) } }
+        }
+    }
+}
+
+fn filter_form(visit: &Visit, blocks: &[String]) -> Markup {
+    let any = visit.t("any", "bất kỳ");
+    let classes = FailureClass::ALL.map(|class| (class.name(), visit.class(class)));
+    let mut classes = classes.to_vec();
+    classes.insert(0, ("", any));
+    let mut verdicts = Verdict::ALL
+        .map(|one| (one.name(), visit.given_by_somebody(one)))
+        .to_vec();
+    verdicts.insert(0, ("", any));
+    verdicts.push(("none", visit.t("not judged", "chưa đánh giá")));
+    let metrics = ThresholdMetric::ALL.map(|metric| (metric.name(), visit.metric(metric)));
+    let metric = visit
+        .query
+        .get("metric")
+        .unwrap_or(ThresholdMetric::DEFAULT.name());
+    html! {
+        form.filter method="get" action=(visit.here) aria-label=(visit.t("Filter", "Bộ lọc")) {
+            @if let Some(view) = visit.query.get("view") { input type="hidden" name="view" value=(view); }
+            (field(visit, "state", visit.t("State", "Trạng thái"), &[
+                ("", any), ("aligned", visit.status(JobStatus::Done)), ("failed", visit.status(JobStatus::Quarantined)),
+                ("waiting", visit.status(JobStatus::Ready)), ("running", visit.status(JobStatus::Leased)),
+            ]))
+            (field(visit, "class", visit.t("Why failed", "Lý do lỗi"), &classes))
+            (field(visit, "confidence", visit.t("Confidence", "Độ tin cậy"), &[("", any), ("low", visit.t("low", "thấp"))]))
+            (field(visit, "verdict", visit.t("Verdict", "Đánh giá"), &verdicts))
+            label { span { (visit.t("Block", "Ván")) }
+                input name="block" value=[visit.query.get("block")] list="blocks" autocomplete="off";
+                datalist #blocks { @for block in blocks { option value=(block) {} } }
+            }
+            label { span { (visit.t("Character", "Chữ")) }
+                input.short name="character" value=[visit.query.get("character")] autocomplete="off";
+            }
+            (field(visit, "sort", visit.t("Order", "Thứ tự"), &[
+                (PairOrder::Imported.name(), visit.t("as imported", "như khi nhập")),
+                (PairOrder::LeastConfident.name(), visit.t("least confident first", "độ tin cậy thấp trước")),
+                (PairOrder::MostConfident.name(), visit.t("most confident first", "độ tin cậy cao trước")),
+                (PairOrder::LowestIou.name(), visit.t("lowest IoU first", "IoU thấp trước")),
+                (PairOrder::HighestIou.name(), visit.t("highest IoU first", "IoU cao trước")),
+            ]))
+            label { span { (visit.t("Metric", "Độ đo")) }
+                select name="metric" { @for (value, text) in metrics { (choice(value, text, Some(metric))) } }
+            }
+            button.primary { (visit.t("Show", "Hiện")) }
+            a href=(visit.here) { (visit.t("Reset", "Đặt lại")) }
+        }
+    }
+}
+
+/// Returns the links to the gallery and the table of the same list.
+fn views(visit: &Visit, query: &PairQuery) -> Markup {
+    let link = |view: &str, is_shown: bool, text: &str| {
+        let target = visit.query.with("view", view).with("after", "");
+        html! {
+            a href={ (visit.here) (target.text()) } aria-current=[is_shown.then_some("true")] { (text) }
+        }
+    };
+    html! {
+        p.views {
+            (link("", !query.is_table, visit.t("Gallery", "Hình ảnh"))) " "
+            (link("table", query.is_table, visit.t("Table", "Bảng")))
+        }
+    }
+}
+
+/// Returns the card of a pair. `base` is the relative address of its project.
+pub(super) fn pair_card(
+    visit: &Visit,
+    base: &str,
+    pair: &PairResults,
+    metric: ThresholdMetric,
+) -> Markup {
+    let name = pair.attributes.name.as_str();
+    let path = format!("{base}pair/{}/", encoded(name));
+    let outcome = pair.metric(metric).map(|record| &record.outcome);
+    let is_low = outcome.is_some_and(MetricOutcome::is_low_confidence);
+    html! {
+        a.pair-card href=(path) {
+            img src={ (path) "picture/thumb-" (metric) } alt="" loading="lazy" width="180" height="180";
+            span.name { (one_line(name)) @if let Some(character) = &pair.attributes.character { " " span.character { (one_line(character)) } } }
+            @match outcome {
+                Some(outcome) => span.muted.warn[is_low] {
+                    (visit.t("confidence", "độ tin cậy")) " " (score(outcome.confidence))
+                },
+                None => span.state.(pair.status.name()) { (visit.status(pair.status)) },
+            }
+            (verdict_marks(visit, pair, metric))
+        }
+    }
+}
+
+/// Returns the verdicts on the result of a metric.
+fn verdict_marks(visit: &Visit, pair: &PairResults, metric: ThresholdMetric) -> Markup {
+    let verdicts = pair
+        .metric(metric)
+        .map_or(&[][..], |record| &record.verdicts);
+    html! {
+        @if !verdicts.is_empty() {
+            span.verdicts { @for given in verdicts {
+                span.verdict.(given.verdict.name()) { (visit.verdict(given.verdict)) } " "
+            } }
+        }
+    }
+}
+
+fn table(visit: &Visit, query: &PairQuery, pairs: &[PairResults]) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(visit.t("Pairs", "Các cặp")) {
+            table {
+                thead { tr {
+                    @for (index, title) in [
+                        visit.t("Id", "Mã"), visit.t("Character", "Chữ"), visit.t("Block", "Ván"), visit.t("State", "Trạng thái"),
+                        visit.t("Confidence", "Độ tin cậy"), "IoU", "SSIM", "Dice", visit.t("Verdict", "Đánh giá"),
+                        visit.t("Why failed", "Lý do lỗi"),
+                    ].into_iter().enumerate() { th.number[NUMBER_COLUMNS.contains(&index)] scope="col" { (title) } }
+                } }
+                tbody { @for pair in pairs { (table_row(visit, query, pair)) } }
+            }
+        }
+    }
+}
+
+fn table_row(visit: &Visit, query: &PairQuery, pair: &PairResults) -> Markup {
+    let name = pair.attributes.name.as_str();
+    let outcome = pair.metric(query.metric).map(|record| &record.outcome);
+    let scores = outcome.map(|outcome| outcome.scores);
+    let failure = pair.failure.as_ref().map(|stored| &stored.failure);
+    html! {
+        tr {
+            th scope="row" { a href={ "pair/" (encoded(name)) "/" } { (one_line(name)) } }
+            td { (pair.attributes.character.as_deref().map(one_line).unwrap_or_default()) }
+            td { (pair.attributes.block.as_deref().map(one_line).unwrap_or_default()) }
+            td { span.state.(pair.status.name()) { (visit.status(pair.status)) } }
+            td.number { (score(outcome.and_then(|outcome| outcome.confidence))) }
+            td.number { (score(scores.map(|scores| scores.iou))) }
+            td.number { (score(scores.map(|scores| scores.ssim))) }
+            td.number { (score(scores.map(|scores| scores.dice))) }
+            td { (verdict_marks(visit, pair, query.metric)) }
+            td.reason { @if let Some(failure) = failure { (one_line(&failure.message)) } }
+        }
+    }
+}
+
+fn pager(visit: &Visit, query: &PairQuery, list: &PairListPage) -> Markup {
+    let next = list
+        .next
+        .map(|next| visit.query.with("after", &cursor_text(next)));
+    html! {
+        @if let Some(scanned) = list.scanned {
+            p.notice {
+                (visit.t("Pairs looked at for this page", "Số cặp đã xem cho trang này")) ": " (grouped(scanned as u64)) ". "
+                (visit.t("There may be more matches.", "Có thể còn cặp phù hợp."))
+            }
+        }
+        nav.pager aria-label=(visit.t("Pages of the list", "Các trang của danh sách")) {
+            @if query.after.is_some() {
+                a.button href={ (visit.here) (visit.query.with("after", "").text()) } { (visit.t("First page", "Trang đầu")) } " "
+            }
+            @if let Some(next) = next {
+                a.button rel="next" href={ (visit.here) (next.text()) } { (visit.t("Next page", "Trang sau")) }
+            }
+        }
+    }
+}

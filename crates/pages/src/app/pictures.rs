@@ -1,0 +1,182 @@
+//! Pictures of a pair: the print, the relief and the masks in the frame of the print.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, State};
+use axum::http::header;
+use axum::response::{IntoResponse as _, Response};
+use maud::html;
+
+use super::failure::{AppFailure, AppResult};
+use super::projects::OpenProject;
+use super::state::AppState;
+use mocban_catalog::PairResults;
+use mocban_core::InputLimits;
+use mocban_core::domain::{Affine2, PairName, ThresholdMetric, enum_names};
+use mocban_core::raster::{Grid, Mask, jpeg_rgb8, png_mask};
+use mocban_export::SourcePrint;
+use mocban_export::pictures::PrintView;
+use mocban_export::scan_view::ScanView;
+use mocban_results::pair_artifacts::PairArtifacts;
+
+/// Longer side of a picture on a card, pixels.
+const THUMB_SIDE: usize = 180;
+/// Longer side of a picture on the page of a pair, pixels.
+const PICTURE_SIDE: usize = 640;
+const JPEG: &str = "image/jpeg";
+/// JPEG quality of pictures.
+const QUALITY: u8 = 85;
+
+/// A picture of a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum PairPicture {
+    /// The print with the edges of the relief's strokes, small.
+    Thumb,
+    /// The print.
+    Print,
+    /// The relief, lit from the upper left.
+    Relief,
+    /// The ink of the print.
+    PrintMask,
+    /// The strokes of the relief.
+    DepthMask,
+    /// The print with the edges of the relief's strokes.
+    Overlay,
+}
+
+enum_names! { pub PairPicture, "a picture":
+    Thumb = "thumb", Print = "print", Relief = "relief", PrintMask = "print_mask", DepthMask = "depth_mask", Overlay = "overlay",
+}
+
+/// An encoded picture with its content type.
+type Encoded = (&'static str, Vec<u8>);
+
+/// Responds with a picture of the result of a metric. `name` is that of the picture and of the metric: `overlay-relief`.
+pub(super) async fn picture(
+    State(state): State<Arc<AppState>>,
+    Path((key, pair, name)): Path<(String, String, String)>,
+) -> AppResult<Response> {
+    let (picture, metric) = name.split_once('-').unwrap_or((&name, ""));
+    let picture: PairPicture = picture
+        .parse()
+        .map_err(|_unknown: String| AppFailure::not_found())?;
+    let metric = metric.parse().unwrap_or(ThresholdMetric::DEFAULT);
+    let open = state.open(&key).await?;
+    let results = results(&open, &pair).await?;
+    let limits = limits(&open)?;
+    let shown = results
+        .metric(metric)
+        .map(|record| record.result_hash.to_hex());
+    let cached = shown
+        .filter(|_| picture == PairPicture::Thumb)
+        .map(|hash| format!("{key}\0{pair}\0{hash}"));
+    if let Some(jpeg) = cached.as_ref().and_then(|id| state.thumbs.get(id)) {
+        return Ok(([(header::CONTENT_TYPE, JPEG)], jpeg).into_response());
+    }
+    let drawn = state
+        .work
+        .call(move || draw(&open, &results, metric, picture, limits))
+        .await?;
+    if let (Some(id), Some((JPEG, bytes))) = (cached, &drawn) {
+        state.thumbs.add(id, bytes.clone().into());
+    }
+    let (kind, bytes) = drawn.unwrap_or_else(placeholder);
+    Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
+}
+
+/// Responds with the data of the 3D view.
+pub(super) async fn scan(
+    State(state): State<Arc<AppState>>,
+    Path((key, pair)): Path<(String, String)>,
+) -> AppResult<Response> {
+    let open = state.open(&key).await?;
+    let results = results(&open, &pair).await?;
+    let limits = limits(&open)?;
+    let dir = open.dir.clone();
+    let read = move || {
+        let metric = results.metric(ThresholdMetric::DEFAULT);
+        let metric = metric.or_else(|| results.metrics.first())?;
+        let view = ScanView::read(&open.project, &results, metric.outcome.metric, limits);
+        view.map(|view| view.map(|view| view.to_bytes()))
+            .transpose()
+    };
+    let read = state
+        .work
+        .call(read)
+        .await?
+        .ok_or_else(AppFailure::not_found)?;
+    let bytes = read.map_err(|error| AppFailure::of(error, &dir))?;
+    let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
+    Ok((kind, bytes).into_response())
+}
+
+/// Reads a pair by its name in an address.
+pub(super) async fn results(open: &OpenProject, pair: &str) -> AppResult<PairResults> {
+    let name: PairName = pair.parse().map_err(|_invalid| AppFailure::not_found())?;
+    let detail = open.catalog.pair(&name).await?;
+    Ok(detail.ok_or_else(AppFailure::not_found)?.results)
+}
+
+fn limits(open: &OpenProject) -> AppResult<InputLimits> {
+    let settings = open.location().settings();
+    let settings = settings.map_err(|error| AppFailure::of(error, &open.dir))?;
+    Ok(settings.config.limits)
+}
+
+/// Draws a picture. `None` if there is none, because a file cannot be read or the pair has no result yet.
+fn draw(
+    open: &OpenProject,
+    pair: &PairResults,
+    metric: ThresholdMetric,
+    picture: PairPicture,
+    limits: InputLimits,
+) -> Option<Encoded> {
+    let source = SourcePrint::read(&open.project, pair, &limits.image).ok()?;
+    let side = match picture {
+        PairPicture::Thumb => THUMB_SIDE,
+        _ => PICTURE_SIDE,
+    };
+    let view = PrintView::of_side(&source.picture, side);
+    let print = || Some(jpeg(&view.print(&source.picture)));
+    let artifacts = PairArtifacts::new(&open.project, pair);
+    let record = pair.metric(metric).map(|record| &record.outcome);
+    match (picture, record) {
+        (PairPicture::Print, _) | (PairPicture::Thumb | PairPicture::Overlay, None) => print(),
+        (PairPicture::PrintMask, _) => {
+            let ink = artifacts.print_mask().ok()?;
+            Some(mask(&view.mask(&ink, &Affine2::IDENTITY)))
+        }
+        (_, None) => None,
+        (PairPicture::Relief, Some(outcome)) => {
+            let depth = artifacts.depth().ok()?;
+            Some(jpeg(&view.relief(&depth, &outcome.print_from_depth)))
+        }
+        (PairPicture::DepthMask, Some(outcome)) => {
+            let strokes = artifacts.depth().ok()?.stroke_mask(outcome.threshold_level);
+            Some(mask(&view.mask(&strokes, &outcome.print_from_depth)))
+        }
+        (PairPicture::Thumb | PairPicture::Overlay, Some(outcome)) => {
+            let depth = artifacts.depth().ok()?;
+            Some(jpeg(&view.overlay(&source.picture, &depth, outcome)))
+        }
+    }
+}
+
+fn jpeg(picture: &Grid<[u8; 3]>) -> Encoded {
+    (JPEG, jpeg_rgb8(picture, QUALITY))
+}
+
+fn mask(mask: &Mask) -> Encoded {
+    ("image/png", png_mask(&mask.map(|stroke| !stroke)))
+}
+
+/// Returns the picture of a pair that has none.
+fn placeholder() -> Encoded {
+    let drawing = html! {
+        svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 180 180" {
+            rect width="180" height="180" fill="#8884" {}
+            path d="M60 60 L120 120 M120 60 L60 120" stroke="#888" stroke-width="6" {}
+        }
+    };
+    ("image/svg+xml", drawing.into_string().into_bytes())
+}

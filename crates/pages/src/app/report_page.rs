@@ -1,0 +1,208 @@
+//! The report: the answer, the table of the paper with links to the pairs, and its files.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, State};
+use axum::response::{Html, Response};
+use maud::{Markup, html};
+
+use super::components::{NavSection, empty, frame, grouped, score};
+use super::export_page::attachment;
+use super::failure::{AppFailure, AppResult};
+use super::on_thread::on_thread;
+use super::state::AppState;
+use super::visit::Visit;
+use mocban_core::domain::one_line;
+use mocban_project::report::{ReportOptions, read, report};
+use mocban_report::{MetricRow, Report, ReportFormat};
+use mocban_results::IntervalMethod;
+
+/// Formats that can be saved: format, extension, content type and name.
+const DOWNLOADS: [(ReportFormat, &str, &str, &str); 5] = [
+    (
+        ReportFormat::Html,
+        "html",
+        "text/html; charset=utf-8",
+        "HTML",
+    ),
+    (ReportFormat::Csv, "csv", "text/csv; charset=utf-8", "CSV"),
+    (ReportFormat::Latex, "tex", "application/x-tex", "LaTeX"),
+    (
+        ReportFormat::Markdown,
+        "md",
+        "text/markdown; charset=utf-8",
+        "Markdown",
+    ),
+    (ReportFormat::Json, "json", "application/json", "JSON"),
+];
+
+/// Shows the page at once; a script then asks for the numbers, which may take long for a large project.
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    state.open(&key).await?;
+    let body = html! {
+        p.row {
+            (visit.t("Save as", "Lưu thành")) ": "
+            @for (_, extension, _, name) in DOWNLOADS {
+                a.button href={ "report/file/report." (extension) } download { (name) }
+            }
+        }
+        div #numbers data-load="report/numbers" aria-live="polite" {
+            div.notice { p { (visit.t("Reading the results…", "Đang đọc kết quả…")) } progress aria-label=(visit.t("Reading", "Đang đọc")) {} }
+        }
+    };
+    let title = visit.t("Report", "Báo cáo");
+    Ok(frame(&visit, title, Some(&key), NavSection::Report, &body))
+}
+
+/// Responds with the numbers as a part of the page.
+pub(super) async fn numbers(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let location = open.location();
+    let found = on_thread(async move || read(&location).await).await;
+    let found = found.map_err(|error| AppFailure::of(error, &open.dir))?;
+    Ok(Html(numbers_part(&visit, &found).into_string()))
+}
+
+fn numbers_part(visit: &Visit, report: &Report) -> Markup {
+    html! {
+        @for sentence in &report.headline { p lang="en" { (without_commands(sentence)) } }
+        @if report.rows.iter().all(|row| row.n == 0) {
+            (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! { a.button href="./" { (visit.t("Run", "Căn chỉnh")) } }))
+        } @else {
+            (table(visit, report))
+            p.muted { (visit.t(
+                "Acc is the share of passed results among those that reviewers passed or failed. SSIM, IoU and Dice are means over n pairs.",
+                "Acc là tỉ lệ kết quả đạt trong số kết quả được đánh giá đạt hoặc không đạt. SSIM, IoU và Dice là trung bình trên n cặp.",
+            )) }
+        }
+        (reasons(visit, report))
+        @if !report.warnings.is_empty() {
+            h2 { (visit.t("What limits these numbers", "Những giới hạn của các con số này")) }
+            ul lang="en" { @for warning in &report.warnings { li { (without_commands(warning)) } } }
+        }
+    }
+}
+
+/// Returns a sentence without the remarks in brackets that name commands, which are buttons here.
+fn without_commands(sentence: &str) -> String {
+    let mut text = String::new();
+    let mut rest = sentence;
+    while let Some((before, after)) = rest.split_once(" (") {
+        let (inside, behind) = after.split_once(')').unwrap_or((after, ""));
+        text.push_str(before);
+        if !inside.contains('`') {
+            text.extend([" (", inside, ")"]);
+        }
+        rest = behind;
+    }
+    (text + rest).replace('`', "")
+}
+
+fn table(visit: &Visit, report: &Report) -> Markup {
+    let link = |query: String, number: u64| {
+        html! { @if number > 0 { a href={ "pairs?" (query) } { (grouped(number)) } } @else { "0" } }
+    };
+    let titles = [
+        visit.t("Method", "Phương pháp"),
+        "n",
+        visit.t("judged", "đã đánh giá"),
+        visit.t("passed", "đạt"),
+        visit.t("failed", "không đạt"),
+        "Acc %",
+        visit.t("95 % interval", "khoảng 95 %"),
+        "SSIM",
+        "IoU",
+        "Dice",
+    ];
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(visit.t("Scores", "Điểm số")) {
+            table {
+                thead { tr { @for (index, title) in titles.into_iter().enumerate() { th.number[index > 0] scope="col" { (title) } } } }
+                tbody { @for row in &report.rows {
+                    @let metric = row.metric.name();
+                    tr {
+                        th scope="row" { (visit.metric(row.metric)) }
+                        td.number { (link(format!("state=aligned&metric={metric}"), row.n)) }
+                        td.number { (grouped(row.judged)) }
+                        td.number { (link(format!("verdict=pass&metric={metric}"), row.passed)) }
+                        td.number { (link(format!("verdict=fail&metric={metric}"), row.failed)) }
+                        td.number { (percent(row.acc)) }
+                        td.number { (interval(row)) }
+                        td.number { (score(row.ssim)) } td.number { (score(row.iou)) } td.number { (score(row.dice)) }
+                    }
+                } }
+            }
+        }
+    }
+}
+
+fn percent(share: Option<f64>) -> String {
+    share.map_or_else(|| "–".to_owned(), |share| format!("{:.1}", 100.0 * share))
+}
+
+fn interval(row: &MetricRow) -> String {
+    row.acc_ci95.map_or_else(
+        || "–".to_owned(),
+        |[low, high]| format!("{:.1} – {:.1}", 100.0 * low, 100.0 * high),
+    )
+}
+
+/// Returns the failed pairs by class, with links to them.
+fn reasons(visit: &Visit, report: &Report) -> Markup {
+    html! {
+        @if !report.failures.is_empty() {
+            h2 { (visit.t("Pairs without a result", "Các cặp không có kết quả")) }
+            ul { @for group in &report.failures {
+                li {
+                    a href={ "pairs?view=table&state=failed&class=" (group.class) } { (grouped(group.count)) }
+                    " · " (visit.class(group.class))
+                    @if let Some(first) = group.pairs.first() { span.muted { " (" (one_line(&first.error)) ")" } }
+                }
+            } }
+        }
+    }
+}
+
+/// Responds with the report as a file.
+pub(super) async fn download(
+    State(state): State<Arc<AppState>>,
+    Path((key, file)): Path<(String, String)>,
+) -> AppResult<Response> {
+    let open = state.open(&key).await?;
+    let known = DOWNLOADS
+        .iter()
+        .find(|(_, extension, ..)| file == format!("report.{extension}"));
+    let (format, _, kind, _) = *known.ok_or_else(AppFailure::not_found)?;
+    let options = ReportOptions {
+        format,
+        interval: IntervalMethod::default(),
+        with_times: false,
+    };
+    let location = open.location();
+    let rendered = on_thread(async move || report(options, None, &location, &()).await).await;
+    let rendered = rendered.map_err(|error| AppFailure::of(error, &open.dir))?;
+    Ok(attachment(&file, kind, rendered.text.into_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_commands;
+
+    #[test]
+    fn remarks_that_name_commands_are_left_out() {
+        let text = "There is no Acc (`mocban review --reviewer NAME` starts judging). 24 of 24 (86.2–100.0).";
+        assert_eq!(
+            without_commands(text),
+            "There is no Acc. 24 of 24 (86.2–100.0)."
+        );
+        assert_eq!(without_commands("plain `x`"), "plain x");
+    }
+}

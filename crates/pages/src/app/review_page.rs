@@ -1,0 +1,284 @@
+//! Reviews: who has judged what, and the start of a review.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{Path, Request, State};
+use axum::http::Extensions;
+use axum::response::{Html, IntoResponse as _, Response};
+use axum::{Extension, Json};
+use hyper::service::Service as _;
+use hyper_util::service::TowerToHyperService;
+use maud::{Markup, html};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::address::{PageQuery, encoded};
+use super::components::{NavSection, action_form, choice, frame, grouped};
+use super::failure::{AppFailure, AppResult};
+use super::on_thread::on_thread;
+use super::projects::OpenProject;
+use super::state::AppState;
+use super::visit::Visit;
+use crate::local_server::AccessControl;
+use crate::review::{CheckRates, Language, QueueOptions, ReviewOptions, ReviewPages, key_map};
+use mocban_catalog::reviewer_name;
+use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict, one_line};
+use mocban_project::error::explanation;
+use mocban_project::location::{Location, now};
+use mocban_project::reviewers::similar_names;
+use mocban_project::shell::shell_quoted;
+use mocban_project::{ProjectResult, Refusal};
+
+/// Size of the sample that the page suggests.
+const SAMPLE: usize = 50;
+/// Share of results with a planted error, and of results that are shown twice, as in `review`.
+const RATES: CheckRates = CheckRates {
+    faults: 0.04,
+    duplicates: 0.05,
+};
+/// Shortest time that an image is shown before a verdict is accepted, as in `review`.
+const MIN_VIEW_MS: u64 = 250;
+/// Most reviews that are open at a time.
+const MAX_REVIEWS: usize = 32;
+
+/// The fields of the form that starts a review.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StartBody {
+    reviewer: String,
+    metric: String,
+    sample: String,
+    order: String,
+    /// Whether a name that looks like another is that of another person.
+    #[serde(default)]
+    is_new: String,
+}
+
+/// Shows the reviewers and the form that starts a review.
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let log = open.catalog.verdict_log(None).await?;
+    let mut reviewers: BTreeMap<String, BTreeMap<Verdict, u64>> = BTreeMap::new();
+    for event in log.iter().filter(|event| event.undone_at.is_none()) {
+        let counts = reviewers.entry(event.reviewer.clone()).or_default();
+        *counts.entry(event.verdict).or_default() += 1;
+    }
+    let body = html! {
+        p { (visit.t(
+            "The question is always the same: is the rotation within 5 degrees, and is the whole character there? Results come in random order, without scores, and each answer is stored at once.",
+            "Câu hỏi luôn như nhau: góc xoay có lệch không quá 5 độ, và chữ có đủ không? Kết quả xuất hiện theo thứ tự ngẫu nhiên, không kèm điểm, và mỗi câu trả lời được lưu ngay.",
+        )) }
+        (start_form(&visit))
+        @if !reviewers.is_empty() { (reviewer_table(&visit, &reviewers)) }
+    };
+    let title = visit.t("Review", "Đánh giá");
+    Ok(frame(&visit, title, Some(&key), NavSection::Review, &body))
+}
+
+fn start_form(visit: &Visit) -> Markup {
+    let metrics = ThresholdMetric::ALL.map(|metric| (metric.name(), visit.metric(metric)));
+    action_form(
+        "actions/review",
+        "card fields",
+        &html! {
+            label { span { (visit.t("Your name", "Tên của bạn")) }
+                input #reviewer name="reviewer" required maxlength="100" autocomplete="name";
+            }
+            label { span { (visit.t("Results of", "Kết quả của")) }
+                select name="metric" {
+                    @for (value, text) in metrics { (choice(value, text, Some(ThresholdMetric::DEFAULT.name()))) }
+                    (choice("", visit.t("all metrics", "mọi độ đo"), Some(ThresholdMetric::DEFAULT.name())))
+                }
+            }
+            label { span { (visit.t("How many results (empty: all)", "Bao nhiêu kết quả (để trống: tất cả)")) }
+                input.short type="number" name="sample" min="1" value=(SAMPLE);
+            }
+            label { span { (visit.t("Order", "Thứ tự")) }
+                select name="order" {
+                    (choice(ReviewOrder::Random.name(), visit.t("random, for an unbiased accuracy", "ngẫu nhiên, để độ chính xác không bị thiên lệch"), None))
+                    (choice(ReviewOrder::LeastConfident.name(), visit.t("least confident first, to find failures", "độ tin cậy thấp trước, để tìm lỗi"), None))
+                    (choice(ReviewOrder::Adjudicate.name(), visit.t("disagreements of two others", "chỗ hai người khác bất đồng"), None))
+                }
+            }
+            label.check { input type="checkbox" name="is_new" value="yes"; " " (visit.t("another person with a similar name", "người khác có tên gần giống")) }
+            button.primary { (visit.t("Start or continue", "Bắt đầu hoặc tiếp tục")) }
+        },
+    )
+}
+
+fn reviewer_table(visit: &Visit, reviewers: &BTreeMap<String, BTreeMap<Verdict, u64>>) -> Markup {
+    html! {
+        h2 { (visit.t("Reviewers", "Người đánh giá")) }
+        div.scroll tabindex="0" role="region" aria-label=(visit.t("Reviewers", "Người đánh giá")) {
+            table {
+                thead { tr {
+                    th scope="col" { (visit.t("Name", "Tên")) }
+                    @for verdict in Verdict::ALL { th scope="col" { (visit.verdict(verdict)) } }
+                } }
+                tbody { @for (name, counts) in reviewers {
+                    tr {
+                        th scope="row" { (one_line(name)) }
+                        @for verdict in Verdict::ALL { td.number { (grouped(counts.get(&verdict).copied().unwrap_or(0))) } }
+                    }
+                } }
+            }
+        }
+    }
+}
+
+/// Checks the fields of a review and replies with its address.
+pub(super) async fn start(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+    body: Result<Json<StartBody>, JsonRejection>,
+) -> AppResult<Json<Value>> {
+    let Json(body) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
+    let open = state.open(&key).await?;
+    let reviewer = reviewer_name(&body.reviewer);
+    let reviewer = reviewer.map_err(|error| AppFailure::refused(error.to_string()))?;
+    if body.is_new.is_empty() {
+        refuse_similar(&open, &reviewer, &visit).await?;
+    }
+    let query = PageQuery::default()
+        .with("metric", &body.metric)
+        .with("sample", &body.sample)
+        .with("order", &body.order);
+    let text = query.text();
+    let choice = text.trim_start_matches('?');
+    // Opening refuses a queue without items before the page is left.
+    let _router = review(&state, &open, &reviewer, choice).await?;
+    let go = format!("review/{}/{}/", encoded(&reviewer), encoded(choice));
+    Ok(Json(json!({ "go": go })))
+}
+
+/// Refuses a new reviewer whose name looks like another.
+async fn refuse_similar(open: &OpenProject, reviewer: &str, visit: &Visit) -> AppResult<()> {
+    let rights = open.catalog.review_rights().await?;
+    let names = BTreeSet::from([reviewer.to_owned()]);
+    let similar = similar_names(&open.catalog, &rights, &names).await;
+    let similar = similar.map_err(|error| AppFailure::of(error, &open.dir))?;
+    let Some((new, known)) = similar else {
+        return Ok(());
+    };
+    Err(AppFailure::refused(match visit.language {
+        Language::English => format!(
+            "{known:?} and {new:?} are nearly the same name: if they are one person, write {known:?}, or else tick \"another person\""
+        ),
+        Language::Vietnamese => format!(
+            "{known:?} và {new:?} gần như cùng một tên: nếu là một người, hãy viết {known:?}, nếu không hãy chọn \"người khác\""
+        ),
+    }))
+}
+
+/// Passes a request on to the pages of a reviewer.
+pub(super) async fn pages(
+    State(state): State<Arc<AppState>>,
+    Path(parts): Path<Vec<String>>,
+    Extension(access): Extension<Arc<AccessControl>>,
+    request: Request,
+) -> AppResult<Response> {
+    let [key, reviewer, choice, ..] = parts.as_slice() else {
+        return Err(AppFailure::not_found());
+    };
+    let open = state.open(key).await?;
+    let router = review(&state, &open, reviewer, choice).await?;
+    let (mut head, body) = request.into_parts();
+    // The path below the review is everything after the fifth segment.
+    let rest = head.uri.path().splitn(7, '/').nth(6).unwrap_or_default();
+    let target = match head.uri.query() {
+        Some(query) => format!("/{rest}?{query}"),
+        None => format!("/{rest}"),
+    };
+    head.uri = target.parse().map_err(|_invalid| AppFailure::not_found())?;
+    // The parameters of this address are not those of the page.
+    head.extensions = Extensions::new();
+    head.extensions.insert(access);
+    let request = Request::from_parts(head, body);
+    let Ok(response) = TowerToHyperService::new(router).call(request).await;
+    Ok(response.into_response())
+}
+
+/// Returns the pages of a reviewer, which are opened if they are not.
+async fn review(
+    state: &AppState,
+    open: &OpenProject,
+    reviewer: &str,
+    choice: &str,
+) -> AppResult<axum::Router> {
+    let id = [open.key.as_str(), reviewer, choice].map(str::to_owned);
+    let mut reviews = state.reviews.lock().await;
+    if let Some(router) = reviews.get(&id) {
+        return Ok(router.clone());
+    }
+    let opened = open_review(state, open, reviewer, &PageQuery::parse(choice)).await?;
+    if reviews.len() >= MAX_REVIEWS {
+        reviews.pop_first();
+    }
+    reviews.insert(id, opened.clone());
+    Ok(opened)
+}
+
+/// Opens the pages of a reviewer.
+async fn open_review(
+    state: &AppState,
+    open: &OpenProject,
+    reviewer: &str,
+    query: &PageQuery,
+) -> AppResult<axum::Router> {
+    let (location, reviewer) = (open.location(), reviewer.to_owned());
+    let (language, query) = (state.language(), query.clone());
+    let opened = on_thread(async move || review_pages(&location, language, reviewer, &query).await);
+    let pages = opened
+        .await
+        .map_err(|error| AppFailure::of(error, &open.dir))?;
+    if pages.counts().items == 0 {
+        let text = "there is no result to judge yet; run the pairs first";
+        return Err(AppFailure::refused(text));
+    }
+    Ok(pages.routes())
+}
+
+async fn review_pages(
+    location: &Location,
+    language: Option<Language>,
+    reviewer: String,
+    query: &PageQuery,
+) -> ProjectResult<ReviewPages> {
+    let settings = location.settings()?;
+    let keys = key_map(&settings.config.review.keys);
+    let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
+    let (project, catalog) = location.open().await?;
+    let rights = catalog.review_rights().await?;
+    rights.require_review(Some(&reviewer))?;
+    let (catalog, _) = catalog.without_faulty_rows().await?;
+    let options = ReviewOptions {
+        command: format!(
+            "mocban -C {}",
+            shell_quoted(&location.dir.to_string_lossy())
+        ),
+        project_page: Some("../../../"),
+        language,
+        keys,
+        min_view_ms: MIN_VIEW_MS,
+        opens_guide: true,
+        limits: settings.config.limits,
+        explain: explanation,
+        now,
+        queue: QueueOptions {
+            reviewer,
+            metrics: query.parsed("metric").into_iter().collect(),
+            order: query.parsed("order").unwrap_or(ReviewOrder::Random),
+            seed: QueueOptions::DEFAULT_SEED,
+            sample: query.parsed::<usize>("sample").filter(|sample| *sample > 0),
+            rates: RATES,
+        },
+    };
+    Ok(ReviewPages::open(catalog, project, options).await?)
+}

@@ -1,0 +1,71 @@
+//! The routes of the app.
+
+use std::sync::Arc;
+
+use axum::routing::{any, get, post};
+use axum::{Router, middleware};
+
+use super::state::{AppOptions, AppState};
+use super::{
+    assets, export_page, failure_page, health_page, home, import_page, pair_page, pairs_page,
+    pictures, report_page, review_page, run_actions, run_page, settings_page,
+};
+
+/// Returns the routes of the app, for a server.
+pub fn app_pages(options: AppOptions) -> Router {
+    let state = Arc::new(AppState::new(options));
+    let pair = "/p/{project}/pair/{pair}";
+    let review = "/p/{project}/review/{reviewer}/{choice}";
+    Router::new()
+        .route("/", get(home::page))
+        .route("/assets/{name}", get(assets::asset))
+        .route("/p/{project}/", get(run_page::page))
+        .route("/p/{project}/pairs", get(pairs_page::page))
+        .route(&format!("{pair}/"), get(pair_page::page))
+        .route(&format!("{pair}/picture/{{name}}"), get(pictures::picture))
+        .route(&format!("{pair}/3d/"), get(pair_page::scan_view))
+        .route(&format!("{pair}/3d/scan"), get(pictures::scan))
+        .route(
+            &format!("{pair}/3d/assets/{{name}}"),
+            get(pair_page::scan_view_asset),
+        )
+        .route("/p/{project}/review", get(review_page::page))
+        .route("/import", get(import_page::page))
+        .route("/actions/import", post(import_page::import))
+        .route("/actions/demo", post(run_actions::demo))
+        .route("/p/{project}/report", get(report_page::page))
+        .route("/p/{project}/report/numbers", get(report_page::numbers))
+        .route(
+            "/p/{project}/report/file/{file}",
+            get(report_page::download),
+        )
+        .route("/p/{project}/export", get(export_page::page))
+        .route("/p/{project}/actions/export", post(export_page::start))
+        .route(
+            "/p/{project}/exports/{name}/{file}",
+            get(export_page::download),
+        )
+        .route("/p/{project}/settings", get(settings_page::page))
+        .route("/p/{project}/actions/setting", post(settings_page::store))
+        .route("/p/{project}/health", get(health_page::page))
+        .route("/p/{project}/actions/check", post(health_page::start_check))
+        .route(
+            "/p/{project}/actions/backup",
+            post(health_page::start_backup),
+        )
+        .route("/p/{project}/backup.sqlite", get(health_page::download))
+        .route("/p/{project}/actions/run", post(run_actions::run))
+        .route("/p/{project}/actions/run-list", post(run_actions::run_list))
+        .route("/p/{project}/actions/stop", post(run_actions::stop))
+        .route("/p/{project}/actions/retry", post(run_actions::retry))
+        .route("/p/{project}/actions/retire", post(run_actions::retire))
+        .route("/p/{project}/actions/review", post(review_page::start))
+        .layer(middleware::from_fn_with_state(
+            Arc::clone(&state),
+            failure_page::explain,
+        ))
+        // The pages of a review explain their failures themselves.
+        .route(&format!("{review}/"), any(review_page::pages))
+        .route(&format!("{review}/{{*rest}}"), any(review_page::pages))
+        .with_state(state)
+}

@@ -1,0 +1,217 @@
+//! Actions on the pairs of a project: run, stop, try again, take out.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{Path, State};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::address::PageQuery;
+use super::child_run;
+use super::failure::{AppFailure, AppResult};
+use super::on_thread::on_thread;
+use super::pair_query::PairQuery;
+use super::projects::{OpenProject, find};
+use super::state::AppState;
+use mocban_core::domain::{ErrorCode, FailureClass};
+use mocban_project::ProjectError;
+use mocban_project::location::now;
+use mocban_project::retire::retire as retire_pairs;
+use mocban_project::retry::{RetryRequest, retry as retry_pairs};
+use mocban_runner::is_running;
+
+/// Name of the project that is made of the built-in dataset.
+const DEMO: &str = "mocban-demo";
+/// Most pairs of a list that are run by their names.
+const MAX_LIST: usize = 1000;
+/// Largest number of pairs at the same time.
+const MAX_JOBS: u16 = 1024;
+
+/// The fields of the form that starts a run.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RunBody {
+    /// Pairs at the same time, as the field has it.
+    #[serde(default)]
+    jobs: String,
+    /// `all` or `failed`.
+    which: String,
+}
+
+/// The fields of the forms about single pairs and groups of failed ones.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PairsBody {
+    #[serde(default)]
+    pair: Option<String>,
+    #[serde(default)]
+    class: Option<FailureClass>,
+}
+
+type Body<T> = Result<Json<T>, JsonRejection>;
+
+/// Replies that the page is read again.
+fn reload() -> Json<Value> {
+    Json(json!({ "reload": true }))
+}
+
+fn invalid(rejection: &JsonRejection) -> AppFailure {
+    AppFailure::refused(rejection.to_string())
+}
+
+/// Starts a run of the pairs that wait, and of the failed ones if asked.
+pub(super) async fn run(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    body: Body<RunBody>,
+) -> AppResult<Json<Value>> {
+    let Json(body) = body.map_err(|rejection| invalid(&rejection))?;
+    let open = state.open(&key).await?;
+    let mut args = Vec::new();
+    if !body.jobs.is_empty() {
+        let jobs = body.jobs.parse::<u16>().ok();
+        let jobs = jobs.filter(|jobs| (1..=MAX_JOBS).contains(jobs));
+        let jobs = jobs.ok_or_else(|| {
+            AppFailure::refused(format!(
+                "{} is not a number of pairs from 1 to {MAX_JOBS}",
+                body.jobs
+            ))
+        })?;
+        args.extend(["-j".to_owned(), jobs.to_string()]);
+    }
+    if body.which == "failed" {
+        args.extend(["--rerun".to_owned(), "failed".to_owned()]);
+    }
+    child_run::start(&state.options.program, &open.dir, &args).await?;
+    Ok(reload())
+}
+
+/// Makes a project of the built-in dataset, which waits for its run.
+pub(super) async fn demo(State(state): State<Arc<AppState>>) -> AppResult<Json<Value>> {
+    let folder = &state.options.folder;
+    if find(folder).iter().any(|found| found.dir == *folder) {
+        return Err(AppFailure::refused("this folder is a project itself"));
+    }
+    let dir = folder.join(DEMO);
+    child_run::finish(
+        &state.options.program,
+        &["demo".as_ref(), dir.as_os_str(), "--no-run".as_ref()],
+    )
+    .await?;
+    Ok(Json(json!({ "go": format!("p/{DEMO}/") })))
+}
+
+/// The list whose pairs run, as its address names it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ListBody {
+    list: String,
+}
+
+/// Runs the pairs of a list, also failed ones.
+pub(super) async fn run_list(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    body: Body<ListBody>,
+) -> AppResult<Json<Value>> {
+    let Json(body) = body.map_err(|rejection| invalid(&rejection))?;
+    let open = state.open(&key).await?;
+    let query = PairQuery::of(&PageQuery::parse(&body.list));
+    let mut names: Vec<String> = Vec::new();
+    let mut after = None;
+    loop {
+        let page = open.catalog.pair_list(
+            &query.filter,
+            query.order,
+            query.metric,
+            after,
+            query.page_size(),
+        );
+        let page = page.await?;
+        names.extend(
+            page.pairs
+                .iter()
+                .map(|pair| pair.attributes.name.to_string()),
+        );
+        after = page.next;
+        if names.len() > MAX_LIST {
+            return Err(AppFailure::refused(format!(
+                "the list has more than {MAX_LIST} pairs: narrow the filter, or run all pairs"
+            )));
+        }
+        if after.is_none() {
+            break;
+        }
+    }
+    if names.is_empty() {
+        return Err(AppFailure::refused("the list has no pairs"));
+    }
+    let (request, location) = (RetryRequest::Names(names.clone()), open.location());
+    let retried = on_thread(async move || retry_pairs(&request, &location).await).await;
+    // None of them may have failed.
+    let is_none_failed = |error: &ProjectError| error.code() == ErrorCode::NothingSelected;
+    if let Err(error) = retried
+        && !is_none_failed(&error)
+    {
+        return Err(AppFailure::of(error, &open.dir));
+    }
+    if !runs(&open).await? {
+        names.insert(0, "--".to_owned());
+        child_run::start(&state.options.program, &open.dir, &names).await?;
+    }
+    Ok(Json(json!({ "go": "./" })))
+}
+
+/// Stops the run on this computer.
+pub(super) async fn stop(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+) -> AppResult<Json<Value>> {
+    let open = state.open(&key).await?;
+    child_run::stop(&open.catalog).await?;
+    Ok(reload())
+}
+
+/// Lets failed pairs run again. Starts a run unless one is active, which then takes them up.
+pub(super) async fn retry(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    body: Body<PairsBody>,
+) -> AppResult<Json<Value>> {
+    let Json(body) = body.map_err(|rejection| invalid(&rejection))?;
+    let open = state.open(&key).await?;
+    let request = match (body.pair, body.class) {
+        (Some(pair), _) => RetryRequest::Names(vec![pair]),
+        (None, Some(class)) => RetryRequest::Class(class),
+        (None, None) => RetryRequest::All,
+    };
+    let location = open.location();
+    let retried = on_thread(async move || retry_pairs(&request, &location).await).await;
+    retried.map_err(|error| AppFailure::of(error, &open.dir))?;
+    if !runs(&open).await? {
+        child_run::start(&state.options.program, &open.dir, &[]).await?;
+    }
+    Ok(reload())
+}
+
+/// Takes a pair out of every count.
+pub(super) async fn retire(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    body: Body<PairsBody>,
+) -> AppResult<Json<Value>> {
+    let Json(body) = body.map_err(|rejection| invalid(&rejection))?;
+    let open = state.open(&key).await?;
+    let pair = body.pair.ok_or_else(AppFailure::not_found)?;
+    let location = open.location();
+    let retired = on_thread(async move || retire_pairs(&[pair], &location).await).await;
+    retired.map_err(|error| AppFailure::of(error, &open.dir))?;
+    Ok(Json(json!({ "go": "../../pairs" })))
+}
+
+async fn runs(open: &OpenProject) -> AppResult<bool> {
+    let running = is_running(&open.project, &open.catalog, now()).await;
+    running.map_err(|error| AppFailure::of(error, &open.dir))
+}

@@ -1,0 +1,289 @@
+//! The first page of a project: its state, the run in progress, and what failed.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, State};
+use axum::response::Html;
+use maud::{Markup, html};
+
+use super::child_run;
+use super::components::{NavSection, action_form, empty, figure, frame, grouped};
+use super::failure::AppResult;
+use super::home::free_space;
+use super::pairs_page::pair_card;
+use super::projects::OpenProject;
+use super::state::AppState;
+use super::visit::Visit;
+use mocban_catalog::{PairFilter, PairOrder, PairResults, StatusCounts, WorkerRecord, WorkerState};
+use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, one_line};
+use mocban_project::failures::may_succeed_unchanged;
+use mocban_project::location::now;
+use mocban_project::{ProjectError, ProjectResult};
+use mocban_runner::{fingerprints, is_running};
+use mocban_system::platform;
+
+/// Number of the latest results that are shown.
+const LATEST: usize = 12;
+/// Number of failed pairs that are shown as examples of each class.
+const EXAMPLES: usize = 3;
+
+/// What the page shows of a project.
+struct RunState {
+    counts: StatusCounts,
+    is_running: bool,
+    workers: Vec<WorkerRecord>,
+    latest: Vec<PairResults>,
+    failures: Vec<(FailureClass, u64, Vec<PairResults>)>,
+    blocks: Option<String>,
+    /// Number of pairs at the same time, as the settings give it.
+    jobs: usize,
+}
+
+impl RunState {
+    async fn read(open: &OpenProject) -> ProjectResult<Self> {
+        let (catalog, location) = (&open.catalog, open.location());
+        let settings = location.settings()?;
+        // Read before the counts: a run that ends in between leaves no leases.
+        let running = is_running(&open.project, catalog, now()).await?;
+        let workers = child_run::workers(catalog).await;
+        let counts = catalog
+            .status(&fingerprints(&settings.config.stages))
+            .await?;
+        let mut classes = catalog.failure_counts().await?;
+        classes.sort_by_key(|(class, number)| (std::cmp::Reverse(*number), *class));
+        let mut failures = Vec::new();
+        for (class, number) in classes {
+            let filter = PairFilter {
+                class: Some(class),
+                statuses: vec![JobStatus::Quarantined],
+                ..PairFilter::default()
+            };
+            let metric = ThresholdMetric::DEFAULT;
+            let list = catalog.pair_list(&filter, PairOrder::Imported, metric, None, EXAMPLES);
+            failures.push((class, number, list.await?.pairs));
+        }
+        let blocks = catalog.block_states().await?;
+        Ok(Self {
+            counts,
+            is_running: running,
+            workers: workers.unwrap_or_default(),
+            latest: catalog.recent_results(LATEST).await?,
+            failures,
+            blocks: (!blocks.is_empty()).then(|| grouped(blocks.len() as u64)),
+            jobs: mocban_project::run::options(&settings.config).workers,
+        })
+    }
+
+    fn jobs(&self, status: JobStatus) -> u64 {
+        self.counts.jobs.get(&status).copied().unwrap_or(0)
+    }
+
+    /// Returns the number of pairs that a run would work on or works on.
+    fn outstanding(&self) -> u64 {
+        [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased]
+            .map(|status| self.jobs(status))
+            .iter()
+            .sum()
+    }
+
+    /// Returns the pairs that the present workers settle in a second, since they started.
+    fn rate(&self) -> Option<f64> {
+        let rates = self.workers.iter().filter_map(|worker| {
+            let metrics = worker.metrics.as_ref()?;
+            let seconds = metrics.elapsed_ms as f64 / 1000.0;
+            (seconds > 0.0).then(|| (metrics.done + metrics.failed) as f64 / seconds)
+        });
+        let rate: f64 = rates.sum();
+        (rate > 0.0).then_some(rate)
+    }
+
+    fn is_stopping(&self) -> bool {
+        let now = now();
+        let mut workers = self.workers.iter();
+        self.is_running && workers.any(|worker| worker.state(now) == WorkerState::Stopping)
+    }
+}
+
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let read = RunState::read(&open).await;
+    let run =
+        read.map_err(|error: ProjectError| super::failure::AppFailure::of(error, &open.dir))?;
+    let body = html! {
+        div #live data-live="2000" {
+            (figures(&visit, &run))
+            (progress(&visit, &run))
+            (controls(&visit, &run))
+            (disk(&visit, &open))
+            (latest(&visit, &run))
+            (failures(&visit, &run))
+        }
+    };
+    let title = visit.t("Run", "Căn chỉnh");
+    Ok(frame(&visit, title, Some(&key), NavSection::Run, &body))
+}
+
+fn figures(visit: &Visit, run: &RunState) -> Markup {
+    let waiting = run.jobs(JobStatus::Ready) + run.jobs(JobStatus::Backoff);
+    let running = run.jobs(JobStatus::Leased);
+    let running_name = if run.is_running {
+        visit.t("running", "đang chạy")
+    } else {
+        visit.t("interrupted", "bị ngắt")
+    };
+    let judged: u64 = run.counts.verdicts.values().sum();
+    html! {
+        div.figures {
+            (figure(run.counts.pairs, visit.t("pairs", "cặp"), Some("pairs"), ""))
+            (figure(run.jobs(JobStatus::Done), visit.t("aligned", "đã căn chỉnh"), Some("pairs?state=aligned"), "good"))
+            (figure(run.jobs(JobStatus::Quarantined), visit.t("failed", "lỗi"), Some("pairs?state=failed&view=table"), "bad"))
+            (figure(waiting, visit.t("waiting", "đang chờ"), Some("pairs?state=waiting"), ""))
+            (figure(running, running_name, Some("pairs?state=running"), ""))
+            (figure(run.counts.low_confidence, visit.t("low confidence", "độ tin cậy thấp"), Some("pairs?confidence=low&sort=confidence"), "warn"))
+            (figure(judged, visit.t("verdicts", "đánh giá"), Some("review"), ""))
+            @if let Some(blocks) = &run.blocks { span.figure { b { (blocks) } span { (visit.t("blocks", "ván")) } } }
+        }
+    }
+}
+
+fn progress(visit: &Visit, run: &RunState) -> Markup {
+    let settled = run.jobs(JobStatus::Done) + run.jobs(JobStatus::Quarantined);
+    let rate = run.rate().filter(|_| run.is_running);
+    html! {
+        progress.wide value=(settled) max=(run.counts.pairs.max(1)) aria-label=(visit.t("Progress of the project", "Tiến độ của dự án")) {}
+        p.muted {
+            (grouped(settled)) " / " (grouped(run.counts.pairs))
+            @if let Some(rate) = rate {
+                " · " (rate_text(visit, rate))
+                " · " (visit.t("time left", "còn lại")) " " (duration(visit, run.outstanding() as f64 / rate))
+            }
+            @if run.is_running {
+                @for worker in &run.workers { " · " (one_line(&worker.host)) ", " (visit.t("process", "tiến trình")) " " (worker.pid) }
+            }
+        }
+    }
+}
+
+/// Returns a number of pairs a second, or a minute if they are few.
+fn rate_text(visit: &Visit, per_second: f64) -> String {
+    if per_second < 1.0 {
+        let per_minute = 60.0 * per_second;
+        format!(
+            "{per_minute:.1} {}",
+            visit.t("pairs a minute", "cặp mỗi phút")
+        )
+    } else {
+        format!(
+            "{per_second:.1} {}",
+            visit.t("pairs a second", "cặp mỗi giây")
+        )
+    }
+}
+
+/// Returns a time as a person says it.
+fn duration(visit: &Visit, seconds: f64) -> String {
+    let (number, unit) = match seconds {
+        s if s < 90.0 => (s.ceil(), visit.t("s", "giây")),
+        s if s < 5400.0 => ((s / 60.0).ceil(), visit.t("min", "phút")),
+        s => ((s / 3600.0).ceil(), visit.t("h", "giờ")),
+    };
+    format!("{number} {unit}")
+}
+
+fn controls(visit: &Visit, run: &RunState) -> Markup {
+    if run.is_running {
+        let text = if run.is_stopping() {
+            visit.t("Stop at once", "Dừng ngay")
+        } else {
+            visit.t(
+                "Stop after the stages in progress",
+                "Dừng sau các giai đoạn đang làm",
+            )
+        };
+        return html! {
+            @if run.is_stopping() {
+                p.notice { (visit.t("The run is stopping. Everything finished so far is stored.", "Đang dừng. Mọi thứ đã xong đều được lưu.")) }
+            }
+            (action_form("actions/stop", "inline", &html! { button #stop { (text) } }))
+        };
+    }
+    let waiting = run.outstanding() + run.counts.stale;
+    let failed = run.jobs(JobStatus::Quarantined);
+    html! {
+        @if run.counts.stale > 0 {
+            p.notice { (grouped(run.counts.stale)) " " (visit.t("pairs were computed with other settings or files; a run updates them.", "cặp được tính với thiết lập hoặc tệp khác; lần chạy sẽ cập nhật.")) }
+        }
+        (action_form("actions/run", "inline run-form", &html! {
+            label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "
+                input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
+            }
+            button.primary #start name="which" value="all" disabled[waiting == 0] {
+                (visit.t("Align", "Căn chỉnh")) " " (grouped(waiting)) " " (visit.t("pairs", "cặp"))
+            }
+            @if failed > 0 {
+                button name="which" value="failed" { (visit.t("Try failed pairs again", "Thử lại các cặp lỗi")) }
+            }
+        }))
+        @if waiting == 0 && failed == 0 && run.counts.pairs > 0 {
+            p.good { (visit.t("Everything is aligned. Next: judge a sample of the results.", "Mọi thứ đã được căn chỉnh. Tiếp theo: đánh giá một mẫu kết quả.")) " "
+                a href="review" { (visit.t("Review", "Đánh giá")) } }
+        }
+    }
+}
+
+fn disk(visit: &Visit, open: &OpenProject) -> Markup {
+    let free = platform::free_bytes(&open.dir);
+    html! { @if let Some(free) = free { p.muted { (free_space(visit, free)) } } }
+}
+
+fn latest(visit: &Visit, run: &RunState) -> Markup {
+    html! {
+        section {
+            h2 { (visit.t("Latest results", "Kết quả mới nhất")) }
+            @if run.latest.is_empty() {
+                (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! {}))
+            } @else {
+                div.gallery { @for pair in &run.latest { (pair_card(visit, "", pair, ThresholdMetric::DEFAULT)) } }
+            }
+        }
+    }
+}
+
+fn failures(visit: &Visit, run: &RunState) -> Markup {
+    html! {
+        @if !run.failures.is_empty() {
+            section {
+                h2 { (visit.t("Failed pairs by reason", "Các cặp lỗi theo lý do")) }
+                @for (class, number, examples) in &run.failures {
+                    article.card {
+                        h3 { (grouped(*number)) " · " (visit.class(*class)) }
+                        p { (visit.remedy(*class)) }
+                        ul { @for pair in examples { (example(pair)) } }
+                        div.row {
+                            a.button href={ "pairs?view=table&state=failed&class=" (class) } { (visit.t("Show them", "Xem các cặp này")) }
+                            (action_form("actions/retry", "inline", &html! {
+                                input type="hidden" name="class" value=(class);
+                                button class=[may_succeed_unchanged(*class).then_some("primary")] { (visit.t("Try these again", "Thử lại các cặp này")) }
+                            }))
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn example(pair: &PairResults) -> Markup {
+    let name = pair.attributes.name.as_str();
+    let message = pair.failure.as_ref().map(|stored| &stored.failure.message);
+    html! {
+        li {
+            a href={ "pair/" (super::address::encoded(name)) "/" } { (one_line(name)) }
+            @if let Some(message) = message { ": " (one_line(message)) }
+        }
+    }
+}

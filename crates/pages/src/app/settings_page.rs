@@ -1,0 +1,172 @@
+//! Settings in words: what each means, its range, and what a change costs before it is saved.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{Path, State};
+use axum::response::Html;
+use maud::{Markup, html};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::components::{NavSection, action_form, frame, grouped};
+use super::failure::{AppFailure, AppResult};
+use super::on_thread::on_thread;
+use super::state::AppState;
+use super::visit::Visit;
+use mocban_catalog::Catalog;
+use mocban_config::{Origin, Setting, explanation};
+use mocban_core::domain::one_line;
+use mocban_project::ProjectResult;
+use mocban_project::change_setting::{SettingChange, preview, save};
+use mocban_project::location::Location;
+
+/// Sections that this page leaves out: addresses of databases and stores, and keys.
+const HIDDEN: [&str; 2] = ["storage", "review"];
+
+/// A change, as the form sends it.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SettingBody {
+    key: String,
+    value: String,
+}
+
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let location = open.location();
+    let settings = location.settings();
+    let settings = settings.map_err(|error| AppFailure::of(error, &open.dir))?;
+    let change = match (visit.query.get("key"), visit.query.get("value")) {
+        (Some(name), Some(value)) => {
+            let body = SettingBody {
+                key: name.to_owned(),
+                value: value.to_owned(),
+            };
+            Some(looked_at(body, open.catalog.clone(), location).await)
+        }
+        _ => None,
+    };
+    let body = html! {
+        p { (visit.t(
+            "A change is saved in the settings file of the project. You see how many pairs it concerns before it is saved; the next run computes them again.",
+            "Thay đổi được lưu trong tệp thiết lập của dự án. Trước khi lưu, bạn thấy thay đổi liên quan đến bao nhiêu cặp; lần chạy sau sẽ tính lại chúng.",
+        )) }
+        @match &change {
+            None => {},
+            Some(Ok(change)) => (change_part(&visit, change)),
+            Some(Err(error)) => p.notice.bad role="alert" { (error.text(&open.dir)) },
+        }
+        (sections(&visit, &settings.tree.settings()))
+    };
+    let title = visit.t("Settings", "Thiết lập");
+    Ok(frame(
+        &visit,
+        title,
+        Some(&key),
+        NavSection::Settings,
+        &body,
+    ))
+}
+
+async fn looked_at(
+    body: SettingBody,
+    catalog: Catalog,
+    location: Location,
+) -> ProjectResult<SettingChange> {
+    on_thread(async move || preview(&body.key, &body.value, &catalog, &location).await).await
+}
+
+fn change_part(visit: &Visit, change: &SettingChange) -> Markup {
+    let (before, after) = (&change.before, &change.after);
+    html! {
+        section.card #change {
+            h2 { (after.key) }
+            @if before.value == after.value {
+                p { (visit.t("This is the value that it has.", "Đây đã là giá trị hiện tại.")) }
+            } @else {
+                p { code { (before.value) } " → " code { (after.value) } }
+                p { b { (grouped(change.stale)) } " " (visit.t("pairs would be computed again by the next run.", "cặp sẽ được tính lại trong lần chạy sau.")) }
+                (action_form("actions/setting", "inline", &html! {
+                    input type="hidden" name="key" value=(after.key);
+                    input type="hidden" name="value" value=(visit.query.get("value").unwrap_or_default());
+                    button.primary #save { (visit.t("Save", "Lưu")) }
+                    a href=(visit.here) { (visit.t("Cancel", "Hủy")) }
+                }))
+            }
+        }
+    }
+}
+
+/// Returns the settings by section. Those with a value of their own are open.
+fn sections(visit: &Visit, settings: &[Setting]) -> Markup {
+    let section = |setting: &Setting| {
+        let (section, _) = setting.key.rsplit_once('.').unwrap_or(("", ""));
+        section.to_owned()
+    };
+    let mut names: Vec<String> = Vec::new();
+    for setting in settings {
+        let name = section(setting);
+        let first = name.split('.').next().unwrap_or_default();
+        if !names.contains(&name) && !HIDDEN.contains(&first) {
+            names.push(name);
+        }
+    }
+    let asked = visit.query.get("key");
+    html! {
+        @for name in &names {
+            @let of_section: Vec<&Setting> = settings.iter().filter(|setting| section(setting) == *name).collect();
+            @let is_open = of_section.iter().any(|setting| setting.origin != Origin::Default || asked == Some(&setting.key));
+            details.card open[is_open] {
+                summary { h2 { (name) } }
+                @for setting in of_section { (setting_part(visit, setting)) }
+            }
+        }
+    }
+}
+
+fn setting_part(visit: &Visit, setting: &Setting) -> Markup {
+    let text = explanation(&setting.key).join(" ");
+    let value = setting.value.to_string();
+    let value = value.trim_matches('"');
+    let id = format!("setting-{}", setting.key);
+    html! {
+        form.setting method="get" action=(visit.here) {
+            input type="hidden" name="key" value=(setting.key);
+            label for=(id) { (setting.key) }
+            input id=(id) name="value" value=(value) autocomplete="off" spellcheck="false";
+            button { (visit.t("Look at the change", "Xem thay đổi")) }
+            p.muted lang="en" {
+                (text)
+                @if setting.origin != Origin::Default { " · " (one_line(&setting.origin.to_string())) }
+            }
+        }
+    }
+}
+
+/// Saves a change.
+pub(super) async fn store(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    body: Result<Json<SettingBody>, JsonRejection>,
+) -> AppResult<Json<Value>> {
+    let Json(body) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
+    let hidden = body.key.split('.').next().unwrap_or_default();
+    if HIDDEN.contains(&hidden) {
+        return Err(AppFailure::not_found());
+    }
+    let open = state.open(&key).await?;
+    let (catalog, location) = (open.catalog.clone(), open.location());
+    let stored = on_thread(async move || {
+        let change = preview(&body.key, &body.value, &catalog, &location).await?;
+        save(&change, &location)
+    });
+    let stored = stored.await;
+    stored.map_err(|error| AppFailure::of(error, &open.dir))?;
+    Ok(Json(json!({ "go": "settings" })))
+}

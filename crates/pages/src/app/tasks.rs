@@ -1,0 +1,79 @@
+//! Long work of the app itself, such as exports: one of a kind at a time for each project, and what became of it.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::failure::{AppFailure, AppResult};
+use super::on_thread::on_thread;
+use super::projects::OpenProject;
+use mocban_project::ProjectResult;
+use mocban_project::location::Location;
+
+/// A kind of long work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum TaskKind {
+    Export,
+    Check,
+    Backup,
+}
+
+/// Lines that say what was done, each in English and Vietnamese.
+pub(super) type TaskLines = Vec<[String; 2]>;
+
+/// What became of a task.
+#[derive(Debug, Clone)]
+pub(super) enum TaskState {
+    Running,
+    Done(TaskLines),
+    Failed(String),
+}
+
+/// The tasks of all projects.
+#[derive(Debug, Default)]
+pub(super) struct AppTasks(Arc<Mutex<BTreeMap<(String, TaskKind), TaskState>>>);
+
+impl AppTasks {
+    /// Starts a task for a project.
+    ///
+    /// # Errors
+    /// Refuses a second task of a kind.
+    pub(super) fn start<F>(
+        &self,
+        kind: TaskKind,
+        open: &OpenProject,
+        work: impl FnOnce(Location) -> F + Send + 'static,
+    ) -> AppResult<()>
+    where
+        F: Future<Output = ProjectResult<TaskLines>>,
+    {
+        let id = (open.key.clone(), kind);
+        {
+            let mut tasks = self.lock();
+            if matches!(tasks.get(&id), Some(TaskState::Running)) {
+                return Err(AppFailure::refused("this is already being done"));
+            }
+            tasks.insert(id.clone(), TaskState::Running);
+        }
+        let (tasks, dir) = (Self(Arc::clone(&self.0)), open.dir.clone());
+        let location = open.location();
+        tokio::spawn(async move {
+            let done = on_thread(move || work(location)).await;
+            let state = match done {
+                Ok(lines) => TaskState::Done(lines),
+                Err(error) => TaskState::Failed(error.text(&dir)),
+            };
+            tasks.lock().insert(id, state);
+        });
+        Ok(())
+    }
+
+    /// Returns the state of the last task of a kind.
+    pub(super) fn state(&self, kind: TaskKind, open: &OpenProject) -> Option<TaskState> {
+        self.lock().get(&(open.key.clone(), kind)).cloned()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<(String, TaskKind), TaskState>> {
+        // Each change is a single insertion.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

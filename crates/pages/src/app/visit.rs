@@ -1,0 +1,86 @@
+//! One request for a page: its language, and its place among the pages, from which links are relative.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use axum::extract::FromRequestParts;
+use axum::http::header;
+use axum::http::request::Parts;
+
+use super::address::PageQuery;
+use super::state::AppState;
+use crate::local_server::AccessControl;
+use crate::review::Language;
+
+/// A request for a page.
+#[derive(Debug, Clone)]
+pub(super) struct Visit {
+    pub(super) language: Language,
+    /// Relative path of the home page, which ends with a slash.
+    pub(super) root: String,
+    /// Relative address of this page without its query.
+    pub(super) here: String,
+    pub(super) query: PageQuery,
+    /// The token that actions must carry.
+    pub(super) csrf_token: String,
+}
+
+impl Visit {
+    /// Returns the text in the language of the page.
+    pub(super) const fn t<'t>(&self, english: &'t str, vietnamese: &'t str) -> &'t str {
+        match self.language {
+            Language::English => english,
+            Language::Vietnamese => vietnamese,
+        }
+    }
+
+    /// Returns the position of the language of the page in texts with one entry per language.
+    pub(super) const fn index(&self) -> usize {
+        match self.language {
+            Language::English => 0,
+            Language::Vietnamese => 1,
+        }
+    }
+
+    /// Returns the relative address of a page of a project.
+    pub(super) fn project_page(&self, key: &str, page: &str) -> String {
+        format!("{}p/{}/{page}", self.root, super::address::encoded(key))
+    }
+}
+
+impl FromRequestParts<Arc<AppState>> for Visit {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(
+        parts: &mut Parts,
+        state: &Arc<AppState>,
+    ) -> Result<Self, Self::Rejection> {
+        let path = parts.uri.path();
+        let query = PageQuery::parse(parts.uri.query().unwrap_or_default());
+        if let Some(chosen) = query.parsed("language") {
+            state.set_language(chosen);
+        }
+        let accepted = parts.headers.get(header::ACCEPT_LANGUAGE);
+        let of_browser = accepted.and_then(|value| Language::accepted(value.to_str().ok()?));
+        let language = state.language().or(of_browser);
+        let depth = path.matches('/').count().saturating_sub(1);
+        let root = if depth == 0 {
+            "./".to_owned()
+        } else {
+            "../".repeat(depth)
+        };
+        let here = path.rsplit('/').next().unwrap_or_default();
+        let access = parts.extensions.get::<Arc<AccessControl>>();
+        Ok(Self {
+            language: language.unwrap_or(Language::English),
+            root,
+            here: if here.is_empty() {
+                "./".to_owned()
+            } else {
+                here.to_owned()
+            },
+            query: query.with("language", ""),
+            csrf_token: access.map_or_else(String::new, |access| access.csrf_token().to_owned()),
+        })
+    }
+}

@@ -1,0 +1,117 @@
+//! The pages of one reviewer: reads the queue, and gives the routes for a server.
+
+use std::sync::Arc;
+
+use axum::Router;
+
+use super::item::ReviewItem;
+use super::item_images::ImageCache;
+use super::options::ReviewOptions;
+use super::planted_faults::{FaultPlanter, FaultShortage, QueueError};
+use super::routes;
+use super::state::ServerState;
+use super::unstored::UnstoredEvents;
+use crate::local_server::{WorkFailed, WorkThread};
+use mocban_catalog::{Catalog, CatalogError};
+use mocban_core::domain::explained_by_cause;
+use mocban_store::Project;
+
+/// Why the queue cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReviewError {
+    /// The catalog cannot be read.
+    #[error("cannot read the review queue: {0}")]
+    Catalog(#[source] CatalogError),
+    /// An attention check could not be planted.
+    #[error("cannot plant an attention check: {0}")]
+    Fault(WorkFailed),
+}
+
+explained_by_cause! { ReviewError: Catalog }
+
+/// The pages of a reviewer, with the queue at their start.
+#[derive(Debug)]
+pub struct ReviewPages {
+    state: Arc<ServerState>,
+    counts: QueueCounts,
+    shortage: Option<FaultShortage>,
+}
+
+/// Number of items in the queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueueCounts {
+    /// All items.
+    pub items: usize,
+    /// Items that show results. All other items are attention checks.
+    pub results: usize,
+    /// Items that the reviewer has answered.
+    pub answered: usize,
+}
+
+impl ReviewPages {
+    /// Reads the queue of a reviewer.
+    ///
+    /// # Errors
+    /// Returns an error if the queue cannot be read.
+    pub async fn open(
+        catalog: Catalog,
+        project: Project,
+        options: ReviewOptions,
+    ) -> Result<Self, ReviewError> {
+        let quick = Arc::new(WorkThread::default());
+        let (read, files) = (catalog.clone(), project.clone());
+        let state = ServerState {
+            planter: FaultPlanter::new(read.clone(), files.clone(), Arc::clone(&quick)),
+            images: ImageCache::new(read, files, options.limits, quick),
+            catalog,
+            project,
+            options,
+            unstored: UnstoredEvents::default(),
+            served_items: std::sync::Mutex::default(),
+        };
+        // Loads the items now: after a restart, a page may resend an answer before it requests the queue.
+        let queue = state.load_queue().await.map_err(|error| match error {
+            QueueError::Catalog(error) => ReviewError::Catalog(error),
+            QueueError::Stopped(error) => ReviewError::Fault(error),
+        })?;
+        let count =
+            |is: &dyn Fn(&ReviewItem) -> bool| queue.items.iter().filter(|item| is(item)).count();
+        Ok(Self {
+            counts: QueueCounts {
+                items: queue.items.len(),
+                results: count(&|item| item.check.is_none()),
+                answered: count(&|item| queue.history.answer(item).is_some()),
+            },
+            shortage: queue.shortage,
+            state: Arc::new(state),
+        })
+    }
+
+    /// Returns the number of items in the queue.
+    pub const fn counts(&self) -> QueueCounts {
+        self.counts
+    }
+
+    /// Returns whether fewer faults could be planted than wanted.
+    pub const fn shortage(&self) -> Option<&FaultShortage> {
+        self.shortage.as_ref()
+    }
+
+    /// Returns the routes of the pages.
+    pub fn routes(&self) -> Router {
+        routes::router(&self.state)
+    }
+
+    /// Returns the number of requests that browsers keep because they are not stored.
+    pub fn unstored(&self) -> usize {
+        self.state.unstored.count()
+    }
+}
+
+/// Returns a name that is the same on every start for a project and reviewer. The browser keeps unsaved answers per
+/// origin, so a restarted server needs the same port to receive these answers.
+pub fn origin_name(project: &Project, reviewer: &str) -> String {
+    let dir = project.dir();
+    let dir = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
+    format!("{}\0{reviewer}", dir.display())
+}

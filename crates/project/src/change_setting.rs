@@ -1,0 +1,77 @@
+//! Changes a setting in the file of a project, after saying what that costs.
+
+use mocban_config::{Origin, Setting, with_setting};
+use mocban_runner::fingerprints;
+use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
+
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
+use crate::exit::Refusal;
+use crate::files;
+use crate::location::Location;
+use mocban_catalog::Catalog;
+
+/// A setting that would be changed, and what follows.
+#[derive(Debug)]
+pub struct SettingChange {
+    /// The setting as it is.
+    pub before: Setting,
+    /// The setting as it would be.
+    pub after: Setting,
+    /// Number of pairs that the next run would compute again, also for other reasons.
+    pub stale: u64,
+}
+
+/// Looks at a change of a setting. `value` is written as in a settings file; text needs no quotes.
+///
+/// # Errors
+/// Returns an error if there is no such setting, or its value is refused.
+pub async fn preview(
+    key: &str,
+    value: &str,
+    catalog: &Catalog,
+    location: &Location,
+) -> ProjectResult<SettingChange> {
+    let current = location.settings()?;
+    let find = |settings: Vec<Setting>| settings.into_iter().find(|setting| setting.key == key);
+    let before = find(current.tree.settings());
+    let before = before.ok_or_else(|| Refusal::Usage(format!("there is no setting {key}")))?;
+    let mut changed = location.with_saved_settings();
+    changed.sets = vec![format!("{key}={value}")];
+    let changed = changed.settings()?;
+    let after = find(changed.tree.settings()).unwrap_or_else(|| before.clone());
+    let fingerprints = fingerprints(&changed.config.stages);
+    Ok(SettingChange {
+        before,
+        after,
+        stale: catalog.count_stale(&fingerprints).await?,
+    })
+}
+
+/// Stores a change in the settings file of the project, which is created if there is none.
+///
+/// # Errors
+/// Returns an error if the file cannot be written, or its form does not allow the change.
+pub fn save(change: &SettingChange, location: &Location) -> ProjectResult<()> {
+    let file = location.dir.join(SETTINGS_FILE);
+    let failed = || format!("cannot write {}", file.display());
+    let _lock = TargetLock::acquire(&file).with_context(failed)?;
+    let text = files::small(&file)?.unwrap_or_default();
+    let text = String::from_utf8(text)
+        .map_err(|_invalid| ProjectError::unexpected(format!("{} is not UTF-8", file.display())))?;
+    let origin = Origin::File(file.clone());
+    let text = with_setting(&text, &change.after.key, &change.after.value, &origin)?;
+    write_atomic(&file, text.as_bytes()).with_context(failed)?;
+    // The settings of the environment are above the file.
+    let stored = location.with_saved_settings().settings()?.tree.settings();
+    let stored = stored
+        .into_iter()
+        .find(|setting| setting.key == change.after.key);
+    match stored {
+        Some(stored) if stored.value == change.after.value => Ok(()),
+        _ => Err(Refusal::Usage(format!(
+            "{} is saved, but an environment variable gives it another value",
+            change.after.key
+        ))
+        .into()),
+    }
+}

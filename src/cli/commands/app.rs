@@ -1,0 +1,72 @@
+//! `app`: serves the pages of all projects of a folder on this machine.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::input::language::language_of_system;
+use crate::cli::input::signals;
+use crate::cli::output::context::Context;
+use crate::cli::output::page_address::{open_page, print_address};
+use mocban_core::page_vec;
+use mocban_pages::app::{AppOptions, app_pages};
+use mocban_pages::local_server::LocalServer;
+use mocban_pages::review::Language;
+use mocban_project::error::WithContext as _;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
+use mocban_runner::{Stop, StopLevel};
+
+/// Arguments of `app`.
+#[derive(Debug, Args)]
+pub(crate) struct AppArgs {
+    /// A project, or a folder of projects [default: the folder of -C, or the current one]
+    #[arg(value_name = "FOLDER")]
+    folder: Option<PathBuf>,
+    /// Port on this machine; 0 chooses the same port each time for a folder, or any free port
+    #[arg(long, value_name = "N", default_value = "0")]
+    port: u16,
+    /// Language of the pages, en or vi [default: vi if LANG is Vietnamese, else that of the browser]
+    #[arg(long)]
+    lang: Option<Language>,
+    /// Print the address without opening a browser
+    #[arg(long)]
+    no_open: bool,
+}
+
+pub(crate) async fn app(args: AppArgs, context: &Context) -> ProjectResult<ExitCode> {
+    page_vec::keep_few_pages();
+    let folder = args.folder.unwrap_or_else(|| context.location.dir.clone());
+    if !folder.is_dir() {
+        let text = format!("there is no folder {}", folder.display());
+        return Err(Refusal::Usage(text).into());
+    }
+    let whole = folder.canonicalize();
+    let name = whole
+        .unwrap_or_else(|_| folder.clone())
+        .display()
+        .to_string();
+    let program = std::env::current_exe();
+    let options = AppOptions {
+        folder,
+        language: args.lang.or_else(language_of_system),
+        program: program.with_context(|| "cannot find this program, to start runs".to_owned())?,
+    };
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
+    let server = LocalServer::bind(address, &name, "app").await?;
+    let stop = Stop::default();
+    let signals = signals::watch(&stop)?;
+    let url = server.url();
+    print_address(&url, context)?;
+    context.info(
+        "the address works once, in one browser; press Ctrl-C to end: runs that were started go on",
+    );
+    let _file = open_page(&url, args.no_open, context);
+    let drain = stop.clone();
+    tokio::select! {
+        _ = server.serve(app_pages(options), async move { drain.reached(StopLevel::Drain).await }) => {}
+        () = stop.reached(StopLevel::Now) => {}
+    }
+    signals.abort();
+    Ok(ExitCode::Done)
+}

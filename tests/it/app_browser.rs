@@ -1,0 +1,230 @@
+//! `mocban app` in a browser: from an empty folder to a report without a typed command, every page in both themes, and the
+//! keyboard alone.
+
+use crate::accessible::{axe, no_violation};
+use crate::app::app;
+use crate::browser::{Browser, Tab};
+use crate::cli::mocban;
+use crate::page::{Page, read_project};
+use crate::review_browser::{judge, saved};
+
+/// Opens the app in a tab and returns the address of its home page.
+fn enter<'b>(browser: &'b Browser, page: &Page, size: [u32; 2]) -> (Tab<'b>, String) {
+    let tab = browser.tab(size[0], size[1]);
+    tab.open(&page.url);
+    tab.wait("document.body?.dataset.ready");
+    let home = tab.eval("location.href");
+    (tab, home.as_str().expect("a URL").to_owned())
+}
+
+/// Follows a link or presses a button, and waits for the next page.
+fn click(tab: &Tab<'_>, element: &str, shown: &str) {
+    tab.eval(&format!(
+        "document.querySelector(`{element}`).click(), null"
+    ));
+    tab.wait(shown);
+}
+
+fn on_page(section: &str) -> String {
+    format!("document.body?.dataset.ready && location.pathname.endsWith('{section}')")
+}
+
+/// The page of a pair is shown, and its keys work.
+fn on_pair(name: &str) -> String {
+    format!(
+        "{} && document.getElementById('stage')?.dataset.ready",
+        on_page(&format!("/pair/{name}/"))
+    )
+}
+
+#[test]
+fn the_demo_comes_to_its_report_without_a_typed_command() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, _) = enter(&browser, &page, [1366, 660]);
+    click(&tab, "#demo", &on_page("/p/mocban-demo/"));
+    tab.screenshot("app_before_run");
+    tab.eval("document.querySelector('#start').click(), null");
+    tab.wait("document.querySelectorAll('.pair-card').length > 0");
+    tab.screenshot("app_running");
+    // The page follows the run by itself.
+    tab.wait("document.querySelector('a.figure.good b')?.textContent === '24'");
+    tab.wait("!document.querySelector('#stop') && document.querySelector('#start')");
+    click(&tab, "nav a[href$='/review']", &on_page("/review"));
+    tab.eval("document.querySelector('#reviewer').value = 'lan', document.querySelector('[name=sample]').value = '2', null");
+    let item = "document.body?.dataset.shown && document.getElementById('canvas')";
+    click(&tab, "form.action button", item);
+    tab.key("Escape");
+    tab.wait("!document.querySelector('dialog[open]')");
+    for _ in 0..4 {
+        // An image must be shown for some time before an answer is accepted.
+        tab.eval("window.since = Date.now(), null");
+        tab.wait("Date.now() - window.since > 400");
+        judge(&tab, "KeyP");
+    }
+    saved(&tab);
+    let status = || mocban(&dir.path().join("mocban-demo"), &["status", "--json"]).expect(0);
+    click(&tab, "header a", &on_page("/p/mocban-demo/"));
+    click(&tab, "nav a[href$='/report']", &on_page("/report"));
+    tab.wait("document.querySelector('#numbers table')");
+    tab.screenshot("app_report");
+    let text = tab.eval("document.querySelector('#numbers').innerText");
+    assert!(text.as_str().expect("text").contains("24"), "{text}");
+    assert_eq!(status().json()["jobs"]["done"], 24);
+    let judged = status().json()["verdicts"]["pass"].as_u64();
+    assert!(judged > Some(0), "{judged:?}");
+}
+
+#[test]
+fn every_page_is_accessible_in_both_themes_and_logs_no_error() {
+    let (axe, Some(browser)) = (axe(), Browser::start()) else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    // A pair that failed, with its reason.
+    std::fs::write(project.dir().join("broken.stl"), "solid x").expect("written");
+    let list = "id,mesh,print,block\nbroken,broken.stl,data/prints/upright-0001.jpg,b 01\n";
+    std::fs::write(project.dir().join("more.csv"), list).expect("written");
+    mocban(project.dir(), &["import", "more.csv"]).expect(0);
+    mocban(project.dir(), &["run"]).expect(3);
+    let page = Page::of(&mut app(dir.path()));
+    let (tab, home) = enter(&browser, &page, [1440, 900]);
+    for (name, path) in [
+        ("home", ""),
+        ("run", "p/p/"),
+        ("pairs", "p/p/pairs"),
+        ("table", "p/p/pairs?view=table&state=failed"),
+        ("none", "p/p/pairs?block=nowhere"),
+        ("unknown", "p/p/pairs?id=nobody"),
+        ("pair", "p/p/pair/upright-0000/"),
+        ("failed_pair", "p/p/pair/broken/"),
+        ("review", "p/p/review"),
+        ("report", "p/p/report"),
+        ("export", "p/p/export"),
+        ("import", "import"),
+        ("settings", "p/p/settings?key=run.workers&value=3"),
+        ("health", "p/p/health"),
+        ("missing", "p/nowhere/"),
+    ] {
+        tab.resize([1440, 900]);
+        tab.open(&format!("{home}{path}"));
+        tab.wait("document.body?.dataset.ready");
+        for (size, dark) in [
+            ([1440, 900], false),
+            ([1366, 660], true),
+            ([400, 800], true),
+            ([400, 800], false),
+        ] {
+            tab.resize(size);
+            tab.dark(dark);
+            let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
+            assert!(
+                overflow.as_f64() <= Some(0.0),
+                "{name} is {overflow} wider than {size:?}"
+            );
+            let theme = if dark { "dark" } else { "light" };
+            let what = format!("app_{name}_{}_{theme}", size[0]);
+            match &axe {
+                Some(axe) => {
+                    tab.eval(&format!("{axe}; null"));
+                    no_violation(&tab, &what);
+                }
+                None => tab.screenshot(&what),
+            }
+        }
+        let mut problems = browser.take_problems();
+        problems.retain(|problem| !problem.contains("axe"));
+        assert!(problems.is_empty(), "{name}: {problems:#?}");
+    }
+}
+
+#[test]
+fn a_pair_is_found_and_seen_with_the_keyboard_alone() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1280, 800]);
+    tab.open(&format!("{home}p/p/pairs"));
+    tab.wait(&on_page("/pairs"));
+    // The field for an id is reached with Tab, and Enter opens the pair.
+    tab.eval("document.querySelector('#main').focus(), null");
+    tab.eval("document.querySelector('#jump-id').focus(), null");
+    tab.text("upright-0003");
+    tab.eval("document.querySelector('#jump-id').form.requestSubmit(), null");
+    tab.wait(&on_pair("upright-0003"));
+    tab.key("KeyB");
+    tab.wait("document.querySelector('#blink').getAttribute('aria-pressed') === 'true'");
+    tab.wait("document.querySelector('#stage').src.includes('relief')");
+    tab.key("KeyB");
+    tab.key("ArrowRight");
+    tab.wait(&on_pair("upright-0004"));
+    tab.key("ArrowLeft");
+    tab.wait(&on_pair("upright-0003"));
+    let address = tab.eval("location.href");
+    tab.open(&format!("{}3d/", address.as_str().expect("a URL")));
+    tab.wait("document.querySelector('.scan-canvas canvas')");
+    tab.eval("history.back(), null");
+    tab.wait(&on_pair("upright-0003"));
+    // Every control can be reached.
+    let unreachable = tab.eval(
+        "[...document.querySelectorAll('a[href], button, input, select')].filter((one) => one.tabIndex < 0).length",
+    );
+    assert_eq!(unreachable, 0);
+}
+
+#[test]
+fn a_run_survives_the_app_and_is_stopped_from_the_next_one() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let demo = ["demo", "p", "--pairs", "12", "--no-run", "-q"];
+    mocban(dir.path(), &demo).expect(0);
+    // The run waits at its third pair until the file is removed.
+    let hold = dir.path().join("hold");
+    let held = || {
+        let mut command = app(dir.path());
+        command.args(["--lang", "en"]);
+        command.env("MOCBAN_HOLD_AT", "register:computed:3");
+        command.env("MOCBAN_HOLD_FILE", &hold);
+        command
+    };
+    let mut page = Page::of(&mut held());
+    let (tab, home) = enter(&browser, &page, [1280, 800]);
+    tab.open(&format!("{home}p/p/"));
+    tab.wait(&on_page("/p/p/"));
+    tab.eval("document.querySelector('[name=jobs]').value = '1', document.querySelector('#start').click(), null");
+    tab.wait("document.querySelector('#stop')");
+    let deadline = std::time::Instant::now() + std::time::Duration::from_mins(1);
+    while !hold.exists() {
+        assert!(std::time::Instant::now() < deadline, "the run is not held");
+        crate::waiting::pause();
+    }
+    page.kill();
+    let status = || {
+        let status = mocban(&dir.path().join("p"), &["status", "--json"]);
+        status.expect(0).json()
+    };
+    assert_eq!(status()["running"], true, "the run goes on");
+    let next = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &next, [1280, 800]);
+    tab.open(&format!("{home}p/p/"));
+    tab.wait(&on_page("/p/p/"));
+    tab.wait("document.querySelector('#stop')");
+    tab.eval("document.querySelector('#stop').click(), null");
+    tab.wait("document.querySelector('#stop')?.textContent === 'Stop at once'");
+    std::fs::remove_file(&hold).expect("the run waits");
+    tab.wait("document.querySelector('#start')");
+    let stopped = status();
+    assert_eq!(stopped["running"], false);
+    assert_eq!(stopped["jobs"]["leased"], 0);
+    assert!(stopped["jobs"]["ready"].as_u64() > Some(0), "{stopped}");
+    mocban(&dir.path().join("p"), &["check"]).expect(0);
+}
