@@ -10,6 +10,7 @@ use super::column::{ColumnText, TextColumn};
 use super::kind::BlockRanges;
 use super::page_looks::PageLooks;
 use super::page_measures::PageMeasures;
+use super::page_rule::PageRule;
 use super::text_cell::TextCell;
 use super::text_source::TextSource;
 use crate::draw::within;
@@ -19,15 +20,6 @@ use crate::polygon::BoundsMm;
 const HEAD_MM: f64 = 0.8;
 /// Distance between two registers, mm.
 const REGISTER_GAP_MM: f64 = 2.4;
-
-/// A straight rule.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PageRule {
-    /// End points, mm.
-    pub ends: [[f64; 2]; 2],
-    /// Half the width, mm.
-    pub half_width_mm: f64,
-}
 
 /// A fish tail: a black rectangle with a V-shaped notch in one side.
 #[derive(Debug, Clone, Copy)]

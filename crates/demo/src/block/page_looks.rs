@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::layout::PageRule;
+use super::page_rule::PageRule;
 use crate::draw::{number_within, within};
 use crate::kind::NumberRange;
 use crate::polygon::BoundsMm;
