@@ -103,7 +103,7 @@ impl PageRules {
         found > 0
     }
 
-    /// Takes out the rules that the block shows and the page hardly, and forgets those that only the page shows, such as a
+    /// Takes out the rules that are carved but hardly printed, and forgets lines on the page that are not carved, such as a
     /// tear along the fold.
     fn take_carved(&mut self) {
         for is_across in [false, true] {

@@ -1,7 +1,7 @@
 //! Two notes side by side that are as high as the characters of the text.
 //!
-//! Such a row looks like a character of two parts. It is told from one by four measures: the gap between the notes is wide
-//! and in the middle of the column, and both together are wider and have more strokes than a character.
+//! Such a row looks like a character of two parts. Four measures distinguish them: the gap between the notes is wide and in
+//! the middle of the column, and both together are wider and have more strokes than a character.
 
 use super::column_profile::{ColumnProfile, RowSpan};
 use super::layout::CELL_MM;
