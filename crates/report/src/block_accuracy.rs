@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::box_matching::BoxMatches;
 use mocban_catalog::{BlockDetail, Catalog, CatalogError, PairResults};
-use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, ThresholdMetric, TrueBox};
+use mocban_core::domain::{
+    BlockCharacterState, BlockName, BlockStage, BoxMatches, ThresholdMetric, TrueBox,
+};
 use mocban_results::TruthEvaluation;
 use mocban_results::ground_truth::TruthErrors;
 use mocban_results::stats::ratio;

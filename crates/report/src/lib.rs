@@ -10,7 +10,6 @@ mod accumulate;
 mod accuracy_sentence;
 mod adjudication;
 mod block_accuracy;
-mod box_matching;
 mod build;
 mod comparison;
 mod fail_reasons;

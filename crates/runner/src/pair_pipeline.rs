@@ -11,11 +11,12 @@ use super::stage_inputs::StageInputs;
 use super::stage_output::{self, PairStageError, PairStageOutput, png};
 use mocban_align::scan_size;
 use mocban_align::stages::normalize::{Normalized, PrintMasks};
+use mocban_align::stages::register::ExpectedPose;
 use mocban_align::stages::{ScanHints, Settings, StageError, depth, pipeline};
 use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };
-use mocban_core::domain::{Affine2, AlignmentPrior, ArtifactRef, FailureClass, Stage};
+use mocban_core::domain::{AlignmentPrior, ArtifactRef, FailureClass, Stage};
 use mocban_core::mesh;
 use mocban_core::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use mocban_store::Project;
@@ -168,7 +169,10 @@ impl PairPipeline {
 }
 
 /// Returns the pose that the registration of the block expects; `None` for a pair that was not cut from one.
-fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>, PairStageError> {
+fn expected_pose(
+    pair: &PairContext,
+    depth: &DepthMap,
+) -> Result<Option<ExpectedPose>, PairStageError> {
     let Some(prior) = &pair.attributes.prior else {
         return Ok(None);
     };
@@ -181,9 +185,13 @@ fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>
         PairStageError::failed(FailureClass::Bug, text)
     })?;
     let scale = &depth.scale.depth_from_plane;
-    Ok(prior
+    let pose = prior
         .print_from_mesh
-        .print_from_depth(scale, &fit.plane_from_mesh))
+        .print_from_depth(scale, &fit.plane_from_mesh);
+    Ok(pose.map(|print_from_depth| ExpectedPose {
+        print_from_depth,
+        confidence: prior.confidence,
+    }))
 }
 
 /// Returns the failure of a stage on the likelier of the two files. `length` is that of the scan in its unit, or 0 if it

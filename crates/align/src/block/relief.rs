@@ -16,6 +16,9 @@ const CELL: usize = 27;
 const TOP_QUANTILE: f64 = 0.95;
 /// Residuals of the fit count a quarter at this scale, mm. Starts wide, so that the ground does not hold the surface down.
 const SCALES_MM: [f64; 8] = [2.0, 1.2, 0.8, 0.5, 0.3, 0.2, 0.15, 0.12];
+/// Cells this far below the surface are ground without tops, mm, and their weight in the fit.
+const GROUND_MM: f64 = 1.0;
+const GROUND_WEIGHT: f64 = 0.02;
 /// Tops within this many cells around a cell are its tops: 20 mm across.
 const DILATION: usize = 2;
 /// Local correction of the surface, at most, mm.
@@ -135,14 +138,21 @@ fn fit_quadric(tops: &Grid<Option<f32>>) -> Option<SVector<f64, 6>> {
     }
     let mut sorted: Vec<f64> = samples.iter().map(|(_, top)| *top).collect();
     sorted.sort_by(f64::total_cmp);
-    let upper = *sorted.get(sorted.len() * 4 / 5)?;
+    let upper = *sorted.get(sorted.len() * 9 / 10)?;
     let mut fitted = SVector::from([upper, 0.0, 0.0, 0.0, 0.0, 0.0]);
     for scale in SCALES_MM {
         let mut normal = SMatrix::<f64, 6, 6>::identity() * 1e-6;
         let mut right = normal * fitted;
         for (terms, top) in &samples {
-            let residual = (top - fitted.dot(terms)) / scale;
-            let weight = (1.0 + residual * residual).powi(-2);
+            let above = top - fitted.dot(terms);
+            let residual = above / scale;
+            // Cells without tops do not hold the surface down, even where most cells have none.
+            let ground = if above < -GROUND_MM {
+                GROUND_WEIGHT
+            } else {
+                1.0
+            };
+            let weight = ground * (1.0 + residual * residual).powi(-2);
             normal += terms * terms.transpose() * weight;
             right += terms * (top * weight);
         }
@@ -168,7 +178,9 @@ fn highest_around(residuals: &Grid<Option<f64>>) -> Grid<f64> {
                 }
             }
         }
-        highest.unwrap_or(0.0).clamp(-MAX_LOCAL_MM, MAX_LOCAL_MM)
+        // Where there is only ground, the fitted surface alone says where tops would be.
+        let of_tops = highest.filter(|highest| *highest > -GROUND_MM);
+        of_tops.unwrap_or(0.0).clamp(-MAX_LOCAL_MM, MAX_LOCAL_MM)
     })
 }
 
@@ -264,6 +276,26 @@ mod tests {
         assert!((0.4..0.95).contains(&carved), "{carved}");
         face.relief.soft.data_mut().fill(255);
         assert!(face.relief.carved_fraction() < 1e-9);
+    }
+
+    /// Only one row of characters along the edges has tops.
+    #[test]
+    fn ground_without_tops_is_black() {
+        let mut world = TestWorld::new(13);
+        world.clear(|[u, v]| (13.0..137.0).contains(&u) && (13.0..87.0).contains(&v));
+        let face = world.face();
+        let soft = &face.relief.soft;
+        let stroke = (0..soft.height())
+            .flat_map(|y| (0..soft.width()).map(move |x| [x, y]))
+            .filter(|[x, y]| soft.at(*x, *y) > 127)
+            .map(|at| at.map(|k| k as f64 * super::HEIGHT_STEP_MM));
+        let (right, wrong): (Vec<_>, Vec<_>) = stroke.partition(|at| world.is_stroke(*at));
+        assert!(
+            wrong.len() * 20 < right.len(),
+            "{} of {}",
+            wrong.len(),
+            right.len()
+        );
     }
 
     #[test]

@@ -49,6 +49,11 @@ impl TestWorld {
         Self { bars }
     }
 
+    /// Removes the bars whose middle lies in a part of the face.
+    pub(super) fn clear(&mut self, is_in: impl Fn([f64; 2]) -> bool) {
+        self.bars.retain(|(middle, ..)| !is_in(*middle));
+    }
+
     /// Returns whether a point of the face lies on a stroke.
     pub(super) fn is_stroke(&self, [u, v]: [f64; 2]) -> bool {
         self.bars.iter().any(|([x, y], length, width, angle)| {

@@ -16,11 +16,11 @@ use super::fit::{self, FitError};
 use super::normalize::{self, NormalizeError, Normalized};
 use super::paper_method;
 use super::print::Print;
-use super::register::{self, RegisterError, Registered};
+use super::register::{self, ExpectedPose, RegisterError, Registered};
 use super::scan::Scan;
 use super::settings::{AlignmentMethod, Settings};
 use mocban_core::domain::{
-    Affine2, FailureClass, FitOutcome, LengthUnit, MetricOutcome, PrintFromMesh, ThresholdMetric,
+    FailureClass, FitOutcome, LengthUnit, MetricOutcome, PrintFromMesh, ThresholdMetric,
 };
 use mocban_core::raster::DepthMap;
 
@@ -117,7 +117,7 @@ pub fn normalize(
 pub fn register(
     depth: &DepthMap,
     normalized: &Normalized,
-    expected: Option<&Affine2>,
+    expected: Option<&ExpectedPose>,
     settings: &Settings,
 ) -> Result<Registered, RegisterError> {
     match settings.pipeline.method {

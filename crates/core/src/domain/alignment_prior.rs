@@ -9,4 +9,7 @@ use super::transform::PrintFromMesh;
 pub struct AlignmentPrior {
     /// Maps points of the mesh to pixels of the print.
     pub print_from_mesh: PrintFromMesh,
+    /// How sure the block is of it, 0..=1; 0 if an earlier version stored it.
+    #[serde(default)]
+    pub confidence: f64,
 }

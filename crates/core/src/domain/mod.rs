@@ -7,6 +7,7 @@ pub mod artifact_role;
 mod attention_check;
 mod block;
 mod box_iou;
+mod box_matching;
 mod box_name;
 pub mod cancel;
 mod catalog_identity;
@@ -48,6 +49,7 @@ pub use block::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
 };
 pub use box_iou::box_iou;
+pub use box_matching::BoxMatches;
 pub use box_name::{BoxName, NotABoxName, NotePart};
 pub use catalog_identity::{CATALOG_FILE, CatalogIdentity, UNKNOWN_SERVER};
 pub use control_points::{ControlPoint, ControlPoints};

@@ -4,7 +4,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::face_field::{FAR_MM, FaceField};
-use super::layout::{FishTail, PageRule};
+use super::layout::FishTail;
+use super::page_rule::PageRule;
 use crate::noise::{Noise, smoothstep};
 use crate::polygon::BoundsMm;
 

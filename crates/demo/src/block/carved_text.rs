@@ -60,9 +60,12 @@ impl<'a> TextCarver<'a> {
         let (sin, cos) = cell.angle_rad.sin_cos();
         let mut carved = CarvedCell {
             strokes,
-            centre: [0, 1].map(|i| cell.centre[i] + cell.em_mm * middle[i]),
+            centre: [
+                cell.centre[0] + cell.em_mm * cell.stretch * middle[0],
+                cell.centre[1] + cell.em_mm * middle[1],
+            ],
             turn: [sin, cos],
-            stretch: rng.random_range(0.95..1.04),
+            stretch: cell.stretch * rng.random_range(0.95..1.04),
             bounds: BoundsMm::around([cell.centre]),
             reach: BoundsMm::around([cell.centre]),
         };

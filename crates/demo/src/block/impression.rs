@@ -47,6 +47,15 @@ impl Impression {
         }
     }
 
+    /// Draws how much thinner than carved the strokes are printed, with little ink or pressure.
+    #[must_use]
+    pub(super) fn thinned(self, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            spread_mm: rng.random_range(-0.16..-0.05),
+            ..self
+        }
+    }
+
     /// Returns the colour of the ink, 0..=255 per channel.
     pub(super) const fn colour(&self) -> [f64; 3] {
         self.colour

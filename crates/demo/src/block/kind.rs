@@ -3,6 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use super::page_looks::LookRanges;
 use super::seeding::{hash, part_rng};
 use crate::kind::NumberRange;
 use mocban_core::domain::enum_names;
@@ -39,12 +40,28 @@ pub enum BlockKind {
     WrongPage,
     /// Text on both sides, notes, a warped sheet and damage, most of them milder.
     Mixed,
+    /// A page image in which a character is 20 to 50 pixels high, often with thin strokes.
+    Coarse,
+    /// Notes whose rows are as far apart as those of the text, also in single rows and on one side only.
+    TallNotes,
+    /// Rules in pieces, leaning or doubled, ridges beyond the frame, and a torn fold.
+    BrokenRules,
+    /// A page with few characters, such as a list or the end of a text.
+    Sparse,
+    /// Two registers of text, one above the other.
+    Registers,
+    /// A page with stamps, blots and dark stains.
+    Stamped,
+    /// Any of the looks from `coarse` on at once, as in the scans of libraries.
+    Library,
 }
 
 enum_names! { pub BlockKind, "a kind of block":
     Plain = "plain", Notes = "notes", Warp = "warp", QuarterTurn = "quarter-turn", Back = "back",
     HalfPage = "half-page", OpenedBook = "opened-book", Broken = "broken", Holder = "holder",
     Turntable = "turntable", ScannerBed = "scanner-bed", Fine = "fine", WrongPage = "wrong-page", Mixed = "mixed",
+    Coarse = "coarse", TallNotes = "tall-notes", BrokenRules = "broken-rules", Sparse = "sparse",
+    Registers = "registers", Stamped = "stamped", Library = "library",
 }
 
 /// Which part of the page an image shows.
@@ -76,6 +93,8 @@ pub(super) struct BlockRanges {
     pub scale: NumberRange,
     /// Fraction of the columns that contain notes.
     pub notes: NumberRange,
+    /// What makes the page unlike a clean one.
+    pub looks: LookRanges,
     /// Probability that the page is folded in the middle.
     pub folded: f64,
     /// Probability that both sides are carved.
@@ -126,6 +145,7 @@ pub(super) struct BlockRanges {
 const PLAIN: BlockRanges = BlockRanges {
     scale: [1.0, 1.0],
     notes: [0.0, 0.0],
+    looks: LookRanges::CLEAN,
     folded: 0.5,
     double_faced: 0.15,
     page_of_back: false,
@@ -241,6 +261,85 @@ const MIXED: BlockRanges = BlockRanges {
     ..PLAIN
 };
 
+const COARSE: BlockRanges = BlockRanges {
+    scale: [0.85, 1.0],
+    looks: LookRanges {
+        thin_ink: 0.5,
+        ..LookRanges::CLEAN
+    },
+    px_per_mm: [2.5, 4.5],
+    ..PLAIN
+};
+
+const TALL_NOTES: BlockRanges = BlockRanges {
+    notes: [0.3, 0.9],
+    looks: LookRanges {
+        tall_notes: 1.0,
+        ..LookRanges::CLEAN
+    },
+    px_per_mm: [4.0, 12.0],
+    ..PLAIN
+};
+
+const BROKEN_RULES: BlockRanges = BlockRanges {
+    looks: LookRanges {
+        broken_rules: 1.0,
+        torn_fold: 0.5,
+        ..LookRanges::CLEAN
+    },
+    px_per_mm: [4.0, 12.0],
+    ..PLAIN
+};
+
+const SPARSE: BlockRanges = BlockRanges {
+    looks: LookRanges {
+        sparse: 1.0,
+        ..LookRanges::CLEAN
+    },
+    px_per_mm: [4.0, 12.0],
+    ..PLAIN
+};
+
+const REGISTERS: BlockRanges = BlockRanges {
+    looks: LookRanges {
+        registers: 1.0,
+        ..LookRanges::CLEAN
+    },
+    px_per_mm: [4.0, 12.0],
+    ..PLAIN
+};
+
+const STAMPED: BlockRanges = BlockRanges {
+    looks: LookRanges {
+        blots: [0.0, 8.0],
+        stamps: [1.0, 4.0],
+        ..LookRanges::CLEAN
+    },
+    px_per_mm: [4.0, 12.0],
+    ..PLAIN
+};
+
+const LIBRARY: BlockRanges = BlockRanges {
+    scale: [0.8, 1.0],
+    notes: [0.0, 0.6],
+    looks: LookRanges {
+        tall_notes: 0.5,
+        broken_rules: 0.6,
+        torn_fold: 0.3,
+        sparse: 0.15,
+        registers: 0.15,
+        thin_ink: 0.4,
+        blots: [0.0, 5.0],
+        stamps: [0.0, 2.0],
+    },
+    rotation_deg: 2.5,
+    shrink: [0.0, 0.02],
+    shear: 0.005,
+    warp_mm: [0.1, 0.8],
+    px_per_mm: [2.5, 8.0],
+    ..PLAIN
+};
+
 /// Which block is made. The same options give the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BlockOptions {
@@ -282,6 +381,13 @@ impl BlockKind {
             Self::Fine => &FINE,
             Self::WrongPage => &WRONG_PAGE,
             Self::Mixed => &MIXED,
+            Self::Coarse => &COARSE,
+            Self::TallNotes => &TALL_NOTES,
+            Self::BrokenRules => &BROKEN_RULES,
+            Self::Sparse => &SPARSE,
+            Self::Registers => &REGISTERS,
+            Self::Stamped => &STAMPED,
+            Self::Library => &LIBRARY,
         }
     }
 }

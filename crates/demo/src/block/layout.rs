@@ -8,7 +8,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::column::{ColumnText, TextColumn};
 use super::kind::BlockRanges;
+use super::page_looks::PageLooks;
 use super::page_measures::PageMeasures;
+use super::page_rule::PageRule;
 use super::text_cell::TextCell;
 use super::text_source::TextSource;
 use crate::draw::within;
@@ -16,15 +18,8 @@ use crate::polygon::BoundsMm;
 
 /// Gap between the frame and the first and last characters, mm.
 const HEAD_MM: f64 = 0.8;
-
-/// A straight rule.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PageRule {
-    /// End points, mm.
-    pub ends: [[f64; 2]; 2],
-    /// Half the width, mm.
-    pub half_width_mm: f64,
-}
+/// Distance between two registers, mm.
+const REGISTER_GAP_MM: f64 = 2.4;
 
 /// A fish tail: a black rectangle with a V-shaped notch in one side.
 #[derive(Debug, Clone, Copy)]
@@ -57,12 +52,14 @@ impl PageLayout {
     pub(super) fn draw(
         ranges: &BlockRanges,
         is_folded: bool,
+        looks: &PageLooks,
         texts: &TextSource,
         rng: &mut ChaCha8Rng,
     ) -> Self {
         let measures = PageMeasures::draw(ranges, is_folded, rng);
+        let registers = Registers::of(&measures, looks);
         let width = measures.column_pitch * measures.columns as f64 + measures.strip;
-        let height = measures.row_pitch * measures.rows as f64 + 2.0 * HEAD_MM;
+        let height = measures.row_pitch * measures.rows as f64 + 2.0 * HEAD_MM + registers.gap_mm();
         let inner = BoundsMm {
             min: [-width / 2.0, -height / 2.0],
             max: [width / 2.0, height / 2.0],
@@ -76,7 +73,23 @@ impl PageLayout {
             fold_u: is_folded.then_some(0.0),
         };
         page.add_frame(inner, &measures);
-        page.add_columns(inner, &measures, ranges, texts, rng);
+        let notes = within(ranges.notes, rng);
+        let has_rules = rng.random_bool(0.85);
+        let rule_half_width = rng.random_range(0.12..0.22);
+        let pitches = [measures.row_pitch, measures.column_pitch];
+        let text = ColumnText::draw(pitches, notes, looks, rng);
+        let rule = has_rules.then_some(rule_half_width);
+        page.add_columns(inner, &measures, &registers, &text, (texts, rng));
+        page.add_rules(inner, &measures, rule, rule_half_width);
+        if let Some(v) = registers.rule_v(inner.min[1]) {
+            page.rules.push(PageRule {
+                ends: [[inner.min[0], v], [inner.max[0], v]],
+                half_width_mm: rule_half_width,
+            });
+        }
+        if let Some(broken) = &looks.rules {
+            page.rules = broken.clone().apply(&page.rules, inner, page.outer);
+        }
         page
     }
 
@@ -96,19 +109,15 @@ impl PageLayout {
         }
     }
 
-    /// Adds the columns from the right, with rules between them, and the middle strip.
+    /// Adds the columns from the right, and the middle strip.
     fn add_columns(
         &mut self,
         inner: BoundsMm,
         measures: &PageMeasures,
-        ranges: &BlockRanges,
-        texts: &TextSource,
-        rng: &mut ChaCha8Rng,
+        registers: &Registers,
+        text: &ColumnText,
+        (texts, rng): (&TextSource, &mut ChaCha8Rng),
     ) {
-        let notes = within(ranges.notes, rng);
-        let has_rules = rng.random_bool(0.85);
-        let rule_half_width = rng.random_range(0.12..0.22);
-        let text = ColumnText::draw(measures.row_pitch, measures.column_pitch, notes, rng);
         let strip_at = measures.columns / 2;
         let mut right = inner.max[0];
         let mut number = 0;
@@ -120,26 +129,49 @@ impl PageLayout {
                     middle_u: right - measures.strip / 2.0,
                     top: inner.min[1],
                     rows: measures.rows,
+                    lines_above: 0,
                 };
                 self.add_strip(&strip, measures, texts, rng);
                 right -= measures.strip;
             }
             number += 1;
-            let column = TextColumn {
-                number,
-                middle_u: right - measures.column_pitch / 2.0,
-                top: inner.min[1] + HEAD_MM,
-                rows: measures.rows,
-            };
             let is_last = index + 1 == measures.columns;
-            self.cells.extend(text.fill(&column, is_last, texts, rng));
-            right -= measures.column_pitch;
-            let beside_strip = measures.strip > 0.0 && index + 1 == strip_at;
-            if (has_rules || beside_strip) && !is_last {
-                self.add_vertical_rule(right, inner, rule_half_width);
+            let mut lines_above = 0;
+            for (top, rows) in registers.tops_and_rows(inner.min[1] + HEAD_MM) {
+                let column = TextColumn {
+                    number,
+                    middle_u: right - measures.column_pitch / 2.0,
+                    top,
+                    rows,
+                    lines_above,
+                };
+                let (cells, last_line) = text.fill(&column, is_last, texts, rng);
+                lines_above = last_line;
+                self.cells.extend(cells);
             }
-            if measures.strip > 0.0 && index + 1 == strip_at {
-                self.add_vertical_rule(right - measures.strip, inner, rule_half_width);
+            right -= measures.column_pitch;
+        }
+    }
+
+    /// Adds rules between the columns, if there are any, and at both sides of the middle strip.
+    fn add_rules(
+        &mut self,
+        inner: BoundsMm,
+        measures: &PageMeasures,
+        between: Option<f64>,
+        beside_strip: f64,
+    ) {
+        let strip_at = measures.columns / 2;
+        let mut right = inner.max[0];
+        for index in 1..measures.columns {
+            right -= measures.column_pitch;
+            let is_beside_strip = measures.strip > 0.0 && index == strip_at;
+            if let Some(half_width) = between.or(is_beside_strip.then_some(beside_strip)) {
+                self.add_vertical_rule(right, inner, half_width);
+            }
+            if is_beside_strip {
+                right -= measures.strip;
+                self.add_vertical_rule(right, inner, beside_strip);
             }
         }
     }
@@ -195,11 +227,59 @@ impl PageLayout {
                 character: texts.character(rng),
                 centre: [u, v - pitch / 2.0],
                 em_mm,
+                stretch: 1.0,
                 angle_rad: rng.random_range(-0.02..0.02),
                 is_note: false,
                 is_strip: true,
             });
         }
+    }
+}
+
+/// One or two registers of text.
+struct Registers {
+    row_pitch: f64,
+    /// Rows of each register from the top.
+    rows: Vec<usize>,
+}
+
+impl Registers {
+    fn of(measures: &PageMeasures, looks: &PageLooks) -> Self {
+        let rows = match looks.upper {
+            None => vec![measures.rows],
+            Some(upper) => {
+                let upper = (upper * measures.rows as f64).round() as usize;
+                vec![upper, measures.rows - upper]
+            }
+        };
+        Self {
+            row_pitch: measures.row_pitch,
+            rows,
+        }
+    }
+
+    /// Returns the distance between the registers, mm.
+    fn gap_mm(&self) -> f64 {
+        REGISTER_GAP_MM * (self.rows.len() - 1) as f64
+    }
+
+    /// Returns the upper end and the number of rows of each register below the head of a page.
+    fn tops_and_rows(&self, head: f64) -> Vec<(f64, usize)> {
+        let mut top = head;
+        let mut registers = Vec::new();
+        for rows in &self.rows {
+            registers.push((top, *rows));
+            top += *rows as f64 * self.row_pitch + REGISTER_GAP_MM;
+        }
+        registers
+    }
+
+    /// Returns the position of the rule between two registers, mm.
+    fn rule_v(&self, top: f64) -> Option<f64> {
+        let [upper, _] = self.rows[..] else {
+            return None;
+        };
+        Some(top + HEAD_MM + upper as f64 * self.row_pitch + REGISTER_GAP_MM / 2.0)
     }
 }
 
@@ -209,6 +289,7 @@ mod tests {
 
     use super::PageLayout;
     use crate::block::kind::BlockKind;
+    use crate::block::page_looks::PageLooks;
     use crate::block::seeding::part_rng;
     use crate::block::text_source::TextSource;
     use crate::glyph::Glyphs;
@@ -218,14 +299,17 @@ mod tests {
         let texts = TextSource::draw(&glyphs, &mut part_rng(1, 0));
         let draw = |seed: u64| {
             let mut rng = part_rng(seed, 3);
-            PageLayout::draw(kind.ranges(), seed.is_multiple_of(2), &texts, &mut rng)
+            let ranges = kind.ranges();
+            let looks = PageLooks::draw(&ranges.looks, &mut part_rng(seed, 12));
+            PageLayout::draw(ranges, seed.is_multiple_of(2), &looks, &texts, &mut rng)
         };
         (0..24).map(draw).collect()
     }
 
     #[test]
     fn names_are_unique_and_columns_run_from_right_to_left() {
-        for page in layouts(BlockKind::Notes) {
+        let kinds = [BlockKind::Notes, BlockKind::TallNotes, BlockKind::Registers];
+        for page in kinds.into_iter().flat_map(layouts) {
             let names: BTreeSet<&str> = page.cells.iter().map(|cell| cell.name.as_str()).collect();
             assert_eq!(names.len(), page.cells.len());
             for (one, next) in page.cells.iter().zip(&page.cells[1..]) {
@@ -271,5 +355,35 @@ mod tests {
             }
         }
         assert!(notes > 500, "{notes}");
+    }
+
+    #[test]
+    fn looks_of_libraries_differ_from_clean_pages() {
+        let count = |kind: BlockKind| {
+            let pages = layouts(kind);
+            let cells: usize = pages.iter().map(|page| page.cells.len()).sum();
+            let rules: usize = pages.iter().map(|page| page.rules.len()).sum();
+            (cells, rules)
+        };
+        let (plain, rules) = count(BlockKind::Plain);
+        assert!(count(BlockKind::Sparse).0 * 3 < plain);
+        assert!(count(BlockKind::BrokenRules).1 > 3 * rules);
+        let text = |page: &PageLayout| {
+            let full = page
+                .cells
+                .iter()
+                .filter(|cell| !cell.is_note && !cell.is_strip);
+            full.map(|cell| cell.em_mm).fold(0.0, f64::max)
+        };
+        for page in layouts(BlockKind::TallNotes) {
+            let usual = text(&page);
+            for note in page.cells.iter().filter(|cell| cell.is_note) {
+                assert!(
+                    note.em_mm > 0.55 * usual && note.stretch <= 1.0,
+                    "{}",
+                    note.name
+                );
+            }
+        }
     }
 }

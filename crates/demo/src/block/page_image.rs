@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::impression::{INK_REACH_MM, Impression};
 use super::leaf::PrintedLeaf;
+use super::page_marks::PageMarks;
 use super::page_sheet::PageSheet;
 use super::true_map::TruePageMap;
 use crate::noise::lerp;
@@ -23,6 +24,7 @@ pub(super) struct PageRendering<'a> {
     /// The leaf of which boxes are measured, and others.
     pub leaves: Vec<PrintedLeaf<'a>>,
     pub sheet: &'a PageSheet,
+    pub marks: &'a PageMarks,
     pub ink: &'a Impression,
     pub map: &'a TruePageMap,
     /// Width and height, pixels.
@@ -102,6 +104,11 @@ impl PageRendering<'_> {
                 colour = [0, 1, 2].map(|i| lerp(colour[i], ink_colour[i], ink * on_sheet));
                 if let Some(index) = character {
                     grow(&mut boxes[index], x as u32, y as u32);
+                }
+                // Marks are translucent: they darken what lies below them.
+                if let Some((mark, density)) = self.marks.at(point) {
+                    let dark = |c: f64, mark: f64| c * (1.0 - density * (1.0 - mark / 255.0));
+                    colour = [0, 1, 2].map(|i| dark(colour[i], mark[i]));
                 }
             }
             *pixel = colour.map(|c| c.clamp(0.0, 255.0).round() as u8);

@@ -11,6 +11,8 @@ pub(super) struct TextCell {
     pub centre: [f64; 2],
     /// Side of the font's em square, mm.
     pub em_mm: f64,
+    /// Factor of the width.
+    pub stretch: f64,
     /// Rotation, rad, clockwise on the print.
     pub angle_rad: f64,
     /// Whether it belongs to a note.

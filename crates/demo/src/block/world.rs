@@ -15,6 +15,8 @@ use super::layout::PageLayout;
 use super::leaf::{PageScene, PrintedLeaf};
 use super::page_file::{PageFileBytes, encode_page};
 use super::page_image::{InkBox, PageRendering};
+use super::page_looks::PageLooks;
+use super::page_marks::PageMarks;
 use super::page_sheet::PageSheet;
 use super::ply_file::write_ply;
 use super::pose::{BlockPose, FaceSide, SideFrame};
@@ -37,6 +39,9 @@ mod part {
     pub(super) const PAGE: u64 = 9;
     pub(super) const FILE: u64 = 10;
     pub(super) const LABELS: u64 = 11;
+    pub(super) const LOOKS: [u64; 3] = [12, 13, 14];
+    pub(super) const MARKS: u64 = 15;
+    pub(super) const THIN_INK: u64 = 16;
     /// First part of a field; each character has the next number.
     pub(super) const FIELDS: [u64; 3] = [1 << 20, 2 << 20, 3 << 20];
 }
@@ -70,7 +75,8 @@ impl BlockWorld {
         let texts = TextSource::draw(&glyphs, &mut choice.rng(part::TEXT));
         let text = |index: usize| {
             let mut rng = choice.rng(part::LAYOUTS[index]);
-            let layout = PageLayout::draw(ranges, is_folded, &texts, &mut rng);
+            let looks = PageLooks::draw(&ranges.looks, &mut choice.rng(part::LOOKS[index]));
+            let layout = PageLayout::draw(ranges, is_folded, &looks, &texts, &mut rng);
             let field = carve_page(&layout, &glyphs, choice.part_seed(), part::FIELDS[index]);
             (layout, field)
         };
@@ -109,7 +115,12 @@ impl BlockWorld {
         let scene = PageScene::draw(ranges, &printed, beside, &mut rng);
         let (map, size) = TruePageMap::draw(ranges, scene.view, &mut rng);
         let sheet = PageSheet::draw(scene.sheet, scene.gutter_u, &mut rng);
-        let ink = Impression::draw(&mut rng);
+        let marks = PageMarks::draw(&ranges.looks, printed.outer, &mut choice.rng(part::MARKS));
+        let mut ink = Impression::draw(&mut rng);
+        let mut ink_rng = choice.rng(part::THIN_INK);
+        if ink_rng.random_bool(ranges.looks.thin_ink) {
+            ink = ink.thinned(&mut ink_rng);
+        }
         let own = match other {
             Some((_, field)) if ranges.page_of_other => {
                 PrintedLeaf::of_page(field, None, scene.clip_u)
@@ -122,6 +133,7 @@ impl BlockWorld {
         let rendering = PageRendering {
             leaves: [Some(own), beside].into_iter().flatten().collect(),
             sheet: &sheet,
+            marks: &marks,
             ink: &ink,
             map: &map,
             size,

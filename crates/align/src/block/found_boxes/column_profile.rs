@@ -1,7 +1,7 @@
 //! The ink of a column line by line, and what is usual on a page.
 
 use super::columns::FoundColumn;
-use super::layout::Layout;
+use super::layout::{CELL, Layout};
 
 /// Pitches of rows that are tried, in pitches of columns.
 const ROW_PITCHES: [f64; 2] = [0.5, 1.2];
@@ -10,9 +10,32 @@ const MIDDLE_REACH: f64 = 0.09;
 /// Ink of a line that counts as a stroke, in the usual ink of a line.
 const MIDDLE_LINE: f64 = 0.2;
 
+/// Distance of a gap from the middle of the column, in its widths, and the fraction of a gap that may be inked.
+const GAP_REACH: f64 = 0.12;
+const GAP_INK: f64 = 0.02;
+
+/// Where the strokes of a row lie across its column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RowSpan {
+    /// First position with strokes, and the one after the last, cells.
+    pub(super) across: [usize; 2],
+    /// The widest gap near the middle of the column, likewise.
+    pub(super) gap: Option<[usize; 2]>,
+    /// Mean number of strokes that a line across the row meets, of the lines with strokes.
+    pub(super) strokes: f64,
+}
+
+impl RowSpan {
+    /// Returns the width of the strokes, cells.
+    pub(super) fn width(&self) -> f64 {
+        (self.across[1] - self.across[0]) as f64
+    }
+}
+
 /// Sums of the cells of a column.
 pub(super) struct ColumnProfile {
     pub(super) is_strip: bool,
+    pub(super) left: usize,
     pub(super) width: usize,
     pub(super) top: usize,
     /// Sum of each line of cells.
@@ -21,6 +44,10 @@ pub(super) struct ColumnProfile {
     pub(super) halves: [Vec<f64>; 2],
     /// Positions across near the middle, with the sums of all lines before each line.
     pub(super) middles: Vec<(usize, Vec<f64>)>,
+    /// Pixels of strokes at each position across, in all lines before each line.
+    inked: Vec<Vec<u32>>,
+    /// Numbers of strokes that lines across meet, and of pixel lines with strokes, in all lines before each line.
+    strokes: Vec<[u32; 2]>,
 }
 
 impl ColumnProfile {
@@ -45,6 +72,7 @@ impl ColumnProfile {
         };
         Self {
             is_strip: column.is_strip,
+            left,
             width: right - left,
             top,
             lines: (top..bottom).map(|y| line(y, left, right)).collect(),
@@ -53,7 +81,37 @@ impl ColumnProfile {
                 .filter(|x| *x > left && x + 1 < right)
                 .map(|x| (x, before(x, x + 1)))
                 .collect(),
+            inked: (left..right)
+                .map(|x| pixels_before(layout, x, [top, bottom]))
+                .collect(),
+            strokes: strokes_before(layout, [left, right], [top, bottom]),
         }
+    }
+
+    /// Returns where the strokes of the lines `from..to` lie; `None` if there are none.
+    pub(super) fn span(&self, from: usize, to: usize) -> Option<RowSpan> {
+        let count = |x: usize| self.inked[x][to] - self.inked[x][from];
+        let first = (0..self.width).find(|x| count(*x) > 0)?;
+        let last = (0..self.width).rfind(|x| count(*x) > 0)?;
+        let few = (GAP_INK * ((to - from) * CELL * CELL) as f64) as u32;
+        let middle = self.width as f64 / 2.0;
+        let reach = GAP_REACH * self.width as f64;
+        let mut gap: Option<[usize; 2]> = None;
+        let mut x = first;
+        while x < last {
+            let end = (x..last).find(|x| count(*x) > few).unwrap_or(last);
+            let is_near = x as f64 <= middle + reach && end as f64 >= middle - reach;
+            if is_near && end > x && gap.is_none_or(|[from, to]| end - x > to - from) {
+                gap = Some([x, end]);
+            }
+            x = end + 1;
+        }
+        let [strokes, lines] = [0, 1].map(|k: usize| self.strokes[to][k] - self.strokes[from][k]);
+        Some(RowSpan {
+            across: [first + self.left, last + 1 + self.left],
+            gap: gap.map(|ends| ends.map(|x| x + self.left)),
+            strokes: f64::from(strokes) / f64::from(lines.max(1)),
+        })
     }
 
     /// Returns 1 if a line in the middle third of a row is empty, 0 if all have usual ink.
@@ -76,6 +134,40 @@ impl ColumnProfile {
         }
         best
     }
+}
+
+/// Returns the pixels of strokes at a position across in all lines before each line.
+fn pixels_before(layout: &Layout, x: usize, [top, bottom]: [usize; 2]) -> Vec<u32> {
+    let mut sums = vec![0];
+    let mut sum = 0;
+    for y in top * CELL..bottom * CELL {
+        let pixels = &layout.rules.text.row(y)[x * CELL..(x + 1) * CELL];
+        sum += pixels.iter().filter(|is_stroke| **is_stroke).count() as u32;
+        if (y + 1).is_multiple_of(CELL) {
+            sums.push(sum);
+        }
+    }
+    sums
+}
+
+/// Returns the numbers of strokes and of lines with strokes in all lines before each line.
+fn strokes_before(
+    layout: &Layout,
+    [left, right]: [usize; 2],
+    [top, bottom]: [usize; 2],
+) -> Vec<[u32; 2]> {
+    let mut sums = vec![[0; 2]];
+    let mut sum = [0; 2];
+    for y in top * CELL..bottom * CELL {
+        let line = &layout.rules.text.row(y)[left * CELL..right * CELL];
+        let starts = line.windows(2).filter(|ends| !ends[0] && ends[1]).count();
+        let strokes = starts as u32 + u32::from(line[0]);
+        sum = [sum[0] + strokes, sum[1] + u32::from(strokes > 0)];
+        if (y + 1).is_multiple_of(CELL) {
+            sums.push(sum);
+        }
+    }
+    sums
 }
 
 /// Returns the usual ink of a line.

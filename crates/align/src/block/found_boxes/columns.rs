@@ -19,7 +19,7 @@ const STRIP_COST: f64 = 0.5;
 const LEAST_AROUND: f64 = 0.3;
 /// Largest cost of ink on a boundary, in relation to the ink around it.
 const MAX_INK_COST: f64 = 1.5;
-/// What a boundary gains.
+/// What a boundary gains if there is ink around it.
 const BOUNDARY_GAIN: f64 = 0.45;
 /// What a boundary on a rule gains, and a column over a rule costs.
 const RULE_GAIN: f64 = 1.0;
@@ -146,8 +146,10 @@ impl<'a> Boundaries<'a> {
                 return 0.0;
             }
             let ink = f64::midpoint(profile[k - 1], profile[k]);
-            let usual = around[k].max(LEAST_AROUND * all).max(1e-9);
-            (ink / usual).min(MAX_INK_COST) - BOUNDARY_GAIN - RULE_GAIN * nearness(k)
+            let least = (LEAST_AROUND * all).max(1e-9);
+            // Between empty columns, only a rule shows a boundary.
+            let gain = BOUNDARY_GAIN * (around[k] / least).min(1.0);
+            (ink / around[k].max(least)).min(MAX_INK_COST) - gain - RULE_GAIN * nearness(k)
         };
         let mut rules_before = vec![0_usize; count + 1];
         for k in 1..=count {

@@ -20,8 +20,10 @@ use mocban_core::raster::Mask;
 
 /// Total length of inner rules that decides alone, mm.
 const SURE_RULES_MM: f64 = 150.0;
-/// A profile below this fraction of its mean is a gap.
+/// A profile below this fraction of its mean is a gap. Profiles are those of squares of this side, so that a page with
+/// few characters has gaps between them and not only beside all of them.
 const GAP_INK: f64 = 0.25;
+const GAP_WINDOW_MM: f64 = 45.0;
 /// The fraction of gaps along the image must be larger by this to turn the text.
 const SURE_GAPS: f64 = 0.05;
 /// Side of the corners of a character, in its size.
@@ -76,7 +78,7 @@ impl Upright {
         let characters = places.iter().zip(strokes);
         let full = characters.filter(|(place, strokes)| place.half.is_none() && strokes.area > 0);
         let bounds: Vec<[f64; 4]> = full.map(|(_, strokes)| strokes.bounds).collect();
-        standing(&self.layout.text, &bounds) < limit
+        standing(&self.layout.rules.text, &bounds) < limit
     }
 }
 
@@ -86,12 +88,8 @@ fn runs_along_x(layout: &Layout) -> bool {
     if (along_y - along_x).abs() >= SURE_RULES_MM {
         return along_x > along_y;
     }
-    let gaps = |profile: Vec<f64>| {
-        let mean = profile.iter().sum::<f64>() / profile.len().max(1) as f64;
-        let low = profile.iter().filter(|ink| **ink < GAP_INK * mean).count();
-        low as f64 / profile.len().max(1) as f64
-    };
-    gaps(layout.profile_along()) > gaps(layout.profile_across()) + SURE_GAPS
+    let [across, along] = layout.gaps(GAP_INK, GAP_WINDOW_MM);
+    along > across + SURE_GAPS
 }
 
 /// Returns how much more ink the lower corners of characters hold than the upper ones, in standard errors; 0 for few

@@ -1,6 +1,7 @@
 //! The strokes of a page without frame and rules, and the part of the page inside the frame.
 
-use super::rules::{Rule, find_solid, take_rules};
+use super::page_rules::PageRules;
+use super::rules::{Rule, find_solid};
 use super::text_image::{PIXEL_MM, TextImage, Trust};
 use mocban_core::raster::{Grid, Mask};
 
@@ -14,16 +15,16 @@ const FRAME_MM: f64 = 5.0;
 const BEYOND_FRAME: f64 = 0.02;
 /// Marks in the strip that contain a square of this side are ornaments, in widths of the strip.
 const SOLID: f64 = 0.18;
-/// Least value of strokes, of 255.
-const STROKE: u8 = 128;
+/// The same in other narrow columns.
+const SOLID_IN_COLUMN: f64 = 0.4;
 
 /// Strokes of a page, by which columns and rows are found.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
     /// Fraction of each cell that is covered by strokes of text, 0..=1.
     pub(super) cells: Grid<f32>,
-    /// Strokes of text in the pixels of the image.
-    pub(super) text: Mask,
+    /// Strokes of text and rules in the pixels of the image.
+    pub(super) rules: PageRules,
     /// First column and row of cells inside the frame, and the ones after the last.
     pub(super) inside: [usize; 4],
     /// Middles of the rules along y inside the frame, in cells.
@@ -35,63 +36,71 @@ pub(super) struct Layout {
 impl Layout {
     /// Takes frame, rules and ornaments out of the strokes of an image.
     pub(super) fn of(image: &TextImage) -> Self {
-        let mut text: Mask = image.strokes().map(|value| *value >= STROKE);
-        let mut erased = Mask::new(text.width(), text.height(), false);
-        let (mut text_across, mut erased_across) = (text.transposed(), erased.transposed());
-        let along_y = take_rules(&mut text, &mut erased);
-        let along_x = take_rules(&mut text_across, &mut erased_across);
-        let erased_across = erased_across.transposed();
-        for ((text, erased), across) in (text.data_mut().iter_mut())
-            .zip(erased.data_mut())
-            .zip(erased_across.data())
-        {
-            *erased |= across;
-            *text &= !across;
+        let mut layout = Self {
+            cells: Grid::new(1, 1, 0.0),
+            rules: PageRules::of(image),
+            inside: [0; 4],
+            inner_rules: Vec::new(),
+            rule_lengths_mm: [0.0; 2],
+        };
+        layout.measure(image);
+        layout
+    }
+
+    /// Erases rules in pieces: those near the edges of columns, which are given in cells with their pitch, and those
+    /// across the page. Returns whether there are any.
+    pub(super) fn erase_broken_rules(
+        &mut self,
+        image: &TextImage,
+        (edges, pitch): (&[usize], f64),
+    ) -> bool {
+        let edges: Vec<f64> = (edges.iter())
+            .map(|edge| (edge * CELL) as f64 - 0.5)
+            .collect();
+        let found = self.rules.erase_broken(&edges, pitch * CELL as f64);
+        if found {
+            self.measure(image);
         }
-        let cells = cells(image, &erased);
-        let (left, right) = frame(&along_y, &sums(&cells, false));
-        let (top, bottom) = frame(&along_x, &sums(&cells, true));
-        let inside = [left, top, right, bottom];
-        let within = |rule: &&Rule, low: usize, high: usize| {
+        found
+    }
+
+    /// Measures the cells of the text, the inside of the frame and the rules in it.
+    fn measure(&mut self, image: &TextImage) {
+        self.cells = cells(image, &self.rules.erased);
+        let [along_y, along_x] = &self.rules.found;
+        let (left, right) = frame(along_y, &sums(&self.cells, false));
+        let (top, bottom) = frame(along_x, &sums(&self.cells, true));
+        self.inside = [left, top, right, bottom];
+        let is_within = |rule: &Rule, low: usize, high: usize| {
             let at = rule.at / CELL as f64;
             at > low as f64 + 1.0 && at + 1.0 < high as f64
         };
-        let inner = |rules: &[Rule], low: usize, high: usize| {
-            let inner: Vec<Rule> = rules
-                .iter()
-                .filter(|r| within(r, low, high))
-                .copied()
-                .collect();
-            inner
+        let inner = |rules: &[Rule], low: usize, high: usize| -> Vec<Rule> {
+            let inner = rules.iter().filter(|rule| is_within(rule, low, high));
+            inner.copied().collect()
         };
-        let (inner_y, inner_x) = (inner(&along_y, left, right), inner(&along_x, top, bottom));
+        let (inner_y, inner_x) = (inner(along_y, left, right), inner(along_x, top, bottom));
         let length = |rules: &[Rule]| {
-            rules
-                .iter()
-                .map(|r| r.length as f64 * PIXEL_MM)
-                .sum::<f64>()
+            let lengths = rules.iter().map(|rule| rule.length as f64 * PIXEL_MM);
+            lengths.sum::<f64>()
         };
-        Self {
-            cells,
-            text,
-            inside,
-            inner_rules: inner_y
-                .iter()
-                .map(|rule| (rule.at + 0.5) / CELL as f64)
-                .collect(),
-            rule_lengths_mm: [length(&inner_y), length(&inner_x)],
-        }
+        self.rule_lengths_mm = [length(&inner_y), length(&inner_x)];
+        self.inner_rules = inner_y
+            .iter()
+            .map(|rule| (rule.at + 0.5) / CELL as f64)
+            .collect();
     }
 
-    /// Erases the ornaments of the strip at the fold, from its first position across to the one after the last, in cells.
-    pub(super) fn erase_ornaments(&mut self, strip: [usize; 2]) {
-        let [left, right] = strip.map(|x| x * CELL);
-        let height = self.text.height();
-        let part = Mask::from_fn(right - left, height, |x, y| self.text.at(left + x, y));
-        let solid = find_solid(&part, (SOLID * (right - left) as f64) as usize);
+    /// Erases the ornaments of a column, from its first position across to the one after the last, in cells.
+    pub(super) fn erase_ornaments(&mut self, across: [usize; 2], is_strip: bool) {
+        let [left, right] = across.map(|x| x * CELL);
+        let height = self.rules.text.height();
+        let part = Mask::from_fn(right - left, height, |x, y| self.rules.text.at(left + x, y));
+        let side = if is_strip { SOLID } else { SOLID_IN_COLUMN };
+        let solid = find_solid(&part, (side * (right - left) as f64) as usize);
         for y in 0..height {
             for x in (left..right).filter(|x| solid.at(x - left, y)) {
-                self.text.set(x, y, false);
+                self.rules.text.set(x, y, false);
                 if y / CELL < self.cells.height() {
                     self.cells.set(x / CELL, y / CELL, 0.0);
                 }
@@ -112,14 +121,32 @@ impl Layout {
         sums.into_iter().map(|sum| sum / rows).collect()
     }
 
-    /// Returns the mean of the cells at each position along y, inside the frame.
-    pub(super) fn profile_along(&self) -> Vec<f64> {
+    /// Returns the fractions of gaps in the profiles across and along y of squares, weighted by the ink in them. A gap has
+    /// less than a fraction of the mean ink of its profile.
+    pub(super) fn gaps(&self, gap_ink: f64, side_mm: f64) -> [f64; 2] {
+        let side = ((side_mm / CELL_MM) as usize).max(1);
         let [left, top, right, bottom] = self.inside;
-        let mean = |y: usize| {
-            let row = &self.cells.row(y)[left..right];
-            row.iter().map(|cell| f64::from(*cell)).sum::<f64>() / row.len().max(1) as f64
-        };
-        (top..bottom).map(mean).collect()
+        let (mut ink, mut gaps) = (0.0, [0.0; 2]);
+        for y in (top..bottom).step_by(side) {
+            for x in (left..right).step_by(side) {
+                let (end_x, end_y) = ((x + side).min(right), (y + side).min(bottom));
+                let mut profiles = [vec![0.0; end_x - x], vec![0.0; end_y - y]];
+                for row in y..end_y {
+                    for (column, cell) in self.cells.row(row)[x..end_x].iter().enumerate() {
+                        profiles[0][column] += f64::from(*cell);
+                        profiles[1][row - y] += f64::from(*cell);
+                    }
+                }
+                let all: f64 = profiles[0].iter().sum();
+                ink += all;
+                for (sum, profile) in gaps.iter_mut().zip(profiles) {
+                    let least = gap_ink * all / profile.len() as f64;
+                    let low = profile.iter().filter(|ink| **ink < least).count();
+                    *sum += all * low as f64 / profile.len() as f64;
+                }
+            }
+        }
+        gaps.map(|sum| sum / ink.max(1e-9))
     }
 }
 

@@ -1,13 +1,20 @@
 //! Finds the characters of a page without labels, on relief and ink together.
 
+mod broken_rules;
 mod column_profile;
 mod columns;
 mod direction;
+#[cfg(test)]
+mod drawing;
 mod layout;
+#[cfg(test)]
+mod look_tests;
+mod page_rules;
 mod places;
 mod rows;
 mod rules;
 mod skew;
+mod tall_notes;
 #[cfg(test)]
 mod tests;
 mod text_image;
@@ -25,10 +32,13 @@ use mocban_core::domain::{BoxName, NotePart};
 /// Least area of a character, mm^2, and least length of its longer side, in pitches.
 const MIN_AREA_MM2: f64 = 0.8;
 const MIN_SIDE: f64 = 0.25;
+/// Width below which a column without rules may be the strip at the fold, in pitches.
+const STRIP_WIDTH: f64 = 0.9;
+/// Largest thickness of a piece of a rule, and largest length of one along the rows, in pitches.
+const THIN: f64 = 0.14;
+const LEVEL_STROKE: f64 = 0.6;
 /// Least mean relief below the ink of a character.
 const MIN_SUPPORT: f64 = 0.08;
-/// Least fraction of the relief of a character that is printed.
-const MIN_PRINTED: f64 = 0.5;
 /// Largest fraction of a character's strokes where the page does not show the block.
 const MAX_UNSEEN: f64 = 0.5;
 /// A page that lacks more than this fraction of the characters shows only a part of the text. With a smaller fraction,
@@ -55,11 +65,27 @@ impl FoundBox {
 /// Finds the characters of a page in reading order: columns from right to left, each from the top.
 pub fn find_boxes(face: &CarvedFace, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
     let mut upright = Upright::of(face, page, map);
-    let Some(columns) = find_columns(&upright.layout) else {
+    let Some(mut columns) = find_columns(&upright.layout) else {
         return Vec::new();
     };
-    for strip in columns.all.iter().filter(|column| column.is_strip) {
-        upright.layout.erase_ornaments(strip.across);
+    let edges: Vec<usize> = columns
+        .all
+        .iter()
+        .flat_map(|column| column.across)
+        .collect();
+    if upright
+        .layout
+        .erase_broken_rules(&upright.image, (&edges, columns.pitch))
+    {
+        columns = find_columns(&upright.layout).unwrap_or(columns);
+    }
+    for column in &columns.all {
+        let is_narrow = (column.across[1] - column.across[0]) as f64 <= STRIP_WIDTH * columns.pitch;
+        if column.is_strip || is_narrow {
+            upright
+                .layout
+                .erase_ornaments(column.across, column.is_strip);
+        }
     }
     let (rows, pitches) = find_rows(&upright.layout, &columns);
     let places = places(&columns, &rows);
@@ -82,8 +108,14 @@ fn is_character(place: &CharacterPlace, strokes: &Strokes, pitches: &RowPitches)
     } else {
         pitches.row
     };
+    let pitch_mm = pitch * CELL_MM;
     let [width, height] = strokes.size_mm();
-    strokes.area_mm2() >= MIN_AREA_MM2 && width.max(height) >= MIN_SIDE * pitch * CELL_MM
+    // The character for one is a level stroke, but a long one, and no character is a thin upright stroke.
+    let is_piece_of_rule =
+        width <= THIN * pitch_mm || (height <= THIN * pitch_mm && width <= LEVEL_STROKE * pitch_mm);
+    strokes.area_mm2() >= MIN_AREA_MM2
+        && width.max(height) >= MIN_SIDE * pitch_mm
+        && !is_piece_of_rule
 }
 
 /// Returns whether a box lies on the page, with a tolerance of one pixel.
@@ -134,7 +166,7 @@ fn numbered(
         if before.is_none_or(|(last, _)| last != column) {
             (number, before) = (0, None);
         }
-        let (is_seen, is_printed) = (is_seen(strokes), strokes.printed >= MIN_PRINTED);
+        let (is_seen, is_printed) = (is_seen(strokes), strokes.is_printed());
         // Relief without ink before all characters is wood beside the text, unless the page shows only a part of it.
         if number == 0 && !is_printed && (is_seen || !is_part) {
             continue;

@@ -3,7 +3,7 @@
 use super::columns::Columns;
 use super::layout::{CELL, Layout};
 use super::rows::{FoundRow, RowKind};
-use super::text_image::{PIXEL_MM, TextImage, Trust};
+use super::text_image::{PIXEL_MM, TextImage, Trust, add, correlation};
 use crate::block::page_map::PageMap;
 use mocban_core::raster::Grid;
 use mocban_core::raster::components::ConnectedComponents;
@@ -15,6 +15,10 @@ const SPECK_MM2: f64 = 0.1;
 const LOOSE_SPECK_MM2: f64 = 0.8;
 /// Mean relief below the ink of a part that the block shows, of 255.
 const SHOWN: f64 = 70.0;
+
+/// Least fraction of the relief of a character that is printed, or least correlation of relief and ink.
+const MIN_PRINTED: f64 = 0.5;
+const MIN_LIKENESS: f64 = 0.3;
 
 /// Half of a row of notes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -49,6 +53,8 @@ pub(super) struct Strokes {
     pub(super) only_relief: usize,
     /// Fraction of the relief in the place that is printed.
     pub(super) printed: f64,
+    /// Correlation of relief and ink in the place.
+    pub(super) likeness: f64,
 }
 
 impl Strokes {
@@ -69,6 +75,7 @@ impl Strokes {
         relief: 0,
         only_relief: 0,
         printed: 0.0,
+        likeness: 0.0,
     };
 
     /// Returns the area in mm^2.
@@ -79,6 +86,12 @@ impl Strokes {
     /// Returns the fraction of the text that only the relief shows, because the page does not show the place.
     pub(super) fn unseen(&self) -> f64 {
         self.only_relief as f64 / self.area.max(1) as f64
+    }
+
+    /// Returns whether the page shows the relief of the place. Thin strokes never cover it, because it is a little wider
+    /// than they were carved, but lie where it is high.
+    pub(super) fn is_printed(&self) -> bool {
+        self.printed >= MIN_PRINTED || self.likeness >= MIN_LIKENESS
     }
 
     /// Returns width and height in mm.
@@ -175,7 +188,7 @@ pub(super) fn measure(
             owners.data_mut()[row + left..row + right].fill(number as u16);
         }
     }
-    let components = ConnectedComponents::label(&layout.text);
+    let components = ConnectedComponents::label(&layout.rules.text);
     let parts = assign(image, layout, &components, &owners);
     let local: Vec<LocalMap> = places
         .iter()
@@ -216,26 +229,32 @@ pub(super) fn measure(
         }
     });
     for (found, place) in strokes.iter_mut().zip(places) {
-        found.printed = printed(image, layout, place);
+        (found.printed, found.likeness) = printed(image, layout, place);
     }
     strokes
 }
 
-/// Returns the fraction of the relief in a place that is printed; 1 if there is none.
-fn printed(image: &TextImage, layout: &Layout, place: &CharacterPlace) -> f64 {
+/// Returns the fraction of the relief in a place that is printed, 1 if there is none, and the correlation of both.
+fn printed(image: &TextImage, layout: &Layout, place: &CharacterPlace) -> (f64, f64) {
     let [left, top, right, bottom] = place.room;
     let (mut all, mut printed) = (1.0, 1.0);
+    let mut sums = [0.0; 6];
     for y in top * CELL..bottom * CELL {
-        for x in left * CELL..right * CELL {
+        for x in left..right {
+            let pixels = x * CELL..(x + 1) * CELL;
+            let relief = &image.relief.row(y)[pixels.clone()];
+            let ink = &image.ink.row(y)[pixels];
+            add(&mut sums, relief, ink);
             // Rules are no part of the character.
-            if layout.cells.at(x / CELL, y / CELL) > 0.0 {
-                let relief = f64::from(image.relief.at(x, y));
-                all += relief;
-                printed += relief * f64::from(image.ink.at(x, y)) / 255.0;
+            if layout.cells.at(x, y / CELL) > 0.0 {
+                for (relief, ink) in relief.iter().zip(ink) {
+                    all += f64::from(*relief);
+                    printed += f64::from(*relief) * f64::from(*ink) / 255.0;
+                }
             }
         }
     }
-    printed / all
+    (printed / all, correlation(&sums))
 }
 
 fn extend(bounds: &mut [f64; 4], [x, y]: [f64; 2]) {
@@ -253,8 +272,8 @@ fn for_runs(
     owners: &Grid<u16>,
     mut visit: impl FnMut(usize, u16, usize, usize, usize),
 ) {
-    for y in 0..layout.text.height() {
-        let row = layout.text.row(y);
+    for y in 0..layout.rules.text.height() {
+        let row = layout.rules.text.row(y);
         let owners = owners.row(y / CELL);
         let mut x = 0;
         while let Some(gap) = row[x..].iter().position(|set| *set) {

@@ -3,6 +3,7 @@
 use super::column_profile::{ColumnProfile, row_pitch, usual_ink};
 use super::columns::Columns;
 use super::layout::Layout;
+use super::tall_notes::{FEW_ROWS, UsualCharacter};
 
 /// Pitches of notes that are tried, in pitches of rows.
 const NOTE_PITCHES: [f64; 2] = [0.44, 0.64];
@@ -30,6 +31,8 @@ const EMPTY_MIDDLE_COST: f64 = 1.1;
 const INKED_MIDDLE_COST: f64 = 2.5;
 /// Further cost of a character without ink in the middle across and along.
 const EMPTY_CROSS_COST: f64 = 1.5;
+/// Cost of two notes that are as high as a character.
+const TALL_NOTES_COST: f64 = 0.3;
 /// Cost of a change from characters to notes.
 const NOTES_COST: f64 = 1.4;
 /// Ink of a half of a character that has two, in the usual ink of a character.
@@ -70,6 +73,7 @@ pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<FoundRow
         .collect();
     let usual = usual_ink(&profiles);
     let row = row_pitch(&profiles, columns.pitch);
+    let character = usual_character(&profiles, usual, row);
     let mut best: Option<(f64, f64)> = None;
     let steps = ((NOTE_PITCHES[1] - NOTE_PITCHES[0]) / NOTE_PITCH_STEP).round() as i32;
     for step in 0..=steps {
@@ -77,7 +81,7 @@ pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<FoundRow
         let pitches = RowPitches { row, note };
         let full = profiles.iter().filter(|profile| !profile.is_strip);
         let cost = full
-            .map(|profile| RowSearch::run(profile, usual, pitches).cost())
+            .map(|profile| RowSearch::run(profile, usual, pitches, character).cost())
             .sum();
         if best.is_none_or(|(least, _)| cost < least) {
             best = Some((cost, note));
@@ -85,17 +89,45 @@ pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<FoundRow
     }
     let note = best.map_or(row / 2.0, |(_, note)| note);
     let pitches = RowPitches { row, note };
-    let rows = profiles
-        .iter()
-        .map(|profile| {
+    let divide = |character: Option<UsualCharacter>| -> Vec<Vec<FoundRow>> {
+        let rows = profiles.iter().map(|profile| {
             if profile.is_strip {
                 strip_rows(profile, usual)
             } else {
-                RowSearch::run(profile, usual, pitches).rows()
+                RowSearch::run(profile, usual, pitches, character).rows()
             }
-        })
-        .collect();
+        });
+        rows.collect()
+    };
+    let mut rows = divide(character);
+    let is_tall = |row: &&FoundRow| {
+        let height = (row.along[1] - row.along[0]) as f64;
+        row.kind != RowKind::Character && height > NARROW_HEIGHTS[1] * note
+    };
+    let tall = rows.iter().flatten().filter(is_tall).count();
+    if (1..FEW_ROWS).contains(&tall) {
+        rows = divide(character.map(UsualCharacter::of_few_notes));
+    }
     (rows, pitches)
+}
+
+/// Returns what is usual for a character, from the rows that are found if notes may be only half as high.
+fn usual_character(profiles: &[ColumnProfile], usual: f64, row: f64) -> Option<UsualCharacter> {
+    let pitches = RowPitches {
+        row,
+        note: row / 2.0,
+    };
+    let full = profiles.iter().filter(|profile| !profile.is_strip);
+    UsualCharacter::of(full.flat_map(|profile| {
+        let rows = RowSearch::run(profile, usual, pitches, None).rows();
+        let characters = rows
+            .into_iter()
+            .filter(|row| row.kind == RowKind::Character);
+        characters.filter_map(|row| {
+            let [from, to] = row.along.map(|y| y - profile.top);
+            profile.span(from, to)
+        })
+    }))
 }
 
 /// One step of a sequence: where it came from.
@@ -120,6 +152,8 @@ struct RowSearch<'a> {
     /// Usual ink of a line.
     usual: f64,
     pitches: RowPitches,
+    /// What is usual for a character, if notes may be as high as one.
+    character: Option<UsualCharacter>,
     /// Cost of a cut before each line.
     cuts: Vec<f64>,
     /// The best step to each position, among characters and among notes.
@@ -128,7 +162,12 @@ struct RowSearch<'a> {
 
 impl<'a> RowSearch<'a> {
     /// Finds the best steps to all positions. The strip at the fold has no notes.
-    fn run(profile: &'a ColumnProfile, usual: f64, pitches: RowPitches) -> Self {
+    fn run(
+        profile: &'a ColumnProfile,
+        usual: f64,
+        pitches: RowPitches,
+        character: Option<UsualCharacter>,
+    ) -> Self {
         let count = profile.lines.len();
         let cut = |k: usize| {
             if k == 0 || k == count {
@@ -141,6 +180,7 @@ impl<'a> RowSearch<'a> {
             profile,
             usual,
             pitches,
+            character,
             cuts: (0..=count).map(cut).collect(),
             best: [vec![UNREACHED; count + 1], vec![UNREACHED; count + 1]],
         };
@@ -236,11 +276,23 @@ impl<'a> RowSearch<'a> {
             INKED_MIDDLE_COST * (1.0 - empty)
         } else if profile.halves.iter().all(has_ink) {
             let cross = EMPTY_CROSS_COST * profile.emptiest(from, to, self.usual);
-            (EMPTY_MIDDLE_COST + cross) * empty
+            let one = (EMPTY_MIDDLE_COST + cross) * empty;
+            let is_two = one > TALL_NOTES_COST && self.tall_middle(from, to).is_some();
+            if is_two {
+                one.min(TALL_NOTES_COST + cross)
+            } else {
+                one
+            }
         } else {
             0.0
         };
         pitch / self.pitches.row * (HEIGHT_COST * height * height + ROW_COST + middle)
+    }
+
+    /// Returns the position across between two notes that are as high as a character, if a row looks like that.
+    fn tall_middle(&self, from: usize, to: usize) -> Option<usize> {
+        let span = self.profile.span(from, to)?;
+        self.character?.middle_of_two(self.profile, &span)
     }
 
     /// Returns the rows of the cheapest sequence from the top.
@@ -252,6 +304,8 @@ impl<'a> RowSearch<'a> {
             if step.is_row {
                 let kind = if notes {
                     let (middle, _) = self.profile.middle(step.from, to);
+                    RowKind::Notes { middle }
+                } else if let Some(middle) = self.tall_middle(step.from, to) {
                     RowKind::Notes { middle }
                 } else {
                     RowKind::Character
@@ -283,7 +337,7 @@ fn strip_rows(profile: &ColumnProfile, usual: f64) -> Vec<FoundRow> {
                 row: pitch,
                 note: pitch / 2.0,
             };
-            let search = RowSearch::run(profile, STRIP_INK * usual, pitches);
+            let search = RowSearch::run(profile, STRIP_INK * usual, pitches, None);
             let rows = search.rows();
             // Only the cuts decide, not the number of rows.
             (search.cost() - ROW_COST * rows.len() as f64, rows)

@@ -147,7 +147,7 @@ fn group(found: &Mask) -> Vec<Rule> {
 }
 
 /// Erases the thin strokes along a rule, also where it is broken into short parts.
-fn erase_thin(strokes: &mut Mask, erased: &mut Mask, rule: &Rule) {
+pub(super) fn erase_thin(strokes: &mut Mask, erased: &mut Mask, rule: &Rule) {
     let width = strokes.width();
     let spread = LINE_SPREAD_MM / PIXEL_MM;
     let low = (rule.edges[0] - spread).max(0.0) as usize;

@@ -19,7 +19,7 @@ const TRUST_CELL: usize = 16;
 /// Cells around a cell that are compared with it: 17 mm across.
 const TRUST_REACH: usize = 3;
 /// Least correlation of relief and ink where the page is believed to show the relief.
-const TRUST_NCC: f64 = 0.45;
+const TRUST_NCC: f64 = 0.35;
 /// Fraction of strokes below which a surrounding has no relief.
 const NO_RELIEF: f64 = 0.02;
 
@@ -194,7 +194,7 @@ fn page_points(map: &PageMap, frame: &TextFrame, y: usize) -> Vec<[f64; 2]> {
 }
 
 /// Sums of relief r, ink i, r r, i i, r i and the number of pixels.
-type Sums = [f64; 6];
+pub(super) type Sums = [f64; 6];
 
 /// Compares relief and ink around each cell.
 fn compare(relief: &Grid<u8>, ink: &Grid<u8>, on_page: &Grid<bool>) -> Grid<Trust> {
@@ -239,7 +239,7 @@ fn compare(relief: &Grid<u8>, ink: &Grid<u8>, on_page: &Grid<bool>) -> Grid<Trus
 }
 
 /// Adds a run of pixels to the sums of a cell.
-fn add(sums: &mut Sums, relief: &[u8], ink: &[u8]) {
+pub(super) fn add(sums: &mut Sums, relief: &[u8], ink: &[u8]) {
     let mut whole = [0_u32; 5];
     for (r, i) in relief.iter().zip(ink) {
         let (r, i) = (u32::from(*r), u32::from(*i));
@@ -256,7 +256,7 @@ fn add(sums: &mut Sums, relief: &[u8], ink: &[u8]) {
 }
 
 /// Returns the correlation of relief and ink; 0 if one of them is even.
-fn correlation([r, i, rr, ii, ri, count]: &Sums) -> f64 {
+pub(super) fn correlation([r, i, rr, ii, ri, count]: &Sums) -> f64 {
     let energy = (rr - r * r / count) * (ii - i * i / count);
     if energy > 0.0 {
         (ri - r * i / count) / energy.sqrt()

@@ -57,19 +57,48 @@ pub struct ConfidenceInputs {
     pub mask: [f64; MASK_INPUTS],
     /// Inputs of the model for the probability that print and relief show the same character, given a right pose.
     pub character: [f64; CHARACTER_INPUTS],
+    /// Logarithm of the odds of pose and character that the block gives, 0 for a pair that was not cut from one.
+    pub prior: f64,
 }
 
 impl ConfidenceInputs {
     /// Returns the confidence, 0..=1, under the built-in weights.
     pub fn confidence(&self) -> f64 {
-        let pose_and_mask = logistic(&POSE, &self.pose) * logistic(&MASK, &self.mask);
-        pose_and_mask * logistic(&CHARACTER, &self.character)
+        let pose_and_mask =
+            pose_probability(&self.pose, self.prior) * logistic(&MASK, &self.mask, 0.0);
+        pose_and_mask * logistic(&CHARACTER, &self.character, self.prior)
     }
 }
 
-/// Returns the probability, 0..=1, that the pose is right.
-pub(super) fn of_pose(features: &PoseFeatures) -> f64 {
-    logistic(&POSE, &pose_inputs(features))
+/// Logarithms of the odds that a block gives a pose near the one that it expects, if its own confidence is 0.5 and 1. On
+/// generated blocks, all of 2,445 characters lie where the block places them.
+const BLOCK_ODDS: [f64; 2] = [2.5, 4.5];
+
+/// Returns the logarithm of the odds that a block gives a pose near the one that it expects. A block that is less than
+/// half sure says nothing.
+pub(super) fn prior_of(confidence: f64) -> f64 {
+    let [least, most] = BLOCK_ODDS;
+    if confidence < 0.5 {
+        return 0.0;
+    }
+    least + (most - least) * (2.0 * confidence - 1.0).min(1.0)
+}
+
+/// Returns the probability, 0..=1, that the pose is right. `prior` is the logarithm of the odds that the block gives.
+pub(super) fn of_pose(features: &PoseFeatures, prior: f64) -> f64 {
+    pose_probability(&pose_inputs(features), prior)
+}
+
+/// Returns the probability of a pose. The evidence of the pair or that of the block is enough: a coarse scan or faint ink of
+/// one character says nothing against its place.
+fn pose_probability(inputs: &[f64; POSE_INPUTS], prior: f64) -> f64 {
+    let own = logistic(&POSE, inputs, 0.0);
+    let block = if prior > 0.0 {
+        1.0 / (1.0 + (-prior).exp())
+    } else {
+        0.0
+    };
+    1.0 - (1.0 - own) * (1.0 - block)
 }
 
 fn pose_inputs(features: &PoseFeatures) -> [f64; POSE_INPUTS] {
@@ -85,9 +114,9 @@ fn pose_inputs(features: &PoseFeatures) -> [f64; POSE_INPUTS] {
     ]
 }
 
-/// Returns the probability, 0..=1, that print and relief show the same character.
-pub(super) fn of_character(features: &PoseFeatures) -> f64 {
-    logistic(&CHARACTER, &character_inputs(features))
+/// Returns the probability, 0..=1, that print and relief show the same character. `prior` is as in [`of_pose`].
+pub(super) fn of_character(features: &PoseFeatures, prior: f64) -> f64 {
+    logistic(&CHARACTER, &character_inputs(features), prior)
 }
 
 /// Returns the inputs of the character model. With `size(area) = ln(1 + area / SMALL_AREA)`, they are 1, the size of
@@ -139,28 +168,28 @@ fn spread_input(spread: f64) -> f64 {
 /// The heights of a levelling are chosen from the ink, so that a wrong pose and a wrong print agree better too. A levelling
 /// is evidence for the mask, but neither for the pose nor for the character.
 fn less_likely(
-    probability: fn(&PoseFeatures) -> f64,
+    probability: fn(&PoseFeatures, f64) -> f64,
     [rendered, levelled]: [&PoseFeatures; 2],
 ) -> &PoseFeatures {
-    if probability(rendered) < probability(levelled) {
+    if probability(rendered, 0.0) < probability(levelled, 0.0) {
         rendered
     } else {
         levelled
     }
 }
 
-fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N]) -> f64 {
+fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N], prior: f64) -> f64 {
     let sum: f64 = weights.iter().zip(inputs).map(|(w, x)| w * x).sum();
-    1.0 / (1.0 + (-sum).exp())
+    1.0 / (1.0 + (-sum - prior).exp())
 }
 
 /// Sets the confidence of each metric, and returns each metric's model inputs. `rendered` are the features of the depth
-/// map as rendered, which differ from `features` if the map was levelled. `probabilities` holds the probability that the
+/// map as rendered, which differ from `features` if the map was levelled. `prior` is as in [`of_pose`]. `probabilities` holds the probability that the
 /// mask is right, for each metric.
 pub(super) fn set_confidence(
     metrics: &mut [MetricOutcome],
-    features: &PoseFeatures,
-    rendered: &PoseFeatures,
+    [features, rendered]: [&PoseFeatures; 2],
+    prior: f64,
     probabilities: impl Iterator<Item = f64>,
 ) -> Vec<ConfidenceInputs> {
     let pose = pose_inputs(less_likely(of_pose, [rendered, features]));
@@ -170,6 +199,7 @@ pub(super) fn set_confidence(
             pose,
             mask: mask_inputs(features, probability),
             character,
+            prior,
         };
         outcome.confidence = Some(inputs.confidence());
         inputs
@@ -183,11 +213,11 @@ pub(super) fn set_confidence(
 
 #[cfg(test)]
 mod tests {
-    use super::{MASK, less_likely, logistic, mask_inputs, of_character, of_pose};
+    use super::{MASK, less_likely, logistic, mask_inputs, of_character, of_pose, prior_of};
     use mocban_core::domain::PoseFeatures;
 
     fn of_mask(features: &PoseFeatures, probability_right: f64) -> f64 {
-        logistic(&MASK, &mask_inputs(features, probability_right))
+        logistic(&MASK, &mask_inputs(features, probability_right), 0.0)
     }
 
     const PLAIN: PoseFeatures = PoseFeatures {
@@ -205,7 +235,7 @@ mod tests {
 
     #[test]
     fn each_feature_moves_the_probability_its_way() {
-        let plain = of_pose(&PLAIN);
+        let plain = of_pose(&PLAIN, 0.0);
         assert!(plain > 0.99);
         let worse = [
             PoseFeatures {
@@ -230,8 +260,31 @@ mod tests {
             },
         ];
         for features in worse {
-            assert!(of_pose(&features) < plain, "{features:?}");
+            assert!(of_pose(&features, 0.0) < plain, "{features:?}");
         }
+    }
+
+    #[test]
+    fn a_block_that_is_sure_outweighs_doubts_but_not_contradictions() {
+        let doubtful = PoseFeatures {
+            unmatched_tops: 1.5,
+            unmatched_ink: 1.5,
+            edge_scatter: 0.08,
+            other_angle: 0.7,
+            mirrored: 0.85,
+            ..PLAIN
+        };
+        let wrong = PoseFeatures {
+            unmatched_tops: 8.0,
+            unmatched_ink: 8.0,
+            ..doubtful
+        };
+        let sure = prior_of(1.0);
+        assert!(of_character(&doubtful, 0.0) < 0.5);
+        assert!(of_character(&doubtful, sure) > 0.5);
+        assert!(of_character(&wrong, sure) < 0.1);
+        assert!(of_pose(&doubtful, sure) > of_pose(&doubtful, 0.0));
+        assert_eq!(prior_of(0.3), 0.0);
     }
 
     #[test]
@@ -250,7 +303,7 @@ mod tests {
             ..PLAIN
         };
         for probability in [of_pose, of_character] {
-            assert!(probability(&levelled) > probability(&PLAIN));
+            assert!(probability(&levelled, 0.0) > probability(&PLAIN, 0.0));
             assert_eq!(less_likely(probability, [&PLAIN, &levelled]), &PLAIN);
             assert_eq!(less_likely(probability, [&levelled, &PLAIN]), &PLAIN);
         }
@@ -266,15 +319,18 @@ mod tests {
     #[test]
     fn strokes_without_a_partner_are_evidence_against_the_character() {
         let probability = |unmatched_tops, unmatched_ink, edge_scatter, ink_area| {
-            of_character(&PoseFeatures {
-                unmatched_tops,
-                unmatched_ink,
-                edge_scatter,
-                ink_area,
-                other_angle: 0.7,
-                mirrored: 0.85,
-                ..PLAIN
-            })
+            of_character(
+                &PoseFeatures {
+                    unmatched_tops,
+                    unmatched_ink,
+                    edge_scatter,
+                    ink_area,
+                    other_angle: 0.7,
+                    mirrored: 0.85,
+                    ..PLAIN
+                },
+                0.0,
+            )
         };
         assert!(probability(0.0, 0.0, 0.03, 50.0) > 0.98);
         // Lost wood.
@@ -298,7 +354,7 @@ mod tests {
             mirrored: 0.95,
             ..strokes
         };
-        assert!(of_character(&close) < 0.3 * of_character(&strokes));
+        assert!(of_character(&close, 0.0) < 0.3 * of_character(&strokes, 0.0));
     }
 
     #[test]
@@ -312,6 +368,6 @@ mod tests {
             spread: 0.0,
             ..PLAIN
         };
-        assert!(of_pose(&wrong) < 0.05);
+        assert!(of_pose(&wrong, 0.0) < 0.05);
     }
 }

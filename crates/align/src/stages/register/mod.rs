@@ -24,7 +24,7 @@ mod unmatched;
 
 pub use confidence::ConfidenceInputs;
 pub use observation::Observation;
-pub use params::{RegisterError, RegisterParams};
+pub use params::{ExpectedPose, RegisterError, RegisterParams};
 pub use scoring::Registered;
 pub(super) use scoring::{Alignment, canvas_print, score_alignments};
 pub use stroke_map::StrokeMap;
@@ -32,12 +32,12 @@ pub use stroke_map::StrokeMap;
 use super::normalize::{Normalized, relative_depths};
 use crate::stages::binarize::rim_share;
 use metric_thresholds::ChosenThreshold;
-use mocban_core::domain::{Affine2, InkHypothesis, PoseFeatures};
+use mocban_core::domain::{InkHypothesis, PoseFeatures};
 use mocban_core::raster::DepthMap;
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 22;
+pub const REVISION: u32 = 23;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -88,12 +88,17 @@ const TOPS_AT_RIM: f64 = 0.6;
 pub fn register(
     depth: &DepthMap,
     normalized: &Normalized,
-    expected: Option<&Affine2>,
+    expected: Option<&ExpectedPose>,
     params: &RegisterParams,
 ) -> Result<Registered, RegisterError> {
     let relief = normalized.outcome.relief.ok_or(RegisterError::NoStrokes)?;
     let depths = relative_depths(depth, &relief);
-    let expected = expected.map(|pose| normalized.prints[0].masks_from_print().after(pose));
+    let expected = expected.map(|expected| ExpectedPose {
+        print_from_depth: normalized.prints[0]
+            .masks_from_print()
+            .after(&expected.print_from_depth),
+        ..*expected
+    });
     let search = pose_search::search(&depths, &normalized.prints, expected.as_ref(), params)?;
     let single = Posed::new(depth, &depths, &relief, normalized, &search, params)?;
     let levelled = Levelled::try_new(depth, &relief, &single, normalized, &search, params);
@@ -110,7 +115,8 @@ pub fn register(
         params,
     )?;
     for features in [features, &single.features] {
-        require_character(features, params).map_err(|error| error.with(|| posed.observe(depth)))?;
+        require_character(features, search.prior, params)
+            .map_err(|error| error.with(|| posed.observe(depth)))?;
     }
     let alignments: Vec<Alignment> = thresholds
         .iter()
@@ -137,22 +143,27 @@ pub fn register(
     )?;
     let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);
     let metrics = &mut registered.outcome.metrics;
-    registered.confidence_inputs =
-        confidence::set_confidence(metrics, features, &single.features, probabilities);
+    registered.confidence_inputs = confidence::set_confidence(
+        metrics,
+        [features, &single.features],
+        search.prior,
+        probabilities,
+    );
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
     Ok(registered)
 }
 
 /// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character. Also
-/// refuses less unlikely pairs whose mirrored relief matches better.
+/// refuses less unlikely pairs whose mirrored relief matches better. `prior` is what the block knows.
 fn require_character(
     features: &PoseFeatures,
+    prior: f64,
     params: &RegisterParams,
 ) -> Result<(), RegisterError> {
     let [pose, character] = [
-        confidence::of_pose(features),
-        confidence::of_character(features),
+        confidence::of_pose(features, prior),
+        confidence::of_character(features, prior),
     ];
     if features.mirrored > MIRROR_LIKELY && pose * character < params.min_confidence {
         return Err(RegisterError::Mirrored {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::observation::Observation;
 use crate::stages::score::SsimWindow;
-use mocban_core::domain::{FailureClass, ThresholdMetric};
+use mocban_core::domain::{Affine2, FailureClass, ThresholdMetric};
 
 /// Settings of the register stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,6 +33,15 @@ pub struct RegisterParams {
     /// Number of angular steps in the second search of the paper's method, 2 or more. This search covers three coarse
     /// steps on either side of the best angle.
     pub fine_angles: u32,
+}
+
+/// The pose that the registration of a whole block gives a character that was cut from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpectedPose {
+    /// Maps depth-map pixels to print-image pixels.
+    pub print_from_depth: Affine2,
+    /// How sure the block is of the pose, 0..=1.
+    pub confidence: f64,
 }
 
 /// Why the register stage found no result.

@@ -1,6 +1,7 @@
 //! Coarse-to-fine search of the pose on soft strokes, without an exact threshold.
 
-use super::params::{RegisterError, RegisterParams};
+use super::confidence;
+use super::params::{ExpectedPose, RegisterError, RegisterParams};
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, Loss, PoseCandidate, RefinementPass, Refiner, SearchRange, SoftMask,
@@ -47,8 +48,12 @@ const MIRROR_WINS: f64 = 1.3;
 const EXPECTED_DEG: f64 = 6.0;
 const EXPECTED_RATIO: f64 = 0.08;
 const EXPECTED_SHIFT: f64 = 0.06;
-/// A pose other than the expected one is preferred only if its score is more than this many times the expected one's.
+/// A pose other than the expected one is preferred only if its score is more than this many times the expected one's, and
+/// high enough to convince: the best of all poses on a coarse scan or faint ink is a chance match.
 const UNEXPECTED_WINS: f64 = 1.5;
+const CONVINCING: f64 = 0.45;
+/// The expected pose holds if its score is at least this part of the best one near it.
+const HOLDS: f64 = 0.85;
 /// `at_bound` is set if the scale is this close to either end of the searched band, in natural logarithms.
 const BOUND: f64 = 0.02;
 
@@ -63,6 +68,11 @@ pub(super) struct PoseSearch {
     pub(super) mirrored: Option<PoseCandidate>,
     /// Whether the best pose's scale lies at the end of the band.
     pub(super) at_bound: bool,
+    /// Logarithm of the odds that the block gives the best pose; 0 if it expects none, or another one.
+    pub(super) prior: f64,
+    /// The expected pose, which maps to pixels of the masks, if it matches about as well as the best pose near it. It is
+    /// more exact: the strokes of all characters around determine it.
+    pub(super) expected: Option<Affine2>,
 }
 
 impl PoseSearch {
@@ -82,7 +92,7 @@ impl PoseSearch {
 pub(super) fn search(
     depths: &SoftMask,
     prints: &[PrintMasks],
-    expected: Option<&Affine2>,
+    expected: Option<&ExpectedPose>,
     params: &RegisterParams,
 ) -> Result<PoseSearch, RegisterError> {
     let wood = ImagePyramid::new(depths, BASE_PX).ok_or(RegisterError::NoPose)?;
@@ -105,7 +115,7 @@ fn find_poses(
     depth_px: f64,
     ink: usize,
     print: &PrintMasks,
-    expected: Option<&Affine2>,
+    expected: Option<&ExpectedPose>,
     params: &RegisterParams,
 ) -> Result<PoseSearch, RegisterError> {
     let print_base = ImagePyramid::new(&print.soft_ink(), BASE_PX).ok_or(RegisterError::NoPose)?;
@@ -116,9 +126,17 @@ fn find_poses(
     let mut found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
     let print_bounds = print.known.bounding_box();
     let print_px = longest(print_bounds);
+    let (mut prior, mut kept) = (0.0, None);
     if let (Some(expected), Some(bounds)) = (expected, print_bounds) {
-        let near = near_expected(&print_base, wood, &found, expected, bounds);
-        prefer_expected(&mut found, near);
+        let pose = &expected.print_from_depth;
+        let near = near_expected(&print_base, wood, &found, pose, bounds);
+        if prefer_expected(&mut found, near.map(|near| near.best)) {
+            prior = confidence::prior_of(expected.confidence);
+            let holds = |near: &NearPose| near.expected_score >= HOLDS * near.best.score;
+            kept = near
+                .filter(|near| prior > 0.0 && holds(near))
+                .map(|_| *pose);
+        }
     }
     require_upright(&found)?;
     let is_at_bound = |pose: &PoseCandidate| {
@@ -132,7 +150,16 @@ fn find_poses(
         at_bound: poses.first().is_some_and(is_at_bound),
         poses,
         mirrored: mirrored.first().copied(),
+        prior,
+        expected: kept,
     })
+}
+
+/// The best pose near the expected one, and the score of the expected pose itself.
+#[derive(Clone, Copy)]
+struct NearPose {
+    best: PoseCandidate,
+    expected_score: f64,
 }
 
 /// Refines the expected pose and the poses found near it; returns the best of them that stays near. `None` if the expected
@@ -143,7 +170,7 @@ fn near_expected(
     found: &[PoseCandidate],
     expected: &Affine2,
     bounds: PixelBox,
-) -> Option<PoseCandidate> {
+) -> Option<NearPose> {
     let print_middle = [bounds.x0 + bounds.x1, bounds.y0 + bounds.y1].map(|sum| sum as f64 / 2.0);
     if expected.determinant() <= 0.0 {
         return None;
@@ -168,18 +195,25 @@ fn near_expected(
     };
     let refined = refiner.refine(&start, LAST_PASS.max_steps, Loss::Huber);
     let upright = found.iter().filter(|pose| !pose.mirrored).copied();
-    upright
-        .chain([refined, refiner.evaluate(&start)])
+    let evaluated = refiner.evaluate(&start);
+    let best = upright
+        .chain([refined, evaluated])
         .filter(is_near)
-        .max_by(|a, b| a.score.total_cmp(&b.score))
+        .max_by(|a, b| a.score.total_cmp(&b.score))?;
+    Some(NearPose {
+        best,
+        expected_score: evaluated.score,
+    })
 }
 
-/// Keeps only the pose near the expected one, unless another one matches much better.
-fn prefer_expected(found: &mut Vec<PoseCandidate>, near: Option<PoseCandidate>) {
+/// Keeps only the pose near the expected one, unless another one matches much better. Returns whether it was kept.
+fn prefer_expected(found: &mut Vec<PoseCandidate>, near: Option<PoseCandidate>) -> bool {
     let best = found.iter().map(|pose| pose.score).fold(0.0, f64::max);
-    if let Some(near) = near.filter(|near| best <= UNEXPECTED_WINS * near.score) {
+    let near = near.filter(|near| best <= CONVINCING.max(UNEXPECTED_WINS * near.score));
+    if let Some(near) = near {
         *found = vec![near];
     }
+    near.is_some()
 }
 
 /// Returns the longest side of the box around the known pixels, or 1 if there are none.

@@ -59,7 +59,7 @@ impl Posed {
             let (pose, side) = (&refined.print_from_depth, normalized.outcome.canvas_px);
             HalfCanvas::new(depth, print, &canvas_from_print, pose, side)
         };
-        require_match(&refined.features, params)
+        require_match(&refined.features, search.prior, params)
             .map_err(|error| error.with(|| observe(depth, relief, &canvas())))?;
         let canvas = canvas();
         let (thresholds, spread) = metric_thresholds::choose(depth, relief, &canvas, params)?;
@@ -169,12 +169,13 @@ fn observe(depth: &DepthMap, relief: &ReliefHeights, canvas: &HalfCanvas) -> Obs
     Observation::of_scan(depth, relief).or(halves)
 }
 
-/// Refuses pairs that are mirrored or whose pose is too unlikely.
+/// Refuses pairs that are mirrored or whose pose is too unlikely. `prior` is what the block knows.
 pub(super) fn require_match(
     features: &PoseFeatures,
+    prior: f64,
     params: &RegisterParams,
 ) -> Result<(), RegisterError> {
-    let confidence = confidence::of_pose(features);
+    let confidence = confidence::of_pose(features, prior);
     if features.mirrored > MIRROR_WINS && params.min_confidence > 0.0 {
         Err(RegisterError::Mirrored {
             times: features.mirrored,

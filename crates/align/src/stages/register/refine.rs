@@ -60,7 +60,8 @@ pub(super) fn refine(
     let closer = images.at(CLOSER);
     let strokes = closer.strokes(cuts);
     poses.sharpen(&SoftThresholds::new(cuts, &closer.ink, &strokes))?;
-    let (masks_from_depth, spread) = images.refine_fully(&few, &poses.best)?;
+    let (refined, spread) = images.refine_fully(&few, &poses.best)?;
+    let masks_from_depth = search.expected.unwrap_or(refined);
     Some(Refinement {
         // Poses are found in the frame of the masks.
         print_from_depth: print.print_from_masks().after(&masks_from_depth),

@@ -22,8 +22,8 @@ use mocban_core::raster::png_rgb8;
 
 /// Meshes with fewer triangles show no character.
 const MIN_TRIANGLES: usize = 200;
-/// The face looks up or down if its normal has at least this z.
-const MIN_NORMAL_Z: f64 = 0.3;
+/// The face looks up or down if its normal has at least this z. The plane of a character differs by up to about 3 degrees.
+const MIN_NORMAL_Z: f64 = 0.08;
 
 /// Least confidence of a position that `register` gets as a prior.
 const MIN_PRIOR: f64 = 0.5;
@@ -88,7 +88,7 @@ pub(crate) fn cut(
                     unit: Some(scan.unit),
                     scanned_face_down: (normal_z.abs() >= MIN_NORMAL_Z).then_some(normal_z < 0.0),
                     prior: (character.confidence >= MIN_PRIOR)
-                        .then(|| prior(&rounded, &crop))
+                        .then(|| prior(&rounded, &crop, character.confidence))
                         .flatten(),
                 }),
             }
@@ -167,10 +167,12 @@ fn maps(local: &CharacterMap, crop: &PrintCrop) -> Value {
     })
 }
 
-/// Returns the alignment that `register` may expect, as JSON.
-fn prior(rounded: &CharacterMap, crop: &PrintCrop) -> Option<Value> {
+/// Returns the alignment that `register` may expect, as JSON. The confidence is rounded, so that it stays equal when other
+/// boxes of the page change.
+fn prior(rounded: &CharacterMap, crop: &PrintCrop, confidence: f64) -> Option<Value> {
     let prior = AlignmentPrior {
         print_from_mesh: rounded.print_from_mesh(&crop.page_from_crop)?,
+        confidence: (confidence * 10.0).floor() / 10.0,
     };
     serde_json::to_value(prior).ok()
 }

@@ -1,21 +1,21 @@
 //! Found boxes compared with true ones.
 
-use mocban_core::domain::{TrueBox, box_iou};
+use super::{TrueBox, box_iou};
 
 /// Counts of found and true boxes at one threshold of the intersection over union.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct BoxMatches {
+pub struct BoxMatches {
     /// Found boxes without the ones that match a character of which the page shows only a part.
-    pub(super) found: u64,
+    pub found: u64,
     /// True boxes of whole characters.
-    pub(super) whole: u64,
+    pub whole: u64,
     /// Pairs of a found box and a whole character.
-    pub(super) matched: u64,
+    pub matched: u64,
 }
 
 impl BoxMatches {
     /// Matches boxes one to one, those with the highest intersection over union first; `min_iou` is the least one.
-    pub(super) fn of(truth: &[TrueBox], found: &[[f64; 4]], min_iou: f64) -> Self {
+    pub fn of(truth: &[TrueBox], found: &[[f64; 4]], min_iou: f64) -> Self {
         let mut candidates = Vec::new();
         for (f, found) in found.iter().enumerate() {
             let overlaps = truth.iter().map(|one| box_iou(one.bounds, *found));
@@ -48,7 +48,7 @@ impl BoxMatches {
 #[cfg(test)]
 mod tests {
     use super::BoxMatches;
-    use mocban_core::domain::{TrueBox, box_iou};
+    use crate::domain::{TrueBox, box_iou};
 
     fn square(left: f64, is_partial: bool) -> TrueBox {
         TrueBox {
