@@ -198,7 +198,7 @@ fn the_documentation_folds_and_searches() {
     );
     tab.eval("document.querySelector('.translation a').click(), null");
     tab.wait("document.documentElement.lang === 'vi' && document.querySelector('main h1')");
-    for page in ["python", "thuat-ngu"] {
+    for page in ["ung-dung", "python", "thuat-ngu"] {
         tab.eval("document.querySelector('a[rel=next]').click(), null");
         tab.wait(&format!(
             "location.pathname.endsWith('{page}.html') && document.querySelector('main h1')"
