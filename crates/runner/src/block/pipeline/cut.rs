@@ -22,8 +22,8 @@ use mocban_core::raster::png_rgb8;
 
 /// Meshes with fewer triangles show no character.
 const MIN_TRIANGLES: usize = 200;
-/// The face looks up or down if its normal has at least this z. The plane of a character differs by up to about 3 degrees.
-const MIN_NORMAL_Z: f64 = 0.08;
+/// The face looks up or down if its normal has at least this z.
+const MIN_NORMAL_Z: f64 = 0.3;
 
 /// Least confidence of a position that `register` gets as a prior.
 const MIN_PRIOR: f64 = 0.5;
