@@ -1,7 +1,7 @@
 // Actions, and parts of pages that are read again while they are shown.
 
 const token = document.querySelector('meta[name="csrf-token"]').content;
-const status = document.getElementById("status");
+const offline = document.getElementById("offline");
 
 /** Returns the fields of a form, with the button that sent it. A name that occurs twice has a list. */
 function fields(form, button) {
@@ -48,7 +48,6 @@ document.addEventListener("submit", async (event) => {
   showProblem(form, "");
   try {
     const reply = await send(form, event.submitter);
-    if (reply.text) status.textContent = reply.text;
     if (reply.go) location.assign(reply.go);
     else if (reply.reload) await refresh(true);
   } catch (error) {
@@ -62,7 +61,7 @@ document.addEventListener("submit", async (event) => {
 function isInUse(part) {
   const active = document.activeElement;
   const isTyping = active && part.contains(active) && active.matches("input, select, textarea");
-  return isTyping || part.querySelector('[aria-busy="true"]') !== null;
+  return isTyping || part.querySelector('[aria-busy="true"], .problem:not([hidden])') !== null;
 }
 
 /** Moves the focus to the element in the place of the one that had it. */
@@ -93,10 +92,11 @@ async function refresh(mustReload) {
   }
   if (!mustReload && isInUse(part)) return;
   const response = await fetch(location.href).catch(() => null);
+  offline.hidden = response?.ok === true;
   if (!response?.ok) return;
   const page = new DOMParser().parseFromString(await response.text(), "text/html");
   const fresh = page.querySelector("[data-live]");
-  if (!fresh || fresh.dataset.seen === part.dataset.seen && fresh.innerHTML === part.dataset.html) return;
+  if (!fresh || fresh.innerHTML === part.dataset.html) return;
   part.dataset.html = fresh.innerHTML;
   update(part, fresh);
 }
@@ -120,6 +120,13 @@ for (const part of document.querySelectorAll("[data-load]")) {
   const shown = response?.ok ? page.body : page.querySelector("main") ?? page.body;
   part.replaceChildren(...shown.childNodes);
   part.dataset.loaded = "true";
+}
+
+// The language was chosen with this address; a later one may be chosen on another page.
+const here = new URL(location.href);
+if (here.searchParams.has("language")) {
+  here.searchParams.delete("language");
+  history.replaceState(null, "", here);
 }
 
 document.body.dataset.ready = "true";

@@ -46,7 +46,7 @@ fn set(table: &mut Table, key: &str, value: Value) -> Option<()> {
 
 /// Replaces the line of the setting, or adds one below the header of its section, or at the end.
 fn edited(text: &str, section: &str, name: &str, value: &Value) -> String {
-    let line = format!("{name} = {value}");
+    let mut line = format!("{name} = {value}");
     let mut lines: Vec<&str> = text.lines().collect();
     let header = |line: &str| {
         let line = line.trim().strip_prefix('[')?;
@@ -65,7 +65,10 @@ fn edited(text: &str, section: &str, name: &str, value: &Value) -> String {
             .take_while(|line| header(line).is_none());
         let place = inside.clone().position(|line| is_setting(line));
         match place {
-            Some(place) => lines[start + 1 + place] = &line,
+            Some(place) => {
+                line += comment_of(lines[start + 1 + place]);
+                lines[start + 1 + place] = &line;
+            }
             None => lines.insert(start + 1, &line),
         }
         return lines.join("\n") + "\n";
@@ -74,6 +77,16 @@ fn edited(text: &str, section: &str, name: &str, value: &Value) -> String {
     let text = lines.join("\n");
     let end = if text.is_empty() { "" } else { "\n" };
     format!("{text}{end}{gap}[{section}]\n{line}\n")
+}
+
+/// Returns the comment behind a value, with the white space before it; empty if there is none.
+fn comment_of(line: &str) -> &str {
+    let is_whole = |end: usize| line[..end].parse::<Table>().is_ok();
+    let start = line
+        .match_indices('#')
+        .map(|(at, _)| at)
+        .find(|at| is_whole(*at));
+    start.map_or("", |at| &line[line[..at].trim_end().len()..])
 }
 
 #[cfg(test)]
@@ -89,7 +102,7 @@ mod tests {
     fn a_setting_is_changed_or_added_and_comments_stay() {
         let text = "# mine\npreset = \"paper\"\n\n[run] # speed\nworkers = 2 # two\n# last\n[fit]\nseed = 1\n";
         let changed = with(text, "run.workers", 4).expect("changed");
-        assert_eq!(changed, text.replace("workers = 2 # two", "workers = 4"));
+        assert_eq!(changed, text.replace("workers = 2", "workers = 4"));
         let added = with(text, "run.memory_mib", 512).expect("added");
         assert!(
             added.contains("[run] # speed\nmemory_mib = 512\nworkers = 2"),
@@ -100,6 +113,9 @@ mod tests {
             section.ends_with("\n\n[limits.mesh]\nmax_bytes = 7\n"),
             "{section}"
         );
+        let sharp = "[fit]\nside = \"#1\"  # a # b\n";
+        let changed = with(sharp, "fit.side", "auto").expect("changed");
+        assert_eq!(changed, sharp.replace("#1", "auto"));
         let new = with("", "fit.side", "auto").expect("added");
         assert_eq!(new, "[fit]\nside = \"auto\"\n");
     }

@@ -17,7 +17,7 @@ pub struct SettingChange {
     pub before: Setting,
     /// The setting as it would be.
     pub after: Setting,
-    /// Number of pairs that the next run would compute again, also for other reasons.
+    /// Number of pairs that the next run would compute again because of the change.
     pub stale: u64,
 }
 
@@ -39,11 +39,16 @@ pub async fn preview(
     changed.sets = vec![format!("{key}={value}")];
     let changed = changed.settings()?;
     let after = find(changed.tree.settings()).unwrap_or_else(|| before.clone());
-    let fingerprints = fingerprints(&changed.config.stages);
+    let stale_now = catalog
+        .count_stale(&fingerprints(&current.config.stages))
+        .await?;
+    let stale = catalog
+        .count_stale(&fingerprints(&changed.config.stages))
+        .await?;
     Ok(SettingChange {
         before,
         after,
-        stale: catalog.count_stale(&fingerprints).await?,
+        stale: stale.saturating_sub(stale_now),
     })
 }
 

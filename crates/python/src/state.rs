@@ -92,6 +92,7 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
     let [width, height] = numbers.print_size;
     let scale = numbers.normalize.mask_scale();
     let mask_size = scale.mask_size(numbers.print_size)?;
+    (scale.print_size(mask_size) == numbers.print_size).then_some(())?;
     let masks = Grid::from_vec(mask_size[0], mask_size[1], images.eight(mask_size)?)?;
     let samples = images.sixteen(numbers.print_size, 3)?;
     let rgb = Grid::from_vec(width, height, samples.as_chunks::<3>().0.to_vec())?;

@@ -93,7 +93,11 @@ impl StageInputs {
         for ink in 0..outcome.inks.len() {
             let bytes = self.artifact(pair, Stage::Normalize, &print_mask(ink))?;
             let grey = raster::decode_grey8(&bytes).ok().ok_or_else(rerun)?;
-            prints.push(PrintMasks::from_grey(&grey, outcome.mask_scale()));
+            let (scale, size) = (outcome.mask_scale(), [grey.width(), grey.height()]);
+            if scale.mask_size(scale.print_size(size)) != Some(size) {
+                return Err(rerun());
+            }
+            prints.push(PrintMasks::from_grey(&grey, scale));
         }
         Ok(Normalized { outcome, prints })
     }

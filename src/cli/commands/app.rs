@@ -36,6 +36,11 @@ pub(crate) struct AppArgs {
 
 pub(crate) async fn app(args: AppArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
+    let location = &context.location;
+    if location.catalog.is_some() || location.config.is_some() || !location.sets.is_empty() {
+        let text = "`app` shows projects with their own settings: leave out --catalog, --config and --set, and write them to the mocban.toml of the project";
+        return Err(Refusal::Usage(text.into()).into());
+    }
     let folder = args.folder.unwrap_or_else(|| context.location.dir.clone());
     if !folder.is_dir() {
         let text = format!("there is no folder {}", folder.display());

@@ -56,10 +56,18 @@ pub enum LabelMisfit {
 /// Returns an error if the outlines have much ink in relation to the insides, or less on the mirrored or turned page.
 pub fn check_label_fit(page: &PageInk, boxes: &[CharacterBox]) -> Result<(), LabelMisfit> {
     let [width, height] = page.size().map(|side| side as f64 - 1.0);
-    let part = |change: &dyn Fn([f64; 2]) -> [f64; 2]| part_on_outline(page, boxes, change);
-    let on_page = part(&|at| at);
-    let mirrored = part(&|[x, y]| [width - x, y]);
-    let turned = part(&|[x, y]| [width - x, height - y]);
+    let [outline, inside] = mean_ink(page, boxes, &|at| at);
+    let on_page = ratio(outline, inside);
+    // On paper without text, all outlines are free of ink.
+    let changed_part = |change: &dyn Fn([f64; 2]) -> [f64; 2]| {
+        let [outline, changed_inside] = mean_ink(page, boxes, change);
+        if changed_inside < LEAST_INSIDE * inside {
+            return MOST_RATIO;
+        }
+        ratio(outline, changed_inside)
+    };
+    let mirrored = changed_part(&|[x, y]| [width - x, y]);
+    let turned = changed_part(&|[x, y]| [width - x, height - y]);
     let changed = mirrored.min(turned);
     let is_changed = changed <= MAX_CHANGED * on_page
         && changed <= MAX_ON_OUTLINE
@@ -80,13 +88,20 @@ pub fn check_label_fit(page: &PageInk, boxes: &[CharacterBox]) -> Result<(), Lab
     })
 }
 
-/// Returns the ink on the outlines as a part of that inside the boxes, after a change of the points; at most 10.
-fn part_on_outline(
+/// The ink of boxes on the changed page that counts as text, as a part of that on the page.
+const LEAST_INSIDE: f64 = 0.5;
+const MOST_RATIO: f64 = 10.0;
+
+fn ratio(outline: f64, inside: f64) -> f64 {
+    (outline / inside.max(1e-9)).min(MOST_RATIO)
+}
+
+/// Returns the mean ink on the outlines of the boxes and inside them, after a change of the points.
+fn mean_ink(
     page: &PageInk,
     boxes: &[CharacterBox],
     change: &dyn Fn([f64; 2]) -> [f64; 2],
-) -> f64 {
-    const MOST: f64 = 10.0;
+) -> [f64; 2] {
     let sampler = page.sampler(1.0);
     let (mut outline, mut inside) = (MeanInk::default(), MeanInk::default());
     for label in boxes {
@@ -106,7 +121,7 @@ fn part_on_outline(
             }
         }
     }
-    (outline.mean() / inside.mean().max(1e-9)).min(MOST)
+    [outline.mean(), inside.mean()]
 }
 
 /// The mean ink of points on the page.
@@ -140,9 +155,14 @@ mod tests {
 
     /// A character every 50 pixels in both directions, with wider gaps at the left and at the top.
     fn page() -> PageInk {
+        page_from(0)
+    }
+
+    /// The same page, blank to the left of a column of pixels.
+    fn page_from(least: usize) -> PageInk {
         let soft = Grid::from_fn(700, 500, |x, y| {
             let inside = |at: usize, first: usize| at >= first && (at - first) % 50 < 38;
-            if inside(x, 67) && inside(y, 71) && x < 640 && y < 470 {
+            if inside(x, 67) && inside(y, 71) && (least..640).contains(&x) && y < 470 {
                 255
             } else {
                 0
@@ -175,6 +195,14 @@ mod tests {
     fn labels_drawn_carelessly_fit() {
         let careless = boxes(|[l, t, r, b]| [l + 5.0, t, r, b]);
         assert_eq!(check_label_fit(&page(), &careless), Ok(()));
+    }
+
+    #[test]
+    fn a_page_that_is_blank_on_one_side_is_not_mirrored() {
+        let careless = boxes(|[l, t, r, b]| [l + 5.0, t, r, b]);
+        let (_, right): (Vec<_>, Vec<_>) =
+            (careless.into_iter()).partition(|label| label.page_box[0] < 400.0);
+        assert_eq!(check_label_fit(&page_from(400), &right), Ok(()));
     }
 
     #[test]

@@ -245,16 +245,25 @@ fn is_text(kind: &FileKind, bytes: &[u8]) -> bool {
 /// Labels of images and lists of pairs may have members of these names with other values.
 fn has_gltf_asset(json: &[u8]) -> bool {
     const NAME: &[u8] = b"\"asset\"";
-    let mut places = json.windows(NAME.len()).enumerate();
-    places.any(|(at, name)| {
-        let value = json[at + NAME.len()..].trim_ascii_start();
+    const VERSION: &[u8] = b"\"version\"";
+    let names = json.windows(NAME.len()).enumerate();
+    let mut ends = names
+        .filter(|(_, name)| *name == NAME)
+        .map(|(at, _)| at + NAME.len());
+    ends.any(|end| {
+        let value = json[end..].trim_ascii_start();
         let value = value.strip_prefix(b":").unwrap_or_default();
         let Some(members) = value.trim_ascii_start().strip_prefix(b"{") else {
             return false;
         };
-        let members = members.split(|byte| *byte == b'}').next();
-        let mut words = members.unwrap_or_default().windows(9);
-        name == NAME && words.any(|word| word == b"\"version\"")
+        let mut depth = 1;
+        let is_inside = |byte: &&u8| {
+            depth += i32::from(**byte == b'{') - i32::from(**byte == b'}');
+            depth > 0
+        };
+        let length = members.iter().take_while(is_inside).count();
+        let mut words = members[..length].windows(VERSION.len());
+        words.any(|word| word == VERSION)
     })
 }
 
@@ -345,6 +354,7 @@ mod tests {
                 vec![
                     b"glTF\x02\0\0\0".to_vec(),
                     b" {\n \"asset\": {\"version\": \"2.0\"}, \"meshes\": []}".to_vec(),
+                    b"{\"asset\": {\"extras\": {\"by\": \"x\"}, \"version\": \"2.0\"}}".to_vec(),
                     embedded.into_bytes(),
                 ],
             ),

@@ -87,7 +87,9 @@ pub(super) fn frame(
                 h1 { (title) }
                 (body)
             }
-            p #status.visually-hidden role="status" {}
+            p #offline.notice.bad role="status" hidden {
+                (visit.t("The program does not answer, so this page may be old. If it was ended, start it again.", "Chương trình không trả lời nên trang này có thể đã cũ. Nếu chương trình đã dừng, hãy mở lại."))
+            }
         }
     };
     let title = match project {

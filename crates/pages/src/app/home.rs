@@ -8,7 +8,7 @@ use maud::{Markup, html};
 
 use super::components::{NavSection, action_form, empty, frame, grouped};
 use super::failure::{AppFailure, AppResult};
-use super::projects::find;
+use super::projects::{find, is_project};
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_catalog::StatusCounts;
@@ -51,10 +51,10 @@ pub(super) async fn page(
             }))
         } @else {
             div.cards { @for project in &projects { (card(&visit, project)) } }
-            div.row {
+            @if !is_project(&state.options.folder) { div.row {
                 a.button href="import" { (visit.t("Import into a new project", "Nhập vào dự án mới")) }
                 @if projects.iter().all(|project| project.key != "mocban-demo") { (demo_form(&visit)) }
-            }
+            } }
         }
     };
     let title = visit.t("Projects", "Các dự án");

@@ -16,7 +16,7 @@ use super::components::{NavSection, action_form, choice, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::{FileCounts, PickedFolder, PickerRoots};
 use super::on_thread::on_thread;
-use super::projects::find;
+use super::projects::{find, is_project};
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::domain::{LengthUnit, one_line};
@@ -95,6 +95,11 @@ impl ImportChoice {
         let found = find(folder).into_iter();
         if let Some(found) = found.into_iter().find(|found| found.key == self.project) {
             return Ok(found.dir);
+        }
+        if is_project(folder) {
+            return Err(AppFailure::refused(
+                "the folder of the app is a project itself: start the app in the folder above it for a new one",
+            ));
         }
         let name = self.project.trim();
         let is_plain = !name.starts_with('.') && !name.contains(['/', '\\', ':']);

@@ -16,6 +16,7 @@ mod health_page;
 mod home;
 mod import_page;
 mod on_thread;
+mod open_reviews;
 mod pair_page;
 mod pair_query;
 mod pairs_page;

@@ -48,7 +48,9 @@ pub(super) async fn page(
         (jump_form(&visit))
         (filter_form(&visit, &blocks))
         (views(&visit, &query))
-        @if list.pairs.is_empty() {
+        @if list.pairs.is_empty() && list.next.is_some() {
+            p.notice { (visit.t("None of the pairs that were looked at so far matches.", "Chưa có cặp nào phù hợp trong số các cặp đã xem.")) }
+        } @else if list.pairs.is_empty() {
             (empty(visit.t("No pair matches.", "Không có cặp nào phù hợp."), &html! {
                 p { a.button href=(visit.here) { (visit.t("Show all pairs", "Hiện tất cả các cặp")) } }
             }))

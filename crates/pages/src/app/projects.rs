@@ -46,6 +46,11 @@ impl OpenProject {
         catalog_file(&self.dir) == self.file
     }
 
+    /// Returns whether another one has the same catalog.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        self.dir == other.dir && self.file == other.file
+    }
+
     /// Returns the folder with its current settings, which are read again for each use.
     pub(super) fn location(&self) -> Location {
         Location::new(&self.dir)
@@ -53,7 +58,7 @@ impl OpenProject {
 }
 
 /// Returns whether a folder is a project: it has a catalog, or settings that name one on a server.
-fn is_project(dir: &Path) -> bool {
+pub(super) fn is_project(dir: &Path) -> bool {
     dir.join(CATALOG_FILE).is_file()
         || dir.join(SETTINGS_FILE).is_file()
             && matches!(Location::new(dir).catalog_url(), Ok(Some(_)))

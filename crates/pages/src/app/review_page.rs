@@ -40,8 +40,6 @@ const RATES: CheckRates = CheckRates {
 };
 /// Shortest time that an image is shown before a verdict is accepted, as in `review`.
 const MIN_VIEW_MS: u64 = 250;
-/// Most reviews that are open at a time.
-const MAX_REVIEWS: usize = 32;
 
 /// The fields of the form that starts a review.
 #[derive(Debug, Deserialize)]
@@ -182,21 +180,17 @@ pub(super) async fn pages(
 /// Returns the pages of a reviewer, which are opened if they are not.
 async fn review(
     state: &AppState,
-    open: &OpenProject,
+    open: &Arc<OpenProject>,
     reviewer: &str,
     choice: &str,
 ) -> AppResult<axum::Router> {
     let id = [open.key.as_str(), reviewer, choice].map(str::to_owned);
-    let mut reviews = state.reviews.lock().await;
-    if let Some(router) = reviews.get(&id) {
-        return Ok(router.clone());
+    if let Some(router) = state.reviews.get(&id, open) {
+        return Ok(router);
     }
+    // Two requests at once may both open it; both get the same pages.
     let opened = open_review(state, open, reviewer, &PageQuery::parse(choice)).await?;
-    if reviews.len() >= MAX_REVIEWS {
-        reviews.pop_first();
-    }
-    reviews.insert(id, opened.clone());
-    Ok(opened)
+    Ok(state.reviews.keep(id, open, opened))
 }
 
 /// Opens the pages of a reviewer.
@@ -213,8 +207,12 @@ async fn open_review(
         .await
         .map_err(|error| AppFailure::of(error, &open.dir))?;
     if pages.counts().items == 0 {
-        let text = "there is no result to judge yet; run the pairs first";
-        return Err(AppFailure::refused(text));
+        let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
+        return Err(AppFailure::refused(if is_settling {
+            "no two reviewers disagree on a result of this metric"
+        } else {
+            "there is no result to judge yet; run the pairs first"
+        }));
     }
     Ok(pages.routes())
 }

@@ -13,7 +13,7 @@ use super::child_run;
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
 use super::pair_query::PairQuery;
-use super::projects::{OpenProject, find};
+use super::projects::{OpenProject, is_project};
 use super::state::AppState;
 use mocban_core::domain::{ErrorCode, FailureClass};
 use mocban_project::ProjectError;
@@ -91,7 +91,7 @@ pub(super) async fn run(
 /// Makes a project of the built-in dataset, which waits for its run.
 pub(super) async fn demo(State(state): State<Arc<AppState>>) -> AppResult<Json<Value>> {
     let folder = &state.options.folder;
-    if find(folder).iter().any(|found| found.dir == *folder) {
+    if is_project(folder) {
         return Err(AppFailure::refused("this folder is a project itself"));
     }
     let dir = folder.join(DEMO);
@@ -185,7 +185,7 @@ pub(super) async fn retry(
     let request = match (body.pair, body.class) {
         (Some(pair), _) => RetryRequest::Names(vec![pair]),
         (None, Some(class)) => RetryRequest::Class(class),
-        (None, None) => RetryRequest::All,
+        (None, None) => return Err(AppFailure::not_found()),
     };
     let location = open.location();
     let retried = on_thread(async move || retry_pairs(&request, &location).await).await;

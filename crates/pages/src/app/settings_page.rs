@@ -25,6 +25,11 @@ use mocban_project::location::Location;
 /// Sections that this page leaves out: addresses of databases and stores, and keys.
 const HIDDEN: [&str; 2] = ["storage", "review"];
 
+fn is_hidden(key: &str) -> bool {
+    let first = key.split('.').next().unwrap_or_default();
+    HIDDEN.contains(&first)
+}
+
 /// A change, as the form sends it.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -43,6 +48,7 @@ pub(super) async fn page(
     let settings = location.settings();
     let settings = settings.map_err(|error| AppFailure::of(error, &open.dir))?;
     let change = match (visit.query.get("key"), visit.query.get("value")) {
+        (Some(name), Some(_)) if is_hidden(name) => return Err(AppFailure::not_found()),
         (Some(name), Some(value)) => {
             let body = SettingBody {
                 key: name.to_owned(),
@@ -112,8 +118,7 @@ fn sections(visit: &Visit, settings: &[Setting]) -> Markup {
     let mut names: Vec<String> = Vec::new();
     for setting in settings {
         let name = section(setting);
-        let first = name.split('.').next().unwrap_or_default();
-        if !names.contains(&name) && !HIDDEN.contains(&first) {
+        if !names.contains(&name) && !is_hidden(&name) {
             names.push(name);
         }
     }
@@ -156,8 +161,7 @@ pub(super) async fn store(
     body: Result<Json<SettingBody>, JsonRejection>,
 ) -> AppResult<Json<Value>> {
     let Json(body) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
-    let hidden = body.key.split('.').next().unwrap_or_default();
-    if HIDDEN.contains(&hidden) {
+    if is_hidden(&body.key) {
         return Err(AppFailure::not_found());
     }
     let open = state.open(&key).await?;

@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use axum::Router;
-
 use super::failure::{AppFailure, AppResult};
+use super::open_reviews::OpenReviews;
 use super::projects::{OpenProject, find};
 use super::tasks::AppTasks;
 use super::thumb_cache::ThumbCache;
@@ -31,9 +30,9 @@ pub(super) struct AppState {
     /// The language that the user has chosen on a page.
     language: Mutex<Option<Language>>,
     /// The projects that are open, by name.
-    projects: tokio::sync::Mutex<BTreeMap<String, Arc<OpenProject>>>,
-    /// The reviews that are open, by project, reviewer and what they show.
-    pub(super) reviews: tokio::sync::Mutex<BTreeMap<[String; 3], Router>>,
+    projects: Mutex<BTreeMap<String, Arc<OpenProject>>>,
+    /// The reviews that are open.
+    pub(super) reviews: OpenReviews,
     /// Exports, checks and backups.
     pub(super) tasks: AppTasks,
     pub(super) thumbs: ThumbCache,
@@ -46,8 +45,8 @@ impl AppState {
         Self {
             language: Mutex::new(options.language),
             options,
-            projects: tokio::sync::Mutex::default(),
-            reviews: tokio::sync::Mutex::default(),
+            projects: Mutex::default(),
+            reviews: OpenReviews::default(),
             tasks: AppTasks::default(),
             thumbs: ThumbCache::default(),
             work: WorkThread::default(),
@@ -71,19 +70,28 @@ impl AppState {
 
     /// Returns an open project by its name. Only projects of the folder have names, so no address leads elsewhere.
     pub(super) async fn open(&self, key: &str) -> AppResult<Arc<OpenProject>> {
-        let mut projects = self.projects.lock().await;
-        if let Some(open) = projects.get(key).filter(|open| open.is_current()) {
-            return Ok(Arc::clone(open));
+        let known = self.lock_projects().get(key).cloned();
+        if let Some(open) = known.filter(|open| open.is_current()) {
+            return Ok(open);
         }
         let folder = self.options.folder.clone();
         let found = tokio::task::spawn_blocking(move || find(&folder)).await;
         let mut found = found.unwrap_or_default().into_iter();
         let Some(found) = found.find(|found| found.key == key) else {
-            projects.remove(key);
+            self.lock_projects().remove(key);
             return Err(AppFailure::not_found());
         };
+        // Other projects do not wait for a server that does not answer.
         let open = OpenProject::open(found).await?;
-        projects.insert(key.to_owned(), Arc::clone(&open));
-        Ok(open)
+        let mut projects = self.lock_projects();
+        let kept = projects.get(key).filter(|kept| kept.is_same(&open));
+        let kept = kept.cloned().unwrap_or(open);
+        projects.insert(key.to_owned(), Arc::clone(&kept));
+        Ok(kept)
+    }
+
+    fn lock_projects(&self) -> MutexGuard<'_, BTreeMap<String, Arc<OpenProject>>> {
+        // Each change is a single insertion or removal.
+        self.projects.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::rules::Rule;
 use super::text_image::PIXEL_MM;
+use mocban_core::domain::cancel::poll;
 use mocban_core::raster::components::ConnectedComponents;
 use mocban_core::raster::{Mask, PixelBox};
 
@@ -91,6 +92,11 @@ pub(super) fn take_broken_rules(
         let (of_line, rest): (Vec<Piece>, Vec<Piece>) =
             (pieces.into_iter()).partition(|piece| line.distance(piece.middle) <= band);
         pieces = rest;
+        // Rounding may leave out pieces at the edge of the band.
+        if of_line.is_empty() {
+            break;
+        }
+        poll();
         rules.push(rule_of(&of_line));
         lines.push(line);
         is_of_rule.extend(of_line.iter().map(|piece| piece.label));
@@ -101,7 +107,7 @@ pub(super) fn take_broken_rules(
     is_of_rule.sort_unstable();
     for y in 0..strokes.height() {
         for x in 0..strokes.width() {
-            let label = components.label_at(x, y).filter(|_| thin.at(x, y));
+            let label = components.label_at(x, y);
             if label.is_some_and(|label| is_of_rule.binary_search(&label).is_ok()) {
                 strokes.set(x, y, false);
                 erased.set(x, y, true);

@@ -128,7 +128,7 @@ impl PageRules {
             self.found[usize::from(is_across)] = known;
             self.take(is_across, |text, erased, relief| {
                 for mark in &marks {
-                    restore(text, erased, relief, mark);
+                    restore(text, erased, relief, &of_rules, mark);
                 }
                 for rule in &carved {
                     erase_thin(text, erased, rule);
@@ -164,8 +164,8 @@ impl PageRules {
     }
 }
 
-/// Restores the text below a mark along y that is no rule, where the block shows strokes.
-fn restore(text: &mut Mask, erased: &mut Mask, relief: &Mask, mark: &Rule) {
+/// Restores the text below a mark along y that is no rule, where the block shows strokes. Rules beside it stay erased.
+fn restore(text: &mut Mask, erased: &mut Mask, relief: &Mask, of_rules: &Mask, mark: &Rule) {
     let spread = SAME_RULE_MM / PIXEL_MM;
     let first = (mark.edges[0] - spread).max(0.0) as usize;
     let last = ((mark.edges[1] + spread) as usize).min(text.width() - 1);
@@ -173,7 +173,7 @@ fn restore(text: &mut Mask, erased: &mut Mask, relief: &Mask, mark: &Rule) {
         for x in first..=last {
             if erased.at(x, y) {
                 erased.set(x, y, false);
-                text.set(x, y, relief.at(x, y));
+                text.set(x, y, relief.at(x, y) && !of_rules.at(x, y));
             }
         }
     }

@@ -46,7 +46,8 @@ const FLOOR: f64 = 0.02;
 /// Range to which the competitors' scores are clamped, as fractions of the best score.
 const RATIO: [f64; 2] = [0.2, 1.5];
 
-/// Inputs of the three logistic models. The confidence of an alignment is the product of their probabilities.
+/// Inputs of the three logistic models. The confidence of an alignment is the product of their probabilities. The block of a
+/// pair adds to that of the pose only: it knows where a character is, and not whether wood and print show the same one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConfidenceInputs {
     /// Inputs of the model for the probability that the pose is right. A pose is right if its rotation is off by at
@@ -57,16 +58,16 @@ pub struct ConfidenceInputs {
     pub mask: [f64; MASK_INPUTS],
     /// Inputs of the model for the probability that print and relief show the same character, given a right pose.
     pub character: [f64; CHARACTER_INPUTS],
-    /// Logarithm of the odds of pose and character that the block gives, 0 for a pair that was not cut from one.
+    /// Logarithm of the odds of the pose that the block gives, 0 for a pair that was not cut from one.
     pub prior: f64,
 }
 
 impl ConfidenceInputs {
     /// Returns the confidence, 0..=1, under the built-in weights.
     pub fn confidence(&self) -> f64 {
-        let pose_and_mask =
-            pose_probability(&self.pose, self.prior) * logistic(&MASK, &self.mask, 0.0);
-        pose_and_mask * logistic(&CHARACTER, &self.character, self.prior)
+        pose_probability(&self.pose, self.prior)
+            * logistic(&MASK, &self.mask)
+            * logistic(&CHARACTER, &self.character)
     }
 }
 
@@ -89,10 +90,15 @@ pub(super) fn of_pose(features: &PoseFeatures, prior: f64) -> f64 {
     pose_probability(&pose_inputs(features), prior)
 }
 
+/// Returns the probability that the pose is right by the evidence of the pair alone.
+fn of_pair_alone(features: &PoseFeatures) -> f64 {
+    of_pose(features, 0.0)
+}
+
 /// Returns the probability of a pose. The evidence of the pair or that of the block is enough: a coarse scan or faint ink of
 /// one character says nothing against its place.
 fn pose_probability(inputs: &[f64; POSE_INPUTS], prior: f64) -> f64 {
-    let own = logistic(&POSE, inputs, 0.0);
+    let own = logistic(&POSE, inputs);
     let block = if prior > 0.0 {
         1.0 / (1.0 + (-prior).exp())
     } else {
@@ -114,9 +120,9 @@ fn pose_inputs(features: &PoseFeatures) -> [f64; POSE_INPUTS] {
     ]
 }
 
-/// Returns the probability, 0..=1, that print and relief show the same character. `prior` is as in [`of_pose`].
-pub(super) fn of_character(features: &PoseFeatures, prior: f64) -> f64 {
-    logistic(&CHARACTER, &character_inputs(features), prior)
+/// Returns the probability, 0..=1, that print and relief show the same character.
+pub(super) fn of_character(features: &PoseFeatures) -> f64 {
+    logistic(&CHARACTER, &character_inputs(features))
 }
 
 /// Returns the inputs of the character model. With `size(area) = ln(1 + area / SMALL_AREA)`, they are 1, the size of
@@ -168,31 +174,31 @@ fn spread_input(spread: f64) -> f64 {
 /// The heights of a levelling are chosen from the ink, so that a wrong pose and a wrong print agree better too. A levelling
 /// is evidence for the mask, but neither for the pose nor for the character.
 fn less_likely(
-    probability: fn(&PoseFeatures, f64) -> f64,
+    probability: fn(&PoseFeatures) -> f64,
     [rendered, levelled]: [&PoseFeatures; 2],
 ) -> &PoseFeatures {
-    if probability(rendered, 0.0) < probability(levelled, 0.0) {
+    if probability(rendered) < probability(levelled) {
         rendered
     } else {
         levelled
     }
 }
 
-fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N], prior: f64) -> f64 {
+fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N]) -> f64 {
     let sum: f64 = weights.iter().zip(inputs).map(|(w, x)| w * x).sum();
-    1.0 / (1.0 + (-sum - prior).exp())
+    1.0 / (1.0 + (-sum).exp())
 }
 
 /// Sets the confidence of each metric, and returns each metric's model inputs. `rendered` are the features of the depth
-/// map as rendered, which differ from `features` if the map was levelled. `prior` is as in [`of_pose`]. `probabilities` holds the probability that the
-/// mask is right, for each metric.
+/// map as rendered, which differ from `features` if the map was levelled. `prior` is as in [`of_pose`]. `probabilities`
+/// holds the probability that the mask is right, for each metric.
 pub(super) fn set_confidence(
     metrics: &mut [MetricOutcome],
     [features, rendered]: [&PoseFeatures; 2],
     prior: f64,
     probabilities: impl Iterator<Item = f64>,
 ) -> Vec<ConfidenceInputs> {
-    let pose = pose_inputs(less_likely(of_pose, [rendered, features]));
+    let pose = pose_inputs(less_likely(of_pair_alone, [rendered, features]));
     let character = character_inputs(less_likely(of_character, [rendered, features]));
     let of_metric = |(outcome, probability): (&mut MetricOutcome, f64)| {
         let inputs = ConfidenceInputs {
@@ -213,11 +219,14 @@ pub(super) fn set_confidence(
 
 #[cfg(test)]
 mod tests {
-    use super::{MASK, less_likely, logistic, mask_inputs, of_character, of_pose, prior_of};
+    use super::{
+        ConfidenceInputs, MASK, character_inputs, less_likely, logistic, mask_inputs, of_character,
+        of_pair_alone, of_pose, pose_inputs, prior_of,
+    };
     use mocban_core::domain::PoseFeatures;
 
     fn of_mask(features: &PoseFeatures, probability_right: f64) -> f64 {
-        logistic(&MASK, &mask_inputs(features, probability_right), 0.0)
+        logistic(&MASK, &mask_inputs(features, probability_right))
     }
 
     const PLAIN: PoseFeatures = PoseFeatures {
@@ -265,26 +274,31 @@ mod tests {
     }
 
     #[test]
-    fn a_block_that_is_sure_outweighs_doubts_but_not_contradictions() {
+    fn a_block_that_is_sure_outweighs_doubts_about_the_pose() {
         let doubtful = PoseFeatures {
-            unmatched_tops: 1.5,
-            unmatched_ink: 1.5,
-            edge_scatter: 0.08,
-            other_angle: 0.7,
-            mirrored: 0.85,
+            other_angle: 0.95,
+            mirrored: 0.95,
             ..PLAIN
         };
-        let wrong = PoseFeatures {
-            unmatched_tops: 8.0,
-            unmatched_ink: 8.0,
-            ..doubtful
-        };
-        let sure = prior_of(1.0);
-        assert!(of_character(&doubtful, 0.0) < 0.5);
-        assert!(of_character(&doubtful, sure) > 0.5);
-        assert!(of_character(&wrong, sure) < 0.1);
-        assert!(of_pose(&doubtful, sure) > of_pose(&doubtful, 0.0));
+        assert!(of_pose(&doubtful, prior_of(1.0)) > of_pose(&doubtful, 0.0));
         assert_eq!(prior_of(0.3), 0.0);
+    }
+
+    #[test]
+    fn a_block_says_nothing_about_the_character() {
+        let other_character = PoseFeatures {
+            unmatched_tops: 3.0,
+            unmatched_ink: 3.0,
+            ..PLAIN
+        };
+        let inputs = |prior| ConfidenceInputs {
+            pose: pose_inputs(&other_character),
+            mask: mask_inputs(&other_character, 0.9),
+            character: character_inputs(&other_character),
+            prior,
+        };
+        assert!(inputs(prior_of(1.0)).confidence() < of_character(&other_character));
+        assert!(of_character(&other_character) < 0.3);
     }
 
     #[test]
@@ -302,8 +316,8 @@ mod tests {
             edge_scatter: 0.02,
             ..PLAIN
         };
-        for probability in [of_pose, of_character] {
-            assert!(probability(&levelled, 0.0) > probability(&PLAIN, 0.0));
+        for probability in [of_pair_alone, of_character] {
+            assert!(probability(&levelled) > probability(&PLAIN));
             assert_eq!(less_likely(probability, [&PLAIN, &levelled]), &PLAIN);
             assert_eq!(less_likely(probability, [&levelled, &PLAIN]), &PLAIN);
         }
@@ -319,18 +333,15 @@ mod tests {
     #[test]
     fn strokes_without_a_partner_are_evidence_against_the_character() {
         let probability = |unmatched_tops, unmatched_ink, edge_scatter, ink_area| {
-            of_character(
-                &PoseFeatures {
-                    unmatched_tops,
-                    unmatched_ink,
-                    edge_scatter,
-                    ink_area,
-                    other_angle: 0.7,
-                    mirrored: 0.85,
-                    ..PLAIN
-                },
-                0.0,
-            )
+            of_character(&PoseFeatures {
+                unmatched_tops,
+                unmatched_ink,
+                edge_scatter,
+                ink_area,
+                other_angle: 0.7,
+                mirrored: 0.85,
+                ..PLAIN
+            })
         };
         assert!(probability(0.0, 0.0, 0.03, 50.0) > 0.98);
         // Lost wood.
@@ -354,7 +365,7 @@ mod tests {
             mirrored: 0.95,
             ..strokes
         };
-        assert!(of_character(&close, 0.0) < 0.3 * of_character(&strokes, 0.0));
+        assert!(of_character(&close) < 0.3 * of_character(&strokes));
     }
 
     #[test]

@@ -163,7 +163,7 @@ fn require_character(
 ) -> Result<(), RegisterError> {
     let [pose, character] = [
         confidence::of_pose(features, prior),
-        confidence::of_character(features, prior),
+        confidence::of_character(features),
     ];
     if features.mirrored > MIRROR_LIKELY && pose * character < params.min_confidence {
         return Err(RegisterError::Mirrored {

@@ -130,12 +130,14 @@ fn find_poses(
     if let (Some(expected), Some(bounds)) = (expected, print_bounds) {
         let pose = &expected.print_from_depth;
         let near = near_expected(&print_base, wood, &found, pose, bounds);
+        let rival = best_score(&found);
         if prefer_expected(&mut found, near.map(|near| near.best)) {
-            prior = confidence::prior_of(expected.confidence);
+            let odds = confidence::prior_of(expected.confidence);
+            // The block is no evidence for a pose that the pair itself contradicts.
+            let agrees = |near: &NearPose| rival <= UNEXPECTED_WINS * near.best.score;
+            prior = near.filter(agrees).map_or(0.0, |_| odds);
             let holds = |near: &NearPose| near.expected_score >= HOLDS * near.best.score;
-            kept = near
-                .filter(|near| prior > 0.0 && holds(near))
-                .map(|_| *pose);
+            kept = near.filter(|near| odds > 0.0 && holds(near)).map(|_| *pose);
         }
     }
     require_upright(&found)?;
@@ -206,10 +208,19 @@ fn near_expected(
     })
 }
 
+fn best_score<'a>(poses: impl IntoIterator<Item = &'a PoseCandidate>) -> f64 {
+    let scores = poses.into_iter().map(|pose| pose.score);
+    scores.fold(0.0, f64::max)
+}
+
 /// Keeps only the pose near the expected one, unless another one matches much better. Returns whether it was kept.
 fn prefer_expected(found: &mut Vec<PoseCandidate>, near: Option<PoseCandidate>) -> bool {
-    let best = found.iter().map(|pose| pose.score).fold(0.0, f64::max);
-    let near = near.filter(|near| best <= CONVINCING.max(UNEXPECTED_WINS * near.score));
+    let upright = best_score(found.iter().filter(|pose| !pose.mirrored));
+    let mirrored = best_score(found.iter().filter(|pose| pose.mirrored));
+    let near = near.filter(|near| {
+        upright <= CONVINCING.max(UNEXPECTED_WINS * near.score)
+            && mirrored <= UNEXPECTED_WINS * near.score
+    });
     if let Some(near) = near {
         *found = vec![near];
     }

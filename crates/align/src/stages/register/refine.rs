@@ -40,7 +40,8 @@ pub(super) struct Refinement {
     pub(super) print_from_depth: Affine2,
     /// Score of the pose minus the score of its best competitor.
     pub(super) margin: f64,
-    /// Evidence for and against the pose.
+    /// Evidence for and against the pose. If the expected pose is used, its correlation and coverage are those of the best
+    /// pose near it, which matches a little better.
     pub(super) features: PoseFeatures,
 }
 

@@ -167,7 +167,7 @@ fn maps(local: &CharacterMap, crop: &PrintCrop) -> Value {
     })
 }
 
-/// Returns the alignment that `register` may expect, as JSON. The confidence is rounded, so that it stays equal when other
+/// Returns the alignment that `register` may expect, as JSON. The confidence is rounded down, so that it seldom changes when other
 /// boxes of the page change.
 fn prior(rounded: &CharacterMap, crop: &PrintCrop, confidence: f64) -> Option<Value> {
     let prior = AlignmentPrior {
