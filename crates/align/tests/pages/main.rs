@@ -8,7 +8,7 @@
 //! `MOCBAN_PAGES` names kinds of blocks and the first and last seed. `MOCBAN_PAGES_DIR` keeps the registered pages, so that a
 //! second run only finds boxes, and gets a picture of each page with its true boxes in green and the found ones in red.
 
-mod look;
+mod overlay;
 mod page;
 mod tally;
 
@@ -54,7 +54,7 @@ fn boxes_found_on_pages() {
             }
             writeln!(out, "{kind} {seed}: {} {seconds:.2} s", tally.line()).expect("written");
             if let Some(dir) = &dir {
-                look::write(&page, &found, &dir.join(format!("{kind}-{seed}.png")));
+                overlay::write(&page, &found, &dir.join(format!("{kind}-{seed}.png")));
             }
             of_kind.push(tally);
         }

@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::page_looks::PageLooks;
+use super::page_appearance::PageAppearance;
 use super::text_cell::TextCell;
 use super::text_source::TextSource;
 
@@ -56,7 +56,7 @@ impl ColumnText {
     pub(super) fn draw(
         [row_pitch, column_pitch]: [f64; 2],
         notes: f64,
-        looks: &PageLooks,
+        appearance: &PageAppearance,
         rng: &mut ChaCha8Rng,
     ) -> Self {
         let em_mm = (row_pitch * rng.random_range(0.9..0.97)).min(column_pitch - 1.2);
@@ -70,10 +70,10 @@ impl ColumnText {
             note_offset,
             note_stretch: 1.0,
             notes,
-            filled: looks.filled,
-            has_odd_notes: looks.notes.is_some(),
+            filled: appearance.filled,
+            has_odd_notes: appearance.notes.is_some(),
         };
-        if let Some(tall) = looks.notes {
+        if let Some(tall) = appearance.notes {
             text.note_pitch = tall.pitch * row_pitch;
             text.note_em_mm = tall.height * text.note_pitch;
             text.note_offset = tall.offset * column_pitch / 4.0;

@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::page_looks::LookRanges;
+use super::page_appearance::AppearanceRanges;
 use super::seeding::{hash, part_rng};
 use crate::kind::NumberRange;
 use mocban_core::domain::enum_names;
@@ -52,7 +52,7 @@ pub enum BlockKind {
     Registers,
     /// A page with stamps, blots and dark stains.
     Stamped,
-    /// Any of the looks from `coarse` on at once, as in the scans of libraries.
+    /// Any of the faults of the kinds from `coarse` on at once, as in the scans of libraries.
     Library,
 }
 
@@ -94,7 +94,7 @@ pub(super) struct BlockRanges {
     /// Fraction of the columns that contain notes.
     pub notes: NumberRange,
     /// What makes the page unlike a clean one.
-    pub looks: LookRanges,
+    pub appearance: AppearanceRanges,
     /// Probability that the page is folded in the middle.
     pub folded: f64,
     /// Probability that both sides are carved.
@@ -145,7 +145,7 @@ pub(super) struct BlockRanges {
 const PLAIN: BlockRanges = BlockRanges {
     scale: [1.0, 1.0],
     notes: [0.0, 0.0],
-    looks: LookRanges::CLEAN,
+    appearance: AppearanceRanges::CLEAN,
     folded: 0.5,
     double_faced: 0.15,
     page_of_back: false,
@@ -263,9 +263,9 @@ const MIXED: BlockRanges = BlockRanges {
 
 const COARSE: BlockRanges = BlockRanges {
     scale: [0.85, 1.0],
-    looks: LookRanges {
+    appearance: AppearanceRanges {
         thin_ink: 0.5,
-        ..LookRanges::CLEAN
+        ..AppearanceRanges::CLEAN
     },
     px_per_mm: [2.5, 4.5],
     ..PLAIN
@@ -273,47 +273,47 @@ const COARSE: BlockRanges = BlockRanges {
 
 const TALL_NOTES: BlockRanges = BlockRanges {
     notes: [0.3, 0.9],
-    looks: LookRanges {
+    appearance: AppearanceRanges {
         tall_notes: 1.0,
-        ..LookRanges::CLEAN
+        ..AppearanceRanges::CLEAN
     },
     px_per_mm: [4.0, 12.0],
     ..PLAIN
 };
 
 const BROKEN_RULES: BlockRanges = BlockRanges {
-    looks: LookRanges {
+    appearance: AppearanceRanges {
         broken_rules: 1.0,
         torn_fold: 0.5,
-        ..LookRanges::CLEAN
+        ..AppearanceRanges::CLEAN
     },
     px_per_mm: [4.0, 12.0],
     ..PLAIN
 };
 
 const SPARSE: BlockRanges = BlockRanges {
-    looks: LookRanges {
+    appearance: AppearanceRanges {
         sparse: 1.0,
-        ..LookRanges::CLEAN
+        ..AppearanceRanges::CLEAN
     },
     px_per_mm: [4.0, 12.0],
     ..PLAIN
 };
 
 const REGISTERS: BlockRanges = BlockRanges {
-    looks: LookRanges {
+    appearance: AppearanceRanges {
         registers: 1.0,
-        ..LookRanges::CLEAN
+        ..AppearanceRanges::CLEAN
     },
     px_per_mm: [4.0, 12.0],
     ..PLAIN
 };
 
 const STAMPED: BlockRanges = BlockRanges {
-    looks: LookRanges {
+    appearance: AppearanceRanges {
         blots: [0.0, 8.0],
         stamps: [1.0, 4.0],
-        ..LookRanges::CLEAN
+        ..AppearanceRanges::CLEAN
     },
     px_per_mm: [4.0, 12.0],
     ..PLAIN
@@ -322,7 +322,7 @@ const STAMPED: BlockRanges = BlockRanges {
 const LIBRARY: BlockRanges = BlockRanges {
     scale: [0.8, 1.0],
     notes: [0.0, 0.6],
-    looks: LookRanges {
+    appearance: AppearanceRanges {
         tall_notes: 0.5,
         broken_rules: 0.6,
         torn_fold: 0.3,

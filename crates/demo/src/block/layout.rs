@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::column::{ColumnText, TextColumn};
 use super::kind::BlockRanges;
-use super::page_looks::PageLooks;
+use super::page_appearance::PageAppearance;
 use super::page_measures::PageMeasures;
 use super::page_rule::PageRule;
 use super::text_cell::TextCell;
@@ -52,12 +52,12 @@ impl PageLayout {
     pub(super) fn draw(
         ranges: &BlockRanges,
         is_folded: bool,
-        looks: &PageLooks,
+        appearance: &PageAppearance,
         texts: &TextSource,
         rng: &mut ChaCha8Rng,
     ) -> Self {
         let measures = PageMeasures::draw(ranges, is_folded, rng);
-        let registers = Registers::of(&measures, looks);
+        let registers = Registers::of(&measures, appearance);
         let width = measures.column_pitch * measures.columns as f64 + measures.strip;
         let height = measures.row_pitch * measures.rows as f64 + 2.0 * HEAD_MM + registers.gap_mm();
         let inner = BoundsMm {
@@ -77,7 +77,7 @@ impl PageLayout {
         let has_rules = rng.random_bool(0.85);
         let rule_half_width = rng.random_range(0.12..0.22);
         let pitches = [measures.row_pitch, measures.column_pitch];
-        let text = ColumnText::draw(pitches, notes, looks, rng);
+        let text = ColumnText::draw(pitches, notes, appearance, rng);
         let rule = has_rules.then_some(rule_half_width);
         page.add_columns(inner, &measures, &registers, &text, (texts, rng));
         page.add_rules(inner, &measures, rule, rule_half_width);
@@ -87,7 +87,7 @@ impl PageLayout {
                 half_width_mm: rule_half_width,
             });
         }
-        if let Some(broken) = &looks.rules {
+        if let Some(broken) = &appearance.rules {
             page.rules = broken.clone().apply(&page.rules, inner, page.outer);
         }
         page
@@ -244,8 +244,8 @@ struct Registers {
 }
 
 impl Registers {
-    fn of(measures: &PageMeasures, looks: &PageLooks) -> Self {
-        let rows = match looks.upper {
+    fn of(measures: &PageMeasures, appearance: &PageAppearance) -> Self {
+        let rows = match appearance.upper {
             None => vec![measures.rows],
             Some(upper) => {
                 let upper = (upper * measures.rows as f64).round() as usize;
@@ -289,7 +289,7 @@ mod tests {
 
     use super::PageLayout;
     use crate::block::kind::BlockKind;
-    use crate::block::page_looks::PageLooks;
+    use crate::block::page_appearance::PageAppearance;
     use crate::block::seeding::part_rng;
     use crate::block::text_source::TextSource;
     use crate::glyph::Glyphs;
@@ -300,8 +300,14 @@ mod tests {
         let draw = |seed: u64| {
             let mut rng = part_rng(seed, 3);
             let ranges = kind.ranges();
-            let looks = PageLooks::draw(&ranges.looks, &mut part_rng(seed, 12));
-            PageLayout::draw(ranges, seed.is_multiple_of(2), &looks, &texts, &mut rng)
+            let appearance = PageAppearance::draw(&ranges.appearance, &mut part_rng(seed, 12));
+            PageLayout::draw(
+                ranges,
+                seed.is_multiple_of(2),
+                &appearance,
+                &texts,
+                &mut rng,
+            )
         };
         (0..24).map(draw).collect()
     }
@@ -358,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn looks_of_libraries_differ_from_clean_pages() {
+    fn pages_of_libraries_differ_from_clean_pages() {
         let count = |kind: BlockKind| {
             let pages = layouts(kind);
             let cells: usize = pages.iter().map(|page| page.cells.len()).sum();

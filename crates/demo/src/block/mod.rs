@@ -1,7 +1,7 @@
 //! Whole blocks and their pages: one carved block with a page of text, the scan of it, the image of its page, and the
 //! exact truth.
 //!
-//! `kind` names the kinds and has their ranges. `layout`, `page_looks`, `page_measures`, `page_rule`, `column`, `text_cell`
+//! `kind` names the kinds and has their ranges. `layout`, `page_appearance`, `page_measures`, `page_rule`, `column`, `text_cell`
 //! and `text_source` draw a page of text. `carved_page` carves it with `carved_text` and `carved_line`, as outlines that
 //! `face_field` holds on a large grid. `relief` and `block_damage` compute the carved surface, and `solid`, `support` and
 //! `pose` the scan, which `ply_file` writes row by row with `facets`. `leaf`, `true_map`, `page_sheet`, `page_marks`,
@@ -22,9 +22,9 @@ mod impression;
 mod kind;
 mod layout;
 mod leaf;
+mod page_appearance;
 mod page_file;
 mod page_image;
-mod page_looks;
 mod page_marks;
 mod page_measures;
 mod page_rule;

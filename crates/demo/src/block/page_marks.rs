@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::page_looks::LookRanges;
+use super::page_appearance::AppearanceRanges;
 use crate::draw::number_within;
 use crate::ellipse::{Axis, Ellipse};
 use crate::noise::{Noise, smoothstep};
@@ -60,7 +60,7 @@ struct Tear {
 
 impl PageMarks {
     /// Draws the marks on a sheet whose text lies in a box.
-    pub(super) fn draw(ranges: &LookRanges, text: BoundsMm, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw(ranges: &AppearanceRanges, text: BoundsMm, rng: &mut ChaCha8Rng) -> Self {
         let stamps = number_within(ranges.stamps, rng);
         let blots = number_within(ranges.blots, rng);
         let is_torn = rng.random_bool(ranges.torn_fold);
@@ -212,7 +212,7 @@ mod tests {
             max: [140.0, 100.0],
         };
         let covered = |kind: BlockKind, seed: u64| {
-            let marks = PageMarks::draw(&kind.ranges().looks, text, &mut part_rng(seed, 0));
+            let marks = PageMarks::draw(&kind.ranges().appearance, text, &mut part_rng(seed, 0));
             let points =
                 (-140..140).flat_map(|u| (-100..100).map(move |v| [f64::from(u), f64::from(v)]));
             points.filter(|point| marks.at(*point).is_some()).count()

@@ -13,9 +13,9 @@ use super::impression::Impression;
 use super::kind::{BlockOptions, BlockSupport, PageExtent};
 use super::layout::PageLayout;
 use super::leaf::{PageScene, PrintedLeaf};
+use super::page_appearance::PageAppearance;
 use super::page_file::{PageFileBytes, encode_page};
 use super::page_image::{InkBox, PageRendering};
-use super::page_looks::PageLooks;
 use super::page_marks::PageMarks;
 use super::page_sheet::PageSheet;
 use super::ply_file::write_ply;
@@ -39,7 +39,7 @@ mod part {
     pub(super) const PAGE: u64 = 9;
     pub(super) const FILE: u64 = 10;
     pub(super) const LABELS: u64 = 11;
-    pub(super) const LOOKS: [u64; 3] = [12, 13, 14];
+    pub(super) const APPEARANCE: [u64; 3] = [12, 13, 14];
     pub(super) const MARKS: u64 = 15;
     pub(super) const THIN_INK: u64 = 16;
     /// First part of a field; each character has the next number.
@@ -75,8 +75,9 @@ impl BlockWorld {
         let texts = TextSource::draw(&glyphs, &mut choice.rng(part::TEXT));
         let text = |index: usize| {
             let mut rng = choice.rng(part::LAYOUTS[index]);
-            let looks = PageLooks::draw(&ranges.looks, &mut choice.rng(part::LOOKS[index]));
-            let layout = PageLayout::draw(ranges, is_folded, &looks, &texts, &mut rng);
+            let appearance =
+                PageAppearance::draw(&ranges.appearance, &mut choice.rng(part::APPEARANCE[index]));
+            let layout = PageLayout::draw(ranges, is_folded, &appearance, &texts, &mut rng);
             let field = carve_page(&layout, &glyphs, choice.part_seed(), part::FIELDS[index]);
             (layout, field)
         };
@@ -115,10 +116,14 @@ impl BlockWorld {
         let scene = PageScene::draw(ranges, &printed, beside, &mut rng);
         let (map, size) = TruePageMap::draw(ranges, scene.view, &mut rng);
         let sheet = PageSheet::draw(scene.sheet, scene.gutter_u, &mut rng);
-        let marks = PageMarks::draw(&ranges.looks, printed.outer, &mut choice.rng(part::MARKS));
+        let marks = PageMarks::draw(
+            &ranges.appearance,
+            printed.outer,
+            &mut choice.rng(part::MARKS),
+        );
         let mut ink = Impression::draw(&mut rng);
         let mut ink_rng = choice.rng(part::THIN_INK);
-        if ink_rng.random_bool(ranges.looks.thin_ink) {
+        if ink_rng.random_bool(ranges.appearance.thin_ink) {
             ink = ink.thinned(&mut ink_rng);
         }
         let own = match other {

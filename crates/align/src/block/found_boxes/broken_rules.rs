@@ -14,8 +14,8 @@ const BAND_MM: f64 = 0.75;
 /// A piece is at least this many times as long as thick.
 const SLENDER: f64 = 2.2;
 /// Strokes that are at most this wide and lie whole within this distance of a line belong to it, mm.
-const CRUMB_WIDTH_MM: f64 = 0.8;
-const CRUMB_MM: f64 = 1.0;
+const FRAGMENT_WIDTH_MM: f64 = 0.8;
+const FRAGMENT_MM: f64 = 1.0;
 
 /// Which pieces make a rule.
 #[derive(Debug, Clone, Copy)]
@@ -114,7 +114,7 @@ pub(super) fn take_broken_rules(
             }
         }
     }
-    erase_crumbs(strokes, erased, &lines);
+    erase_fragments(strokes, erased, &lines);
     rules
 }
 
@@ -215,22 +215,22 @@ fn rule_of(pieces: &[Piece]) -> Rule {
 }
 
 /// Erases the strokes that lie whole on one of the lines.
-fn erase_crumbs(strokes: &mut Mask, erased: &mut Mask, lines: &[Line]) {
+fn erase_fragments(strokes: &mut Mask, erased: &mut Mask, lines: &[Line]) {
     let components = ConnectedComponents::label(strokes);
-    let reach = CRUMB_MM / PIXEL_MM;
+    let reach = FRAGMENT_MM / PIXEL_MM;
     let parts = components.parts_of(strokes);
-    let is_crumb: Vec<bool> = (parts.iter())
+    let is_fragment: Vec<bool> = (parts.iter())
         .map(|(bounds, _)| {
             let y = f64::midpoint(bounds.y0 as f64, bounds.y1 as f64);
             let ends = [bounds.x0, bounds.x1].map(|x| x as f64);
-            let is_thin = bounds.width() as f64 * PIXEL_MM <= CRUMB_WIDTH_MM;
+            let is_thin = bounds.width() as f64 * PIXEL_MM <= FRAGMENT_WIDTH_MM;
             let is_on = |line: &Line| ends.iter().all(|x| line.distance([*x, y]) <= reach);
             is_thin && lines.iter().any(is_on)
         })
         .collect();
     for (bounds, _) in parts
         .iter()
-        .zip(&is_crumb)
+        .zip(&is_fragment)
         .filter(|(_, is)| **is)
         .map(|(part, _)| part)
     {
@@ -238,7 +238,7 @@ fn erase_crumbs(strokes: &mut Mask, erased: &mut Mask, lines: &[Line]) {
             for x in bounds.x0..=bounds.x1 {
                 if components
                     .label_at(x, y)
-                    .is_some_and(|label| is_crumb[label])
+                    .is_some_and(|label| is_fragment[label])
                 {
                     strokes.set(x, y, false);
                     erased.set(x, y, true);

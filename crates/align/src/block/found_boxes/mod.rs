@@ -7,9 +7,9 @@ mod direction;
 #[cfg(test)]
 mod drawing;
 mod layout;
-#[cfg(test)]
-mod look_tests;
 mod page_rules;
+#[cfg(test)]
+mod page_tests;
 mod places;
 mod rows;
 mod rules;

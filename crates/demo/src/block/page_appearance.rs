@@ -19,9 +19,9 @@ const DOUBLE_MM: NumberRange = [0.9, 2.4];
 const RIDGE_MM: NumberRange = [0.8, 9.0];
 const RIDGE_HALF_MM: NumberRange = [0.2, 0.8];
 
-/// Probabilities and ranges from which the looks of a page are drawn.
+/// Probabilities and ranges from which the appearance of a page is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LookRanges {
+pub(super) struct AppearanceRanges {
     /// Probability that notes fill their rows, which are as far apart as those of the text.
     pub tall_notes: f64,
     /// Probability that rules are in pieces, lean or are doubled, and that ridges print beyond the frame.
@@ -40,7 +40,7 @@ pub(super) struct LookRanges {
     pub stamps: NumberRange,
 }
 
-impl LookRanges {
+impl AppearanceRanges {
     /// A clean page.
     pub(super) const CLEAN: Self = Self {
         tall_notes: 0.0,
@@ -54,9 +54,9 @@ impl LookRanges {
     };
 }
 
-/// The looks of one carved page.
+/// The appearance of one carved page.
 #[derive(Debug, Clone)]
-pub(super) struct PageLooks {
+pub(super) struct PageAppearance {
     /// How notes stand, if they fill their rows.
     pub notes: Option<TallNotes>,
     /// Largest fraction of the rows of a column that hold characters, on a page with few of them.
@@ -96,9 +96,9 @@ pub(super) struct BrokenRules {
     rng: ChaCha8Rng,
 }
 
-impl PageLooks {
-    /// Draws the looks of a page.
-    pub(super) fn draw(ranges: &LookRanges, rng: &mut ChaCha8Rng) -> Self {
+impl PageAppearance {
+    /// Draws the appearance of a page.
+    pub(super) fn draw(ranges: &AppearanceRanges, rng: &mut ChaCha8Rng) -> Self {
         let mut has = |probability: f64| rng.random_bool(probability);
         let [notes, sparse, registers, rules] = [
             has(ranges.tall_notes),
