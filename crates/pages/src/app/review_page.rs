@@ -201,13 +201,13 @@ async fn open_review(
     query: &PageQuery,
 ) -> AppResult<axum::Router> {
     let (location, reviewer) = (open.location(), reviewer.to_owned());
+    let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
     let (language, query) = (state.language(), query.clone());
     let opened = on_thread(async move || review_pages(&location, language, reviewer, &query).await);
     let pages = opened
         .await
         .map_err(|error| AppFailure::of(error, &open.dir))?;
     if pages.counts().items == 0 {
-        let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
         return Err(AppFailure::refused(if is_settling {
             "no two reviewers disagree on a result of this metric"
         } else {
