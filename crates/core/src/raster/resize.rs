@@ -1,6 +1,6 @@
 //! Enlarges or reduces colours a whole number of times, and brings masks of that size back to the size of the print.
 
-use super::{Grid, Mask, resample};
+use super::{Grid, Mask};
 use crate::domain::MaskScale;
 use crate::domain::cancel::poll;
 
@@ -80,11 +80,48 @@ pub fn mask_of_print(mask: &Mask, scale: MaskScale) -> Mask {
         MaskScale::Same => mask.clone(),
         MaskScale::Enlarged(times) => majorities(mask, times.get() as usize),
         MaskScale::Reduced(reduction) => {
-            let times = f64::from(reduction.times.get());
-            let print_px = reduction.print_px.map(|side| side as usize);
-            let shift = [(times - 1.0) / 2.0; 2];
-            resample(&mask.to_weights(), times, shift, print_px).map(|set| *set >= 0.5)
+            let times = reduction.times.get();
+            let [columns, rows] = [
+                LinearTaps::all(mask.width(), times, reduction.print_px[0]),
+                LinearTaps::all(mask.height(), times, reduction.print_px[1]),
+            ];
+            let weights = mask.to_weights();
+            Mask::from_fn(columns.len(), rows.len(), |x, y| {
+                if x == 0 {
+                    poll();
+                }
+                rows[y].mix(|k| columns[x].mix(|j| weights.at(j, k))) >= 0.5
+            })
         }
+    }
+}
+
+/// The two source pixels of an output pixel along one axis, and the weight of the second.
+#[derive(Debug, Clone, Copy)]
+struct LinearTaps {
+    pixels: [usize; 2],
+    weight: f32,
+}
+
+impl LinearTaps {
+    /// Computes those of `to` output pixels along an axis of `side` pixels that is enlarged. The border continues.
+    fn all(side: usize, times: u32, to: u32) -> Vec<Self> {
+        let step = f64::from(times);
+        let of = |place: u32| {
+            let last = side as f64 - 1.0;
+            let at = ((f64::from(place) - (step - 1.0) / 2.0) / step).clamp(0.0, last.max(0.0));
+            let before = at as usize;
+            Self {
+                pixels: [before, (before + 1).min(side.saturating_sub(1))],
+                weight: at.fract() as f32,
+            }
+        };
+        (0..to).map(of).collect()
+    }
+
+    fn mix(&self, value: impl Fn(usize) -> f32) -> f32 {
+        let [first, second] = self.pixels.map(value);
+        first + self.weight * (second - first)
     }
 }
 

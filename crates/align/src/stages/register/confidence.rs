@@ -287,8 +287,11 @@ mod tests {
     #[test]
     fn a_block_says_nothing_about_the_character() {
         let other_character = PoseFeatures {
-            unmatched_tops: 3.0,
-            unmatched_ink: 3.0,
+            unmatched_tops: 1.5,
+            unmatched_ink: 1.5,
+            edge_scatter: 0.08,
+            other_angle: 0.7,
+            mirrored: 0.85,
             ..PLAIN
         };
         let inputs = |prior| ConfidenceInputs {
