@@ -17,7 +17,7 @@ pub struct SettingChange {
     pub before: Setting,
     /// The setting as it would be.
     pub after: Setting,
-    /// Number of pairs that the next run would compute again because of the change.
+    /// Number of pairs that the next run would compute again, also for other reasons.
     pub stale: u64,
 }
 
@@ -39,16 +39,11 @@ pub async fn preview(
     changed.sets = vec![format!("{key}={value}")];
     let changed = changed.settings()?;
     let after = find(changed.tree.settings()).unwrap_or_else(|| before.clone());
-    let stale_now = catalog
-        .count_stale(&fingerprints(&current.config.stages))
-        .await?;
-    let stale = catalog
-        .count_stale(&fingerprints(&changed.config.stages))
-        .await?;
+    let fingerprints = fingerprints(&changed.config.stages);
     Ok(SettingChange {
         before,
         after,
-        stale: stale.saturating_sub(stale_now),
+        stale: catalog.count_stale(&fingerprints).await?,
     })
 }
 

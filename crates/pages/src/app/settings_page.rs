@@ -60,8 +60,8 @@ pub(super) async fn page(
     };
     let body = html! {
         p { (visit.t(
-            "A change is saved in the settings file of the project. You see how many pairs it concerns before it is saved; the next run computes them again.",
-            "Thay đổi được lưu trong tệp thiết lập của dự án. Trước khi lưu, bạn thấy thay đổi liên quan đến bao nhiêu cặp; lần chạy sau sẽ tính lại chúng.",
+            "A change is saved in the settings file of the project. Before it is saved, you see how many pairs the next run would then compute again, also for other reasons.",
+            "Thay đổi được lưu trong tệp thiết lập của dự án. Trước khi lưu, bạn thấy lần chạy sau sẽ tính lại bao nhiêu cặp, kể cả vì lý do khác.",
         )) }
         @match &change {
             None => {},
