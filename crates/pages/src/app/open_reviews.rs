@@ -38,7 +38,7 @@ impl OpenReviews {
         Some(review.pages.clone())
     }
 
-    /// Keeps the pages of a review, unless it was opened meanwhile, and returns those that are kept. The review that was
+    /// Keeps the pages of a review, unless it was opened meanwhile, and returns the kept pages. The review that was
     /// not used for longest is closed if there are too many.
     pub(super) fn keep(&self, id: ReviewId, project: &Arc<OpenProject>, pages: Router) -> Router {
         let mut kept = self.lock();
