@@ -1,8 +1,8 @@
-//! Precision and recall of the boxes that are found on generated pages. Slow, so it only runs when it is asked for:
+//! Measures precision and recall of the boxes that are found on generated pages:
 //!
 //! ```text
-//! cargo test -p mocban-align --test pages -- --ignored --nocapture
-//! MOCBAN_PAGES=sparse,library:1-20 MOCBAN_PAGES_DIR=/tmp/pages cargo test -p mocban-align --test pages -- --ignored --nocapture
+//! cargo bench --bench pages
+//! MOCBAN_PAGES=sparse,library:1-20 MOCBAN_PAGES_DIR=/tmp/pages cargo bench --bench pages
 //! ```
 //!
 //! `MOCBAN_PAGES` names kinds of blocks and the first and last seed. `MOCBAN_PAGES_DIR` keeps the registered pages, so that a
@@ -25,9 +25,7 @@ use tally::{PageTally, label_answers, sum_line};
 const DEVELOPMENT: &str =
     "plain,notes,coarse,tall-notes,broken-rules,sparse,registers,stamped,library:1-3";
 
-#[test]
-#[ignore = "takes minutes"]
-fn boxes_found_on_pages() {
+fn main() {
     let asked = std::env::var("MOCBAN_PAGES").unwrap_or_else(|_| DEVELOPMENT.to_owned());
     let dir = std::env::var_os("MOCBAN_PAGES_DIR").map(PathBuf::from);
     let (kinds, seeds) = asked.split_once(':').expect("KIND,KIND:FIRST-LAST");
