@@ -1,21 +1,17 @@
 //! `app`: serves the pages of all projects of a folder on this machine.
 
-use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
 use clap::Args;
 
 use crate::cli::input::language::language_of_system;
-use crate::cli::input::signals;
 use crate::cli::output::context::Context;
-use crate::cli::output::page_address::{open_page, print_address};
+use crate::cli::output::served_pages::ServedPages;
 use mocban_core::page_vec;
 use mocban_pages::app::{AppOptions, app_pages};
-use mocban_pages::local_server::LocalServer;
 use mocban_pages::review::Language;
 use mocban_project::error::WithContext as _;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
-use mocban_runner::{Stop, StopLevel};
 
 /// Arguments of `app`.
 #[derive(Debug, Args)]
@@ -57,21 +53,13 @@ pub(crate) async fn app(args: AppArgs, context: &Context) -> ProjectResult<ExitC
         language: args.lang.or_else(language_of_system),
         program: program.with_context(|| "cannot find this program, to start runs".to_owned())?,
     };
-    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
-    let server = LocalServer::bind(address, &name, "app").await?;
-    let stop = Stop::default();
-    let signals = signals::watch(&stop)?;
-    let url = server.url();
-    print_address(&url, context)?;
-    context.info(
-        "the address works once, in one browser; press Ctrl-C to end: runs that were started go on",
-    );
-    let _file = open_page(&url, args.no_open, context);
-    let drain = stop.clone();
-    tokio::select! {
-        _ = server.serve(app_pages(options), async move { drain.reached(StopLevel::Drain).await }) => {}
-        () = stop.reached(StopLevel::Now) => {}
-    }
-    signals.abort();
-    Ok(ExitCode::Done)
+    let served = ServedPages {
+        pages: app_pages(options),
+        name: &name,
+        port: args.port,
+        command: "app",
+        ending: ": runs that were started go on",
+        no_open: args.no_open,
+    };
+    served.serve(context).await
 }

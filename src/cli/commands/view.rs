@@ -1,20 +1,16 @@
 //! `view PAIR` shows a scan on its print in the browser, `view BLOCK` a whole page.
 
-use std::net::{Ipv4Addr, SocketAddr};
-
 use axum::Router;
 use clap::Args;
 
 use super::block_points::BlockPoints;
 use crate::cli::input::language::language_of_system;
-use crate::cli::input::signals;
 use crate::cli::output::context::Context;
-use crate::cli::output::page_address::{open_page, print_address};
+use crate::cli::output::served_pages::ServedPages;
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_export::scan_view::ScanView;
-use mocban_pages::local_server::LocalServer;
 use mocban_pages::review::Language;
 use mocban_pages::view;
 use mocban_project::error::TaskStopped;
@@ -22,7 +18,6 @@ use mocban_project::selection;
 use mocban_project::sheets::block_view;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
-use mocban_runner::{Stop, StopLevel};
 use mocban_store::Project;
 
 /// Arguments of `view`.
@@ -123,26 +118,19 @@ async fn refusal(catalog: &Catalog, name: &BlockName) -> ProjectResult<Option<St
     Ok(refused.map(|stored| stored.failure.message))
 }
 
-/// Announces the page of a pair or block and serves it until the user ends it.
 async fn serve(
     name: &str,
-    page: Router,
+    pages: Router,
     args: &ViewArgs,
     context: &Context,
 ) -> ProjectResult<ExitCode> {
-    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
-    let server = LocalServer::bind(address, name, "view").await?;
-    let stop = Stop::default();
-    let signals = signals::watch(&stop)?;
-    let url = server.url();
-    print_address(&url, context)?;
-    context.info("the address works once, in one browser; press Ctrl-C to end");
-    let _file = open_page(&url, args.no_open, context);
-    let drain = stop.clone();
-    tokio::select! {
-        _ = server.serve(page, async move { drain.reached(StopLevel::Drain).await }) => {}
-        () = stop.reached(StopLevel::Now) => {}
-    }
-    signals.abort();
-    Ok(ExitCode::Done)
+    let served = ServedPages {
+        pages,
+        name,
+        port: args.port,
+        command: "view",
+        ending: "",
+        no_open: args.no_open,
+    };
+    served.serve(context).await
 }

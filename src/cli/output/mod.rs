@@ -16,6 +16,7 @@ pub(crate) mod panics;
 pub(crate) mod progress;
 pub(crate) mod run_progress;
 pub(crate) mod screen;
+pub(crate) mod served_pages;
 pub(crate) mod show_text;
 pub(crate) mod streams;
 pub(crate) mod table;

@@ -109,6 +109,18 @@ pub(super) fn action_form(action: &str, class: &str, content: &Markup) -> Markup
     }
 }
 
+/// Returns a table of a name and numbers, which scrolls sideways on a narrow screen.
+pub(super) fn number_table(label: &str, titles: &[&str], rows: &Markup) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(label) {
+            table {
+                thead { tr { @for (index, title) in titles.iter().enumerate() { th.number[index > 0] scope="col" { (title) } } } }
+                tbody { (rows) }
+            }
+        }
+    }
+}
+
 /// Returns the part of a page that is shown while there is nothing yet.
 pub(super) fn empty(text: &str, next: &Markup) -> Markup {
     html! {

@@ -4,7 +4,6 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, State};
 use axum::http::header;
 use axum::response::{Html, IntoResponse as _, Response};
@@ -12,6 +11,7 @@ use maud::{Markup, html};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::action_body::ActionBody;
 use super::address::encoded;
 use super::components::{NavSection, action_form, choice, frame};
 use super::failure::{AppFailure, AppResult};
@@ -214,9 +214,8 @@ pub(super) fn size(bytes: u64) -> String {
 pub(super) async fn start(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
-    body: Result<Json<ExportBody>, JsonRejection>,
+    ActionBody(body): ActionBody<ExportBody>,
 ) -> AppResult<Json<Value>> {
-    let Json(body) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
     let open = state.open(&key).await?;
     let purpose = PURPOSES.iter().find(|(name, ..)| *name == body.purpose);
     let purpose = *purpose.ok_or_else(AppFailure::not_found)?;

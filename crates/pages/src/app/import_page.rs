@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
-use axum::extract::rejection::JsonRejection;
 use axum::response::Html;
 use maud::{Markup, html};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::action_body::ActionBody;
 use super::address::{PageQuery, encoded};
 use super::components::{NavSection, action_form, choice, frame, grouped};
 use super::failure::{AppFailure, AppResult};
@@ -353,9 +353,8 @@ fn root_links(visit: &Visit, roots: &PickerRoots) -> Markup {
 /// Imports what was chosen.
 pub(super) async fn import(
     State(state): State<Arc<AppState>>,
-    body: Result<Json<ImportChoice>, JsonRejection>,
+    ActionBody(chosen): ActionBody<ImportChoice>,
 ) -> AppResult<Json<Value>> {
-    let Json(chosen) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
     let folder = state.options.folder.clone();
     let read = {
         let (chosen, folder) = (chosen.clone(), folder.clone());

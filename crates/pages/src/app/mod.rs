@@ -4,6 +4,7 @@
 //! a terminal or on another computer looks the same. A run is a process of its own, which goes on when the page or the app
 //! is closed.
 
+mod action_body;
 mod address;
 mod assets;
 mod child_run;

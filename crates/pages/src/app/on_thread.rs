@@ -5,7 +5,7 @@ use tokio::runtime::Handle;
 use mocban_project::ProjectResult;
 use mocban_project::error::TaskStopped;
 
-/// Waits for a future on a thread of its own. The compiler cannot tell that futures which open a catalog are `Send`.
+/// Runs a future on a blocking thread and waits for its result. The futures that open a catalog are not `Send`.
 pub(super) async fn on_thread<T, F>(work: impl FnOnce() -> F + Send + 'static) -> ProjectResult<T>
 where
     T: Send + 'static,

@@ -6,7 +6,7 @@ use axum::extract::{Path, State};
 use axum::response::{Html, Response};
 use maud::{Markup, html};
 
-use super::components::{NavSection, empty, frame, grouped, score};
+use super::components::{NavSection, empty, frame, grouped, number_table, score};
 use super::export_page::attachment;
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
@@ -122,26 +122,22 @@ fn table(visit: &Visit, report: &Report) -> Markup {
         "IoU",
         "Dice",
     ];
-    html! {
-        div.scroll tabindex="0" role="region" aria-label=(visit.t("Scores", "Điểm số")) {
-            table {
-                thead { tr { @for (index, title) in titles.into_iter().enumerate() { th.number[index > 0] scope="col" { (title) } } } }
-                tbody { @for row in &report.rows {
-                    @let metric = row.metric.name();
-                    tr {
-                        th scope="row" { (visit.metric(row.metric)) }
-                        td.number { (link(format!("state=aligned&metric={metric}"), row.n)) }
-                        td.number { (grouped(row.judged)) }
-                        td.number { (link(format!("verdict=pass&metric={metric}"), row.passed)) }
-                        td.number { (link(format!("verdict=fail&metric={metric}"), row.failed)) }
-                        td.number { (percent(row.acc)) }
-                        td.number { (interval(row)) }
-                        td.number { (score(row.ssim)) } td.number { (score(row.iou)) } td.number { (score(row.dice)) }
-                    }
-                } }
+    let rows = html! {
+        @for row in &report.rows {
+            @let metric = row.metric.name();
+            tr {
+                th scope="row" { (visit.metric(row.metric)) }
+                td.number { (link(format!("state=aligned&metric={metric}"), row.n)) }
+                td.number { (grouped(row.judged)) }
+                td.number { (link(format!("verdict=pass&metric={metric}"), row.passed)) }
+                td.number { (link(format!("verdict=fail&metric={metric}"), row.failed)) }
+                td.number { (percent(row.acc)) }
+                td.number { (interval(row)) }
+                td.number { (score(row.ssim)) } td.number { (score(row.iou)) } td.number { (score(row.dice)) }
             }
         }
-    }
+    };
+    number_table(visit.t("Scores", "Điểm số"), &titles, &rows)
 }
 
 fn percent(share: Option<f64>) -> String {

@@ -6,7 +6,7 @@ use axum::extract::{Path, State};
 use axum::response::Html;
 use maud::{Markup, html};
 
-use super::components::{grouped, score};
+use super::components::{grouped, number_table, score};
 use super::failure::AppResult;
 use super::state::AppState;
 use super::visit::Visit;
@@ -60,21 +60,17 @@ fn reviewer_table(visit: &Visit, reviewers: &[ReviewerRecord]) -> Markup {
             "trả lời giống nhau khi xem lại",
         ),
     ];
-    html! {
-        div.scroll tabindex="0" role="region" aria-label=(visit.t("Reviewers", "Người đánh giá")) {
-            table {
-                thead { tr { @for (index, title) in titles.into_iter().enumerate() { th.number[index > 0] scope="col" { (title) } } } }
-                tbody { @for record in reviewers {
-                    tr {
-                        th scope="row" { (one_line(&record.reviewer)) }
-                        td.number { (grouped(record.judged)) }
-                        td.number { (rate(record.attention_checks.all)) }
-                        td.number { (rate(record.duplicates)) }
-                    }
-                } }
+    let rows = html! {
+        @for record in reviewers {
+            tr {
+                th scope="row" { (one_line(&record.reviewer)) }
+                td.number { (grouped(record.judged)) }
+                td.number { (rate(record.attention_checks.all)) }
+                td.number { (rate(record.duplicates)) }
             }
         }
-    }
+    };
+    number_table(visit.t("Reviewers", "Người đánh giá"), &titles, &rows)
 }
 
 fn pair_table(visit: &Visit, pairs: &[ReviewerPair]) -> Markup {
@@ -85,23 +81,21 @@ fn pair_table(visit: &Visit, pairs: &[ReviewerPair]) -> Markup {
         "kappa",
         "AC1",
     ];
-    html! {
-        div.scroll tabindex="0" role="region" aria-label=(visit.t("Agreement", "Mức độ thống nhất")) {
-            table {
-                thead { tr { @for (index, title) in titles.into_iter().enumerate() { th.number[index > 0] scope="col" { (title) } } } }
-                tbody { @for pair in pairs {
-                    @let agreement = &pair.agreement;
-                    @let value = |value: Option<f64>| score(value.filter(|_| agreement.sufficient));
-                    tr {
-                        th scope="row" { (one_line(&pair.a)) ", " (one_line(&pair.b)) }
-                        td.number { (grouped(agreement.n)) }
-                        td.number { (grouped(agreement.agreed)) }
-                        td.number { (value(agreement.kappa)) }
-                        td.number { (value(agreement.ac1)) }
-                    }
-                } }
+    let rows = html! {
+        @for pair in pairs {
+            @let agreement = &pair.agreement;
+            @let value = |value: Option<f64>| score(value.filter(|_| agreement.sufficient));
+            tr {
+                th scope="row" { (one_line(&pair.a)) ", " (one_line(&pair.b)) }
+                td.number { (grouped(agreement.n)) }
+                td.number { (grouped(agreement.agreed)) }
+                td.number { (value(agreement.kappa)) }
+                td.number { (value(agreement.ac1)) }
             }
         }
+    };
+    html! {
+        (number_table(visit.t("Agreement", "Mức độ thống nhất"), &titles, &rows))
         p.muted { (visit.t("Kappa and AC1 are shown from 30 results on.", "Kappa và AC1 chỉ hiện từ 30 kết quả trở lên.")) }
     }
 }

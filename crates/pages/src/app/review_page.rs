@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, Request, State};
 use axum::http::Extensions;
 use axum::response::{Html, IntoResponse as _, Response};
@@ -14,6 +13,7 @@ use maud::{Markup, html};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::action_body::ActionBody;
 use super::address::{PageQuery, encoded};
 use super::components::{NavSection, action_form, choice, frame};
 use super::failure::{AppFailure, AppResult};
@@ -109,9 +109,8 @@ pub(super) async fn start(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
     visit: Visit,
-    body: Result<Json<StartBody>, JsonRejection>,
+    ActionBody(body): ActionBody<StartBody>,
 ) -> AppResult<Json<Value>> {
-    let Json(body) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
     let open = state.open(&key).await?;
     let reviewer = reviewer_name(&body.reviewer);
     let reviewer = reviewer.map_err(|error| AppFailure::refused(error.to_string()))?;

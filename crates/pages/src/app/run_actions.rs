@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::action_body::ActionBody;
 use super::address::PageQuery;
 use super::child_run;
 use super::failure::{AppFailure, AppResult};
@@ -50,24 +50,17 @@ pub(super) struct PairsBody {
     class: Option<FailureClass>,
 }
 
-type Body<T> = Result<Json<T>, JsonRejection>;
-
 /// Replies that the page is read again.
 fn reload() -> Json<Value> {
     Json(json!({ "reload": true }))
-}
-
-fn invalid(rejection: &JsonRejection) -> AppFailure {
-    AppFailure::refused(rejection.to_string())
 }
 
 /// Starts a run of the pairs that wait, and of the failed ones if asked.
 pub(super) async fn run(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
-    body: Body<RunBody>,
+    ActionBody(body): ActionBody<RunBody>,
 ) -> AppResult<Json<Value>> {
-    let Json(body) = body.map_err(|rejection| invalid(&rejection))?;
     let open = state.open(&key).await?;
     let mut args = Vec::new();
     if !body.jobs.is_empty() {
@@ -114,9 +107,8 @@ pub(super) struct ListBody {
 pub(super) async fn run_list(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
-    body: Body<ListBody>,
+    ActionBody(body): ActionBody<ListBody>,
 ) -> AppResult<Json<Value>> {
-    let Json(body) = body.map_err(|rejection| invalid(&rejection))?;
     let open = state.open(&key).await?;
     let query = PairQuery::of(&PageQuery::parse(&body.list));
     let mut names: Vec<String> = Vec::new();
@@ -178,9 +170,8 @@ pub(super) async fn stop(
 pub(super) async fn retry(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
-    body: Body<PairsBody>,
+    ActionBody(body): ActionBody<PairsBody>,
 ) -> AppResult<Json<Value>> {
-    let Json(body) = body.map_err(|rejection| invalid(&rejection))?;
     let open = state.open(&key).await?;
     let request = match (body.pair, body.class) {
         (Some(pair), _) => RetryRequest::Names(vec![pair]),
@@ -200,9 +191,8 @@ pub(super) async fn retry(
 pub(super) async fn retire(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
-    body: Body<PairsBody>,
+    ActionBody(body): ActionBody<PairsBody>,
 ) -> AppResult<Json<Value>> {
-    let Json(body) = body.map_err(|rejection| invalid(&rejection))?;
     let open = state.open(&key).await?;
     let pair = body.pair.ok_or_else(AppFailure::not_found)?;
     let location = open.location();

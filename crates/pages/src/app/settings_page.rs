@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, State};
 use axum::response::Html;
 use maud::{Markup, html};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::action_body::ActionBody;
 use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
@@ -158,9 +158,8 @@ fn setting_part(visit: &Visit, setting: &Setting) -> Markup {
 pub(super) async fn store(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
-    body: Result<Json<SettingBody>, JsonRejection>,
+    ActionBody(body): ActionBody<SettingBody>,
 ) -> AppResult<Json<Value>> {
-    let Json(body) = body.map_err(|rejection| AppFailure::refused(rejection.to_string()))?;
     if is_hidden(&body.key) {
         return Err(AppFailure::not_found());
     }

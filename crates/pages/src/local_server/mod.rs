@@ -16,6 +16,23 @@ mod server;
 mod session;
 mod work_thread;
 
+/// Fails if an asset loads something from another host, or runs text as code.
+#[cfg(test)]
+pub(crate) fn assert_loads_nothing(name: &str, text: &str) {
+    // The XML namespace of icons is not fetched.
+    let text = text.replace("http://www.w3.org/2000/svg", "");
+    for outside in [
+        "http:",
+        "https:",
+        "//cdn",
+        "@import",
+        "eval(",
+        "sourceMappingURL",
+    ] {
+        assert!(!text.contains(outside), "{name} has {outside}");
+    }
+}
+
 pub use access_control::AccessControl;
 pub use address::listen;
 pub use connection::ConnectionLimits;

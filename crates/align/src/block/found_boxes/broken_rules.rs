@@ -42,14 +42,14 @@ struct Piece {
 
 /// A line along y: x = at + lean (y - middle).
 #[derive(Debug, Clone, Copy)]
-struct Line {
+struct RuleLine {
     at: f64,
     lean: f64,
     middle: f64,
     weight: f64,
 }
 
-impl Line {
+impl RuleLine {
     fn distance(&self, [x, y]: [f64; 2]) -> f64 {
         (x - self.at - self.lean * (y - self.middle)).abs()
     }
@@ -157,9 +157,9 @@ fn thin_strokes(strokes: &Mask, widest: usize) -> Mask {
 }
 
 /// Returns the line with the most pieces.
-fn best_line(pieces: &[Piece], middle: f64, may_be: &impl Fn(f64) -> bool) -> Option<Line> {
+fn best_line(pieces: &[Piece], middle: f64, may_be: &impl Fn(f64) -> bool) -> Option<RuleLine> {
     let band = BAND_MM / PIXEL_MM;
-    let mut best: Option<Line> = None;
+    let mut best: Option<RuleLine> = None;
     for step in -LEANS..=LEANS {
         let lean = MAX_LEAN * f64::from(step) / f64::from(LEANS);
         let mut at: Vec<(f64, f64)> = pieces
@@ -183,7 +183,7 @@ fn best_line(pieces: &[Piece], middle: f64, may_be: &impl Fn(f64) -> bool) -> Op
                 first += 1;
             }
             if best.is_none_or(|best| sum > best.weight) {
-                best = Some(Line {
+                best = Some(RuleLine {
                     at: moment / sum,
                     lean,
                     middle,
@@ -215,7 +215,7 @@ fn rule_of(pieces: &[Piece]) -> Rule {
 }
 
 /// Erases the strokes that lie whole on one of the lines.
-fn erase_fragments(strokes: &mut Mask, erased: &mut Mask, lines: &[Line]) {
+fn erase_fragments(strokes: &mut Mask, erased: &mut Mask, lines: &[RuleLine]) {
     let components = ConnectedComponents::label(strokes);
     let reach = FRAGMENT_MM / PIXEL_MM;
     let parts = components.parts_of(strokes);
@@ -224,7 +224,7 @@ fn erase_fragments(strokes: &mut Mask, erased: &mut Mask, lines: &[Line]) {
             let y = f64::midpoint(bounds.y0 as f64, bounds.y1 as f64);
             let ends = [bounds.x0, bounds.x1].map(|x| x as f64);
             let is_thin = bounds.width() as f64 * PIXEL_MM <= FRAGMENT_WIDTH_MM;
-            let is_on = |line: &Line| ends.iter().all(|x| line.distance([*x, y]) <= reach);
+            let is_on = |line: &RuleLine| ends.iter().all(|x| line.distance([*x, y]) <= reach);
             is_thin && lines.iter().any(is_on)
         })
         .collect();
