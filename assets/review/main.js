@@ -337,8 +337,8 @@ listen(
 labelKeys();
 
 try {
-  requests.start();
-  await queue.load(requests.requests);
+  // An answer that is stored while the queue is read would be in neither of the two.
+  await queue.load(requests.requests).finally(() => requests.start());
   ui.saveState(requests.pendingCount, null);
   ui.faultShortage(queue.faultShortage);
   await show();

@@ -36,7 +36,8 @@ export class ReviewQueue {
   replay(path, body) {
     if (path === "api/undo") this.removeAnswer(body.event);
     const item = this.items.find((item) => item.id === body.item);
-    if (path === "api/answer" && item) this.answer(item, body);
+    // If only the reply was lost, the server has the answer already.
+    if (path === "api/answer" && item && item.answer?.event !== body.event) this.answer(item, body);
   }
 
   get current() {

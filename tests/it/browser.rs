@@ -227,6 +227,14 @@ impl Tab<'_> {
         self.call("Page.navigate", &json!({ "url": url }));
     }
 
+    /// Runs a script before those of every page that is opened from now on.
+    pub(crate) fn before_scripts(&self, source: &str) {
+        self.call(
+            "Page.addScriptToEvaluateOnNewDocument",
+            &json!({ "source": source }),
+        );
+    }
+
     /// Reloads the page.
     pub(crate) fn reload(&self) {
         // The marks of the old page must not be taken for those of the new one.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use mocban::store::Project;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::browser::{Browser, Tab};
 use crate::cli::{call, mocban};
@@ -308,11 +308,29 @@ fn the_end_says_how_many_answers_are_not_saved() {
         ));
     };
     head("All images are reviewed, but 2 not saved yet");
+    tab.before_scripts(LOG_FETCHES);
     let next = Page::start(&project, "lan", &[&few[..], &["--port", &port]].concat());
     let _other = enter(&browser, &next, [1024, 768]);
     head("All images are reviewed. Thank you.");
     assert_eq!(current_verdicts(&project, "lan").len(), 3);
+    // An answer that is stored while the queue is read would be missing in both.
+    let fetches = tab.eval("window.fetches.slice(0, 3)");
+    assert_eq!(
+        fetches,
+        json!(["api/queue has replied", "api/answer", "api/answer has replied"])
+    );
 }
+
+/// Script that lists the requests and replies of a page that concern the reviewer's answers.
+const LOG_FETCHES: &str = "
+    window.fetches = [];
+    const plain = window.fetch;
+    window.fetch = async (path, options) => {
+        if (path === 'api/answer') window.fetches.push(path);
+        const response = await plain(path, options);
+        if (['api/answer', 'api/queue'].includes(path)) window.fetches.push(`${path} has replied`);
+        return response;
+    };";
 
 #[test]
 fn a_relief_is_aligned_by_keys_and_mouse() {
