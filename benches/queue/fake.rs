@@ -117,7 +117,7 @@ impl Fake {
             lease = match catalog.checkpoint(lease, vec![done]).await? {
                 CheckpointOutcome::Lease(next) => next,
                 CheckpointOutcome::Done => return Ok(()),
-                CheckpointOutcome::LeaseLost => anyhow::bail!("a lease was lost"),
+                CheckpointOutcome::Refused => anyhow::bail!("a lease was lost"),
             };
         }
     }
@@ -175,7 +175,7 @@ fn checkpoints(
             at: 1,
             next_deadline: 2_000,
             alive_since: 0,
-            written: Instant::now(),
+            write_began: Instant::now(),
         }
     };
     Stage::ALL.map(checkpoint).to_vec()

@@ -317,7 +317,11 @@ fn the_end_says_how_many_answers_are_not_saved() {
     let fetches = tab.eval("window.fetches.slice(0, 3)");
     assert_eq!(
         fetches,
-        json!(["api/queue has replied", "api/answer", "api/answer has replied"])
+        json!([
+            "api/queue has replied",
+            "api/answer",
+            "api/answer has replied"
+        ])
     );
 }
 

@@ -55,8 +55,8 @@ impl StoredStages {
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
         let stages = self.stages;
         let end = match (self.lease, self.unwritten) {
-            (CheckpointOutcome::LeaseLost, _) => {
-                tracing::info!(pair = %self.pair, "the lease is lost; another worker may have the pair");
+            (CheckpointOutcome::Refused, _) => {
+                tracing::info!(pair = %self.pair, "no result of the pair is stored: its lease is lost, or its files were written too long ago");
                 Ok(PairEnd::LeaseLost)
             }
             (CheckpointOutcome::Lease(lease), Some(Unwritten::Blocked(stage, error))) => {
@@ -162,7 +162,7 @@ async fn store_stages(
         let stored = context.catalog.checkpoint(lease, batch).await;
         context.metrics.end_commit();
         outcome = stored?;
-        if !matches!(outcome, CheckpointOutcome::LeaseLost) {
+        if !matches!(outcome, CheckpointOutcome::Refused) {
             count += times.len() as u64;
             for (stage, ms) in times {
                 report_stored(&context, pair.clone(), stage, ms);

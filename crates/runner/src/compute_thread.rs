@@ -212,7 +212,7 @@ fn run_stage(
         at: context.clock.now(),
         next_deadline: context.deadline(),
         alive_since: context.alive_since(),
-        written: Instant::now(),
+        write_began: Instant::now(),
     };
     Ok((checkpoint, files))
 }

@@ -8,8 +8,8 @@
 //!
 //! Every call fails if the catalog, an input or an artifact cannot be read or written. `# Errors` names other reasons.
 //!
-//! **Invariant:** a kill at any moment costs at most the stages in progress, and a worker whose lease was lost stores no
-//! row. Files that it wrote before stay, until `check --repair` or `check --collect` removes those without a row.
+//! **Invariant:** a kill at any moment costs the stages in progress and those that are not committed yet, nothing else; and a
+//! worker whose lease was lost stores no row. Files that it wrote before stay, until `check --repair` or `check --collect` removes those without a row.
 //!
 //! # A lost lease
 //!
@@ -20,16 +20,16 @@
 //!     |   release        |  | | checkpoint: the deadline of the next stage; heartbeat of the worker: its leases stay valid
 //!     +------------------+  +-+
 //!     |                  |
-//!     |                  | the worker sends no heartbeat for 50 s (PostgreSQL: 7 s without its lock; SQLite: at once, if
-//!     |                  | a run starts alone), or its stage is overdue: recovery; or a repair or a new cut of its block
-//!     |                  | resets the job
+//!     |                  | the worker sends no heartbeat for 50 s (PostgreSQL: 7 s without lock and heartbeat, if it was seen
+//!     |                  | connected; SQLite: at once, if a run starts alone), or its stage is overdue: recovery; or a repair
+//!     |                  | or a new cut of its block resets the job
 //!     |   a new fencing token
 //!     +------------------+------------> quarantined, if the job has crashed too many workers
 //! ```
 //!
 //! A lease is valid while the last heartbeat of its worker is at most 50 s old (`RunContext::alive_since`) and its job has its
-//! token. A checkpoint does not renew it. A passed deadline ends nothing by itself: another worker recovers the job if a
-//! heartbeat comes more than 60 s after the deadline.
+//! token. A checkpoint does not renew it. A passed deadline ends nothing by itself: another worker recovers the job if the
+//! deadline is more than 60 s past and it has read the catalog without a gap for two stage timeouts.
 //!
 //! | who finds out | by | refused by (in `crates/catalog/src`) | what happens |
 //! |---|---|---|---|
@@ -37,22 +37,25 @@
 //! | `block/checkpoint.rs` | a checkpoint of a block is refused | `ADVANCE`; then `IS_DONE` in `blocks/cut.rs` finds a cut that was stored without a reply | the task ends; no stage runs meanwhile |
 //! | `block/task.rs` | the versions of the files of a block are refused | `LEASED` in `blocks/queue.rs` | the same |
 //! | `pair_failure.rs`, `block/checkpoint.rs` | a failure is refused | `FAIL` in `queue/fail.rs` | the failure is not stored |
-//! | `worker_session.rs` | a heartbeat is refused | `HEARTBEAT` in `queue/claim.rs` | `prefetch.rs` releases what has not started; the process registers as a new worker, and recovers the jobs of its old id. The new id ends the waits for `RunContext::expired`, which cancels the stages that run: in `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of `block/task.rs` |
-//! | the catalog | files were written more than 30 minutes ago | pairs on PostgreSQL: `is_late` in `queue/commit/server_commit.rs`; blocks: `store` in `queue/checkpoint.rs`; pairs on SQLite: not checked | nothing is stored; the job stays leased to this worker, which claims it again. Here it looks like a refused checkpoint, and the log says that another worker may have the pair |
+//! | `worker_session.rs` | a heartbeat is refused | `HEARTBEAT` in `queue/claim.rs` | `prefetch.rs` releases what has not started; the process registers as a new worker, and recovers the jobs of its old id. The new id ends the waits for `RunContext::expired`, which cancels the stages that run: in `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of `block/task.rs`. Heartbeats do not show that another worker recovered a job, or that a repair or a new cut reset it: the stage runs on, and its next write is refused |
+//! | the catalog | files were written more than 30 minutes ago | pairs on PostgreSQL: `is_late` in `queue/commit/server_commit.rs`; blocks: `store` in `queue/checkpoint.rs`; pairs on SQLite: not checked | nothing is stored; the job stays leased to this worker, which claims it again. Here it is a refused checkpoint |
 //! | `checkpointer.rs`, `block/task.rs` | a release is refused | `RELEASE` in `queue/claim.rs` | the pair ends as `LeaseLost`, the block as `Released` |
 //!
 //! Except for this block, a pair or block that ran ends as `LeaseLost`, which counts neither as done nor as failed. Stages
 //! stored before stay. On PostgreSQL, `queue/commit/known_leases.rs` finds refused writes of pairs that an earlier commit
 //! without a reply has stored. The job of a retired pair is removed, which ends its lease too. A pair that another worker
-//! recovered runs alone until its next stage is stored, because it may have killed the worker. `liveness.rs` decides when a
-//! worker counts as dead, and `timing.rs` has the times. If heartbeats fail with an error for as long as a lease lasts, the
-//! run finishes the stages in progress and ends with that error.
+//! recovered may have killed the worker, so it runs with no other pair beside it (on PostgreSQL: on its host): in its process
+//! until it ends, in others until its next stage is stored. `liveness.rs` decides when a
+//! worker counts as dead, and `timing.rs` has the times. If heartbeats fail with an error for as long as a lease lasts, or
+//! the log of SQLite is lost, the run finishes the stages in progress and ends with that error. An unavailable server is waited
+//! for; a heartbeat that comes too late is refused.
 //!
 //! # Cancellation
 //!
 //! A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled: inner loops poll the
 //! token of their thread ([`mocban_core::domain::cancel`]) and unwind to `compute_thread.rs` (`block/task.rs`), which waits
-//! for the end of the thread before its memory is given to others. Work on other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
+//! up to 500 ms for the end of the thread; after that its memory no longer counts. After an immediate stop, the task of a pair
+//! does not wait. Work on other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
 
 mod artifacts_owner;
 mod block;

@@ -23,7 +23,7 @@ pub(super) struct FailedAttempt {
     /// Number of the attempt, from 1.
     pub(super) attempt: u32,
     /// Whether it ran with as much memory as it can get, so that another attempt would fail too: a pair that ran
-    /// exclusively, or a block, beside which its process starts nothing.
+    /// exclusively, or a block, beside which its process claims nothing.
     pub(super) ran_alone: bool,
 }
 

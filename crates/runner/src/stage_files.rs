@@ -56,7 +56,7 @@ pub(super) async fn write_batch(
     }
     let (mut batch, mut next) = (Vec::new(), Some(first));
     while let Some((mut stage, files)) = next {
-        stage.written = std::time::Instant::now();
+        stage.write_began = std::time::Instant::now();
         match write_files(context, pair, stage.stage, files).await {
             Ok(true) => {}
             Ok(false) => return Ok((batch, Some(Unwritten::Interrupted))),
@@ -119,7 +119,7 @@ async fn write_pack(
         files.extend(more);
     }
     for stage in &mut batch {
-        stage.written = std::time::Instant::now();
+        stage.write_began = std::time::Instant::now();
     }
     let (project, name) = (context.project.clone(), pair.clone());
     let last = batch[batch.len() - 1].stage;

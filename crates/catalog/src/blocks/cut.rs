@@ -41,8 +41,8 @@ pub struct CutSummary {
 pub enum CutReply {
     /// It was stored.
     Stored(CutSummary),
-    /// The lease was lost; nothing was stored.
-    LeaseLost,
+    /// Nothing was stored, because the lease was lost or the files were written too long ago.
+    Refused,
     /// A pair with this name exists that was not cut from this block; nothing was stored.
     NameTaken(PairName),
 }
@@ -105,7 +105,7 @@ async fn finish(
         let finished: Option<i64> = finished.fetch_optional(conn).await?;
         return Ok(match finished {
             Some(_) => CutReply::Stored(CutSummary::default()),
-            None => CutReply::LeaseLost,
+            None => CutReply::Refused,
         });
     }
     let mut deltas = Deltas::default();

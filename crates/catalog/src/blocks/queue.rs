@@ -104,7 +104,7 @@ impl Catalog {
             checkpoint::store(conn, &item, &mut uncounted()).await
         });
         Ok(match (stored?, next) {
-            (false, _) => CheckpointOutcome::LeaseLost,
+            (false, _) => CheckpointOutcome::Refused,
             (true, Some(lease)) => CheckpointOutcome::Lease(lease),
             (true, None) => CheckpointOutcome::Done,
         })

@@ -88,7 +88,7 @@ impl Catalog {
             .reply_to(|reply| Message::Deferrable(Request::Checkpoint(item, reply)))
             .await?;
         Ok(match (stored, advanced) {
-            (false, _) => CheckpointOutcome::LeaseLost,
+            (false, _) => CheckpointOutcome::Refused,
             (true, Some(lease)) => CheckpointOutcome::Lease(lease),
             (true, None) => CheckpointOutcome::Done,
         })

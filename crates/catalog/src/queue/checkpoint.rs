@@ -86,7 +86,7 @@ pub(crate) async fn store<K: StoredKind>(
     deltas: &mut Deltas,
 ) -> Result<bool> {
     let mut stages = checkpoint.1.iter();
-    if stages.any(|stage| was_written_long_ago(stage.written)) {
+    if stages.any(|stage| was_written_long_ago(stage.write_began)) {
         return Ok(false);
     }
     let mut script = Script::default();

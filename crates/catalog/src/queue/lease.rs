@@ -81,7 +81,7 @@ impl<K: JobKind> Lease<K> {
     }
 
     /// Returns whether no other pair may run at the same time, because the pair exceeded a resource limit or its worker died
-    /// or hung. Blocks have no such mark, because a process starts nothing beside a block.
+    /// or hung. Blocks have no such mark, because a process claims no pairs beside a block.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }
@@ -134,7 +134,7 @@ pub enum CheckpointOutcome<K: JobKind = PairJob> {
     Done,
     /// Nothing was stored, because the lease was lost, or because the files were written so long ago that they may have been
     /// removed.
-    LeaseLost,
+    Refused,
 }
 
 /// The scores of one metric with the hash that verdicts are bound to.
@@ -199,8 +199,8 @@ pub struct StageCheckpoint<K: JobKind = PairJob> {
     pub next_deadline: UnixMillis,
     /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
-    /// When the write of its files began.
-    pub written: Instant,
+    /// When the write of its files began, or earlier.
+    pub write_began: Instant,
 }
 
 /// Longest time from the writing of files to the commit of their rows, which may wait for a server that is unavailable.
@@ -208,8 +208,8 @@ pub struct StageCheckpoint<K: JobKind = PairJob> {
 const LONGEST_COMMIT: Duration = Duration::from_mins(30);
 
 /// Returns whether files that were written at this time may have been removed, because no row names them yet.
-pub(crate) fn was_written_long_ago(written: Instant) -> bool {
-    written.elapsed() > LONGEST_COMMIT / failpoint::time_scale("MOCBAN_COMMIT_TIME_SCALE")
+pub(crate) fn was_written_long_ago(write_began: Instant) -> bool {
+    write_began.elapsed() > LONGEST_COMMIT / failpoint::time_scale("MOCBAN_COMMIT_TIME_SCALE")
 }
 
 /// What happens to a failed job.

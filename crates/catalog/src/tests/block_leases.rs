@@ -21,7 +21,7 @@ async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
     let stage = done(&work, BlockStage::Face);
     let lost = lease.clone();
     let late = world.catalog.checkpoint_block(lease, stage.clone()).await;
-    assert_eq!(late.expect("a reply"), CheckpointOutcome::LeaseLost);
+    assert_eq!(late.expect("a reply"), CheckpointOutcome::Refused);
     let [kept, late_ones] = ["mesh", "other"].map(|mesh| inputs([mesh, "page", "labels"]));
     let store = async |lease: &Lease<BlockJob>, seen: &BlockInputVersions| {
         let stored = world

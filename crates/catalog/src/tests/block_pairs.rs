@@ -177,7 +177,7 @@ async fn a_changed_pair_loses_its_lease() {
     assert_eq!(again, stored(0, 1, 0, 0));
     let late = world.catalog.checkpoint_now(lease, world.done(Stage::Fit));
     let late = late.await.expect("a reply");
-    assert!(matches!(late, CheckpointOutcome::LeaseLost));
+    assert!(matches!(late, CheckpointOutcome::Refused));
     world.assert_counters().await;
 }
 

@@ -68,7 +68,7 @@ pub(super) fn done(work: &BlockWork, stage: BlockStage) -> StageCheckpoint<Block
         at: 100,
         next_deadline: 2_000,
         alive_since: 0,
-        written: std::time::Instant::now(),
+        write_began: std::time::Instant::now(),
     }
 }
 

@@ -43,7 +43,7 @@ async fn worker_ids_are_not_reused() {
     assert!(second > first, "{second:?} again");
     assert_eq!(world.claim_exclusive(second).await.len(), 1);
     let late = world.catalog.checkpoint_now(lease, world.done(Stage::Fit));
-    assert!(matches!(late.await, Ok(CheckpointOutcome::LeaseLost)));
+    assert!(matches!(late.await, Ok(CheckpointOutcome::Refused)));
     assert_eq!(status(&world).await, JobStatus::Leased);
 }
 
@@ -72,7 +72,7 @@ async fn a_late_checkpoint_under_an_older_lease_of_the_same_worker_changes_nothi
         .catalog
         .checkpoint_now(late, world.done(Stage::Fit))
         .await;
-    assert!(matches!(kept, Ok(CheckpointOutcome::LeaseLost)));
+    assert!(matches!(kept, Ok(CheckpointOutcome::Refused)));
     // The job has not advanced either.
     world.assert_counters().await;
     let kept = world
@@ -101,7 +101,7 @@ async fn a_late_checkpoint_in_the_same_commit_changes_nothing() {
         world.catalog.checkpoint_now(late, lost),
         world.catalog.checkpoint_now(lease, world.done(Stage::Fit)),
     );
-    assert!(matches!(lost, Ok(CheckpointOutcome::LeaseLost)), "{lost:?}");
+    assert!(matches!(lost, Ok(CheckpointOutcome::Refused)), "{lost:?}");
     assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))), "{kept:?}");
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     let stages = detail.expect("the pair").results.stages;
@@ -149,7 +149,7 @@ async fn a_worker_that_ended_completes_and_claims_nothing() {
     let ended = world.catalog.end_worker(world.worker, 50, None).await;
     ended.expect("ended");
     let late = world.catalog.checkpoint_now(lease, world.done(Stage::Fit));
-    assert!(matches!(late.await, Ok(CheckpointOutcome::LeaseLost)));
+    assert!(matches!(late.await, Ok(CheckpointOutcome::Refused)));
     assert!(world.claim(1).await.is_empty());
     let heartbeat = world.catalog.heartbeat(world.worker, 51, 0, None).await;
     assert!(!heartbeat.expect("an answer"));
@@ -164,7 +164,7 @@ async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
     let mut late = world.done(Stage::Fit);
     late.alive_since = 2;
     let kept = world.catalog.checkpoint_now(first, late).await;
-    assert!(matches!(kept, Ok(CheckpointOutcome::LeaseLost)));
+    assert!(matches!(kept, Ok(CheckpointOutcome::Refused)));
     let late = StageFailure {
         alive_since: 2,
         ..failed(world.fingerprints, FailureAction::Quarantine)

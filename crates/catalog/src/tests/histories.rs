@@ -270,7 +270,7 @@ impl Game {
             .checkpoint_now(lease, done)
             .await
             .expect("an answer");
-        assert_eq!(stands, !matches!(kept, CheckpointOutcome::LeaseLost));
+        assert_eq!(stands, !matches!(kept, CheckpointOutcome::Refused));
         if let CheckpointOutcome::Lease(lease) = kept {
             self.leases.push(lease);
         }

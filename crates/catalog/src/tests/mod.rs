@@ -254,7 +254,7 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
         at: 100,
         next_deadline: 2_000,
         alive_since: 0,
-        written: Instant::now(),
+        write_began: Instant::now(),
     }
 }
 

@@ -128,7 +128,7 @@ async fn a_late_checkpoint_of_a_recovered_job_changes_nothing() {
         .catalog
         .checkpoint_now(late, world.done(Stage::Fit))
         .await;
-    assert!(matches!(kept, Ok(CheckpointOutcome::LeaseLost)));
+    assert!(matches!(kept, Ok(CheckpointOutcome::Refused)));
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     let detail = detail.expect("the pair");
     assert!(detail.results.stages.is_empty() && detail.attempts.is_empty());
@@ -161,7 +161,7 @@ async fn a_server_does_not_store_a_stage_whose_files_are_old() {
     let long_ago = Instant::now().checked_sub(Duration::from_mins(31));
     let [lease] = world.claim(1).await.try_into().expect("a lease");
     let late = StageCheckpoint {
-        written: long_ago.expect("the clock began before"),
+        write_began: long_ago.expect("the clock began before"),
         ..world.done(Stage::Fit)
     };
     let stored = world.catalog.checkpoint(lease, vec![late]).await;
@@ -170,7 +170,7 @@ async fn a_server_does_not_store_a_stage_whose_files_are_old() {
         assert!(matches!(stored, CheckpointOutcome::Lease(_)));
         return;
     }
-    assert!(matches!(stored, CheckpointOutcome::LeaseLost));
+    assert!(matches!(stored, CheckpointOutcome::Refused));
     assert_eq!(status(&world, "p0").await, JobStatus::Leased);
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     assert!(detail.expect("the pair").results.stages.is_empty());
@@ -366,15 +366,15 @@ async fn a_worker_without_heartbeats_or_with_old_files_stores_no_stage_of_a_bloc
         let written = Instant::now().checked_sub(Duration::from_mins(minutes));
         let refused = StageCheckpoint {
             alive_since,
-            written: written.expect("the clock began before"),
+            write_began: written.expect("the clock began before"),
             ..blocks::done(&work, BlockStage::Face)
         };
         let stored = world.catalog.checkpoint_block(lease.clone(), refused).await;
-        assert_eq!(stored.expect("a reply"), CheckpointOutcome::LeaseLost);
+        assert_eq!(stored.expect("a reply"), CheckpointOutcome::Refused);
     }
     let ended = world.catalog.end_worker(world.worker, 60, None).await;
     ended.expect("ended");
     let stage = blocks::done(&work, BlockStage::Face);
     let stored = world.catalog.checkpoint_block(lease, stage).await;
-    assert_eq!(stored.expect("a reply"), CheckpointOutcome::LeaseLost);
+    assert_eq!(stored.expect("a reply"), CheckpointOutcome::Refused);
 }

@@ -107,7 +107,7 @@ async fn the_lease_of_a_retired_pair_ends() {
         .checkpoint_now(lease, world.done(Stage::Fit))
         .await;
     assert!(
-        matches!(stored, Ok(CheckpointOutcome::LeaseLost)),
+        matches!(stored, Ok(CheckpointOutcome::Refused)),
         "{stored:?}"
     );
     world

@@ -1,7 +1,6 @@
 //! Stores results and failures of the stages of a block.
 
 use std::collections::BTreeSet;
-use std::time::Instant;
 
 use serde::Deserialize;
 
@@ -33,7 +32,12 @@ pub(crate) async fn store_stage(
 ) -> Result<AfterStage, RunError> {
     let ms = computed.ms;
     let name = block.work.attributes.name.clone();
-    let ComputedBlockStage { output, files, .. } = computed;
+    let ComputedBlockStage {
+        output,
+        files,
+        began,
+        ..
+    } = computed;
     let BlockStageOutput {
         outcome,
         characters,
@@ -61,7 +65,7 @@ pub(crate) async fn store_stage(
         at: context.clock.now(),
         next_deadline: context.block_deadline(),
         alive_since: context.alive_since(),
-        written: Instant::now(),
+        write_began: began,
     };
     match stage.next() {
         Some(next) => advance(context, block, checkpoint, next).await,
@@ -135,7 +139,7 @@ async fn finish_cut(
         characters.clone()
     ))? {
         CutReply::Stored(summary) => summary,
-        CutReply::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost)),
+        CutReply::Refused => return Ok(AfterStage::End(BlockEnd::LeaseLost)),
         CutReply::NameTaken(taken) => {
             let text = format!(
                 "there is a pair {taken} that was not cut from this block; import the block with another --name"

@@ -1,5 +1,7 @@
 //! A block between two of its stages.
 
+use std::time::Instant;
+
 use serde_json::Value;
 
 use super::inputs::BlockSources;
@@ -18,7 +20,7 @@ pub(crate) enum BlockEnd {
     Retry,
     /// The block was released unfinished.
     Released,
-    /// The lease was lost: it expired, or another process of the run recovered the job.
+    /// The lease was lost, or a result was not stored because its files were written too long ago.
     LeaseLost,
 }
 
@@ -54,6 +56,8 @@ pub(crate) struct ComputedBlockStage {
     pub(crate) output: BlockStageOutput,
     pub(crate) files: ArtifactSet,
     pub(crate) ms: u64,
+    /// When the computation began, during which its files are written.
+    pub(crate) began: Instant,
 }
 
 /// What happens to a block after a stage.

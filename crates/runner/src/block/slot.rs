@@ -142,7 +142,9 @@ impl BlockSlot {
         match ended? {
             BlockEnd::Done => self.counts.done += 1,
             BlockEnd::Failed => self.counts.failed += 1,
-            BlockEnd::LeaseLost => tracing::info!("the lease of a block is lost"),
+            BlockEnd::LeaseLost => tracing::info!(
+                "no result of a block is stored: its lease is lost, or its files were written too long ago"
+            ),
             BlockEnd::Retry | BlockEnd::Released => {}
         }
         Ok(())

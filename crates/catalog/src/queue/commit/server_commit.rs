@@ -71,7 +71,7 @@ async fn commit_parts(
 /// Returns whether files of a checkpoint may have been removed.
 fn is_late((_, stages): &LeasedCheckpoints) -> bool {
     let mut stages = stages.iter();
-    stages.any(|stage| was_written_long_ago(stage.written))
+    stages.any(|stage| was_written_long_ago(stage.write_began))
 }
 
 /// Returns whether stages that were computed again end where their lease began. The position of the job then does not show
