@@ -25,6 +25,7 @@ use output::{logging, panics};
 
 use mocban_core::domain::{ErrorCode, is_hidden};
 use mocban_project::{ProjectError, ProjectResult};
+use mocban_system::platform;
 
 /// Parses the command line, executes the command and returns the exit code. Prints each error once.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
@@ -70,6 +71,8 @@ fn start(command: Command, context: &Context) -> ProjectResult<ExitCode> {
 /// Returns the asynchronous runtime for a command. A run computes its stages on separate threads. Its asynchronous
 /// tasks are short and exchange many messages, so they run faster on a single thread.
 fn runtime(command: &Command) -> std::io::Result<Runtime> {
+    // Tokio panics if it cannot open its streams for signals.
+    platform::check_free_files(8)?;
     let mut builder = match command {
         Command::Run(_) | Command::Worker(_) | Command::Demo(_) => Builder::new_current_thread(),
         _ => Builder::new_multi_thread(),

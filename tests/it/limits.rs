@@ -169,7 +169,7 @@ fn a_low_limit_of_open_files_is_named_as_the_reason() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "1");
     let mut failed = 0;
-    for limit in (8..24).step_by(2) {
+    for limit in [6, 7, 8, 10, 12, 14, 16, 18, 20, 22] {
         let command = run(&project, &["--rerun", "all"]);
         let mut script = shell(&format!("ulimit -n {limit}; exec \"$@\""));
         script.arg("sh").arg(command.get_program());

@@ -247,6 +247,12 @@ pub fn max_open_files() -> u64 {
     getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
 }
 
+/// Returns an error if this process cannot open that many more files now.
+pub fn check_free_files(count: usize) -> io::Result<()> {
+    let files: io::Result<Vec<_>> = (0..count).map(|_| std::fs::File::open("/")).collect();
+    files.map(drop)
+}
+
 /// Returns the name of this machine.
 pub fn host_name() -> String {
     let system = rustix::system::uname();

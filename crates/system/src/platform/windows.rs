@@ -242,6 +242,11 @@ pub const fn max_open_files() -> u64 {
     u64::MAX
 }
 
+/// Succeeds: Windows has no limit for a process.
+pub const fn check_free_files(_count: usize) -> io::Result<()> {
+    Ok(())
+}
+
 /// Returns the name of this machine, or an empty text if the system does not give it.
 pub fn host_name() -> String {
     use winapi_util::sysinfo::{ComputerNameKind, get_computer_name};
