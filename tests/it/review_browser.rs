@@ -1,9 +1,9 @@
-//! The review page in a browser: keyboard use, reload, two reviewers, a lost server, manual alignment.
+//! The review page in a browser: keyboard use, reload, two reviewers, manual alignment.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use mocban::store::Project;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::browser::{Browser, Tab};
 use crate::cli::{call, mocban};
@@ -55,7 +55,7 @@ fn ready(tab: &Tab<'_>) {
     tab.wait("document.body?.dataset.ready && document.body.dataset.shown");
 }
 
-fn shown(tab: &Tab<'_>) -> String {
+pub(crate) fn shown(tab: &Tab<'_>) -> String {
     tab.eval("document.body.dataset.shown")
         .as_str()
         .expect("an item")
@@ -81,7 +81,10 @@ pub(crate) fn saved(tab: &Tab<'_>) {
 }
 
 /// Returns a reviewer's current verdicts and reasons, keyed by the number of the action that stored them.
-fn current_verdicts(project: &Project, reviewer: &str) -> BTreeMap<i64, (String, Option<String>)> {
+pub(crate) fn current_verdicts(
+    project: &Project,
+    reviewer: &str,
+) -> BTreeMap<i64, (String, Option<String>)> {
     let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
     let events = output
         .out
@@ -159,7 +162,6 @@ fn fifty_items_are_judged_by_keys_with_a_reload_and_ten_undone() {
             "key to image: median {} ms, nine in ten {} ms, worst {} ms",
             paints[25], paints[45], paints[49]
         );
-        assert!(paints[25] <= 50, "{paints:?}");
     });
 }
 
@@ -248,93 +250,6 @@ fn two_reviewers_judge_at_the_same_time() {
     let history = tabs[1].eval("document.getElementById('history').textContent");
     assert!(!history.to_string().contains('✓'), "{history}");
 }
-
-#[test]
-fn at_most_three_answers_wait_for_a_lost_server() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let mut page = Page::start(&project, "lan", &PLAIN);
-    let port = page.address().port().to_string();
-    let tab = enter(&browser, &page, [1024, 768]);
-    judge(&tab, "KeyP");
-    saved(&tab);
-    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
-    page.kill();
-    for waiting in 1..=3 {
-        let before = shown(&tab);
-        tab.key("KeyP");
-        tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
-        tab.wait(&format!(
-            "document.getElementById('saved').textContent === '{waiting} not saved'"
-        ));
-    }
-    let blocked = shown(&tab);
-    tab.key("KeyP");
-    tab.wait("document.getElementById('alert').textContent.startsWith('3 answers are not saved')");
-    assert_eq!(shown(&tab), blocked);
-    let mut again = PLAIN.to_vec();
-    again.extend(["--port", &port]);
-    let next = Page::start(&project, "lan", &again);
-    let _other = enter(&browser, &next, [1024, 768]);
-    saved(&tab);
-    assert_eq!(current_verdicts(&project, "lan").len(), 4);
-    assert_eq!(tab.eval("document.getElementById('alert').hidden"), true);
-}
-
-#[test]
-fn the_end_says_how_many_answers_are_not_saved() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let few = [&PLAIN[..], &["--metric", "density", "--sample", "3"]].concat();
-    let mut page = Page::start(&project, "lan", &few);
-    let port = page.address().port().to_string();
-    let tab = enter(&browser, &page, [1024, 768]);
-    judge(&tab, "KeyP");
-    saved(&tab);
-    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
-    page.kill();
-    judge(&tab, "KeyP");
-    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
-    tab.key("KeyP");
-    let head = |text: &str| {
-        tab.wait(&format!(
-            "document.getElementById('pair').textContent.startsWith('{text}')"
-        ));
-    };
-    head("All images are reviewed, but 2 not saved yet");
-    tab.before_scripts(LOG_FETCHES);
-    let next = Page::start(&project, "lan", &[&few[..], &["--port", &port]].concat());
-    let _other = enter(&browser, &next, [1024, 768]);
-    head("All images are reviewed. Thank you.");
-    assert_eq!(current_verdicts(&project, "lan").len(), 3);
-    // An answer that is stored while the queue is read would be missing in both.
-    let fetches = tab.eval("window.fetches.slice(0, 3)");
-    assert_eq!(
-        fetches,
-        json!([
-            "api/queue has replied",
-            "api/answer",
-            "api/answer has replied"
-        ])
-    );
-}
-
-/// Script that lists the requests and replies of a page that concern the reviewer's answers.
-const LOG_FETCHES: &str = "
-    window.fetches = [];
-    const plain = window.fetch;
-    window.fetch = async (path, options) => {
-        if (path === 'api/answer') window.fetches.push(path);
-        const response = await plain(path, options);
-        if (['api/answer', 'api/queue'].includes(path)) window.fetches.push(`${path} has replied`);
-        return response;
-    };";
 
 #[test]
 fn a_relief_is_aligned_by_keys_and_mouse() {

@@ -1,4 +1,4 @@
-//! Answers of the review page while the catalog or the page's own server does not reply.
+//! Answers of the review page while the catalog or the page's own server does not reply, or is gone.
 
 use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -6,13 +6,13 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use rustix::process::{Signal, kill_process};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::browser::Browser;
 use crate::cli::mocban;
 use crate::lab::Lab;
 use crate::page::{Page, answer, read_project, review};
-use crate::review_browser::{PLAIN, enter, saved};
+use crate::review_browser::{PLAIN, current_verdicts, enter, judge, saved, shown};
 use crate::review_load::begun_answer;
 use crate::silent_server::Suspended;
 
@@ -89,3 +89,90 @@ fn an_answer_without_a_reply_is_sent_again() {
     });
     assert_eq!(acts.collect::<BTreeSet<_>>().len(), 1, "{}", log.out);
 }
+
+#[test]
+fn at_most_three_answers_wait_for_a_lost_server() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let mut page = Page::start(&project, "lan", &PLAIN);
+    let port = page.address().port().to_string();
+    let tab = enter(&browser, &page, [1024, 768]);
+    judge(&tab, "KeyP");
+    saved(&tab);
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+    page.kill();
+    for waiting in 1..=3 {
+        let before = shown(&tab);
+        tab.key("KeyP");
+        tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
+        tab.wait(&format!(
+            "document.getElementById('saved').textContent === '{waiting} not saved'"
+        ));
+    }
+    let blocked = shown(&tab);
+    tab.key("KeyP");
+    tab.wait("document.getElementById('alert').textContent.startsWith('3 answers are not saved')");
+    assert_eq!(shown(&tab), blocked);
+    let mut again = PLAIN.to_vec();
+    again.extend(["--port", &port]);
+    let next = Page::start(&project, "lan", &again);
+    let _other = enter(&browser, &next, [1024, 768]);
+    saved(&tab);
+    assert_eq!(current_verdicts(&project, "lan").len(), 4);
+    assert_eq!(tab.eval("document.getElementById('alert').hidden"), true);
+}
+
+#[test]
+fn the_end_says_how_many_answers_are_not_saved() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let few = [&PLAIN[..], &["--metric", "density", "--sample", "3"]].concat();
+    let mut page = Page::start(&project, "lan", &few);
+    let port = page.address().port().to_string();
+    let tab = enter(&browser, &page, [1024, 768]);
+    judge(&tab, "KeyP");
+    saved(&tab);
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+    page.kill();
+    judge(&tab, "KeyP");
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+    tab.key("KeyP");
+    let head = |text: &str| {
+        tab.wait(&format!(
+            "document.getElementById('pair').textContent.startsWith('{text}')"
+        ));
+    };
+    head("All images are reviewed, but 2 not saved yet");
+    tab.before_scripts(LOG_FETCHES);
+    let next = Page::start(&project, "lan", &[&few[..], &["--port", &port]].concat());
+    let _other = enter(&browser, &next, [1024, 768]);
+    head("All images are reviewed. Thank you.");
+    assert_eq!(current_verdicts(&project, "lan").len(), 3);
+    // An answer that is stored while the queue is read would be missing in both.
+    let fetches = tab.eval("window.fetches.slice(0, 3)");
+    assert_eq!(
+        fetches,
+        json!([
+            "api/queue has replied",
+            "api/answer",
+            "api/answer has replied"
+        ])
+    );
+}
+
+/// Script that lists the requests and replies of a page that concern the reviewer's answers.
+const LOG_FETCHES: &str = "
+    window.fetches = [];
+    const plain = window.fetch;
+    window.fetch = async (path, options) => {
+        if (path === 'api/answer') window.fetches.push(path);
+        const response = await plain(path, options);
+        if (['api/answer', 'api/queue'].includes(path)) window.fetches.push(`${path} has replied`);
+        return response;
+    };";
