@@ -8,8 +8,9 @@
 //!
 //! Every call fails if the catalog, an input or an artifact cannot be read or written. `# Errors` names other reasons.
 //!
-//! **Invariant:** a kill at any moment costs the stages in progress and those that are not committed yet, nothing else; and a
-//! worker whose lease was lost stores no row. Files that it wrote before stay, until `check --repair` or `check --collect` removes those without a row.
+//! **Invariant:** a kill at any moment costs the stages in progress and uncommitted ones, nothing else; and a worker whose
+//! lease was lost stores no row. Files that it wrote before stay, until `check --repair` or `check --collect` removes those
+//! without a row.
 //!
 //! # A lost lease
 //!
