@@ -278,7 +278,7 @@ class CorrectionPage {
   async save() {
     const { next, saved_hash: hash } = await this.send("correct/save", { id: this.tried, saved_hash: this.block.saved_hash });
     [this.block.is_saved, this.block.saved_hash] = [true, hash];
-    this.tell(text("saved", { command: next }));
+    this.tell(next ? text("saved", { command: next }) : text("saved_run"));
   }
 
   async removeSaved() {
@@ -286,7 +286,7 @@ class CorrectionPage {
     [this.block.is_saved, this.block.saved_hash] = [false, null];
     this.points = [];
     this.changed();
-    this.tell(text("removed", { command: next }));
+    this.tell(next ? text("removed", { command: next }) : text("removed_run"));
   }
 
   press(event) {

@@ -62,6 +62,8 @@ const BLOCK_MESSAGES = {
   },
   saved: { en: "Saved. Align and cut the block again with: {command}", vi: "Đã lưu. Khớp và cắt lại ván bằng lệnh: {command}" },
   removed: { en: "Removed. Align and cut the block again with: {command}", vi: "Đã bỏ. Khớp và cắt lại ván bằng lệnh: {command}" },
+  saved_run: { en: "Saved. The next run aligns and cuts the block again.", vi: "Đã lưu. Lần chạy sau sẽ khớp và cắt lại ván." },
+  removed_run: { en: "Removed. The next run aligns and cuts the block again.", vi: "Đã bỏ. Lần chạy sau sẽ khớp và cắt lại ván." },
   correct_keys: {
     en: "click, Enter: choose a place · click on a number: remove the point · Backspace: remove the last one · T: turn the relief · wheel, + −: zoom · 0: whole · drag, arrow keys: move",
     vi: "nhấp, Enter: chọn chỗ · nhấp vào số: bỏ điểm · Backspace: bỏ điểm cuối · T: xoay mặt khắc · con lăn, + −: phóng · 0: toàn bộ · kéo, phím mũi tên: di chuyển",

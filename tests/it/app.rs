@@ -28,7 +28,7 @@ fn with_project() -> (tempfile::TempDir, Page) {
     (dir, page)
 }
 
-fn text(reply: &Reply) -> String {
+pub(crate) fn text(reply: &Reply) -> String {
     String::from_utf8_lossy(&reply.body).into_owned()
 }
 
@@ -68,6 +68,7 @@ fn every_page_is_shown_and_links_only_to_this_server() {
         "/p/p/pairs?id=nobody",
         "/p/p/pair/upright-0000/",
         "/p/p/pair/upright-0000/3d/",
+        "/p/p/blocks",
         "/p/p/review",
         "/p/p/report",
         "/p/p/report/numbers",

@@ -9,7 +9,7 @@ use crate::page::{Page, read_project};
 use crate::review_browser::{judge, saved};
 
 /// Opens the app in a tab and returns the address of its home page.
-fn enter<'b>(browser: &'b Browser, page: &Page, size: [u32; 2]) -> (Tab<'b>, String) {
+pub(crate) fn enter<'b>(browser: &'b Browser, page: &Page, size: [u32; 2]) -> (Tab<'b>, String) {
     let tab = browser.tab(size[0], size[1]);
     tab.open(&page.url);
     tab.wait("document.body?.dataset.ready");
@@ -102,6 +102,7 @@ fn every_page_is_accessible_in_both_themes_and_logs_no_error() {
         ("unknown", "p/p/pairs?id=nobody"),
         ("pair", "p/p/pair/upright-0000/"),
         ("failed_pair", "p/p/pair/broken/"),
+        ("no_blocks", "p/p/blocks"),
         ("review", "p/p/review"),
         ("report", "p/p/report"),
         ("export", "p/p/export"),
@@ -110,36 +111,53 @@ fn every_page_is_accessible_in_both_themes_and_logs_no_error() {
         ("health", "p/p/health"),
         ("missing", "p/nowhere/"),
     ] {
-        tab.resize([1440, 900]);
-        tab.open(&format!("{home}{path}"));
-        tab.wait("document.body?.dataset.ready");
-        for (size, dark) in [
-            ([1440, 900], false),
-            ([1366, 660], true),
-            ([400, 800], true),
-            ([400, 800], false),
-        ] {
-            tab.resize(size);
-            tab.dark(dark);
-            let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
-            assert!(
-                overflow.as_f64() <= Some(0.0),
-                "{name} is {overflow} wider than {size:?}"
-            );
-            let theme = if dark { "dark" } else { "light" };
-            let what = format!("app_{name}_{}_{theme}", size[0]);
-            match &axe {
-                Some(axe) => {
-                    tab.eval(&format!("{axe}; null"));
-                    no_violation(&tab, &what);
-                }
-                None => tab.screenshot(&what),
-            }
-        }
-        let mut problems = browser.take_problems();
-        problems.retain(|problem| !problem.contains("axe"));
-        assert!(problems.is_empty(), "{name}: {problems:#?}");
+        looks_right(
+            &browser,
+            &tab,
+            name,
+            &format!("{home}{path}"),
+            axe.as_deref(),
+        );
     }
+}
+
+/// Opens a page in every size and theme. It must fit, have no fault that axe finds, and log no error.
+pub(crate) fn looks_right(
+    browser: &Browser,
+    tab: &Tab<'_>,
+    name: &str,
+    url: &str,
+    axe: Option<&str>,
+) {
+    tab.resize([1440, 900]);
+    tab.open(url);
+    tab.wait("document.body?.dataset.ready");
+    for (size, dark) in [
+        ([1440, 900], false),
+        ([1366, 660], true),
+        ([400, 800], true),
+        ([400, 800], false),
+    ] {
+        tab.resize(size);
+        tab.dark(dark);
+        let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
+        assert!(
+            overflow.as_f64() <= Some(0.0),
+            "{name} is {overflow} wider than {size:?}"
+        );
+        let theme = if dark { "dark" } else { "light" };
+        let what = format!("app_{name}_{}_{theme}", size[0]);
+        match axe {
+            Some(axe) => {
+                tab.eval(&format!("{axe}; null"));
+                no_violation(&tab, &what);
+            }
+            None => tab.screenshot(&what),
+        }
+    }
+    let mut problems = browser.take_problems();
+    problems.retain(|problem| !problem.contains("axe"));
+    assert!(problems.is_empty(), "{name}: {problems:#?}");
 }
 
 #[test]

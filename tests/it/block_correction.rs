@@ -15,7 +15,7 @@ use crate::small_block::demo_block;
 const FRAGMENT: f64 = 0.42;
 
 /// Creates a project `p` with the block `b1` of a fragment of its page, which is too small for the search.
-fn refused_block(dir: &Path) {
+pub(crate) fn refused_block(dir: &Path) {
     demo_block(dir);
     let page = fs::read(dir.join("d/data/page.jpg")).expect("the page");
     let page = decode(&page, &ImageLimits::SUGGESTED)
@@ -61,7 +61,7 @@ fn vector(value: &Value) -> Vec<f64> {
 }
 
 /// Returns the index of the side that the page shows.
-fn printed_side(dir: &Path) -> usize {
+pub(crate) fn printed_side(dir: &Path) -> usize {
     let normal = vector(&truth(dir)["normal"]);
     let looks_there = |face: &Value| {
         let axis = vector(&face["heights"]["frame"]["axes"][2]);
@@ -74,7 +74,7 @@ fn printed_side(dir: &Path) -> usize {
 }
 
 /// Returns true places of the fragment as pixels of the two pictures, far from each other.
-fn true_points(dir: &Path, block: &Value) -> Vec<Value> {
+pub(crate) fn true_points(dir: &Path, block: &Value) -> Vec<Value> {
     let index = printed_side(dir);
     let face = &faces(dir)[index];
     let frame = &face["heights"]["frame"];
@@ -118,32 +118,42 @@ fn true_points(dir: &Path, block: &Value) -> Vec<Value> {
 }
 
 /// A page of the block whose session is open.
-struct Session {
-    page: Page,
+pub(crate) struct Session {
+    pub(crate) page: Page,
+    /// Address of the block's pages.
+    place: &'static str,
     token: String,
 }
 
 impl Session {
     fn open(dir: &Path) -> Self {
         let words = ["-C", "p", "--json", "view", "--no-open", "b1"];
-        let page = Page::of(binary().current_dir(dir).args(words)).entered();
-        let block = page.get("/correct/block.json").json();
-        let token = block["csrf_token"].as_str().expect("a token").to_owned();
-        Self { page, token }
+        Self::of(
+            Page::of(binary().current_dir(dir).args(words)).entered(),
+            "",
+        )
     }
 
-    fn block(&self) -> Value {
-        self.page.get("/correct/block.json").json()
+    /// Returns the session of a page of the block below an address.
+    pub(crate) fn of(page: Page, place: &'static str) -> Self {
+        let block = page.get(&format!("{place}/correct/block.json")).json();
+        let token = block["csrf_token"].as_str().expect("a token").to_owned();
+        Self { page, place, token }
+    }
+
+    pub(crate) fn block(&self) -> Value {
+        let block = format!("{}/correct/block.json", self.place);
+        self.page.get(&block).json()
     }
 
     /// Tries points, and returns the number of the alignment.
-    fn tried(&self, side: &Value, points: &[Value]) -> u64 {
+    pub(crate) fn tried(&self, side: &Value, points: &[Value]) -> u64 {
         let tried = self.post("/correct/try", &json!({"side": side, "points": points}));
         tried.json()["id"].as_u64().expect("a number")
     }
 
     /// Saves an alignment on a page that has shown points with a hash.
-    fn save(&self, id: u64, saved_hash: &Value) -> Reply {
+    pub(crate) fn save(&self, id: u64, saved_hash: &Value) -> Reply {
         self.post(
             "/correct/save",
             &json!({"id": id, "saved_hash": saved_hash}),
@@ -158,7 +168,8 @@ impl Session {
         let mut headers = self.page.headers();
         headers.retain(|(name, _)| *name != "x-csrf-token");
         headers.push(("x-csrf-token", token.to_owned()));
-        let (path, body) = (format!("{}{page}", self.page.session), body.to_string());
+        let path = format!("{}{}{page}", self.page.session, self.place);
+        let body = body.to_string();
         send(
             self.page.address(),
             "POST",

@@ -5,6 +5,7 @@ mod agreement;
 mod align_command;
 mod all_pages;
 mod app;
+mod app_blocks;
 mod app_browser;
 #[cfg(target_os = "linux")]
 mod attacks;

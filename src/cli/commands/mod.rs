@@ -4,7 +4,6 @@ pub(crate) mod agreement;
 pub(crate) mod align;
 pub(crate) mod app;
 pub(crate) mod backup;
-pub(crate) mod block_points;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;

@@ -3,19 +3,17 @@
 use axum::Router;
 use clap::Args;
 
-use super::block_points::BlockPoints;
 use crate::cli::input::language::language_of_system;
 use crate::cli::output::context::Context;
 use crate::cli::output::served_pages::ServedPages;
 use mocban_catalog::Catalog;
-use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
+use mocban_core::domain::{BlockName, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_export::scan_view::ScanView;
 use mocban_pages::review::Language;
-use mocban_pages::view;
+use mocban_pages::view::{BlockPoints, open_block, scan_page};
 use mocban_project::error::TaskStopped;
 use mocban_project::selection;
-use mocban_project::sheets::block_view;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_store::Project;
@@ -80,7 +78,7 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<Exi
         let text = format!("pair {name} has no result{of} to show; see: {command}");
         return Err(Refusal::NothingSelected(text).into());
     };
-    let page = view::scan_page(name.as_str(), &scan, args.language());
+    let page = scan_page(name.as_str(), &scan, args.language());
     serve(name.as_str(), page, &args, context).await
 }
 
@@ -92,30 +90,15 @@ async fn block_page(
     catalog: &Catalog,
     context: &Context,
 ) -> ProjectResult<Router> {
-    let view = match block_view(&args.pair, args.metric, project, catalog, &context.location).await
-    {
-        Ok(view) => Some(view),
-        Err(error) => {
-            let Some(why) = refusal(catalog, name).await? else {
-                return Err(error);
-            };
-            context.warn(&format!("block {name} is not aligned: {why}"));
-            context.info("choose the same places on the relief and on the page to align them");
-            None
-        }
-    };
-    let store = BlockPoints::new(context, name);
-    Ok(view::block_page(name, view, store, args.language()))
-}
-
-/// Returns why the page of a block was refused, if it was.
-async fn refusal(catalog: &Catalog, name: &BlockName) -> ProjectResult<Option<String>> {
-    let detail = catalog.block(name).await?;
-    let failure = detail.and_then(|detail| detail.state.failure);
-    let refused = failure.filter(|stored| {
-        stored.stage == BlockStage::Align && stored.failure.class == FailureClass::NoSolution
-    });
-    Ok(refused.map(|stored| stored.failure.message))
+    let store = BlockPoints::new(&context.location, name, Some(context.command("run")));
+    let limits = context.location.settings()?.config.limits;
+    let language = args.language();
+    let opened = open_block(catalog, project, name, args.metric, limits, store, language).await?;
+    if let Some(why) = opened.refused {
+        context.warn(&format!("block {name} is not aligned: {why}"));
+        context.info("choose the same places on the relief and on the page to align them");
+    }
+    Ok(opened.pages)
 }
 
 async fn serve(

@@ -18,6 +18,8 @@ pub(super) enum NavSection {
     Run,
     /// The list of pairs.
     Pairs,
+    /// The list of whole blocks.
+    Blocks,
     /// Reviews.
     Review,
     /// The report.
@@ -33,9 +35,10 @@ pub(super) enum NavSection {
 }
 
 /// Address, and name in English and Vietnamese, of the pages in the navigation.
-const SECTIONS: [(NavSection, &str, [&str; 2]); 7] = [
+const SECTIONS: [(NavSection, &str, [&str; 2]); 8] = [
     (NavSection::Run, "", ["Run", "Căn chỉnh"]),
     (NavSection::Pairs, "pairs", ["Pairs", "Các cặp"]),
+    (NavSection::Blocks, "blocks", ["Blocks", "Các ván"]),
     (NavSection::Review, "review", ["Review", "Đánh giá"]),
     (NavSection::Report, "report", ["Report", "Báo cáo"]),
     (NavSection::Export, "export", ["Export", "Xuất dữ liệu"]),

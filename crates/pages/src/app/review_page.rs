@@ -4,11 +4,8 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use axum::extract::{Path, Request, State};
-use axum::http::Extensions;
-use axum::response::{Html, IntoResponse as _, Response};
+use axum::response::{Html, Response};
 use axum::{Extension, Json};
-use hyper::service::Service as _;
-use hyper_util::service::TowerToHyperService;
 use maud::{Markup, html};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -18,6 +15,7 @@ use super::address::{PageQuery, encoded};
 use super::components::{NavSection, action_form, choice, frame};
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
+use super::pass_on::pass_on;
 use super::projects::OpenProject;
 use super::state::AppState;
 use super::visit::Visit;
@@ -160,20 +158,7 @@ pub(super) async fn pages(
     };
     let open = state.open(key).await?;
     let router = review(&state, &open, reviewer, choice).await?;
-    let (mut head, body) = request.into_parts();
-    // The path below the review is everything after the fifth segment.
-    let rest = head.uri.path().splitn(7, '/').nth(6).unwrap_or_default();
-    let target = match head.uri.query() {
-        Some(query) => format!("/{rest}?{query}"),
-        None => format!("/{rest}"),
-    };
-    head.uri = target.parse().map_err(|_invalid| AppFailure::not_found())?;
-    // The parameters of this address are not those of the page.
-    head.extensions = Extensions::new();
-    head.extensions.insert(access);
-    let request = Request::from_parts(head, body);
-    let Ok(response) = TowerToHyperService::new(router).call(request).await;
-    Ok(response.into_response())
+    pass_on(router, access, request).await
 }
 
 /// Returns the pages of a reviewer, which are opened if they are not.

@@ -7,14 +7,16 @@ use axum::{Router, middleware};
 
 use super::state::{AppOptions, AppState};
 use super::{
-    assets, export_page, failure_page, health_page, home, import_page, pair_page, pairs_page,
-    pictures, report_page, review_agreement, review_page, run_actions, run_page, settings_page,
+    assets, block_page, blocks_page, export_page, failure_page, health_page, home, import_page,
+    pair_page, pairs_page, pictures, report_page, review_agreement, review_page, run_actions,
+    run_page, settings_page,
 };
 
 /// Returns the routes of the app, for a server.
 pub fn app_pages(options: AppOptions) -> Router {
     let state = Arc::new(AppState::new(options));
     let pair = "/p/{project}/pair/{pair}";
+    let block = "/p/{project}/block/{block}";
     let review = "/p/{project}/review/{reviewer}/{choice}";
     Router::new()
         .route("/", get(home::page))
@@ -29,6 +31,8 @@ pub fn app_pages(options: AppOptions) -> Router {
             &format!("{pair}/3d/assets/{{name}}"),
             get(pair_page::scan_view_asset),
         )
+        .route("/p/{project}/blocks", get(blocks_page::page))
+        .route(&format!("{block}/"), get(block_page::page))
         .route("/p/{project}/review", get(review_page::page))
         .route("/p/{project}/review/agreement", get(review_agreement::part))
         .route("/import", get(import_page::page))
@@ -65,7 +69,9 @@ pub fn app_pages(options: AppOptions) -> Router {
             Arc::clone(&state),
             failure_page::explain,
         ))
-        // The pages of a review explain their failures themselves.
+        // The pages of a review or a block explain their failures themselves.
+        .route(&format!("{block}/view/"), any(block_page::pages))
+        .route(&format!("{block}/view/{{*rest}}"), any(block_page::pages))
         .route(&format!("{review}/"), any(review_page::pages))
         .route(&format!("{review}/{{*rest}}"), any(review_page::pages))
         .with_state(state)

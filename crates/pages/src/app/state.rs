@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::failure::{AppFailure, AppResult};
-use super::open_reviews::OpenReviews;
+use super::open_pages::OpenPages;
 use super::projects::{OpenProject, find};
 use super::tasks::AppTasks;
 use super::thumb_cache::ThumbCache;
@@ -32,7 +32,9 @@ pub(super) struct AppState {
     /// The projects that are open, by name.
     projects: Mutex<BTreeMap<String, Arc<OpenProject>>>,
     /// The reviews that are open.
-    pub(super) reviews: OpenReviews,
+    pub(super) reviews: OpenPages,
+    /// The blocks that are open, each with its picture and heights.
+    pub(super) blocks: OpenPages,
     /// Exports, checks and backups.
     pub(super) tasks: AppTasks,
     pub(super) thumbs: ThumbCache,
@@ -46,7 +48,8 @@ impl AppState {
             language: Mutex::new(options.language),
             options,
             projects: Mutex::default(),
-            reviews: OpenReviews::default(),
+            reviews: OpenPages::new(32),
+            blocks: OpenPages::new(2),
             tasks: AppTasks::default(),
             thumbs: ThumbCache::default(),
             work: WorkThread::default(),

@@ -1,7 +1,10 @@
 //! Names of states, classes and metrics, and what helps after a failure, in both languages.
 
 use super::visit::Visit;
-use mocban_core::domain::{FailureClass, JobStatus, Reason, Stage, ThresholdMetric, Verdict};
+use mocban_core::domain::{
+    BlockCharacterState, BlockStage, FailureClass, JobStatus, Reason, Stage, ThresholdMetric,
+    Verdict,
+};
 
 impl Visit {
     /// Returns the name of the state of a pair.
@@ -45,6 +48,46 @@ impl Visit {
             Stage::Depth => self.t("depth map", "bản đồ độ sâu"),
             Stage::Normalize => self.t("separation of the strokes", "tách nét"),
             Stage::Register => self.t("registration with the print", "căn chỉnh với bản in"),
+        }
+    }
+
+    /// Returns the name of a stage of a block.
+    pub(super) const fn block_stage(&self, stage: BlockStage) -> &'static str {
+        match stage {
+            BlockStage::Face => self.t("carved face of the scan", "mặt khắc của bản quét"),
+            BlockStage::Align => self.t("registration with the page", "căn chỉnh với trang in"),
+            BlockStage::Boxes => self.t("places of the characters", "vị trí các chữ"),
+            BlockStage::Cut => self.t("cutting into pairs", "cắt thành các cặp"),
+        }
+    }
+
+    /// Returns what became of a character of a block.
+    pub(super) const fn character_state(&self, state: BlockCharacterState) -> &'static str {
+        match state {
+            BlockCharacterState::Cut => self.t("is a pair", "là một cặp"),
+            BlockCharacterState::Left => self.t("left out", "bỏ ra"),
+            BlockCharacterState::Retired => {
+                self.t("not on the page any more", "không còn trên trang in")
+            }
+        }
+    }
+
+    /// Returns what helps after a stage of a block failed.
+    pub(super) const fn block_remedy(
+        &self,
+        stage: BlockStage,
+        class: FailureClass,
+    ) -> &'static str {
+        match (stage, class) {
+            (BlockStage::Align, FailureClass::NoSolution) => self.t(
+                "The page may be that of another block, or the scan may show only a part. If they belong together, align them by places you choose.",
+                "Trang in có thể của ván khác, hoặc bản quét chỉ có một phần. Nếu chúng cùng một ván, hãy căn chỉnh theo các điểm tự chọn.",
+            ),
+            (_, FailureClass::BadInput | FailureClass::NoSolution) => self.t(
+                "Replace the file that is named, or correct it; the next run notices that by itself.",
+                "Hãy thay hoặc sửa tệp được nêu; lần chạy sau sẽ tự nhận ra.",
+            ),
+            (_, class) => self.remedy(class),
         }
     }
 

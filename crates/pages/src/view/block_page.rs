@@ -63,7 +63,7 @@ struct ShownBlock {
 
 /// Returns the routes of the page of a block, and of its correction. Without `view`, only the correction is shown. Without a
 /// language, the browser decides.
-pub fn block_page(
+pub(super) fn block_page(
     block: &BlockName,
     view: Option<BlockView>,
     store: impl CorrectionStore,

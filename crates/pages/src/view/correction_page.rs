@@ -33,8 +33,8 @@ pub trait CorrectionStore: Send + Sync + 'static {
         points: Option<ControlPoints>,
     ) -> impl Future<Output = Result<PointsSaved, String>> + Send;
 
-    /// Returns the command that aligns the block again.
-    fn next_command(&self) -> String;
+    /// Returns the command that aligns the block again; `None` if a page has a button for it.
+    fn next_command(&self) -> Option<String>;
 }
 
 /// What became of points that were to be saved.

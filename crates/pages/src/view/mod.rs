@@ -1,11 +1,13 @@
 //! The pages of `mocban view`: one scan on its print in 3D, or a whole block.
 
 mod block_page;
+mod block_points;
 mod correction_page;
+mod opened_block;
 pub(crate) mod page;
 mod scan_page;
 
-pub use block_page::block_page;
-pub use correction_page::{CorrectionStore, PointsSaved};
+pub use block_points::BlockPoints;
+pub use opened_block::{OpenedBlock, open_block};
 pub(crate) use scan_page::asset as scan_asset;
 pub use scan_page::scan_page;

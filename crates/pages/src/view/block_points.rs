@@ -2,29 +2,31 @@
 
 use tokio::runtime::Handle;
 
-use crate::cli::output::context::Context;
+use super::correction_page::{CorrectionStore, PointsSaved};
 use mocban_catalog::{Catalog, ControlPointsChange};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, replaced_file};
-use mocban_pages::view::{CorrectionStore, PointsSaved};
 use mocban_project::error::TaskStopped;
+use mocban_project::location::Location;
 use mocban_project::{ProjectError, ProjectResult};
 use mocban_store::Project;
 
 /// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays
 /// open does not hold it.
-#[derive(Clone)]
-pub(crate) struct BlockPoints {
-    context: Context,
+#[derive(Debug, Clone)]
+pub struct BlockPoints {
+    location: Location,
     block: BlockName,
+    next_command: Option<String>,
 }
 
 impl BlockPoints {
-    /// Creates the access to the control points of a block.
-    pub(crate) fn new(context: &Context, block: &BlockName) -> Self {
+    /// Creates the access to the control points of a block. `next_command` aligns the block again.
+    pub fn new(location: &Location, block: &BlockName, next_command: Option<String>) -> Self {
         Self {
-            context: context.clone(),
+            location: location.clone(),
             block: block.clone(),
+            next_command,
         }
     }
 
@@ -36,12 +38,12 @@ impl BlockPoints {
     ) -> Result<T, String> {
         let done = tokio::task::spawn_blocking(work).await;
         let done = done.map_err(|error| TaskStopped(error).into()).flatten();
-        done.map_err(|error| error.text(&self.context.location.dir))
+        done.map_err(|error| error.text(&self.location.dir))
     }
 
     async fn read_block(&self) -> ProjectResult<BlockCorrection> {
-        let (project, catalog) = self.context.location.open_read_only().await?;
-        let limits = self.context.location.settings()?.config.limits.image;
+        let (project, catalog) = self.location.open_read_only().await?;
+        let limits = self.location.settings()?.config.limits.image;
         let read = BlockCorrection::read(&catalog, &project, &self.block, limits).await;
         catalog.close().await;
         Ok(read?)
@@ -52,7 +54,7 @@ impl BlockPoints {
         read: Option<ContentHash>,
         points: Option<&ControlPoints>,
     ) -> ProjectResult<PointsSaved> {
-        let (project, catalog) = self.context.location.open().await?;
+        let (project, catalog) = self.location.open().await?;
         let stored = self.store_in(&catalog, &project, read, points).await;
         catalog.close().await;
         stored
@@ -99,7 +101,7 @@ impl CorrectionStore for BlockPoints {
             .await
     }
 
-    fn next_command(&self) -> String {
-        self.context.command("run")
+    fn next_command(&self) -> Option<String> {
+        self.next_command.clone()
     }
 }

@@ -1,0 +1,271 @@
+//! The page of a whole block: its state, its stages, its characters, and the ways to its pictures and its correction.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Path, Request, State};
+use axum::response::{Html, Response};
+use maud::{Markup, html};
+
+use super::address::encoded;
+use super::blocks_page::state_badge;
+use super::components::{NavSection, action_form, frame, grouped, score};
+use super::failure::{AppFailure, AppResult};
+use super::on_thread::on_thread;
+use super::pass_on::{pass_on, path_below};
+use super::projects::OpenProject;
+use super::state::AppState;
+use super::visit::Visit;
+use crate::local_server::AccessControl;
+use crate::view::{BlockPoints, open_block};
+use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
+use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
+use mocban_system::time_text::{duration, local};
+use serde_json::Value;
+
+/// Most characters that are listed.
+const SHOWN_CHARACTERS: usize = 1000;
+/// Most events of the history that are shown.
+const SHOWN_EVENTS: usize = 50;
+
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path((key, block)): Path<(String, String)>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let name = block.parse::<BlockName>().ok();
+    let name = name.ok_or_else(AppFailure::not_found)?;
+    let detail = open.catalog.block(&name).await?;
+    let detail = detail.ok_or_else(AppFailure::not_found)?;
+    let characters = open.catalog.block_characters(&name).await?;
+    let body = html! {
+        nav.pager { a href="../../blocks" { (visit.t("All blocks", "Tất cả các ván")) } }
+        (state_part(&visit, &detail))
+        (ways(&visit, &detail))
+        (stages(&visit, &detail))
+        (character_list(&visit, &name, &characters))
+        (files(&visit, &detail))
+        (history(&visit, &detail))
+    };
+    let title = one_line(name.as_str());
+    Ok(frame(&visit, &title, Some(&key), NavSection::Blocks, &body))
+}
+
+/// Passes a request on to the pages with the pictures of a block and with its correction. The block is read again whenever
+/// one of these pages is opened.
+pub(super) async fn pages(
+    State(state): State<Arc<AppState>>,
+    Path(parts): Path<Vec<String>>,
+    Extension(access): Extension<Arc<AccessControl>>,
+    request: Request,
+) -> AppResult<Response> {
+    let [key, block, ..] = parts.as_slice() else {
+        return Err(AppFailure::not_found());
+    };
+    let open = state.open(key).await?;
+    let id = [open.key.as_str(), block, ""].map(str::to_owned);
+    if matches!(path_below(&request), "" | "correct") {
+        state.blocks.close(&id);
+    }
+    let router = match state.blocks.get(&id, &open) {
+        Some(router) => router,
+        None => {
+            let opened = opened(&state, &open, block).await?;
+            state.blocks.keep(id, &open, opened)
+        }
+    };
+    pass_on(router, access, request).await
+}
+
+/// Reads a block and returns its pages.
+async fn opened(state: &AppState, open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router> {
+    let name = block.parse::<BlockName>().ok();
+    let name = name.ok_or_else(AppFailure::not_found)?;
+    if open.catalog.block(&name).await?.is_none() {
+        return Err(AppFailure::not_found());
+    }
+    let (open, language) = (Arc::clone(open), state.language());
+    let location = open.location();
+    let own = Arc::clone(&open);
+    let read = on_thread(async move || {
+        let store = BlockPoints::new(&location, &name, None);
+        let limits = location.settings()?.config.limits;
+        open_block(
+            &own.catalog,
+            &own.project,
+            &name,
+            None,
+            limits,
+            store,
+            language,
+        )
+        .await
+    });
+    let opened = read.await;
+    Ok(opened
+        .map_err(|error| AppFailure::of(error, &open.dir))?
+        .pages)
+}
+
+fn state_part(visit: &Visit, detail: &BlockDetail) -> Markup {
+    let state = &detail.state;
+    html! {
+        p { (state_badge(visit, state)) }
+        @if let Some(stored) = &state.failure {
+            div.notice.bad {
+                p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored.failure.message) }
+                p { (visit.block_remedy(stored.stage, stored.failure.class)) }
+            }
+        }
+        @for warning in warnings(detail) { div.notice.warn { p { (one_line(warning)) } } }
+    }
+}
+
+/// Returns what the stages assumed or left out.
+fn warnings(detail: &BlockDetail) -> impl Iterator<Item = &str> {
+    let lists = detail.stages.iter();
+    let lists = lists.filter_map(|stage| stage.outcome.get("warnings")?.as_array());
+    lists.flatten().filter_map(Value::as_str)
+}
+
+/// Returns what a person can do with the block.
+fn ways(visit: &Visit, detail: &BlockDetail) -> Markup {
+    let has = |stage| detail.stages.iter().any(|one| one.stage == stage);
+    let state = &detail.state;
+    html! {
+        section.actions {
+            @if has(BlockStage::Align) {
+                a.button href="view/" { (visit.t("Scan and page over each other", "Xem bản quét chồng lên trang in")) }
+            }
+            @if has(BlockStage::Face) {
+                a.button href="view/correct" { (visit.t("Align by places you choose", "Căn chỉnh theo các điểm tự chọn")) }
+            }
+            @if state.status == JobStatus::Quarantined {
+                (action_form("../../actions/retry", "inline", &html! {
+                    input type="hidden" name="pair" value=(state.attributes.name.as_str());
+                    button { (visit.t("Let it run again", "Cho chạy lại")) }
+                }))
+            } @else {
+                (action_form("../../actions/run", "inline", &html! {
+                    input type="hidden" name="jobs" value="";
+                    input type="hidden" name="which" value="all";
+                    button { (visit.t("Run what has changed", "Chạy những gì đã đổi")) }
+                }))
+            }
+        }
+        @if let Some(points) = &state.control_points {
+            p.muted { (grouped(points.points.len() as u64)) " " (visit.t("places were chosen by a person.", "điểm do người dùng chọn.")) }
+        }
+    }
+}
+
+fn stages(visit: &Visit, detail: &BlockDetail) -> Markup {
+    html! {
+        section {
+            h2 { (visit.t("Stages", "Các bước")) }
+            table { tbody { @for stage in BlockStage::ALL {
+                @let done = detail.stages.iter().find(|one| one.stage == stage);
+                tr {
+                    th scope="row" { (visit.block_stage(stage)) }
+                    td { @match done {
+                        Some(done) => { (local(done.at)) " · " (duration(done.ms)) },
+                        None => { "–" },
+                    } }
+                }
+            } } }
+        }
+    }
+}
+
+fn character_list(visit: &Visit, block: &BlockName, characters: &[StoredCharacter]) -> Markup {
+    let label = visit.t("Characters", "Các chữ");
+    html! {
+        section {
+            h2 { (label) }
+            @if characters.is_empty() {
+                p.muted { (visit.t("A run finds them on the page.", "Lần chạy sẽ tìm chúng trên trang in.")) }
+            } @else {
+                p {
+                    (grouped(characters.len() as u64)) " · "
+                    a href={ "../../pairs?block=" (encoded(block.as_str())) } { (visit.t("All pairs of this block", "Tất cả các cặp của ván này")) }
+                }
+                div.scroll tabindex="0" role="region" aria-label=(label) {
+                    table {
+                        thead { tr {
+                            th scope="col" { (visit.t("Label", "Nhãn")) }
+                            th scope="col" { (visit.t("Character", "Chữ")) }
+                            th scope="col" { (visit.t("State", "Trạng thái")) }
+                            th.number scope="col" { (visit.t("Certainty of the place", "Độ chắc chắn của vị trí")) }
+                            th scope="col" { (visit.t("Pair", "Cặp")) }
+                        } }
+                        tbody { @for one in characters.iter().take(SHOWN_CHARACTERS) { (character_row(visit, one)) } }
+                    }
+                }
+                @if characters.len() > SHOWN_CHARACTERS {
+                    p.muted { (visit.t("Only the first are listed:", "Chỉ liệt kê các chữ đầu tiên:")) " " (grouped(SHOWN_CHARACTERS as u64)) }
+                }
+            }
+        }
+    }
+}
+
+fn character_row(visit: &Visit, one: &StoredCharacter) -> Markup {
+    let is_uncertain = one
+        .confidence
+        .is_some_and(|confidence| confidence < Catalog::LOW_CHARACTER_CONFIDENCE);
+    html! {
+        tr {
+            td { (one_line(&one.label)) }
+            td { (one.character.as_deref().map(one_line).unwrap_or_default()) }
+            td {
+                (visit.character_state(one.state))
+                @if let Some(reason) = &one.reason { ": " (one_line(reason)) }
+            }
+            td.number.warn[is_uncertain] { (score(one.confidence)) }
+            td { @if let Some(pair) = one.pair.as_ref().filter(|_| one.state == BlockCharacterState::Cut) {
+                a href={ "../../pair/" (encoded(pair)) "/" } { (one_line(pair)) }
+            } }
+        }
+    }
+}
+
+fn files(visit: &Visit, detail: &BlockDetail) -> Markup {
+    let attributes = &detail.state.attributes;
+    html! {
+        section {
+            h2 { (visit.t("Files", "Các tệp")) }
+            dl {
+                dt { (visit.t("Scan", "Bản quét")) } dd { code { (one_line(&attributes.mesh_path)) }
+                    @if let Some(unit) = attributes.unit { " (" (unit) ")" } }
+                dt { (visit.t("Page", "Trang in")) } dd { code { (one_line(&attributes.page_path)) } }
+                dt { (visit.t("Labels", "Nhãn")) } dd {
+                    @match &attributes.labels_path {
+                        Some(labels) => code { (one_line(labels)) },
+                        None => { (visit.t("none: the characters are found", "không có: chữ được tự tìm")) },
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn history(visit: &Visit, detail: &BlockDetail) -> Markup {
+    let hidden = detail.attempts.len().saturating_sub(SHOWN_EVENTS);
+    html! {
+        section {
+            details {
+                summary { h2 { (visit.t("History", "Lịch sử")) } }
+                ul.history { @for attempt in detail.attempts.iter().skip(hidden) {
+                    li {
+                        (local(attempt.at)) " · " (visit.block_stage(attempt.stage)) " · "
+                        @match &attempt.failure {
+                            Some(failure) => span.bad { (visit.class(failure.class)) ": " (failure.message) },
+                            None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (duration(ms)) ")" } },
+                        }
+                    }
+                } }
+            }
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! The list of the whole blocks of a project.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, State};
+use axum::response::Html;
+use maud::{Markup, html};
+
+use super::address::encoded;
+use super::components::{NavSection, empty, figure, frame, grouped};
+use super::failure::AppResult;
+use super::state::AppState;
+use super::visit::Visit;
+use mocban_catalog::BlockState;
+use mocban_core::domain::{BlockStage, JobStatus, one_line};
+
+/// Most blocks that are listed.
+const SHOWN: usize = 1000;
+
+/// What the list can show, by the name in its address.
+const STATES: [(&str, &[JobStatus]); 3] = [
+    ("done", &[JobStatus::Done]),
+    ("failed", &[JobStatus::Quarantined]),
+    (
+        "waiting",
+        &[JobStatus::Ready, JobStatus::Leased, JobStatus::Backoff],
+    ),
+];
+
+pub(super) async fn page(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let blocks = open.catalog.block_states().await?;
+    let body = if blocks.is_empty() {
+        none(&visit, &key)
+    } else {
+        let chosen = visit.query.get("state");
+        let chosen = STATES.iter().find(|(name, _)| Some(*name) == chosen);
+        let is_shown = |block: &&BlockState| {
+            chosen.is_none_or(|(_, statuses)| statuses.contains(&block.status))
+        };
+        let shown: Vec<&BlockState> = blocks.iter().filter(is_shown).collect();
+        html! {
+            (figures(&visit, &blocks))
+            @if chosen.is_some() { p { a href=(visit.here) { (visit.t("All blocks", "Tất cả các ván")) } } }
+            (table(&visit, &shown))
+        }
+    };
+    let title = visit.t("Blocks", "Các ván");
+    Ok(frame(&visit, title, Some(&key), NavSection::Blocks, &body))
+}
+
+fn none(visit: &Visit, key: &str) -> Markup {
+    let text = visit.t(
+        "This project has no whole blocks. A list of blocks names a scan and a page for each; a run then finds the characters.",
+        "Dự án này không có ván nguyên. Danh sách ván nêu bản quét và trang in của từng ván; lần chạy sẽ tìm các chữ.",
+    );
+    let import = format!("{}import?project={}", visit.root, encoded(key));
+    empty(
+        text,
+        &html! { p { a.button href=(import) { (visit.t("Import a list of blocks", "Nhập danh sách ván")) } } },
+    )
+}
+
+fn figures(visit: &Visit, blocks: &[BlockState]) -> Markup {
+    let of = |statuses: &[JobStatus]| {
+        let of_these = blocks.iter().filter(|one| statuses.contains(&one.status));
+        of_these.count() as u64
+    };
+    let [done, failed, waiting] =
+        STATES.map(|(name, statuses)| (of(statuses), visit.query.with("state", name).text()));
+    let characters: u64 = blocks.iter().map(|block| block.characters).sum();
+    html! {
+        div.figures {
+            (figure(blocks.len() as u64, visit.t("blocks", "ván"), None, ""))
+            (figure(done.0, visit.t("done", "xong"), Some(&done.1), "good"))
+            (figure(failed.0, visit.t("failed", "lỗi"), Some(&failed.1), if failed.0 > 0 { "bad" } else { "" }))
+            (figure(waiting.0, visit.t("waiting or running", "đang chờ hoặc đang chạy"), Some(&waiting.1), ""))
+            (figure(characters, visit.t("characters", "chữ"), None, ""))
+        }
+    }
+}
+
+fn table(visit: &Visit, blocks: &[&BlockState]) -> Markup {
+    let label = visit.t("Blocks", "Các ván");
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(label) {
+            table {
+                thead { tr {
+                    th scope="col" { (visit.t("Block", "Ván")) }
+                    th scope="col" { (visit.t("State", "Trạng thái")) }
+                    th.number scope="col" { (visit.t("Characters", "Số chữ")) }
+                    th.number scope="col" { (visit.t("Uncertain place", "Vị trí chưa chắc")) }
+                    th.number scope="col" { (visit.t("Left out", "Bỏ ra")) }
+                } }
+                tbody { @for block in blocks.iter().take(SHOWN) { (row(visit, block)) } }
+            }
+        }
+        @if blocks.len() > SHOWN {
+            p.muted { (visit.t("Only the first are listed:", "Chỉ liệt kê các ván đầu tiên:")) " " (grouped(SHOWN as u64)) }
+        }
+    }
+}
+
+fn row(visit: &Visit, block: &BlockState) -> Markup {
+    let name = block.attributes.name.as_str();
+    html! {
+        tr {
+            th scope="row" { a href={ "block/" (encoded(name)) "/" } { (one_line(name)) } }
+            td {
+                (state_badge(visit, block))
+                @if let Some(stored) = &block.failure { " " span.bad { (one_line(&stored.failure.message)) } }
+            }
+            td.number { @if block.characters > 0 {
+                a href={ "pairs?block=" (encoded(name)) } { (grouped(block.characters)) }
+            } @else { "0" } }
+            td.number { (grouped(block.low_confidence)) }
+            td.number { (grouped(block.left_out)) }
+        }
+    }
+}
+
+/// Returns the state of a block, with its stage if it is not done.
+pub(super) fn state_badge(visit: &Visit, block: &BlockState) -> Markup {
+    let name = match block.status {
+        JobStatus::Done => visit.t("done", "xong"),
+        status => visit.status(status),
+    };
+    html! {
+        span.state.(block.status.name()) { (name) }
+        @if let Some(stage) = block.next_stage.filter(|_| block.status != JobStatus::Quarantined) {
+            " · " (visit.block_stage(stage)) " (" (stage as usize + 1) "/" (BlockStage::ALL.len()) ")"
+        }
+    }
+}
