@@ -10,11 +10,11 @@ const ORIENTATION: u64 = 274;
 
 /// Returns the orientation of a PNG.
 pub(super) fn of_png(bytes: &[u8]) -> Orientation {
-    of_exif(png_chunk(bytes, b"eXIf"))
+    of_exif(png_chunk(bytes, *b"eXIf"))
 }
 
 /// Returns the content of the first chunk of a kind, which may stand before or after the pixels.
-pub(super) fn png_chunk<'b>(bytes: &'b [u8], wanted: &[u8; 4]) -> Option<&'b [u8]> {
+pub(super) fn png_chunk(bytes: &[u8], wanted: [u8; 4]) -> Option<&[u8]> {
     let mut counter = PollCounter::default();
     let mut at = 8;
     while let Some(head) = bytes.get(at..at + 8) {

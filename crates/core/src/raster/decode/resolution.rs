@@ -17,12 +17,12 @@ const METRES_PER_INCH: f64 = 0.0254;
 pub fn stated_dpi(bytes: &[u8]) -> Option<[f64; 2]> {
     let (stored, orientation) = match FileKind::of(bytes) {
         FileKind::Png => {
-            let physical = orientation::png_chunk(bytes, b"pHYs").and_then(of_phys);
-            let exif = || of_exif(orientation::png_chunk(bytes, b"eXIf")?);
+            let physical = orientation::png_chunk(bytes, *b"pHYs").and_then(of_phys);
+            let exif = || of_exif(orientation::png_chunk(bytes, *b"eXIf")?);
             (physical.or_else(exif), orientation::of_png(bytes))
         }
         FileKind::Jpeg => {
-            let (jfif, exif) = jpeg::metadata(bytes)?;
+            let [jfif, exif] = jpeg::metadata(bytes);
             let stored = jfif.and_then(of_jfif).or_else(|| of_exif(exif?));
             (stored, orientation::of_exif(exif))
         }
