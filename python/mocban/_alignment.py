@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
-from collections.abc import Iterable, Mapping
-from types import MappingProxyType
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from . import _native as _rust
@@ -101,13 +100,16 @@ class MetricResult(Frozen):
         return grey.reshape(side, side)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, MetricResult) and self._key() == other._key()
+        if not isinstance(other, MetricResult) or self._key() != other._key():
+            return False
+        return self._native is other._native or self._native.state() == other._native.state()
 
     def __hash__(self) -> int:
         return hash(self._key())
 
     def _key(self) -> tuple[Any, ...]:
-        return (self.metric, self.threshold_depth, self.ssim, self.iou, self.dice, self.confidence)
+        scores = (self.ssim, self.nl_ssim, self.iou, self.iou_box, self.dice)
+        return (self.metric, self.threshold_depth, *scores, self.confidence)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored_result, (self.metric, *self._native.state())
@@ -117,8 +119,43 @@ class MetricResult(Frozen):
 
 
 def _restored_result(metric: str, numbers: str, images: bytes) -> MetricResult:
-    native = _rust.NativeAlignment(numbers, images)
-    return MetricResult(metric, json.loads(native.json())["results"][metric], native)
+    return Results.of(_rust.NativeAlignment(numbers, images), (metric,))[metric]
+
+
+class Results(Mapping[str, MetricResult]):
+    """The results of an alignment by metric, in the order of the metrics. Cannot be changed."""
+
+    __slots__ = ("_by_metric", "_native")
+
+    def __init__(self, by_metric: Mapping[str, MetricResult], native: _rust.NativeAlignment | None) -> None:
+        self._by_metric, self._native = dict(by_metric), native
+
+    @classmethod
+    def of(cls, native: _rust.NativeAlignment, metrics: Iterable[str]) -> Results:
+        """Return the results of some metrics."""
+        numbers = json.loads(native.json())["results"]
+        return cls({name: MetricResult(name, numbers[name], native) for name in metrics}, native)
+
+    def __getitem__(self, metric: str) -> MetricResult:
+        return self._by_metric[metric]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_metric)
+
+    def __len__(self) -> int:
+        return len(self._by_metric)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._native is None:
+            return Results, ({}, None)
+        return _restored_results, (tuple(self), *self._native.state())
+
+    def __repr__(self) -> str:
+        return repr(self._by_metric)
+
+
+def _restored_results(metrics: tuple[str, ...], numbers: str, images: bytes) -> Results:
+    return Results.of(_rust.NativeAlignment(numbers, images), metrics)
 
 
 class Alignment(Frozen):
@@ -185,7 +222,7 @@ class Alignment(Frozen):
     ) -> None:
         if native is None:
             names = ("confidence", "rotation_deg", "scale", "shift_px", "mirrored", "side", "print_from_mesh")
-            self._set(status="refused", refusal=refusal, results=MappingProxyType({}), _native=None, _first=None)
+            self._set(status="refused", refusal=refusal, results=Results({}, None), _native=None, _first=None)
             self._set(warnings=(), **dict.fromkeys(names))
             return
         import numpy as np
@@ -207,7 +244,7 @@ class Alignment(Frozen):
             mirrored=numbers["mirrored"],
             side=numbers["side"],
             print_from_mesh=matrix,
-            results=MappingProxyType(results),
+            results=Results(results, native),
             warnings=tuple(numbers["warnings"]),
             _native=native,
             _first="relief" if "relief" in all_results else "ensemble",
@@ -287,7 +324,7 @@ class Alignment(Frozen):
         """
         native = self._aligned()
         assert self._first is not None
-        width, height, flat = native.overlay(metric or self._first)
+        width, height, flat = native.overlay(self._first if metric is None else metric)
         return flat.reshape(height, width, 3)
 
     def save(self, dir: str | os.PathLike[str]) -> None:
@@ -452,10 +489,25 @@ def align(
     """
     chosen = settings_of(settings)
     names = None if metrics is None else metric_names(metrics, chosen)
-    scan, image = mesh_of(mesh, chosen, unit), print_of(print, chosen)
-    if scan.warnings:
-        raise UnitError(f"{scan.path or 'the mesh'}: {scan.warnings[0]}", "wrong_unit", scan.path)
-    native, refused = _rust.align_pair(scan._native, image._native, chosen._native, scanned_face_down)
+    return aligned(mesh, print, names, chosen, strict=strict, unit=unit, scanned_face_down=scanned_face_down)
+
+
+def aligned(
+    mesh: Mesh | str | os.PathLike[str],
+    print: Print | str | os.PathLike[str] | ArrayLike,
+    names: Iterable[str] | None,
+    chosen: Settings,
+    *,
+    strict: bool = False,
+    unit: str | None = None,
+    scanned_face_down: bool | None = None,
+    cancel: _rust.NativeCancel | None = None,
+) -> Alignment:
+    """Align a pair. ``cancel`` stops it from another thread, which raises `Cancelled`."""
+    scan, image = mesh_of(mesh, chosen, unit, cancel), print_of(print, chosen, cancel)
+    if warnings := scan.warnings:
+        raise UnitError(f"{scan.path or 'the mesh'}: {warnings[0]}", "wrong_unit", scan.path)
+    native, refused = _rust.align_pair(scan._native, image._native, chosen._native, scanned_face_down, cancel)
     if refused is None:
         return Alignment(native, None, names)
     code, message, is_of_print = refused

@@ -154,8 +154,6 @@ class BlockAlignment(Frozen):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        if self.project._temporary is not None:
-            raise TypeError("the project of this block is in a temporary folder; give align_block a folder to pickle it")
         return BlockAlignment, (self._stored, self.project)
 
     def __eq__(self, other: object) -> bool:
@@ -214,8 +212,10 @@ def align_block(
 
     Raises
     ------
+    InputNotFound
+        If a file is not there.
     ProjectError
-        If a file is missing, or ``folder`` holds anything but the project of an earlier call.
+        If ``folder`` holds anything but the project of an earlier call.
     Refused
         If the block is refused and ``strict`` is true.
 

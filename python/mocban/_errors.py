@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from typing import Any
+
+
+def _number(error: OSError, number: int, path: str | None) -> None:
+    error.errno, error.strerror, error.filename = number, os.strerror(number), path
 
 
 class Error(Exception):
@@ -31,12 +36,16 @@ class Error(Exception):
     code: str
     path: str | None
     hint: str
+    # The number of the system for exceptions that are an OSError too.
+    _errno: int | None = None
 
     def __init__(self, hint: str, code: str = "unexpected", path: str | os.PathLike[str] | None = None) -> None:
         super().__init__(hint)
         self.hint = hint
         self.code = code
         self.path = None if path is None else os.fspath(path)
+        if isinstance(self, OSError) and self._errno is not None:
+            _number(self, self._errno, self.path)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.hint, self.code, self.path)
@@ -64,6 +73,8 @@ class UnitError(InputError):
 class InputNotFound(InputError, FileNotFoundError):
     """An input file that does not exist."""
 
+    _errno = errno.ENOENT
+
 
 class SettingsError(Error, ValueError):
     """A setting that does not exist or has an invalid value."""
@@ -76,6 +87,8 @@ class ProjectError(Error):
 class NotAProject(ProjectError, FileNotFoundError):
     """A folder or address without a project."""
 
+    _errno = errno.ENOENT
+
 
 class ProjectVersionError(ProjectError):
     """A catalog that another version of mocban wrote, or that is no catalog."""
@@ -84,9 +97,13 @@ class ProjectVersionError(ProjectError):
 class ProjectBusy(ProjectError, TimeoutError):
     """Another process runs the project, writes the same output or locks the catalog."""
 
+    _errno = errno.ETIMEDOUT
+
 
 class ReadOnlyProject(ProjectError, PermissionError):
     """A project that may not be written to, or was opened with ``readonly=True``."""
+
+    _errno = errno.EACCES
 
 
 class StaleResult(ProjectError):
@@ -94,7 +111,7 @@ class StaleResult(ProjectError):
 
 
 class Cancelled(Error):
-    """A run that its progress function stopped. What was computed so far is stored."""
+    """A run that its progress function stopped, or an alignment that was stopped. What a run has computed so far is stored."""
 
 
 class Refused(Error):

@@ -189,16 +189,6 @@ class Mesh(Frozen):
         return f"<mocban.Mesh: {', '.join(parts)}>"
 
 
-_DEFAULT_MAX_PIXELS: list[int] = []
-
-
-def _max_pixels() -> int:
-    """Return the default of ``limits.image.max_pixels``, which is read once."""
-    if not _DEFAULT_MAX_PIXELS:
-        _DEFAULT_MAX_PIXELS.append(int(settings()["limits.image.max_pixels"]))
-    return _DEFAULT_MAX_PIXELS[0]
-
-
 def _mesh(vertices: Any, faces: Any, unit: str | None) -> Mesh:
     return Mesh(vertices, faces, unit=unit)
 
@@ -257,6 +247,10 @@ class Print(Frozen):
 
     Attributes
     ----------
+    size : tuple of int
+        Width and height in pixels.
+    dpi : tuple of float or None
+        Pixels per inch, if the image is from a file that says so.
     warnings : tuple of str
         What may be wrong with the image, such as a colour profile that cannot be applied.
     path : str or None
@@ -278,7 +272,7 @@ class Print(Frozen):
     _native: _rust.NativePrint
 
     def __init__(self, image: ArrayLike) -> None:
-        self._fill(image, _max_pixels())
+        self._fill(image, settings()._native.max_pixels)
 
     def _fill(self, image: ArrayLike, most: int) -> None:
         import numpy as np
@@ -317,24 +311,34 @@ class Print(Frozen):
     @property
     def image(self) -> NDArray[np.uint8]:
         """Colours of the upright image in 8 bits, as a new read-only array of shape (H, W, 3)."""
-        width, height = self._native.size()
+        width, height = self.size
         return _read_only(self._native.rgb8().reshape(height, width, 3))
 
     @property
     def image16(self) -> NDArray[np.uint16]:
         """Colours of the upright image in 16 bits, as they are aligned, of shape (H, W, 3)."""
-        width, height = self._native.size()
+        width, height = self.size
         return _read_only(self._native.rgb16().reshape(height, width, 3))
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""
-        return self._native.size()
+        return self._native.size
+
+    @property
+    def dpi(self) -> tuple[float, float] | None:
+        """Pixels per inch of the upright image, horizontally and vertically, as its file says; None if it does not.
+
+        It is read from the PNG, JFIF or TIFF header or from EXIF. It does not change an alignment, and neither a comparison
+        nor a pickle keeps it.
+        """
+        return self._native.dpi
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong with the image."""
-        return tuple(self._native.warnings())
+        warning = self._native.warning
+        return () if warning is None else (warning,)
 
     @property
     def path(self) -> str | None:
@@ -356,10 +360,10 @@ class Print(Frozen):
         return isinstance(other, Print) and np.array_equal(self.image16, other.image16)
 
     def __hash__(self) -> int:
-        return hash(self._native.size())
+        return hash(self.size)
 
     def __repr__(self) -> str:
-        width, height = self._native.size()
+        width, height = self.size
         return f"<mocban.Print: {width} x {height} px>"
 
 
@@ -391,7 +395,7 @@ def read_mesh(path: str | os.PathLike[str], *, unit: str | None = None) -> Mesh:
     >>> mesh.vertices.shape[1]
     3
     """
-    return _logged(Mesh._of(_rust.read_mesh(os.fspath(path), unit, settings()._native)))
+    return _logged(Mesh._of(_rust.read_mesh(os.fspath(path), unit, settings()._native, None)))
 
 
 def read_print(path: str | os.PathLike[str]) -> Print:
@@ -418,7 +422,7 @@ def read_print(path: str | os.PathLike[str]) -> Print:
     >>> mocban.read_print("pair.png").image.dtype
     dtype('uint8')
     """
-    return _logged(Print._of(_rust.read_print(os.fspath(path), settings()._native)))
+    return _logged(Print._of(_rust.read_print(os.fspath(path), settings()._native, None)))
 
 
 def _logged(read: Any) -> Any:
@@ -427,7 +431,12 @@ def _logged(read: Any) -> Any:
     return read
 
 
-def mesh_of(mesh: Mesh | str | os.PathLike[str], chosen: Settings, unit: str | None = None) -> Mesh:
+def mesh_of(
+    mesh: Mesh | str | os.PathLike[str],
+    chosen: Settings,
+    unit: str | None = None,
+    cancel: _rust.NativeCancel | None = None,
+) -> Mesh:
     """Return a mesh, or read its file."""
     if isinstance(mesh, Mesh):
         if unit is not None and unit != mesh.unit:
@@ -435,18 +444,22 @@ def mesh_of(mesh: Mesh | str | os.PathLike[str], chosen: Settings, unit: str | N
             raise UnitError(text, "unknown_unit")
         return mesh
     if isinstance(mesh, (str, os.PathLike)):
-        return _logged(Mesh._of(_rust.read_mesh(os.fspath(mesh), unit, chosen._native)))
+        return _logged(Mesh._of(_rust.read_mesh(os.fspath(mesh), unit, chosen._native, cancel)))
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         raise MeshError("give mocban.Mesh(mesh.vertices, mesh.faces, unit=...) instead of the object", "bad_input")
     raise MeshError(f"the mesh is a {type(mesh).__name__}; give a mocban.Mesh or a path", "bad_input")
 
 
-def print_of(image: Print | str | os.PathLike[str] | ArrayLike, chosen: Settings) -> Print:
+def print_of(
+    image: Print | str | os.PathLike[str] | ArrayLike,
+    chosen: Settings,
+    cancel: _rust.NativeCancel | None = None,
+) -> Print:
     """Return a print, read its file, or copy its array."""
     if isinstance(image, Print):
         return image
     if isinstance(image, (str, os.PathLike)):
-        return _logged(Print._of(_rust.read_print(os.fspath(image), chosen._native)))
+        return _logged(Print._of(_rust.read_print(os.fspath(image), chosen._native, cancel)))
     found = Print.__new__(Print)
-    found._fill(image, int(chosen["limits.image.max_pixels"]))
+    found._fill(image, chosen._native.max_pixels)
     return found

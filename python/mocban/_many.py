@@ -7,7 +7,8 @@ import threading
 from collections.abc import Hashable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ._alignment import Alignment, align, metric_names
+from . import _native as _rust
+from ._alignment import Alignment, aligned, metric_names
 from ._errors import Error, InputError
 from ._inputs import Mesh, Print
 from ._settings import Settings, settings_of
@@ -16,11 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 Key = TypeVar("Key", bound=Hashable)
-
-#: Estimate of the memory that a pair in process needs for each byte of its files.
-_BYTES_PER_FILE_BYTE = 12
-#: Estimate of the memory that a pair in process needs besides.
-_BYTES_PER_PAIR = 40_000_000
 
 
 def align_many(
@@ -34,16 +30,18 @@ def align_many(
     """Align pairs on several threads, and yield results in the order of the pairs.
 
     Pairs are taken from the iterable when they are needed, and at most two for each thread are in memory. Threads run
-    only while the iterator is in use; closing it ends them.
+    only while the iterator is in use. Closing it, an exception and Ctrl-C stop the pairs in process and end the threads.
 
     Parameters
     ----------
     pairs : iterable of (key, mesh, print)
         The key comes back with the result. Meshes and prints are those of `align`; paths are read on the threads.
     threads : int, optional
-        Number of pairs in process at the same time; the number of processors by default.
+        Number of pairs in process at the same time; by default the number of processors that this process may use.
     max_bytes : int, optional
-        Approximate limit of the memory of all pairs in process; a pair that needs more is aligned alone.
+        Approximate limit of the memory of all pairs in process, estimated like ``mocban run --memory`` from the sizes of
+        meshes and prints, and of results that wait for their turn. A pair that needs more is aligned alone. What the caller
+        keeps does not count.
     metrics, settings
         Those of `align`.
 
@@ -64,29 +62,30 @@ def align_many(
     for name, number in (("threads", threads), ("max_bytes", max_bytes)):
         if number is not None and not (isinstance(number, int) and number >= 1):
             raise InputError(f"{name} is {number!r}; give a whole number of at least 1", "usage")
-    count = (os.cpu_count() or 1) if threads is None else threads
+    count = _rust.available_threads() if threads is None else threads
     chosen = settings_of(settings)
     names = None if metrics is None else metric_names(metrics, chosen)
-    return _results(iter(pairs), count, max_bytes, {"metrics": names, "settings": chosen})
+    return _results(iter(pairs), count, max_bytes, names, chosen)
 
 
 class _Work:
     """One pair: its inputs until it is aligned, then its result."""
 
-    __slots__ = ("key", "mesh", "image", "bytes", "done", "result", "failure")
+    __slots__ = ("key", "mesh", "image", "estimate", "done", "result", "failure")
 
     def __init__(self, key: Any, mesh: Any, image: Any) -> None:
         self.key = key
         self.mesh: Any = mesh
         self.image: Any = image
-        self.bytes = _BYTES_PER_PAIR + _BYTES_PER_FILE_BYTE * (_size(mesh) + _size(image))
+        #: Memory that it needs while it is aligned, if there is a limit.
+        self.estimate = 0
         self.done = threading.Event()
         self.result: Alignment | Error | None = None
         self.failure: BaseException | None = None
 
-    def run(self, options: dict[str, Any]) -> None:
+    def run(self, names: tuple[str, ...] | None, chosen: Settings, cancel: _rust.NativeCancel) -> None:
         try:
-            self.result = align(self.mesh, self.image, **options)
+            self.result = aligned(self.mesh, self.image, names, chosen, cancel=cancel)
         except Error as error:
             self.result = error
         except BaseException as failure:  # raised again by the thread that iterates
@@ -94,6 +93,13 @@ class _Work:
         finally:
             self.mesh = self.image = None
             self.done.set()
+
+    def held_bytes(self) -> int:
+        """Return an estimate of the memory that the pair takes, or its result."""
+        if not self.done.is_set():
+            return self.estimate
+        native = self.result._native if isinstance(self.result, Alignment) else None
+        return 0 if native is None else native.held_bytes()
 
 
 def _next(pairs: Iterator[Any]) -> _Work | None:
@@ -105,23 +111,27 @@ def _next(pairs: Iterator[Any]) -> _Work | None:
     return None
 
 
-def _size(value: Any) -> int:
-    if isinstance(value, (str, os.PathLike)):
-        try:
-            return os.stat(value).st_size
-        except OSError:
-            return 0
-    if isinstance(value, Mesh):
-        vertices, faces = value._native.counts()
-        return 24 * vertices + 12 * faces
-    if isinstance(value, Print):
-        width, height = value.size
-        return 6 * width * height
-    return int(getattr(value, "nbytes", 0))
+def _estimate(mesh: Any, image: Any, chosen: Settings) -> int:
+    """Return an estimate of the memory that a pair needs while it is aligned, as a run of a project estimates it."""
+    files = [os.fspath(one) if isinstance(one, (str, os.PathLike)) else None for one in (mesh, image)]
+    counts = mesh._native.counts() if isinstance(mesh, Mesh) else (0, 0)
+    # A path has no pixels; what is neither is refused when it is aligned.
+    width, height = image.size if isinstance(image, Print) else _array_size(image)
+    return _rust.pair_bytes(files[0], counts, files[1], width * height, chosen._native)
+
+
+def _array_size(image: Any) -> tuple[int, int]:
+    """Return width and height of an array, or of an image of PIL."""
+    shape = getattr(image, "shape", None) or getattr(image, "size", None)
+    if shape is None and isinstance(image, (list, tuple)) and image and isinstance(image[0], (list, tuple)):
+        shape = (len(image), len(image[0]))
+    if not isinstance(shape, tuple) or len(shape) < 2:
+        return 0, 0
+    return int(shape[0]), int(shape[1])
 
 
 def _results(
-    pairs: Iterator[Any], threads: int, max_bytes: int | None, options: dict[str, Any]
+    pairs: Iterator[Any], threads: int, max_bytes: int | None, names: tuple[str, ...] | None, chosen: Settings
 ) -> Iterator[tuple[Any, Alignment | Error]]:
     import queue
 
@@ -130,9 +140,10 @@ def _results(
     def worker() -> None:
         while (work := todo.get()) is not None:
             if not stopped:
-                work.run(options)
+                work.run(names, chosen, cancel)
 
     stopped = False
+    cancel = _rust.NativeCancel()
     pool: list[threading.Thread] = []
     waiting: list[_Work] = []
     held: _Work | None = None
@@ -149,9 +160,12 @@ def _results(
                     if held is None:
                         more = False
                         break
-                in_process = sum(work.bytes for work in waiting if not work.done.is_set())
-                if max_bytes is not None and in_process and in_process + held.bytes > max_bytes:
-                    break
+                    if max_bytes is not None:
+                        held.estimate = _estimate(held.mesh, held.image, chosen)
+                if max_bytes is not None:
+                    taken = sum(work.held_bytes() for work in waiting)
+                    if taken and taken + held.estimate > max_bytes:
+                        break
                 if len(pool) < threads:
                     pool.append(threading.Thread(target=worker, name="mocban align_many", daemon=True))
                     pool[-1].start()
@@ -168,9 +182,14 @@ def _results(
                 pass
             if first.failure is not None:
                 raise first.failure
-            assert first.result is not None
-            yield first.key, first.result
+            key, result = first.key, first.result
+            assert result is not None
+            # The caller decides how long the result stays in memory.
+            del first
+            yield key, result
+            del result
     finally:
         stopped = True
+        cancel.cancel()
         for _ in pool:
             todo.put(None)

@@ -5,27 +5,46 @@ from numpy import bool_, float32, float64, uint8, uint16, uint32
 from numpy.typing import NDArray
 
 __all__ = [
+    "HAS_FAILPOINTS",
     "NativeAlignment",
+    "NativeCancel",
     "NativeMesh",
     "NativePrint",
     "NativeProject",
     "NativeSettings",
     "__version__",
     "align_pair",
+    "available_threads",
     "depth_map",
     "fit_surface",
     "forked",
+    "pair_bytes",
     "read_mesh",
     "read_print",
 ]
 
 __version__: str
+HAS_FAILPOINTS: bool
 
+def available_threads() -> int: ...
+def pair_bytes(
+    mesh: str | None,
+    counts: tuple[int, int],
+    print: str | None,
+    pixels: int,
+    settings: NativeSettings,
+) -> int: ...
 def forked() -> None: ...
-def read_mesh(path: str, unit_name: str | None, settings: NativeSettings) -> NativeMesh: ...
-def read_print(path: str, settings: NativeSettings) -> NativePrint: ...
+def read_mesh(
+    path: str, unit_name: str | None, settings: NativeSettings, cancel: NativeCancel | None
+) -> NativeMesh: ...
+def read_print(path: str, settings: NativeSettings, cancel: NativeCancel | None) -> NativePrint: ...
 def align_pair(
-    mesh: NativeMesh, print: NativePrint, settings: NativeSettings, scanned_face_down: bool | None
+    mesh: NativeMesh,
+    print: NativePrint,
+    settings: NativeSettings,
+    scanned_face_down: bool | None,
+    cancel: NativeCancel | None,
 ) -> tuple[NativeAlignment | None, tuple[str, str, bool] | None]: ...
 def fit_surface(
     mesh: NativeMesh, print: NativePrint | None, settings: NativeSettings, scanned_face_down: bool | None
@@ -33,6 +52,11 @@ def fit_surface(
 def depth_map(
     mesh: NativeMesh, surface: str, settings: NativeSettings
 ) -> tuple[int, int, NDArray[uint16], str]: ...
+@final
+class NativeCancel:
+    def __new__(cls) -> NativeCancel: ...
+    def cancel(self) -> None: ...
+
 @final
 class NativeMesh:
     path: Any
@@ -52,18 +76,20 @@ class NativeMesh:
 @final
 class NativePrint:
     path: Any
+    size: tuple[int, int]
+    warning: str | None
+    dpi: tuple[float, float] | None
     def __new__(
         cls, eight: NDArray[uint8] | None, sixteen: NDArray[uint16] | None, width: int, height: int, channels: int
     ) -> NativePrint: ...
-    def size(self) -> tuple[int, int]: ...
     def rgb8(self) -> NDArray[uint8]: ...
     def rgb16(self) -> NDArray[uint16]: ...
-    def warnings(self) -> list[str]: ...
     def ink(self) -> NDArray[bool_]: ...
 
 @final
 class NativeSettings:
     json: str
+    max_pixels: int
     def __new__(cls, preset: str, sets: list[str]) -> NativeSettings: ...
 
 @final
@@ -74,6 +100,7 @@ class NativeAlignment:
     def outcomes(self) -> str: ...
     def print_from_mesh(self, metric: str) -> list[list[float]]: ...
     def levels(self) -> tuple[int, int, NDArray[uint16]]: ...
+    def held_bytes(self) -> int: ...
     def print_size(self) -> tuple[int, int]: ...
     def print_mask(self) -> NDArray[bool_]: ...
     def mask(self, metric: str) -> NDArray[bool_]: ...

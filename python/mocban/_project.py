@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from . import _native as _rust
 from ._alignment import METRICS, Alignment
 from ._blocks import BlockAlignment
-from ._errors import Cancelled, Error, InputError, ReadOnlyProject
+from ._errors import Cancelled, InputError, ReadOnlyProject
 from ._frozen import Frozen
 from ._inputs import Print, read_print
 
@@ -95,7 +95,7 @@ class Pair(Frozen):
     def mask(self, metric: str | None = None) -> NDArray[np.bool_]:
         """Return the strokes of a metric in the frame of the print; of the one that is shown first by default."""
         results = self.alignment.results
-        metric = metric or self.alignment._first
+        metric = self.alignment._first if metric is None else metric
         if metric is None or metric not in results:
             raise InputError(f"there is no metric {metric!r}, only {', '.join(results)}", "usage")
         return results[metric].aligned_mask()
@@ -170,14 +170,19 @@ class Project:
     ) -> None:
         return None
 
+    def _key(self) -> tuple[Path, str | None, bool]:
+        return (self._folder, self._catalog, self._readonly)
+
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Project) and self.__reduce__() == other.__reduce__()
+        return isinstance(other, Project) and self._key() == other._key()
 
     def __hash__(self) -> int:
-        return hash(self.__reduce__())
+        return hash(self._key())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Project, (self._folder, self._catalog, self._readonly)
+        if self._temporary is not None:
+            raise TypeError("the project is in a temporary folder; give align_block a folder to pickle what it returns")
+        return Project, self._key()
 
     def __repr__(self) -> str:
         return f"<mocban.Project {self._catalog or self._folder}{', read-only' if self._readonly else ''}>"
@@ -309,6 +314,8 @@ class Project:
         ------
         StaleResult
             If the current result is not ``expect``. Nothing is recorded.
+        InputError
+            If an argument is none of these words, or cannot be recorded.
         ReadOnlyProject
             If the project was opened for reading.
         """
@@ -331,7 +338,7 @@ class Project:
         rows : iterable of mappings, or a data frame of pandas, polars or pyarrow
             With the columns ``id``, ``mesh`` and ``print``; optional ``character``, ``block``, ``unit`` and
             ``scanned_face_down``; others are kept, as text if JSON has no such type. Paths are relative to the working
-            directory. None and NaN are left out. Messages call the first row line 1.
+            directory. None, NaN, NA and NaT are left out. Messages call the first row line 1.
         allow_missing : bool
             Whether files may be missing.
         allow_changed_files : bool
@@ -385,6 +392,11 @@ class Project:
         -------
         dict
             Numbers ``added`` and ``unchanged``, and ids ``changed``.
+
+        Raises
+        ------
+        InputNotFound
+            If a file is not there. Nothing is imported.
         """
         boxes = None if labels is None else os.fspath(labels)
         return json.loads(self._writable().import_block(os.fspath(mesh), os.fspath(page), boxes, id, unit, side))
@@ -430,7 +442,7 @@ class Project:
             raise InputError(f"workers is {workers}; give a number of at least 1", "usage")
         names = [] if ids is None else [ids] if isinstance(ids, str) else list(ids)
         if ids is not None and not names:
-            raise Error("ids is empty; leave it out to run all pairs", "nothing_selected")
+            raise InputError("ids is empty; leave it out to run all pairs", "nothing_selected")
 
         def heard(event: str) -> None:
             assert progress is not None
@@ -496,10 +508,17 @@ def _row(row: Any, line: int) -> dict[str, Any]:
             value = value.item()
         if isinstance(value, os.PathLike):
             value = os.fspath(value)
-        if value is None or (isinstance(value, float) and math.isnan(value)):
+        if _is_missing(value):
             continue
         values[str(name)] = str(value) if name == "id" else value
     return values
+
+
+def _is_missing(value: Any) -> bool:
+    """Return whether a value is None, NaN, or pandas' NA or NaT, which cannot all be compared."""
+    if isinstance(value, float):
+        return math.isnan(value)
+    return value is None or type(value).__name__ in ("NAType", "NaTType")
 
 
 def open(

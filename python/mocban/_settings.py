@@ -137,7 +137,16 @@ def settings(preset: str = "default", **changes: Any) -> Settings:
         if "." not in name:
             text = f"{name} is not of the form section__key, such as depth__longest_px"
             raise SettingsError(text, "settings")
-    return Settings(preset, tuple(flat))
+    if flat:
+        return Settings(preset, tuple(flat))
+    # Parsing the settings takes as long as a few percent of an alignment.
+    if preset not in _PRESETS:
+        _PRESETS[preset] = Settings(preset)
+    return _PRESETS[preset]
+
+
+#: Presets without changes that were used.
+_PRESETS: Final[dict[str, Settings]] = {}
 
 
 def settings_of(chosen: Settings | str | None) -> Settings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import pickle
@@ -109,6 +110,14 @@ def test_results_are_frozen_values(pair: DemoPair) -> None:
     copied = pickle.loads(pickle.dumps(found))
     assert copied == found and hash(copied) == hash(found) and repr(copied) == repr(found)
     assert copied.results["density"].aligned_mask().sum() == found.results["density"].aligned_mask().sum()
+    results = pickle.loads(pickle.dumps(found.results))
+    assert results == found.results and list(results) == list(found.results)
+    assert (results["relief"].mask() == found.results["relief"].mask()).all()
+    assert found.results["relief"] != other.results["relief"] and found.results != other.results
+    for name in ("nl_ssim", "iou_box"):
+        changed = copy.copy(found.results["relief"])
+        object.__setattr__(changed, name, 0.125)
+        assert changed != found.results["relief"], name
     result = pickle.loads(pickle.dumps(found.results["relief"]))
     assert result == found.results["relief"] and (result.mask() == found.results["relief"].mask()).all()
     with pytest.raises(AttributeError):
@@ -126,6 +135,10 @@ def test_chosen_metrics_alone_are_kept(pair: DemoPair) -> None:
     assert pickle.loads(pickle.dumps(found)) == found
     with pytest.raises(mocban.Error, match="no metric 'relif'"):
         mocban.align(pair.mesh, pair.print, metrics=["relif"])
+    for wrong in (lambda: found.overlay("nope"), lambda: found.overlay("")):
+        with pytest.raises(mocban.InputError, match="no result of the metric") as error:
+            wrong()
+        assert error.value.code == "usage"
     paper = mocban.align(pair.mesh, pair.print, settings=mocban.settings("paper"))
     assert list(paper.results) == ["nl_ssim", "density", "ensemble"] and paper.confidence is None
     assert "not known" in repr(paper)
@@ -138,6 +151,7 @@ def test_a_refusal_is_a_result_unless_strict(pair: DemoPair, tmp_path: Path) -> 
     assert found.status == "refused" and found.results == {} and found.confidence is None
     assert found.refusal.code == "bad_input" and found.refusal.message.startswith("the print: ")
     assert pickle.loads(pickle.dumps(found)) == found and hash(found) == hash(mocban.align(pair.mesh, blank))
+    assert pickle.loads(pickle.dumps(found.results)) == {}
     assert "refused" in repr(found) and "refused" in found._repr_html_()
     with pytest.raises(mocban.Refused) as error:
         mocban.align(pair.mesh, blank, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import pickle
 from pathlib import Path
 
@@ -58,11 +59,14 @@ def test_arrays_give_the_result_of_their_files(aligned: mocban.BlockAlignment, b
         )
         assert np.array_equal(one.page_from_mesh, other.page_from_mesh)
         assert one.alignment == other.alignment
-    with pytest.raises(TypeError, match="temporary folder"):
-        pickle.dumps(found)
+    pair = found.project.pair(found.characters[0].pair)
+    for value in (found, found.characters[0], found.characters, found.project, pair):
+        with pytest.raises(TypeError, match="temporary folder"):
+            pickle.dumps(value)
+    assert pickle.loads(pickle.dumps(aligned.characters)) == aligned.characters
     folder = found.project.folder
     assert folder.exists()
-    del found, one
+    del found, one, pair, value
     assert not folder.exists()
 
 
@@ -73,8 +77,20 @@ def test_a_character_keeps_the_temporary_project(block: Path) -> None:
 
 
 def test_wrong_files_are_named(block: Path, demo: Path, tmp_path: Path) -> None:
-    with pytest.raises(mocban.ProjectError, match="no.ply"):
-        mocban.align_block(tmp_path / "no.ply", block / "page.jpg")
+    files = {"mesh": block / "block.ply", "page": block / "page.jpg", "labels": block / "labels.json"}
+    project = mocban.Project.create(tmp_path / "new")
+    for name in files:
+        wrong = files | {name: tmp_path / "no.ply"}
+        for call in (mocban.align_block, project.import_block):
+            with pytest.raises(mocban.InputNotFound, match=f"no.ply is not there; give the file of the {name}") as error:
+                call(**wrong)
+            assert (error.value.code, error.value.errno) == ("not_found", errno.ENOENT)
+            assert error.value.path == error.value.filename == str(tmp_path / "no.ply")
+    assert not (tmp_path / "new").exists()
+    with pytest.raises(mocban.UnitError):
+        project.import_block(files["mesh"], files["page"], unit="inch")
+    with pytest.raises(mocban.InputError):
+        project.import_block(files["mesh"], files["page"], side="left")
     other = tmp_path / "other"
     other.mkdir()
     (other / "notes.txt").touch()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import doctest
 import importlib
+import importlib.util
 import io
 import json
 import os
@@ -61,6 +62,8 @@ def test_arrays_of_trimesh_are_aligned(folder: Path) -> None:
 def test_a_folder_is_aligned(folder: Path) -> None:
     data = folder / "demo" / "data"
     assert "4 of 4 pairs are aligned" in run(folder, "align_folder.py", str(data / "meshes"), str(data / "prints"))
+    drawn = importlib.util.find_spec("matplotlib") is not None
+    assert (folder / "confidence.png").exists() == drawn
 
 
 def test_doubtful_pairs_are_judged(folder: Path) -> None:

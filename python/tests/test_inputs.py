@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import pickle
 from pathlib import Path
+from typing import Any
 
 import mocban
 import numpy as np
@@ -144,6 +146,42 @@ def test_images_of_pil_have_the_meaning_of_their_mode() -> None:
     assert mocban.Print(image.new("RGB", (4, 4), "white")).image.min() == 255
 
 
+def test_the_resolution_of_a_file_is_read(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    picture = image.new("RGB", (12, 8), "white")
+
+    def exif(orientation: int, dpi: tuple[float, float] | None = None) -> Any:
+        block = image.Exif()
+        block[274] = orientation
+        if dpi is not None:
+            block[282], block[283], block[296] = dpi[0], dpi[1], 2
+        return block
+
+    stated = (300, 600)
+    saved: list[tuple[str, dict[str, Any], tuple[float, float] | None]] = [
+        ("a.png", {"dpi": stated}, stated),
+        ("b.png", {"exif": exif(1, stated)}, stated),
+        ("c.png", {"dpi": stated, "exif": exif(6)}, stated[::-1]),
+        ("a.jpg", {"dpi": stated}, stated),
+        ("b.jpg", {"exif": exif(1, stated)}, stated),
+        ("c.jpg", {"dpi": stated, "exif": exif(8)}, stated[::-1]),
+        ("a.tif", {"dpi": stated}, stated),
+        ("b.tif", {"resolution_unit": "cm", "x_resolution": 100, "y_resolution": 200}, (254, 508)),
+        ("c.tif", {"dpi": stated, "exif": exif(5)}, stated[::-1]),
+        ("d.png", {}, None),
+        ("d.jpg", {}, None),
+        ("d.tif", {}, None),
+    ]
+    for name, options, expected in saved:
+        picture.save(tmp_path / name, **options)
+        read = mocban.read_print(tmp_path / name)
+        assert read.size == ((8, 12) if name.startswith("c") else (12, 8))
+        assert read.dpi == (None if expected is None else pytest.approx(expected, rel=1e-4)), name
+        plain = mocban.Print(read.image)
+        assert plain.dpi is None and plain == read and hash(plain) == hash(read)
+        assert pickle.loads(pickle.dumps(read)) == read
+
+
 def test_files_are_refused_by_kind(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     folder = tmp_path / "thư mục"
     folder.mkdir()
@@ -157,6 +195,9 @@ def test_files_are_refused_by_kind(tmp_path: Path, caplog: pytest.LogCaptureFixt
         with pytest.raises(FileNotFoundError, match="missing.stl") as missing:
             read(str(folder / "missing.stl"))
         assert isinstance(missing.value, mocban.InputError) and missing.value.code == "not_found"
+        path = str(folder / "missing.stl")
+        assert (missing.value.errno, missing.value.filename) == (errno.ENOENT, path)
+        assert pickle.loads(pickle.dumps(missing.value)).errno == errno.ENOENT
         with pytest.raises(mocban.InputError) as directory:
             read(folder)
         assert directory.value.code == "unreadable"

@@ -8,10 +8,13 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import mocban
+import numpy as np
 import pytest
+from mocban import _many, _native
 
 from conftest import DemoPair
 
@@ -76,6 +79,80 @@ def test_other_exceptions_end_the_iteration(pair: DemoPair) -> None:
     assert list(mocban.align_many([])) == []
 
 
+class NoticedPath(os.PathLike):
+    """A path that tells when it is read, which `align_many` does on its threads."""
+
+    def __init__(self, path: Path, read: threading.Event) -> None:
+        self.path, self.read = path, read
+
+    def __fspath__(self) -> str:
+        self.read.set()
+        return str(self.path)
+
+
+def test_closing_stops_the_pairs_in_process(pair: DemoPair, tmp_path: Path) -> None:
+    # A pair takes many seconds with this setting.
+    large = mocban.settings(depth__longest_px=8192)
+    begun = threading.Event()
+    todo = [("missing", tmp_path / "no.stl", pair.print)]
+    todo += [(number, NoticedPath(pair.mesh, begun), pair.print) for number in range(3)]
+    results = mocban.align_many(todo, threads=2, settings=large)
+    assert next(results)[0] == "missing" and begun.wait(10)
+    closed = time.monotonic()
+    results.close()
+    for thread in threading.enumerate():
+        if thread.name == "mocban align_many":
+            thread.join(60)
+    assert time.monotonic() - closed < 1.0
+
+
+def test_memory_is_estimated_from_pixels_and_not_from_the_size_of_a_file(pair: DemoPair, tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    white, chosen = np.full((2000, 4000, 3), 255, dtype=np.uint8), mocban.settings()
+    file = tmp_path / "white.jpg"
+    image.fromarray(white).save(file)
+    assert file.stat().st_size < 1_000_000
+    pictures = (file, str(file), mocban.Print(white), white, image.fromarray(white))
+    estimates = [_many._estimate(pair.mesh, picture, chosen) for picture in pictures]
+    assert all(400e6 < estimate < 500e6 for estimate in estimates), estimates
+    mesh = mocban.read_mesh(pair.mesh)
+    nothing = _many._estimate(object(), [], chosen)
+    assert _many._estimate(mesh, [], chosen) - nothing > 24 * len(mesh.vertices)
+    assert _many._estimate(object(), [[0, 255]] * 3, chosen) - nothing == 6 * 50
+    large = mocban.settings(depth__longest_px=8192)
+    assert _many._estimate(object(), [], large) - nothing > 8000**2 * 20
+
+
+def test_results_that_wait_count_as_memory(pair: DemoPair) -> None:
+    work = _many._Work("a", pair.mesh, pair.print)
+    work.estimate = 7
+    assert work.held_bytes() == 7
+    work.run(None, mocban.settings(), _native.NativeCancel())
+    width, height = mocban.read_print(pair.print).size
+    assert 6 * width * height < work.held_bytes() < 50e6
+    yielded = 0
+
+    def counted():
+        for number in range(4):
+            assert number <= yielded + 1, "one pair is in memory, and one was looked at"
+            yield number, pair.mesh, pair.print
+
+    for key, _ in mocban.align_many(counted(), threads=2, max_bytes=1):
+        assert key == yielded
+        yielded += 1
+    assert yielded == 4
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no affinity")
+def test_threads_are_those_that_the_process_may_use() -> None:
+    allowed = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {min(allowed)})
+        assert _native.available_threads() == 1
+    finally:
+        os.sched_setaffinity(0, allowed)
+
+
 def confidence(mesh: str, image: str) -> float:
     return mocban.align(mesh, image).confidence
 
@@ -106,6 +183,33 @@ def test_work_after_a_fork_is_refused_and_a_fork_before_any_work_is_not(pair: De
     for state, expected in (("used", "forked True"), ("fresh", "aligned")):
         command = [sys.executable, "-c", script, pair.mesh, pair.print, state]
         assert subprocess.check_output(command, text=True, timeout=60).strip() == expected
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+def test_attributes_of_a_print_wait_for_no_lock_after_a_fork() -> None:
+    script = (
+        "import mocban, numpy, os, signal, threading, warnings\n"
+        "warnings.simplefilter('ignore')\n"
+        "image = mocban.Print(numpy.full((5000, 5000, 3), 255, dtype=numpy.uint8))\n"
+        "begun = threading.Event()\n"
+        # The thread holds the lock of the image while it is converted.
+        "def convert():\n"
+        "    begun.set()\n"
+        "    image.image16\n"
+        "thread = threading.Thread(target=convert)\n"
+        "thread.start()\n"
+        "begun.wait()\n"
+        "for _ in range(5):\n"
+        "    child = os.fork()\n"
+        "    if child == 0:\n"
+        "        signal.alarm(10)\n"
+        "        print(image.size, image.warnings, image.dpi, flush=True)\n"
+        "        os._exit(0)\n"
+        "    os.waitpid(child, 0)\n"
+        "thread.join()\n"
+    )
+    output = subprocess.check_output([sys.executable, "-c", script], text=True, timeout=60)
+    assert output == "(5000, 5000) () None\n" * 5
 
 
 def test_memory_does_not_grow(pair: DemoPair) -> None:

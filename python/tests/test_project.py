@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import datetime
+import errno
 import json
 import pickle
 import shutil
+import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 
@@ -90,7 +93,7 @@ def test_verdicts_have_the_rules_of_the_command_line(copied: Path, pair: DemoPai
     assert stale.value.code == "stale_result"
     for arguments in ({"verdict": "good"}, {"metric": "relif"}, {"reason": "ugly"}, {"expect": "x"}, {"reviewer": ""}):
         wrong = {"metric": "relief", "verdict": "fail", "reviewer": "Lan"} | arguments
-        with pytest.raises(mocban.ProjectError) as error:
+        with pytest.raises(mocban.InputError) as error:
             project.add_verdict(pair.id, **wrong)
         assert error.value.code == "usage", arguments
     assert project.verdicts() == log
@@ -103,6 +106,7 @@ def test_verdicts_have_the_rules_of_the_command_line(copied: Path, pair: DemoPai
         with pytest.raises(PermissionError, match="readonly=False") as refused:
             write()
         assert isinstance(refused.value, mocban.ReadOnlyProject)
+        assert (refused.value.errno, refused.value.filename) == (errno.EACCES, str(copied))
 
 
 def test_rows_are_imported_and_run_with_progress(pairs: list[DemoPair], tmp_path: Path) -> None:
@@ -147,13 +151,30 @@ def test_rows_are_imported_and_run_with_progress(pairs: list[DemoPair], tmp_path
     assert (tmp_path / "out" / "jsonl" / "pairs.jsonl").exists()
 
 
-@pytest.mark.parametrize("module", ["pyarrow", "polars"])
+@pytest.mark.parametrize("module", ["pyarrow", "polars", "pandas"])
 def test_data_frames_are_imported(module: str, pair: DemoPair, tmp_path: Path) -> None:
     frames = pytest.importorskip(module)
-    columns = {"id": [7], "mesh": [str(pair.mesh)], "print": [str(pair.print)], "unit": [None]}
+    columns = {"id": [7], "mesh": [str(pair.mesh)], "print": [str(pair.print)], "unit": [None], "page": [12]}
     frame = frames.table(columns) if module == "pyarrow" else frames.DataFrame(columns)
     project = mocban.Project.create(tmp_path / "new")
     assert project.import_pairs(frame)["added"] == 1 and project.pair("7").files["mesh"] == pair.mesh
+    assert project.pair("7").meta == {"page": 12}
+
+
+def test_missing_values_of_pandas_are_left_out(pairs: list[DemoPair], tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    first, second = pairs[:2]
+    frame = pandas.DataFrame({"id": ["a", "b"], "mesh": [first.mesh, second.mesh], "print": [first.print, second.print]})
+    frame["unit"] = pandas.array(["mm", None], dtype="string")
+    frame["scanned_face_down"] = pandas.array([None, True], dtype="boolean")
+    frame["count"] = pandas.array([3, None], dtype="Int64")
+    frame["when"] = pandas.to_datetime(["2020-01-02", None])
+    project = mocban.Project.create(tmp_path / "new")
+    assert project.import_pairs(frame)["added"] == 2
+    a, b = project.pair("a"), project.pair("b")
+    assert a.meta == {"count": 3, "when": "2020-01-02 00:00:00"} and b.meta == {}
+    assert (a._detail["unit"], b._detail["unit"]) == ("mm", None)
+    assert (a._detail["scanned_face_down"], b._detail["scanned_face_down"]) == (None, True)
 
 
 def test_wrong_arguments_have_a_sentence(demo: Path, tmp_path: Path) -> None:
@@ -167,7 +188,12 @@ def test_wrong_arguments_have_a_sentence(demo: Path, tmp_path: Path) -> None:
         ("where is no expression", lambda: project.pairs(where="iou > 0.9")),
         ("no metric 'nope'", lambda: project.pairs(metric="nope")),
         ("no metric 'nope'", lambda: pair.mask("nope")),
+        ("no result of the metric nope", lambda: pair.overlay("nope")),
         ("formats is empty", lambda: project.export(tmp_path / "e", [])),
+        ("nope", lambda: project.export(tmp_path / "e", ["nope"])),
+        ("nope", lambda: project.export(tmp_path / "e", metrics=["nope"])),
+        ("nope", lambda: project.export(tmp_path / "e", only="nope")),
+        ("ids is empty", lambda: mocban.open(demo, readonly=False).run(ids=[])),
         ("the rows are a str", lambda: new.import_pairs("rows.csv")),
         ("the rows are a dict", lambda: new.import_pairs({"id": "a"})),
         ("line 1 of the rows is a int", lambda: new.import_pairs([1])),
@@ -186,9 +212,18 @@ def test_wrong_arguments_have_a_sentence(demo: Path, tmp_path: Path) -> None:
         new.import_pairs([{"id": "b", "mesh": "", "print": "x.png"}])
 
 
+def test_a_result_of_an_unknown_ink_is_damaged(copied: Path, pair: DemoPair) -> None:
+    with contextlib.closing(sqlite3.connect(copied / "catalog.sqlite")) as catalog, catalog:
+        catalog.execute("UPDATE stage_result SET outcome = json_set(outcome, '$.ink', 9) WHERE outcome ->> '$.ink' >= 0")
+    with pytest.raises(mocban.ProjectError, match="interpretation 9 of the print") as error:
+        mocban.open(copied).pair(pair.id).alignment
+    assert error.value.code == "damaged"
+
+
 def test_folders_that_are_no_project_are_refused(demo: Path, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError) as missing:
         mocban.open(tmp_path)
+    assert (missing.value.errno, missing.value.filename) == (errno.ENOENT, str(tmp_path))
     assert isinstance(missing.value, mocban.NotAProject) and missing.value.code == "no_project"
     other = tmp_path / "other"
     other.mkdir()

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import os
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import mocban
 
+GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "python.md"
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "python.md"
 
 
@@ -50,6 +53,29 @@ def test_the_page_is_that_of_the_docstrings() -> None:
     if os.environ.get("MOCBAN_UPDATE_DOCS") == "1":
         PAGE.write_text(page(), encoding="utf-8")
     assert PAGE.read_text(encoding="utf-8") == page()
+
+
+def codes() -> Iterator[str]:
+    """Return all values of ``code``, from the sources of the package and the names of the codes of the libraries."""
+    names = {name for name in mocban.__all__ if isinstance(getattr(mocban, name), type)}
+    names = {name for name in names if issubclass(getattr(mocban, name), mocban.Error)} | {"error"}
+    for file in Path(mocban.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names:
+                if len(node.args) > 1 and isinstance(node.args[1], ast.Constant):
+                    yield node.args[1].value
+    root = Path(__file__).parents[2] / "crates"
+    for file in (root / "python" / "src").glob("*.rs"):
+        yield from re.findall(r'raise\(\s*py,\s*"?\w+"?,\s*"(\w+)"', file.read_text(encoding="utf-8"))
+    for name in ("explained", "failure"):
+        enum = (root / "core" / "src" / "domain" / f"{name}.rs").read_text(encoding="utf-8")
+        yield from re.findall(r'[A-Z]\w+ = "(\w+)"', enum)
+
+
+def test_the_guide_has_all_codes_of_exceptions() -> None:
+    rows = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|", GUIDE.read_text(encoding="utf-8"), re.MULTILINE)
+    listed = [code for row in rows for code in re.findall(r"`(\w+)`", row)]
+    assert sorted(listed) == sorted(set(codes()))
 
 
 def test_everything_public_is_described() -> None:

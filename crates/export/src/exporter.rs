@@ -24,8 +24,10 @@ use super::readme;
 use super::record::ManualAlignmentFields;
 use super::split::{SplitCounts, SplitPlan};
 use mocban_catalog::{Catalog, CatalogError, CutOrigin, PairResults, SetApart, StoredAlignment};
+use mocban_core::domain::cancel::{ThreadToken, poll};
 use mocban_core::domain::{BlockName, PairName};
 use mocban_store::{Project, create_folders};
+use mocban_system::failpoint::{self, Point};
 
 /// Pairs whose rows are in memory at a time.
 const PAGE: usize = 32;
@@ -70,8 +72,8 @@ impl ExportSummary {
 ///
 /// # Errors
 /// Returns an error if the folder cannot be written, the catalog or the place of the artifacts cannot be read, or a worker
-/// task panics. If the error
-/// occurs before the earlier export is replaced, that export is kept.
+/// task panics. If the error occurs before the earlier export is replaced, or the future is dropped before, that export is
+/// kept. Each few pairs poll for a cancellation.
 pub async fn export(
     catalog: &Catalog,
     project: &Project,
@@ -106,7 +108,8 @@ pub async fn export(
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
         let page = ExportedPage::read(catalog, page).await?;
-        let task = move || run.add_page(page).map(|()| run);
+        let token = ThreadToken::current();
+        let task = move || token.scope(|| run.add_page(page).map(|()| run));
         run = tokio::task::spawn_blocking(task).await??;
     }
     run.write_unpaired(catalog, project).await?;
@@ -213,6 +216,7 @@ impl ExportRun {
             })
             .collect();
         for pairs in pairs.chunks(ENCODED_PER_CORE * rayon::current_num_threads()) {
+            poll();
             let writer = PairWriter {
                 project: &self.project,
                 root: self.folder.path(),
@@ -229,7 +233,11 @@ impl ExportRun {
             for pair in written? {
                 match pair {
                     None => self.summary.pairs.left_out += 1,
-                    Some(pair) => self.append(pair)?,
+                    Some(pair) => {
+                        let name = pair.record.pair.id.clone();
+                        self.append(pair)?;
+                        failpoint::hit("export", Point::Written, Some(&name));
+                    }
                 }
             }
         }

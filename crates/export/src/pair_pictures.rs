@@ -296,9 +296,7 @@ impl<'a> PairPictures<'a> {
 /// stored.
 pub(super) fn canvas_from_print(outcomes: &StageOutcomes, side: u32) -> Option<Affine2> {
     let scale = f64::from(side) / f64::from(outcomes.normalize.canvas_px);
-    // Pixel centres are integers, so both canvases share the corner (-0.5, -0.5).
-    let resize = Affine2::scale_shift(scale, [(scale - 1.0) / 2.0; 2]);
-    Some(resize.after(&outcomes.ink()?.canvas_from_print))
+    Some(Affine2::resize(scale).after(&outcomes.ink()?.canvas_from_print))
 }
 
 /// Returns the value of a cell, which is read when it is first needed.

@@ -63,7 +63,7 @@ fn align_files(
         read_scan(&files.mesh, limits)?,
         read_print(&files.print, limits)?,
     ) {
-        (Ok(scan), Ok(print)) => (scan, print),
+        (Ok(scan), Ok(read)) => (scan, read.print),
         (Err(failure), _) | (_, Err(failure)) => return Ok(FileAlignment::Refused(failure)),
     };
     let named = |failure: AlignFailure| {
@@ -145,14 +145,30 @@ pub fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failu
     }
 }
 
+/// A print and what its file says about it.
+#[derive(Debug)]
+pub struct ReadPrint {
+    /// The print.
+    pub print: Print,
+    /// Pixels per inch of the upright image, from left to right and from top to bottom.
+    pub dpi: Option<[f64; 2]>,
+}
+
 /// Reads a print. The inner error is that of its content.
-pub fn read_print(path: &Path, limits: &InputLimits) -> Result<Result<Print, Failure>, Refusal> {
+pub fn read_print(
+    path: &Path,
+    limits: &InputLimits,
+) -> Result<Result<ReadPrint, Failure>, Refusal> {
     let input = Input::file(in_existing_form(path));
     let read = read_input(&input, limits.image.max_bytes, "limits.image.max_bytes");
     let file = read.map_err(|error| unreadable(&error))?;
     let decoded = raster::decode(&file.bytes, &limits.image);
+    let read = |image: raster::PrintImage| ReadPrint {
+        print: image.into(),
+        dpi: raster::stated_dpi(&file.bytes),
+    };
     Ok(decoded
-        .map(Print::from)
+        .map(read)
         .map_err(|error| Failure::new(error.class(), format!("{}: {error}", path.display()))))
 }
 

@@ -17,6 +17,7 @@ use crate::new_project::import_with;
 use crate::row_spool::RowSpool;
 use crate::truth_file::{self, TruthRow};
 use mocban_catalog::{Catalog, ImportRow, ImportSummary, ImportTerms};
+use mocban_core::domain::cancel::{ThreadToken, poll};
 use mocban_core::domain::{LengthUnit, PairName};
 use mocban_lists::manifest::{ManifestRow, RowIds};
 use mocban_store::Project;
@@ -86,7 +87,8 @@ pub struct ImportOutcome {
     pub renamed: Option<String>,
 }
 
-/// Imports pairs. If the import fails, no pair is imported.
+/// Imports pairs. If the import fails, or its future is dropped, no pair is imported. Looking at the files polls for a
+/// cancellation.
 pub async fn import_pairs(
     import: PairImport,
     location: &Location,
@@ -105,7 +107,10 @@ pub async fn import_pairs(
     let truths = stored_truths(truths, &project)?;
     // The files are looked at before the catalog is locked, because a disk may be slow and a list long.
     let looked_at = project.clone();
-    let spooled = tokio::task::spawn_blocking(move || spool(&listing, &looked_at, import.allowed));
+    let token = ThreadToken::current();
+    let spooled = tokio::task::spawn_blocking(move || {
+        token.scope(|| spool(&listing, &looked_at, import.allowed))
+    });
     let (rows, missing) = spooled.await.map_err(TaskStopped)??;
     let (rows, terms) = (
         Arc::new(Mutex::new(rows)),
@@ -160,6 +165,7 @@ fn spool(
     let mut missing = MissingFiles::default();
     let mut outcome = Ok(());
     listing.rows(project, |row, lines| {
+        poll();
         failpoint::hit("import", Point::Computed, Some(&row.name));
         for line in lines {
             missing.add(line);

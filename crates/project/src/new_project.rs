@@ -32,21 +32,28 @@ pub fn check_new_folder(dir: &Path) -> Result<(), Refusal> {
     }
 }
 
-/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded; a new catalog on a
-/// server is created before.
+/// Folders that an import creates. They are removed when this is dropped, unless the import succeeded.
+struct NewFolders(Vec<PathBuf>);
+
+impl Drop for NewFolders {
+    fn drop(&mut self) {
+        // Fails, as it should, if another process put something there.
+        let _ = self.0.iter().try_for_each(std::fs::remove_dir);
+    }
+}
+
+/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded, and not if the future
+/// is dropped before; a new catalog on a server is created before.
 pub async fn import_with<T>(
     project: &Project,
     url: Option<&str>,
     import: impl AsyncFn(&Catalog) -> ProjectResult<T>,
 ) -> ProjectResult<T> {
     check_new_folder(project.dir())?;
-    let missing_dirs = missing_dirs(project.dir());
-    let stored = store(project, url, import).await;
-    if stored.is_err() {
-        // Fails, as it should, if another process put something there.
-        let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
-    }
-    stored
+    let mut new_folders = NewFolders(missing_dirs(project.dir()));
+    let stored = store(project, url, import).await?;
+    new_folders.0.clear();
+    Ok(stored)
 }
 
 async fn store<T>(

@@ -29,7 +29,8 @@ impl RowSpool {
         self.0.write_all(b"\n")
     }
 
-    /// Sends all rows in chunks, then the end. After an error, the end is not sent, and the catalog imports nothing.
+    /// Sends all rows in chunks, then the end. After an error, the end is not sent, and the catalog imports nothing. Stops if
+    /// nobody receives: the catalog reports its error itself.
     pub(crate) fn send(&mut self, chunks: &mpsc::Sender<ImportChunk>) -> io::Result<()> {
         // Flushes, too.
         self.0.seek(SeekFrom::Start(0))?;
@@ -40,8 +41,10 @@ impl RowSpool {
             bytes += line.len();
             line.clear();
             if rows.len() == CHUNK_ROWS || bytes >= CHUNK_BYTES {
-                // The catalog stops receiving after an error, which it reports itself.
-                let _ = chunks.blocking_send(ImportChunk::Rows(std::mem::take(&mut rows)));
+                let chunk = ImportChunk::Rows(std::mem::take(&mut rows));
+                if chunks.blocking_send(chunk).is_err() {
+                    return Ok(());
+                }
                 bytes = 0;
             }
         }

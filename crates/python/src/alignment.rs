@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::json;
 
-use crate::compute::compute;
-use crate::failure::{project_failure, raise};
+use crate::compute::{NativeCancel, compute};
+use crate::failure::{project_failure, raise, wrong_argument};
 use crate::mesh::NativeMesh;
 use crate::print::NativePrint;
 use crate::settings::NativeSettings;
@@ -19,6 +19,7 @@ use mocban_core::domain::MetricOutcome;
 use mocban_core::raster::{Mask, compact_rgb8, warp_mask};
 use mocban_export::pictures::{PrintView, Rgb};
 use mocban_project::align::{self, AlignFailure};
+use mocban_system::failpoint::{self, Point};
 
 /// An aligned pair.
 #[pyclass(frozen, module = "mocban._native")]
@@ -37,7 +38,7 @@ impl NativeAlignment {
             .find(|(_, found)| found.metric.name() == metric)
             .ok_or_else(|| {
                 let text = format!("there is no result of the metric {metric}");
-                raise(py, "Error", "usage", &text, None)
+                wrong_argument(py, &text)
             })
     }
 
@@ -66,13 +67,8 @@ impl NativeAlignment {
     fn restored(py: Python<'_>, numbers: &str, images: &[u8]) -> PyResult<Self> {
         let restored = py.detach(|| state::restore(numbers, images));
         let (pair, print) = restored.ok_or_else(|| {
-            raise(
-                py,
-                "Error",
-                "usage",
-                "the pickled alignment is damaged",
-                None,
-            )
+            let text = "the pickled alignment is damaged";
+            raise(py, "InputError", "damaged", text, None)
         })?;
         Ok(Self {
             pair: Arc::new(pair),
@@ -113,6 +109,11 @@ impl NativeAlignment {
         )
     }
 
+    /// Estimates the memory that the alignment and its print take, in bytes.
+    fn held_bytes(&self) -> usize {
+        state::held_bytes(&self.pair, &self.print)
+    }
+
     /// Returns width and height of the print.
     fn print_size(&self) -> (usize, usize) {
         let rgb = &self.print.image().rgb;
@@ -148,8 +149,7 @@ impl NativeAlignment {
     ) -> PyResult<(usize, Bound<'py, PyArray1<u8>>)> {
         let (place, _) = self.outcome(py, metric)?;
         let map = self.pair.registered.stroke_maps.get(place);
-        let map =
-            map.ok_or_else(|| raise(py, "Error", "usage", "this method has no stroke maps", None))?;
+        let map = map.ok_or_else(|| wrong_argument(py, "this method has no stroke maps"))?;
         Ok((map.width(), PyArray1::from_slice(py, map.data())))
     }
 
@@ -175,7 +175,9 @@ impl NativeAlignment {
     /// Writes the files of `mocban align -o`. Returns a warning if earlier files could not be removed.
     fn save(&self, py: Python<'_>, dir: PathBuf) -> PyResult<Option<String>> {
         let (pair, print, folder) = (Arc::clone(&self.pair), Arc::clone(&self.print), dir.clone());
-        let written = compute(py, move || align::write_alignment(&folder, &pair, &print))?;
+        let written = compute(py, None, move || {
+            align::write_alignment(&folder, &pair, &print)
+        })?;
         let left = written.map_err(|error| project_failure(py, &error, &dir))?;
         Ok(left.map(|(path, error)| {
             let path = path.display();
@@ -195,6 +197,7 @@ pub(crate) fn align_pair(
     print: &NativePrint,
     settings: &NativeSettings,
     scanned_face_down: Option<bool>,
+    cancel: Option<&NativeCancel>,
 ) -> PyResult<(Option<NativeAlignment>, Option<RefusalParts>)> {
     let hints = ScanHints {
         unit: mesh.unit,
@@ -205,10 +208,11 @@ pub(crate) fn align_pair(
         print.image(),
         Arc::clone(&settings.stages),
     );
-    let found = compute(py, move || {
+    let found = compute(py, cancel, move || {
         let print = image();
-        let found = align::align_pair(&scan, &print, hints, &stages).map(state::needed);
-        found.map(|pair| (pair, print))
+        let pair = align::align_pair(&scan, &print, hints, &stages)?;
+        failpoint::hit("align", Point::Computed, None);
+        Ok((state::needed(pair), print))
     })?;
     Ok(match found {
         Ok((pair, print)) => {

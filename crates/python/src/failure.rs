@@ -21,6 +21,11 @@ pub(crate) fn raise(
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
+/// Makes the exception of an argument that cannot be used.
+pub(crate) fn wrong_argument(py: Python<'_>, text: &str) -> PyErr {
+    raise(py, "InputError", "usage", text, None)
+}
+
 /// Makes the exception of a file that cannot be opened or read.
 pub(crate) fn unreadable(py: Python<'_>, class: &str, error: &Refusal, path: &Path) -> PyErr {
     let text = error.to_string();

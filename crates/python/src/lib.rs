@@ -2,10 +2,10 @@
 //!
 //! - `compute.rs`: runs work without the GIL until it ends or Python gets a signal
 //! - `failure.rs`: raises the exceptions of `mocban._errors`
-//! - `mesh.rs`, `print.rs`, `settings.rs`: inputs, from arrays and files
+//! - `mesh.rs`, `print.rs`, `settings.rs`: inputs, from arrays and files; `memory.rs`: the memory that they need
 //! - `alignment.rs`: the result of a pair; `state.rs`: the same as bytes; `stages.rs`: single stages
 //! - `project.rs`: a project; `stored_pair.rs`: a pair of it; `stored_block.rs`: a block of it
-//! - `log.rs`: messages for Python's `logging`
+//! - `log.rs`: messages for Python's `logging`, also those of panics
 //!
 //! Classes here hold data and convert arrays of exactly one kind. The Python part checks and converts everything else, and
 //! has the documentation.
@@ -22,6 +22,7 @@ mod alignment;
 mod compute;
 mod failure;
 mod log;
+mod memory;
 mod mesh;
 mod print;
 mod project;
@@ -40,7 +41,9 @@ mod _native {
     #[pymodule_export]
     use super::alignment::{NativeAlignment, align_pair};
     #[pymodule_export]
-    use super::compute::forked;
+    use super::compute::{NativeCancel, forked};
+    #[pymodule_export]
+    use super::memory::{available_threads, pair_bytes};
     #[pymodule_export]
     use super::mesh::{NativeMesh, read_mesh};
     #[pymodule_export]
@@ -54,6 +57,8 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::log::install();
+        module.add("HAS_FAILPOINTS", cfg!(debug_assertions))?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

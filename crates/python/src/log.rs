@@ -1,4 +1,4 @@
-//! Log messages of the Rust libraries, which go to Python's `logging`.
+//! Log messages of the Rust libraries and messages of panics, which go to Python's `logging`.
 
 use std::collections::VecDeque;
 use std::fmt::{Debug, Write as _};
@@ -22,12 +22,24 @@ fn waiting() -> MutexGuard<'static, VecDeque<(u32, String)>> {
     WAITING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Receives the messages of this process from now on.
+/// Receives the messages of this process from now on. Panics print nothing any more.
 pub(crate) fn install() {
     INSTALL.call_once(|| {
         // Only this library is in the extension module.
         let _ = tracing::subscriber::set_global_default(MessageQueue(AtomicU64::new(1)));
+        std::panic::set_hook(Box::new(|panic| {
+            push(ERROR, panic.to_string().replace(":\n", ": "));
+        }));
     });
+}
+
+/// Adds a message; drops the oldest one if too many wait.
+fn push(level: u32, text: String) {
+    let mut waiting = waiting();
+    if waiting.len() == MAX_WAITING {
+        waiting.pop_front();
+    }
+    waiting.push_back((level, text));
 }
 
 /// Passes all messages that wait to the logger `mocban`.
@@ -41,6 +53,8 @@ pub(crate) fn forward(py: Python<'_>) -> PyResult<()> {
 
 /// Level of a warning in Python's `logging`.
 pub(crate) const WARNING: u32 = 30;
+/// Level of an error in Python's `logging`.
+const ERROR: u32 = 40;
 
 /// Passes messages with their levels to the logger `mocban`.
 pub(crate) fn write(
@@ -74,17 +88,13 @@ impl Subscriber for MessageQueue {
 
     fn event(&self, event: &Event<'_>) {
         let level = match *event.metadata().level() {
-            Level::ERROR => 40,
-            Level::WARN => 30,
+            Level::ERROR => ERROR,
+            Level::WARN => WARNING,
             _ => 20,
         };
         let mut text = EventText(String::new());
         event.record(&mut text);
-        let mut waiting = waiting();
-        if waiting.len() == MAX_WAITING {
-            waiting.pop_front();
-        }
-        waiting.push_back((level, text.0));
+        push(level, text.0);
     }
 
     fn enter(&self, _: &Id) {}

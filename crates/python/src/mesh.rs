@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
-use crate::compute::compute;
+use crate::compute::{NativeCancel, compute};
 use crate::failure::{raise, unreadable};
 use crate::settings::NativeSettings;
 use mocban_align::stages::Scan;
@@ -92,7 +92,7 @@ impl NativeMesh {
     fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         if self.wrong_unit.get().is_none() {
             let (scan, unit) = (Arc::clone(&self.scan), self.unit);
-            let found = compute(py, move || align::wrong_unit(&scan, unit))?;
+            let found = compute(py, None, move || align::wrong_unit(&scan, unit))?;
             let _ = self.wrong_unit.set(found.map(|failure| failure.message));
         }
         Ok(self
@@ -117,10 +117,11 @@ pub(crate) fn read_mesh(
     path: PathBuf,
     unit_name: Option<&str>,
     settings: &NativeSettings,
+    cancel: Option<&NativeCancel>,
 ) -> PyResult<NativeMesh> {
     let unit = unit(py, unit_name)?;
     let (file, limits) = (path.clone(), settings.limits);
-    let read = compute(py, move || align::read_scan(&file, &limits))?;
+    let read = compute(py, cancel, move || align::read_scan(&file, &limits))?;
     let content = read.map_err(|error| unreadable(py, "MeshError", &error, &path))?;
     let scan = content.map_err(|failure| {
         let class = failure.class.name();

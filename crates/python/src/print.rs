@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
-use crate::compute::compute;
+use crate::compute::{NativeCancel, compute};
 use crate::failure::{raise, unreadable};
 use crate::settings::NativeSettings;
 use mocban_align::stages::{Print, normalize};
 use mocban_core::raster::{PrintSamples, SampleSlice};
-use mocban_project::align;
+use mocban_project::align::{self, ReadPrint};
 
 /// The image of a print and its file.
 #[pyclass(frozen, module = "mocban._native")]
@@ -19,6 +19,15 @@ pub(crate) struct NativePrint {
     source: Arc<Mutex<PrintSource>>,
     #[pyo3(get)]
     pub(crate) path: Option<PathBuf>,
+    /// Width and height.
+    #[pyo3(get)]
+    size: (usize, usize),
+    /// What may be wrong with the colours.
+    #[pyo3(get)]
+    warning: Option<String>,
+    /// Pixels per inch, from left to right and from top to bottom.
+    #[pyo3(get)]
+    dpi: Option<(f64, f64)>,
 }
 
 /// The samples of an array until the image is needed, so that creating a print only copies them.
@@ -28,13 +37,6 @@ enum PrintSource {
 }
 
 impl NativePrint {
-    fn new(source: PrintSource, path: Option<PathBuf>) -> Self {
-        Self {
-            source: Arc::new(Mutex::new(source)),
-            path,
-        }
-    }
-
     /// Returns a function that returns the image, for use without the GIL.
     pub(crate) fn image(&self) -> impl FnOnce() -> Arc<Print> + Send + use<> {
         let source = Arc::clone(&self.source);
@@ -72,55 +74,33 @@ impl NativePrint {
             let text = "the image has no pixels";
             raise(py, "ImageError", "bad_input", text, None)
         })?;
-        Ok(Self::new(PrintSource::Samples(samples), None))
-    }
-
-    /// Returns width and height.
-    fn size(&self, py: Python<'_>) -> (usize, usize) {
-        let source = Arc::clone(&self.source);
-        // Without the GIL, because a thread that holds the lock may wait for it.
-        py.detach(move || {
-            let source = source.lock().unwrap_or_else(PoisonError::into_inner);
-            match &*source {
-                PrintSource::Samples(samples) => samples.size().into(),
-                PrintSource::Image(print) => {
-                    let rgb = &print.image().rgb;
-                    (rgb.width(), rgb.height())
-                }
-            }
+        Ok(Self {
+            path: None,
+            size: samples.size().into(),
+            warning: None,
+            dpi: None,
+            source: Arc::new(Mutex::new(PrintSource::Samples(samples))),
         })
     }
 
     /// Returns the colours in 8 bits.
     fn rgb8<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
         let image = self.image();
-        let colours = compute(py, move || image().image().to_rgb8())?;
+        let colours = compute(py, None, move || image().image().to_rgb8())?;
         Ok(PyArray1::from_slice(py, colours.data().as_flattened()))
     }
 
     /// Returns the colours in 16 bits.
     fn rgb16<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u16>>> {
-        let print = compute(py, self.image())?;
+        let print = compute(py, None, self.image())?;
         let colours = print.image().rgb.data().as_flattened();
         Ok(PyArray1::from_slice(py, colours))
-    }
-
-    /// Returns what may be wrong with the colours.
-    fn warnings(&self, py: Python<'_>) -> Vec<String> {
-        let source = Arc::clone(&self.source);
-        py.detach(move || {
-            let source = source.lock().unwrap_or_else(PoisonError::into_inner);
-            match &*source {
-                PrintSource::Samples(_) => Vec::new(),
-                PrintSource::Image(print) => print.image().profile_warning().into_iter().collect(),
-            }
-        })
     }
 
     /// Returns the ink of the likeliest interpretation.
     fn ink<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let image = self.image();
-        let ink = compute(py, move || normalize::likeliest_ink(&image()))?;
+        let ink = compute(py, None, move || normalize::likeliest_ink(&image()))?;
         let ink = ink.map_err(|error| {
             let text = error.to_string();
             raise(
@@ -141,11 +121,12 @@ pub(crate) fn read_print(
     py: Python<'_>,
     path: PathBuf,
     settings: &NativeSettings,
+    cancel: Option<&NativeCancel>,
 ) -> PyResult<NativePrint> {
     let (file, limits) = (path.clone(), settings.limits);
-    let read = compute(py, move || align::read_print(&file, &limits))?;
+    let read = compute(py, cancel, move || align::read_print(&file, &limits))?;
     let content = read.map_err(|error| unreadable(py, "ImageError", &error, &path))?;
-    let print = content.map_err(|failure| {
+    let ReadPrint { print, dpi } = content.map_err(|failure| {
         raise(
             py,
             "ImageError",
@@ -154,8 +135,12 @@ pub(crate) fn read_print(
             Some(&path),
         )
     })?;
-    Ok(NativePrint::new(
-        PrintSource::Image(Arc::new(print)),
-        Some(path),
-    ))
+    let rgb = &print.image().rgb;
+    Ok(NativePrint {
+        path: Some(path),
+        size: (rgb.width(), rgb.height()),
+        warning: print.image().profile_warning(),
+        dpi: dpi.map(Into::into),
+        source: Arc::new(Mutex::new(PrintSource::Image(Arc::new(print)))),
+    })
 }

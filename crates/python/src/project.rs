@@ -9,10 +9,12 @@ use serde_json::{Value, json};
 
 use crate::alignment::NativeAlignment;
 use crate::compute::{EventSender, compute_with_events};
-use crate::failure::{project_failure, raise};
+use crate::failure::{project_failure, raise, wrong_argument};
+use crate::mesh::unit as mesh_unit;
 use crate::{log, stored_block, stored_pair};
 use mocban_catalog::{NewVerdict, ReviewContext};
-use mocban_core::domain::ContentHash;
+use mocban_core::domain::cancel::CancelToken;
+use mocban_core::domain::{ContentHash, ErrorCode};
 use mocban_export::{ExportFormat, ExportOptions};
 use mocban_project::events::{Listener, ProjectEvent};
 use mocban_project::import_blocks::ImportedBlock;
@@ -23,7 +25,7 @@ use mocban_project::run::{PreparedRun, options};
 use mocban_project::status::ProjectStatus;
 use mocban_project::verdict_words;
 use mocban_project::verdicts::{self, RecordedVerdict};
-use mocban_project::{ProjectError, ProjectResult, Refusal, export};
+use mocban_project::{ProjectError, ProjectResult, export};
 use mocban_results::IntervalMethod;
 use mocban_runner::{Stop, StopLevel};
 
@@ -52,23 +54,32 @@ impl Listener for Hearing {
     }
 }
 
-/// Parses a name, such as that of a metric.
-fn parsed<T: std::str::FromStr>(name: &str) -> ProjectResult<T>
+/// Parses an argument, such as the name of a metric.
+fn parsed<T: std::str::FromStr>(py: Python<'_>, name: &str) -> PyResult<T>
 where
     T::Err: std::fmt::Display,
 {
     name.parse()
-        .map_err(|error: T::Err| Refusal::Usage(error.to_string()).into())
+        .map_err(|error: T::Err| wrong_argument(py, &error.to_string()))
+}
+
+/// Parses arguments of a list.
+fn all_parsed<T: std::str::FromStr>(py: Python<'_>, names: &[String]) -> PyResult<Vec<T>>
+where
+    T::Err: std::fmt::Display,
+{
+    names.iter().map(|name| parsed(py, name)).collect()
 }
 
 impl NativeProject {
-    /// Runs a function of the project library in a runtime of its own.
+    /// Runs a function of the project library in a runtime of its own. After a signal, calls `stop`.
     fn call<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(Location, Hearing, Arc<Stop>) -> F + Send + 'static,
         mut on_event: impl FnMut(&str) -> PyResult<()>,
-    ) -> PyResult<T> {
+        also_stop: impl Fn(&CancelToken),
+    ) -> PyResult<ProjectResult<T>> {
         let (location, stop) = (self.location.clone(), Arc::new(Stop::new()));
         let inner = Arc::clone(&stop);
         let body = move |events| {
@@ -81,22 +92,42 @@ impl NativeProject {
             Heard::Run(event) => on_event(&event),
             Heard::Warning(text) => log::write(py, [(log::WARNING, text)]),
         };
-        let result = compute_with_events(py, body, hear, || {
+        compute_with_events(py, body, hear, |token| {
             stop.escalate();
-        })?;
-        result.map_err(|error| project_failure(py, &error, &self.location.dir))
+            also_stop(token);
+        })
     }
 
+    /// Runs a function of the project library until it ends or a signal comes, which drops its future and cancels its
+    /// computations: transactions are rolled back, and outputs are not replaced.
+    fn outcome<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(Location, Hearing) -> F + Send + 'static,
+    ) -> PyResult<ProjectResult<T>> {
+        let until_stopped = |location, hearing, stop: Arc<Stop>| async move {
+            tokio::select! {
+                biased;
+                result = work(location, hearing) => result,
+                // The exception of the signal is raised in place of this error.
+                () = stop.reached(StopLevel::Drain) => Err(ProjectError::unexpected("stopped")),
+            }
+        };
+        self.call(py, until_stopped, |_| Ok(()), CancelToken::cancel)
+    }
+
+    /// Like `outcome`; raises the exception of an error.
     fn simple<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(Location, Hearing) -> F + Send + 'static,
     ) -> PyResult<T> {
-        self.call(
-            py,
-            |location, hearing, _stop| work(location, hearing),
-            |_| Ok(()),
-        )
+        let result = self.outcome(py, work)?;
+        result.map_err(|error| self.failure(py, &error))
+    }
+
+    fn failure(&self, py: Python<'_>, error: &ProjectError) -> PyErr {
+        project_failure(py, error, &self.location.dir)
     }
 }
 
@@ -189,15 +220,13 @@ impl NativeProject {
         expect: Option<&str>,
         new_reviewer: bool,
     ) -> PyResult<bool> {
-        let refuse = |error: ProjectError| project_failure(py, &error, &self.location.dir);
-        let metric = metric.map(parsed).transpose().map_err(refuse)?;
-        let verdict = verdict_words::verdict(verdict);
-        let verdict = verdict.map_err(|text| refuse(Refusal::Usage(text).into()))?;
+        let metric = metric.map(|name| parsed(py, name)).transpose()?;
+        let verdict = verdict_words::verdict(verdict).map_err(|text| wrong_argument(py, &text))?;
         let reason = reason.map(verdict_words::reason).transpose();
-        let reason = reason.map_err(|text| refuse(Refusal::Usage(text).into()))?;
-        let judged: Option<ContentHash> = expect.map(parsed).transpose().map_err(refuse)?;
+        let reason = reason.map_err(|text| wrong_argument(py, &text))?;
+        let judged: Option<ContentHash> = expect.map(|hash| parsed(py, hash)).transpose()?;
         let name = id.clone();
-        let recorded = self.simple(py, move |location, _| async move {
+        let recorded = self.outcome(py, move |location, _| async move {
             let new = |pair| NewVerdict {
                 pair,
                 metric,
@@ -213,6 +242,11 @@ impl NativeProject {
                     .await?
                     .1,
             )
+        })?;
+        // The library refuses other arguments, such as the name of a reviewer.
+        let recorded = recorded.map_err(|error| match error.code() {
+            ErrorCode::Usage => wrong_argument(py, &error.text(&self.location.dir)),
+            _ => self.failure(py, &error),
         })?;
         if recorded == RecordedVerdict::Stale {
             let text = format!(
@@ -280,15 +314,29 @@ impl NativeProject {
         unit: Option<&str>,
         side: Option<&str>,
     ) -> PyResult<String> {
-        let refuse = |error: ProjectError| project_failure(py, &error, &self.location.dir);
         let block = ImportedBlock {
             mesh,
             page,
             labels,
-            side: side.map(parsed).transpose().map_err(refuse)?,
+            side: side.map(|name| parsed(py, name)).transpose()?,
             name,
-            unit: unit.map(parsed).transpose().map_err(refuse)?,
+            unit: mesh_unit(py, unit)?,
         };
+        let files = [
+            ("mesh", Some(&block.mesh)),
+            ("page", Some(&block.page)),
+            ("labels", block.labels.as_ref()),
+        ];
+        for (what, path) in files {
+            let missing = path.filter(|path| py.detach(|| matches!(path.try_exists(), Ok(false))));
+            if let Some(path) = missing {
+                let text = format!(
+                    "{} is not there; give the file of the {what}",
+                    path.display()
+                );
+                return Err(raise(py, "InputNotFound", "not_found", &text, Some(path)));
+            }
+        }
         self.simple(py, |location, hearing| async move {
             stored_block::import(block, &location, &hearing).await
         })
@@ -327,14 +375,16 @@ impl NativeProject {
             let outcome = run.run(&stop, &hearing).await?;
             Ok(serde_json::to_string(&outcome.summary)?)
         };
-        self.call(py, work, on_event)
+        let result = self.call(py, work, on_event, |_| ())?;
+        result.map_err(|error| self.failure(py, &error))
     }
 
     /// Returns the report in a format.
     fn report(&self, py: Python<'_>, format: String) -> PyResult<String> {
+        let format = parsed(py, &format)?;
         self.simple(py, move |location, hearing| async move {
             let options = ReportOptions {
-                format: parsed(&format)?,
+                format,
                 interval: IntervalMethod::default(),
                 with_times: false,
             };
@@ -352,18 +402,12 @@ impl NativeProject {
         only: String,
         images: bool,
     ) -> PyResult<String> {
+        let formats: Vec<ExportFormat> = all_parsed(py, &formats)?;
+        let (metrics, only) = (all_parsed(py, &metrics)?, parsed(py, &only)?);
         self.simple(py, move |location, hearing| async move {
-            let formats = formats
-                .iter()
-                .map(|name| parsed(name))
-                .collect::<ProjectResult<Vec<ExportFormat>>>()?;
-            let metrics = metrics
-                .iter()
-                .map(|name| parsed(name))
-                .collect::<ProjectResult<Vec<_>>>()?;
             let limits = location.settings()?.config.limits;
             let options = ExportOptions {
-                only: parsed(&only)?,
+                only,
                 images,
                 ..ExportOptions::all_of(&metrics, limits)
             };

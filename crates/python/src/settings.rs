@@ -14,6 +14,9 @@ use mocban_core::InputLimits;
 pub(crate) struct NativeSettings {
     pub(crate) stages: Arc<Settings>,
     pub(crate) limits: InputLimits,
+    /// Most pixels of a print.
+    #[pyo3(get)]
+    max_pixels: u64,
     /// All settings in JSON.
     #[pyo3(get)]
     json: String,
@@ -42,6 +45,7 @@ impl NativeSettings {
         Ok(Self {
             stages: Arc::new(config.stages),
             limits: config.limits,
+            max_pixels: config.limits.image.max_pixels,
             json: json.to_string(),
         })
     }

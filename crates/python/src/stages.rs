@@ -39,7 +39,7 @@ pub(crate) fn fit_surface(
 ) -> PyResult<String> {
     let (scan, stages) = (Arc::clone(&mesh.scan), Arc::clone(&settings.stages));
     let image = print.map(NativePrint::image);
-    let fitted = compute(py, move || {
+    let fitted = compute(py, None, move || {
         let image = image.map(|image| image());
         fit(&scan, image.as_deref(), scanned_face_down, &stages)
     })?;
@@ -59,8 +59,8 @@ pub(crate) fn depth_map<'py>(
     let surface: FitOutcome = serde_json::from_str(surface).map_err(|error| {
         raise(
             py,
-            "Error",
-            "usage",
+            "InputError",
+            "damaged",
             &format!("the surface is damaged: {error}"),
             None,
         )
@@ -70,7 +70,9 @@ pub(crate) fn depth_map<'py>(
         Arc::clone(&settings.stages),
         mesh.unit,
     );
-    let map = compute(py, move || depth(&scan, &surface, unit, &stages.depth))?;
+    let map = compute(py, None, move || {
+        depth(&scan, &surface, unit, &stages.depth)
+    })?;
     let map = map
         .map_err(|error| no_result(py, error.class(), &error.to_string(), mesh.path.as_deref()))?;
     let (levels, scale) = (&map.levels, json!(map.scale).to_string());

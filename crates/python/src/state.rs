@@ -27,18 +27,70 @@ struct AlignmentNumbers {
     ignored_profile: Option<String>,
 }
 
+/// What the functions of an alignment need of it.
+pub(crate) struct NeededParts {
+    pub(crate) hints: ScanHints,
+    pub(crate) fit: FitOutcome,
+    pub(crate) depth: DepthMap,
+    pub(crate) normalize: NormalizeOutcome,
+    /// Masks of the interpretation of the print that was used.
+    pub(crate) masks: PrintMasks,
+    pub(crate) register: RegisterOutcome,
+    pub(crate) stroke_maps: Vec<Grid<u8>>,
+}
+
+impl NeededParts {
+    /// Returns an alignment with one interpretation of the print, or `None` if `normalize` lacks the one of `register`.
+    pub(crate) fn into_pair(mut self) -> Option<AlignedPair> {
+        self.normalize.inks = vec![*self.normalize.inks.get(self.register.ink)?];
+        self.register.ink = 0;
+        Some(AlignedPair {
+            hints: self.hints,
+            fit: self.fit,
+            depth: self.depth,
+            normalized: Normalized {
+                outcome: self.normalize,
+                prints: vec![self.masks],
+            },
+            registered: Registered {
+                outcome: self.register,
+                canvas_print: Mask::new(0, 0, false),
+                canvas_depths: Vec::new(),
+                stroke_maps: self.stroke_maps,
+                confidence_inputs: Vec::new(),
+            },
+        })
+    }
+}
+
 /// Removes what no function of an alignment needs.
 pub(crate) fn needed(mut pair: AlignedPair) -> AlignedPair {
-    let ink = pair.registered.outcome.ink;
-    let masks = pair.normalized.prints.swap_remove(ink);
-    let hypothesis = pair.normalized.outcome.inks[ink];
-    pair.normalized.prints = vec![masks];
-    pair.normalized.outcome.inks = vec![hypothesis];
-    pair.registered.outcome.ink = 0;
-    pair.registered.canvas_depths = Vec::new();
-    pair.registered.canvas_print = Mask::new(0, 0, false);
-    pair.registered.confidence_inputs = Vec::new();
-    pair
+    let register = pair.registered.outcome;
+    let parts = NeededParts {
+        hints: pair.hints,
+        fit: pair.fit,
+        depth: pair.depth,
+        normalize: pair.normalized.outcome,
+        masks: pair.normalized.prints.swap_remove(register.ink),
+        register,
+        stroke_maps: pair.registered.stroke_maps,
+    };
+    parts.into_pair().expect("the pose is that of a known ink")
+}
+
+/// Bytes for each pixel of the masks of an alignment: its own masks, and the binarizations that its print keeps.
+const MASK_PIXEL_BYTES: usize = 24;
+
+/// Estimates the memory that an alignment and its print take, in bytes.
+pub(crate) fn held_bytes(pair: &AlignedPair, print: &Print) -> usize {
+    let masks = pair.normalized.prints.iter();
+    let masks: usize = masks.map(|masks| masks.ink.data().len()).sum();
+    let maps = pair.registered.stroke_maps.iter();
+    let maps: usize = maps.map(|map| map.data().len()).sum();
+    size_of_val(pair.depth.levels.data())
+        + size_of_val(print.image().rgb.data())
+        + MASK_PIXEL_BYTES * masks
+        + maps
 }
 
 /// Returns the numbers and the images of an alignment.
@@ -81,7 +133,6 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
     let numbers: AlignmentNumbers = serde_json::from_str(numbers).ok()?;
     let is_whole = numbers.form == FORM
         && numbers.normalize.inks.len() == 1
-        && numbers.register.ink == 0
         && !numbers.register.metrics.is_empty();
     if !is_whole {
         return None;
@@ -104,7 +155,7 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
         turned: numbers.print_turned,
         ignored_profile: numbers.ignored_profile,
     };
-    let pair = AlignedPair {
+    let parts = NeededParts {
         hints: ScanHints {
             unit: numbers.unit,
             scanned_face_down: numbers.scanned_face_down,
@@ -114,18 +165,12 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
             levels,
             scale: numbers.scale,
         },
-        normalized: Normalized {
-            outcome: numbers.normalize,
-            prints: vec![PrintMasks::from_grey(&masks, scale)],
-        },
-        registered: Registered {
-            outcome: numbers.register,
-            canvas_print: Mask::new(0, 0, false),
-            canvas_depths: Vec::new(),
-            stroke_maps,
-            confidence_inputs: Vec::new(),
-        },
+        normalize: numbers.normalize,
+        masks: PrintMasks::from_grey(&masks, scale),
+        register: numbers.register,
+        stroke_maps,
     };
+    let pair = parts.into_pair()?;
     images.0.is_empty().then(|| (pair, print.into()))
 }
 

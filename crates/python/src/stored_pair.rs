@@ -1,13 +1,12 @@
 //! A pair of a project: its numbers, and its alignment from the stored files.
 
-use mocban_align::stages::normalize::{Normalized, PrintMasks};
-use mocban_align::stages::register::Registered;
+use crate::state::NeededParts;
+use mocban_align::stages::normalize::PrintMasks;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
 use mocban_catalog::{Catalog, PairDetail, PairResults};
 use mocban_core::InputLimits;
 use mocban_core::domain::artifact_role::stroke_map;
 use mocban_core::domain::{JobStatus, NormalizeOutcome, RegisterOutcome, Stage};
-use mocban_core::raster::Mask;
 use mocban_export::SourcePrint;
 use mocban_project::location::Location;
 use mocban_project::{ProjectError, ProjectResult, Refusal, selection};
@@ -61,20 +60,23 @@ fn assembled(
     let print = SourcePrint::read(project, results, &limits.image)
         .map_err(|error| Refusal::Damaged(format!("pair {}: {error}", results.attributes.name)))?;
     let artifacts = PairArtifacts::new(project, results);
-    let mut normalize: NormalizeOutcome =
-        artifacts.outcome(Stage::Normalize).map_err(unreadable)?;
-    let mut register: RegisterOutcome = artifacts.outcome(Stage::Register).map_err(unreadable)?;
+    let normalize: NormalizeOutcome = artifacts.outcome(Stage::Normalize).map_err(unreadable)?;
+    let register: RegisterOutcome = artifacts.outcome(Stage::Register).map_err(unreadable)?;
+    let (used, known) = (register.ink, normalize.inks.len());
+    let unknown_ink = || {
+        let name = &results.attributes.name;
+        let text = format!(
+            "pair {name}: its result uses interpretation {used} of the print, but only {known} are stored; run it again"
+        );
+        Refusal::Damaged(text)
+    };
+    if used >= known {
+        return Err(unknown_ink().into());
+    }
     let masks = PrintMasks::from_grey(
         &artifacts.print_grey().map_err(unreadable)?,
         normalize.mask_scale(),
     );
-    normalize.inks = normalize
-        .inks
-        .get(register.ink)
-        .copied()
-        .into_iter()
-        .collect();
-    register.ink = 0;
     // All metrics have maps, or none. A map belongs to the metric at its place.
     let maps = register.metrics.iter().map_while(|metric| {
         let role = stroke_map(metric.metric);
@@ -82,24 +84,18 @@ fn assembled(
         Some(artifacts.grey(Stage::Register, &role))
     });
     let stroke_maps = maps.collect::<Result<Vec<_>, _>>().map_err(unreadable)?;
-    let pair = AlignedPair {
+    let parts = NeededParts {
         hints: ScanHints {
             unit: results.attributes.unit,
             scanned_face_down: results.attributes.scanned_face_down,
         },
         fit: artifacts.outcome(Stage::Fit).map_err(unreadable)?,
         depth: artifacts.depth().map_err(unreadable)?,
-        normalized: Normalized {
-            outcome: normalize,
-            prints: vec![masks],
-        },
-        registered: Registered {
-            outcome: register,
-            canvas_print: Mask::new(0, 0, false),
-            canvas_depths: Vec::new(),
-            stroke_maps,
-            confidence_inputs: Vec::new(),
-        },
+        normalize,
+        masks,
+        register,
+        stroke_maps,
     };
+    let pair = parts.into_pair().ok_or_else(unknown_ink)?;
     Ok((pair, print.picture.into()))
 }

@@ -75,6 +75,7 @@ mod input_changes;
 mod input_reads;
 mod liveness;
 mod memory_budget;
+pub mod memory_estimate;
 mod options;
 mod pair_context;
 mod pair_failure;

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::memory_budget::{self, PAIR_BYTES};
+use super::memory_estimate::{self, PAIR_BYTES};
 use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
@@ -50,7 +50,7 @@ impl PairStages for PairPipeline {
     }
 
     fn map_bytes(&self) -> u64 {
-        memory_budget::map_bytes(&self.settings.depth)
+        memory_estimate::map_bytes(&self.settings.depth)
     }
 }
 

@@ -98,8 +98,7 @@ impl MaskScale {
 }
 
 fn larger_from_smaller(times: NonZeroU32) -> Affine2 {
-    let times = f64::from(times.get());
-    Affine2::scale_shift(times, [(times - 1.0) / 2.0; 2])
+    Affine2::resize(f64::from(times.get()))
 }
 
 fn smaller_from_larger(times: NonZeroU32) -> Affine2 {

@@ -44,6 +44,12 @@ impl Affine2 {
         Self([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
     }
 
+    /// Returns the map from the pixels of an image to those of the image resized by `scale`. Pixel centres are integers, so
+    /// both images share the corner (-0.5, -0.5).
+    pub fn resize(scale: f64) -> Self {
+        Self::scale_shift(scale, [(scale - 1.0) / 2.0; 2])
+    }
+
     /// Maps a point.
     pub fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [a, b] = self.0;

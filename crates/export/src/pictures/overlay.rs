@@ -38,13 +38,12 @@ impl PrintView {
         Self::new(factor as f64, size[0] * factor, size[1] * factor)
     }
 
-    /// Creates a view. Pixel centres are integers, so print and view share the top left corner (-0.5, -0.5).
+    /// Creates a view.
     fn new(scale: f64, width: usize, height: usize) -> Self {
-        let shift = (scale - 1.0) / 2.0;
         Self {
             width,
             height,
-            from_print: Affine2::scale_shift(scale, [shift, shift]),
+            from_print: Affine2::resize(scale),
         }
     }
 

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::quantile::quantile;
+use mocban_core::domain::cancel::ThreadToken;
 
 /// Seed of the resamples, so that equal results have equal intervals.
 pub const BOOTSTRAP_SEED: u64 = 1;
@@ -55,9 +56,10 @@ pub fn resample_count(units: usize) -> usize {
 pub fn resampled_means(units: &[QuantitySums], width: usize) -> Vec<Vec<f64>> {
     let flat = units.concat();
     let streams: Vec<u64> = (0..resample_count(units.len()) as u64).collect();
+    let token = ThreadToken::current();
     let totals: Vec<QuantitySums> = streams
         .par_chunks(STREAMS_PER_PASS)
-        .flat_map_iter(|streams| resample(&flat, width, streams))
+        .flat_map_iter(|streams| token.scope(|| resample(&flat, width, streams)))
         .collect();
     let means = |quantity: usize| {
         let all = totals.iter().map(move |sums| sums[quantity]);

@@ -4,7 +4,7 @@ use std::io::Read as _;
 use std::path::PathBuf;
 
 use crate::input_reads::ReadItem;
-use crate::memory_budget::{mesh_bytes, print_pixels};
+use crate::memory_estimate::{mesh_bytes, print_pixels};
 use mocban_align::block::MAX_MAP_PIXELS;
 use mocban_catalog::BlockAttributes;
 use mocban_core::mesh::{STL_HEAD, binary_stl_triangles};

@@ -106,7 +106,7 @@ impl HalfCanvas {
 
 /// Returns a map to the canvas as a map to the half canvas.
 pub(super) fn to_half(canvas_from_image: &Affine2) -> Affine2 {
-    Affine2::scale_shift(0.5, [-0.25, -0.25]).after(canvas_from_image)
+    Affine2::resize(0.5).after(canvas_from_image)
 }
 
 /// Returns the mean width of the strokes with this edge, in pixels, at least 1. The mean distance to the edge of a stroke

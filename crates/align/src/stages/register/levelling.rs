@@ -253,7 +253,7 @@ mod tests {
     fn levelling(depth: &DepthMap, wider: usize) -> Option<Levelling> {
         let ink = Mask::from_fn(SIDE, SIDE, |x, _| on_bar(x, wider));
         let canvas = HalfCanvas::of(depth.levels.clone(), ink);
-        let canvas_from_depth = Affine2::scale_shift(2.0, [0.5, 0.5]);
+        let canvas_from_depth = Affine2::resize(2.0);
         let level = level(depth);
         fit(
             depth,

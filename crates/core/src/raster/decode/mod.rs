@@ -6,6 +6,7 @@ mod jpeg;
 mod limits;
 mod orientation;
 mod print_image;
+mod resolution;
 mod samples;
 mod tags;
 mod tiff;
@@ -24,6 +25,7 @@ use tags::TagFileWindow;
 pub use error::DecodeError;
 pub use limits::ImageLimits;
 pub use print_image::PrintImage;
+pub use resolution::stated_dpi;
 pub use samples::{PrintSamples, SampleSlice};
 
 /// Decodes a grey, RGB or palette image of a print. Transparent pixels are composited on white.

@@ -8,8 +8,13 @@ use crate::raster::Grid;
 
 const ORIENTATION: u64 = 274;
 
-/// Returns the orientation of a PNG. Its `eXIf` chunk may stand before or after the pixels.
+/// Returns the orientation of a PNG.
 pub(super) fn of_png(bytes: &[u8]) -> Orientation {
+    of_exif(png_chunk(bytes, *b"eXIf"))
+}
+
+/// Returns the content of the first chunk of a kind, which may stand before or after the pixels.
+pub(super) fn png_chunk(bytes: &[u8], wanted: [u8; 4]) -> Option<&[u8]> {
     let mut counter = PollCounter::default();
     let mut at = 8;
     while let Some(head) = bytes.get(at..at + 8) {
@@ -18,19 +23,22 @@ pub(super) fn of_png(bytes: &[u8]) -> Orientation {
         let len = len
             .iter()
             .fold(0, |sum, byte| sum << 8 | usize::from(*byte));
-        if kind == b"eXIf" {
-            return of_exif(bytes.get(at + 8..at + 8 + len));
+        if kind == wanted {
+            return bytes.get(at + 8..at + 8 + len);
         }
         at += 12 + len;
     }
-    Orientation::NoTransforms
+    None
+}
+
+/// Returns an EXIF block without the prefix of JPEG segments, which some programs copy to other formats.
+pub(super) fn without_prefix(block: &[u8]) -> &[u8] {
+    block.strip_prefix(b"Exif\0\0").unwrap_or(block)
 }
 
 /// Returns the orientation in an EXIF block, whatever integer type it is stored as. An unreadable one counts as upright.
 pub(super) fn of_exif(block: Option<&[u8]>) -> Orientation {
-    // Some programs copy the prefix of JPEG segments to other formats.
-    let block = block.map(|block| block.strip_prefix(b"Exif\0\0").unwrap_or(block));
-    let block = block.unwrap_or_default();
+    let block = block.map(without_prefix).unwrap_or_default();
     let directory = TaggedFile::new(&block).and_then(|file| file.first_directory());
     of_tag(directory.and_then(|directory| directory.number(ORIENTATION)))
 }
@@ -41,6 +49,11 @@ pub(super) fn of_tag(number: Option<u64>) -> Orientation {
         .and_then(|number| u8::try_from(number).ok())
         .and_then(Orientation::from_exif)
         .unwrap_or(Orientation::NoTransforms)
+}
+
+/// Returns whether the upright image is as wide as the stored one is high.
+pub(super) fn swaps_sides(orientation: Orientation) -> bool {
+    orientation.to_exif() >= 5
 }
 
 /// Returns the pixels of the upright image.

@@ -47,6 +47,12 @@ pub(super) fn decode<'b>(
     })
 }
 
+/// Returns the JFIF header behind its name, and the EXIF block, if the file has them.
+pub(super) fn metadata(bytes: &[u8]) -> [Option<&[u8]>; 2] {
+    let segments = JpegSegments::read(bytes);
+    segments.map_or([None; 2], |found| [found.jfif, found.exif])
+}
+
 /// Decodes a part of a TIFF image. Luma and chroma samples are not converted.
 ///
 /// # Errors

@@ -42,6 +42,8 @@ pub(super) struct JpegSegments<'b> {
     pub(super) scans: Vec<JpegScan>,
     /// Segments of tables, with their markers, in their order.
     pub(super) tables: Vec<Range<usize>>,
+    /// The JFIF header behind its name.
+    pub(super) jfif: Option<&'b [u8]>,
     pub(super) exif: Option<&'b [u8]>,
     /// Numbers and bytes of the parts of the ICC profile.
     profile: Vec<(u8, &'b [u8])>,
@@ -120,6 +122,7 @@ impl<'b> JpegSegments<'b> {
                 });
                 self.scans.extend(scan);
             }
+            0xe0 if self.jfif.is_none() => self.jfif = body.strip_prefix(b"JFIF\0"),
             0xe1 if self.exif.is_none() => self.exif = body.strip_prefix(b"Exif\0\0"),
             0xe2 => {
                 let part = body.strip_prefix(b"ICC_PROFILE\0");

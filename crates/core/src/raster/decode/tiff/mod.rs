@@ -21,9 +21,10 @@ use crate::domain::cancel::poll;
 use crate::raster::Grid;
 use chunks::DecodedChunk;
 use layout::TiffLayout;
+use pages::PrintPage;
 use photometric::{Photometric, YCbCrCode};
 
-const ORIENTATION: u64 = 274;
+pub(super) const ORIENTATION: u64 = 274;
 const ICC_PROFILE: u64 = 34675;
 
 /// The print of a TIFF file, as stored.
@@ -56,6 +57,14 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, De
             .map(<[u8]>::to_vec),
         has_16_bits: layout.used_bits == 16 && !layout.is_float,
     })
+}
+
+/// Reads tags of the print of a TIFF file. Returns `None` if its tags cannot be read.
+pub(super) fn with_print_tags<T>(
+    file: &dyn TagSource,
+    read: impl FnOnce(&PrintPage<'_>) -> T,
+) -> Option<T> {
+    pages::find_print_page(file).ok().map(|print| read(&print))
 }
 
 /// Returns the number of pixels of the print of a TIFF file, or `None` if its tags cannot be read.

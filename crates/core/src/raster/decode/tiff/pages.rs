@@ -2,7 +2,7 @@
 
 use crate::domain::FileKind;
 use crate::raster::decode::error::{DecodeError, broken};
-use crate::raster::decode::tags::{TagDirectory, TagSource, TaggedFile};
+use crate::raster::decode::tags::{TagDirectory, TagSource, TagValues, TaggedFile};
 
 /// Flags of `NewSubfileType`: a reduced copy of another page, and a mask.
 const REDUCED: u64 = 1;
@@ -20,24 +20,28 @@ const SUB_DIRECTORIES: u64 = 330;
 
 /// The page of a print.
 #[derive(Clone, Copy)]
-pub(super) struct PrintPage<'b> {
+pub(in crate::raster::decode) struct PrintPage<'b> {
     pub(super) page: TagDirectory<'b>,
     /// The page that refers to it, if it is a subdirectory. Metadata of the picture may be there.
     parent: Option<TagDirectory<'b>>,
 }
 
-impl PrintPage<'_> {
+impl<'b> PrintPage<'b> {
     /// Returns the first value of a tag of the page, or of its parent.
-    pub(super) fn inherited(&self, tag: u64) -> Option<u64> {
+    pub(in crate::raster::decode) fn inherited(&self, tag: u64) -> Option<u64> {
         let own = self.page.number(tag);
         own.or_else(|| self.parent?.number(tag))
     }
 
     /// Returns the bytes of a tag of the page, or of its parent.
-    pub(super) fn inherited_bytes(&self, tag: u64) -> Option<&[u8]> {
+    pub(super) fn inherited_bytes(&self, tag: u64) -> Option<&'b [u8]> {
+        self.inherited_values(tag)?.bytes()
+    }
+
+    /// Returns the values of a tag of the page, or of its parent.
+    pub(in crate::raster::decode) fn inherited_values(&self, tag: u64) -> Option<TagValues<'b>> {
         let own = self.page.values(tag);
-        let values = own.or_else(|| self.parent?.values(tag))?;
-        values.bytes()
+        own.or_else(|| self.parent?.values(tag))
     }
 }
 
