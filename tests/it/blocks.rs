@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use mocban::mesh::write::MeshFormat;
+use mocban::mesh::{self, MeshLimits};
 use serde_json::Value;
 
 use crate::cli::{Call, mocban};
@@ -258,4 +260,48 @@ fn replaced_labels_give_the_results_of_a_new_import() {
     import("p", "first.json");
     assert!(first == exported(dir, "p"));
     assert!(first != replaced);
+}
+
+/// A scan of a block is read without its vertices that have no position and its faces that have two corners, and says so.
+#[test]
+fn what_is_left_out_of_the_scan_of_a_block_is_told_by_run_and_kept() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    demo_block(dir);
+    few_labels(dir, &dir.join("few.json"));
+    let bytes = fs::read(dir.join("d/data/block.ply")).expect("the scan");
+    let mesh = mesh::read(&bytes, "block.ply", &MeshLimits::SUGGESTED);
+    let mut mesh = mesh.expect("a mesh");
+    mesh.vertices.extend([[f64::NAN; 3]; 3]);
+    let faces = |number: usize| format!("element face {number}\n");
+    let text = String::from_utf8(MeshFormat::PlyAscii.encode(&mesh)).expect("text");
+    let count = mesh.triangles.len();
+    let text = text.replace(&faces(count), &faces(count + 2)) + "2 0 1\n2 1 2\n";
+    fs::write(dir.join("block.ply"), text).expect("written");
+    let import = [
+        "import",
+        "--block",
+        "block.ply",
+        "--page",
+        "d/data/page.jpg",
+        "--labels",
+        "few.json",
+        "--name",
+        "b1",
+    ];
+    project(dir, &import).expect(0);
+    let run = project(dir, &["--progress", "none", "run"]).expect(0);
+    for sentence in [
+        "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces: 3",
+        "faces with fewer than three corners were left out: 2",
+    ] {
+        assert_eq!(run.err.matches(sentence).count(), 1, "{}", run.err);
+    }
+    let shown = project(dir, &["show", "b1", "--json"]).expect(0).json();
+    let outcome = &shown["stages"][0]["outcome"];
+    assert_eq!(
+        (&outcome["missing_vertices"], &outcome["incomplete_faces"]),
+        (&3.into(), &2.into()),
+        "{outcome}"
+    );
 }

@@ -2,6 +2,7 @@
 
 use mocban::workbook::test_helpers::{text_rows, workbook};
 
+use crate::check::{at, done};
 use crate::cli::{empty, mocban};
 use crate::snapshots::{TWO_PAIRS, assert_call, write};
 
@@ -145,5 +146,57 @@ fn import_of_directories() {
         } else {
             assert_call("error_changed_files", dir.path(), &args);
         }
+    }
+}
+
+#[test]
+fn workbooks_of_blocks_and_of_verdicts_are_read() {
+    let dir = empty();
+    let project = done(dir.path());
+    let save = |name: &str, rows: &[&[&str]]| {
+        let rows = text_rows(rows);
+        let sheets = [("Ghi chú", ""), ("Danh sách", rows.as_str())];
+        std::fs::write(dir.path().join(name), workbook(&sheets, "", "")).expect("written");
+    };
+    for name in ["ván.stl", "trang.png"] {
+        write(dir.path(), name, "x");
+    }
+    save(
+        "ván.xlsx",
+        &[
+            &["Khối", "mesh", "page", "unit"],
+            &["Ván 4", "ván.stl", "trang.png", "mm"],
+        ],
+    );
+    let import = [
+        "-C",
+        "q",
+        "import",
+        "ván.xlsx",
+        "--sheet",
+        "Danh sách",
+        "--json",
+    ];
+    let imported = mocban(dir.path(), &import).expect(0).json();
+    assert_eq!(imported["blocks"]["added"], 1);
+    let block = mocban(dir.path(), &["-C", "q", "show", "Ván 4", "--json"]).expect(0);
+    assert_eq!(block.json()["unit"], "mm", "{}", block.out);
+    save(
+        "đánh giá.xlsx",
+        &[
+            &["Pair", "Verdict", "Reviewer"],
+            &["upright-0000", "đạt", "minh"],
+            &["upright-0001", "không đạt", "minh"],
+        ],
+    );
+    let file = dir.path().join("đánh giá.xlsx").display().to_string();
+    let verdicts = ["verdict", "import", &file, "--sheet", "Danh sách"];
+    at(&project, &verdicts).expect(0);
+    for (pair, verdict) in [("upright-0000", "pass"), ("upright-0001", "fail")] {
+        let log = at(&project, &["verdict", "log", pair, "--json"]).expect(0);
+        let line = log.out.lines().find(|line| line.contains("\"minh\""));
+        let line = line.unwrap_or_else(|| panic!("{pair}: {}", log.out));
+        let line: serde_json::Value = serde_json::from_str(line).expect("JSON");
+        assert_eq!(line["verdict"], verdict, "{pair}");
     }
 }

@@ -127,6 +127,7 @@ mod semi_real;
 #[cfg(target_os = "linux")]
 mod session_browser;
 mod shim;
+mod show_low;
 #[cfg(target_os = "linux")]
 mod silent_review;
 #[cfg(unix)]

@@ -12,6 +12,8 @@ pub(crate) struct MeshForm {
     pub(crate) bytes: Vec<u8>,
     /// Vertices without a position.
     pub(crate) missing: u64,
+    /// Faces with fewer than three corners.
+    pub(crate) incomplete: u64,
 }
 
 fn form(name: &'static str, bytes: impl Into<Vec<u8>>, missing: u64) -> MeshForm {
@@ -19,6 +21,7 @@ fn form(name: &'static str, bytes: impl Into<Vec<u8>>, missing: u64) -> MeshForm
         name,
         bytes: bytes.into(),
         missing,
+        incomplete: 0,
     }
 }
 
@@ -40,7 +43,26 @@ pub(crate) fn with_faces(mesh: &Mesh) -> Vec<MeshForm> {
     forms.extend(ply(mesh));
     forms.extend(obj(mesh));
     forms.extend(stl(mesh));
+    forms.extend(two_corners(mesh));
     forms
+}
+
+/// Returns the mesh with edges that are written as faces.
+fn two_corners(mesh: &Mesh) -> [MeshForm; 3] {
+    let obj = text(MeshFormat::Obj, mesh) + "f 1 2\nf 2//1 3//1\n";
+    let count = |faces: usize| format!("element face {faces}\n");
+    let faces = mesh.triangles.len();
+    let ply = text(MeshFormat::PlyAscii, mesh).replace(&count(faces), &count(faces + 2));
+    let forms = [
+        form("two-corners.obj", obj.clone(), 0),
+        // Lines that only the slow reader takes.
+        form("two-corners-slow.obj", format!("lod 1\n{obj}"), 0),
+        form("two-corners.ply", ply + "2 0 1\n2 1 2\n", 0),
+    ];
+    forms.map(|form| MeshForm {
+        incomplete: 2,
+        ..form
+    })
 }
 
 fn ply(mesh: &Mesh) -> Vec<MeshForm> {

@@ -41,6 +41,8 @@ fn files_of_a_project_are_never_an_output() {
     for name in [
         "catalog.sqlite",
         "mocban.toml",
+        "run.lock",
+        "run.members",
         "artifacts/x.html",
         "artifacts",
     ] {
@@ -49,6 +51,8 @@ fn files_of_a_project_are_never_an_output() {
             &["report", "-o"][..],
             &["contact-sheet", "-o"],
             &["export", "-o"],
+            &["backup", "-o"],
+            &["align", "a.ply", "a.png", "-o"],
             &["docs", "-o"],
             &["man", "-o"],
             &["completions", "zsh", "-o"],
@@ -59,7 +63,78 @@ fn files_of_a_project_are_never_an_output() {
         }
     }
     assert!(!project.dir().join("artifacts/x.html").exists());
+    let backup = dir.path().join("b.sqlite").display().to_string();
+    at(&project, &["backup", &backup]).expect(0);
+    let list = dir.path().join("pairs.csv").display().to_string();
+    std::fs::write(&list, "id,mesh,print\na,a.stl,a.png\n").expect("written");
+    let new = own("artifacts/new");
+    for args in [
+        &["demo", &new, "--pairs", "1"][..],
+        &["restore", &backup, &new],
+        &["-C", &new, "import", &list, "--allow-missing"],
+        &["copy", &own(""), &new],
+    ] {
+        let refused = mocban(dir.path(), args).expect(2);
+        let reason = "artifacts/new belongs to the results of a project; name another folder";
+        assert!(refused.err.contains(reason), "{args:?}: {}", refused.err);
+    }
+    assert!(!Path::new(&new).exists());
     at(&project, &["check"]).expect(0);
+}
+
+#[test]
+fn files_of_other_programs_are_no_scripts_and_no_logs() {
+    let dir = empty();
+    let write = |name: &str, bytes: &[u8]| {
+        std::fs::write(dir.path().join(name), bytes).expect("written");
+    };
+    write("a.stl", b"solid a");
+    write("scan", b"\x89PNG\r\n\x1a\n");
+    write(".zshrc", b"source <(mocban completions zsh)\n");
+    for (args, reason) in [
+        (
+            ["completions", "zsh", "-o", "a.stl"],
+            "is no completion script for zsh",
+        ),
+        (
+            ["completions", "zsh", "-o", ".zshrc"],
+            "is no completion script for zsh",
+        ),
+        (
+            ["config", "show", "--log-file", "a.stl"],
+            "is not a log file",
+        ),
+        (
+            ["config", "show", "--log-file", "scan"],
+            "is not a log file",
+        ),
+    ] {
+        let name = args[3];
+        let before = std::fs::read(dir.path().join(name)).expect("a file");
+        let refused = mocban(dir.path(), &args).expect(2);
+        assert!(refused.err.contains(reason), "{args:?}: {}", refused.err);
+        let after = std::fs::read(dir.path().join(name)).expect("a file");
+        assert_eq!(after, before, "{args:?}");
+    }
+    // An earlier script and an earlier log stay in use.
+    for _ in 0..2 {
+        for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+            mocban(dir.path(), &["completions", shell, "-o", shell]).expect(0);
+        }
+        for format in ["text", "json"] {
+            let args = [
+                "config",
+                "show",
+                "--log-file",
+                format,
+                "--log-format",
+                format,
+                "-vv",
+            ];
+            mocban(dir.path(), &args).expect(0);
+        }
+    }
+    mocban(dir.path(), &["completions", "bash", "-o", "fish"]).expect(2);
 }
 
 #[test]

@@ -5,9 +5,11 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::block_view::finished_block;
 use crate::cli::{call, mocban};
 use crate::processes::Running;
 use crate::resume::{project, results, run};
+use crate::small_block::few_labels_with;
 use crate::snapshots::assert_call;
 
 const PAIRS: [&str; 3] = ["upright-0000", "upright-0001", "upright-0002"];
@@ -185,4 +187,85 @@ fn copies_backups_and_verdict_files_keep_retired_pairs_apart() {
     let log = fs::read_to_string(dir.path().join("out/verdicts.jsonl")).expect("a log");
     assert_eq!(log.lines().count(), 4);
     at(&["verdict", "import", "out/verdicts.jsonl"]).expect(0);
+}
+
+/// Returns the numbers of pairs in and out of the counts.
+fn pairs_and_retired(dir: &Path) -> [u64; 2] {
+    let status = mocban(dir, &["-C", "p", "status", "--json"]).expect(0);
+    let status = status.json();
+    ["pairs", "retired"].map(|key| number(&status[key]))
+}
+
+#[test]
+fn the_block_of_a_list_stands_for_its_pairs() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let list =
+        "id,mesh,print,block\na,a.stl,a.png,Ván 01\nb,b.stl,b.png,Ván 02\nc,c.stl,c.png,Ván 01\n";
+    fs::write(dir.path().join("pairs.csv"), list).expect("written");
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
+    at(&["import", "pairs.csv", "--allow-missing"]).expect(0);
+    at(&["retire", "a"]).expect(0);
+    let retired = at(&["retire", "Ván 01"]).expect(0);
+    for text in ["1 pair out of every count", "1 pair retired already"] {
+        assert!(retired.err.contains(text), "{}", retired.err);
+    }
+    assert_eq!(pairs_and_retired(dir.path()), [1, 2]);
+    let undo = retired.next();
+    assert!(undo[0].ends_with("retire --undo 'Ván 01'"), "{undo:?}");
+    // A list does not bring back what a person retired.
+    at(&["import", "pairs.csv", "--allow-missing"]).expect(0);
+    assert_eq!(pairs_and_retired(dir.path()), [1, 2]);
+    at(&["retire", "--undo", "Ván 01", "c"]).expect(0);
+    assert_eq!(pairs_and_retired(dir.path()), [3, 0]);
+    let unknown = at(&["retire", "Ván 09"]).expect(4);
+    let reason = "there is no pair or block Ván 09";
+    assert!(unknown.err.contains(reason), "{}", unknown.err);
+}
+
+#[test]
+fn a_cut_block_stands_for_its_pairs_and_a_later_run_leaves_them_retired() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    finished_block(dir.path());
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
+    let block = || {
+        let block = at(&["show", "b1", "--json"]).expect(0).json();
+        ["characters", "retired"].map(|key| number(&block[key]))
+    };
+    assert_eq!((pairs_and_retired(dir.path()), block()), ([6, 0], [6, 0]));
+    at(&["retire", "b1"]).expect(0);
+    let is_out = || {
+        assert_eq!((pairs_and_retired(dir.path()), block()), ([0, 6], [0, 6]));
+        let status = at(&["status", "--json"]).expect(0).json();
+        // The block is done and stays in the project: a person retired its pairs, not its files.
+        let blocks = &status["blocks"];
+        assert_eq!(
+            (&blocks["total"], &blocks["jobs"]["done"]),
+            (&1.into(), &1.into())
+        );
+    };
+    is_out();
+    // The block is cut again, from labels of which one box is moved.
+    few_labels_with(dir.path(), &dir.path().join("few.json"), |few| {
+        let x = &mut few[0]["shape_attributes"]["x"];
+        *x = (x.as_i64().expect("pixels") + 4).into();
+    });
+    at(&["run"]).expect(0);
+    is_out();
+    at(&["retire", "--undo", "b1"]).expect(0);
+    at(&["run"]).expect(0);
+    assert_eq!((pairs_and_retired(dir.path()), block()), ([6, 0], [6, 0]));
+    at(&["check"]).expect(0);
+    let again = [
+        "import",
+        "--block",
+        "d/data/block.ply",
+        "--page",
+        "d/data/page.jpg",
+        "--name",
+        "b2",
+    ];
+    at(&again).expect(0);
+    let uncut = at(&["retire", "b2"]).expect(4);
+    let reason = "block b2 has no pairs yet; `run` cuts them";
+    assert!(uncut.err.contains(reason), "{}", uncut.err);
 }

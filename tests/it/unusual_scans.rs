@@ -1,5 +1,6 @@
 //! Scans in files that other programs wrote, from the file to the exported result.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -102,28 +103,36 @@ fn every_form_of_a_scan_is_aligned_like_its_plain_twin() {
                 let error = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
                 assert!(error < LANDMARK_PX, "{name}: {error} px");
             }
-            assert_says_missing(dir.path(), form, &run.err);
+            assert_says_losses(dir.path(), form, &run.err);
         }
     }
 }
 
-/// The log of the run and `show` say once how many vertices have no position.
-fn assert_says_missing(dir: &Path, form: &MeshForm, log: &str) {
-    let sentence = format!(
-        "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces: {}",
-        form.missing
-    );
+/// The log of the run and `show` say once what was left out.
+fn assert_says_losses(dir: &Path, form: &MeshForm, log: &str) {
     let name = form.name;
     let shown = mocban(dir, &["-C", "p", "show", name]).expect(0).out;
-    let of_form = log.lines().filter(|line| line.contains(name));
-    let warnings = of_form.filter(|line| line.contains(&sentence)).count();
-    let expected = usize::from(form.missing > 0);
-    assert_eq!(warnings, expected, "{name}: {log}");
-    assert_eq!(
-        shown.matches(&sentence).count(),
-        expected,
-        "{name}: {shown}"
-    );
+    for (text, number) in [
+        (
+            "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces",
+            form.missing,
+        ),
+        (
+            "faces with fewer than three corners were left out",
+            form.incomplete,
+        ),
+    ] {
+        let sentence = format!("{text}: {number}");
+        let of_form = log.lines().filter(|line| line.contains(name));
+        let warnings = of_form.filter(|line| line.contains(&sentence)).count();
+        let expected = usize::from(number > 0);
+        assert_eq!(warnings, expected, "{name}: {log}");
+        assert_eq!(
+            shown.matches(&sentence).count(),
+            expected,
+            "{name}: {shown}"
+        );
+    }
 }
 
 /// A list of scans in a format that is not read gets one sentence when it is imported.
@@ -145,4 +154,53 @@ fn scans_of_another_format_are_refused_when_their_folder_is_imported() {
     ] {
         assert_eq!(refused.matches(sentence).count(), 1, "{refused}");
     }
+}
+
+/// A list of such scans is refused with one sentence, and a run says once why pairs of a mixed list fail.
+#[test]
+fn scans_of_another_format_are_refused_or_named_once_when_a_list_has_them() {
+    const SCANS: usize = 60;
+    let dir = empty();
+    let mut list = "id,mesh,print\n".to_owned();
+    for number in 0..SCANS {
+        fs::write(dir.path().join(format!("{number}.glb")), "glTF\u{2}\0\0\0").expect("written");
+        writeln!(list, "b-{number},{number}.glb,page.pdf").expect("a String takes any text");
+    }
+    for name in ["page.pdf", "a.stl", "a.png"] {
+        fs::write(dir.path().join(name), "").expect("written");
+    }
+    fs::write(dir.path().join("pairs.csv"), &list).expect("written");
+    let import = ["-C", "p", "import", "pairs.csv"];
+    let sentences = [
+        "a glTF scene is not read: 0.glb and 59 more; open",
+        "a PDF document is not read: page.pdf; save",
+    ];
+    let refused = mocban(dir.path(), &import).expect(2).err;
+    for sentence in sentences {
+        assert_eq!(refused.matches(sentence).count(), 1, "{refused}");
+    }
+    assert!(refused.contains("nothing was imported"), "{refused}");
+    fs::write(dir.path().join("pairs.csv"), list + "a,a.stl,a.png\n").expect("written");
+    let imported = mocban(dir.path(), &import).expect(0).err;
+    for sentence in sentences {
+        let warning = format!("warning: {sentence}");
+        assert_eq!(imported.matches(&warning).count(), 1, "{imported}");
+    }
+    let failed_lines = |args: &[&str]| {
+        let args = [&["-C", "p", "run", "--progress", "plain"], args].concat();
+        let err = mocban(dir.path(), &args).expect(3).err;
+        let failed = err.lines().filter_map(|line| line.strip_prefix("failed "));
+        let more = failed.clone().filter_map(|line| {
+            let (number, _) = line.split_once(" more like this one")?;
+            number.parse::<usize>().ok()
+        });
+        let is_pair = |line: &&str| line.contains(" at fit: ") && !line.contains(" more like ");
+        let shown = failed.filter(is_pair).count();
+        ([shown, more.sum()], err)
+    };
+    let ([shown, more], err) = failed_lines(&[]);
+    assert_eq!(shown + more, SCANS + 1, "{err}");
+    assert!(shown < SCANS / 2, "{err}");
+    let (all, err) = failed_lines(&["--rerun", "failed", "-v"]);
+    assert_eq!(all, [SCANS + 1, 0], "{err}");
 }

@@ -192,13 +192,13 @@ impl FileAlignment {
 
 /// Returns what may be wrong with the files of an aligned pair, one sentence each.
 pub fn warnings(pair: &AlignedPair, print: &Print) -> Vec<String> {
-    let missing = pair.fit.missing_vertices;
-    let missing = missing.map(|number| format!("mesh: {}", mesh::missing_sentence(number.get())));
+    let lost = pair.fit.losses().sentences().into_iter();
+    let lost = lost.map(|text| format!("mesh: {text}"));
     let profile = print.image().profile_warning();
     let profile = profile.map(|warning| format!("print: {warning}"));
     let said = scan_size::contradictions(&pair.fit, pair.hints).into_iter();
     let said = said.map(|text| format!("mesh: {text}"));
-    missing.into_iter().chain(said).chain(profile).collect()
+    lost.chain(said).chain(profile).collect()
 }
 
 /// Returns the result of an aligned pair as `align --json` prints it.

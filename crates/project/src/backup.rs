@@ -10,6 +10,7 @@ use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
 use crate::location::Location;
+use crate::own_files::project_role;
 use mocban_catalog::Catalog;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, rename_into_place,
@@ -78,18 +79,22 @@ fn check_target(file: &Path, project: &Project) -> ProjectResult<()> {
     let refuse = |reason: &str| Err(Refusal::Usage(format!("{shown} {reason}")).into());
     let failed = || format!("cannot read {shown}");
     let found = metadata(file).with_context(failed)?;
-    if file.file_name().is_none() || found.as_ref().is_some_and(Metadata::is_dir) {
-        return refuse("is a directory; name a file for the backup");
-    }
     let is_named = |known: &str| file.file_name().is_some_and(|name| name == known);
     // The parent of a bare file name is empty.
     let parent = Path::new(".").join(file.parent().unwrap_or(file));
-    let here = is_same(&parent, project.dir())?;
-    if is_named(CATALOG_FILE) && (here || found.is_some())
-        || is_named(SETTINGS_FILE) && here
-        || is_same(file, &project.catalog_path())?
-    {
-        return refuse("is a file of a project; name another file for the backup");
+    // The catalog and the settings of this project may be elsewhere.
+    let is_here =
+        [CATALOG_FILE, SETTINGS_FILE].into_iter().any(is_named) && is_same(&parent, project.dir())?;
+    let role = if is_here || is_same(file, &project.catalog_path())? {
+        Some("is a file of a project")
+    } else {
+        project_role(file)
+    };
+    if let Some(role) = role {
+        return refuse(&format!("{role}; name another file for the backup"));
+    }
+    if file.file_name().is_none() || found.as_ref().is_some_and(Metadata::is_dir) {
+        return refuse("is a directory; name a file for the backup");
     }
     match found {
         None => Ok(()),

@@ -1,17 +1,14 @@
 //! Checks that the files of blocks are a mesh, an image and labels, by their first bytes and their names.
 
-use std::io::Read as _;
 use std::path::Path;
 
 use crate::exit::Refusal;
-use crate::files::listed;
+use crate::files::{self, listed};
 use crate::manifest_file::place_of;
 use mocban_core::domain::{FileKind, sanitize};
 use mocban_lists::manifest::{BlockRow, is_named_like_mesh, is_named_like_print};
-use mocban_store::{Project, open_regular};
+use mocban_store::Project;
 
-/// Bytes at the beginning of a file that show its kind.
-const HEAD_BYTES: u64 = 4096;
 /// Largest number of files that a refusal names.
 const MAX_SHOWN: usize = 10;
 /// Longest path in a message, in characters.
@@ -35,7 +32,7 @@ pub(crate) fn check(rows: &[BlockRow], label: &str, project: &Project) -> Result
 
 /// Returns what is wrong with the files of a block.
 fn faults(row: &BlockRow, project: &Project) -> Vec<String> {
-    let kind = |path: &Path| kind(&place_of(path, project));
+    let kind = |path: &Path| files::kind(&place_of(path, project));
     let (mesh, page) = (kind(&row.mesh), kind(&row.page));
     let may_be_image =
         |kind, path: &Path| is_image(kind) || kind.is_none() && is_named_like_print(path);
@@ -67,14 +64,6 @@ fn faults(row: &BlockRow, project: &Project) -> Vec<String> {
         add("labels", labels, kind.description());
     }
     faults
-}
-
-/// Returns the kind of a file, or `None` if it cannot be read.
-fn kind(path: &Path) -> Option<FileKind> {
-    let (file, _) = open_regular(path).ok()?;
-    let mut head = Vec::new();
-    file.take(HEAD_BYTES).read_to_end(&mut head).ok()?;
-    (!head.is_empty()).then(|| FileKind::of(&head))
 }
 
 const fn is_image(kind: Option<FileKind>) -> bool {

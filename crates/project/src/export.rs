@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork, warn_about_set_apart};
 use crate::exit::Refusal;
-use crate::files;
 use crate::location::Location;
+use crate::own_files::refuse_project_file;
 use crate::status::warn_about_stale;
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{ExportFormat, ExportOptions, ExportSummary, export as export_pairs};
@@ -24,7 +24,7 @@ pub async fn export(
     location: &Location,
     listener: &dyn Listener,
 ) -> ProjectResult<ExportSummary> {
-    files::refuse_project_file(output)?;
+    refuse_project_file(output)?;
     let (project, catalog) = location.open_read_only().await?;
     let config = location.settings()?.config;
     let computed = config.stages.pipeline.method.metrics();

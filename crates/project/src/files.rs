@@ -7,13 +7,11 @@ use std::path::{Path, PathBuf};
 use super::exit::Refusal;
 use super::input_paths::in_existing_form;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
-use mocban_catalog::Catalog;
-use mocban_core::domain::{ErrorCode, sanitize};
+use mocban_core::domain::{ErrorCode, FileKind, sanitize};
 use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::workbook::{is_workbook, read_sheet};
 use mocban_store::{
-    CATALOG_FILE, Project, SETTINGS_FILE, create_folders, open_regular, read_file_or_pipe,
-    write_atomic,
+    CATALOG_FILE, Project, create_folders, open_regular, read_file_or_pipe, write_atomic,
 };
 
 /// Longest list that is read, in bytes.
@@ -21,8 +19,17 @@ const MAX_LIST_BYTES: u64 = 512 << 20;
 
 /// Reads a list that is named on the command line, from a file or a pipe.
 pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
-    read_file_or_pipe(&in_existing_form(path), MAX_LIST_BYTES)
-        .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))
+    let bytes = read_file_or_pipe(&in_existing_form(path), MAX_LIST_BYTES)
+        .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))?;
+    let kind = FileKind::of(&bytes[..bytes.len().min(HEAD_BYTES)]);
+    if kind == FileKind::LfsPointer {
+        let text = format!(
+            "{} is {kind} and does not hold the file; fetch the file with `git lfs pull`",
+            path.display()
+        );
+        return Err(Refusal::Usage(text));
+    }
+    Ok(bytes)
 }
 
 /// A list that was read.
@@ -116,6 +123,22 @@ pub fn small(path: &Path) -> ProjectResult<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
+/// Bytes at the beginning of a file that show its kind.
+pub(crate) const HEAD_BYTES: usize = 4096;
+
+/// Returns the first bytes of a regular file, or `None` if it is empty or cannot be read.
+pub fn head(path: &Path) -> Option<Vec<u8>> {
+    let (file, _) = open_regular(path).ok()?;
+    let mut head = Vec::new();
+    file.take(HEAD_BYTES as u64).read_to_end(&mut head).ok()?;
+    (!head.is_empty()).then_some(head)
+}
+
+/// Returns the kind of a regular file by its first bytes, or `None` if it is empty or cannot be read.
+pub fn kind(path: &Path) -> Option<FileKind> {
+    head(path).map(|head| FileKind::of(&head))
+}
+
 /// Creates the folder of a file that will be written.
 pub fn create_parent(path: &Path) -> ProjectResult<()> {
     let parent = path.parent();
@@ -126,87 +149,6 @@ pub fn create_parent(path: &Path) -> ProjectResult<()> {
             format!("cannot write {shown}, because the folder {folder} cannot be created")
         }),
     }
-}
-
-/// Refuses to write over a catalog, a backup, or another file that a project needs, or into its folder of results.
-pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
-    let real = real_path(path);
-    let name = real.file_name().unwrap_or_default().to_string_lossy();
-    let is_known = name.starts_with(CATALOG_FILE)
-        || [SETTINGS_FILE, "run.lock", "run.members"].contains(&&*name);
-    // The parent of a bare file name is empty.
-    let folder = Path::new(".").join(real.parent().unwrap_or(&real));
-    let reason = if is_known && folder.join(CATALOG_FILE).exists() {
-        "is a file of a project"
-    } else if is_among_results(&real) {
-        "belongs to the results of a project"
-    } else if is_backup(&real).unwrap_or(false) {
-        "is a backup"
-    } else {
-        return Ok(());
-    };
-    let shown = path.display();
-    Err(Refusal::Usage(format!(
-        "{shown} {reason}; name another file for the output"
-    )))
-}
-
-/// Returns the absolute path of a file that need not exist, without links.
-fn real_path(path: &Path) -> PathBuf {
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let found = absolute.ancestors().find_map(|folder| {
-        let below = absolute.strip_prefix(folder).ok()?;
-        let real = folder.canonicalize().ok()?;
-        // Joining an empty path would add a separator.
-        Some(if below == Path::new("") {
-            real
-        } else {
-            real.join(below)
-        })
-    });
-    found.unwrap_or(absolute)
-}
-
-/// Returns whether a path is the folder of results of a project, or inside it.
-fn is_among_results(real: &Path) -> bool {
-    real.ancestors().any(|folder| {
-        let project = folder.parent().map(Project::at);
-        project.is_some_and(|project| {
-            project.artifacts_dir() == folder && project.catalog_path().exists()
-        })
-    })
-}
-
-/// Refuses to write over a file of a project, or over an input of its pairs and blocks.
-pub async fn refuse_used_file(
-    path: &Path,
-    project: &Project,
-    catalog: &Catalog,
-) -> ProjectResult<()> {
-    refuse_project_file(path)?;
-    // A file that does not exist is not an input.
-    let Ok(real) = path.canonicalize() else {
-        return Ok(());
-    };
-    // Two inputs may have the same file name in different folders, and an input may be a link.
-    let is_target = |stored: &String| {
-        let input = project.input_path(stored);
-        input == real || input.canonicalize().is_ok_and(|input| input == real)
-    };
-    let inputs = catalog.inputs_named([path, &real].map(file_name)).await?;
-    let Some((pair, _)) = inputs.into_iter().find(|(_, stored)| is_target(stored)) else {
-        return Ok(());
-    };
-    let shown = path.display();
-    Err(Refusal::Usage(format!(
-        "{shown} is an input of {pair}; name another file for the output"
-    ))
-    .into())
-}
-
-fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
 }
 
 /// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).

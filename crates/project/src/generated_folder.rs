@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{ProjectResult, WithContext as _};
 use crate::exit::Refusal;
-use crate::files::refuse_project_file;
+use crate::own_files::refuse_project_file;
 use mocban_store::{Leftover, ReplacementFolder, create_folders};
 
 /// A folder and what it is for.

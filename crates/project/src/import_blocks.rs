@@ -6,7 +6,7 @@ use crate::block_files;
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
-use crate::files::{self, ListFile};
+use crate::files::{self, HEAD_BYTES, ListFile};
 use crate::import_pairs::{AllowedChanges, PairSource};
 use crate::input_paths::{SimilarFiles, in_existing_form};
 use crate::location::{Location, now};
@@ -120,9 +120,6 @@ fn refuse_input(file: &Path, bytes: &[u8]) -> Result<(), Refusal> {
     )))
 }
 
-/// Bytes at the beginning of a list that show its kind.
-const HEAD_BYTES: usize = 4096;
-
 /// Imports blocks. If the import fails, no block is imported.
 pub async fn import_blocks(
     source: &BlockSource,
@@ -232,12 +229,17 @@ mod tests {
     use super::ListedItems;
 
     #[test]
-    fn a_mesh_an_image_or_an_html_table_is_no_list() {
+    fn other_files_in_place_of_a_list_are_named() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let advice = "not a list; name folders with --meshes DIR --prints DIR, or a list of pairs";
         for (name, bytes, expected) in [
             ("a.ply", &b"ply\nformat ascii 1.0\n"[..], format!("a.ply is a PLY mesh, {advice}")),
             ("a.stl", b"solid a", format!("a.stl is a mesh, {advice}")),
+            (
+                "b.csv",
+                b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n",
+                "b.csv is a pointer of Git LFS and does not hold the file; fetch the file with `git lfs pull`".to_owned(),
+            ),
             ("a.csv", b"\x89PNG\r\n\x1a\n", format!("a.csv is a PNG image, {advice}")),
             (
                 "a.xls",

@@ -107,4 +107,31 @@ mod tests {
         assert!(plan.warnings.iter().any(|line| line.contains("alone.stl")));
         assert!(!project.dir().exists(), "nothing is stored");
     }
+
+    #[test]
+    fn formats_of_a_list_that_are_not_read_get_one_sentence_each() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::at(&dir.path().join("project"));
+        let plan = |list: String| {
+            let source = PairSource::List {
+                file: dir.path().join("pairs.csv"),
+                bytes: Some(list.into_bytes()),
+            };
+            plan_import(source, &project, 1)
+        };
+        let list = "id,mesh,print\n1,a.glb,a.png\n2,b.glb,b.bmp\n".to_owned();
+        let sentences = [
+            "a glTF scene is not read: a.glb and 1 more; ",
+            "a BMP image is not read: b.bmp; ",
+        ];
+        let refused = plan(list.clone()).expect_err("nothing to read").to_string();
+        for sentence in sentences {
+            assert_eq!(refused.matches(sentence).count(), 1, "{refused}");
+        }
+        let mixed = plan(list + "3,c.ply,c.png\n").expect("one pair can be read");
+        assert_eq!((mixed.pairs, mixed.warnings.len()), (3, 2));
+        for (warning, sentence) in mixed.warnings.iter().zip(sentences) {
+            assert!(warning.starts_with(sentence), "{warning}");
+        }
+    }
 }

@@ -53,6 +53,7 @@ pub mod manifest_file;
 pub mod missing_files;
 pub mod missing_inputs;
 pub mod new_project;
+pub mod own_files;
 pub mod pair_table;
 pub mod report;
 pub mod restore;

@@ -7,7 +7,7 @@ use super::exit::Refusal;
 use super::files;
 use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form, is_windows_path};
 use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
-use super::unread_files::UnreadFiles;
+use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
 use mocban_core::domain::{FileKind, LengthUnit, first_names, sanitize};
 use mocban_lists::manifest::{
@@ -68,6 +68,9 @@ impl Listing {
     }
 
     /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`].
+    ///
+    /// # Errors
+    /// Returns an error if the content is no list, or the names of its files say that none of its pairs can be read.
     pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> ProjectResult<Self> {
         let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {
@@ -75,10 +78,15 @@ impl Listing {
         } else {
             read_csv
         };
-        let mut misspelt = MisspeltColumns::default();
-        let mut each = |row: ManifestRow| misspelt.add(&row);
+        let (mut misspelt, mut unread) = (MisspeltColumns::default(), UnreadRows::default());
+        let mut each = |row: ManifestRow| {
+            misspelt.add(&row);
+            unread.add(&row);
+        };
         let read = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
-        let warnings = misspelt.warnings();
+        let mut warnings = misspelt.warnings();
+        let unread = unread.warnings();
+        warnings.extend(unread.map_err(|sentences| refuse(file, &sentences))?);
         let renamed = renamed(&read);
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
@@ -108,8 +116,11 @@ impl Listing {
             files::list_below(&root).map(|files| ListedFolder { root, files })
         };
         let (mesh_folder, print_folder) = (listed(meshes)?, listed(prints)?);
-        let mut unread = UnreadFiles::of(&mesh_folder.files, FileKind::mesh_advice);
-        unread.append(UnreadFiles::of(&print_folder.files, FileKind::image_advice));
+        let mut unread = UnreadFiles::of_folder(&mesh_folder.files, FileKind::mesh_advice);
+        unread.append(UnreadFiles::of_folder(
+            &print_folder.files,
+            FileKind::image_advice,
+        ));
         let found = pair_folders(&mesh_folder, &print_folder).map_err(|problems| {
             let lines = [&[problems.to_string()][..], &unread.sentences].concat();
             refuse(meshes, &lines.join("\n"))

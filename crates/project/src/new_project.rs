@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
+use crate::own_files::project_role;
 use mocban_catalog::{Catalog, CatalogError, NewCatalog};
 use mocban_store::Project;
 
@@ -16,8 +17,14 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Refuses a new folder whose name begins or ends with white space, because it looks like another one.
+/// Refuses the folder of a new project among the files of another one, and a new folder whose name begins or ends with
+/// white space, because it looks like another one.
 pub fn check_new_folder(dir: &Path) -> Result<(), Refusal> {
+    if let Some(reason) = project_role(dir) {
+        let shown = dir.display();
+        let text = format!("{shown} {reason}; name another folder for the new project");
+        return Err(Refusal::Usage(text));
+    }
     let mut names = missing_dirs(dir).into_iter();
     let is_odd = |dir: &PathBuf| {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
-use crate::files;
 use crate::location::{Location, now};
+use crate::own_files::refuse_used_file;
 use crate::status::warn_about_stale;
 use mocban_config::{Sources, load};
 use mocban_export::{GallerySelection, draw_gallery};
@@ -49,7 +49,7 @@ pub async fn report(
 ) -> ProjectResult<RenderedReport> {
     let (project, catalog) = location.open_read_only().await?;
     if let Some(path) = output {
-        files::refuse_used_file(path, &project, &catalog).await?;
+        refuse_used_file(path, &project, &catalog).await?;
     }
     warn_about_stale(&catalog, location, listener).await?;
     let _work = LongWork::begin(listener, "reading the results");

@@ -20,10 +20,10 @@ pub struct RetireOutcome {
     pub warnings: Vec<String>,
 }
 
-/// Takes pairs out of every count. A process that works on one of them stores nothing more of it.
+/// Takes pairs out of every count; the id of a block stands for the pairs that it has now. A process that works on one of them stores nothing more of it.
 pub async fn retire(typed: &[String], location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
-    let names = named(&catalog, typed).await?;
+    let names = selection::known_pairs_of(&catalog, typed).await?;
     let changed = catalog.retire_pairs(&names, now()).await?;
     catalog.close().await;
     Ok(RetireOutcome {
@@ -33,14 +33,14 @@ pub async fn retire(typed: &[String], location: &Location) -> ProjectResult<Reti
     })
 }
 
-/// Brings retired pairs back, with their results and verdicts.
+/// Brings retired pairs back, with their results and verdicts; the id of a block stands for its pairs.
 ///
 /// # Errors
-/// Returns an error if none comes back, because none is retired, or they have no boxes any more in the labels of their
+/// Returns an error if none comes back, because none is retired or they have no boxes any more in the labels of their
 /// blocks.
 pub async fn undo(typed: &[String], location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
-    let names = named(&catalog, typed).await?;
+    let names = selection::known_pairs_of(&catalog, typed).await?;
     let changed = catalog.restore_pairs(&names).await?;
     let still_retired = still_retired(&catalog, &names).await?;
     catalog.close().await;
@@ -55,12 +55,6 @@ pub async fn undo(typed: &[String], location: &Location) -> ProjectResult<Retire
         changed,
         warnings,
     })
-}
-
-async fn named(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
-    let names = selection::known_pairs(catalog, typed).await?;
-    let names: BTreeSet<PairName> = names.into_iter().collect();
-    Ok(names.into_iter().collect())
 }
 
 /// Returns the pairs among `names` that are retired.

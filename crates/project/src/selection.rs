@@ -133,13 +133,57 @@ pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectRes
             found.pairs.extend(listed);
             continue;
         }
-        let pairs = catalog.pair_names().await?;
-        let blocks = all_blocks.iter().map(BlockName::as_str);
-        let all = pairs.iter().map(PairName::as_str).chain(blocks);
-        return Err(no_such("pair or block", text, all).into());
+        return Err(no_such_pair_or_block(catalog, text, &all_blocks)
+            .await?
+            .into());
     }
     refuse_retired(catalog, &found.pairs).await?;
     Ok(found)
+}
+
+/// Looks up pairs by their ids or those of their blocks, also retired ones. Returns each pair once, sorted. An id of both is
+/// that of the pair.
+///
+/// # Errors
+/// Returns an error if there is neither a pair nor a block with an id, or a block has no pairs.
+pub async fn known_pairs_of(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
+    let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    let mut found = BTreeSet::new();
+    for text in typed {
+        let pair = text.parse::<PairName>().ok();
+        if let Some(pair) = pair.filter(|name| !unknown.contains(name)) {
+            found.insert(pair);
+            continue;
+        }
+        let block = text.parse::<BlockName>().ok();
+        let id = block.as_ref().map_or(text.as_str(), BlockName::as_str);
+        let of_block = catalog.pairs_of_block_with_retired(id).await?;
+        if of_block.is_empty() {
+            let all = catalog.block_names().await?;
+            let refusal = match block.filter(|name| all.contains(name)) {
+                Some(block) => {
+                    let text = format!("block {block} has no pairs yet; `run` cuts them");
+                    Refusal::NothingSelected(text)
+                }
+                None => no_such_pair_or_block(catalog, text, &all).await?,
+            };
+            return Err(refusal.into());
+        }
+        found.extend(of_block);
+    }
+    Ok(found.into_iter().collect())
+}
+
+async fn no_such_pair_or_block(
+    catalog: &Catalog,
+    typed: &str,
+    blocks: &[BlockName],
+) -> ProjectResult<Refusal> {
+    let pairs = catalog.pair_names().await?;
+    let blocks = blocks.iter().map(BlockName::as_str);
+    let all = pairs.iter().map(PairName::as_str).chain(blocks);
+    Ok(no_such("pair or block", typed, all))
 }
 
 /// Looks up one block.

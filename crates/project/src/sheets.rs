@@ -7,6 +7,7 @@ use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::exit::Refusal;
 use crate::files;
 use crate::location::Location;
+use crate::own_files::refuse_used_file;
 use crate::selection;
 use mocban_catalog::Catalog;
 use mocban_core::domain::ThresholdMetric;
@@ -30,7 +31,7 @@ pub async fn contact_sheet(
 ) -> ProjectResult<(PathBuf, ContactSheet)> {
     let (project, catalog) = location.open_read_only().await?;
     let path = output.map_or_else(|| project.dir().join("sheet.png"), Path::to_owned);
-    files::refuse_used_file(&path, &project, &catalog).await?;
+    refuse_used_file(&path, &project, &catalog).await?;
     files::require_png(output)?;
     let metric = options.metric;
     let options = ContactSheetOptions {
@@ -74,7 +75,7 @@ pub async fn block_sheet(
     let (project, catalog) = location.open_read_only().await?;
     let default = ["page.png", "overlay.png"][usize::from(is_overlay)];
     let path = output.map_or_else(|| project.dir().join(default), Path::to_owned);
-    files::refuse_used_file(&path, &project, &catalog).await?;
+    refuse_used_file(&path, &project, &catalog).await?;
     files::require_png(output)?;
     let work = LongWork::begin(listener, "drawing the page");
     let view = block_view(block, metric, &project, &catalog, location).await?;

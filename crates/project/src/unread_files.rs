@@ -1,9 +1,13 @@
-//! Says once per format, instead of once per file, that files of a folder are not read.
+//! Says once per format, instead of once per file, that files of a folder or a list are not read.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use mocban_core::domain::FileKind;
+use mocban_lists::manifest::ManifestRow;
+
+/// Begins the sentences of a folder, whose other files are imported without these.
+const IGNORED: &str = "ignored, ";
 
 /// Files in formats that are not read, by their names.
 pub(crate) struct UnreadFiles {
@@ -14,12 +18,20 @@ pub(crate) struct UnreadFiles {
 
 impl UnreadFiles {
     /// Finds the files of a folder whose format is not read and for which there is advice.
-    pub(crate) fn of(folder: &[PathBuf], advice: fn(FileKind) -> Option<String>) -> Self {
+    pub(crate) fn of_folder(folder: &[PathBuf], advice: fn(FileKind) -> Option<String>) -> Self {
+        Self::of(folder, IGNORED, advice)
+    }
+
+    /// Finds files like [`Self::of_folder`], with sentences that begin with `start`.
+    fn of<'a>(
+        files: impl IntoIterator<Item = &'a PathBuf>,
+        start: &str,
+        advice: fn(FileKind) -> Option<String>,
+    ) -> Self {
         let mut formats: BTreeMap<&'static str, (FileKind, String, Vec<&PathBuf>)> =
             BTreeMap::new();
-        for path in folder {
-            let extension = path.extension().and_then(|extension| extension.to_str());
-            let kind = extension.and_then(FileKind::of_unread_extension);
+        for path in files {
+            let kind = unread_kind(path);
             if let Some((kind, advice)) = kind.and_then(|kind| Some((kind, advice(kind)?))) {
                 let format = formats.entry(kind.name());
                 let (_, _, paths) = format.or_insert((kind, advice, Vec::new()));
@@ -37,7 +49,7 @@ impl UnreadFiles {
                 0 => String::new(),
                 more => format!(" and {more} more"),
             };
-            let sentence = format!("ignored, {kind} is not read: {first}{more}; {advice}");
+            let sentence = format!("{start}{kind} is not read: {first}{more}; {advice}");
             found.sentences.push(sentence);
             found.paths.extend(paths.into_iter().cloned());
         }
@@ -48,6 +60,52 @@ impl UnreadFiles {
     pub(crate) fn append(&mut self, mut other: Self) {
         self.paths.append(&mut other.paths);
         self.sentences.append(&mut other.sentences);
+    }
+}
+
+fn unread_kind(path: &Path) -> Option<FileKind> {
+    let extension = path.extension().and_then(|extension| extension.to_str());
+    extension.and_then(FileKind::of_unread_extension)
+}
+
+/// The rows of a list with files in formats that are not read.
+#[derive(Debug, Default)]
+pub(crate) struct UnreadRows {
+    meshes: BTreeSet<PathBuf>,
+    prints: BTreeSet<PathBuf>,
+    /// Whether a row has files that may be read.
+    has_others: bool,
+}
+
+impl UnreadRows {
+    /// Looks at the paths of a row.
+    pub(crate) fn add(&mut self, row: &ManifestRow) {
+        let is_unread = |path: &Path, advice: fn(FileKind) -> Option<String>| {
+            unread_kind(path).and_then(advice).is_some()
+        };
+        let mesh = is_unread(&row.mesh, FileKind::mesh_advice);
+        let print = is_unread(&row.print, FileKind::image_advice);
+        if mesh {
+            self.meshes.insert(row.mesh.clone());
+        }
+        if print {
+            self.prints.insert(row.print.clone());
+        }
+        self.has_others |= !mesh && !print;
+    }
+
+    /// Returns one warning per format.
+    ///
+    /// # Errors
+    /// Returns the sentences as an error if no row can be read.
+    pub(crate) fn warnings(self) -> Result<Vec<String>, String> {
+        let mut found = UnreadFiles::of(&self.meshes, "", FileKind::mesh_advice);
+        found.append(UnreadFiles::of(&self.prints, "", FileKind::image_advice));
+        if self.has_others || found.sentences.is_empty() {
+            Ok(found.sentences)
+        } else {
+            Err(found.sentences.join("\n"))
+        }
     }
 }
 

@@ -17,7 +17,6 @@ use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };
 use mocban_core::domain::{AlignmentPrior, ArtifactRef, FailureClass, Stage};
-use mocban_core::mesh;
 use mocban_core::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use mocban_store::Project;
 
@@ -65,8 +64,7 @@ impl PairPipeline {
 
     fn fit(&self, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError> {
         let scan = self.inputs.read_scan(pair)?;
-        if scan.missing() > 0 {
-            let said = mesh::missing_sentence(scan.missing());
+        for said in scan.losses().sentences() {
             tracing::warn!(pair = %pair.attributes.name, "{}: {said}", pair.attributes.mesh_path);
         }
         let length = scan_size::length_of(&scan.mesh().vertices);

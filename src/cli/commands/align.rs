@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::cli::output::context::Context;
+use crate::cli::output::digits::{LENGTH_DIGITS, length, significant};
 use crate::cli::output::table::columns;
 use clap::Args;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
@@ -94,22 +95,24 @@ fn text(pair: &AlignedPair) -> String {
         None => "not known under this method".to_owned(),
     };
     let map = pair.print_from_mesh(metric);
-    let scale = pixels_per_unit(&map.0);
+    let unit = pair.hints.unit;
     let rows = [
         ("confidence", confidence),
         (
             "pose",
             format!(
-                "turned by {:.2} degrees, shifted by {x:.1}, {y:.1} px, {scale:.2} px per unit of the mesh",
-                metric.angle_deg
+                "turned by {:.2} degrees, shifted by {x:.1}, {y:.1} px, {}",
+                metric.angle_deg,
+                scale_text(pixels_per_unit(&map.0), unit)
             ),
         ),
         ("carved side", format!("towards {} of the mesh", side(pair))),
         (
             "threshold",
             format!(
-                "{} at {:.3} below the fitted surface, in units of the mesh",
-                metric.metric, -metric.threshold_depth
+                "{} at {} below the fitted surface",
+                metric.metric,
+                length(-metric.threshold_depth, unit)
             ),
         ),
         (
@@ -123,6 +126,12 @@ fn text(pair: &AlignedPair) -> String {
     columns(rows.map(|(name, value)| vec![name.to_owned(), value]), "<<")
 }
 
+/// Formats a number of pixels per unit of the mesh: `20.5 px per mm`.
+fn scale_text(scale: f64, unit: Option<LengthUnit>) -> String {
+    let unit = unit.map_or("unit of the mesh", LengthUnit::name);
+    format!("{} px per {unit}", significant(scale, LENGTH_DIGITS))
+}
+
 /// Returns how many pixels of the print a unit of the mesh is long on it.
 fn pixels_per_unit(map: &[[f64; 4]; 3]) -> f64 {
     let length = |row: &[f64; 4]| {
@@ -133,4 +142,22 @@ fn pixels_per_unit(map: &[[f64; 4]; 3]) -> f64 {
             .sqrt()
     };
     f64::midpoint(length(&map[0]), length(&map[1]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LengthUnit, length, scale_text};
+
+    #[test]
+    fn lengths_and_scales_have_their_unit() {
+        for (unit, threshold, scale) in [
+            (Some(LengthUnit::M), "0.000412 m", "20512 px per m"),
+            (Some(LengthUnit::In), "0.0162 in", "521 px per in"),
+            (None, "0.412 mesh units", "20.5 px per unit of the mesh"),
+        ] {
+            let mm = unit.map_or(1.0, LengthUnit::mm);
+            assert_eq!(length(0.412 / mm, unit), threshold);
+            assert_eq!(scale_text(20.512 * mm, unit), scale);
+        }
+    }
 }

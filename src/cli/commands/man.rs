@@ -7,6 +7,7 @@ use clap::{Args, Command};
 use crate::cli::output::context::Context;
 use mocban_project::error::WithContext as _;
 use mocban_project::files;
+use mocban_project::own_files::refuse_project_file;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_store::{StagingFolder, create_folders, rename_into_place};
@@ -25,7 +26,7 @@ pub(crate) struct ManArgs {
 pub(crate) fn man(args: ManArgs, command: Command, context: &Context) -> ProjectResult<ExitCode> {
     let folder = args.dir.or(args.output).unwrap_or_default();
     let dir = folder.display();
-    files::refuse_project_file(&folder)?;
+    refuse_project_file(&folder)?;
     create_folders(&folder).with_context(|| format!("cannot create {dir}"))?;
     let failed = || format!("cannot write manual pages to {dir}");
     let staging = StagingFolder::beside(&folder.join("mocban.1")).with_context(failed)?;

@@ -12,8 +12,8 @@ use mocban_project::{ExitCode, ProjectResult};
 /// Arguments of `retire`.
 #[derive(Debug, Args)]
 pub(crate) struct RetireArgs {
-    /// The pairs
-    #[arg(value_name = "PAIR", required = true)]
+    /// The pairs, or the blocks of which all pairs are meant
+    #[arg(value_name = "PAIR|BLOCK", required = true)]
     pub(crate) pairs: Vec<String>,
     /// Bring the pairs back, with their results and verdicts
     #[arg(long)]
@@ -49,8 +49,8 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
     }
     if args.undo {
         context.next("run");
-    } else if let [pair] = names.as_slice() {
-        context.next(&format!("retire --undo {}", shell_quoted(pair.as_str())));
+    } else if let [typed] = args.pairs.as_slice() {
+        context.next(&format!("retire --undo {}", shell_quoted(typed)));
     }
     Ok(ExitCode::Done)
 }

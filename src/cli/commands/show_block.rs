@@ -151,19 +151,30 @@ fn warnings_text(detail: &BlockDetail, palette: Palette) -> String {
     format!("{head}\n{}", columns(rows, "<"))
 }
 
-/// Formats the numbers and short texts of an outcome on its first level: `agreement 0.93, side front`.
+/// Ends of the names of numbers, and the units that they mean.
+const UNITS: [(&str, &str); 4] = [
+    ("px_per_mm", " px/mm"),
+    ("_mm", " mm"),
+    ("_px", " px"),
+    ("_deg", "\u{b0}"),
+];
+
+/// Formats the numbers and short texts of an outcome on its first level: `agreement 0.93, side front, angle 0.1°`.
 fn numbers(outcome: &Value) -> String {
     const MAX_TEXT: usize = 60;
     let entries = outcome.as_object().into_iter().flatten();
     let shown = entries.filter_map(|(name, value)| {
-        let name = name.replace('_', " ");
+        let with_unit = |(end, unit): &(&str, &'static str)| Some((name.strip_suffix(end)?, *unit));
+        let (short, unit) = UNITS.iter().find_map(with_unit).unwrap_or((name, ""));
+        let [name, short] = [name, short].map(|name| name.replace('_', " "));
         match value {
-            Value::Number(number) => Some(match number.as_f64() {
-                Some(real) if !number.is_u64() && !number.is_i64() => {
-                    format!("{name} {}", significant(real, DIGITS))
-                }
-                _ => format!("{name} {number}"),
-            }),
+            Value::Number(number) => {
+                let number = match number.as_f64() {
+                    Some(real) if !number.is_u64() && !number.is_i64() => significant(real, DIGITS),
+                    _ => number.to_string(),
+                };
+                Some(format!("{short} {number}{unit}").trim_start().to_owned())
+            }
             Value::Bool(flag) => Some(format!("{name} {flag}")),
             Value::String(text) if text.len() <= MAX_TEXT => {
                 Some(format!("{name} {}", one_line(text)))
@@ -274,11 +285,13 @@ mod tests {
 
     #[test]
     fn numbers_of_an_outcome_are_on_one_line() {
-        let outcome =
-            json!({ "agreement": 0.93456, "windows": 120, "grid": [1, 2], "side": "front" });
+        let outcome = json!({
+            "agreement": 0.93456, "windows": 120, "grid": [1, 2], "side": "front", "angle_deg": -0.1234,
+            "px_per_mm": 10.234, "size_mm": 250,
+        });
         assert_eq!(
             numbers(&outcome),
-            "agreement 0.9346, side front, windows 120"
+            "agreement 0.9346, angle -0.1234\u{b0}, 10.23 px/mm, side front, size 250 mm, windows 120"
         );
     }
 }

@@ -40,7 +40,7 @@ const EXAMPLES: [(&str, &str); 32] = [
     ("retry", "mocban -C blocks retry --class io"),
     (
         "retire",
-        "mocban -C blocks retire b01-0117\nmocban -C blocks retire --undo b01-0117",
+        "mocban -C blocks retire b01-0117\nmocban -C blocks retire --undo b01-0117\nmocban -C blocks retire b02",
     ),
     ("check", "mocban -C blocks check --repair"),
     ("backup", "mocban -C blocks backup blocks.sqlite"),

@@ -76,6 +76,19 @@ impl NameRequest {
     }
 }
 
+/// Returns whether a command, or one of its subcommands, has arguments that are pairs or blocks.
+pub(crate) fn takes_names(command: &Command) -> bool {
+    let is_name = |arg: &Arg| PAIR_ARGUMENTS.contains(&arg.get_id().as_str());
+    !WITH_NEW_NAMES.contains(&command.get_name())
+        && (command.get_positionals().any(is_name) || command.get_subcommands().any(takes_names))
+}
+
+/// Returns whether a command has an option that is a block.
+pub(crate) fn has_block_option(command: &Command) -> bool {
+    let is_block = |arg: &Arg| arg.get_id() == BLOCK_ARGUMENT;
+    !WITH_NEW_NAMES.contains(&command.get_name()) && command.get_opts().any(is_block)
+}
+
 /// Returns the option of a word that takes a value, and the value if the word has it too. Returns `None` for an unknown
 /// option.
 fn find_option<'a>(command: &'a Command, word: &str) -> Option<(Option<&'a Arg>, Option<String>)> {
@@ -151,6 +164,9 @@ mod tests {
             "-Cblocks --json view --metric relief b0",
             "run b1 b0",
             "retry b0",
+            "retire b0",
+            "retire --undo b0",
+            "plan b0",
             "sheet b0",
             "verdict set b0",
             "verdict log b0",

@@ -3,7 +3,7 @@
 use clap::Command;
 use clap_complete::Shell;
 
-use crate::cli::input::name_request::PAIR_ARGUMENTS;
+use crate::cli::input::name_request::{PAIR_ARGUMENTS, has_block_option, takes_names};
 
 /// Returns the script of a shell.
 pub(crate) fn completion_script(shell: Shell, command: &mut Command) -> String {
@@ -13,6 +13,7 @@ pub(crate) fn completion_script(shell: Shell, command: &mut Command) -> String {
     let script = match shell {
         Shell::Bash => script.replace("complete -F _mocban ", "complete -F _mocban_with_names "),
         Shell::Zsh => with_zsh_names(&script),
+        Shell::PowerShell => script.replace(POWERSHELL_START, POWERSHELL_NAMES),
         _ => script.into_owned(),
     };
     let place = place(shell);
@@ -25,7 +26,8 @@ pub(crate) fn completion_script(shell: Shell, command: &mut Command) -> String {
             None => script,
         },
         Shell::Bash => format!("{note}\n{BASH_NAMES}{script}"),
-        Shell::Fish => format!("{note}\n{script}{FISH_NAMES}"),
+        Shell::Fish => format!("{note}\n{script}{}", fish_names(command)),
+        Shell::Elvish => format!("{note}\n{script}{ELVISH_NAMES}"),
         _ => format!("{note}\n{script}"),
     }
 }
@@ -92,7 +94,74 @@ function __mocban_names
     set -l words (commandline -opc) (commandline -ct)
     $words[1] completions fish -- $words[2..-1] 2>/dev/null
 end
-complete -c mocban -n "__fish_seen_subcommand_from show view run retry retire contact-sheet sheet verdict" -a "(__mocban_names)"
+"#;
+
+/// Returns the lines with which fish completes names after the commands that take them.
+fn fish_names(command: &Command) -> String {
+    let all: Vec<&Command> = command.get_subcommands().collect();
+    let names = |has: fn(&Command) -> bool| -> String {
+        let with = all.iter().filter(|command| has(command));
+        let names = with.flat_map(|command| command.get_name_and_visible_aliases());
+        names.collect::<Vec<_>>().join(" ")
+    };
+    let complete = |commands: String, more: &str| {
+        format!(
+            "complete -c mocban -n \"__fish_seen_subcommand_from {commands}\" {more}-a \"(__mocban_names)\"\n"
+        )
+    };
+    let pairs = complete(names(takes_names), "");
+    let blocks = complete(names(has_block_option), "-l block -r -f ");
+    format!("{FISH_NAMES}{pairs}{blocks}")
+}
+
+/// The beginning of the function that completes in PowerShell.
+const POWERSHELL_START: &str = "    param($wordToComplete, $commandAst, $cursorPosition)\n";
+/// The same, which then tries names. An empty word gets quotes, because PowerShell does not pass on empty words.
+const POWERSHELL_NAMES: &str = r#"    param($wordToComplete, $commandAst, $cursorPosition)
+
+    $elements = @($commandAst.CommandElements | Where-Object { $_.Extent.StartOffset -lt $cursorPosition })
+    $words = @($elements | Select-Object -Skip 1 | ForEach-Object {
+        if ($_ -is [StringConstantExpressionAst] -or $_ -is [ExpandableStringExpressionAst]) {
+            "'" + $_.Value + "'"
+        } else {
+            "$_"
+        }
+    })
+    if ($wordToComplete -eq '') {
+        $words += "''"
+    }
+    $encoding = [Console]::OutputEncoding
+    try {
+        [Console]::OutputEncoding = [System.Text.UTF8Encoding]::new($false)
+        $names = @(& $elements[0].Value completions powershell '--' @words 2>$null)
+    } catch {
+        $names = @()
+    } finally {
+        [Console]::OutputEncoding = $encoding
+    }
+    if ($names.Count -gt 0) {
+        return $names | ForEach-Object {
+            $text = if ($_ -match '^[\w.-]+$') { $_ } else { "'" + ($_ -replace "'", "''") + "'" }
+            [CompletionResult]::new($text, $_, [CompletionResultType]::ParameterValue, $_)
+        }
+    }
+"#;
+
+const ELVISH_NAMES: &str = r#"
+var mocban-arguments~ = $edit:completion:arg-completer[mocban]
+set edit:completion:arg-completer[mocban] = {|@words|
+    var names = []
+    try {
+        set names = [((external $words[0]) completions elvish -- (all $words[1..]) 2>&- | from-lines)]
+    } catch {
+        nop
+    }
+    if (> (count $names) 0) {
+        all $names
+    } else {
+        mocban-arguments $@words
+    }
+}
 "#;
 
 /// Lets zsh complete names for the arguments that are pairs or blocks, and keeps the whole command line for it.
@@ -135,6 +204,12 @@ mod tests {
             ),
             (Shell::Zsh, "~/.zfunc/_mocban", ":_mocban_names'"),
             (Shell::Fish, "completions/mocban.fish", "(__mocban_names)"),
+            (
+                Shell::PowerShell,
+                "$PROFILE",
+                " completions powershell '--' @words",
+            ),
+            (Shell::Elvish, "lib/mocban.elv", " completions elvish -- "),
         ] {
             let script = completion_script(shell, &mut args::command());
             let head: Vec<&str> = script.lines().take(8).collect();
@@ -145,5 +220,29 @@ mod tests {
         let zsh = completion_script(Shell::Zsh, &mut args::command());
         assert!(zsh.starts_with("#compdef mocban\n"), "{zsh}");
         assert!(zsh.matches(":_mocban_names'").count() >= 8, "{zsh}");
+    }
+
+    #[test]
+    fn fish_completes_names_after_every_command_that_takes_them() {
+        let fish = completion_script(Shell::Fish, &mut args::command());
+        let lines: Vec<&str> = fish
+            .lines()
+            .filter(|line| line.ends_with("-a \"(__mocban_names)\""))
+            .collect();
+        let commands = "show view run plan retry retire contact-sheet sheet verdict";
+        let [pairs, blocks] = lines.as_slice() else {
+            panic!("{lines:?}");
+        };
+        for name in commands.split(' ') {
+            assert!(pairs.contains(&format!(" {name}")), "{name}: {pairs}");
+        }
+        assert!(
+            !pairs.contains(" import") && !pairs.contains(" demo"),
+            "{pairs}"
+        );
+        assert!(
+            blocks.contains(" contact-sheet sheet\" -l block "),
+            "{blocks}"
+        );
     }
 }

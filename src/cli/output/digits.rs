@@ -1,7 +1,22 @@
 //! Numbers with a fixed number of significant digits, for lengths in any unit.
 
+use mocban_core::domain::LengthUnit;
+
+/// Significant digits of lengths.
+pub(crate) const LENGTH_DIGITS: i32 = 3;
 /// Most decimals: a nanometre in metres.
 const MAX_DECIMALS: i32 = 9;
+
+/// Formats a length of a mesh, such as `0.00213 m`, or `2.13 mesh units` if the unit is unknown.
+pub(crate) fn length(value: f64, unit: Option<LengthUnit>) -> String {
+    let value = significant(value, LENGTH_DIGITS);
+    format!("{value} {}", unit_name(unit))
+}
+
+/// Returns the unit of lengths of a mesh.
+pub(crate) fn unit_name(unit: Option<LengthUnit>) -> &'static str {
+    unit.map_or("mesh units", LengthUnit::name)
+}
 
 /// Formats a number with this many significant digits and without an exponent. Digits before the decimal point are all kept.
 pub(crate) fn significant(value: f64, digits: i32) -> String {

@@ -9,9 +9,11 @@ use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
 use super::screen::{Palette, Screen};
 use crate::cli::input::global::{Global, LogFormat};
+use mocban_core::domain::FileKind;
 use mocban_lists::manifest::is_named_like_input;
 use mocban_project::error::WithContext as _;
-use mocban_project::files::{create_parent, refuse_project_file};
+use mocban_project::files;
+use mocban_project::own_files::refuse_project_file;
 use mocban_project::{ProjectResult, Refusal};
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
@@ -48,14 +50,15 @@ fn writer(
     };
     refuse_project_file(path)?;
     // Which files are inputs of the project is not known yet.
-    if is_named_like_input(path) && path.exists() {
+    let is_named_like_input = is_named_like_input(path) && path.exists();
+    if is_named_like_input || files::kind(path).is_some_and(|kind| kind != FileKind::Text) {
         let text = format!(
             "{} is not a log file; name another file for the log",
             path.display()
         );
         return Err(Refusal::Usage(text).into());
     }
-    create_parent(path)?;
+    files::create_parent(path)?;
     let file = OpenOptions::new()
         .create(true)
         .append(true)

@@ -9,7 +9,7 @@ use serde_json::json;
 use super::run_progress::RunProgress;
 use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
 use super::table::count;
-use crate::cli::input::global::ProgressMode;
+use crate::cli::input::global::{Global, ProgressMode};
 use mocban_core::domain::one_line;
 use mocban_runner::{RunEvent, StopLevel};
 use mocban_system::time_text::duration;
@@ -19,6 +19,8 @@ use mocban_system::time_text::duration;
 pub(crate) struct ProgressReporter {
     screen: Screen,
     palette: Palette,
+    /// Whether only the first of equal failures are shown.
+    counts_equal: bool,
     progress: RunProgress,
     started: Instant,
     display: Display,
@@ -47,15 +49,16 @@ const PLAIN_PERCENT: u64 = 5;
 const PLAIN_MIN_INTERVAL: Duration = Duration::from_secs(1);
 
 impl ProgressReporter {
-    /// Starts the requested display; `-q` turns the automatic one off.
-    pub(crate) fn new(mode: ProgressMode, quiet: bool, screen: &Screen, palette: Palette) -> Self {
+    /// Starts the requested display; `-q` turns the automatic one off, and `-v` shows all failures.
+    pub(crate) fn new(global: &Global, screen: &Screen, palette: Palette) -> Self {
         let now = Instant::now();
         Self {
             screen: screen.clone(),
             palette,
+            counts_equal: global.verbose == 0,
             progress: RunProgress::default(),
             started: now,
-            display: display(mode, quiet, screen, now),
+            display: display(global.progress, global.quiet, screen, now),
         }
     }
 
@@ -87,8 +90,12 @@ impl ProgressReporter {
                 }
             }
         }
-        if let Some(line) = event_line(event, self.palette) {
-            self.screen.line(&line);
+        match event_line(event, self.palette) {
+            Some((label, text)) if self.counts_equal && !label.is_empty() => {
+                self.screen.warning(&label, &text);
+            }
+            Some((label, text)) => self.screen.line(&format!("{label}{text}")),
+            None => {}
         }
     }
 
@@ -156,39 +163,41 @@ fn update_bar(bar: &ProgressBar, is_of_blocks: &mut bool, progress: &RunProgress
     bar.set_message(blocks.unwrap_or_else(|| progress.by_stage_line()));
 }
 
-/// Returns the line that is printed for an event, if any.
-fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
+/// Returns the line that is printed for an event, if any: a label, which failures have, and a text.
+fn event_line(event: &RunEvent, palette: Palette) -> Option<(String, String)> {
+    let label = |tone, word| palette.paint(tone, word) + " ";
+    let [failed, waiting] =
+        [(Tone::Bad, "failed"), (Tone::Warn, "waiting")].map(|(tone, word)| label(tone, word));
+    let plain = |text: String| Some((String::new(), text));
     match event {
         RunEvent::PairFailed {
             pair,
             stage,
             failure,
             ..
-        } => Some(format!(
-            "{} {} at {stage}: {} ({})",
-            palette.paint(Tone::Bad, "failed"),
+        } => Some((failed, format!(
+            "{} at {stage}: {} ({})",
             palette.paint(Tone::Strong, pair),
             one_line(&failure.message),
             failure.class
-        )),
+        ))),
         RunEvent::PairBackingOff {
             pair,
             stage,
             failure,
             wait_ms,
-        } => Some(format!(
-            "{} {pair} at {stage}: {} ({}), retrying in {}",
-            palette.paint(Tone::Warn, "waiting"),
+        } => Some((waiting, format!(
+            "{pair} at {stage}: {} ({}), retrying in {}",
             one_line(&failure.message),
             failure.class,
             duration(*wait_ms)
-        )),
+        ))),
         RunEvent::Recovered { pairs } => {
             let pairs = count(*pairs, "pair");
-            Some(format!("{pairs} recovered from a worker that died"))
+            plain(format!("{pairs} recovered from a worker that died"))
         }
         RunEvent::Stopping { level, reason } => {
-            Some(palette.paint(Tone::Warn, stopping_line(*level, reason)))
+            plain(palette.paint(Tone::Warn, stopping_line(*level, reason)))
         }
         RunEvent::BlockDone {
             block,
@@ -196,7 +205,7 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
             changed,
             retired,
             ..
-        } => Some(format!(
+        } => plain(format!(
             "block {block}: {} added, {changed} changed, {retired} retired",
             count(*added, "pair")
         )),
@@ -204,25 +213,23 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
             block,
             stage,
             failure,
-        } => Some(format!(
-            "{} block {} at {stage}: {} ({})",
-            palette.paint(Tone::Bad, "failed"),
+        } => Some((failed, format!(
+            "block {} at {stage}: {} ({})",
             palette.paint(Tone::Strong, block),
             one_line(&failure.message),
             failure.class
-        )),
+        ))),
         RunEvent::BlockBackingOff {
             block,
             stage,
             failure,
             wait_ms,
-        } => Some(format!(
-            "{} block {block} at {stage}: {} ({}), retrying in {}",
-            palette.paint(Tone::Warn, "waiting"),
+        } => Some((waiting, format!(
+            "block {block} at {stage}: {} ({}), retrying in {}",
             one_line(&failure.message),
             failure.class,
             duration(*wait_ms)
-        )),
+        ))),
         RunEvent::Started { .. }
         | RunEvent::BlockStageStarted { .. }
         | RunEvent::BlockStageFinished { .. }
@@ -279,8 +286,9 @@ mod tests {
         ];
         let lines = events
             .each_ref()
-            .map(|event| event_line(event, Palette::PLAIN));
-        insta::assert_snapshot!(lines.map(Option::unwrap_or_default).join("\n"));
+            .map(|event| event_line(event, Palette::PLAIN).unwrap_or_default())
+            .map(|(label, text)| label + &text);
+        insta::assert_snapshot!(lines.join("\n"));
         insta::assert_snapshot!(
             "json",
             events.map(|event| json!(event).to_string()).join("\n")

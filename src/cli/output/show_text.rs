@@ -1,6 +1,6 @@
 //! The text that `show` prints about one pair.
 
-use super::digits::significant;
+use super::digits::{LENGTH_DIGITS, length, significant, unit_name};
 use super::screen::{Palette, Tone};
 use super::table::columns;
 use mocban_align::scan_size;
@@ -10,7 +10,6 @@ use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
     Verdict, one_line,
 };
-use mocban_core::mesh::missing_sentence;
 use mocban_project::details::{Adjustment, ManualResult};
 use mocban_results::ManualCorrection;
 use mocban_store::Project;
@@ -142,12 +141,7 @@ impl PairPage<'_> {
         if metrics.is_empty() {
             return String::new();
         }
-        let unit = self.detail.results.attributes.unit;
-        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
-        let head = format!(
-            "  metric,angle °,scale,shift px,threshold{unit},ssim,iou,iou box,dice,no ink,no wood,margin,confidence,verdicts"
-        );
-        let head = head.split(',').map(ToOwned::to_owned).collect();
+        let head = metric_head(self.detail.results.attributes.unit);
         let rows = std::iter::once(head).chain(metrics.iter().map(metric_row));
         section("result", rows, "<>>>>>>>>>>>><", self.palette)
     }
@@ -196,55 +190,43 @@ pub(crate) const fn state_name(status: JobStatus) -> &'static str {
     }
 }
 
-/// Significant digits of lengths, which have the unit of the mesh.
-const DIGITS: i32 = 3;
-
-/// Returns the few numbers of a stage that show whether it succeeded. Lengths are in units of the mesh.
+/// Returns the few numbers of a stage that show whether it succeeded.
 fn numbers(record: &StageRecord, hints: ScanHints) -> String {
-    let unit = unit_name(hints);
     let text = match record.stage {
         Stage::Fit => record.parse().map(|fit| fit_numbers(&fit, hints)),
-        Stage::Depth => record.parse().map(|depth| depth_numbers(&depth, unit)),
+        Stage::Depth => record
+            .parse()
+            .map(|depth| depth_numbers(&depth, hints.unit)),
         Stage::Normalize => record.parse().map(|found| ink_numbers(&found)),
         Stage::Register => Ok(String::new()),
     };
     text.unwrap_or_else(|_| "written by another version of this program".to_owned())
 }
 
-fn unit_name(hints: ScanHints) -> &'static str {
-    hints.unit.map_or("mesh units", LengthUnit::name)
-}
-
 fn fit_numbers(fit: &FitOutcome, hints: ScanHints) -> String {
-    let unit = unit_name(hints);
     let curvature = match fit.curvature {
-        Some(_) => format!(
-            ", curvature {} {unit}",
-            significant(fit.curvature_height, DIGITS)
-        ),
+        Some(_) => format!(", curvature {}", length(fit.curvature_height, hints.unit)),
         None => String::new(),
     };
-    let missing = fit.missing_vertices;
-    let missing = missing.map(|missing| missing_sentence(missing.get()));
-    let said = scan_size::contradictions(fit, hints);
-    let notes: Vec<String> = missing.into_iter().chain(said).collect();
+    let mut notes = fit.losses().sentences();
+    notes.extend(scan_size::contradictions(fit, hints));
     let notes = if notes.is_empty() {
         String::new()
     } else {
         format!("; {}", notes.join("; "))
     };
-    let [relief, rms] = [fit.relief, fit.rms].map(|length| significant(length, DIGITS));
+    let [relief, rms] = [fit.relief, fit.rms].map(|value| length(value, hints.unit));
     format!(
-        "relief {relief} {unit}, rms {rms} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{notes}",
+        "relief {relief}, rms {rms}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{notes}",
         fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }
 
-fn depth_numbers(depth: &DepthOutcome, unit: &str) -> String {
+fn depth_numbers(depth: &DepthOutcome, unit: Option<LengthUnit>) -> String {
     let DepthOutcome { width, height, .. } = depth;
-    let side = significant(depth.scale.mesh_unit_per_px, DIGITS);
+    let side = length(depth.scale.mesh_unit_per_px, unit);
     let covered = depth.coverage * 100.0;
-    format!("{width} x {height} px, {side} {unit} a pixel, {covered:.0} % covered")
+    format!("{width} x {height} px, {side} a pixel, {covered:.0} % covered")
 }
 
 fn ink_numbers(found: &NormalizeOutcome) -> String {
@@ -267,6 +249,14 @@ fn percent(share: f64) -> String {
     format!("{:.1} %", share * 100.0)
 }
 
+fn metric_head(unit: Option<LengthUnit>) -> Vec<String> {
+    let unit = unit_name(unit);
+    let head = format!(
+        "  metric,angle °,scale,shift px,threshold {unit},ssim,iou,iou box,dice,no ink,no wood,margin,confidence,verdicts"
+    );
+    head.split(',').map(ToOwned::to_owned).collect()
+}
+
 fn metric_row(record: &MetricRecord) -> Vec<String> {
     let result = &record.outcome;
     let bound = if result.at_bound { " at a limit" } else { "" };
@@ -275,7 +265,7 @@ fn metric_row(record: &MetricRecord) -> Vec<String> {
         format!("{:.2}", result.angle_deg),
         format!("{:.4}", result.scale),
         format!("{:.1}, {:.1}", result.shift_px[0], result.shift_px[1]),
-        significant(result.threshold_depth, DIGITS),
+        significant(result.threshold_depth, LENGTH_DIGITS),
         format!("{:.3}", result.scores.ssim),
         format!("{:.3}", result.scores.iou),
         format!("{:.3}", result.scores.iou_box),
@@ -352,22 +342,4 @@ fn adjustment_text(adjustment: &Adjustment, iou: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{Adjustment, ManualCorrection, adjustment_text};
-    use mocban_core::domain::ThresholdMetric;
-
-    #[test]
-    fn adjustment_is_one_line() {
-        let adjustment = Adjustment {
-            from: ThresholdMetric::Ensemble,
-            by: ManualCorrection {
-                rotation_deg: -5.04,
-                shift_px: [3.0, 4.0],
-                scale: 1.0,
-                mirrored: true,
-            },
-            from_iou: 0.7021,
-        };
-        insta::assert_snapshot!(adjustment_text(&adjustment, 0.616));
-    }
-}
+mod tests;

@@ -30,7 +30,7 @@ impl<'a> Terminal<'a> {
     pub(crate) fn of_run(context: &'a Context) -> Self {
         let global = &context.global;
         let (screen, palette) = (&context.screen, context.stderr);
-        let progress = ProgressReporter::new(global.progress, global.quiet, screen, palette);
+        let progress = ProgressReporter::new(global, screen, palette);
         Self {
             progress: Mutex::new(Some(progress)),
             ..Self::new(context)

@@ -20,6 +20,9 @@ pub struct FaceOutcome {
     /// Number of vertices of the scan that were left out because they have no position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing_vertices: Option<NonZeroU64>,
+    /// Number of faces of the scan that were left out because they have fewer than three corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub incomplete_faces: Option<NonZeroU64>,
     /// The faces that were found.
     pub faces: Vec<FoundFace>,
 }

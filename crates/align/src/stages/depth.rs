@@ -267,6 +267,7 @@ mod tests {
             vertices: 0,
             triangles: 0,
             missing_vertices: None,
+            incomplete_faces: None,
         }
     }
 

@@ -86,7 +86,8 @@ pub fn fit(
         AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
         AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
     }?;
-    outcome.missing_vertices = NonZeroU64::new(scan.missing());
+    outcome.missing_vertices = NonZeroU64::new(scan.losses().missing_vertices);
+    outcome.incomplete_faces = NonZeroU64::new(scan.losses().incomplete_faces);
     Ok(outcome)
 }
 

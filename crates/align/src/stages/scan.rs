@@ -3,15 +3,15 @@
 use std::sync::OnceLock;
 
 use super::zbuffer::IndexedSurface;
-use mocban_core::domain::ScanRegion;
 use mocban_core::domain::cancel::polled;
+use mocban_core::domain::{MeshLosses, ScanRegion};
 use mocban_core::mesh::{Mesh, MeshRead};
 
 /// A mesh as read, and its surface, which is indexed on first use.
 #[derive(Debug)]
 pub struct Scan {
     mesh: Mesh,
-    missing: u64,
+    losses: MeshLosses,
     indexed: OnceLock<IndexedSurface>,
 }
 
@@ -21,9 +21,9 @@ impl Scan {
         &self.mesh
     }
 
-    /// Returns the number of vertices of the file that were left out because they have no position.
-    pub const fn missing(&self) -> u64 {
-        self.missing
+    /// Returns what was left out of the file's mesh.
+    pub const fn losses(&self) -> MeshLosses {
+        self.losses
     }
 
     /// Returns the faces with all corners in a region. For a mesh without faces, returns the points in the region.
@@ -38,10 +38,10 @@ impl Scan {
 }
 
 impl From<MeshRead> for Scan {
-    fn from(MeshRead { mesh, missing }: MeshRead) -> Self {
+    fn from(MeshRead { mesh, losses }: MeshRead) -> Self {
         Self {
             mesh,
-            missing,
+            losses,
             indexed: OnceLock::new(),
         }
     }
@@ -49,7 +49,8 @@ impl From<MeshRead> for Scan {
 
 impl From<Mesh> for Scan {
     fn from(mesh: Mesh) -> Self {
-        MeshRead { mesh, missing: 0 }.into()
+        let losses = MeshLosses::default();
+        MeshRead { mesh, losses }.into()
     }
 }
 

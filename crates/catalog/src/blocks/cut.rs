@@ -20,6 +20,7 @@ use crate::queue::provenance::InputVersions;
 use crate::queue::requeue::send_back;
 use crate::queue::retired;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
+use crate::records::similar_names;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, PairId, PairName, RetireCause, Stage};
 
@@ -43,7 +44,8 @@ pub enum CutReply {
     Stored(CutSummary),
     /// Nothing was stored, because the lease was lost or the files were written too long ago.
     Refused,
-    /// A pair with this name exists that was not cut from this block; nothing was stored.
+    /// This pair was not cut from this block, and its name differs at most in upper and lower case from that of a pair
+    /// that was, so that their files would fall together on Windows and macOS; nothing was stored.
     NameTaken(PairName),
 }
 
@@ -52,10 +54,9 @@ const IS_DONE: &str = "SELECT 1 FROM block_job WHERE block = ?1 AND token = ?2 A
 
 const NAME: &str = "SELECT name FROM block WHERE id = ?1";
 
-/// Selects the first pair with one of these names that does not belong to the block.
-const TAKEN: &str = "
-SELECT p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?2)) AND NOT EXISTS (
-    SELECT 1 FROM block_character AS c WHERE c.block = ?1 AND c.pair = p.id) ORDER BY p.name LIMIT 1";
+/// Selects the names of the pairs that were cut from the block before.
+const OWN: &str = "
+SELECT p.name FROM block_character AS c JOIN pair AS p ON p.id = c.pair WHERE c.block = ?1";
 
 const PAIRS: &str = "
 SELECT p.id, p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id";
@@ -92,12 +93,15 @@ async fn finish(
     let name: BlockName = name.fetch_one(&mut *conn).await?;
     let rows = pair_rows(&name, found)?;
     let names: Vec<PairName> = rows.iter().map(|cut| cut.row.name.clone()).collect();
-    let taken: Option<PairName> = query_scalar(TAKEN)
+    let own: Vec<PairName> = query_scalar(OWN)
         .bind(lease.unit.0)
-        .bind(names_json(&names))
-        .fetch_optional(&mut *conn)
+        .fetch_all(&mut *conn)
         .await?;
-    if let Some(taken) = taken {
+    let own: BTreeSet<PairName> = own.into_iter().collect();
+    // Names that the block has already are its own.
+    if names.iter().any(|name| !own.contains(name))
+        && let Some(taken) = similar_names::taken(conn, lease.unit, &names).await?
+    {
         return Ok(CutReply::NameTaken(taken));
     }
     if !checkpoint::store(conn, done, &mut uncounted()).await? {

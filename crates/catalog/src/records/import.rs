@@ -136,6 +136,8 @@ WHERE p.name >= ?1 AND p.name < ?2 ORDER BY p.name LIMIT ?3";
 
 const OF_LISTED_BLOCK: &str = "SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id WHERE p.block = ?1 ORDER BY p.name";
 
+const OF_BLOCK: &str = "SELECT name FROM pair WHERE block = ?1 ORDER BY name";
+
 impl Catalog {
     /// Imports streamed rows, and true alignments, in one transaction. Adds new pairs and updates existing ones. If a
     /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
@@ -212,6 +214,15 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let names = query_scalar(OF_LISTED_BLOCK).bind(block);
         names.fetch_all(&mut conn).await
+    }
+
+    /// Returns the names of the pairs of a list's or a whole block, sorted, with retired pairs.
+    pub async fn pairs_of_block_with_retired(&self, block: &str) -> Result<Vec<PairName>> {
+        let mut conn = self.read_conn().await?;
+        query_scalar(OF_BLOCK)
+            .bind(block)
+            .fetch_all(&mut conn)
+            .await
     }
 
     /// Returns the unknown names among `names`, in the given order.

@@ -1,14 +1,14 @@
 //! Refuses new pairs and blocks whose names differ from those of others only in upper and lower case, because their files
 //! would fall together on Windows and macOS; and new pairs that are known under a name with other leading zeros.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::{CatalogError, Result};
 use mocban_core::domain::spelling::without_leading_zeros;
-use mocban_core::domain::{BlockName, ContentHash, PairName};
+use mocban_core::domain::{BlockId, BlockName, ContentHash, PairName};
 
 const LAST: &str = "SELECT coalesce(max(id), 0) FROM pair";
 
@@ -16,6 +16,11 @@ const LAST: &str = "SELECT coalesce(max(id), 0) FROM pair";
 const PAGE: &str = "SELECT id, name FROM pair WHERE id > ?1 AND id <= ?2 ORDER BY id LIMIT 10000";
 
 const FILES: &str = "SELECT name, mesh_path, print_path FROM pair WHERE id = ?1";
+
+/// Names of a page of pairs that were not cut from a block.
+const OTHERS: &str = "
+SELECT p.id, p.name FROM pair AS p WHERE p.id > ?2 AND NOT EXISTS (
+    SELECT 1 FROM block_character AS c WHERE c.block = ?1 AND c.pair = p.id) ORDER BY p.id LIMIT 10000";
 
 const BLOCKS: &str = "SELECT name FROM block ORDER BY id";
 
@@ -107,6 +112,32 @@ async fn refuse_similar(conn: &mut Conn, new: i64, known: i64) -> Result<()> {
         });
     }
     Ok(())
+}
+
+/// Returns a pair that was not cut from a block and whose name differs at most in case from one of these.
+pub(crate) async fn taken(
+    conn: &mut Conn,
+    block: BlockId,
+    names: &[PairName],
+) -> Result<Option<PairName>> {
+    let folded: HashSet<String> = names.iter().map(PairName::folded).collect();
+    let mut after = 0;
+    loop {
+        let page = query_as(OTHERS).bind(block.0).bind(after);
+        let page: Vec<NamedPair> = page.fetch_all(&mut *conn).await?;
+        let Some(last) = page.last() else {
+            return Ok(None);
+        };
+        after = last.id;
+        // A damaged name is reported by `check`.
+        let others = page
+            .iter()
+            .filter_map(|pair| PairName::new(&pair.name).ok());
+        let mut others = others.filter(|name| folded.contains(&name.folded()));
+        if let Some(other) = others.next() {
+            return Ok(Some(other));
+        }
+    }
 }
 
 /// Refuses blocks whose names differ only in case.

@@ -183,14 +183,39 @@ async fn a_changed_pair_loses_its_lease() {
 
 #[tokio::test]
 async fn a_pair_that_is_not_of_the_block_is_not_replaced() {
+    // A name in other case is the same file on Windows and macOS.
+    for (listed, label) in [("b_a", "a"), ("B_A", "a"), ("b_ĐĨA", "đĩa")] {
+        let world = world().await;
+        let row = super::row(listed);
+        world.catalog.import(vec![row], 1).await.expect("imported");
+        let cut = world.finish_block(vec![character(label, "a")]).await;
+        assert_eq!(cut, CutReply::NameTaken(name(listed)));
+        let states = world.catalog.block_states().await.expect("a read");
+        assert_eq!(states[0].next_stage, Some(BlockStage::Cut));
+        assert_eq!(world.character_states().await, []);
+        assert_eq!(
+            world.catalog.pair_names().await.expect("a read"),
+            [name(listed)]
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_new_character_of_a_known_block_takes_no_name_in_other_case() {
     let world = world().await;
-    let row = super::row("b_a");
+    world.finish_block(vec![character("a", "a")]).await;
+    let row = super::row("B_c");
     world.catalog.import(vec![row], 1).await.expect("imported");
-    let cut = world.finish_block(vec![character("a", "a")]).await;
-    assert_eq!(cut, CutReply::NameTaken(name("b_a")));
-    let states = world.catalog.block_states().await.expect("a read");
-    assert_eq!(states[0].next_stage, Some(BlockStage::Cut));
-    assert_eq!(world.character_states().await, []);
+    for (label, expected) in [
+        ("c", CutReply::NameTaken(name("B_c"))),
+        ("d", stored(1, 0, 1, 0)),
+    ] {
+        let known = world.catalog.known_blocks().await.expect("a read");
+        let reset = vec![(known[0].block, BlockStage::Cut)];
+        world.catalog.reset_blocks(reset).await.expect("reset");
+        let cut = vec![character("a", "a"), character(label, label)];
+        assert_eq!(world.finish_block(cut).await, expected);
+    }
 }
 
 #[tokio::test]

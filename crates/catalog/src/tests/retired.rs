@@ -192,6 +192,8 @@ async fn pairs_of_blocks_are_retired_by_people_and_not_by_lists() {
         (state.characters, state.retired)
     };
     assert_eq!(state().await, (1, 1));
+    let of_block = catalog.pairs_of_block_with_retired("b").await;
+    assert_eq!(of_block.expect("a read"), ["b_a", "b_b"].map(name));
     // The next cut does not bring it back, and without its box neither does a person.
     let known = catalog.known_blocks().await.expect("a read");
     let cut = vec![(known[0].block, BlockStage::Cut)];

@@ -23,6 +23,7 @@ mod input_version;
 mod job;
 mod levelling;
 mod mask_scale;
+mod mesh_losses;
 mod metric;
 mod outcome;
 mod pair_name;
@@ -65,6 +66,7 @@ pub use input_version::InputVersion;
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use levelling::Levelling;
 pub use mask_scale::{MaskReduction, MaskScale};
+pub use mesh_losses::MeshLosses;
 pub use metric::ThresholdMetric;
 pub use outcome::{
     Curvature, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,

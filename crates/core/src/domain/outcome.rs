@@ -7,7 +7,8 @@ use std::num::{NonZeroU32, NonZeroU64};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Affine2, LengthUnit, Levelling, MaskReduction, MaskScale, PrintOutline, Rigid3, ThresholdMetric,
+    Affine2, LengthUnit, Levelling, MaskReduction, MaskScale, MeshLosses, PrintOutline, Rigid3,
+    ThresholdMetric,
 };
 
 /// The curved surface of the stroke tops. All lengths are in mesh units.
@@ -96,6 +97,20 @@ pub struct FitOutcome {
     /// Number of vertices of the file that were left out because they have no position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing_vertices: Option<NonZeroU64>,
+    /// Number of faces of the file that were left out because they have fewer than three corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub incomplete_faces: Option<NonZeroU64>,
+}
+
+impl FitOutcome {
+    /// Returns what was left out of the file's mesh.
+    pub fn losses(&self) -> MeshLosses {
+        let number = |found: Option<NonZeroU64>| found.map_or(0, NonZeroU64::get);
+        MeshLosses {
+            missing_vertices: number(self.missing_vertices),
+            incomplete_faces: number(self.incomplete_faces),
+        }
+    }
 }
 
 /// Conversion of levels and pixels of a depth map to mesh units.

@@ -1,9 +1,10 @@
-//! Vertices without a position, which are left out of a mesh.
+//! What is left out of a mesh: vertices without a position, and faces without three corners.
 //!
 //! Scanners and converters write NaN for a point that they did not measure, and 0 0 0 in organized clouds.
 
 use super::error::MeshError;
 use super::{Mesh, Vertices};
+use crate::domain::MeshLosses;
 use crate::domain::cancel::polled;
 
 /// A mesh as read.
@@ -11,16 +12,8 @@ use crate::domain::cancel::polled;
 pub struct MeshRead {
     /// The vertices with a position, and the faces between them.
     pub mesh: Mesh,
-    /// Number of vertices that were left out because they have no position: a coordinate is NaN or infinite, or several
-    /// vertices without faces are at the origin.
-    pub missing: u64,
-}
-
-/// Says that vertices were left out.
-pub fn missing_sentence(missing: u64) -> String {
-    format!(
-        "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces: {missing}"
-    )
+    /// What was left out.
+    pub losses: MeshLosses,
 }
 
 /// Notices vertices that may have no position, while a file is read.
@@ -63,15 +56,24 @@ impl PositionCheck {
         }
     }
 
-    /// Leaves out vertices without a position, and faces that use them.
+    /// Leaves out vertices without a position, and faces that use them. `incomplete_faces` were left out before.
     ///
     /// Several vertices at the origin have no position if no face uses them; one may be a point.
     ///
     /// # Errors
     /// Returns an error if nothing is left.
-    pub(super) fn without_missing(self, mesh: Mesh) -> Result<MeshRead, MeshError> {
+    pub(super) fn without_missing(
+        self,
+        mesh: Mesh,
+        incomplete_faces: u64,
+    ) -> Result<MeshRead, MeshError> {
+        let losses = |missing_vertices| MeshLosses {
+            missing_vertices,
+            incomplete_faces,
+        };
         if self.is_finite && self.origins < 2 {
-            return Ok(MeshRead { mesh, missing: 0 });
+            let losses = losses(0);
+            return Ok(MeshRead { mesh, losses });
         }
         let Mesh {
             vertices,
@@ -116,7 +118,8 @@ impl PositionCheck {
             vertices,
             triangles,
         };
-        Ok(MeshRead { mesh, missing })
+        let losses = losses(missing);
+        Ok(MeshRead { mesh, losses })
     }
 }
 
@@ -200,8 +203,8 @@ mod tests {
         };
         let check = PositionCheck::of(&mesh.vertices);
         check
-            .without_missing(mesh)
-            .map(|read| (read.mesh, read.missing))
+            .without_missing(mesh, 0)
+            .map(|read| (read.mesh, read.losses.missing_vertices))
     }
 
     #[test]

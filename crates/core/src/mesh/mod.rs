@@ -22,7 +22,7 @@ mod xyz;
 
 pub use arrays::{MeshArrayError, PositionSlice};
 pub use error::{MeshError, MeshLimits, MeshReadError};
-pub use missing::{MeshRead, missing_sentence};
+pub use missing::MeshRead;
 pub use triangle_mesh::{Mesh, Vertices};
 pub use triangle_stream::{
     STL_HEAD, Triangle, TriangleStream, binary_stl_triangles, pass_over_binary_stl,
@@ -39,7 +39,7 @@ use missing::PositionCheck;
 /// Reads a mesh or point set from the bytes of a file, like [`read_from`].
 ///
 /// The format is detected from the content; `name` is used only if the content is truncated or ambiguous. Polygons are
-/// triangulated as fans; faces of fewer than three corners are ignored. Each triangle of an STL gets three vertices of
+/// triangulated as fans; faces with fewer than three corners are left out. Each triangle of an STL gets three vertices of
 /// its own. A wrong count in a header never reserves more memory than a file of this size could need.
 ///
 /// ```
@@ -65,22 +65,25 @@ pub fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshE
 fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead, MeshError> {
     limits.check_bytes(bytes.len() as u64)?;
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-    let checked = |mesh: Mesh| {
+    let checked = |mesh: Mesh, incomplete_faces| {
         let check = PositionCheck::of(&mesh.vertices);
-        (mesh, check)
+        (mesh, check, incomplete_faces)
     };
-    let (mesh, check) = match DetectedFormat::of(bytes, name)? {
-        DetectedFormat::Obj => obj::read(bytes, limits).map(checked),
+    let whole = |mesh| checked(mesh, 0);
+    let (mesh, check, incomplete_faces) = match DetectedFormat::of(bytes, name)? {
+        DetectedFormat::Obj => obj::read(bytes, limits).map(|(mesh, faces)| checked(mesh, faces)),
         DetectedFormat::Ply => ply::read(bytes, limits),
-        DetectedFormat::StlBinary => stl::read_binary(bytes, limits),
-        DetectedFormat::StlAscii => stl::read_ascii(bytes, limits).map(checked),
-        DetectedFormat::Xyz => xyz::read(bytes, limits).map(checked),
+        DetectedFormat::StlBinary => {
+            stl::read_binary(bytes, limits).map(|(mesh, check)| (mesh, check, 0))
+        }
+        DetectedFormat::StlAscii => stl::read_ascii(bytes, limits).map(whole),
+        DetectedFormat::Xyz => xyz::read(bytes, limits).map(whole),
     }
     .map_err(|fault| text::fault_at_end(fault, bytes))?;
     if mesh.vertices.is_empty() {
         return Err(MeshError::NoVertices);
     }
-    check.without_missing(mesh)
+    check.without_missing(mesh, incomplete_faces)
 }
 
 /// Some programs write this mark before text.
@@ -98,7 +101,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// let limits = MeshLimits::SUGGESTED;
 /// let mesh = read_from(&mut ply.as_slice(), ply.len() as u64, "a.ply", &limits)?;
 /// assert_eq!(mesh.mesh, read(ply, "a.ply", &limits)?);
-/// assert_eq!(mesh.missing, 0);
+/// assert_eq!(mesh.losses.missing_vertices, 0);
 /// # Ok::<(), mocban_core::mesh::MeshReadError>(())
 /// ```
 ///
@@ -120,7 +123,7 @@ pub fn read_from(
     let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
         let (mesh, check) = stl::read_facets(&mut source, count, limits)?;
-        return Ok(check.without_missing(mesh)?);
+        return Ok(check.without_missing(mesh, 0)?);
     }
     let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
     Ok(read_bytes(&bytes, name, limits)?)

@@ -19,12 +19,12 @@ use super::triangle_mesh::Mesh;
 /// Reads an OBJ file.
 ///
 /// A mesh with faces holds the vertices that its faces use, in the order of their first use. A file without faces is a
-/// point set with all its vertices.
+/// point set with all its vertices. Returns the mesh, and how many faces with fewer than three corners were left out.
 ///
 /// # Errors
 /// Returns an error if the file exceeds the limits, a line is too long, a `v` or `f` line cannot be parsed, or a face
 /// refers to a missing vertex.
-pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
+pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<(Mesh, u64), MeshError> {
     text::check_lines(bytes)?;
     check_end(bytes)?;
     match plain::read(bytes, limits) {
@@ -33,7 +33,7 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     }
 }
 
-/// Refuses a file that ends within a face of fewer than three corners. Elsewhere, such faces are ignored.
+/// Refuses a file that ends within a face of fewer than three corners. Elsewhere, such faces are left out.
 fn check_end(bytes: &[u8]) -> Result<(), MeshError> {
     let Some(last) = text::unended_line(bytes) else {
         return Ok(());

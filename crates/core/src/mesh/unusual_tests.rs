@@ -103,7 +103,7 @@ fn vertices_that_are_not_numbers_are_left_out_in_every_text_format() {
             if name == "a.xyz" {
                 let read = opened(odd.as_bytes(), name);
                 assert_eq!(
-                    (read.mesh.vertices.len(), read.missing),
+                    (read.mesh.vertices.len(), read.losses.missing_vertices),
                     (3, 1),
                     "{spelling}"
                 );
@@ -114,7 +114,7 @@ fn vertices_that_are_not_numbers_are_left_out_in_every_text_format() {
             // The last corner, which one triangle has.
             let odd = text.replace("1 2 0.5", &format!("{spelling} 2 0.5"));
             let read = opened(odd.as_bytes(), name);
-            assert_eq!(read.missing, 1, "{name} {spelling}");
+            assert_eq!(read.losses.missing_vertices, 1, "{name} {spelling}");
             let first = Mesh {
                 triangles: vec![[0, 1, 2]].into(),
                 ..square()
@@ -140,7 +140,7 @@ fn vertices_that_are_not_numbers_are_left_out_in_every_binary_format() {
             mesh.vertices.set(3, [1.0, value, 0.5]);
             let read = opened(&format.encode(&mesh), &name);
             assert_eq!(
-                (soup(&read.mesh), read.missing),
+                (soup(&read.mesh), read.losses.missing_vertices),
                 (soup(&square())[..3].to_vec(), 1),
                 "{name}"
             );
@@ -169,7 +169,11 @@ fn several_points_at_the_origin_are_left_out_in_every_format() {
     ];
     for (name, bytes) in files {
         let read = opened(&bytes, name);
-        assert_eq!((&read.mesh.vertices, read.missing), (&usual, 2), "{name}");
+        assert_eq!(
+            (&read.mesh.vertices, read.losses.missing_vertices),
+            (&usual, 2),
+            "{name}"
+        );
     }
 }
 
@@ -183,7 +187,7 @@ fn words_in_columns_that_nobody_uses_do_not_matter() {
         let read = opened(text.as_bytes(), name);
         let points = vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
         assert_eq!(
-            (read.mesh.vertices, read.missing),
+            (read.mesh.vertices, read.losses.missing_vertices),
             (points.into(), 0),
             "{name}"
         );

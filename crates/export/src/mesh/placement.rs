@@ -179,6 +179,7 @@ pub(super) mod tests {
             vertices: 0,
             triangles: 0,
             missing_vertices: None,
+            incomplete_faces: None,
         }
     }
 

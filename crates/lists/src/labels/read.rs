@@ -14,6 +14,8 @@ use mocban_core::domain::{FileKind, UniqueKeys, sanitize};
 
 /// Largest file that is read, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
+/// Bytes at the beginning of a file that show a pointer of Git LFS.
+const HEAD_BYTES: usize = 256;
 
 /// Reads the labels of a page from the content of a file. The format is recognized by the content; `file_name` is only
 /// used in messages.
@@ -60,6 +62,9 @@ fn parse(bytes: &[u8], page: &PageFile<'_>) -> Result<(LabelFormat, PageRegions)
             kind => kind.to_string(),
         })
     })?;
+    if FileKind::of(&bytes[..bytes.len().min(HEAD_BYTES)]) == FileKind::LfsPointer {
+        return Err(LabelsProblem::Pointer);
+    }
     let text = text.trim_start_matches('\u{feff}').trim();
     let first_line = text.lines().next().unwrap_or_default();
     match text.chars().next() {

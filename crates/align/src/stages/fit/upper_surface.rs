@@ -115,5 +115,6 @@ fn outcome(fine: &FittedSide, side: SideEvidence, mesh: &Mesh) -> FitOutcome {
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
         missing_vertices: None,
+        incomplete_faces: None,
     }
 }

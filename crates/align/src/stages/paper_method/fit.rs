@@ -65,6 +65,7 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
         missing_vertices: None,
+        incomplete_faces: None,
     })
 }
 

@@ -19,11 +19,16 @@ use crate::mesh::triangle_mesh::{Mesh, Vertices};
 /// Largest file. `tobj` takes 5 to 20 times as many bytes, and notices no cancellation after the last line.
 const MAX_BYTES: usize = 128 << 20;
 
-/// Reads a file whose first unusual line is `odd`.
+/// Reads a file whose first unusual line is `odd`. Returns the mesh, and the number of faces with fewer than three corners,
+/// which are left out.
 ///
 /// # Errors
 /// Returns an error if the file exceeds the limits or `tobj` refuses it.
-pub(super) fn read(bytes: &[u8], odd: OddLine, limits: &MeshLimits) -> Result<Mesh, MeshError> {
+pub(super) fn read(
+    bytes: &[u8],
+    odd: OddLine,
+    limits: &MeshLimits,
+) -> Result<(Mesh, u64), MeshError> {
     if bytes.len() > MAX_BYTES {
         let reason =
             format!("an OBJ with such a line may have at most {MAX_BYTES} bytes; save it as PLY");
@@ -32,7 +37,12 @@ pub(super) fn read(bytes: &[u8], odd: OddLine, limits: &MeshLimits) -> Result<Me
             reason,
         });
     }
-    let (mut text, vertices, triangles) = geometry_lines(bytes, limits)?;
+    let GeometryLines {
+        mut text,
+        vertices,
+        triangles,
+        incomplete_faces,
+    } = GeometryLines::of(bytes, limits)?;
     if triangles == 0 {
         // `tobj` drops vertices without a face.
         for vertex in polled(1..=vertices) {
@@ -56,59 +66,79 @@ pub(super) fn read(bytes: &[u8], odd: OddLine, limits: &MeshLimits) -> Result<Me
         .expect("`tobj` adds a model at the end");
     let positions = model.mesh.positions.as_chunks().0;
     let corners = model.mesh.indices.as_chunks().0;
-    Ok(Mesh {
+    let mesh = Mesh {
         vertices: Vertices::Double(polled(positions).copied().collect()),
         triangles: polled(corners).copied().take(triangles as usize).collect(),
-    })
+    };
+    Ok((mesh, incomplete_faces))
 }
 
-/// Returns the lines for `tobj` with empty lines for all others, and the numbers of vertices and triangles.
-fn geometry_lines(bytes: &[u8], limits: &MeshLimits) -> Result<(String, u64, u64), MeshError> {
-    let (mut out, mut vertices, mut triangles) = (String::with_capacity(bytes.len()), 0, 0);
-    let mut lines = text::lines(bytes);
-    while let Some((_, line)) = lines.next() {
-        let line = String::from_utf8_lossy(line);
-        let keyword = line.trim_end_matches('\\').split_whitespace().next();
-        let mut joined = String::new();
-        let mut ends = 1;
-        if matches!(keyword, Some("v" | "f")) {
-            joined += without_comment(&line);
-            while joined.ends_with('\\') {
-                let (_, more) = lines.next().unwrap_or_default();
-                joined.pop();
-                joined = joined + " " + without_comment(&String::from_utf8_lossy(more));
-                ends += 1;
-            }
-        }
-        let mut words: Vec<&str> = joined.split_whitespace().collect();
-        for word in &mut words {
-            if text::number(word.as_bytes()).is_some_and(f64::is_nan) {
-                *word = "NaN";
-            }
-        }
-        let is_index = |corner: &&str| corner.parse::<i64>().is_ok();
-        match words.as_slice() {
-            ["f", corners @ ..] if corners.len() < 3 && corners.iter().all(is_index) => {
-                words.clear();
-            }
-            ["f", corners @ ..] => triangles += corners.len().saturating_sub(2) as u64,
-            ["v", rest @ ..] => {
-                vertices += 1;
-                match rest {
-                    // `tobj` divides by a weight, but other programs do not. It refuses two numbers.
-                    [_, _, _, weight] if weight.parse() != Ok(1.0) => words.push(weight),
-                    [_, _, _, _, _, _] | [_, _, _, _, _, _, _] => words.truncate(4),
-                    _ => {}
+/// The lines for `tobj`.
+struct GeometryLines {
+    /// The lines of vertices and faces, with empty lines for all others.
+    text: String,
+    vertices: u64,
+    triangles: u64,
+    /// Number of faces with fewer than three corners.
+    incomplete_faces: u64,
+}
+
+impl GeometryLines {
+    fn of(bytes: &[u8], limits: &MeshLimits) -> Result<Self, MeshError> {
+        let mut found = Self {
+            text: String::with_capacity(bytes.len()),
+            vertices: 0,
+            triangles: 0,
+            incomplete_faces: 0,
+        };
+        let mut lines = text::lines(bytes);
+        while let Some((_, line)) = lines.next() {
+            let line = String::from_utf8_lossy(line);
+            let keyword = line.trim_end_matches('\\').split_whitespace().next();
+            let mut joined = String::new();
+            let mut ends = 1;
+            if matches!(keyword, Some("v" | "f")) {
+                joined += without_comment(&line);
+                while joined.ends_with('\\') {
+                    let (_, more) = lines.next().unwrap_or_default();
+                    joined.pop();
+                    joined = joined + " " + without_comment(&String::from_utf8_lossy(more));
+                    ends += 1;
                 }
             }
-            _ => {}
+            let mut words: Vec<&str> = joined.split_whitespace().collect();
+            for word in &mut words {
+                if text::number(word.as_bytes()).is_some_and(f64::is_nan) {
+                    *word = "NaN";
+                }
+            }
+            let is_index = |corner: &&str| corner.parse::<i64>().is_ok();
+            match words.as_slice() {
+                ["f", corners @ ..] if corners.len() < 3 => {
+                    found.incomplete_faces += 1;
+                    if corners.iter().all(is_index) {
+                        words.clear();
+                    }
+                }
+                ["f", corners @ ..] => found.triangles += corners.len() as u64 - 2,
+                ["v", rest @ ..] => {
+                    found.vertices += 1;
+                    match rest {
+                        // `tobj` divides by a weight, but other programs do not. It refuses two numbers.
+                        [_, _, _, weight] if weight.parse() != Ok(1.0) => words.push(weight),
+                        [_, _, _, _, _, _] | [_, _, _, _, _, _, _] => words.truncate(4),
+                        _ => {}
+                    }
+                }
+                _ => {}
+            }
+            limits.check_vertices(found.vertices)?;
+            limits.check_triangles(found.triangles)?;
+            found.text += &words.join(" ");
+            found.text.extend(std::iter::repeat_n('\n', ends));
         }
-        limits.check_vertices(vertices)?;
-        limits.check_triangles(triangles)?;
-        out += &words.join(" ");
-        out.extend(std::iter::repeat_n('\n', ends));
+        Ok(found)
     }
-    Ok((out, vertices, triangles))
 }
 
 /// Returns a line up to its comment. The `#` of `1.#IND` begins none.

@@ -24,10 +24,15 @@ pub(super) struct OddLine(pub(super) u64);
 /// - `v` with three numbers, and then nothing, a weight of 1 or a colour
 /// - `f` with corners: an integer, which up to two more and slashes may follow
 ///
+/// Returns the mesh, and the number of faces with fewer than three corners, which are left out.
+///
 /// # Errors
 /// Returns the first other line. The inner error says that the file exceeds the limits, or that a face refers to a missing
 /// vertex.
-pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Result<Mesh, MeshError>, OddLine> {
+pub(super) fn read(
+    bytes: &[u8],
+    limits: &MeshLimits,
+) -> Result<Result<(Mesh, u64), MeshError>, OddLine> {
     if text::is_classic_mac(bytes) {
         return Err(OddLine(1));
     }
@@ -37,6 +42,7 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Result<Mesh, Mes
         vertices: PageVec::with_capacity(bytes.len() / BYTES_PER_VERTEX),
         triangles: PageVec::with_capacity(bytes.len() / BYTES_PER_TRIANGLE),
         last_used: (0, 1),
+        incomplete_faces: 0,
     };
     let mut counter = PollCounter::default();
     while !reader.rest.is_empty() && limits.allow(reader.vertices.len(), reader.triangles.len()) {
@@ -58,11 +64,13 @@ struct PlainReader<'a> {
     triangles: PageVec<[u32; 3]>,
     /// The highest index in a face, and the first line with it.
     last_used: (u32, u64),
+    /// Number of faces with fewer than three corners.
+    incomplete_faces: u64,
 }
 
 impl PlainReader<'_> {
     /// Keeps the vertices that faces use, in the order of their first use, or all vertices if there are no faces.
-    fn into_mesh(mut self, limits: &MeshLimits) -> Result<Mesh, MeshError> {
+    fn into_mesh(mut self, limits: &MeshLimits) -> Result<(Mesh, u64), MeshError> {
         limits.check_vertices(self.vertices.len() as u64)?;
         limits.check_triangles(self.triangles.len() as u64)?;
         if !self.triangles.is_empty() {
@@ -73,10 +81,11 @@ impl PlainReader<'_> {
             }
             self.vertices = in_order_of_use(&self.vertices, &mut self.triangles);
         }
-        Ok(Mesh {
+        let mesh = Mesh {
             vertices: Vertices::Double(self.vertices),
             triangles: self.triangles,
-        })
+        };
+        Ok((mesh, self.incomplete_faces))
     }
 
     /// Reads a line; returns `None` if it is another than [`read`] lists.
@@ -169,8 +178,8 @@ impl PlainReader<'_> {
         Some(value)
     }
 
-    /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner. Polygons of
-    /// fewer than three corners add nothing. Stops at the first triangle that exceeds the limits.
+    /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner. Polygons with
+    /// fewer than three corners are only counted. Stops at the first triangle that exceeds the limits.
     fn face(&mut self, limits: &MeshLimits) -> Option<()> {
         let before = self.triangles.len();
         let (mut first, mut last, mut highest) = (0, 0, 0);
@@ -178,6 +187,7 @@ impl PlainReader<'_> {
             self.skip_space();
             let is_end = matches!(self.rest, [] | [b'\n' | b'#', ..]);
             if is_end || self.triangles.len() as u64 > limits.max_triangles {
+                self.incomplete_faces += u64::from(count < 3);
                 break;
             }
             let corner = self.corner()?;

@@ -7,7 +7,7 @@ use crate::domain::cancel::{CancelToken, Cancelled};
 use crate::mesh::{Mesh, MeshError, MeshLimits};
 
 fn read(text: &str) -> Result<Mesh, MeshError> {
-    super::read(text.as_bytes(), &MeshLimits::SUGGESTED)
+    super::read(text.as_bytes(), &MeshLimits::SUGGESTED).map(|(mesh, _)| mesh)
 }
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
@@ -64,11 +64,24 @@ fn positions_keep_all_their_digits() {
 }
 
 #[test]
-fn faces_of_two_corners_and_lines_are_ignored() {
-    let mesh = read(&format!("{SQUARE}f 1 2\nf\nl 1 2 3\nf 1 2 3\n")).expect("reads");
-    assert_eq!(mesh.triangles.len(), 1);
-    let points = read(&format!("{SQUARE}f 1 2\n")).expect("reads");
-    assert_eq!((points.vertices.len(), points.triangles.len()), (4, 0));
+fn faces_of_two_corners_are_counted_and_lines_are_ignored() {
+    // The second text of a kind has a line that only `tobj` reads.
+    for (text, triangles, incomplete) in [
+        ("f 1 2\nf 3 \nf 1 2 3\nf 1/1 2/1\n", 1, 3),
+        ("f 1 2\nf\nl 1 2 3\nf 1 2 3\nf 1/1 2/1\n", 1, 3),
+        ("f 1 2\n", 0, 1),
+        ("f 1 2 \\\n\nl 1 2\n", 0, 1),
+    ] {
+        let text = format!("{SQUARE}{text}");
+        let read = super::read(text.as_bytes(), &MeshLimits::SUGGESTED);
+        let (mesh, faces) = read.expect("reads");
+        assert_eq!(
+            (mesh.triangles.len(), faces),
+            (triangles, incomplete),
+            "{text}"
+        );
+        assert_eq!(mesh.vertices.len(), if triangles == 0 { 4 } else { 3 });
+    }
 }
 
 #[test]
@@ -232,11 +245,11 @@ fn usual_files_are_read_in_one_pass_and_by_tobj_alike() {
         let text = lines.join(end);
         let limits = MeshLimits::SUGGESTED;
         let mesh = plain::read(text.as_bytes(), &limits).expect("a usual file");
-        let mesh = mesh.expect("sound");
+        let (mesh, incomplete) = mesh.expect("sound");
         assert_eq!(*mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices.at(0), [0.0, 1.0, 0.0]);
         let again = by_tobj::read(text.as_bytes(), plain::OddLine(1), &limits);
-        assert_eq!(again, Ok(mesh));
+        assert_eq!(again, Ok((mesh, incomplete)));
     }
     let points = read("v 0 0 0\nv 1 0 0").expect("points");
     assert_eq!(points.vertices, vec![[0.0; 3], [1.0, 0.0, 0.0]].into());

@@ -19,6 +19,8 @@ const CHUNK_ROWS: usize = 256;
 pub(super) struct PlyBody {
     pub(super) mesh: Mesh,
     pub(super) check: PositionCheck,
+    /// Number of faces with fewer than three corners, which are left out.
+    pub(super) incomplete_faces: u64,
     /// White space and zeros after the last row, bytes.
     pub(super) padding: usize,
 }
@@ -36,6 +38,7 @@ pub(super) fn read(
         declared_vertices: header.rows("vertex"),
         mesh: Mesh::default(),
         check: PositionCheck::NONE,
+        incomplete_faces: 0,
         row: 0,
         counter: PollCounter::default(),
     };
@@ -55,6 +58,7 @@ pub(super) fn read(
         padding: rest.len(),
         mesh: body.mesh,
         check: body.check,
+        incomplete_faces: body.incomplete_faces,
     })
 }
 
@@ -65,6 +69,7 @@ struct BodyReader<'a, S> {
     declared_vertices: u64,
     mesh: Mesh,
     check: PositionCheck,
+    incomplete_faces: u64,
     /// Complete rows of the current element.
     row: u64,
     counter: PollCounter,
@@ -328,6 +333,9 @@ impl<S: NumberSource> BodyReader<'_, S> {
             if let Some(triangle) = joined.corner(index as u32, kind) {
                 self.push(triangle)?;
             }
+        }
+        if kind == FaceKind::Polygon && joined.seen < 3 {
+            self.incomplete_faces += 1;
         }
         Ok(())
     }

@@ -12,8 +12,12 @@ use crate::mesh::error::{MeshError, MeshLimits};
 use crate::mesh::missing::PositionCheck;
 use crate::mesh::triangle_mesh::Mesh;
 
-/// Reads vertices, faces and triangle strips; ignores other elements and properties.
-pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<(Mesh, PositionCheck), MeshError> {
+/// Reads vertices, faces and triangle strips; ignores other elements and properties. Returns also the number of faces with
+/// fewer than three corners, which are left out.
+pub(super) fn read(
+    bytes: &[u8],
+    limits: &MeshLimits,
+) -> Result<(Mesh, PositionCheck, u64), MeshError> {
     let (header, start) = PlyHeader::parse(bytes)?;
     let read = |rest| match header.encoding {
         PlyEncoding::Ascii => body::read(&header, AsciiSource::new(rest), limits),
@@ -33,8 +37,8 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<(Mesh, PositionC
         }
         body = Ok(other);
     }
-    let PlyBody { mesh, check, .. } = body?;
-    Ok((mesh, check))
+    let body = body?;
+    Ok((body.mesh, body.check, body.incomplete_faces))
 }
 
 #[cfg(test)]
@@ -44,7 +48,7 @@ mod tests {
     use super::super::{Mesh, MeshError, MeshLimits, Vertices};
 
     fn read(bytes: &[u8]) -> Result<Mesh, MeshError> {
-        super::read(bytes, &MeshLimits::SUGGESTED).map(|(mesh, _)| mesh)
+        super::read(bytes, &MeshLimits::SUGGESTED).map(|(mesh, ..)| mesh)
     }
 
     fn ascii(elements: &str, body: &str) -> Vec<u8> {

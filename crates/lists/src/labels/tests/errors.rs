@@ -23,6 +23,10 @@ fn content_of_no_known_format() {
         ("no bytes", vec![]),
         ("white space", text(" \n\t")),
         ("a picture", b"\x89PNG\r\n\x1a\n\0\0\0\xff".to_vec()),
+        (
+            "a pointer of Git LFS",
+            text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n"),
+        ),
         ("UTF-16", b"\xff\xfe{\0}\0".to_vec()),
         ("Latin-1", b"filename,caf\xe9".to_vec()),
         ("other text", text("hello,\u{202e} world\n1 2 3")),

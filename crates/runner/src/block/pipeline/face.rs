@@ -10,7 +10,6 @@ use mocban_align::block::{
     BlockError, FaceOutcome, FoundFace, HEIGHT_STEP_MM, Orientation, draw_height_maps, heights_role,
 };
 use mocban_core::domain::{BlockSide, LengthUnit};
-use mocban_core::mesh::missing_sentence;
 use mocban_core::raster::png_grey16;
 
 /// Least longer side of a face, mm, if the user gave the unit. A character has 6 to 30 mm.
@@ -24,10 +23,9 @@ pub(crate) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, Block
     let (frame, part) = Orientation::find(&mut mesh, context.inputs.unit).map_err(fail)?;
     let maps =
         draw_height_maps(&mut mesh, (&frame, &part), context.max_map_pixels).map_err(fail)?;
-    let missing_vertices = NonZeroU64::new(mesh.missing());
+    let losses = mesh.losses();
     drop(mesh);
-    if let Some(missing) = missing_vertices {
-        let said = missing_sentence(missing.get());
+    for said in losses.sentences() {
         tracing::warn!(block = %context.inputs.name, "{}: {said}", scan.name());
     }
     let mut faces = Vec::new();
@@ -65,7 +63,8 @@ pub(crate) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, Block
             .find(unit)
             .unwrap_or(LengthUnit::Mm),
         triangles: frame.triangles,
-        missing_vertices,
+        missing_vertices: NonZeroU64::new(losses.missing_vertices),
+        incomplete_faces: NonZeroU64::new(losses.incomplete_faces),
         faces,
     })
 }

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::failure::{StopRequested, failed};
 use crate::block_stages::{BlockFile, BlockStageError};
 use mocban_align::block::BlockError;
+use mocban_core::domain::MeshLosses;
 use mocban_core::mesh::{
     self, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,
     binary_stl_triangles, pass_over_binary_stl,
@@ -18,8 +19,8 @@ const BUFFER: usize = 1 << 20;
 /// The scan of a block.
 pub(crate) struct ScanStream<'a> {
     source: ScanSource,
-    /// Vertices without a position that were left out of the mesh, or of the last pass.
-    missing: u64,
+    /// What was left out of the mesh, or of the last pass.
+    losses: MeshLosses,
     limits: &'a MeshLimits,
     stop: &'a AtomicBool,
 }
@@ -42,7 +43,7 @@ impl<'a> ScanStream<'a> {
         stop: &'a AtomicBool,
     ) -> Result<Self, BlockStageError> {
         let mut file = scan.open()?;
-        let mut missing = 0;
+        let mut losses = MeshLosses::default();
         let read = || -> Result<ScanSource, MeshReadError> {
             let mut head = Vec::with_capacity(STL_HEAD);
             Stoppable(&mut file, stop)
@@ -54,7 +55,7 @@ impl<'a> ScanStream<'a> {
             file.seek(SeekFrom::Start(0))?;
             let mut source = BufReader::with_capacity(BUFFER, Stoppable(&mut file, stop));
             let read = mesh::read_from(&mut source, scan.size(), scan.name(), limits)?;
-            missing = read.missing;
+            losses = read.losses;
             Ok(ScanSource::Mesh(read.mesh))
         };
         let source = { read }().map_err(|error| failed(scan, BlockError::Mesh(error)))?;
@@ -66,15 +67,15 @@ impl<'a> ScanStream<'a> {
         }
         Ok(Self {
             source,
-            missing,
+            losses,
             limits,
             stop,
         })
     }
 
-    /// Returns how many vertices were left out because they have no position.
-    pub(crate) const fn missing(&self) -> u64 {
-        self.missing
+    /// Returns what was left out.
+    pub(crate) const fn losses(&self) -> MeshLosses {
+        self.losses
     }
 }
 
@@ -87,7 +88,8 @@ impl TriangleStream for ScanStream<'_> {
             ScanSource::Stl(file, count) => {
                 file.seek(SeekFrom::Start(STL_HEAD as u64))?;
                 let mut source = Stoppable(file, self.stop);
-                self.missing = pass_over_binary_stl(&mut source, *count, self.limits, visit)?;
+                let missing = pass_over_binary_stl(&mut source, *count, self.limits, visit)?;
+                self.losses.missing_vertices = missing;
                 Ok(())
             }
             ScanSource::Mesh(mesh) => {

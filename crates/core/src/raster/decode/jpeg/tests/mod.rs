@@ -154,6 +154,75 @@ fn an_orientation_of_four_bytes_turns_the_image() {
     assert_eq!(turned.rgb.at(0, 44), plain.rgb.at(44, 36));
 }
 
+/// Encodes 8 x 8 equal pixels with four stored components, as Adobe programs save CMYK: 255 is a place without ink.
+fn cmyk(stored: [u8; 4]) -> Vec<u8> {
+    let mut bits = String::new();
+    for value in stored {
+        // The quantization makes the average a difference from 128. Each size has a code of four bits.
+        let average = i32::from(value) - 128;
+        let size = 32 - average.unsigned_abs().leading_zeros() as usize;
+        let coded = if average < 0 { average - 1 } else { average } & ((1 << size) - 1);
+        bits += &format!("{size:04b}");
+        if size > 0 {
+            bits += &format!("{coded:0size$b}");
+        }
+        // There is no other coefficient.
+        bits.push('0');
+    }
+    while bits.len() % 8 != 0 {
+        bits.push('1');
+    }
+    let bytes = bits.as_bytes().chunks(8);
+    let byte = |bits: &[u8]| {
+        bits.iter()
+            .fold(0, |byte: u8, bit| byte << 1 | (bit - b'0'))
+    };
+    let mut coded = Vec::new();
+    for byte in bytes.map(byte) {
+        coded.push(byte);
+        if byte == 0xff {
+            coded.push(0);
+        }
+    }
+    let components: Vec<u8> = (1..=4).flat_map(|id| [id, 0x11, 0]).collect();
+    let tables: Vec<u8> = (1..=4).flat_map(|id| [id, 0]).collect();
+    let lengths = |length: usize, count: u8| {
+        let mut lengths = [0; 16];
+        lengths[length - 1] = count;
+        lengths
+    };
+    let sizes: Vec<u8> = (0..12).collect();
+    [
+        b"\xff\xd8".to_vec(),
+        segment(0xee, &[b"Adobe\0\x64\0\0\0\0\0"]),
+        segment(0xdb, &[&[0], &[8; 64]]),
+        segment(0xc0, &[&[8, 0, 8, 0, 8, 4], &components]),
+        segment(0xc4, &[&[0], &lengths(4, 12), &sizes]),
+        segment(0xc4, &[&[0x10], &lengths(1, 1), &[0]]),
+        segment(0xda, &[&[4], &tables, &[0, 63, 0]]),
+        coded,
+        b"\xff\xd9".to_vec(),
+    ]
+    .concat()
+}
+
+#[test]
+fn cmyk_leaves_the_light_that_its_inks_do_not_take() {
+    for (stored, wanted) in [
+        ([255; 4], [255; 3]),
+        ([0, 255, 255, 255], [0, 255, 255]),
+        ([255, 0, 255, 255], [255, 0, 255]),
+        ([255, 255, 0, 255], [255, 255, 0]),
+        ([255, 255, 255, 0], [0; 3]),
+        ([128, 255, 64, 255], [128, 255, 64]),
+        ([255, 255, 255, 90], [90; 3]),
+    ] {
+        let image = read(&cmyk(stored)).expect("an image");
+        let wanted: Grid<[u8; 3]> = Grid::new(8, 8, wanted);
+        assert!(most_different(&image, &wanted) <= 2, "{stored:?}");
+    }
+}
+
 #[test]
 fn a_colour_profile_in_several_segments_is_applied() {
     let profile = TestProfile::WIDE.icc();

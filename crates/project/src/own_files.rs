@@ -1,0 +1,103 @@
+//! Files that a project needs, over which no output is written.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::ProjectResult;
+use crate::exit::Refusal;
+use crate::files::is_backup;
+use mocban_catalog::Catalog;
+use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};
+
+/// Refuses to write over a catalog, a backup, or another file that a project needs, or into its folder of results.
+pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
+    let is_copy = || is_backup(path).unwrap_or(false).then_some("is a backup");
+    let Some(reason) = project_role(path).or_else(is_copy) else {
+        return Ok(());
+    };
+    let shown = path.display();
+    Err(Refusal::Usage(format!(
+        "{shown} {reason}; name another file for the output"
+    )))
+}
+
+/// Returns what a path is to a project, such as `is a file of a project`, or `None` if no project needs it. The path need
+/// not exist.
+pub(crate) fn project_role(path: &Path) -> Option<&'static str> {
+    let real = real_path(path);
+    let name = real.file_name().unwrap_or_default().to_string_lossy();
+    let is_known = name.starts_with(CATALOG_FILE)
+        || [SETTINGS_FILE, "run.lock", "run.members"].contains(&&*name);
+    // The parent of a bare file name is empty.
+    let folder = Path::new(".").join(real.parent().unwrap_or(&real));
+    if is_known && is_project(&folder) {
+        Some("is a file of a project")
+    } else if is_among_results(&real) {
+        Some("belongs to the results of a project")
+    } else {
+        None
+    }
+}
+
+/// Returns the absolute path of a file that need not exist, without links.
+fn real_path(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let found = absolute.ancestors().find_map(|folder| {
+        let below = absolute.strip_prefix(folder).ok()?;
+        let real = folder.canonicalize().ok()?;
+        // Joining an empty path would add a separator.
+        Some(if below == Path::new("") {
+            real
+        } else {
+            real.join(below)
+        })
+    });
+    found.unwrap_or(absolute)
+}
+
+/// Returns whether a path is the folder of results of a project, or inside it.
+fn is_among_results(real: &Path) -> bool {
+    real.ancestors().any(|folder| {
+        let project = folder.parent().map(Project::at);
+        project
+            .is_some_and(|project| project.artifacts_dir() == folder && is_project(project.dir()))
+    })
+}
+
+/// Returns whether a folder has a catalog, or settings, which may name a catalog on a server.
+fn is_project(folder: &Path) -> bool {
+    [CATALOG_FILE, SETTINGS_FILE]
+        .iter()
+        .any(|name| folder.join(name).exists())
+}
+
+/// Refuses to write over a file of a project, or over an input of its pairs and blocks.
+pub async fn refuse_used_file(
+    path: &Path,
+    project: &Project,
+    catalog: &Catalog,
+) -> ProjectResult<()> {
+    refuse_project_file(path)?;
+    // A file that does not exist is not an input.
+    let Ok(real) = path.canonicalize() else {
+        return Ok(());
+    };
+    // Two inputs may have the same file name in different folders, and an input may be a link.
+    let is_target = |stored: &String| {
+        let input = project.input_path(stored);
+        input == real || input.canonicalize().is_ok_and(|input| input == real)
+    };
+    let inputs = catalog.inputs_named([path, &real].map(file_name)).await?;
+    let Some((pair, _)) = inputs.into_iter().find(|(_, stored)| is_target(stored)) else {
+        return Ok(());
+    };
+    let shown = path.display();
+    Err(Refusal::Usage(format!(
+        "{shown} is an input of {pair}; name another file for the output"
+    ))
+    .into())
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
