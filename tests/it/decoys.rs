@@ -153,16 +153,38 @@ fn two_pieces(index: u64) -> DecoyPair {
     wrong
 }
 
+/// The own print of a pair, of which the right half is folded back.
+fn folded(index: u64) -> DecoyPair {
+    let pair = PairGenerator::new(Tier::Upright, 77).pair(index);
+    let pair = pair.expect("images encode");
+    let print = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("a print");
+    let (width, height) = (print.rgb.width(), print.rgb.height());
+    let shown = raster::Grid::from_fn(width, height, |x, y| {
+        let at = if x < width / 2 {
+            print.rgb.at(x, y)
+        } else {
+            print.rgb.at(0, 0)
+        };
+        at.map(|value| (value / 257) as u8)
+    });
+    DecoyPair {
+        mesh: pair.mesh,
+        print: raster::png_rgb8(&shown),
+    }
+}
+
 #[test]
 fn refusals_say_what_was_seen() {
     let seen = ["separate pieces", "nearly flat", "half of the print only"];
     let (mut wrong, mut pieces, mut flat) = (Vec::new(), Vec::new(), Vec::new());
+    let mut half = Vec::new();
     for index in 0..COUNT {
         for tier in [Tier::Upright, Tier::Pose] {
             wrong.extend(refusal(&made(tier, 77, Decoy::WrongPrint, index)));
             flat.extend(refusal(&made(tier, 77, Decoy::Uncarved, index)));
         }
         pieces.extend(refusal(&two_pieces(index)));
+        half.extend(refusal(&folded(index)));
     }
     assert!(wrong.len() > COUNT as usize && flat.len() > COUNT as usize);
     let of_others = wrong
@@ -175,4 +197,7 @@ fn refusals_say_what_was_seen() {
         flat.iter().all(|text| !text.contains("another character?")),
         "{flat:#?}"
     );
+    assert!(named(&flat, "is nearly flat"), "{flat:#?}");
+    let is_seen = "they agree in the left half of the print only: is the sheet folded, torn or covered there?";
+    assert!(named(&half, is_seen), "{half:#?}");
 }

@@ -12,10 +12,13 @@ use super::failure::AppResult;
 use super::home::free_space;
 use super::pairs_page::pair_card;
 use super::projects::OpenProject;
+use super::sentence::{Sentence, without_commands};
 use super::state::AppState;
 use super::visit::Visit;
+use crate::review::Language;
 use mocban_catalog::{PairFilter, PairOrder, PairResults, StatusCounts, WorkerRecord, WorkerState};
 use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, one_line};
+use mocban_project::block_status::BlockStatus;
 use mocban_project::failures::may_succeed_unchanged;
 use mocban_project::location::now;
 use mocban_project::{ProjectError, ProjectResult};
@@ -26,6 +29,8 @@ use mocban_system::platform;
 const LATEST: usize = 12;
 /// Number of failed pairs that are shown as examples of each class.
 const EXAMPLES: usize = 3;
+/// Most blocks in progress that are named.
+const MAX_BLOCKS: usize = 5;
 
 /// What the page shows of a project.
 struct RunState {
@@ -34,13 +39,15 @@ struct RunState {
     workers: Vec<WorkerRecord>,
     latest: Vec<PairResults>,
     failures: Vec<(FailureClass, u64, Vec<PairResults>)>,
-    blocks: Option<String>,
+    blocks: BlockStatus,
+    /// Why the last run that the app started ended, if it failed.
+    failed_run: Option<Sentence>,
     /// Number of pairs at the same time, as the settings give it.
     jobs: usize,
 }
 
 impl RunState {
-    async fn read(open: &OpenProject) -> ProjectResult<Self> {
+    async fn read(open: &OpenProject, failed_run: Option<Sentence>) -> ProjectResult<Self> {
         let (catalog, location) = (&open.catalog, open.location());
         let settings = location.settings()?;
         // Read before the counts: a run that ends in between leaves no leases.
@@ -62,14 +69,15 @@ impl RunState {
             let list = catalog.pair_list(&filter, PairOrder::Imported, metric, None, EXAMPLES);
             failures.push((class, number, list.await?.pairs));
         }
-        let blocks = catalog.block_states().await?;
+        let blocks = BlockStatus(catalog.block_states().await?);
         Ok(Self {
             counts,
             is_running: running,
             workers: workers.unwrap_or_default(),
             latest: catalog.recent_results(LATEST).await?,
             failures,
-            blocks: (!blocks.is_empty()).then(|| grouped(blocks.len() as u64)),
+            blocks,
+            failed_run,
             jobs: mocban_project::run::options(&settings.config).workers,
         })
     }
@@ -84,6 +92,11 @@ impl RunState {
             .map(|status| self.jobs(status))
             .iter()
             .sum()
+    }
+
+    /// Returns the number of blocks that a run would work on or works on, whose pairs are not yet all known.
+    fn open_blocks(&self) -> u64 {
+        self.blocks.waiting() + self.blocks.leased()
     }
 
     /// Returns the pairs that the present workers settle in a second, since they started.
@@ -110,12 +123,15 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let read = RunState::read(&open).await;
+    let read = RunState::read(&open, state.failed_runs.last(&open.dir)).await;
     let run =
         read.map_err(|error: ProjectError| super::failure::AppFailure::of(error, &open.dir))?;
     let body = html! {
         div #live data-live="2000" {
             (figures(&visit, &run))
+            @if let Some(sentence) = run.failed_run.as_ref().filter(|_| !run.is_running) {
+                p.notice.bad #failed-run role="alert" { (one_line(sentence.text(visit.language))) }
+            }
             (progress(&visit, &run))
             (controls(&visit, &run))
             (disk(&visit, &open))
@@ -145,7 +161,7 @@ fn figures(visit: &Visit, run: &RunState) -> Markup {
             (figure(running, running_name, Some("pairs?state=running"), ""))
             (figure(run.counts.low_confidence, visit.t("low confidence", "độ tin cậy thấp"), Some("pairs?confidence=low&sort=confidence"), "warn"))
             (figure(judged, visit.t("verdicts", "đánh giá"), Some("review"), ""))
-            @if let Some(blocks) = &run.blocks { span.figure { b { (blocks) } span { (visit.t("blocks", "ván")) } } }
+            @if !run.blocks.is_empty() { span.figure { b { (grouped(run.blocks.0.len() as u64)) } span { (visit.t("blocks", "ván")) } } }
         }
     }
 }
@@ -159,13 +175,39 @@ fn progress(visit: &Visit, run: &RunState) -> Markup {
             (grouped(settled)) " / " (grouped(run.counts.pairs))
             @if let Some(rate) = rate {
                 " · " (rate_text(visit, rate))
-                " · " (visit.t("time left", "còn lại")) " " (duration(visit, run.outstanding() as f64 / rate))
+                @if run.open_blocks() == 0 {
+                    " · " (visit.t("time left", "còn lại")) " " (duration(visit, run.outstanding() as f64 / rate))
+                }
             }
             @if run.is_running {
                 @for worker in &run.workers { " · " (one_line(&worker.host)) ", " (visit.t("process", "tiến trình")) " " (worker.pid) }
             }
         }
+        @if !run.blocks.is_empty() { p.muted #blocks { (blocks_text(visit, &run.blocks)) } }
     }
+}
+
+/// Returns the stages of the blocks in progress and how many blocks are done, such as `b04 at align, 1 of 3 done`.
+fn blocks_text(visit: &Visit, blocks: &BlockStatus) -> String {
+    let mut parts: Vec<String> = (blocks.in_progress())
+        .take(MAX_BLOCKS)
+        .map(|(block, stage)| {
+            let (block, stage) = (one_line(block.as_str()), visit.block_stage(stage));
+            match visit.language {
+                Language::English => format!("{block} at {stage}"),
+                Language::Vietnamese => format!("{block} ở bước {stage}"),
+            }
+        })
+        .collect();
+    let done = grouped(blocks.number(&[JobStatus::Done]));
+    let all = grouped(blocks.0.len() as u64);
+    parts.push(match visit.language {
+        Language::English => format!("{done} of {all} done"),
+        Language::Vietnamese => format!("xong {done} trên {all}"),
+    });
+    let failed = blocks.number(&[JobStatus::Quarantined]);
+    parts.extend((failed > 0).then(|| format!("{} {}", grouped(failed), visit.t("failed", "lỗi"))));
+    parts.join(", ")
 }
 
 /// Returns a number of pairs a second, or a minute if they are few.
@@ -212,6 +254,8 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
         };
     }
     let waiting = run.outstanding() + run.counts.stale;
+    let blocks = run.open_blocks();
+    let is_idle = waiting + blocks == 0;
     let failed = run.jobs(JobStatus::Quarantined);
     html! {
         @if run.counts.stale > 0 {
@@ -221,14 +265,16 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
             label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
             }
-            button.primary #start name="which" value="all" disabled[waiting == 0] {
-                (visit.t("Align", "Căn chỉnh")) " " (grouped(waiting)) " " (visit.t("pairs", "cặp"))
+            button.primary #start name="which" value="all" disabled[is_idle] {
+                (visit.t("Align", "Căn chỉnh")) " "
+                @if blocks > 0 { (grouped(blocks)) " " (visit.t("blocks and", "ván và")) " " }
+                (grouped(waiting)) " " (visit.t("pairs", "cặp"))
             }
             @if failed > 0 {
                 button name="which" value="failed" { (visit.t("Try failed pairs again", "Thử lại các cặp lỗi")) }
             }
         }))
-        @if waiting == 0 && failed == 0 && run.counts.pairs > 0 {
+        @if is_idle && failed == 0 && run.counts.pairs > 0 {
             p.good { (visit.t("Everything is aligned. Next: judge a sample of the results.", "Mọi thứ đã được căn chỉnh. Tiếp theo: đánh giá một mẫu kết quả.")) " "
                 a href="review" { (visit.t("Review", "Đánh giá")) } }
         }
@@ -283,7 +329,137 @@ fn example(pair: &PairResults) -> Markup {
     html! {
         li {
             a href={ "pair/" (super::address::encoded(name)) "/" } { (one_line(name)) }
-            @if let Some(message) = message { ": " (one_line(message)) }
+            @if let Some(message) = message { ": " span lang="en" { (one_line(&without_commands(message))) } }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::{RunState, blocks_text, controls, progress};
+    use crate::app::address::PageQuery;
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+    use mocban_catalog::{BlockAttributes, BlockState, StatusCounts, WorkerId, WorkerRecord};
+    use mocban_core::domain::{BlockStage, JobStatus, WorkerMetrics};
+    use mocban_project::block_status::BlockStatus;
+
+    fn visit(language: Language) -> Visit {
+        Visit {
+            language,
+            root: "./".to_owned(),
+            here: "./".to_owned(),
+            query: PageQuery::default(),
+            csrf_token: String::new(),
+        }
+    }
+
+    fn block(name: &str, status: JobStatus) -> BlockState {
+        BlockState {
+            attributes: BlockAttributes {
+                name: name.parse().expect("a valid id"),
+                mesh_path: "m.stl".to_owned(),
+                page_path: "p.png".to_owned(),
+                labels_path: None,
+                unit: None,
+                side: None,
+            },
+            status,
+            next_stage: (status != JobStatus::Done).then_some(BlockStage::Align),
+            attempts: 0,
+            crashes: 0,
+            failure: None,
+            control_points: None,
+            characters: 0,
+            left_out: 0,
+            retired: 0,
+            low_confidence: 0,
+        }
+    }
+
+    /// A run that has done 10 of 20 pairs in a minute, in a project with these blocks.
+    fn running(blocks: Vec<BlockState>) -> RunState {
+        let metrics = WorkerMetrics {
+            elapsed_ms: 60_000,
+            done: 10,
+            ..WorkerMetrics::default()
+        };
+        RunState {
+            counts: StatusCounts {
+                schema: 1,
+                pairs: 20,
+                retired: 0,
+                jobs: BTreeMap::from([(JobStatus::Done, 10), (JobStatus::Ready, 10)]),
+                stages: BTreeMap::new(),
+                stale: 0,
+                low_confidence: 0,
+                verdicts: BTreeMap::new(),
+            },
+            is_running: true,
+            workers: vec![WorkerRecord {
+                id: WorkerId(1),
+                host: "here".to_owned(),
+                pid: 7,
+                started: 0,
+                heartbeat: 0,
+                ended: None,
+                died: false,
+                leased: 1,
+                metrics: Some(metrics),
+            }],
+            latest: Vec::new(),
+            failures: Vec::new(),
+            blocks: BlockStatus(blocks),
+            failed_run: None,
+            jobs: 2,
+        }
+    }
+
+    #[test]
+    fn blocks_in_progress_have_their_stage_in_both_languages() {
+        let blocks = BlockStatus(vec![
+            block("b03", JobStatus::Done),
+            block("b04", JobStatus::Leased),
+            block("b05", JobStatus::Ready),
+        ]);
+        let text = |language| blocks_text(&visit(language), &blocks);
+        assert_eq!(text(Language::English), "b04 at align, 1 of 3 done");
+        assert_eq!(
+            text(Language::Vietnamese),
+            "b04 ở bước căn chỉnh trang, xong 1 trên 3"
+        );
+    }
+
+    #[test]
+    fn time_is_estimated_once_every_pair_is_known() {
+        let visit = visit(Language::English);
+        let is_estimated = |blocks| {
+            let shown = progress(&visit, &running(blocks)).into_string();
+            assert!(shown.contains("10.0 pairs a minute"), "{shown}");
+            shown.contains("time left 60 s")
+        };
+        assert!(is_estimated(Vec::new()));
+        assert!(is_estimated(vec![
+            block("b1", JobStatus::Done),
+            block("b2", JobStatus::Quarantined)
+        ]));
+        for status in [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased] {
+            assert!(!is_estimated(vec![block("b1", status)]), "{status}");
+        }
+    }
+
+    #[test]
+    fn a_project_of_blocks_alone_can_be_run() {
+        let mut run = running(vec![block("b1", JobStatus::Ready)]);
+        run.is_running = false;
+        run.counts.jobs.clear();
+        let shown = controls(&visit(Language::English), &run).into_string();
+        assert!(shown.contains("Align 1 blocks and 0 pairs"), "{shown}");
+        assert!(!shown.contains("disabled"), "{shown}");
+        run.blocks = BlockStatus(Vec::new());
+        let shown = controls(&visit(Language::English), &run).into_string();
+        assert!(shown.contains("disabled"), "{shown}");
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
 use super::open_reviews::OpenReviews;
 use super::projects::{OpenProject, find};
@@ -35,6 +36,8 @@ pub(super) struct AppState {
     pub(super) reviews: OpenReviews,
     /// Exports, checks and backups.
     pub(super) tasks: AppTasks,
+    /// Why runs that the app started failed.
+    pub(super) failed_runs: FailedRuns,
     pub(super) thumbs: ThumbCache,
     /// Draws pictures.
     pub(super) work: WorkThread,
@@ -48,6 +51,7 @@ impl AppState {
             projects: Mutex::default(),
             reviews: OpenReviews::default(),
             tasks: AppTasks::default(),
+            failed_runs: FailedRuns::default(),
             thumbs: ThumbCache::default(),
             work: WorkThread::default(),
         }

@@ -1,7 +1,9 @@
 //! Names of states, classes and metrics, and what helps after a failure, in both languages.
 
 use super::visit::Visit;
-use mocban_core::domain::{FailureClass, JobStatus, Reason, Stage, ThresholdMetric, Verdict};
+use mocban_core::domain::{
+    BlockStage, FailureClass, JobStatus, Reason, Stage, ThresholdMetric, Verdict,
+};
 
 impl Visit {
     /// Returns the name of the state of a pair.
@@ -45,6 +47,16 @@ impl Visit {
             Stage::Depth => self.t("depth map", "bản đồ độ sâu"),
             Stage::Normalize => self.t("separation of the strokes", "tách nét"),
             Stage::Register => self.t("registration with the print", "căn chỉnh với bản in"),
+        }
+    }
+
+    /// Returns the name of a stage of a block.
+    pub(super) const fn block_stage(&self, stage: BlockStage) -> &'static str {
+        match stage {
+            BlockStage::Face => self.t("face", "tìm mặt khắc"),
+            BlockStage::Align => self.t("align", "căn chỉnh trang"),
+            BlockStage::Boxes => self.t("boxes", "tìm ô chữ"),
+            BlockStage::Cut => self.t("cut", "cắt chữ"),
         }
     }
 
