@@ -6,8 +6,8 @@ use super::{RunState, blocks_text, controls, progress};
 use crate::app::address::PageQuery;
 use crate::app::visit::Visit;
 use crate::review::Language;
-use mocban_catalog::{BlockAttributes, BlockState, StatusCounts, WorkerId, WorkerRecord};
-use mocban_core::domain::{BlockStage, JobStatus, WorkerMetrics};
+use mocban_catalog::{BlockAttributes, BlockState, StatusCounts, WorkerRecord};
+use mocban_core::domain::{BlockStage, JobStatus, WorkerId, WorkerMetrics};
 use mocban_project::block_status::BlockStatus;
 
 fn visit(language: Language) -> Visit {
