@@ -322,13 +322,13 @@ function perform(action, event, at) {
 }
 
 addEventListener("click", (event) => {
-  const step = event.target.closest("[data-align]");
-  if (step) return editor?.step(step.dataset.align, event.shiftKey || ui.isFine());
-  const button = event.target.closest("[data-action]");
-  if (!button) return;
-  perform(button.dataset.action, null, event.timeStamp);
+  const control = event.target.closest("[data-align], [data-action], #alignment-fine");
+  if (!control) return;
+  const { align, action } = control.dataset;
+  if (align) editor?.step(align, event.shiftKey || ui.isFine());
+  else if (action) perform(action, null, event.timeStamp);
   // After a mouse click, return the keys to the page. Keyboard users keep the focus.
-  if (event.detail > 0) button.blur();
+  if (event.detail > 0) control.blur();
 });
 listen(
   (action, event) => perform(action, event, event.timeStamp),

@@ -21,7 +21,7 @@ pub(crate) fn app(folder: &Path) -> std::process::Command {
 }
 
 /// Opens the app on a folder with the shared project `p`.
-fn with_project() -> (tempfile::TempDir, Page) {
+pub(crate) fn with_project() -> (tempfile::TempDir, Page) {
     let dir = tempfile::tempdir().expect("a temporary directory");
     read_project(&dir);
     let page = open_app(dir.path());
@@ -33,7 +33,7 @@ pub(crate) fn text(reply: &Reply) -> String {
 }
 
 /// Returns the token that actions carry, from a page.
-fn token(page: &Page) -> String {
+pub(crate) fn token(page: &Page) -> String {
     let html = text(&page.get("/"));
     let token = html.split("name=\"csrf-token\" content=\"").nth(1);
     let token = token.and_then(|rest| rest.split('"').next());
@@ -41,7 +41,7 @@ fn token(page: &Page) -> String {
 }
 
 /// Sends an action with the headers of the page; `change` may change them.
-fn act(
+pub(crate) fn act(
     page: &Page,
     path: &str,
     body: &Value,

@@ -16,6 +16,18 @@ use crate::small_block::{demo_block, few_labels};
 const STROKE_ONLY: [u8; 3] = [213, 94, 0];
 const INK_ONLY: [u8; 3] = [0, 114, 178];
 
+/// Keeps the browser from asking for the layer of the relief until `releaseRelief` is called.
+const HOLD_RELIEF: &str = "(() => {
+    const { get, set } = Object.getOwnPropertyDescriptor(HTMLImageElement.prototype, 'src');
+    Object.defineProperty(HTMLImageElement.prototype, 'src', {
+        get,
+        set(address) {
+            if (address !== 'layer/relief' || window.releaseRelief) set.call(this, address);
+            else window.releaseRelief = () => set.call(this, address);
+        },
+    });
+})()";
+
 /// Creates a project `p` with a finished block `b1` of six characters. The truth is in `d/data/truth.json`.
 pub(crate) fn finished_block(dir: &Path) {
     copy_of("a finished block", dir, finish_block);
@@ -116,6 +128,28 @@ fn check_routes(page: Page) {
     assert!(get("/scan/0").body.len() > 10_000);
 }
 
+/// Checks the language of the page of a block and of its correction, by flag and by locale.
+fn check_languages(dir: &Path) {
+    for (args, lang, expected) in [
+        (&["--lang", "vi"][..], "C", Some("vi")),
+        (&["--lang", "en"], "vi_VN.UTF-8", Some("en")),
+        (&[], "vi_VN.UTF-8", Some("vi")),
+        (&[], "C", None),
+    ] {
+        let mut command = binary();
+        command.current_dir(dir).env("LANG", lang);
+        command.env_remove("LC_ALL").env_remove("LC_MESSAGES");
+        command.args(["-C", "p", "--json", "view", "--no-open", "b1"]);
+        let page = Page::of(command.args(args)).entered();
+        for path in ["/", "/correct"] {
+            let html = String::from_utf8(page.get(path).body).expect("UTF-8");
+            let given = html.split("name=\"page-language\" content=\"").nth(1);
+            let given = given.and_then(|rest| rest.split('"').next());
+            assert_eq!(given, expected, "{path} {args:?} {lang}");
+        }
+    }
+}
+
 fn number(tab: &Tab<'_>, expression: &str) -> f64 {
     let value = tab.eval(expression);
     value
@@ -128,12 +162,18 @@ fn use_page(tab: &Tab<'_>) {
     let zoom = |tab: &Tab<'_>| number(tab, "mocbanBlock.camera.zoom");
     tab.screenshot("block-page");
     for (key, layer) in [("KeyR", "relief"), ("KeyO", "overlay"), ("KeyP", "page")] {
-        let is_new = format!("mocbanBlock.overview.getAttribute('src') !== 'layer/{layer}'");
-        let is_new = tab.eval(&is_new) == true;
         tab.key(key);
-        // Drawing a layer takes a while, and the page says so.
-        let is_told = tab.eval("!mocbanBlock.work.hidden || mocbanBlock.overview.complete");
-        assert!(is_told == true || !is_new, "no sign of work on {layer}");
+        if layer == "relief" {
+            // Drawing takes a while, and the page says so. The browser does not ask for this layer yet.
+            tab.wait("window.releaseRelief");
+            let sign = tab.eval("mocbanBlock.work.hidden ? '' : mocbanBlock.work.innerText");
+            assert_eq!(sign, "Drawing the relief …", "the sign of work");
+            assert_eq!(
+                tab.eval("mocbanBlock.overview.classList.contains('block-loading')"),
+                true
+            );
+            tab.eval("releaseRelief(), null");
+        }
         tab.wait("mocbanBlock.work.hidden");
         tab.wait(&format!(
             "mocbanBlock.overview.complete && mocbanBlock.overview.naturalWidth > 100 && mocbanBlock.layer === '{layer}'"
@@ -175,11 +215,24 @@ fn use_page(tab: &Tab<'_>) {
     tab.drag([x, y], [x, y]);
     tab.wait("window.mocbanViewer && mocbanBlock.dialog.open");
     assert_eq!(tab.eval("mocbanViewer.header.pair"), format!("b1_{label}"));
-    let is_inside = "(() => {
-        const [view, dialog] = ['dialog .scan-viewer', 'dialog'].map((one) => document.querySelector(one).getBoundingClientRect());
-        return view.bottom <= dialog.bottom + 0.5 && view.right <= dialog.right + 0.5;
-    })()";
-    assert_eq!(tab.eval(is_inside), true, "the 3D view is cut off");
+    for [width, height] in [[900, 750], [1000, 900], [900, 900], [1000, 750]] {
+        tab.resize([width, height]);
+        tab.wait(&format!(
+            "innerWidth === {width} && innerHeight === {height}"
+        ));
+        let cut_off = tab.eval(
+            "(() => {
+                const [view, dialog] = ['dialog .scan-viewer', 'dialog'].map((one) => document.querySelector(one).getBoundingClientRect());
+                const isInside = view.bottom <= dialog.bottom + 0.5 && view.right <= dialog.right + 0.5;
+                const isOnScreen = dialog.bottom <= innerHeight + 0.5 && dialog.right <= innerWidth + 0.5;
+                return isInside && isOnScreen ? null : JSON.stringify([view, dialog]);
+            })()",
+        );
+        assert!(
+            cut_off.is_null(),
+            "the 3D view is cut off at {width} x {height}: {cut_off}"
+        );
+    }
     tab.screenshot("block-dialog");
     tab.key("Escape");
     tab.wait("!window.mocbanViewer && !mocbanBlock.dialog.open");
@@ -200,11 +253,13 @@ fn a_block_is_drawn_and_shown_in_the_browser() {
     let args = ["-C", "p", "--json", "view", "--no-open", "b1"];
     let start = || Page::of(binary().current_dir(dir.path()).args(args));
     check_routes(start());
+    check_languages(dir.path());
     let Some(browser) = Browser::start() else {
         return;
     };
     let page = start();
     let tab = browser.tab(1000, 750);
+    tab.before_scripts(HOLD_RELIEF);
     tab.open(&page.url);
     tab.wait("window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100");
     use_page(&tab);

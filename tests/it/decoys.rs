@@ -153,16 +153,30 @@ fn two_pieces(index: u64) -> DecoyPair {
     wrong
 }
 
+/// The back of a block, with traces of tools that are a tenth as deep as a carving.
+fn rough_back(index: u64) -> DecoyPair {
+    let mut wrong = made(Tier::Upright, 77, Decoy::WrongPrint, index);
+    let pair = PairGenerator::new(Tier::Upright, 77).pair(index);
+    let plane = pair.expect("images encode").truth.plane;
+    wrong.mesh.vertices.map_in_place(|vertex| {
+        let height = (0..3).map(|i| plane.n[i] * vertex[i]).sum::<f64>() + plane.d;
+        [0, 1, 2].map(|i| vertex[i] - 0.9 * height * plane.n[i])
+    });
+    wrong
+}
+
 #[test]
 fn refusals_say_what_was_seen() {
     let seen = ["separate pieces", "nearly flat", "half of the print only"];
     let (mut wrong, mut pieces, mut flat) = (Vec::new(), Vec::new(), Vec::new());
+    let mut back = Vec::new();
     for index in 0..COUNT {
         for tier in [Tier::Upright, Tier::Pose] {
             wrong.extend(refusal(&made(tier, 77, Decoy::WrongPrint, index)));
             flat.extend(refusal(&made(tier, 77, Decoy::Uncarved, index)));
         }
         pieces.extend(refusal(&two_pieces(index)));
+        back.extend(refusal(&rough_back(index)));
     }
     assert!(wrong.len() > COUNT as usize && flat.len() > COUNT as usize);
     let of_others = wrong
@@ -175,4 +189,7 @@ fn refusals_say_what_was_seen() {
         flat.iter().all(|text| !text.contains("another character?")),
         "{flat:#?}"
     );
+    assert!(named(&flat, "no carving found"), "{flat:#?}");
+    let is_back = "of its length): does it show the back of the block?";
+    assert!(named(&back, is_back), "{back:#?}");
 }

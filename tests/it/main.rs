@@ -3,10 +3,12 @@
 mod accessible;
 mod agreement;
 mod align_command;
+mod alignment_editor;
 mod all_pages;
 mod app;
 mod app_blocks;
 mod app_browser;
+mod app_sentences;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;
@@ -76,6 +78,7 @@ mod many_reviewers;
 #[cfg(target_os = "linux")]
 mod memory;
 mod mesh_forms;
+mod method_change;
 mod names;
 mod object_store;
 mod object_store_blocks;
@@ -106,6 +109,8 @@ mod resume;
 mod retire;
 mod review_alignment;
 mod review_browser;
+#[cfg(unix)]
+mod review_closing;
 mod review_data;
 mod review_guard;
 mod review_guide;

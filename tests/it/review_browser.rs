@@ -30,7 +30,7 @@ pub(crate) fn enter<'a>(browser: &'a Browser, page: &Page, size: [u32; 2]) -> Ta
 }
 
 /// Opens a page on a new project; skips if there is no browser.
-fn on_a_page(test: impl FnOnce(&Project, &Tab<'_>)) {
+pub(crate) fn on_a_page(test: impl FnOnce(&Project, &Tab<'_>)) {
     on_a_page_of(read_project, &PLAIN, [1440, 900], test);
 }
 
@@ -51,7 +51,7 @@ pub(crate) fn on_a_page_of(
     test(&project, &tab);
 }
 
-fn ready(tab: &Tab<'_>) {
+pub(crate) fn ready(tab: &Tab<'_>) {
     tab.wait("document.body?.dataset.ready && document.body.dataset.shown");
 }
 
@@ -249,102 +249,6 @@ fn two_reviewers_judge_at_the_same_time() {
     // The second reviewer's page does not show the first one's answers.
     let history = tabs[1].eval("document.getElementById('history').textContent");
     assert!(!history.to_string().contains('✓'), "{history}");
-}
-
-#[test]
-fn a_relief_is_aligned_by_keys_and_mouse() {
-    on_a_page(|project, tab| {
-        let pair = tab.eval("document.getElementById('pair').textContent");
-        tab.key("KeyC");
-        tab.wait("document.getElementById('legend').textContent.includes('IoU')");
-        let iou = || {
-            let text = tab.eval("document.getElementById('legend').textContent.split(' ')[1]");
-            text.as_str()
-                .and_then(|text| text.parse::<f64>().ok())
-                .expect("a number")
-        };
-        let before = iou();
-        for _ in 0..5 {
-            tab.key("BracketRight");
-        }
-        let rotated = iou();
-        assert!(rotated < before, "{rotated} {before}");
-        let middle = tab.eval(
-            "(({ left, top, width, height }) => [left + width / 2, top + height / 2])
-            (document.getElementById('canvas').getBoundingClientRect())",
-        );
-        let at = [0, 1].map(|i| middle[i].as_f64().expect("a number"));
-        tab.drag(at, [at[0] + 60.0, at[1]]);
-        assert!(iou() < rotated);
-        tab.screenshot("alignment");
-        tab.key("Digit0");
-        assert!((iou() - before).abs() < 1e-9);
-        for _ in 0..5 {
-            tab.key("BracketRight");
-        }
-        let legend = || {
-            tab.eval("document.getElementById('legend').textContent")
-                .to_string()
-        };
-        // Mirroring keeps the rotation.
-        for _ in 0..2 {
-            tab.key("KeyM");
-            assert!(legend().contains("rotated by 5.00°"), "{}", legend());
-        }
-        let saved_iou = iou();
-        // A verdict would leave the item and lose the alignment.
-        tab.key("KeyP");
-        tab.wait("document.getElementById('live').textContent.startsWith('Save the alignment')");
-        tab.key("Enter");
-        // It is worse than the computed alignment.
-        tab.wait("document.querySelector('#confirm[open]')");
-        tab.eval("document.querySelector('#confirm button[value=yes]').click()");
-        tab.wait(
-            "document.getElementById('live').textContent.startsWith('Manual alignment saved')",
-        );
-        // The page shows the alignment, and the editor continues from it.
-        tab.wait("document.getElementById('legend').textContent.includes('aligned manually by lan: rotated 5.0°')");
-        assert!(
-            legend().contains(&format!("IoU {saved_iou:.3}")),
-            "{}",
-            legend()
-        );
-        tab.reload();
-        ready(tab);
-        tab.wait(
-            "document.getElementById('legend').textContent.includes('aligned manually by lan')",
-        );
-        tab.key("KeyC");
-        tab.wait("document.getElementById('legend').textContent.includes('rotated by 5.00°')");
-        assert!((iou() - saved_iou).abs() < 1e-9, "{}", legend());
-        tab.key("Digit0");
-        assert!((iou() - before).abs() < 1e-9);
-        tab.key("Escape");
-        mocban(project.dir(), &["export", "-o", "out"]).expect(0);
-        let lines = std::fs::read_to_string(project.dir().join("out/pairs.jsonl")).expect("lines");
-        let lines = lines
-            .lines()
-            .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
-        let mine: Vec<Value> = lines.filter(|line| line["id"] == pair).collect();
-        let angle = |map: &Value| {
-            let at = |row: usize| map[row][0].as_f64().expect("a number");
-            at(1).atan2(at(0)).to_degrees()
-        };
-        let turns = mine.iter().map(|line| {
-            let turn = angle(&line["manual_alignment"]["print_from_depth"])
-                - angle(&line["print_from_depth"]);
-            (turn + 540.0).rem_euclid(360.0) - 180.0
-        });
-        let turns: Vec<f64> = turns.collect();
-        assert!(
-            turns.iter().any(|turn| (turn - 5.0).abs() < 1e-6),
-            "{turns:?}"
-        );
-        assert!(
-            current_verdicts(project, "lan").is_empty(),
-            "an alignment is not a verdict"
-        );
-    });
 }
 
 #[test]

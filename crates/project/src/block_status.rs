@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use mocban_catalog::BlockState;
-use mocban_core::domain::JobStatus;
+use mocban_core::domain::{BlockName, BlockStage, JobStatus};
 
 /// The blocks of a project.
 #[derive(Debug, Clone, Default)]
@@ -31,6 +31,13 @@ impl BlockStatus {
     /// Returns the number of blocks that a process works on or left.
     pub fn leased(&self) -> u64 {
         self.number(&[JobStatus::Leased])
+    }
+
+    /// Returns the blocks that a process works on or left, each with its stage.
+    pub fn in_progress(&self) -> impl Iterator<Item = (&BlockName, BlockStage)> {
+        let leased = self.0.iter();
+        let leased = leased.filter(|state| state.status == JobStatus::Leased);
+        leased.filter_map(|state| Some((&state.attributes.name, state.next_stage?)))
     }
 
     /// Returns the failed blocks.

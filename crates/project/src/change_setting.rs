@@ -1,13 +1,14 @@
 //! Changes a setting in the file of a project, after saying what that costs.
 
 use mocban_config::{Origin, Setting, with_setting};
-use mocban_runner::fingerprints;
+use mocban_runner::{changes_method, fingerprints};
 use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
 
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::exit::Refusal;
 use crate::files;
 use crate::location::Location;
+use crate::run::options;
 use mocban_catalog::Catalog;
 
 /// A setting that would be changed, and what follows.
@@ -19,6 +20,8 @@ pub struct SettingChange {
     pub after: Setting,
     /// Number of pairs that the next run would compute again, also for other reasons.
     pub stale: u64,
+    /// Whether the next run would replace results by those of another method.
+    pub changes_method: bool,
 }
 
 /// Looks at a change of a setting. `value` is written as in a settings file; text needs no quotes.
@@ -39,11 +42,13 @@ pub async fn preview(
     changed.sets = vec![format!("{key}={value}")];
     let changed = changed.settings()?;
     let after = find(changed.tree.settings()).unwrap_or_else(|| before.clone());
-    let fingerprints = fingerprints(&changed.config.stages);
+    let stages = &changed.config.stages;
+    let changes_method = changes_method(catalog, stages, &options(&changed.config)).await?;
     Ok(SettingChange {
         before,
         after,
-        stale: catalog.count_stale(&fingerprints).await?,
+        stale: catalog.count_stale(&fingerprints(stages)).await?,
+        changes_method,
     })
 }
 

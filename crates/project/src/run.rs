@@ -16,6 +16,9 @@ use mocban_core::domain::ErrorCode;
 use mocban_runner::{self as runner, RunOptions, RunPlan, RunSummary, Stop};
 use mocban_store::{Project, ProjectStorage};
 
+/// What a run with another method than before does to the results.
+pub const TWO_METHODS: &str = "the results of the other method would be replaced; to keep both, import the pairs into a second project, and compare the two with `report --compare`";
+
 /// Longest time for looking at the roots of inputs before a run.
 const ROOT_CHECK: Duration = Duration::from_secs(5);
 
@@ -105,12 +108,17 @@ impl PreparedRun {
         Ok((plan, is_running))
     }
 
-    /// Runs until nothing is left or `stop` is set.
+    /// Runs until nothing is left or `stop` is set. Before that, warns if the method differs from that of the results.
     ///
     /// # Errors
     /// Returns an error if another process runs the project, or if the catalog or the place of the artifacts fails.
     pub async fn run(self, stop: &Stop, listener: &dyn Listener) -> ProjectResult<RunOutcome> {
         let (project, catalog) = (&self.project, &self.catalog);
+        // The run itself reports what cannot be read.
+        let changes = runner::changes_method(catalog, &self.config.stages, &self.options).await;
+        if changes.unwrap_or(false) {
+            warn(listener, TWO_METHODS);
+        }
         let ended = runner::run(
             project,
             catalog,

@@ -155,10 +155,22 @@ fn conclusion(
         return "No significant difference: each alone is right on as many pairs as the other."
             .to_owned();
     };
-    let (pairs, known, a, b) = (about(pairs), basis.pairs(), a.title(), b.title());
+    let needed = sample_size(basis, (a, b), pairs);
+    format!("No significant difference. {needed}")
+}
+
+/// Returns the sentences on how many pairs would show a difference between two metrics.
+pub(super) fn sample_size(
+    basis: Basis,
+    (a, b): (ThresholdMetric, ThresholdMetric),
+    pairs: u64,
+) -> String {
     format!(
-        "No significant difference. At this rate, {pairs} {known} would be needed to show a difference between {a} and \
-         {b} (80 % power, 5 % level)."
+        "To show one between {} and {}, {} {} would be needed. This assumes 80 % power and a 5 % level.",
+        a.title(),
+        b.title(),
+        about(pairs),
+        basis.pairs()
     )
 }
 
@@ -176,7 +188,7 @@ fn two_digits(pairs: f64) -> u64 {
 }
 
 /// Formats a sample size, such as `about 4,700` or `more than 100,000`.
-pub(super) fn about(pairs: u64) -> String {
+fn about(pairs: u64) -> String {
     if pairs > MAX_SAMPLE_SIZE {
         return format!("more than {}", format_count(MAX_SAMPLE_SIZE));
     }
@@ -212,8 +224,8 @@ mod tests {
         assert_eq!(found[0].p, Some(0.625));
         assert_eq!(
             found[0].conclusion,
-            "No significant difference. At this rate, about 4,700 judged pairs would be needed to show a difference \
-             between Ensemble and Non-luminous SSIM (80 % power, 5 % level)."
+            "No significant difference. To show one between Ensemble and Non-luminous SSIM, about 4,700 judged pairs \
+             would be needed. This assumes 80 % power and a 5 % level."
         );
         assert!((found[1].p.expect("ten discordant") - 0.021_484_375).abs() < 1e-12);
         assert!((found[1].p_holm.expect("ten discordant") - 0.064_453_125).abs() < 1e-12);

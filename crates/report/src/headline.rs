@@ -3,7 +3,7 @@
 //! A command in a sentence stands in backticks, which renderers turn into the code of their format.
 
 use super::accuracy_sentence::accuracy;
-use super::comparison::{Basis, Comparison, MIN_PAIRS, TOO_FEW_TO_ESTIMATE, about};
+use super::comparison::{Basis, Comparison, MIN_PAIRS, TOO_FEW_TO_ESTIMATE, sample_size};
 use super::model::{MetricRow, Report};
 use mocban_core::domain::{MetricOutcome, ThresholdMetric};
 use mocban_results::number_format::{format_count, format_p, joined};
@@ -95,14 +95,15 @@ fn significance(report: &Report) -> String {
         "Every"
     };
     format!(
-        "By {}, {}. {others} tested difference is significant (McNemar's exact test, Holm's correction).",
+        "By {}, {} {others} tested difference is significant (McNemar's exact test, Holm's correction).",
         basis.title(),
         better_than(&significant)
     )
 }
 
-/// Returns which metrics are right more often than others, such as `Ensemble (p = 0.016) and Relief (p = 0.003) are right
-/// significantly more often than Pixel density`. Metrics that are better than the same other metric are joined.
+/// Returns sentences on which metrics are right more often than others, such as `Ensemble (p = 0.016) and Relief (p =
+/// 0.003) are right significantly more often than Pixel density.` A sentence names at most two metrics that are better than
+/// the same other metric.
 fn better_than(significant: &[&Comparison]) -> String {
     let mut groups: Vec<(ThresholdMetric, Vec<String>)> = Vec::new();
     for found in significant {
@@ -114,22 +115,23 @@ fn better_than(significant: &[&Comparison]) -> String {
         };
         let p = format_p(found.p_holm.unwrap_or_default());
         let text = format!("{} ({p})", better.title());
-        match groups.iter_mut().find(|(other, _)| *other == worse) {
+        let mut open = groups.iter_mut().filter(|(_, names)| names.len() < 2);
+        match open.find(|(other, _)| *other == worse) {
             Some((_, names)) => names.push(text),
             None => groups.push((worse, vec![text])),
         }
     }
-    let clauses: Vec<String> = (groups.iter().enumerate())
-        .map(|(i, (worse, names))| {
-            let verb = match (i, names.len()) {
-                (0, 1) => " is right significantly more often",
-                (0, _) => " are right significantly more often",
-                _ => "",
-            };
-            format!("{}{verb} than {}", joined(names), worse.title())
+    let sentences: Vec<String> = (groups.iter())
+        .map(|(worse, names)| {
+            let verb = if names.len() == 1 { "is" } else { "are" };
+            format!(
+                "{} {verb} right significantly more often than {}.",
+                joined(names),
+                worse.title()
+            )
         })
         .collect();
-    joined(&clauses)
+    sentences.join(" ")
 }
 
 /// Returns the sentence on a basis without a significant difference, with the number of pairs that would show one.
@@ -145,12 +147,10 @@ fn no_difference(basis: Basis, family: &[&Comparison]) -> String {
         .iter()
         .filter(|found| found.pairs_needed > Some(found.n));
     let needed = match larger.min_by_key(|found| found.pairs_needed) {
-        Some(found) => format!(
-            "To show one between {} and {}, {} {} would be needed (80 % power, 5 % level).",
-            found.a.title(),
-            found.b.title(),
-            about(found.pairs_needed.unwrap_or_default()),
-            basis.pairs()
+        Some(found) => sample_size(
+            basis,
+            (found.a, found.b),
+            found.pairs_needed.unwrap_or_default(),
         ),
         None if family.iter().any(|found| found.pairs_needed.is_some()) => {
             "More pairs would be needed to show one after the correction.".to_owned()
@@ -199,6 +199,7 @@ fn without_basis(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::headline;
+    use crate::test_fixtures::long_sentences;
     use crate::{Report, ReportAccumulator, test_fixtures};
     use mocban_catalog::PairResults;
     use mocban_core::domain::ThresholdMetric::{Density, Ensemble};
@@ -321,6 +322,23 @@ mod tests {
     }
 
     #[test]
+    fn three_better_metrics_have_two_sentences() {
+        let found = judged(60, |i, metric| match metric {
+            Ensemble if i < 14 => Fail,
+            _ if i == 59 => Fail,
+            _ => Pass,
+        });
+        let text = &found.headline[2];
+        assert_eq!(
+            text.matches(" right significantly more often than Ensemble.")
+                .count(),
+            2,
+            "{text}"
+        );
+        assert_eq!(long_sentences(text), Vec::<String>::new());
+    }
+
+    #[test]
     fn without_significance_the_number_of_pairs_is_estimated() {
         let found = judged(60, |i, metric| match metric {
             Ensemble if i < 3 => Fail,
@@ -330,8 +348,8 @@ mod tests {
         assert_eq!(
             found.headline[2],
             "No difference between metrics is significant by verdicts (smallest p = 1.000 after Holm's correction). To \
-             show one between Ensemble and Non-luminous SSIM, about 160 judged pairs would be needed (80 % power, 5 % \
-             level)."
+             show one between Ensemble and Non-luminous SSIM, about 160 judged pairs would be needed. This assumes 80 % \
+             power and a 5 % level."
         );
     }
 

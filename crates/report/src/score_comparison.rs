@@ -111,8 +111,8 @@ impl ScoreComparison {
     }
 }
 
-/// Returns one sentence for every two compared metrics. Scores with the same conclusion are listed together, as in
-/// `Ensemble v. Relief: Ensemble is significantly higher (SSIM, IoU); no significant difference (Dice).`
+/// Returns one text for every two compared metrics. Scores with the same conclusion are listed together, as in
+/// `Ensemble v. Relief: Ensemble is significantly higher (SSIM, IoU). No significant difference (Dice).`
 pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
     let mut compared: Vec<(ThresholdMetric, ThresholdMetric)> = Vec::new();
     for one in found {
@@ -120,7 +120,7 @@ pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
             compared.push((one.a, one.b));
         }
     }
-    let sentence = |(a, b): (ThresholdMetric, ThresholdMetric)| {
+    let sentences = |(a, b): (ThresholdMetric, ThresholdMetric)| {
         let mut scores_by_conclusion: Vec<(&str, Vec<&str>)> = Vec::new();
         for one in found.iter().filter(|one| (one.a, one.b) == (a, b)) {
             let mut known = scores_by_conclusion.iter_mut();
@@ -129,13 +129,24 @@ pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
                 None => scores_by_conclusion.push((&one.conclusion, vec![one.score.title()])),
             }
         }
-        let parts: Vec<String> = scores_by_conclusion
-            .iter()
-            .map(|(conclusion, scores)| format!("{conclusion} ({})", scores.join(", ")))
-            .collect();
-        format!("{}: {}.", versus(a, b), parts.join("; "))
+        let parts = scores_by_conclusion.iter().enumerate();
+        let parts = parts.map(|(i, (conclusion, scores))| {
+            let scores = scores.join(", ");
+            match i {
+                0 => format!("{}: {conclusion} ({scores}).", versus(a, b)),
+                _ => format!(" {} ({scores}).", capitalized(conclusion)),
+            }
+        });
+        parts.collect::<String>()
     };
-    compared.into_iter().map(sentence).collect()
+    compared.into_iter().map(sentences).collect()
+}
+
+/// Returns a text whose first letter is a capital.
+fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|first| first.to_ascii_uppercase());
+    first.into_iter().chain(letters).collect()
 }
 
 #[cfg(test)]
@@ -195,7 +206,7 @@ mod tests {
         assert_eq!(
             conclusions(&found),
             [
-                "Ensemble v. Pixel density: Ensemble is significantly higher (SSIM, Dice); no significant difference \
+                "Ensemble v. Pixel density: Ensemble is significantly higher (SSIM, Dice). No significant difference \
                  (IoU)."
             ]
         );

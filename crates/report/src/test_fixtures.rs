@@ -44,6 +44,21 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> MetricRow {
     }
 }
 
+/// Returns the sentences of a text that have more than 20 words. A word holds a letter or a digit. The `v.` between two
+/// compared metrics ends no sentence.
+pub(crate) fn long_sentences(text: &str) -> Vec<String> {
+    let text = text.replace(" v. ", " v ");
+    let sentences = text.split(". ").flat_map(str::lines);
+    let count = |sentence: &&str| {
+        let words = sentence.split_whitespace();
+        words
+            .filter(|word| word.chars().any(char::is_alphanumeric))
+            .count()
+    };
+    let long = sentences.filter(|sentence| count(sentence) > 20);
+    long.map(str::to_owned).collect()
+}
+
 /// Returns the boxes of a block with four characters, of which the page shows three whole. Without labels, one of them was
 /// found well, one roughly and one not at all.
 pub(crate) fn block_boxes(name: &str, is_found: bool) -> BlockBoxes {

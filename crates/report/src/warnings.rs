@@ -56,7 +56,7 @@ fn missed_checks(rates: &AttentionCheckRates) -> impl Iterator<Item = String> {
     rates.inattentive().into_iter().map(|(reviewer, rate)| {
         let [noticed, n] = [rate.count, rate.n].map(format_count);
         format!(
-            "{} noticed {noticed} of {n} attention checks. Let another person judge the same results, or let this one \
+            "{} noticed {noticed} of {n} attention checks. Let another person judge the same results. Or let this one \
              practise (key ? on the review page) and judge again.",
             sanitize(reviewer, 60)
         )
@@ -66,16 +66,16 @@ fn missed_checks(rates: &AttentionCheckRates) -> impl Iterator<Item = String> {
 fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {
     let why = match skipped {
         BootstrapSkipped::TooMany(by) => format!(
-            "there are more than {} {}, and sampling error is negligible",
+            "There are more than {} {}, and sampling error is negligible.",
             format_count(MAX_UNITS as u64),
             by.plural()
         ),
         BootstrapSkipped::TooFew { units, by } => format!(
-            "an interval needs at least {MIN_UNITS} {}; here: {units}",
+            "An interval needs at least {MIN_UNITS} {}, and there are {units}.",
             by.plural()
         ),
     };
-    format!("Means have no intervals, and metrics are not compared by score, because {why}.")
+    format!("Means have no intervals, and metrics are not compared by score. {why}")
 }
 
 fn missing_pairs(progress: PairProgress) -> Option<String> {
@@ -98,7 +98,7 @@ fn impossible_dice(row: &MetricRow) -> Option<String> {
         [iou, bound, dice].map(|score| format_number(score, Score));
     (dice > bound + ROUNDING).then(|| {
         format!(
-            "{}: a mean Dice of {shown_dice} is above {shown_bound}, the most that a mean IoU of {iou} allows; the two \
+            "{}: a mean Dice of {shown_dice} is above {shown_bound}, the most that a mean IoU of {iou} allows. The two \
              cannot be of the same masks.",
             row.metric.title()
         )
@@ -160,12 +160,16 @@ fn unusable_truth(truth: &TruthProblems) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{bootstrap_skipped, impossible_dice, missing_pairs, qualified_results};
+    use super::{
+        TruthProblems, bootstrap_skipped, impossible_dice, missing_pairs, qualified_results,
+        warnings,
+    };
     use crate::model::PairProgress;
     use crate::score_bootstrap::BootstrapSkipped;
-    use crate::test_fixtures;
+    use crate::test_fixtures::{self, long_sentences};
     use mocban_core::domain::ThresholdMetric;
-    use mocban_results::stats::ResamplingUnit;
+    use mocban_results::AttentionCheckRates;
+    use mocban_results::stats::{Rate, ResamplingUnit};
 
     #[test]
     fn the_reason_for_no_bootstrap_is_given() {
@@ -174,14 +178,48 @@ mod tests {
             by: ResamplingUnit::Block,
         });
         assert!(
-            few.ends_with("because an interval needs at least 10 blocks; here: 5."),
+            few.ends_with(" An interval needs at least 10 blocks, and there are 5."),
             "{few}"
         );
         let many = bootstrap_skipped(BootstrapSkipped::TooMany(ResamplingUnit::Block));
         assert!(
-            many.contains("there are more than 100,000 blocks"),
+            many.contains(" There are more than 100,000 blocks"),
             "{many}"
         );
+    }
+
+    #[test]
+    fn every_warning_has_sentences_of_at_most_20_words() {
+        let mut row = crate::MetricRow {
+            stale: 10_000,
+            conflicts: 10_000,
+            ..test_fixtures::row(ThresholdMetric::NlSsim, 0.708, 0.870)
+        };
+        row.n = 100_000;
+        let truth = TruthProblems {
+            count: 2,
+            first: Some("a: the mask is missing".to_owned()),
+        };
+        let checks = AttentionCheckRates {
+            by_reviewer: [("nguyen lan".to_owned(), Rate::new(1, 5))].into(),
+            ..AttentionCheckRates::default()
+        };
+        let progress = PairProgress {
+            done: 1000,
+            failed: 1000,
+            pending: 1000,
+        };
+        let by = ResamplingUnit::Block;
+        for skipped in [
+            BootstrapSkipped::TooMany(by),
+            BootstrapSkipped::TooFew { units: 5, by },
+        ] {
+            let row = row.clone();
+            let found = warnings(progress, &[row], &truth, Some(skipped), Some(&checks));
+            assert_eq!(found.len(), 7, "{found:?}");
+            let long: Vec<String> = found.iter().flat_map(|text| long_sentences(text)).collect();
+            assert_eq!(long, Vec::<String>::new());
+        }
     }
 
     #[test]

@@ -23,6 +23,23 @@ pub struct RunPlan {
     pub blocks: Vec<BlockPlanEntry>,
 }
 
+/// Returns whether a run would compute pairs with another method than before, and so replace their results.
+///
+/// # Errors
+/// Returns an error if a named pair or block does not exist, or the catalog cannot be read.
+pub async fn changes_method(
+    catalog: &Catalog,
+    settings: &Settings,
+    options: &RunOptions,
+) -> Result<bool, RunError> {
+    let selection = RunSelection::of(catalog, options.only.as_ref()).await?;
+    let pairs = selection.as_ref().map(|selection| &selection.pairs);
+    let planned = catalog
+        .plan(&fingerprints(settings), pairs, options.rerun)
+        .await?;
+    Ok(planned.changes_method())
+}
+
 /// Returns what `run` would do, for `--dry-run`. Stores in the catalog which input files have changed. A read-only catalog
 /// cannot take this, so the plan is then one without these changes.
 ///

@@ -168,10 +168,16 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     };
     waits.abort();
     catalog.stop_waiting();
+    let is_finished =
+        kept == 0 && tokio::time::timeout(CLOSE, pages.is_finished()).await == Ok(true);
     let limit = if kept == 0 { CLOSE } else { AFTER_SILENCE };
     close_within(catalog, &stop, limit).await;
     signals.abort();
     context.info(closing_line(kept == 0));
+    if !is_finished {
+        let reviewer = shell_quoted(&args.reviewer);
+        context.next(&queue_options(&args).to_continue(&reviewer));
+    }
     context.next("report");
     if !args.adjudicate {
         let command = context.command(&queue_options(&args).for_another_reviewer());
@@ -299,7 +305,7 @@ fn user_name() -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{QueueCounts, order, percent, progress, review_command};
+    use super::{CheckRates, QueueCounts, order, percent, progress, review_command};
     use mocban_config::{Sources, load};
     use mocban_core::domain::ReviewOrder;
     use mocban_pages::review::key_map;
@@ -332,7 +338,13 @@ mod tests {
 
     #[test]
     fn percentages_and_orders_are_parsed() {
-        assert_eq!(percent("4"), Ok(0.04));
+        let plain = CheckRates::default();
+        assert_eq!(percent("4"), Ok(plain.faults), "the default of the option");
+        assert_eq!(
+            percent("5"),
+            Ok(plain.duplicates),
+            "the default of the option"
+        );
         assert_eq!(percent("12.5%"), Ok(0.125));
         assert!(percent("101").is_err() && percent("-1").is_err() && percent("NaN").is_err());
         assert_eq!(order("least-confident"), Ok(ReviewOrder::LeastConfident));

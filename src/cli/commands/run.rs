@@ -12,7 +12,7 @@ use crate::cli::output::terminal::Terminal;
 use mocban_catalog::RerunPolicy;
 use mocban_config::Config;
 use mocban_core::domain::Stage;
-use mocban_project::run::{self, PreparedRun, RunOutcome};
+use mocban_project::run::{self, PreparedRun, RunOutcome, TWO_METHODS};
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{RunOptions, RunPart, RunPlan, RunSummary, Stop};
 
@@ -169,9 +169,7 @@ fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> ProjectResult
         plan_text(plan, running) + &block_plan_text(blocks)
     })?;
     if plan.changes_method() {
-        context.info(
-            "the results of the other method would be replaced; to keep both, import the pairs into a second project, and compare the two with `report --compare`",
-        );
+        context.info(TWO_METHODS);
     }
     if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
         context.next("run");

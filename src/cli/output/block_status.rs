@@ -44,17 +44,9 @@ pub(crate) fn blocks_line(blocks: &BlockStatus, is_running: bool, palette: Palet
 
 /// Returns the stages of the blocks that a process works on or left, such as `b04 at align`.
 fn running_stages(blocks: &BlockStatus) -> Option<String> {
-    let leased = blocks
-        .0
-        .iter()
-        .filter(|state| state.status == JobStatus::Leased);
-    let stages = leased.filter_map(|state| {
-        let stage = state.next_stage?;
-        Some(format!(
-            "{} at {stage}",
-            one_line(state.attributes.name.as_str())
-        ))
-    });
+    let in_progress = blocks.in_progress();
+    let stages =
+        in_progress.map(|(block, stage)| format!("{} at {stage}", one_line(block.as_str())));
     let stages: Vec<String> = stages.take(NAME_LIMIT).collect();
     (!stages.is_empty()).then(|| stages.join(", "))
 }

@@ -1,12 +1,15 @@
 //! Runs as processes of their own, which go on when the app ends, and their stop.
 
 use std::ffi::OsStr;
+use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use super::failure::{AppFailure, AppResult};
+use super::sentence::{Sentence, without_commands};
+use super::state::AppState;
 use mocban_catalog::{Catalog, WorkerRecord, WorkerState};
 use mocban_project::ExitCode;
 use mocban_project::location::now;
@@ -19,16 +22,22 @@ const RECENT_MS: i64 = 3_600_000;
 /// Most bytes of the messages of a run that are shown.
 const MESSAGE_BYTES: u64 = 4096;
 
-/// Starts `run` for a project with more arguments. Returns once it works, or has ended at once without an error.
+/// Starts `run` for a project with more arguments. Returns once it works, or has ended at once without an error. The state
+/// keeps the reason of a later failure.
 ///
 /// # Errors
 /// Returns the last message of a run that ended with an error at its beginning.
-pub(super) async fn start(program: &Path, dir: &Path, args: &[String]) -> AppResult<()> {
-    let failed =
-        |error: std::io::Error| AppFailure::refused(format!("the run cannot start: {error}"));
+pub(super) async fn start(state: &AppState, dir: &Path, args: &[String]) -> AppResult<()> {
+    let failed = |error: std::io::Error| {
+        AppFailure::refused(Sentence::new(
+            format!("the run cannot start: {error}"),
+            format!("không bắt đầu chạy được: {error}"),
+        ))
+    };
+    state.failed_runs.set(dir, None);
     // The file has no name, so nothing stays if the app is killed.
-    let mut messages = tempfile::tempfile().map_err(failed)?;
-    let mut command = Command::new(program);
+    let messages = tempfile::tempfile().map_err(failed)?;
+    let mut command = Command::new(&state.options.program);
     command
         .arg("-C")
         .arg(dir)
@@ -39,25 +48,62 @@ pub(super) async fn start(program: &Path, dir: &Path, args: &[String]) -> AppRes
         .stderr(messages.try_clone().map_err(failed)?);
     platform::detach(&mut command);
     let mut child = command.spawn().map_err(failed)?;
-    let (ended, ends) = tokio::sync::oneshot::channel();
+    let (ended, mut ends) = tokio::sync::oneshot::channel();
     // Waits for the process, so that it does not stay as a zombie.
     std::thread::spawn(move || {
         if let Ok(status) = child.wait() {
             let _ = ended.send(status);
         }
     });
-    let Ok(Ok(status)) = tokio::time::timeout(WATCHED, ends).await else {
-        return Ok(());
-    };
-    if is_success(status) {
-        return Ok(());
+    match tokio::time::timeout(WATCHED, &mut ends).await {
+        Ok(Ok(status)) => {
+            failure(status, messages).map_or(Ok(()), |why| Err(AppFailure::refused(why)))
+        }
+        Ok(Err(_)) => Ok(()),
+        Err(_) => {
+            let (runs, dir) = (state.failed_runs.clone(), dir.to_owned());
+            tokio::spawn(async move {
+                if let Ok(status) = ends.await {
+                    runs.set(&dir, failure(status, messages));
+                }
+            });
+            Ok(())
+        }
     }
-    let mut text = String::new();
-    let read = messages
-        .seek(SeekFrom::Start(0))
-        .and_then(|_| messages.take(MESSAGE_BYTES).read_to_string(&mut text));
-    read.map_err(failed)?;
-    Err(AppFailure::refused(last_error(&text)))
+}
+
+/// Returns why a run failed, or `None` if it did its work or was asked to stop.
+fn failure(status: ExitStatus, messages: File) -> Option<Sentence> {
+    if is_success(status) || status.code() == Some(ExitCode::Stopped as i32) {
+        return None;
+    }
+    if status.code().is_none() {
+        return Some(Sentence::new(
+            format!("The run ended before its work was done ({status}). Press Align to go on."),
+            format!(
+                "Lần chạy kết thúc trước khi làm xong ({status}). Hãy bấm Căn chỉnh để chạy tiếp."
+            ),
+        ));
+    }
+    let text = last_bytes(messages).unwrap_or_default();
+    Some(why(&last_error(&String::from_utf8_lossy(&text))))
+}
+
+fn why(message: &str) -> Sentence {
+    let plain = without_commands(message);
+    Sentence::new(
+        format!("The run failed: {plain}"),
+        format!("Lần chạy bị lỗi: {plain}"),
+    )
+}
+
+/// Reads the end of the messages of a run.
+fn last_bytes(mut messages: File) -> std::io::Result<Vec<u8>> {
+    let length = messages.metadata()?.len();
+    messages.seek(SeekFrom::Start(length.saturating_sub(MESSAGE_BYTES)))?;
+    let mut bytes = Vec::new();
+    messages.take(MESSAGE_BYTES).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// Runs a command to its end.
@@ -71,14 +117,20 @@ pub(super) async fn finish(program: &Path, args: &[&OsStr]) -> AppResult<()> {
         .args(args);
     command.stdin(Stdio::null());
     let ended = tokio::task::spawn_blocking(move || command.output()).await;
-    let failed = |error: String| AppFailure::refused(format!("the command cannot start: {error}"));
+    let failed = |error: String| {
+        AppFailure::refused(Sentence::new(
+            format!("the program cannot start: {error}"),
+            format!("không khởi động được chương trình: {error}"),
+        ))
+    };
     let output = ended.map_err(|error| failed(error.to_string()))?;
     let output = output.map_err(|error| failed(error.to_string()))?;
     if is_success(output.status) {
         return Ok(());
     }
-    Err(AppFailure::refused(last_error(&String::from_utf8_lossy(
-        &output.stderr,
+    let text = String::from_utf8_lossy(&output.stderr);
+    Err(AppFailure::refused(Sentence::of_program(&last_error(
+        &text,
     ))))
 }
 
@@ -90,14 +142,13 @@ fn is_success(status: ExitStatus) -> bool {
         .is_some_and(|code| codes.iter().any(|known| *known as i32 == code))
 }
 
-/// Returns the error in the messages of a command.
+/// Returns the last error in the messages of a command, or else its last message.
 fn last_error(text: &str) -> String {
-    let lines = text.lines().map(|line| line.trim_start_matches("error: "));
-    let mut lines = lines.filter(|line| !line.starts_with("next:") && !line.is_empty());
-    lines
-        .next_back()
-        .unwrap_or("the run ended without a message")
-        .to_owned()
+    let is_message = |line: &&str| !line.starts_with("next:") && !line.is_empty();
+    let mut errors = text.lines().filter_map(|line| line.strip_prefix("error: "));
+    let last = errors.next_back();
+    let last = last.or_else(|| text.lines().rfind(is_message));
+    last.unwrap_or("the run ended without a message").to_owned()
 }
 
 /// Returns the workers that work on a project now.
@@ -132,19 +183,32 @@ pub(super) async fn stop(catalog: &Catalog) -> AppResult<()> {
         return Ok(());
     }
     Err(AppFailure::refused(match workers.first() {
-        Some(worker) => format!("the run is on the computer {}: stop it there", worker.host),
-        None => "no run works on this project".to_owned(),
+        Some(WorkerRecord { host, .. }) => Sentence::new(
+            format!("the run is on the computer {host}: stop it there"),
+            format!("lần chạy ở trên máy {host}: hãy dừng nó ở đó"),
+        ),
+        None => Sentence::new(
+            "no run works on this project",
+            "không có lần chạy nào trên dự án này",
+        ),
     }))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::last_error;
+    use super::{last_error, why};
+    use crate::review::Language;
 
     #[test]
     fn the_error_of_a_run_is_shown_without_its_advice() {
+        let failed = why("no catalog at p; `mocban import` creates it");
+        let text = failed.text(Language::Vietnamese);
+        assert_eq!(text, "Lần chạy bị lỗi: no catalog at p");
         let text = "warning: x\nerror: the project is in use by process 7\nnext: mocban status\n";
         assert_eq!(last_error(text), "the project is in use by process 7");
+        let later = "error: no file a.stl\n2 pairs failed:\n  a  fit\nnext: mocban status\n";
+        assert_eq!(last_error(later), "no file a.stl");
+        assert_eq!(last_error("panicked at x\n"), "panicked at x");
         assert_eq!(last_error(""), "the run ended without a message");
     }
 }

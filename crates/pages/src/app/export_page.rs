@@ -15,6 +15,7 @@ use super::action_body::ActionBody;
 use super::address::encoded;
 use super::components::{NavSection, action_form, choice, frame};
 use super::failure::{AppFailure, AppResult};
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
 use super::tasks::{TaskKind, TaskLines};
@@ -222,7 +223,7 @@ pub(super) async fn start(
     let only: ResultFilter = body
         .only
         .parse()
-        .map_err(|text: String| AppFailure::refused(text))?;
+        .map_err(|text: String| AppFailure::refused(Sentence::of_program(&text)))?;
     let metric = body.metric.parse::<ThresholdMetric>().ok();
     let work = move |location| run(purpose, only, metric, location);
     state.tasks.start(TaskKind::Export, &open, work)?;

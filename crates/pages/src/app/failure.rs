@@ -5,7 +5,9 @@ use std::path::Path;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 
+use super::sentence::Sentence;
 use crate::local_server::WorkFailed;
+use crate::review::Language;
 use mocban_catalog::CatalogError;
 use mocban_core::domain::ErrorCode;
 use mocban_project::ProjectError;
@@ -17,8 +19,8 @@ pub(super) type AppResult<T> = Result<T, AppFailure>;
 #[derive(Debug, Clone)]
 pub(super) struct AppFailure {
     status: StatusCode,
-    /// One sentence. Empty if there is no such page.
-    text: String,
+    /// What failed. `None` if there is no such page.
+    sentence: Option<Sentence>,
 }
 
 impl AppFailure {
@@ -26,15 +28,15 @@ impl AppFailure {
     pub(super) const fn not_found() -> Self {
         Self {
             status: StatusCode::NOT_FOUND,
-            text: String::new(),
+            sentence: None,
         }
     }
 
     /// A request that cannot be done as asked.
-    pub(super) fn refused(text: impl Into<String>) -> Self {
+    pub(super) const fn refused(sentence: Sentence) -> Self {
         Self {
             status: StatusCode::UNPROCESSABLE_ENTITY,
-            text: text.into(),
+            sentence: Some(sentence),
         }
     }
 
@@ -49,20 +51,22 @@ impl AppFailure {
         };
         Self {
             status,
-            text: error.text(dir),
+            sentence: Some(Sentence::of_error(&error, dir)),
         }
     }
-}
 
-impl AppFailure {
     /// Returns the status of the response.
     pub(super) const fn status(&self) -> StatusCode {
         self.status
     }
 
-    /// Returns what failed. Empty if there is no such page.
-    pub(super) fn text(self) -> String {
-        self.text
+    /// Returns what failed.
+    pub(super) fn text(&self, language: Language) -> &str {
+        match (&self.sentence, language) {
+            (Some(sentence), _) => sentence.text(language),
+            (None, Language::English) => "There is no such page.",
+            (None, Language::Vietnamese) => "Không có trang này.",
+        }
     }
 }
 
@@ -82,7 +86,7 @@ impl From<WorkFailed> for AppFailure {
     fn from(error: WorkFailed) -> Self {
         Self {
             status: StatusCode::INTERNAL_SERVER_ERROR,
-            text: error.to_string(),
+            sentence: Some(Sentence::of_program(&error.to_string())),
         }
     }
 }

@@ -28,12 +28,7 @@ pub(super) async fn explain(
     let Some(failure) = response.extensions().get::<AppFailure>().cloned() else {
         return response;
     };
-    let (status, text) = (failure.status(), failure.text());
-    let text = if text.is_empty() {
-        visit.t("There is no such page.", "Không có trang này.")
-    } else {
-        &text
-    };
+    let (status, text) = (failure.status(), failure.text(visit.language));
     if !is_page {
         return (status, Json(json!({ "error": text }))).into_response();
     }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::failure::{AppFailure, AppResult};
+use super::sentence::Sentence;
 use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
 
 /// Most entries of all folders that are counted for one page.
@@ -75,13 +76,22 @@ impl PickerRoots {
     pub(super) fn allowed(&self, path: &Path) -> AppResult<PathBuf> {
         let shown = path.display();
         let whole = path.canonicalize();
-        let whole =
-            whole.map_err(|_invalid| AppFailure::refused(format!("{shown} cannot be opened")))?;
+        let whole = whole.map_err(|_invalid| {
+            AppFailure::refused(Sentence::new(
+                format!("{shown} cannot be opened"),
+                format!("không mở được {shown}"),
+            ))
+        })?;
         if self.has(&whole) {
             return Ok(whole);
         }
-        Err(AppFailure::refused(format!(
-            "{shown} is outside your folders and disks; move or copy the files to one of them"
+        Err(AppFailure::refused(Sentence::new(
+            format!(
+                "{shown} is outside your folders and disks; move or copy the files to one of them"
+            ),
+            format!(
+                "{shown} nằm ngoài các thư mục và ổ đĩa của bạn; hãy chuyển hoặc chép các tệp vào đó"
+            ),
         )))
     }
 
@@ -96,7 +106,12 @@ impl PickerRoots {
     pub(super) fn read(&self, path: &Path) -> AppResult<PickedFolder> {
         let path = self.allowed(path)?;
         let shown = path.display().to_string();
-        let failed = |error| AppFailure::refused(format!("{shown} cannot be read: {error}"));
+        let failed = |error: std::io::Error| {
+            AppFailure::refused(Sentence::new(
+                format!("{shown} cannot be read: {error}"),
+                format!("không đọc được {shown}: {error}"),
+            ))
+        };
         let mut budget = COUNTED;
         let (mut folders, mut lists) = (Vec::new(), Vec::new());
         let mut counts = FileCounts::default();

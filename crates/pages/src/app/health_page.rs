@@ -6,8 +6,10 @@ use axum::Json;
 use axum::extract::{Path, State};
 use axum::response::{Html, Response};
 use maud::html;
+use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::action_body::ActionBody;
 use super::components::{NavSection, action_form, frame};
 use super::export_page::{attachment, size};
 use super::failure::{AppFailure, AppResult};
@@ -21,7 +23,7 @@ use mocban_project::ProjectResult;
 use mocban_project::backup::backup;
 use mocban_project::check::check;
 use mocban_project::location::Location;
-use mocban_runner::check::CheckOptions;
+use mocban_runner::check::{CheckOptions, Kind};
 use mocban_system::platform;
 
 /// Path of the backup in a project.
@@ -48,7 +50,10 @@ pub(super) async fn page(
             section.card {
                 h2 { (visit.t("Check", "Kiểm tra")) }
                 p { (visit.t("Reads every file of results and compares it with the catalog. Nothing is changed, and a run may go on.", "Đọc mọi tệp kết quả và so với danh mục. Không thay đổi gì, và vẫn có thể chạy.")) }
-                (action_form("actions/check", "inline", &html! { button.primary #check { (visit.t("Check now", "Kiểm tra ngay")) } }))
+                (action_form("actions/check", "inline", &html! {
+                    button.primary #check name="what" value="check" { (visit.t("Check now", "Kiểm tra ngay")) }
+                    button #repair name="what" value="repair" data-confirm=(visit.t("Mend what can be mended? Damaged results are computed again by the next run.", "Sửa những gì sửa được? Kết quả bị hỏng sẽ được tính lại trong lần chạy sau.")) { (visit.t("Repair", "Sửa chữa")) }
+                }))
                 (task_part(&visit, checked.as_ref()))
             }
             section.card {
@@ -72,33 +77,55 @@ pub(super) async fn page(
 pub(super) async fn start_check(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
+    ActionBody(body): ActionBody<CheckBody>,
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
-    state.tasks.start(TaskKind::Check, &open, check_lines)?;
+    let repair = body.what == "repair";
+    let work = move |location| check_lines(location, repair);
+    state.tasks.start(TaskKind::Check, &open, work)?;
     Ok(Json(json!({ "reload": true })))
 }
 
-async fn check_lines(location: Location) -> ProjectResult<TaskLines> {
-    let summary = check(CheckOptions::default(), &location, &()).await?;
+/// The field of the form that starts a check.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CheckBody {
+    /// `check` or `repair`.
+    #[serde(default)]
+    what: String,
+}
+
+async fn check_lines(location: Location, repair: bool) -> ProjectResult<TaskLines> {
+    let options = CheckOptions {
+        repair,
+        ..CheckOptions::default()
+    };
+    let summary = check(options, &location, &()).await?;
     let (pairs, files) = (summary.pairs, summary.files);
-    let mut lines = vec![if summary.left() == 0 {
-        [
-            format!("{pairs} pairs and {files} files were checked, and all are sound."),
-            format!("Đã kiểm tra {pairs} cặp và {files} tệp, tất cả đều tốt."),
-        ]
-    } else {
-        [
-            format!(
-                "{pairs} pairs and {files} files were checked. Damage was found; `mocban check --repair` mends what can be mended:"
-            ),
-            format!(
-                "Đã kiểm tra {pairs} cặp và {files} tệp. Có hư hỏng; `mocban check --repair` sửa những gì sửa được:"
-            ),
-        ]
-    }];
+    let (english, vietnamese) = match (summary.found(), summary.left()) {
+        (0, _) => ("All are sound.", "Tất cả đều tốt."),
+        (_, 0) => (
+            "All damage was mended. Press Align on the page Run to compute missing results again. The damage was:",
+            "Mọi hư hỏng đã được sửa. Hãy bấm Căn chỉnh ở trang Căn chỉnh để tính lại kết quả bị thiếu. Các hư hỏng là:",
+        ),
+        _ if repair => (
+            "Some damage cannot be mended: put your last backup in place of the catalog. The damage was:",
+            "Có hư hỏng không sửa được: hãy thay danh mục bằng bản sao lưu gần nhất. Các hư hỏng là:",
+        ),
+        _ => (
+            "Damage was found. Press Repair to mend what can be mended:",
+            "Có hư hỏng. Hãy bấm Sửa chữa để sửa những gì sửa được:",
+        ),
+    };
+    let mut lines = vec![[
+        format!("{pairs} pairs and {files} files were checked. {english}"),
+        format!("Đã kiểm tra {pairs} cặp và {files} tệp. {vietnamese}"),
+    ]];
     for (kind, found) in &summary.damage {
-        let line = format!("{}: {}", kind.heading(), found.found);
-        lines.push([line.clone(), line]);
+        let number = found.found;
+        lines.push(
+            [kind.heading(), vietnamese_heading(*kind)].map(|what| format!("{what}: {number}")),
+        );
     }
     for (what, notes) in [
         (
@@ -126,6 +153,26 @@ async fn check_lines(location: Location) -> ProjectResult<TaskLines> {
         }
     }
     Ok(lines)
+}
+
+/// Returns the label of a number of findings of a kind in Vietnamese.
+const fn vietnamese_heading(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Database => "lỗi của cơ sở dữ liệu",
+        Kind::Schema => "bảng, chỉ mục hoặc trigger khác với lược đồ",
+        Kind::Row => "dòng hỏng mà không lần chạy nào tính lại được",
+        Kind::Fingerprint => "dấu vân tay khác với thiết lập",
+        Kind::Reference => "dòng trỏ đến dòng bị thiếu",
+        Kind::Counter => "số đếm sai",
+        Kind::JobMissing => "cặp không có việc",
+        Kind::ReasonMissing => "cặp lỗi không có lý do",
+        Kind::ResultMissing => "kết quả bị thiếu",
+        Kind::ResultChanged => "kết quả bị đổi",
+        Kind::Metrics => "cặp có số đo khác với kết quả",
+        Kind::FileMissing => "tệp bị thiếu",
+        Kind::FileChanged => "tệp bị đổi",
+        Kind::FileUnreadable => "tệp không đọc được",
+    }
 }
 
 /// Starts a backup.

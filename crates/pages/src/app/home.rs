@@ -22,7 +22,7 @@ use mocban_system::time_text::local;
 struct Overview {
     key: String,
     /// Counts and whether a run is active, or why they cannot be read.
-    state: Result<(StatusCounts, bool), String>,
+    state: Result<(StatusCounts, bool), AppFailure>,
     last_change: Option<i64>,
 }
 
@@ -64,7 +64,7 @@ pub(super) async fn page(
 async fn read(state: &AppState, key: String) -> Overview {
     let mut last_change = None;
     let counts = async {
-        let open = state.open(&key).await.map_err(AppFailure::text)?;
+        let open = state.open(&key).await?;
         last_change = open.catalog.last_activity().await.ok().flatten();
         let read = async {
             let settings = open.location().settings()?;
@@ -73,7 +73,7 @@ async fn read(state: &AppState, key: String) -> Overview {
             let counts = open.catalog.status(&fingerprints).await?;
             Ok::<_, mocban_project::ProjectError>((counts, running))
         };
-        read.await.map_err(|error| error.text(&open.dir))
+        read.await.map_err(|error| AppFailure::of(error, &open.dir))
     };
     let counts = counts.await;
     Overview {
@@ -108,7 +108,7 @@ fn card(visit: &Visit, project: &Overview) -> Markup {
         article.card {
             h2 { a href=(href) { (one_line(&project.key)) } }
             @match &project.state {
-                Err(text) => p.notice.bad { (text) },
+                Err(failure) => p.notice.bad { (failure.text(visit.language)) },
                 Ok((counts, running)) => {
                     (summary(visit, counts, *running))
                     @if let Some(time) = project.last_change {

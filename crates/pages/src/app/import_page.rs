@@ -17,6 +17,7 @@ use super::failure::{AppFailure, AppResult};
 use super::folder_picker::{FileCounts, PickedFolder, PickerRoots};
 use super::on_thread::on_thread;
 use super::projects::{find, is_project};
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::domain::{LengthUnit, one_line};
@@ -97,9 +98,10 @@ impl ImportChoice {
             return Ok(found.dir);
         }
         if is_project(folder) {
-            return Err(AppFailure::refused(
+            return Err(AppFailure::refused(Sentence::new(
                 "the folder of the app is a project itself: start the app in the folder above it for a new one",
-            ));
+                "thư mục của ứng dụng đã là một dự án: hãy mở ứng dụng ở thư mục bên trên để tạo dự án mới",
+            )));
         }
         let name = self.project.trim();
         let is_plain = !name.starts_with('.') && !name.contains(['/', '\\', ':']);
@@ -107,9 +109,14 @@ impl ImportChoice {
         if is_plain && is_short && !name.contains(char::is_control) {
             return Ok(folder.join(name));
         }
-        Err(AppFailure::refused(format!(
-            "{:?} cannot be the name of a project: give a name of at most {NAME_CHARS} characters without / and :",
-            self.project
+        let name = &self.project;
+        Err(AppFailure::refused(Sentence::new(
+            format!(
+                "{name:?} cannot be the name of a project: give a name of at most {NAME_CHARS} characters without / and :"
+            ),
+            format!(
+                "{name:?} không thể là tên dự án: hãy đặt tên tối đa {NAME_CHARS} ký tự, không có / và :"
+            ),
         )))
     }
 
@@ -148,13 +155,13 @@ pub(super) async fn page(
     let body = html! {
         (chosen_part(&visit, &chosen))
         @match planned {
-            Err(failure) => p.notice.bad role="alert" { (failure.text()) },
+            Err(failure) => p.notice.bad role="alert" { (failure.text(visit.language)) },
             Ok(None) => {},
             Ok(Some(planned)) => (plan_part(&visit, &chosen, &planned)),
         }
         h2 { (visit.t("Folders of this computer", "Thư mục trên máy này")) }
         @match picked {
-            Err(failure) => p.notice.bad role="alert" { (failure.text()) },
+            Err(failure) => p.notice.bad role="alert" { (failure.text(visit.language)) },
             Ok(picked) => (picker(&visit, &picked)),
         }
         (root_links(&visit, &roots))
@@ -360,7 +367,12 @@ pub(super) async fn import(
         let (chosen, folder) = (chosen.clone(), folder.clone());
         move || {
             let items = chosen.items(&PickerRoots::new(&folder))?;
-            let nothing = || AppFailure::refused("choose folders or a list first");
+            let nothing = || {
+                AppFailure::refused(Sentence::new(
+                    "choose folders or a list first",
+                    "trước hết hãy chọn thư mục hoặc danh sách",
+                ))
+            };
             Ok((items.ok_or_else(nothing)?, chosen.dir(&folder)?))
         }
     };

@@ -10,6 +10,8 @@ use super::components::{NavSection, empty, frame, grouped, number_table, score};
 use super::export_page::attachment;
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
+use super::report_sentences::{headline, limits};
+use super::sentence::without_commands;
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::domain::one_line;
@@ -73,7 +75,7 @@ pub(super) async fn numbers(
 
 fn numbers_part(visit: &Visit, report: &Report) -> Markup {
     html! {
-        @for sentence in &report.headline { p lang="en" { (without_commands(sentence)) } }
+        @for sentence in headline(visit, report) { p { (sentence) } }
         @if report.rows.iter().all(|row| row.n == 0) {
             (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! { a.button href="./" { (visit.t("Run", "Căn chỉnh")) } }))
         } @else {
@@ -84,26 +86,12 @@ fn numbers_part(visit: &Visit, report: &Report) -> Markup {
             )) }
         }
         (reasons(visit, report))
-        @if !report.warnings.is_empty() {
+        @let limits = limits(visit, report);
+        @if !limits.is_empty() {
             h2 { (visit.t("What limits these numbers", "Những giới hạn của các con số này")) }
-            ul lang="en" { @for warning in &report.warnings { li { (without_commands(warning)) } } }
+            ul { @for limit in limits { li { (limit) } } }
         }
     }
-}
-
-/// Returns a sentence without the remarks in brackets that name commands, which are buttons here.
-fn without_commands(sentence: &str) -> String {
-    let mut text = String::new();
-    let mut rest = sentence;
-    while let Some((before, after)) = rest.split_once(" (") {
-        let (inside, behind) = after.split_once(')').unwrap_or((after, ""));
-        text.push_str(before);
-        if !inside.contains('`') {
-            text.extend([" (", inside, ")"]);
-        }
-        rest = behind;
-    }
-    (text + rest).replace('`', "")
 }
 
 fn table(visit: &Visit, report: &Report) -> Markup {
@@ -160,7 +148,7 @@ fn reasons(visit: &Visit, report: &Report) -> Markup {
                 li {
                     a href={ "pairs?view=table&state=failed&class=" (group.class) } { (grouped(group.count)) }
                     " · " (visit.class(group.class))
-                    @if let Some(first) = group.pairs.first() { span.muted { " (" (one_line(&first.error)) ")" } }
+                    @if let Some(first) = group.pairs.first() { span.muted lang="en" { " (" (one_line(&without_commands(&first.error))) ")" } }
                 }
             } }
         }
@@ -186,19 +174,4 @@ pub(super) async fn download(
     let rendered = on_thread(async move || report(options, None, &location, &()).await).await;
     let rendered = rendered.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(attachment(&file, kind, rendered.text.into_bytes()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::without_commands;
-
-    #[test]
-    fn remarks_that_name_commands_are_left_out() {
-        let text = "There is no Acc (`mocban review --reviewer NAME` starts judging). 24 of 24 (86.2–100.0).";
-        assert_eq!(
-            without_commands(text),
-            "There is no Acc. 24 of 24 (86.2–100.0)."
-        );
-        assert_eq!(without_commands("plain `x`"), "plain x");
-    }
 }

@@ -17,6 +17,7 @@ use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
 use super::pass_on::pass_on;
 use super::projects::OpenProject;
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
@@ -31,11 +32,6 @@ use mocban_project::{ProjectResult, Refusal};
 
 /// Size of the sample that the page suggests.
 const SAMPLE: usize = 50;
-/// Share of results with a planted error, and of results that are shown twice, as in `review`.
-const RATES: CheckRates = CheckRates {
-    faults: 0.04,
-    duplicates: 0.05,
-};
 /// Shortest time that an image is shown before a verdict is accepted, as in `review`.
 const MIN_VIEW_MS: u64 = 250;
 
@@ -106,14 +102,14 @@ fn start_form(visit: &Visit) -> Markup {
 pub(super) async fn start(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
-    visit: Visit,
     ActionBody(body): ActionBody<StartBody>,
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
     let reviewer = reviewer_name(&body.reviewer);
-    let reviewer = reviewer.map_err(|error| AppFailure::refused(error.to_string()))?;
+    let reviewer =
+        reviewer.map_err(|error| AppFailure::refused(Sentence::of_program(&error.to_string())))?;
     if body.is_new.is_empty() {
-        refuse_similar(&open, &reviewer, &visit).await?;
+        refuse_similar(&open, &reviewer).await?;
     }
     let query = PageQuery::default()
         .with("metric", &body.metric)
@@ -128,7 +124,7 @@ pub(super) async fn start(
 }
 
 /// Refuses a new reviewer whose name looks like another.
-async fn refuse_similar(open: &OpenProject, reviewer: &str, visit: &Visit) -> AppResult<()> {
+async fn refuse_similar(open: &OpenProject, reviewer: &str) -> AppResult<()> {
     let rights = open.catalog.review_rights().await?;
     let names = BTreeSet::from([reviewer.to_owned()]);
     let similar = similar_names(&open.catalog, &rights, &names).await;
@@ -136,14 +132,14 @@ async fn refuse_similar(open: &OpenProject, reviewer: &str, visit: &Visit) -> Ap
     let Some((new, known)) = similar else {
         return Ok(());
     };
-    Err(AppFailure::refused(match visit.language {
-        Language::English => format!(
+    Err(AppFailure::refused(Sentence::new(
+        format!(
             "{known:?} and {new:?} are nearly the same name: if they are one person, write {known:?}, or else tick \"another person\""
         ),
-        Language::Vietnamese => format!(
+        format!(
             "{known:?} và {new:?} gần như cùng một tên: nếu là một người, hãy viết {known:?}, nếu không hãy chọn \"người khác\""
         ),
-    }))
+    )))
 }
 
 /// Passes a request on to the pages of a reviewer.
@@ -193,9 +189,15 @@ async fn open_review(
         .map_err(|error| AppFailure::of(error, &open.dir))?;
     if pages.counts().items == 0 {
         return Err(AppFailure::refused(if is_settling {
-            "no two reviewers disagree on a result of this metric"
+            Sentence::new(
+                "no two reviewers disagree on a result of this metric",
+                "không có hai người đánh giá nào bất đồng về kết quả của phương pháp này",
+            )
         } else {
-            "there is no result to judge yet; run the pairs first"
+            Sentence::new(
+                "there is no result to judge yet: press Align on the page Run first",
+                "chưa có kết quả nào để đánh giá: trước hết hãy bấm Căn chỉnh ở trang Căn chỉnh",
+            )
         }));
     }
     Ok(pages.routes())
@@ -233,7 +235,7 @@ async fn review_pages(
             order: query.parsed("order").unwrap_or(ReviewOrder::Random),
             seed: QueueOptions::DEFAULT_SEED,
             sample: query.parsed::<usize>("sample").filter(|sample| *sample > 0),
-            rates: RATES,
+            rates: CheckRates::default(),
         },
     };
     Ok(ReviewPages::open(catalog, project, options).await?)

@@ -14,6 +14,7 @@ use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
 use super::pair_query::PairQuery;
 use super::projects::{OpenProject, is_project};
+use super::sentence::Sentence;
 use super::state::AppState;
 use mocban_core::domain::{ErrorCode, FailureClass};
 use mocban_project::ProjectError;
@@ -67,9 +68,10 @@ pub(super) async fn run(
         let jobs = body.jobs.parse::<u16>().ok();
         let jobs = jobs.filter(|jobs| (1..=MAX_JOBS).contains(jobs));
         let jobs = jobs.ok_or_else(|| {
-            AppFailure::refused(format!(
-                "{} is not a number of pairs from 1 to {MAX_JOBS}",
-                body.jobs
+            let jobs = &body.jobs;
+            AppFailure::refused(Sentence::new(
+                format!("{jobs} is not a number of pairs from 1 to {MAX_JOBS}"),
+                format!("{jobs} không phải là số cặp từ 1 đến {MAX_JOBS}"),
             ))
         })?;
         args.extend(["-j".to_owned(), jobs.to_string()]);
@@ -77,7 +79,7 @@ pub(super) async fn run(
     if body.which == "failed" {
         args.extend(["--rerun".to_owned(), "failed".to_owned()]);
     }
-    child_run::start(&state.options.program, &open.dir, &args).await?;
+    child_run::start(&state, &open.dir, &args).await?;
     Ok(reload())
 }
 
@@ -85,7 +87,10 @@ pub(super) async fn run(
 pub(super) async fn demo(State(state): State<Arc<AppState>>) -> AppResult<Json<Value>> {
     let folder = &state.options.folder;
     if is_project(folder) {
-        return Err(AppFailure::refused("this folder is a project itself"));
+        return Err(AppFailure::refused(Sentence::new(
+            "this folder is a project itself",
+            "thư mục này đã là một dự án",
+        )));
     }
     let dir = folder.join(DEMO);
     child_run::finish(
@@ -129,8 +134,11 @@ pub(super) async fn run_list(
         );
         after = page.next;
         if names.len() > MAX_LIST {
-            return Err(AppFailure::refused(format!(
-                "the list has more than {MAX_LIST} pairs: narrow the filter, or run all pairs"
+            return Err(AppFailure::refused(Sentence::new(
+                format!(
+                    "the list has more than {MAX_LIST} pairs: narrow the filter, or run all pairs"
+                ),
+                format!("danh sách có hơn {MAX_LIST} cặp: hãy lọc bớt, hoặc chạy mọi cặp"),
             )));
         }
         if after.is_none() {
@@ -138,7 +146,10 @@ pub(super) async fn run_list(
         }
     }
     if names.is_empty() {
-        return Err(AppFailure::refused("the list has no pairs"));
+        return Err(AppFailure::refused(Sentence::new(
+            "the list has no pairs",
+            "danh sách không có cặp nào",
+        )));
     }
     let (request, location) = (RetryRequest::Names(names.clone()), open.location());
     let retried = on_thread(async move || retry_pairs(&request, &location).await).await;
@@ -151,7 +162,7 @@ pub(super) async fn run_list(
     }
     if !runs(&open).await? {
         names.insert(0, "--".to_owned());
-        child_run::start(&state.options.program, &open.dir, &names).await?;
+        child_run::start(&state, &open.dir, &names).await?;
     }
     Ok(Json(json!({ "go": "./" })))
 }
@@ -182,7 +193,7 @@ pub(super) async fn retry(
     let retried = on_thread(async move || retry_pairs(&request, &location).await).await;
     retried.map_err(|error| AppFailure::of(error, &open.dir))?;
     if !runs(&open).await? {
-        child_run::start(&state.options.program, &open.dir, &[]).await?;
+        child_run::start(&state, &open.dir, &[]).await?;
     }
     Ok(reload())
 }

@@ -12,10 +12,13 @@ use super::failure::AppResult;
 use super::home::free_space;
 use super::pairs_page::pair_card;
 use super::projects::OpenProject;
+use super::sentence::{Sentence, without_commands};
 use super::state::AppState;
 use super::visit::Visit;
+use crate::review::Language;
 use mocban_catalog::{PairFilter, PairOrder, PairResults, StatusCounts, WorkerRecord, WorkerState};
 use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, one_line};
+use mocban_project::block_status::BlockStatus;
 use mocban_project::failures::may_succeed_unchanged;
 use mocban_project::location::now;
 use mocban_project::{ProjectError, ProjectResult};
@@ -26,6 +29,8 @@ use mocban_system::platform;
 const LATEST: usize = 12;
 /// Number of failed pairs that are shown as examples of each class.
 const EXAMPLES: usize = 3;
+/// Most blocks in progress that are named.
+const MAX_BLOCKS: usize = 5;
 
 /// What the page shows of a project.
 struct RunState {
@@ -34,13 +39,15 @@ struct RunState {
     workers: Vec<WorkerRecord>,
     latest: Vec<PairResults>,
     failures: Vec<(FailureClass, u64, Vec<PairResults>)>,
-    blocks: Option<String>,
+    blocks: BlockStatus,
+    /// Why the last run that the app started ended, if it failed.
+    failed_run: Option<Sentence>,
     /// Number of pairs at the same time, as the settings give it.
     jobs: usize,
 }
 
 impl RunState {
-    async fn read(open: &OpenProject) -> ProjectResult<Self> {
+    async fn read(open: &OpenProject, failed_run: Option<Sentence>) -> ProjectResult<Self> {
         let (catalog, location) = (&open.catalog, open.location());
         let settings = location.settings()?;
         // Read before the counts: a run that ends in between leaves no leases.
@@ -62,14 +69,15 @@ impl RunState {
             let list = catalog.pair_list(&filter, PairOrder::Imported, metric, None, EXAMPLES);
             failures.push((class, number, list.await?.pairs));
         }
-        let blocks = catalog.block_states().await?;
+        let blocks = BlockStatus(catalog.block_states().await?);
         Ok(Self {
             counts,
             is_running: running,
             workers: workers.unwrap_or_default(),
             latest: catalog.recent_results(LATEST).await?,
             failures,
-            blocks: (!blocks.is_empty()).then(|| grouped(blocks.len() as u64)),
+            blocks,
+            failed_run,
             jobs: mocban_project::run::options(&settings.config).workers,
         })
     }
@@ -84,6 +92,11 @@ impl RunState {
             .map(|status| self.jobs(status))
             .iter()
             .sum()
+    }
+
+    /// Returns the number of blocks that a run would work on or works on, whose pairs are not yet all known.
+    fn open_blocks(&self) -> u64 {
+        self.blocks.waiting() + self.blocks.leased()
     }
 
     /// Returns the pairs that the present workers settle in a second, since they started.
@@ -110,12 +123,15 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let read = RunState::read(&open).await;
+    let read = RunState::read(&open, state.failed_runs.last(&open.dir)).await;
     let run =
         read.map_err(|error: ProjectError| super::failure::AppFailure::of(error, &open.dir))?;
     let body = html! {
         div #live data-live="2000" {
             (figures(&visit, &run))
+            @if let Some(sentence) = run.failed_run.as_ref().filter(|_| !run.is_running) {
+                p.notice.bad #failed-run role="alert" { (one_line(sentence.text(visit.language))) }
+            }
             (progress(&visit, &run))
             (controls(&visit, &run))
             (disk(&visit, &open))
@@ -145,7 +161,7 @@ fn figures(visit: &Visit, run: &RunState) -> Markup {
             (figure(running, running_name, Some("pairs?state=running"), ""))
             (figure(run.counts.low_confidence, visit.t("low confidence", "độ tin cậy thấp"), Some("pairs?confidence=low&sort=confidence"), "warn"))
             (figure(judged, visit.t("verdicts", "đánh giá"), Some("review"), ""))
-            @if let Some(blocks) = &run.blocks { span.figure { b { (blocks) } span { (visit.t("blocks", "ván")) } } }
+            @if !run.blocks.is_empty() { (figure(run.blocks.0.len() as u64, visit.t("blocks", "ván"), Some("blocks"), "")) }
         }
     }
 }
@@ -159,13 +175,36 @@ fn progress(visit: &Visit, run: &RunState) -> Markup {
             (grouped(settled)) " / " (grouped(run.counts.pairs))
             @if let Some(rate) = rate {
                 " · " (rate_text(visit, rate))
-                " · " (visit.t("time left", "còn lại")) " " (duration(visit, run.outstanding() as f64 / rate))
+                @if run.open_blocks() == 0 {
+                    " · " (visit.t("time left", "còn lại")) " " (duration(visit, run.outstanding() as f64 / rate))
+                }
             }
             @if run.is_running {
                 @for worker in &run.workers { " · " (one_line(&worker.host)) ", " (visit.t("process", "tiến trình")) " " (worker.pid) }
             }
         }
+        @if !run.blocks.is_empty() { p.muted #blocks { (blocks_text(visit, &run.blocks)) } }
     }
+}
+
+/// Returns the stages of the blocks in progress and how many blocks are done, such as `b04: registration with the page, 1 of 3 done`.
+fn blocks_text(visit: &Visit, blocks: &BlockStatus) -> String {
+    let mut parts: Vec<String> = (blocks.in_progress())
+        .take(MAX_BLOCKS)
+        .map(|(block, stage)| {
+            let (block, stage) = (one_line(block.as_str()), visit.block_stage(stage));
+            format!("{block}: {stage}")
+        })
+        .collect();
+    let done = grouped(blocks.number(&[JobStatus::Done]));
+    let all = grouped(blocks.0.len() as u64);
+    parts.push(match visit.language {
+        Language::English => format!("{done} of {all} done"),
+        Language::Vietnamese => format!("xong {done} trên {all}"),
+    });
+    let failed = blocks.number(&[JobStatus::Quarantined]);
+    parts.extend((failed > 0).then(|| format!("{} {}", grouped(failed), visit.t("failed", "lỗi"))));
+    parts.join(", ")
 }
 
 /// Returns a number of pairs a second, or a minute if they are few.
@@ -212,6 +251,8 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
         };
     }
     let waiting = run.outstanding() + run.counts.stale;
+    let blocks = run.open_blocks();
+    let is_idle = waiting + blocks == 0;
     let failed = run.jobs(JobStatus::Quarantined);
     html! {
         @if run.counts.stale > 0 {
@@ -221,14 +262,16 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
             label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
             }
-            button.primary #start name="which" value="all" disabled[waiting == 0] {
-                (visit.t("Align", "Căn chỉnh")) " " (grouped(waiting)) " " (visit.t("pairs", "cặp"))
+            button.primary #start name="which" value="all" disabled[is_idle] {
+                (visit.t("Align", "Căn chỉnh")) " "
+                @if blocks > 0 { (grouped(blocks)) " " (visit.t("blocks and", "ván và")) " " }
+                (grouped(waiting)) " " (visit.t("pairs", "cặp"))
             }
             @if failed > 0 {
                 button name="which" value="failed" { (visit.t("Try failed pairs again", "Thử lại các cặp lỗi")) }
             }
         }))
-        @if waiting == 0 && failed == 0 && run.counts.pairs > 0 {
+        @if is_idle && failed == 0 && run.counts.pairs > 0 {
             p.good { (visit.t("Everything is aligned. Next: judge a sample of the results.", "Mọi thứ đã được căn chỉnh. Tiếp theo: đánh giá một mẫu kết quả.")) " "
                 a href="review" { (visit.t("Review", "Đánh giá")) } }
         }
@@ -283,7 +326,10 @@ fn example(pair: &PairResults) -> Markup {
     html! {
         li {
             a href={ "pair/" (super::address::encoded(name)) "/" } { (one_line(name)) }
-            @if let Some(message) = message { ": " (one_line(message)) }
+            @if let Some(message) = message { ": " span lang="en" { (one_line(&without_commands(message))) } }
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,6 +13,7 @@ use super::action_body::ActionBody;
 use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_catalog::Catalog;
@@ -66,7 +67,7 @@ pub(super) async fn page(
         @match &change {
             None => {},
             Some(Ok(change)) => (change_part(&visit, change)),
-            Some(Err(error)) => p.notice.bad role="alert" { (error.text(&open.dir)) },
+            Some(Err(error)) => p.notice.bad role="alert" { (Sentence::of_error(error, &open.dir).text(visit.language)) },
         }
         (sections(&visit, &settings.tree.settings()))
     };
@@ -98,6 +99,7 @@ fn change_part(visit: &Visit, change: &SettingChange) -> Markup {
             } @else {
                 p { code { (before.value) } " → " code { (after.value) } }
                 p { b { (grouped(change.stale)) } " " (visit.t("pairs would be computed again by the next run.", "cặp sẽ được tính lại trong lần chạy sau.")) }
+                @if change.changes_method { p.notice #two-methods { (two_methods(visit)) } }
                 (action_form("actions/setting", "inline", &html! {
                     input type="hidden" name="key" value=(after.key);
                     input type="hidden" name="value" value=(visit.query.get("value").unwrap_or_default());
@@ -107,6 +109,14 @@ fn change_part(visit: &Visit, change: &SettingChange) -> Markup {
             }
         }
     }
+}
+
+/// Says that a run with another method replaces the results.
+pub(super) const fn two_methods(visit: &Visit) -> &'static str {
+    visit.t(
+        "The results of the other method would be replaced. To keep both, import the pairs into a second project.",
+        "Kết quả của phương pháp kia sẽ bị thay thế. Để giữ cả hai, hãy nhập các cặp vào một dự án thứ hai.",
+    )
 }
 
 /// Returns the settings by section. Those with a value of their own are open.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
 use super::open_pages::OpenPages;
 use super::projects::{OpenProject, find};
@@ -37,6 +38,8 @@ pub(super) struct AppState {
     pub(super) blocks: OpenPages,
     /// Exports, checks and backups.
     pub(super) tasks: AppTasks,
+    /// Why runs that the app started failed.
+    pub(super) failed_runs: FailedRuns,
     pub(super) thumbs: ThumbCache,
     /// Draws pictures.
     pub(super) work: WorkThread,
@@ -51,6 +54,7 @@ impl AppState {
             reviews: OpenPages::new(32),
             blocks: OpenPages::new(2),
             tasks: AppTasks::default(),
+            failed_runs: FailedRuns::default(),
             thumbs: ThumbCache::default(),
             work: WorkThread::default(),
         }

@@ -18,7 +18,7 @@ pub(super) fn task_part(visit: &Visit, state: Option<&TaskState>) -> Markup {
             Some(TaskState::Done(lines)) => div.notice.good role="status" data-task="done" {
                 @for line in lines { p { (one_line(&line[visit.index()])) } }
             },
-            Some(TaskState::Failed(text)) => div.notice.bad role="alert" data-task="failed" { p { (text) } },
+            Some(TaskState::Failed(why)) => div.notice.bad role="alert" data-task="failed" { p { (why.text(visit.language)) } },
         }
     }
 }

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use super::failure::{AppFailure, AppResult};
 use super::on_thread::on_thread;
 use super::projects::OpenProject;
+use super::sentence::Sentence;
 use mocban_project::ProjectResult;
 use mocban_project::location::Location;
 
@@ -25,7 +26,7 @@ pub(super) type TaskLines = Vec<[String; 2]>;
 pub(super) enum TaskState {
     Running,
     Done(TaskLines),
-    Failed(String),
+    Failed(Sentence),
 }
 
 /// The tasks of all projects.
@@ -50,7 +51,10 @@ impl AppTasks {
         {
             let mut tasks = self.lock();
             if matches!(tasks.get(&id), Some(TaskState::Running)) {
-                return Err(AppFailure::refused("this is already being done"));
+                return Err(AppFailure::refused(Sentence::new(
+                    "this is already being done",
+                    "việc này đang được làm",
+                )));
             }
             tasks.insert(id.clone(), TaskState::Running);
         }
@@ -60,7 +64,7 @@ impl AppTasks {
             let done = on_thread(move || work(location)).await;
             let state = match done {
                 Ok(lines) => TaskState::Done(lines),
-                Err(error) => TaskState::Failed(error.text(&dir)),
+                Err(error) => TaskState::Failed(Sentence::of_error(&error, &dir)),
             };
             tasks.lock().insert(id, state);
         });

@@ -15,6 +15,16 @@ pub struct CheckRates {
     pub duplicates: f64,
 }
 
+/// The rates if none are given: four planted faults and five duplicates in a hundred results.
+impl Default for CheckRates {
+    fn default() -> Self {
+        Self {
+            faults: 0.04,
+            duplicates: 0.05,
+        }
+    }
+}
+
 /// Minimum number of faults in a queue that has any. The catch rate of a small sample would otherwise say nothing.
 const MIN_FAULTS: usize = 5;
 /// Range of planted rotations in degrees: more than the 5 degrees allowed in a pass, but not obvious at first sight.

@@ -34,20 +34,51 @@ impl QueueOptions {
     /// Returns the arguments with which `review` shows the same results to another person, such as `review --reviewer NAME
     /// --metric relief --sample 50`. What has its default value is left out.
     pub fn for_another_reviewer(&self) -> String {
-        let metrics = self.metrics.iter();
-        let mut words: Vec<String> = metrics.map(|metric| format!("--metric {metric}")).collect();
+        let mut words = vec!["review --reviewer NAME".to_owned()];
+        words.extend(self.metric_words());
         if let Some(sample) = self.sample {
             words.push(format!("--sample {sample}"));
             // The order and the seed decide which results are in the sample.
-            if self.order == ReviewOrder::LeastConfident {
-                words.push("--order least-confident".to_owned());
-            }
-            if self.seed != Self::DEFAULT_SEED {
-                words.push(format!("--seed {}", self.seed));
+            words.extend(self.order_words());
+        }
+        words.join(" ")
+    }
+
+    /// Returns the arguments with which `review` goes on with this queue. `name` is the reviewer as a shell takes it. What
+    /// has its default value is left out.
+    pub fn to_continue(&self, name: &str) -> String {
+        let mut words = vec![format!("review --reviewer {name}")];
+        words.extend(self.metric_words());
+        words.extend(self.sample.map(|sample| format!("--sample {sample}")));
+        words.extend(self.order_words());
+        if self.order == ReviewOrder::Adjudicate {
+            words.push("--adjudicate".to_owned());
+        }
+        let CheckRates { faults, duplicates } = self.rates;
+        let plain = CheckRates::default();
+        for (option, rate, plain) in [
+            ("--attention-checks", faults, plain.faults),
+            ("--duplicates", duplicates, plain.duplicates),
+        ] {
+            if rate != plain {
+                // A share such as 0.07 has no exact percentage.
+                words.push(format!("{option} {}", (1e6 * rate).round() / 1e4));
             }
         }
-        words.insert(0, "review --reviewer NAME".to_owned());
         words.join(" ")
+    }
+
+    fn metric_words(&self) -> impl Iterator<Item = String> {
+        let metrics = self.metrics.iter();
+        metrics.map(|metric| format!("--metric {metric}"))
+    }
+
+    /// Returns the arguments of the order and the seed, except those of adjudication.
+    fn order_words(&self) -> impl Iterator<Item = String> + use<> {
+        let is_by_confidence = self.order == ReviewOrder::LeastConfident;
+        let order = is_by_confidence.then(|| "--order least-confident".to_owned());
+        let seed = (self.seed != Self::DEFAULT_SEED).then(|| format!("--seed {}", self.seed));
+        order.into_iter().chain(seed)
     }
 
     /// Returns whether the queue can have attention checks. If so, the page shows the pair of an item only after the
@@ -113,6 +144,23 @@ mod tests {
         assert_eq!(
             some.for_another_reviewer(),
             "review --reviewer NAME --metric relief --metric ensemble --sample 50 --order least-confident --seed 7"
+        );
+        assert_eq!(
+            some.to_continue("lan"),
+            "review --reviewer lan --metric relief --metric ensemble --sample 50 --order least-confident --seed 7 \
+             --attention-checks 0 --duplicates 0"
+        );
+        let settling = QueueOptions {
+            order: ReviewOrder::Adjudicate,
+            sample: None,
+            metrics: Vec::new(),
+            rates: CheckRates::default(),
+            seed: QueueOptions::DEFAULT_SEED,
+            ..some
+        };
+        assert_eq!(
+            settling.to_continue("lan"),
+            "review --reviewer lan --adjudicate"
         );
     }
 }

@@ -92,6 +92,15 @@ impl ReviewPages {
         self.counts
     }
 
+    /// Returns whether the reviewer has answered every item by now. Returns `false` if that cannot be read.
+    pub async fn is_finished(&self) -> bool {
+        let queue = self.state.load_queue().await;
+        queue.is_ok_and(|queue| {
+            let mut items = queue.items.iter();
+            items.all(|item| queue.history.answer(item).is_some())
+        })
+    }
+
     /// Returns whether fewer faults could be planted than wanted.
     pub const fn shortage(&self) -> Option<&FaultShortage> {
         self.shortage.as_ref()

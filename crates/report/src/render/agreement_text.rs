@@ -49,8 +49,8 @@ fn agreement(found: &ReviewerAgreement) -> Table {
             }
         })
         .caption("agreement", format!(
-            "Over the n results that both passed or failed; kappa (Cohen) and AC1 (Gwet) need at least {MIN_RESULTS}. \
-             Kappa falls to 0 when failures are rare, however well reviewers agree; AC1 does not."
+            "Over the n results that both passed or failed. Kappa (Cohen) and AC1 (Gwet) need at least {MIN_RESULTS}. \
+             Kappa falls to 0 when failures are rare, however well reviewers agree. AC1 does not."
         ))
 }
 
@@ -89,7 +89,7 @@ fn reviewers(found: &ReviewerAgreement) -> Table {
         .interval(interval, Share, |record| record.attention_checks.all.ci95)
         .caption("reviewers",
             "Duplicates: results shown twice that got the same verdict twice. Detected: planted faults (attention \
-             checks) that the reviewer failed; this shows how well they find such faults, and no others.",
+             checks) that the reviewer failed. This shows how well they find such faults, and no others.",
         )
 }
 

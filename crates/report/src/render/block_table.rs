@@ -28,7 +28,7 @@ pub(super) fn blocks(report: &Report) -> Option<Table> {
             .caption("blocks", format!(
                 "Whole blocks against ground truth. True: characters that the page shows whole. Found: those that were cut \
                  and aligned. Right as above, and tight if landmarks are within 1.5 %, both for {}. P and R: precision and \
-                 recall of boxes that were found without labels, at an IoU of at least 0.5 and 0.7.",
+                 recall of boxes that were found without labels. 50 and 70: at an IoU of at least 0.5 and 0.7.",
                 ThresholdMetric::DEFAULT.title()
             ))
     })

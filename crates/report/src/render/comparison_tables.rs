@@ -31,8 +31,8 @@ pub(super) fn comparisons(report: &Report) -> Vec<Table> {
                 .caption(
                     id,
                     format!(
-                        "Metrics compared by which of n pairs they are right on, by {}: pairs on which only the first \
-                         or only the second is right ({test}; Holm's correction).",
+                        "Pairs on which only the first or only the second metric is right, by {}, of n. Test: {test}, \
+                         with Holm's correction.",
                         basis.title()
                     ),
                 ),
@@ -57,7 +57,7 @@ pub(super) fn comparison_sentences(report: &Report) -> Vec<String> {
     }
     let line = |(basis, conclusion, compared): (Basis, &str, Vec<String>)| {
         let (basis, compared) = (basis.title(), compared.join("; "));
-        format!("By {basis}, {compared}: {conclusion}")
+        format!("Compared by {basis}: {compared}. {conclusion}")
     };
     groups.into_iter().map(line).collect()
 }
@@ -118,8 +118,8 @@ pub(super) fn score_comparisons(report: &Report) -> Option<Table> {
             .p_value("p", |found| found.p)
             .p_value("Holm p", |found| found.p_holm)
             .caption("score-comparisons", format!(
-                "Mean of the first minus mean of the second on the same pairs, by the {}; two-sided p with Holm's \
-                 correction within each score. A higher score does not mean a better alignment: a mask that copies the \
+                "Mean of the first minus mean of the second on the same pairs. Intervals and two-sided p are by the {}. \
+                 Holm's correction is within each score. A higher score does not mean a better alignment: a mask that copies the \
                  ink would score best.",
                 method(settings)
             ))

@@ -45,7 +45,7 @@ pub(super) fn scores(report: &Report) -> Table {
         .score("Dice", |row| row.dice)
         .caption("scores",
             "Acc is the share of passed results among the decided ones, which reviewers passed or failed. SSIM, IoU and \
-             Dice are means over n pairs, computed by pixel; IoU box is that of the bounding boxes.",
+             Dice are means over n pairs, computed by pixel. IoU box is that of the bounding boxes.",
         )
 }
 
@@ -82,9 +82,9 @@ pub(super) fn rules(report: &Report) -> Option<Table> {
     }
     report.rows.iter().any(is_double).then(|| {
         table.caption("rules",
-            "Acc under three rules for results on which reviewers disagree: a result fails if either reviewer fails it; \
-             it counts as adjudicated (the Acc above); it fails only if both fail it. n is the number of decided \
-             results; double is the number that at least two reviewers decided.",
+            "Acc under three rules for results on which reviewers disagree. Either: a result fails if one reviewer fails \
+             it. Adjudicated: it counts as in the Acc above. Both: it fails only if both fail it. n is the number of \
+             decided results. Double is the number that at least two reviewers decided.",
         )
     })
 }
@@ -149,8 +149,9 @@ pub(super) fn truth(report: &Report) -> Table {
         })
         .score("mask IoU", |row| value(row, |truth| truth.mask_iou_median))
         .caption("truth",
-            "Errors against ground truth. Acc here: angle within 5 degrees, landmarks within 5 % of the character's \
-             height, and mask IoU with the true stroke tops at least 0.7. Angle, landmarks and mask IoU are medians.",
+            "Errors against ground truth. Acc here counts results within three limits. The angle is within 5 degrees, \
+             and landmarks are within 5 % of the character's height. The mask IoU with the true stroke tops is at least \
+             0.7. Angle, landmarks and mask IoU are medians.",
         )
 }
 
@@ -174,8 +175,9 @@ pub(super) fn manual_alignments(report: &Report) -> Option<Table> {
             .number("scale %", Percent, |(_, errors)| errors.scale_median_pct)
             .number("95 %", Percent, |(_, errors)| errors.scale_p95_pct)
             .caption("manual-alignments",
-                "Errors against manual alignments, over the n pairs that have one: share within 5 degrees; angle, shift \
-                 in percent of the relief's longer side, and difference in scale, each as median and 95th percentile.",
+                "Errors against manual alignments, over the n pairs that have one. The first column is the share within \
+                 5 degrees. Angle, shift and difference in scale are medians and 95th percentiles. Shift is in percent \
+                 of the relief's longer side.",
             )
     })
 }
@@ -190,8 +192,8 @@ pub(super) fn thresholds(report: &Report) -> Option<Table> {
             .score("median", |found| Some(found.median))
             .score("95 %", |found| Some(found.p95))
             .caption("thresholds",
-                "Relative height of the thresholds, from 0 (the lowest point of a depth map) to 1 (its highest): 5th \
-                 percentile, median and 95th percentile.",
+                "Relative height of the thresholds: 5th percentile, median and 95th percentile. 0 is the lowest point \
+                 of a depth map, and 1 its highest.",
             )
     })
 }
@@ -206,8 +208,8 @@ pub(super) fn times(report: &Report) -> Option<Table> {
             .number("95 % ms", Milliseconds, |time| Some(time.p95_ms))
             .number("sum s", Seconds, |time| Some(time.total_s))
             .caption("times",
-                "Computing time of the current results by stage, on one core: median and 95th percentile in \
-                 milliseconds, sum in seconds.",
+                "Computing time of the current results by stage, on one core. Median and 95th percentile are in \
+                 milliseconds, the sum in seconds.",
             )
     })
 }

@@ -69,7 +69,7 @@ const fn title(basis: Basis) -> &'static str {
 
 fn caption(basis: Basis, curves: &[&RiskCoverageCurve]) -> String {
     let mut sentences = vec![format!(
-        "Acc in percent by {} of the most confident results, at the share of results that is kept (coverage).",
+        "Acc in percent by {} of the most confident results. Coverage is the share of results that is kept.",
         basis.title()
     )];
     sentences.extend(curves.iter().filter_map(|curve| failures(curve)));

@@ -48,8 +48,8 @@ impl<'a> Album<'a> {
     pub(super) fn body(&self) -> Option<Markup> {
         let groups = self.gallery.groups.iter().zip(&self.figures);
         (!self.figures.is_empty()).then(|| html! {
-            p { "Each result has three images: the print, the aligned relief lit from the side, and the print with the \
-                edges of the relief's strokes in orange. Results that look the same for several methods are shown once." }
+            p { "Each result has three images. The first is the print, and the second the aligned relief, lit from the \
+                side. The third is the print with the edges of the relief's strokes in orange. Results that look the same for several methods are shown once." }
             @for (group, figures) in groups { (self.group(group, figures)) }
         })
     }

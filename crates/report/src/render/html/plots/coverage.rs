@@ -64,7 +64,7 @@ fn line(curve: &RiskCoverageCurve) -> PlotLine {
     }
 }
 
-/// Returns the clause on metrics with the same line, whose names only the legend shows.
+/// Returns the sentence on metrics with the same line, whose names only the legend shows.
 fn coincidence(lines: &[PlotLine]) -> String {
     let is_same =
         |line: &&PlotLine| lines.iter().filter(|one| one.points == line.points).count() > 1;
@@ -72,7 +72,7 @@ fn coincidence(lines: &[PlotLine]) -> String {
     if same.is_empty() {
         return String::new();
     }
-    format!("; lines that lie on each other: {}", same.join(", "))
+    format!(". Lines that lie on each other: {}", same.join(", "))
 }
 
 /// Returns Acc of a curve at full and at half coverage in words.
@@ -146,7 +146,7 @@ mod tests {
             ">Results kept, the most confident first (%)</text>",
             ">Acc by ground truth (%)</text>",
             "Ensemble 95.0\u{202f}% of all results and 100.0\u{202f}% of half of them",
-            "; lines that lie on each other: Non-luminous SSIM, Pixel density, Ensemble, Relief.",
+            ". Lines that lie on each other: Non-luminous SSIM, Pixel density, Ensemble, Relief.",
             // All results at 95 %: the middle of an axis from 90 to 100.
             "440.0,142.0",
         ] {

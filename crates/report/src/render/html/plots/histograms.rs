@@ -18,7 +18,7 @@ const PANEL: f64 = BARS + 14.0;
 pub(in crate::render::html) fn thresholds(report: &Report) -> Markup {
     let found = &report.thresholds;
     let below = PANEL * found.len() as f64;
-    let caption = "Results of each metric by the relative height of their threshold; a dashed line and the number \
+    let caption = "Results of each metric by the relative height of their threshold. A dashed line and the number \
                    beside it show the median";
     let labels = found.iter().map(|found| {
         let median = format_number(found.median, Score);

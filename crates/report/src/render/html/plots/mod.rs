@@ -48,7 +48,7 @@ fn horizontal_axis(axis: &PlotAxis, [top, bottom]: [f64; 2], title: &str) -> Mar
 
 /// Returns the text of a plot for screen readers.
 fn alt_text(caption: &str, labels: impl Iterator<Item = String>) -> String {
-    format!("{caption}: {}", labels.collect::<Vec<_>>().join(", "))
+    format!("{caption}. {}.", labels.collect::<Vec<_>>().join(". "))
 }
 
 /// Formats a coordinate.

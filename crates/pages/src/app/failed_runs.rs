@@ -1,0 +1,32 @@
+//! Why the last run of each project failed, as far as this app started it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::sentence::Sentence;
+
+/// The failures by the folder of the project.
+#[derive(Debug, Clone, Default)]
+pub(super) struct FailedRuns(Arc<Mutex<BTreeMap<PathBuf, Sentence>>>);
+
+impl FailedRuns {
+    /// Returns why the last run of a project failed, if it did.
+    pub(super) fn last(&self, dir: &Path) -> Option<Sentence> {
+        self.lock().get(dir).cloned()
+    }
+
+    /// Stores why the last run of a project failed, or that it did not.
+    pub(super) fn set(&self, dir: &Path, why: Option<Sentence>) {
+        let mut failed = self.lock();
+        match why {
+            Some(why) => failed.insert(dir.to_owned(), why),
+            None => failed.remove(dir),
+        };
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<PathBuf, Sentence>> {
+        // Each change is a single insertion or removal.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

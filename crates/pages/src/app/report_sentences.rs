@@ -1,0 +1,165 @@
+//! The answer of a report and its limits in sentences. The report itself is in English, so the Vietnamese ones are made here.
+
+use super::components::grouped;
+use super::sentence::without_commands;
+use super::visit::Visit;
+use crate::review::Language;
+use mocban_core::domain::{MetricOutcome, ThresholdMetric, sanitize};
+use mocban_report::{Basis, Comparison, MetricRow, Report};
+use mocban_results::number_format::NumberStyle;
+use mocban_results::number_format::{format_interval, format_p, format_share};
+use mocban_results::stats::SIGNIFICANCE_LEVEL;
+
+/// Returns the paragraphs of the answer.
+pub(super) fn headline(visit: &Visit, report: &Report) -> Vec<String> {
+    match visit.language {
+        Language::English => plain(&report.headline),
+        Language::Vietnamese if report.pairs == 0 => {
+            vec!["Dự án chưa có cặp nào: hãy thêm ở trang Nhập dữ liệu.".to_owned()]
+        }
+        Language::Vietnamese if report.progress.done == 0 => vec![aligned(report)],
+        Language::Vietnamese => vec![
+            aligned(report),
+            accuracy(visit, report),
+            differences(visit, report),
+        ],
+    }
+}
+
+/// Returns what limits the numbers.
+pub(super) fn limits(visit: &Visit, report: &Report) -> Vec<String> {
+    match visit.language {
+        Language::English => plain(&report.warnings),
+        Language::Vietnamese => vietnamese_limits(visit, report),
+    }
+}
+
+fn plain(sentences: &[String]) -> Vec<String> {
+    let sentences = sentences.iter();
+    sentences
+        .map(|sentence| without_commands(sentence))
+        .collect()
+}
+
+/// Says how many pairs are aligned, failed and not finished.
+fn aligned(report: &Report) -> String {
+    let progress = report.progress;
+    let [pairs, done] = [report.pairs, progress.done].map(grouped);
+    let mut text = format!("{done} trên {pairs} cặp đã được căn chỉnh");
+    let row = report.row(ThresholdMetric::DEFAULT);
+    if let Some(low) = row.and_then(|row| row.low_confidence) {
+        let (low, least) = (grouped(low), MetricOutcome::LOW_CONFIDENCE);
+        text += &format!(", trong đó {low} có độ tin cậy dưới {least}");
+    }
+    for (number, what) in [(progress.failed, "bị lỗi"), (progress.pending, "chưa xong")] {
+        if number > 0 {
+            text += &format!("; {} {what}", grouped(number));
+        }
+    }
+    text + "."
+}
+
+/// Says how often reviewers passed results of the default metric, or of the first that they judged.
+fn accuracy(visit: &Visit, report: &Report) -> String {
+    let default = report.row(ThresholdMetric::DEFAULT).into_iter();
+    let mut rows = default.chain(&report.rows);
+    let known = |row: &MetricRow| {
+        let acc = row.acc?;
+        let interval = row
+            .acc_ci95
+            .map(|bounds| format_interval(bounds, NumberStyle::Share));
+        Some(format!(
+            "Acc của {} là {} % ({}): người đánh giá cho đạt {} trên {} kết quả.",
+            visit.metric(row.metric),
+            format_share(acc),
+            interval.unwrap_or_default(),
+            grouped(row.passed),
+            grouped(row.passed + row.failed),
+        ))
+    };
+    let found = rows.find_map(known);
+    found.unwrap_or_else(|| {
+        if report.has_verdicts() {
+            "Chưa có Acc, vì người đánh giá chưa chắc về mọi kết quả.".to_owned()
+        } else {
+            "Chưa ai đánh giá kết quả nào, nên chưa có Acc: hãy bắt đầu ở trang Đánh giá."
+                .to_owned()
+        }
+    })
+}
+
+/// Says which metrics are right more often than others.
+fn differences(visit: &Visit, report: &Report) -> String {
+    let of = |basis| -> Vec<&Comparison> {
+        let compared = report.comparisons.iter();
+        compared.filter(|found| found.basis == basis).collect()
+    };
+    let mut families = Basis::ALL.into_iter().map(|basis| (basis, of(basis)));
+    let Some((basis, family)) = families.find(|(_, family)| !family.is_empty()) else {
+        return "Chưa đủ đánh giá để so sánh các phương pháp.".to_owned();
+    };
+    let basis = match basis {
+        Basis::Verdicts => "đánh giá",
+        Basis::Truth => "đáp án",
+    };
+    let significant = family.iter().filter_map(|found| {
+        let p = found.p_holm.filter(|p| *p < SIGNIFICANCE_LEVEL)?;
+        let is_a = found.a_only > found.b_only;
+        let [better, worse] = if is_a {
+            [found.a, found.b]
+        } else {
+            [found.b, found.a]
+        };
+        let [better, worse] = [better, worse].map(|metric| visit.metric(metric));
+        Some(format!("{better} đúng nhiều hơn {worse} ({})", format_p(p)))
+    });
+    let significant: Vec<String> = significant.collect();
+    if significant.is_empty() {
+        return format!("Theo {basis}, không có khác biệt có ý nghĩa giữa các phương pháp.");
+    }
+    format!(
+        "Theo {basis}, khác biệt có ý nghĩa: {}.",
+        significant.join("; ")
+    )
+}
+
+fn vietnamese_limits(visit: &Visit, report: &Report) -> Vec<String> {
+    let mut limits = Vec::new();
+    let progress = report.progress;
+    let missing = progress.failed + progress.pending;
+    if missing > 0 {
+        let [missing, all] = [missing, missing + progress.done].map(grouped);
+        limits.push(format!(
+            "{missing} trên {all} cặp không có trong bảng, vì bị lỗi hoặc chưa xong."
+        ));
+    }
+    for row in &report.rows {
+        let metric = visit.metric(row.metric);
+        let mirrored = row.truth.as_ref().map_or(0, |truth| truth.mirrored);
+        for (number, what) in [
+            (row.stale, "kết quả chỉ có đánh giá cho lần tính trước"),
+            (
+                row.conflicts,
+                "kết quả chưa chắc vì người đánh giá bất đồng",
+            ),
+            (mirrored, "kết quả bị lật gương"),
+        ] {
+            if number > 0 {
+                limits.push(format!("{metric}: {} {what}.", grouped(number)));
+            }
+        }
+    }
+    let checks = report.attention_checks.iter();
+    for (reviewer, rate) in checks.flat_map(|rates| rates.inattentive()) {
+        limits.push(format!(
+            "{} chỉ nhận ra {} trên {} lỗi cài sẵn. Hãy để người khác đánh giá cùng các kết quả đó, hoặc luyện tập rồi đánh giá lại.",
+            sanitize(reviewer, 60),
+            grouped(rate.count),
+            grouped(rate.n)
+        ));
+    }
+    if let Some(problem) = &report.unusable_truth {
+        limits.push(format!("Không dùng được đáp án của {problem}."));
+    }
+    limits
+}

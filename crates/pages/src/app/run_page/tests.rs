@@ -1,0 +1,131 @@
+//! What the page of a run shows of blocks and of the time left.
+
+use std::collections::BTreeMap;
+
+use super::{RunState, blocks_text, controls, progress};
+use crate::app::address::PageQuery;
+use crate::app::visit::Visit;
+use crate::review::Language;
+use mocban_catalog::{BlockAttributes, BlockState, StatusCounts, WorkerRecord};
+use mocban_core::domain::{BlockStage, JobStatus, WorkerId, WorkerMetrics};
+use mocban_project::block_status::BlockStatus;
+
+fn visit(language: Language) -> Visit {
+    Visit {
+        language,
+        root: "./".to_owned(),
+        here: "./".to_owned(),
+        query: PageQuery::default(),
+        csrf_token: String::new(),
+    }
+}
+
+fn block(name: &str, status: JobStatus) -> BlockState {
+    BlockState {
+        attributes: BlockAttributes {
+            name: name.parse().expect("a valid id"),
+            mesh_path: "m.stl".to_owned(),
+            page_path: "p.png".to_owned(),
+            labels_path: None,
+            unit: None,
+            side: None,
+        },
+        status,
+        next_stage: (status != JobStatus::Done).then_some(BlockStage::Align),
+        attempts: 0,
+        crashes: 0,
+        failure: None,
+        control_points: None,
+        characters: 0,
+        left_out: 0,
+        retired: 0,
+        low_confidence: 0,
+    }
+}
+
+/// A run that has done 10 of 20 pairs in a minute, in a project with these blocks.
+fn running(blocks: Vec<BlockState>) -> RunState {
+    let metrics = WorkerMetrics {
+        elapsed_ms: 60_000,
+        done: 10,
+        ..WorkerMetrics::default()
+    };
+    RunState {
+        counts: StatusCounts {
+            schema: 1,
+            pairs: 20,
+            retired: 0,
+            jobs: BTreeMap::from([(JobStatus::Done, 10), (JobStatus::Ready, 10)]),
+            stages: BTreeMap::new(),
+            stale: 0,
+            low_confidence: 0,
+            verdicts: BTreeMap::new(),
+        },
+        is_running: true,
+        workers: vec![WorkerRecord {
+            id: WorkerId(1),
+            host: "here".to_owned(),
+            pid: 7,
+            started: 0,
+            heartbeat: 0,
+            ended: None,
+            died: false,
+            leased: 1,
+            metrics: Some(metrics),
+        }],
+        latest: Vec::new(),
+        failures: Vec::new(),
+        blocks: BlockStatus(blocks),
+        failed_run: None,
+        jobs: 2,
+    }
+}
+
+#[test]
+fn blocks_in_progress_have_their_stage_in_both_languages() {
+    let blocks = BlockStatus(vec![
+        block("b03", JobStatus::Done),
+        block("b04", JobStatus::Leased),
+        block("b05", JobStatus::Ready),
+    ]);
+    let text = |language| blocks_text(&visit(language), &blocks);
+    assert_eq!(
+        text(Language::English),
+        "b04: registration with the page, 1 of 3 done"
+    );
+    assert_eq!(
+        text(Language::Vietnamese),
+        "b04: căn chỉnh với trang in, xong 1 trên 3"
+    );
+}
+
+#[test]
+fn time_is_estimated_once_every_pair_is_known() {
+    let visit = visit(Language::English);
+    let is_estimated = |blocks| {
+        let shown = progress(&visit, &running(blocks)).into_string();
+        assert!(shown.contains("10.0 pairs a minute"), "{shown}");
+        shown.contains("time left 60 s")
+    };
+    assert!(is_estimated(Vec::new()));
+    assert!(is_estimated(vec![
+        block("b1", JobStatus::Done),
+        block("b2", JobStatus::Quarantined)
+    ]));
+    for status in [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased] {
+        assert!(!is_estimated(vec![block("b1", status)]), "{status}");
+    }
+}
+
+#[test]
+fn a_project_of_blocks_alone_can_be_run() {
+    let mut run = running(vec![block("b1", JobStatus::Ready)]);
+    run.is_running = false;
+    run.counts.jobs.clear();
+    let shown = controls(&visit(Language::English), &run).into_string();
+    assert!(shown.contains("Align 1 blocks and 0 pairs"), "{shown}");
+    assert!(!shown.contains("disabled"), "{shown}");
+    run.blocks = BlockStatus(Vec::new());
+    let shown = controls(&visit(Language::English), &run).into_string();
+    assert!(shown.contains("disabled"), "{shown}");
+}

@@ -1,0 +1,198 @@
+//! Sentences in both languages, without commands, because the app has buttons for them.
+
+use crate::review::Language;
+use mocban_core::domain::ErrorCode;
+use mocban_project::ProjectError;
+use std::path::Path;
+
+/// A sentence in English and Vietnamese.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Sentence {
+    english: String,
+    vietnamese: String,
+}
+
+impl Sentence {
+    /// Makes a sentence of its texts.
+    pub(super) fn new(english: impl Into<String>, vietnamese: impl Into<String>) -> Self {
+        Self {
+            english: english.into(),
+            vietnamese: vietnamese.into(),
+        }
+    }
+
+    /// Quotes a message of the program, which is in English, without its commands.
+    pub(super) fn of_program(text: &str) -> Self {
+        let plain = without_commands(text);
+        let vietnamese = format!("Chương trình báo: {plain}");
+        Self::new(plain, vietnamese)
+    }
+
+    /// Explains an error of the project in a folder, and names the page or button that helps.
+    pub(super) fn of_error(error: &ProjectError, dir: &Path) -> Self {
+        let at = dir.display();
+        match error.code() {
+            ErrorCode::ProjectInUse => Self::new(
+                format!(
+                    "another run works on {at}: wait for its end, or press Stop on the page Run"
+                ),
+                format!(
+                    "một lần chạy khác đang làm việc với {at}: hãy chờ, hoặc bấm Dừng ở trang Căn chỉnh"
+                ),
+            ),
+            ErrorCode::Locked => Self::new(
+                format!(
+                    "another program has used the catalog in {at} for too long: close it and try again"
+                ),
+                format!(
+                    "một chương trình khác dùng danh mục trong {at} quá lâu: hãy đóng nó rồi thử lại"
+                ),
+            ),
+            ErrorCode::NotWritable => Self::new(
+                format!("{at} cannot be written to: check its rights and its disk, and try again"),
+                format!("không ghi được vào {at}: hãy kiểm tra quyền và ổ đĩa, rồi thử lại"),
+            ),
+            ErrorCode::DiskFull => Self::new(
+                format!(
+                    "the disk of {at} is full: free some space and try again, everything stored so far is safe"
+                ),
+                format!(
+                    "đĩa của {at} đã đầy: hãy giải phóng chỗ trống rồi thử lại, mọi thứ đã lưu vẫn an toàn"
+                ),
+            ),
+            ErrorCode::Damaged => Self::new(
+                format!("the catalog in {at} is damaged: press Check now on the page Health"),
+                format!("danh mục trong {at} bị hỏng: hãy bấm Kiểm tra ngay ở trang Tình trạng"),
+            ),
+            ErrorCode::DamagedFile | ErrorCode::NotACatalog | ErrorCode::LogLost => Self::new(
+                format!("the catalog in {at} cannot be read: put your last backup in its place"),
+                format!("không đọc được danh mục trong {at}: hãy thay bằng bản sao lưu gần nhất"),
+            ),
+            ErrorCode::NoProject => Self::new(
+                format!("there is no project in {at}: make one on the page Import"),
+                format!("không có dự án trong {at}: hãy tạo dự án ở trang Nhập dữ liệu"),
+            ),
+            ErrorCode::Unavailable => Self::new(
+                format!(
+                    "the server of the project in {at} does not answer: check the network and try again"
+                ),
+                format!(
+                    "máy chủ của dự án trong {at} không trả lời: hãy kiểm tra mạng rồi thử lại"
+                ),
+            ),
+            ErrorCode::TooManyFiles => Self::new(
+                format!("too many files are open to read {at}: close other programs and try again"),
+                format!(
+                    "có quá nhiều tệp đang mở để đọc {at}: hãy đóng các chương trình khác rồi thử lại"
+                ),
+            ),
+            _ => Self::of_program(&error.text(dir)),
+        }
+    }
+
+    /// Returns the text in a language.
+    pub(super) fn text(&self, language: Language) -> &str {
+        match language {
+            Language::English => &self.english,
+            Language::Vietnamese => &self.vietnamese,
+        }
+    }
+}
+
+/// Returns a text without the remarks in brackets and the clauses that name commands or options.
+pub(super) fn without_commands(text: &str) -> String {
+    let text = without_remarks(text);
+    let sentences = text.trim_end_matches('.').split(". ");
+    let sentences: Vec<String> = sentences
+        .filter_map(|sentence| {
+            let clauses = sentence.split("; ");
+            let clauses: Vec<&str> = clauses.filter(|clause| !names_command(clause)).collect();
+            (!clauses.is_empty()).then(|| clauses.join("; "))
+        })
+        .collect();
+    if sentences.is_empty() {
+        return text.replace('`', "");
+    }
+    let end = if text.ends_with('.') { "." } else { "" };
+    sentences.join(". ") + end
+}
+
+fn names_command(clause: &str) -> bool {
+    let is_option = |word: &str| word.trim_start_matches('(').starts_with("--");
+    clause.contains('`') || clause.contains("mocban ") || clause.split(' ').any(is_option)
+}
+
+/// Removes the remarks in brackets that name commands.
+fn without_remarks(text: &str) -> String {
+    let mut plain = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once(" (") {
+        let Some((inside, behind)) = after.split_once(')') else {
+            break;
+        };
+        plain.push_str(before);
+        if !names_command(inside) {
+            plain.extend([" (", inside, ")"]);
+        }
+        rest = behind;
+    }
+    plain + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Sentence, without_commands};
+    use crate::review::Language;
+    use mocban_project::{ProjectError, Refusal};
+    use std::path::Path;
+
+    #[test]
+    fn remarks_and_clauses_that_name_commands_are_left_out() {
+        for (text, plain) in [
+            (
+                "There is no Acc (`mocban review --reviewer NAME` starts judging). 24 of 24 (86.2–100.0).",
+                "There is no Acc. 24 of 24 (86.2–100.0).",
+            ),
+            (
+                "The project has no pairs yet; `mocban import` adds them.",
+                "The project has no pairs yet.",
+            ),
+            (
+                "pair a was retired; its verdicts are kept, and `retire --undo` brings it back",
+                "pair a was retired",
+            ),
+            (
+                "there is no result to judge yet; first: mocban -C p run",
+                "there is no result to judge yet",
+            ),
+            ("use `x`", "use x"),
+            ("a (b", "a (b"),
+        ] {
+            assert_eq!(without_commands(text), plain);
+        }
+    }
+
+    #[test]
+    fn an_error_names_no_command_in_either_language() {
+        let error = ProjectError::from(Refusal::Damaged(
+            "a row; `check --repair` mends it".to_owned(),
+        ));
+        let sentence = Sentence::of_error(&error, Path::new("p"));
+        for language in Language::ALL {
+            let text = sentence.text(language);
+            assert!(text.contains(" p ") && !text.contains('`'), "{text}");
+        }
+        assert!(sentence.text(Language::English).contains("Check now"));
+        assert!(
+            sentence
+                .text(Language::Vietnamese)
+                .contains("Kiểm tra ngay")
+        );
+        let error = ProjectError::from(Refusal::Usage("a = 7 is too large".to_owned()));
+        let sentence = Sentence::of_error(&error, Path::new("p"));
+        assert_eq!(
+            sentence.text(Language::Vietnamese),
+            "Chương trình báo: a = 7 is too large"
+        );
+    }
+}

@@ -1,0 +1,219 @@
+//! What the app says to people without a terminal: in both languages, and with buttons instead of commands.
+
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+
+use crate::app::{act, app, open_app, text, with_project};
+use crate::block_view::finished_block;
+use crate::check::sql;
+use crate::page::{Page, read_project};
+use crate::waiting::pause;
+use mocban::store::Project;
+
+/// Reads a page again until a text is on it.
+fn wait_for(page: &Page, path: &str, part: &str) -> String {
+    let deadline = Instant::now() + Duration::from_mins(1);
+    loop {
+        let html = text(&page.get(path));
+        if html.contains(part) {
+            return html;
+        }
+        assert!(
+            Instant::now() < deadline,
+            "{part} is not on the page: {html}"
+        );
+        pause();
+    }
+}
+
+#[test]
+fn no_page_names_a_command_or_an_option() {
+    let (_dir, page) = with_project();
+    for path in [
+        "/",
+        "/p/p/",
+        "/p/p/report/numbers",
+        "/p/p/review",
+        "/p/p/review/agreement",
+        "/p/p/export",
+        "/p/p/health",
+        "/import",
+        "/p/nowhere/",
+    ] {
+        for language in ["en", "vi"] {
+            let html = text(&page.get(&format!("{path}?language={language}")));
+            for command in ["`", "mocban run", "mocban import", "mocban check", " --"] {
+                assert!(
+                    !html.contains(command),
+                    "{path} {language} has {command}: {html}"
+                );
+            }
+        }
+    }
+    let numbers = text(&page.get("/p/p/report/numbers?language=vi"));
+    assert!(
+        numbers.contains("15 trên 15 cặp đã được căn chỉnh"),
+        "{numbers}"
+    );
+    assert!(
+        numbers.contains("Chưa ai đánh giá kết quả nào"),
+        "{numbers}"
+    );
+    assert!(!numbers.contains("lang=\"en\""), "{numbers}");
+    let english = text(&page.get("/p/p/report/numbers?language=en"));
+    assert!(english.contains("All 15 pairs are aligned"), "{english}");
+}
+
+#[test]
+fn a_refused_action_is_explained_in_the_language_of_the_page() {
+    let (_dir, page) = with_project();
+    for (language, expected) in [
+        ("en", "700000 is not a number of pairs from 1 to 1024"),
+        ("vi", "700000 không phải là số cặp từ 1 đến 1024"),
+    ] {
+        page.get(&format!("/?language={language}"));
+        let jobs = json!({"jobs": "700000", "which": "all"});
+        let reply = act(&page, "/p/p/actions/run", &jobs, |_| {});
+        assert_eq!(
+            (reply.status, reply.json()["error"].as_str()),
+            (422, Some(expected))
+        );
+    }
+    let wrong = act(
+        &page,
+        "/p/p/actions/retire",
+        &json!({"pair": "nobody"}),
+        |_| {},
+    );
+    let error = wrong.json()["error"].to_string();
+    assert!(
+        error.contains("Chương trình báo: ") && error.contains("nobody"),
+        "{error}"
+    );
+}
+
+#[test]
+fn damage_is_mended_by_a_button() {
+    let (dir, page) = with_project();
+    let project = Project::open(&dir.path().join("p")).expect("a project");
+    sql(
+        &project,
+        "UPDATE metric_result SET result_hash = zeroblob(32) WHERE pair = 1 AND metric = 'relief'",
+    );
+    let done = "data-task=\"done\"";
+    act(
+        &page,
+        "/p/p/actions/check",
+        &json!({"what": "check"}),
+        |_| {},
+    );
+    let found = wait_for(&page, "/p/p/health", done);
+    assert!(found.contains("Damage was found. Press Repair"), "{found}");
+    assert!(
+        found.contains("pairs whose metrics differ from their result: 1"),
+        "{found}"
+    );
+    let vietnamese = text(&page.get("/p/p/health?language=vi"));
+    assert!(vietnamese.contains("Hãy bấm Sửa chữa"), "{vietnamese}");
+    assert!(
+        vietnamese.contains("cặp có số đo khác với kết quả: 1"),
+        "{vietnamese}"
+    );
+    page.get("/?language=en");
+    act(
+        &page,
+        "/p/p/actions/check",
+        &json!({"what": "repair"}),
+        |_| {},
+    );
+    let mended = wait_for(&page, "/p/p/health", "All damage was mended. Press Align");
+    assert!(mended.contains(done), "{mended}");
+    act(
+        &page,
+        "/p/p/actions/check",
+        &json!({"what": "check"}),
+        |_| {},
+    );
+    wait_for(&page, "/p/p/health", "files were checked. All are sound.");
+}
+
+#[test]
+fn another_method_is_said_to_replace_the_results() {
+    let (_dir, page) = with_project();
+    let asked = |value: &str, language: &str| {
+        text(&page.get(&format!(
+            "/p/p/settings?key=pipeline.method&value={value}&language={language}"
+        )))
+    };
+    let sentence = "The results of the other method would be replaced. To keep both, import the pairs into a second project.";
+    let english = asked("paper", "en");
+    assert!(english.contains(sentence), "{english}");
+    let vietnamese = asked("paper", "vi");
+    assert!(
+        vietnamese.contains("nhập các cặp vào một dự án thứ hai"),
+        "{vietnamese}"
+    );
+    assert!(!asked("default", "en").contains(sentence));
+    let other = text(&page.get("/p/p/settings?key=register.min_confidence&value=0.4"));
+    assert!(!other.contains(sentence), "{other}");
+}
+
+#[test]
+fn blocks_are_counted_on_the_page_of_the_run() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    finished_block(dir.path());
+    let page = open_app(dir.path());
+    let english = text(&page.get("/p/p/"));
+    assert!(english.contains("1 of 1 done"), "{english}");
+    let vietnamese = text(&page.get("/p/p/?language=vi"));
+    assert!(vietnamese.contains("xong 1 trên 1"), "{vietnamese}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_that_fails_later_says_why_on_its_page() {
+    use rustix::process::{Pid, Signal, kill_process};
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let hold = dir.path().join("hold");
+    let mut command = app(dir.path());
+    command.args(["--lang", "en"]);
+    command.env("MOCBAN_HOLD_AT", "register:computed:1");
+    command.env("MOCBAN_HOLD_FILE", &hold);
+    let page = Page::of(&mut command).entered();
+    sql(
+        &project,
+        "DELETE FROM stage_result WHERE pair = 1; UPDATE job SET stage = 0, status = 0 WHERE pair = 1",
+    );
+    let reply = act(
+        &page,
+        "/p/p/actions/run",
+        &json!({"jobs": "1", "which": "all"}),
+        |_| {},
+    );
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    let deadline = Instant::now() + Duration::from_mins(1);
+    while !hold.exists() {
+        assert!(Instant::now() < deadline, "the run is not held");
+        pause();
+    }
+    // The run has begun, so its start has succeeded.
+    let running = wait_for(&page, "/p/p/", "id=\"stop\"");
+    assert!(!running.contains("failed-run"), "{running}");
+    let id = running.split(", process ").nth(1).expect("its process");
+    let id: String = id.chars().take_while(char::is_ascii_digit).collect();
+    let id = Pid::from_raw(id.parse().expect("a number")).expect("an id");
+    kill_process(id, Signal::KILL).expect("killed");
+    let failed = wait_for(&page, "/p/p/", "id=\"failed-run\"");
+    assert!(
+        failed.contains("The run ended before its work was done (signal: 9"),
+        "{failed}"
+    );
+    assert!(failed.contains("Press Align to go on."), "{failed}");
+    let vietnamese = text(&page.get("/p/p/?language=vi"));
+    assert!(
+        vietnamese.contains("Hãy bấm Căn chỉnh để chạy tiếp."),
+        "{vietnamese}"
+    );
+}
