@@ -338,7 +338,9 @@ labelKeys();
 
 try {
   // An answer that is stored while the queue is read would be in neither of the two.
-  await queue.load(requests.requests).finally(() => requests.start());
+  await queue.load(requests.requests).finally(() => {
+    requests.start();
+  });
   ui.saveState(requests.pendingCount, null);
   ui.faultShortage(queue.faultShortage);
   await show();

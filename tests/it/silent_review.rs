@@ -12,7 +12,7 @@ use crate::browser::Browser;
 use crate::cli::mocban;
 use crate::lab::Lab;
 use crate::page::{Page, answer, read_project, review};
-use crate::review_browser::{PLAIN, current_verdicts, enter, judge, saved, shown};
+use crate::review_browser::{PLAIN, current_verdicts, enter, judge, ready, saved, shown};
 use crate::review_load::begun_answer;
 use crate::silent_server::Suspended;
 
@@ -176,3 +176,33 @@ const LOG_FETCHES: &str = "
         if (['api/answer', 'api/queue'].includes(path)) window.fetches.push(`${path} has replied`);
         return response;
     };";
+
+/// A page that is read again shows its item although its answer cannot be stored.
+#[test]
+fn a_page_with_an_answer_that_cannot_be_stored_is_shown() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::start(&project, "lan", &PLAIN);
+    let tab = enter(&browser, &page, [1024, 768]);
+    tab.before_scripts(REFUSE_ANSWERS);
+    tab.eval(LEAVE_AN_ANSWER);
+    tab.reload();
+    ready(&tab);
+    tab.wait("document.getElementById('saved').textContent === '1 not saved'");
+    assert!(current_verdicts(&project, "lan").is_empty());
+}
+
+/// Script that leaves an answer to the first item as one that is not saved yet.
+const LEAVE_AN_ANSWER: &str = "fetch('api/queue').then((reply) => reply.json()).then(({ items }) => {
+    const body = { event: crypto.randomUUID(), item: items[0].id, verdict: 'pass', reason: null, note: null };
+    sessionStorage.setItem('mocban-pending:lan', JSON.stringify([{ path: 'api/answer', body }]));
+})";
+
+/// Script with which every answer fails at the server.
+const REFUSE_ANSWERS: &str = "
+    const plain = window.fetch;
+    window.fetch = async (path, options) =>
+        path === 'api/answer' ? new Response('{}', { status: 503 }) : plain(path, options);";
