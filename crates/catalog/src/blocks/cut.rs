@@ -22,7 +22,7 @@ use crate::queue::retired;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::records::similar_names;
 use crate::{Catalog, Result};
-use mocban_core::domain::{BlockName, PairId, PairName, RetireCause, Stage};
+use mocban_core::domain::{BlockId, BlockName, PairId, PairName, RetireCause, Stage};
 
 /// What the cut of a block changed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -78,30 +78,55 @@ impl Catalog {
         characters: Vec<NewCharacter>,
     ) -> Result<CutReply> {
         let done = (lease, vec![stage]);
-        in_transaction!(self, |conn| { finish(conn, &done, &characters).await })
+        // Other writers need not wait while the names of all pairs are read. Ids grow, and no pair is renamed, so the
+        // transaction reads only newer pairs.
+        let mut conn = self.read_conn().await?;
+        let last = similar_names::last_pair(&mut conn).await?;
+        let new = new_names(&mut conn, done.0.unit, &characters).await?;
+        let taken = similar_names::taken(&mut conn, done.0.unit, &new, 0).await?;
+        drop(conn);
+        if let Some(taken) = taken {
+            return Ok(CutReply::NameTaken(taken));
+        }
+        in_transaction!(self, |conn| {
+            finish(conn, &done, &characters, last).await
+        })
     }
+}
+
+/// Returns the names of the pairs that a block does not have yet.
+async fn new_names(
+    conn: &mut Conn,
+    block: BlockId,
+    found: &[NewCharacter],
+) -> Result<Vec<PairName>> {
+    let name: BlockName = query_scalar(NAME)
+        .bind(block.0)
+        .fetch_one(&mut *conn)
+        .await?;
+    let own: Vec<PairName> = query_scalar(OWN)
+        .bind(block.0)
+        .fetch_all(&mut *conn)
+        .await?;
+    let own: BTreeSet<PairName> = own.into_iter().collect();
+    let rows = pair_rows(&name, found)?.into_iter();
+    let names = rows.map(|cut| cut.row.name);
+    Ok(names.filter(|name| !own.contains(name)).collect())
 }
 
 async fn finish(
     conn: &mut Conn,
     done: &LeasedCheckpoints<BlockJob>,
     found: &[NewCharacter],
+    last: i64,
 ) -> Result<CutReply> {
     let (lease, stages) = done;
     let at = stages.last().map_or(0, |last| last.at);
     let name = query_scalar(NAME).bind(lease.unit.0);
     let name: BlockName = name.fetch_one(&mut *conn).await?;
     let rows = pair_rows(&name, found)?;
-    let names: Vec<PairName> = rows.iter().map(|cut| cut.row.name.clone()).collect();
-    let own: Vec<PairName> = query_scalar(OWN)
-        .bind(lease.unit.0)
-        .fetch_all(&mut *conn)
-        .await?;
-    let own: BTreeSet<PairName> = own.into_iter().collect();
-    // Names that the block has already are its own.
-    if names.iter().any(|name| !own.contains(name))
-        && let Some(taken) = similar_names::taken(conn, lease.unit, &names).await?
-    {
+    let new = new_names(conn, lease.unit, found).await?;
+    if let Some(taken) = similar_names::taken(conn, lease.unit, &new, last).await? {
         return Ok(CutReply::NameTaken(taken));
     }
     if !checkpoint::store(conn, done, &mut uncounted()).await? {

@@ -114,14 +114,17 @@ async fn refuse_similar(conn: &mut Conn, new: i64, known: i64) -> Result<()> {
     Ok(())
 }
 
-/// Returns a pair that was not cut from a block and whose name differs at most in case from one of these.
+/// Returns a pair after `after` that was not cut from a block and whose name differs at most in case from one of these.
 pub(crate) async fn taken(
     conn: &mut Conn,
     block: BlockId,
     names: &[PairName],
+    mut after: i64,
 ) -> Result<Option<PairName>> {
+    if names.is_empty() {
+        return Ok(None);
+    }
     let folded: HashSet<String> = names.iter().map(PairName::folded).collect();
-    let mut after = 0;
     loop {
         let page = query_as(OTHERS).bind(block.0).bind(after);
         let page: Vec<NamedPair> = page.fetch_all(&mut *conn).await?;
