@@ -1,6 +1,7 @@
 //! Writes and reads the artifacts of the stages of a block.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Instant;
 
 use crate::block_stages::{BlockArtifacts, BlockStageError};
 use mocban_core::domain::{
@@ -18,6 +19,8 @@ pub(crate) struct StageArtifacts<'a> {
     written: Mutex<ArtifactSet>,
     /// Artifacts for the pack.
     packed: Mutex<Vec<NewArtifact>>,
+    /// When the first file was written.
+    began: OnceLock<Instant>,
 }
 
 impl<'a> StageArtifacts<'a> {
@@ -29,17 +32,19 @@ impl<'a> StageArtifacts<'a> {
             stage,
             written: Mutex::default(),
             packed: Mutex::default(),
+            began: OnceLock::new(),
         }
     }
 
-    /// Returns the artifacts that were written, by role. Stores the pack.
-    pub(crate) fn finish(self) -> Result<ArtifactSet, BlockStageError> {
+    /// Stores the pack. Returns the artifacts that were written, by role, and when the first write began.
+    pub(crate) fn finish(self) -> Result<(ArtifactSet, Instant), BlockStageError> {
+        let began = *self.began.get_or_init(Instant::now);
         let written = self.written.into_inner();
         let mut written = written.unwrap_or_else(PoisonError::into_inner);
         let packed = self.packed.into_inner();
         let packed = packed.unwrap_or_else(PoisonError::into_inner);
         if packed.is_empty() {
-            return Ok(written);
+            return Ok((written, began));
         }
         failpoint::hit(self.stage, Point::Written, Some(self.block));
         let locations = self.project.write_pack(&packed).map_err(unwritten)?;
@@ -48,12 +53,15 @@ impl<'a> StageArtifacts<'a> {
                 artifact.pack = Some(location);
             }
         }
-        Ok(written)
+        Ok((written, began))
     }
 
     /// Writes an artifact, or keeps it for the pack.
     fn store(&self, file: NewArtifact) -> Result<(), BlockStageError> {
         let on_written = || failpoint::hit(self.stage, Point::Written, Some(self.block));
+        if !self.project.has_packs() || self.stage == BlockStage::Cut {
+            self.began.get_or_init(Instant::now);
+        }
         if !self.project.has_packs() {
             let files = std::slice::from_ref(&file);
             return (self.project.write_artifacts(files, &on_written)).map_err(unwritten);

@@ -56,7 +56,7 @@ pub(crate) struct ComputedBlockStage {
     pub(crate) output: BlockStageOutput,
     pub(crate) files: ArtifactSet,
     pub(crate) ms: u64,
-    /// When the computation began, during which its files are written.
+    /// When the write of its files began.
     pub(crate) began: Instant,
 }
 

@@ -184,7 +184,7 @@ async fn compute(
     stage: BlockStage,
     earlier: Vec<BlockStageRecord>,
 ) -> Result<ComputedBlockStage, Interruption> {
-    let began = Instant::now();
+    let begun = Instant::now();
     let (sources, read) = (block.sources.clone(), block.inputs.clone());
     let points = block.work.control_points.clone();
     let points = points.filter(|points| read.have(points));
@@ -200,9 +200,9 @@ async fn compute(
         Ok((output, artifacts.finish()?))
     })
     .await?;
-    let ms = began.elapsed().as_millis() as u64;
+    let ms = begun.elapsed().as_millis() as u64;
     match outcome {
-        Ok((output, files)) => Ok(ComputedBlockStage {
+        Ok((output, (files, began))) => Ok(ComputedBlockStage {
             output,
             files,
             ms,
