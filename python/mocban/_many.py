@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from . import _native as _rust
 from ._alignment import Alignment, aligned, metric_names
-from ._errors import Error, InputError
+from ._errors import Cancelled, Error, InputError
 from ._inputs import Mesh, Print
 from ._settings import Settings, settings_of
 
@@ -86,6 +86,8 @@ class _Work:
     def run(self, names: tuple[str, ...] | None, chosen: Settings, cancel: _rust.NativeCancel) -> None:
         try:
             self.result = aligned(self.mesh, self.image, names, chosen, cancel=cancel)
+        except Cancelled as failure:  # of another pair, or of all
+            self.failure = failure
         except Error as error:
             self.result = error
         except BaseException as failure:  # raised again by the thread that iterates
@@ -93,6 +95,12 @@ class _Work:
         finally:
             self.mesh = self.image = None
             self.done.set()
+
+    def take(self) -> Alignment | Error:
+        """Return the result, and forget it."""
+        result, self.result = self.result, None
+        assert result is not None
+        return result
 
     def held_bytes(self) -> int:
         """Return an estimate of the memory that the pair takes, or its result."""
@@ -155,13 +163,13 @@ def _results(
                 if held is None:
                     try:
                         held = _next(pairs)
+                        if held is not None and max_bytes is not None:
+                            held.estimate = _estimate(held.mesh, held.image, chosen)
                     except Exception as error:  # raised again after the results of the pairs before it
-                        failure = error
+                        held, failure = None, error
                     if held is None:
                         more = False
                         break
-                    if max_bytes is not None:
-                        held.estimate = _estimate(held.mesh, held.image, chosen)
                 if max_bytes is not None:
                     taken = sum(work.held_bytes() for work in waiting)
                     if taken and taken + held.estimate > max_bytes:
@@ -182,12 +190,8 @@ def _results(
                 pass
             if first.failure is not None:
                 raise first.failure
-            key, result = first.key, first.result
-            assert result is not None
             # The caller decides how long the result stays in memory.
-            del first
-            yield key, result
-            del result
+            yield first.key, first.take()
     finally:
         stopped = True
         cancel.cancel()

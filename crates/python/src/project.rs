@@ -99,7 +99,8 @@ impl NativeProject {
     }
 
     /// Runs a function of the project library until it ends or a signal comes, which drops its future and cancels its
-    /// computations: transactions are rolled back, and outputs are not replaced.
+    /// computations: a transaction is rolled back unless its commit has begun, and outputs are not
+    /// replaced.
     fn outcome<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
         &self,
         py: Python<'_>,
@@ -323,22 +324,26 @@ impl NativeProject {
             unit: mesh_unit(py, unit)?,
         };
         let files = [
-            ("mesh", Some(&block.mesh)),
-            ("page", Some(&block.page)),
-            ("labels", block.labels.as_ref()),
+            ("mesh", Some(block.mesh.clone())),
+            ("page", Some(block.page.clone())),
+            ("labels", block.labels.clone()),
         ];
-        for (what, path) in files {
-            let missing = path.filter(|path| py.detach(|| matches!(path.try_exists(), Ok(false))));
-            if let Some(path) = missing {
-                let text = format!(
-                    "{} is not there; give the file of the {what}",
-                    path.display()
-                );
-                return Err(raise(py, "InputNotFound", "not_found", &text, Some(path)));
-            }
-        }
-        self.simple(py, |location, hearing| async move {
+        let imported = self.outcome(py, |location, hearing| async move {
             stored_block::import(block, &location, &hearing).await
+        })?;
+        imported.map_err(|error| {
+            // The import also finds files by other forms of their names.
+            let gone = |path: &PathBuf| py.detach(|| matches!(path.try_exists(), Ok(false)));
+            let mut files = files.iter();
+            let found = files.find_map(|(what, path)| Some((what, path.clone().filter(&gone)?)));
+            let Some((what, path)) = found else {
+                return self.failure(py, &error);
+            };
+            let text = format!(
+                "{} is not there; give the file of the {what}",
+                path.display()
+            );
+            raise(py, "InputNotFound", "not_found", &text, Some(&path))
         })
     }
 
