@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::exit::Refusal;
 use super::input_paths::in_existing_form;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
-use mocban_core::domain::{ErrorCode, FileKind, sanitize};
+use mocban_core::domain::{ErrorCode, FileKind, pointer_of, sanitize};
 use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::workbook::{is_workbook, read_sheet};
 use mocban_store::{
@@ -21,12 +21,8 @@ const MAX_LIST_BYTES: u64 = 512 << 20;
 pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     let bytes = read_file_or_pipe(&in_existing_form(path), MAX_LIST_BYTES)
         .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))?;
-    let kind = FileKind::of(&bytes[..bytes.len().min(HEAD_BYTES)]);
-    if kind == FileKind::LfsPointer {
-        let text = format!(
-            "{} is {kind} and does not hold the file; fetch the file with `git lfs pull`",
-            path.display()
-        );
+    if FileKind::of(&bytes[..bytes.len().min(HEAD_BYTES)]) == FileKind::LfsPointer {
+        let text = format!("{} {}", path.display(), pointer_of("file"));
         return Err(Refusal::Usage(text));
     }
     Ok(bytes)

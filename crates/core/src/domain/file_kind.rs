@@ -118,6 +118,14 @@ const GLTF: FileKind = FileKind::OtherMesh("a glTF scene");
 /// Bytes at the beginning and the end of a container that are searched for the name of its content.
 const SEARCHED_BYTES: usize = 1 << 16;
 
+/// Says that a file is a pointer of Git LFS and not what is `needed`, and what to do.
+pub fn pointer_of(needed: &str) -> String {
+    format!(
+        "is {} and does not hold the {needed}; fetch the {needed} with `git lfs pull`",
+        FileKind::LfsPointer
+    )
+}
+
 impl FileKind {
     /// Returns the type of a file that begins with these bytes.
     pub fn of(bytes: &[u8]) -> Self {
@@ -220,9 +228,7 @@ impl FileKind {
     /// Says that a file of this type is not what is `needed`, which files of the `formats` that are read hold.
     pub(crate) fn refusal(self, needed: &str, formats: &str, advice: Option<String>) -> String {
         if self == Self::LfsPointer {
-            return format!(
-                "the file is {self} and does not hold the {needed}; fetch the {needed} with `git lfs pull`"
-            );
+            return format!("the file {}", pointer_of(needed));
         }
         let advice = advice.map_or(String::new(), |advice| format!(": {advice}"));
         format!("the file is {self}; {formats} are read{advice}")

@@ -1,7 +1,7 @@
 //! Errors of the reader of labels.
 
 use super::message::{boxes, for_count, list, quoted};
-use mocban_core::domain::{FileKind, sanitize};
+use mocban_core::domain::{pointer_of, sanitize};
 
 /// Maximum number of characters of a reason, which may quote the file.
 const MAX_REASON: usize = 300;
@@ -31,10 +31,7 @@ pub enum LabelsProblem {
         limit: u64,
     },
     /// The file is a pointer of Git LFS.
-    #[error(
-        "the file is {} and does not hold the labels; fetch the labels with `git lfs pull`",
-        FileKind::LfsPointer
-    )]
+    #[error("the file {}", pointer_of("labels"))]
     Pointer,
     /// The file is not text in UTF-8.
     #[error("the file is {0}; labels are {FORMATS}, in UTF-8")]

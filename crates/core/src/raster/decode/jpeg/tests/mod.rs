@@ -162,14 +162,14 @@ fn cmyk(stored: [u8; 4]) -> Vec<u8> {
         let average = i32::from(value) - 128;
         let size = 32 - average.unsigned_abs().leading_zeros() as usize;
         let coded = if average < 0 { average - 1 } else { average } & ((1 << size) - 1);
-        bits += &format!("{size:04b}");
+        bits.extend([format!("{size:04b}")]);
         if size > 0 {
-            bits += &format!("{coded:0size$b}");
+            bits.extend([format!("{coded:0size$b}")]);
         }
         // There is no other coefficient.
         bits.push('0');
     }
-    while bits.len() % 8 != 0 {
+    while !bits.len().is_multiple_of(8) {
         bits.push('1');
     }
     let bytes = bits.as_bytes().chunks(8);
