@@ -373,7 +373,7 @@ fn backup_overwrites_only_a_backup() {
         ("../thesis.docx", "not a backup"),
         ("catalog.sqlite", "is a file of a project"),
         ("mocban.toml", "is a file of a project"),
-        ("artifacts", "is a directory"),
+        ("artifacts", "belongs to the results of a project"),
     ] {
         let refused = mocban(project.dir(), &["backup", place]).expect(2);
         assert!(refused.err.contains(says), "{place}: {}", refused.err);

@@ -6,7 +6,7 @@ use crate::page::read_project;
 use crate::snapshots::assert_call;
 
 /// The sentence of `run` and `run --dry-run`.
-const SENTENCE: &str = "the results of the other method would be replaced; to keep both, import the pairs into a second project, and compare the two with `report --compare`";
+const SENTENCE: &str = "this run replaces the results of the other method; to keep both, stop it now, import the pairs into a second project, and compare the two with `report --compare`";
 
 #[test]
 fn a_run_with_another_method_says_that_two_methods_want_two_projects() {

@@ -31,6 +31,28 @@ fn every_command_makes_the_folder_of_its_output() {
         at(&project, &[args, &[output.as_str()]].concat()).expect(0);
         assert!(Path::new(&output).exists(), "{output}");
     }
+    // Commands that make a project or need none.
+    let project = project.dir().display().to_string();
+    let input = |name: &str| format!("{project}/data/{name}");
+    let [mesh, print] = ["meshes/upright-0000.ply", "prints/upright-0000.jpg"].map(input);
+    let list = input("manifest.csv");
+    let [demo, align, restored, imported, backup] = [
+        "l/demo",
+        "m/align",
+        "n/restored",
+        "o/imported",
+        "e/b.sqlite",
+    ]
+    .map(new);
+    for (args, output) in [
+        (&["demo", "--pairs", "1", "--no-run", &demo][..], &demo),
+        (&["align", &mesh, &print, "-o", &align], &align),
+        (&["restore", &backup, &restored], &restored),
+        (&["-C", &imported, "import", &list], &imported),
+    ] {
+        mocban(dir.path(), args).expect(0);
+        assert!(Path::new(output).exists(), "{output}");
+    }
 }
 
 #[test]

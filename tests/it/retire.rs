@@ -210,8 +210,8 @@ fn the_block_of_a_list_stands_for_its_pairs() {
         assert!(retired.err.contains(text), "{}", retired.err);
     }
     assert_eq!(pairs_and_retired(dir.path()), [1, 2]);
-    let undo = retired.next();
-    assert!(undo[0].ends_with("retire --undo 'Ván 01'"), "{undo:?}");
+    // Undo of the block would also bring back `a`, which was retired before.
+    assert_eq!(retired.next(), [""; 0]);
     // A list does not bring back what a person retired.
     at(&["import", "pairs.csv", "--allow-missing"]).expect(0);
     assert_eq!(pairs_and_retired(dir.path()), [1, 2]);
@@ -232,7 +232,8 @@ fn a_cut_block_stands_for_its_pairs_and_a_later_run_leaves_them_retired() {
         ["characters", "retired"].map(|key| number(&block[key]))
     };
     assert_eq!((pairs_and_retired(dir.path()), block()), ([6, 0], [6, 0]));
-    at(&["retire", "b1"]).expect(0);
+    let undo = at(&["retire", "b1"]).expect(0).next();
+    assert!(undo[0].ends_with("retire --undo b1"), "{undo:?}");
     let is_out = || {
         assert_eq!((pairs_and_retired(dir.path()), block()), ([0, 6], [0, 6]));
         let status = at(&["status", "--json"]).expect(0).json();

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use crate::own_files::project_role;
+use crate::own_files::{is_project, project_role};
 use mocban_catalog::{Catalog, CatalogError, NewCatalog};
 use mocban_store::Project;
 
@@ -20,7 +20,9 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
 /// Refuses the folder of a new project among the files of another one, and a new folder whose name begins or ends with
 /// white space, because it looks like another one.
 pub fn check_new_folder(dir: &Path) -> Result<(), Refusal> {
-    if let Some(reason) = project_role(dir) {
+    if !is_project(dir)
+        && let Some(reason) = project_role(dir)
+    {
         let shown = dir.display();
         let text = format!("{shown} {reason}; name another folder for the new project");
         return Err(Refusal::Usage(text));

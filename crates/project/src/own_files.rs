@@ -25,8 +25,10 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
 pub(crate) fn project_role(path: &Path) -> Option<&'static str> {
     let real = real_path(path);
     let name = real.file_name().unwrap_or_default().to_string_lossy();
-    let is_known = name.starts_with(CATALOG_FILE)
-        || [SETTINGS_FILE, "run.lock", "run.members"].contains(&&*name);
+    // Copies such as `catalog.sqlite.bak` are not files of the project.
+    let rest = name.strip_prefix(CATALOG_FILE);
+    let is_catalog = rest.is_some_and(|rest| ["", "-wal", "-shm", "-journal"].contains(&rest));
+    let is_known = is_catalog || [SETTINGS_FILE, "run.lock", "run.members"].contains(&&*name);
     // The parent of a bare file name is empty.
     let folder = Path::new(".").join(real.parent().unwrap_or(&real));
     if is_known && is_project(&folder) {
@@ -64,7 +66,7 @@ fn is_among_results(real: &Path) -> bool {
 }
 
 /// Returns whether a folder has a catalog, or settings, which may name a catalog on a server.
-fn is_project(folder: &Path) -> bool {
+pub(crate) fn is_project(folder: &Path) -> bool {
     [CATALOG_FILE, SETTINGS_FILE]
         .iter()
         .any(|name| folder.join(name).exists())

@@ -20,7 +20,8 @@ pub struct RetireOutcome {
     pub warnings: Vec<String>,
 }
 
-/// Takes pairs out of every count; the id of a block stands for the pairs that it has now. A process that works on one of them stores nothing more of it.
+/// Takes pairs out of every count; the id of a block stands for the pairs that it has now. A process that works on one of
+/// them stores nothing more of it.
 pub async fn retire(typed: &[String], location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
     let names = selection::known_pairs_of(&catalog, typed).await?;

@@ -16,8 +16,11 @@ use mocban_core::domain::ErrorCode;
 use mocban_runner::{self as runner, RunOptions, RunPlan, RunSummary, Stop};
 use mocban_store::{Project, ProjectStorage};
 
-/// What a run with another method than before does to the results.
+/// What a run with another method than before would do to the results.
 pub const TWO_METHODS: &str = "the results of the other method would be replaced; to keep both, import the pairs into a second project, and compare the two with `report --compare`";
+
+/// What a run with another method than before does to the results.
+pub const REPLACES_METHOD: &str = "this run replaces the results of the other method; to keep both, stop it now, import the pairs into a second project, and compare the two with `report --compare`";
 
 /// Longest time for looking at the roots of inputs before a run.
 const ROOT_CHECK: Duration = Duration::from_secs(5);
@@ -117,7 +120,7 @@ impl PreparedRun {
         // The run itself reports what cannot be read.
         let changes = runner::changes_method(catalog, &self.config.stages, &self.options).await;
         if changes.unwrap_or(false) {
-            warn(listener, TWO_METHODS);
+            warn(listener, REPLACES_METHOD);
         }
         let ended = runner::run(
             project,

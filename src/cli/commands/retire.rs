@@ -49,7 +49,7 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
     }
     if args.undo {
         context.next("run");
-    } else if let [typed] = args.pairs.as_slice() {
+    } else if let ([typed], 0) = (args.pairs.as_slice(), others) {
         context.next(&format!("retire --undo {}", shell_quoted(typed)));
     }
     Ok(ExitCode::Done)
