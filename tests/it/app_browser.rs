@@ -150,7 +150,7 @@ pub(crate) fn looks_right(
         match axe {
             Some(axe) => {
                 tab.eval(&format!("{axe}; null"));
-                no_violation(&tab, &what);
+                no_violation(tab, &what);
             }
             None => tab.screenshot(&what),
         }

@@ -23,7 +23,7 @@ fn only_pairs_of_low_confidence_are_listed_the_least_confident_first() {
     let ids = ["right", "wrong-0", "wrong-1", "wrong-2"];
     for (id, [mesh, print]) in ids.into_iter().zip([[0, 0], [0, 1], [1, 2], [2, 0]]) {
         let [mesh, print] = [meshes[mesh].display(), prints[print].display()];
-        list += &format!("{id},{mesh},{print}\n");
+        list.extend([format!("{id},{mesh},{print}\n")]);
     }
     fs::write(dir.path().join("pairs.csv"), list).expect("written");
     let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());

@@ -12,5 +12,6 @@
 
 pub mod app;
 pub mod local_server;
+mod on_thread;
 pub mod review;
 pub mod view;

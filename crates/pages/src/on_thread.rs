@@ -6,7 +6,7 @@ use mocban_project::ProjectResult;
 use mocban_project::error::TaskStopped;
 
 /// Runs a future on a blocking thread and waits for its result. The futures that open a catalog are not `Send`.
-pub(super) async fn on_thread<T, F>(work: impl FnOnce() -> F + Send + 'static) -> ProjectResult<T>
+pub(crate) async fn on_thread<T, F>(work: impl FnOnce() -> F + Send + 'static) -> ProjectResult<T>
 where
     T: Send + 'static,
     F: Future<Output = ProjectResult<T>>,

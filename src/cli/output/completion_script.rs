@@ -89,12 +89,12 @@ const ZSH_NAMES: &str = r#"_mocban_names() {
 }
 "#;
 
-const FISH_NAMES: &str = r#"
+const FISH_NAMES: &str = r"
 function __mocban_names
     set -l words (commandline -opc) (commandline -ct)
     $words[1] completions fish -- $words[2..-1] 2>/dev/null
 end
-"#;
+";
 
 /// Returns the lines with which fish completes names after the commands that take them.
 fn fish_names(command: &Command) -> String {
@@ -147,7 +147,7 @@ const POWERSHELL_NAMES: &str = r#"    param($wordToComplete, $commandAst, $curso
     }
 "#;
 
-const ELVISH_NAMES: &str = r#"
+const ELVISH_NAMES: &str = r"
 var mocban-arguments~ = $edit:completion:arg-completer[mocban]
 set edit:completion:arg-completer[mocban] = {|@words|
     var names = []
@@ -162,7 +162,7 @@ set edit:completion:arg-completer[mocban] = {|@words|
         mocban-arguments $@words
     }
 }
-"#;
+";
 
 /// Lets zsh complete names for the arguments that are pairs or blocks, and keeps the whole command line for it.
 fn with_zsh_names(script: &str) -> String {

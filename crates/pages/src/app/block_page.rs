@@ -11,15 +11,17 @@ use super::address::encoded;
 use super::blocks_page::state_badge;
 use super::components::{NavSection, action_form, frame, grouped, score};
 use super::failure::{AppFailure, AppResult};
-use super::on_thread::on_thread;
 use super::pass_on::{pass_on, path_below};
 use super::projects::OpenProject;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
+use crate::on_thread::on_thread;
 use crate::view::{BlockPoints, open_block};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
-use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
+use mocban_core::domain::{
+    BlockCharacterState, BlockName, BlockStage, FailureClass, JobStatus, one_line,
+};
 use mocban_system::time_text::{duration, local};
 use serde_json::Value;
 
@@ -53,7 +55,7 @@ pub(super) async fn page(
 }
 
 /// Passes a request on to the pages with the pictures of a block and with its correction. The block is read again whenever
-/// one of these pages is opened.
+/// its pictures are opened; the correction reads it again by itself.
 pub(super) async fn pages(
     State(state): State<Arc<AppState>>,
     Path(parts): Path<Vec<String>>,
@@ -65,15 +67,14 @@ pub(super) async fn pages(
     };
     let open = state.open(key).await?;
     let id = [open.key.as_str(), block, ""].map(str::to_owned);
-    if matches!(path_below(&request), "" | "correct") {
+    if path_below(&request).is_empty() {
         state.blocks.close(&id);
     }
-    let router = match state.blocks.get(&id, &open) {
-        Some(router) => router,
-        None => {
-            let opened = opened(&state, &open, block).await?;
-            state.blocks.keep(id, &open, opened)
-        }
+    let router = if let Some(router) = state.blocks.get(&id, &open) {
+        router
+    } else {
+        let opened = opened(&state, &open, block).await?;
+        state.blocks.keep(id, &open, opened)
     };
     pass_on(router, access, request).await
 }
@@ -133,12 +134,16 @@ fn warnings(detail: &BlockDetail) -> impl Iterator<Item = &str> {
 fn ways(visit: &Visit, detail: &BlockDetail) -> Markup {
     let has = |stage| detail.stages.iter().any(|one| one.stage == stage);
     let state = &detail.state;
+    let is_refused = has(BlockStage::Face)
+        && state.failure.as_ref().is_some_and(|stored| {
+            stored.stage == BlockStage::Align && stored.failure.class == FailureClass::NoSolution
+        });
     html! {
         section.actions {
             @if has(BlockStage::Align) {
                 a.button href="view/" { (visit.t("Scan and page over each other", "Xem bản quét chồng lên trang in")) }
             }
-            @if has(BlockStage::Face) {
+            @if has(BlockStage::Align) || is_refused {
                 a.button href="view/correct" { (visit.t("Align by places you choose", "Căn chỉnh theo các điểm tự chọn")) }
             }
             @if state.status == JobStatus::Quarantined {

@@ -5,14 +5,16 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::sentence::Sentence;
+use mocban_core::domain::UnixMillis;
+use mocban_project::location::now;
 
 /// The failures by the folder of the project.
 #[derive(Debug, Clone, Default)]
-pub(super) struct FailedRuns(Arc<Mutex<BTreeMap<PathBuf, Sentence>>>);
+pub(super) struct FailedRuns(Arc<Mutex<BTreeMap<PathBuf, (UnixMillis, Sentence)>>>);
 
 impl FailedRuns {
-    /// Returns why the last run of a project failed, if it did.
-    pub(super) fn last(&self, dir: &Path) -> Option<Sentence> {
+    /// Returns when the last run of a project failed and why, if it did.
+    pub(super) fn last(&self, dir: &Path) -> Option<(UnixMillis, Sentence)> {
         self.lock().get(dir).cloned()
     }
 
@@ -20,12 +22,12 @@ impl FailedRuns {
     pub(super) fn set(&self, dir: &Path, why: Option<Sentence>) {
         let mut failed = self.lock();
         match why {
-            Some(why) => failed.insert(dir.to_owned(), why),
+            Some(why) => failed.insert(dir.to_owned(), (now(), why)),
             None => failed.remove(dir),
         };
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<PathBuf, Sentence>> {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<PathBuf, (UnixMillis, Sentence)>> {
         // Each change is a single insertion or removal.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

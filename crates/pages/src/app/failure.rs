@@ -72,7 +72,7 @@ impl AppFailure {
 
 impl From<ProjectError> for AppFailure {
     fn from(error: ProjectError) -> Self {
-        Self::of(error, Path::new("."))
+        Self::of(error, Path::new(Sentence::UNKNOWN_FOLDER))
     }
 }
 

@@ -23,7 +23,7 @@ use mocban_project::ProjectResult;
 use mocban_project::backup::backup;
 use mocban_project::check::check;
 use mocban_project::location::Location;
-use mocban_runner::check::{CheckOptions, Kind};
+use mocban_runner::check::{CheckOptions, CheckSummary, Kind};
 use mocban_system::platform;
 
 /// Path of the backup in a project.
@@ -49,7 +49,7 @@ pub(super) async fn page(
             @if let Some(free) = platform::free_bytes(&open.dir) { p.muted { (free_space(&visit, free)) } }
             section.card {
                 h2 { (visit.t("Check", "Kiểm tra")) }
-                p { (visit.t("Reads every file of results and compares it with the catalog. Nothing is changed, and a run may go on.", "Đọc mọi tệp kết quả và so với danh mục. Không thay đổi gì, và vẫn có thể chạy.")) }
+                p { (visit.t("A check reads every file of results and compares it with the catalog. It changes nothing, and a run may go on. A repair needs the project for itself.", "Kiểm tra đọc mọi tệp kết quả và so với danh mục, không thay đổi gì, và vẫn có thể chạy. Sửa chữa cần dự án không có lần chạy nào.")) }
                 (action_form("actions/check", "inline", &html! {
                     button.primary #check name="what" value="check" { (visit.t("Check now", "Kiểm tra ngay")) }
                     button #repair name="what" value="repair" data-confirm=(visit.t("Mend what can be mended? Damaged results are computed again by the next run.", "Sửa những gì sửa được? Kết quả bị hỏng sẽ được tính lại trong lần chạy sau.")) { (visit.t("Repair", "Sửa chữa")) }
@@ -102,21 +102,7 @@ async fn check_lines(location: Location, repair: bool) -> ProjectResult<TaskLine
     };
     let summary = check(options, &location, &()).await?;
     let (pairs, files) = (summary.pairs, summary.files);
-    let (english, vietnamese) = match (summary.found(), summary.left()) {
-        (0, _) => ("All are sound.", "Tất cả đều tốt."),
-        (_, 0) => (
-            "All damage was mended. Press Align on the page Run to compute missing results again. The damage was:",
-            "Mọi hư hỏng đã được sửa. Hãy bấm Căn chỉnh ở trang Căn chỉnh để tính lại kết quả bị thiếu. Các hư hỏng là:",
-        ),
-        _ if repair => (
-            "Some damage cannot be mended: put your last backup in place of the catalog. The damage was:",
-            "Có hư hỏng không sửa được: hãy thay danh mục bằng bản sao lưu gần nhất. Các hư hỏng là:",
-        ),
-        _ => (
-            "Damage was found. Press Repair to mend what can be mended:",
-            "Có hư hỏng. Hãy bấm Sửa chữa để sửa những gì sửa được:",
-        ),
-    };
+    let [english, vietnamese] = conclusion(&summary, repair);
     let mut lines = vec![[
         format!("{pairs} pairs and {files} files were checked. {english}"),
         format!("Đã kiểm tra {pairs} cặp và {files} tệp. {vietnamese}"),
@@ -153,6 +139,44 @@ async fn check_lines(location: Location, repair: bool) -> ProjectResult<TaskLine
         }
     }
     Ok(lines)
+}
+
+/// Returns what the findings of a check or a repair mean, and what to do.
+fn conclusion(summary: &CheckSummary, repair: bool) -> [&'static str; 2] {
+    let needs_backup = [Kind::Database, Kind::Row, Kind::Reference]
+        .iter()
+        .any(|kind| (summary.damage.get(kind)).is_some_and(|found| found.left > 0));
+    match (summary.found(), summary.left()) {
+        (0, _) => ["All are sound.", "Tất cả đều tốt."],
+        (_, 0) if summary.repaired.requeued + summary.repaired.requeued_blocks == 0 => [
+            "All damage was mended. The damage was:",
+            "Mọi hư hỏng đã được sửa. Các hư hỏng là:",
+        ],
+        (_, 0) => [
+            "All damage was mended. Press Align on the page Run to compute missing results again. The damage was:",
+            "Mọi hư hỏng đã được sửa. Hãy bấm Căn chỉnh ở trang Căn chỉnh để tính lại kết quả bị thiếu. Các hư hỏng là:",
+        ],
+        _ if summary.lacks_most_files() => [
+            "Most files of results are missing. Connect their disk and check again. The damage is:",
+            "Thiếu hầu hết các tệp kết quả. Hãy nối lại ổ đĩa chứa chúng rồi kiểm tra lại. Các hư hỏng là:",
+        ],
+        _ if repair && needs_backup => [
+            "Some damage cannot be mended: put your last backup in place of the catalog. The damage was:",
+            "Có hư hỏng không sửa được: hãy thay danh mục bằng bản sao lưu gần nhất. Các hư hỏng là:",
+        ],
+        _ if repair => [
+            "Some files cannot be read or are missing. Put them back, then press Repair again. The damage was:",
+            "Một số tệp không đọc được hoặc bị thiếu. Hãy đưa chúng về chỗ cũ rồi bấm Sửa chữa lần nữa. Các hư hỏng là:",
+        ],
+        _ if summary.is_repairable() => [
+            "Damage was found. Press Repair to mend what can be mended:",
+            "Có hư hỏng. Hãy bấm Sửa chữa để sửa những gì sửa được:",
+        ],
+        _ => [
+            "Damage was found that Repair cannot mend:",
+            "Có hư hỏng mà Sửa chữa không sửa được:",
+        ],
+    }
 }
 
 /// Returns the label of a number of findings of a kind in Vietnamese.

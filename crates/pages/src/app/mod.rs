@@ -19,7 +19,6 @@ mod folder_picker;
 mod health_page;
 mod home;
 mod import_page;
-mod on_thread;
 mod open_pages;
 mod pair_page;
 mod pair_query;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::failure::{AppFailure, AppResult};
-use super::on_thread::on_thread;
+use crate::on_thread::on_thread;
 use mocban_catalog::Catalog;
 use mocban_project::location::Location;
 use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};

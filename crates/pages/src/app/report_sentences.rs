@@ -6,8 +6,7 @@ use super::visit::Visit;
 use crate::review::Language;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric, sanitize};
 use mocban_report::{Basis, Comparison, MetricRow, Report};
-use mocban_results::number_format::NumberStyle;
-use mocban_results::number_format::{format_interval, format_p, format_share};
+use mocban_results::number_format::{NumberStyle, format_interval, format_p, format_share};
 use mocban_results::stats::SIGNIFICANCE_LEVEL;
 
 /// Returns the paragraphs of the answer.
@@ -49,11 +48,11 @@ fn aligned(report: &Report) -> String {
     let row = report.row(ThresholdMetric::DEFAULT);
     if let Some(low) = row.and_then(|row| row.low_confidence) {
         let (low, least) = (grouped(low), MetricOutcome::LOW_CONFIDENCE);
-        text += &format!(", trong đó {low} có độ tin cậy dưới {least}");
+        text.extend([format!(", trong đó {low} có độ tin cậy dưới {least}")]);
     }
     for (number, what) in [(progress.failed, "bị lỗi"), (progress.pending, "chưa xong")] {
         if number > 0 {
-            text += &format!("; {} {what}", grouped(number));
+            text.extend([format!("; {} {what}", grouped(number))]);
         }
     }
     text + "."
@@ -80,7 +79,7 @@ fn accuracy(visit: &Visit, report: &Report) -> String {
     let found = rows.find_map(known);
     found.unwrap_or_else(|| {
         if report.has_verdicts() {
-            "Chưa có Acc, vì người đánh giá chưa chắc về mọi kết quả.".to_owned()
+            "Chưa có Acc, vì người đánh giá không chắc về kết quả nào đã đánh giá.".to_owned()
         } else {
             "Chưa ai đánh giá kết quả nào, nên chưa có Acc: hãy bắt đầu ở trang Đánh giá."
                 .to_owned()

@@ -65,14 +65,14 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/p/{project}/actions/retry", post(run_actions::retry))
         .route("/p/{project}/actions/retire", post(run_actions::retire))
         .route("/p/{project}/actions/review", post(review_page::start))
-        .layer(middleware::from_fn_with_state(
-            Arc::clone(&state),
-            failure_page::explain,
-        ))
-        // The pages of a review or a block explain their failures themselves.
         .route(&format!("{block}/view/"), any(block_page::pages))
         .route(&format!("{block}/view/{{*rest}}"), any(block_page::pages))
         .route(&format!("{review}/"), any(review_page::pages))
         .route(&format!("{review}/{{*rest}}"), any(review_page::pages))
+        // Replies of the pages of a review or a block pass unchanged.
+        .layer(middleware::from_fn_with_state(
+            Arc::clone(&state),
+            failure_page::explain,
+        ))
         .with_state(state)
 }

@@ -16,8 +16,10 @@ use super::sentence::{Sentence, without_commands};
 use super::state::AppState;
 use super::visit::Visit;
 use crate::review::Language;
-use mocban_catalog::{PairFilter, PairOrder, PairResults, StatusCounts, WorkerRecord, WorkerState};
-use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, one_line};
+use mocban_catalog::{
+    Catalog, PairFilter, PairOrder, PairResults, StatusCounts, WorkerRecord, WorkerState,
+};
+use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, UnixMillis, one_line};
 use mocban_project::block_status::BlockStatus;
 use mocban_project::failures::may_succeed_unchanged;
 use mocban_project::location::now;
@@ -47,8 +49,16 @@ struct RunState {
 }
 
 impl RunState {
-    async fn read(open: &OpenProject, failed_run: Option<Sentence>) -> ProjectResult<Self> {
+    async fn read(
+        open: &OpenProject,
+        failed: Option<(UnixMillis, Sentence)>,
+    ) -> ProjectResult<Self> {
         let (catalog, location) = (&open.catalog, open.location());
+        let failed_run = match failed {
+            // Another run, also in a terminal, has begun since.
+            Some((at, _)) if began_since(catalog, at).await? => None,
+            failed => failed.map(|(_, why)| why),
+        };
         let settings = location.settings()?;
         // Read before the counts: a run that ends in between leaves no leases.
         let running = is_running(&open.project, catalog, now()).await?;
@@ -117,13 +127,20 @@ impl RunState {
     }
 }
 
+/// Returns whether a run has begun since a time.
+async fn began_since(catalog: &Catalog, at: UnixMillis) -> ProjectResult<bool> {
+    let workers = catalog.workers(at).await?;
+    Ok(workers.iter().any(|worker| worker.started > at))
+}
+
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let read = RunState::read(&open, state.failed_runs.last(&open.dir)).await;
+    let failed = state.failed_runs.last(&open.dir);
+    let read = RunState::read(&open, failed).await;
     let run =
         read.map_err(|error: ProjectError| super::failure::AppFailure::of(error, &open.dir))?;
     let body = html! {
@@ -264,8 +281,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
             }
             button.primary #start name="which" value="all" disabled[is_idle] {
                 (visit.t("Align", "Căn chỉnh")) " "
-                @if blocks > 0 { (grouped(blocks)) " " (visit.t("blocks and", "ván và")) " " }
-                (grouped(waiting)) " " (visit.t("pairs", "cặp"))
+                (to_align(visit, blocks, waiting))
             }
             @if failed > 0 {
                 button name="which" value="failed" { (visit.t("Try failed pairs again", "Thử lại các cặp lỗi")) }
@@ -276,6 +292,20 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
                 a href="review" { (visit.t("Review", "Đánh giá")) } }
         }
     }
+}
+
+/// Returns the number of blocks and pairs that a run would align, such as `1 block and 3 pairs`.
+fn to_align(visit: &Visit, blocks: u64, pairs: u64) -> String {
+    let counted = |number: u64, one, many, vietnamese| {
+        let name = visit.t(if number == 1 { one } else { many }, vietnamese);
+        (number > 0).then(|| format!("{} {name}", grouped(number)))
+    };
+    let parts = [
+        counted(blocks, "block", "blocks", "ván"),
+        counted(pairs, "pair", "pairs", "cặp"),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    parts.join(visit.t(" and ", " và "))
 }
 
 fn disk(visit: &Visit, open: &OpenProject) -> Markup {

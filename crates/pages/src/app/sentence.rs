@@ -13,6 +13,9 @@ pub(super) struct Sentence {
 }
 
 impl Sentence {
+    /// Stands for a folder that is not known where an error occurs.
+    pub(super) const UNKNOWN_FOLDER: &'static str = ".";
+
     /// Makes a sentence of its texts.
     pub(super) fn new(english: impl Into<String>, vietnamese: impl Into<String>) -> Self {
         Self {
@@ -30,14 +33,18 @@ impl Sentence {
 
     /// Explains an error of the project in a folder, and names the page or button that helps.
     pub(super) fn of_error(error: &ProjectError, dir: &Path) -> Self {
-        let at = dir.display();
+        let [at, place] = if dir == Path::new(Self::UNKNOWN_FOLDER) {
+            ["this project", "dự án này"].map(str::to_owned)
+        } else {
+            [(); 2].map(|()| dir.display().to_string())
+        };
         match error.code() {
             ErrorCode::ProjectInUse => Self::new(
                 format!(
                     "another run works on {at}: wait for its end, or press Stop on the page Run"
                 ),
                 format!(
-                    "một lần chạy khác đang làm việc với {at}: hãy chờ, hoặc bấm Dừng ở trang Căn chỉnh"
+                    "một lần chạy khác đang làm việc với {place}: hãy chờ, hoặc bấm Dừng ở trang Căn chỉnh"
                 ),
             ),
             ErrorCode::Locked => Self::new(
@@ -45,45 +52,47 @@ impl Sentence {
                     "another program has used the catalog in {at} for too long: close it and try again"
                 ),
                 format!(
-                    "một chương trình khác dùng danh mục trong {at} quá lâu: hãy đóng nó rồi thử lại"
+                    "một chương trình khác dùng danh mục trong {place} quá lâu: hãy đóng nó rồi thử lại"
                 ),
             ),
             ErrorCode::NotWritable => Self::new(
                 format!("{at} cannot be written to: check its rights and its disk, and try again"),
-                format!("không ghi được vào {at}: hãy kiểm tra quyền và ổ đĩa, rồi thử lại"),
+                format!("không ghi được vào {place}: hãy kiểm tra quyền và ổ đĩa, rồi thử lại"),
             ),
             ErrorCode::DiskFull => Self::new(
                 format!(
                     "the disk of {at} is full: free some space and try again, everything stored so far is safe"
                 ),
                 format!(
-                    "đĩa của {at} đã đầy: hãy giải phóng chỗ trống rồi thử lại, mọi thứ đã lưu vẫn an toàn"
+                    "đĩa của {place} đã đầy: hãy giải phóng chỗ trống rồi thử lại, mọi thứ đã lưu vẫn an toàn"
                 ),
             ),
             ErrorCode::Damaged => Self::new(
                 format!("the catalog in {at} is damaged: press Check now on the page Health"),
-                format!("danh mục trong {at} bị hỏng: hãy bấm Kiểm tra ngay ở trang Tình trạng"),
+                format!("danh mục trong {place} bị hỏng: hãy bấm Kiểm tra ngay ở trang Tình trạng"),
             ),
             ErrorCode::DamagedFile | ErrorCode::NotACatalog | ErrorCode::LogLost => Self::new(
                 format!("the catalog in {at} cannot be read: put your last backup in its place"),
-                format!("không đọc được danh mục trong {at}: hãy thay bằng bản sao lưu gần nhất"),
+                format!(
+                    "không đọc được danh mục trong {place}: hãy thay bằng bản sao lưu gần nhất"
+                ),
             ),
             ErrorCode::NoProject => Self::new(
                 format!("there is no project in {at}: make one on the page Import"),
-                format!("không có dự án trong {at}: hãy tạo dự án ở trang Nhập dữ liệu"),
+                format!("không có dự án trong {place}: hãy tạo dự án ở trang Nhập dữ liệu"),
             ),
             ErrorCode::Unavailable => Self::new(
                 format!(
                     "the server of the project in {at} does not answer: check the network and try again"
                 ),
                 format!(
-                    "máy chủ của dự án trong {at} không trả lời: hãy kiểm tra mạng rồi thử lại"
+                    "máy chủ của dự án trong {place} không trả lời: hãy kiểm tra mạng rồi thử lại"
                 ),
             ),
             ErrorCode::TooManyFiles => Self::new(
                 format!("too many files are open to read {at}: close other programs and try again"),
                 format!(
-                    "có quá nhiều tệp đang mở để đọc {at}: hãy đóng các chương trình khác rồi thử lại"
+                    "có quá nhiều tệp đang mở để đọc {place}: hãy đóng các chương trình khác rồi thử lại"
                 ),
             ),
             _ => Self::of_program(&error.text(dir)),
@@ -118,8 +127,12 @@ pub(super) fn without_commands(text: &str) -> String {
 }
 
 fn names_command(clause: &str) -> bool {
-    let is_option = |word: &str| word.trim_start_matches('(').starts_with("--");
-    clause.contains('`') || clause.contains("mocban ") || clause.split(' ').any(is_option)
+    // A path may also contain the name of the program.
+    let is_command = |word: &str| {
+        let word = word.trim_start_matches('(');
+        word == "mocban" || word.len() > 2 && word.starts_with("--")
+    };
+    clause.contains('`') || clause.split(' ').any(is_command)
 }
 
 /// Removes the remarks in brackets that name commands.
@@ -164,6 +177,10 @@ mod tests {
             (
                 "there is no result to judge yet; first: mocban -C p run",
                 "there is no result to judge yet",
+            ),
+            (
+                "/home/lan/mocban data/list.csv:3: the id a is there twice; rename it",
+                "/home/lan/mocban data/list.csv:3: the id a is there twice; rename it",
             ),
             ("use `x`", "use x"),
             ("a (b", "a (b"),

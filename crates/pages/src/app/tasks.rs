@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::failure::{AppFailure, AppResult};
-use super::on_thread::on_thread;
 use super::projects::OpenProject;
 use super::sentence::Sentence;
+use crate::on_thread::on_thread;
 use mocban_project::ProjectResult;
 use mocban_project::location::Location;
 

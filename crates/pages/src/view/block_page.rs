@@ -9,7 +9,8 @@ use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse as _, Redirect, Response};
 use axum::routing::get;
 
-use super::correction_page::{self, CorrectionStore};
+use super::block_points::BlockPoints;
+use super::correction_page;
 use super::page;
 use super::scan_page::jpeg;
 use crate::local_server::WorkThread;
@@ -66,7 +67,7 @@ struct ShownBlock {
 pub(super) fn block_page(
     block: &BlockName,
     view: Option<BlockView>,
-    store: impl CorrectionStore,
+    store: BlockPoints,
     language: Option<Language>,
 ) -> Router {
     let work = Arc::new(WorkThread::default());

@@ -1,15 +1,25 @@
 //! Reads a block for its correction, and stores its control points in the catalog.
 
-use tokio::runtime::Handle;
+use std::path::PathBuf;
 
-use super::correction_page::{CorrectionStore, PointsSaved};
+use crate::on_thread::on_thread;
 use mocban_catalog::{Catalog, ControlPointsChange};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, replaced_file};
-use mocban_project::error::TaskStopped;
 use mocban_project::location::Location;
 use mocban_project::{ProjectError, ProjectResult};
 use mocban_store::Project;
+
+/// What became of points that were to be saved.
+#[derive(Debug)]
+pub(super) enum PointsSaved {
+    /// They are saved.
+    Saved,
+    /// Another page, which may belong to another process, has saved points since this one was opened.
+    OthersSaved,
+    /// The block has another file than the one on which the points were tried.
+    FileReplaced(PathBuf),
+}
 
 /// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays
 /// open does not hold it.
@@ -30,15 +40,28 @@ impl BlockPoints {
         }
     }
 
-    /// Runs work on a thread for long work, and returns the sentence that explains an error. Futures that open a catalog are
-    /// not `Send`.
-    async fn on_thread<T: Send + 'static>(
+    /// Reads the block. Returns a sentence if that fails.
+    pub(super) async fn read(&self) -> Result<BlockCorrection, String> {
+        let own = self.clone();
+        let read = on_thread(async move || own.read_block().await).await;
+        read.map_err(|error| error.text(&self.location.dir))
+    }
+
+    /// Stores control points, or removes the stored ones, if these still have the hash `read`. Returns a sentence if that
+    /// fails.
+    pub(super) async fn save(
         &self,
-        work: impl FnOnce() -> ProjectResult<T> + Send + 'static,
-    ) -> Result<T, String> {
-        let done = tokio::task::spawn_blocking(work).await;
-        let done = done.map_err(|error| TaskStopped(error).into()).flatten();
-        done.map_err(|error| error.text(&self.location.dir))
+        read: Option<ContentHash>,
+        points: Option<ControlPoints>,
+    ) -> Result<PointsSaved, String> {
+        let own = self.clone();
+        let stored = on_thread(async move || own.store(read, points.as_ref()).await).await;
+        stored.map_err(|error| error.text(&self.location.dir))
+    }
+
+    /// Returns the command that aligns the block again; `None` if a page has a button for it.
+    pub(super) fn next_command(&self) -> Option<String> {
+        self.next_command.clone()
     }
 
     async fn read_block(&self) -> ProjectResult<BlockCorrection> {
@@ -81,27 +104,5 @@ impl BlockPoints {
                 Err(ProjectError::unexpected(text))
             }
         }
-    }
-}
-
-impl CorrectionStore for BlockPoints {
-    async fn read(&self) -> Result<BlockCorrection, String> {
-        let own = self.clone();
-        self.on_thread(move || Handle::current().block_on(own.read_block()))
-            .await
-    }
-
-    async fn save(
-        &self,
-        read: Option<ContentHash>,
-        points: Option<ControlPoints>,
-    ) -> Result<PointsSaved, String> {
-        let own = self.clone();
-        self.on_thread(move || Handle::current().block_on(own.store(read, points.as_ref())))
-            .await
-    }
-
-    fn next_command(&self) -> Option<String> {
-        self.next_command.clone()
     }
 }

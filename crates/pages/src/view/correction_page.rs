@@ -1,6 +1,6 @@
 //! The page on which a person chooses the same places on the relief and on the page of a block.
 
-use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::body::Bytes;
@@ -13,6 +13,7 @@ use axum::{Extension, Json, Router};
 use serde::Deserialize;
 use serde_json::json;
 
+use super::block_points::{BlockPoints, PointsSaved};
 use super::page;
 use super::scan_page::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
@@ -20,39 +21,15 @@ use crate::review::Language;
 use mocban_core::domain::{BlockName, BlockSide, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
 
-/// Reads a block for its correction, and stores the control points.
-pub trait CorrectionStore: Send + Sync + 'static {
-    /// Reads the block. Returns a sentence if that fails.
-    fn read(&self) -> impl Future<Output = Result<BlockCorrection, String>> + Send;
-
-    /// Stores control points, or removes the stored ones, if these still have the hash `read`. Returns a sentence if that
-    /// fails.
-    fn save(
-        &self,
-        read: Option<ContentHash>,
-        points: Option<ControlPoints>,
-    ) -> impl Future<Output = Result<PointsSaved, String>> + Send;
-
-    /// Returns the command that aligns the block again; `None` if a page has a button for it.
-    fn next_command(&self) -> Option<String>;
-}
-
-/// What became of points that were to be saved.
-#[derive(Debug)]
-pub enum PointsSaved {
-    /// They are saved.
-    Saved,
-    /// Another page, which may belong to another process, has saved points since this one was opened.
-    OthersSaved,
-    /// The block has another file than the one on which the points were tried.
-    FileReplaced(PathBuf),
-}
+/// Number of the last alignment that was tried on any page: if a block is opened again, a page that was opened before does not
+/// take the alignment of another page for its own.
+static LAST_TRIED: AtomicU64 = AtomicU64::new(0);
 
 /// The state of the page.
-struct CorrectionState<S> {
+struct CorrectionState {
     block: BlockName,
     language: Option<Language>,
-    store: S,
+    store: BlockPoints,
     work: Arc<WorkThread>,
     /// The block, which is read when the page is opened.
     shown: tokio::sync::Mutex<Option<Arc<BlockCorrection>>>,
@@ -83,12 +60,12 @@ struct RemoveBody {
     saved_hash: Option<ContentHash>,
 }
 
-type CorrectionPage<S> = State<Arc<CorrectionState<S>>>;
+type CorrectionPage = State<Arc<CorrectionState>>;
 
 /// Returns the routes of the page of a block.
-pub(super) fn routes<S: CorrectionStore>(
+pub(super) fn routes(
     block: BlockName,
-    store: S,
+    store: BlockPoints,
     work: Arc<WorkThread>,
     language: Option<Language>,
 ) -> Router {
@@ -101,18 +78,18 @@ pub(super) fn routes<S: CorrectionStore>(
         tried: Mutex::default(),
     };
     Router::new()
-        .route("/correct", get(index::<S>))
-        .route("/correct/block.json", get(block_json::<S>))
-        .route("/correct/face/{side}/{turns}", get(face::<S>))
-        .route("/correct/page", get(page_image::<S>))
-        .route("/correct/overlay/{id}", get(overlay::<S>))
-        .route("/correct/try", post(try_points::<S>))
-        .route("/correct/save", post(save::<S>))
-        .route("/correct/remove", post(remove::<S>))
+        .route("/correct", get(index))
+        .route("/correct/block.json", get(block_json))
+        .route("/correct/face/{side}/{turns}", get(face))
+        .route("/correct/page", get(page_image))
+        .route("/correct/overlay/{id}", get(overlay))
+        .route("/correct/try", post(try_points))
+        .route("/correct/save", post(save))
+        .route("/correct/remove", post(remove))
         .with_state(Arc::new(state))
 }
 
-impl<S: CorrectionStore> CorrectionState<S> {
+impl CorrectionState {
     /// Returns the block, which is read if it was not yet.
     async fn shown(&self) -> Result<Arc<BlockCorrection>, Response> {
         let mut shown = self.shown.lock().await;
@@ -133,9 +110,10 @@ impl<S: CorrectionStore> CorrectionState<S> {
 
     /// Keeps an alignment, and returns its number.
     fn set_tried(&self, alignment: Option<TriedAlignment>) -> u64 {
+        let id = LAST_TRIED.fetch_add(1, Ordering::Relaxed) + 1;
         let mut tried = self.tried.lock().unwrap_or_else(PoisonError::into_inner);
-        *tried = (tried.0 + 1, alignment.map(Arc::new));
-        tried.0
+        *tried = (id, alignment.map(Arc::new));
+        id
     }
 
     /// Stores points, and responds.
@@ -167,12 +145,12 @@ impl<S: CorrectionStore> CorrectionState<S> {
     }
 }
 
-async fn index<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Html<String> {
+async fn index(State(state): CorrectionPage) -> Html<String> {
     Html(page::correction(state.block.as_str(), state.language))
 }
 
-async fn block_json<S: CorrectionStore>(
-    State(state): CorrectionPage<S>,
+async fn block_json(
+    State(state): CorrectionPage,
     Extension(access): Extension<Arc<AccessControl>>,
 ) -> Response {
     // The block may have run, or its files may have changed, since the page was opened before.
@@ -188,31 +166,25 @@ async fn block_json<S: CorrectionStore>(
 }
 
 /// Responds with the relief of a side after a number of quarter turns, clockwise.
-async fn face<S: CorrectionStore>(
-    State(state): CorrectionPage<S>,
-    Path((side, turns)): Path<(String, u8)>,
-) -> Response {
+async fn face(State(state): CorrectionPage, Path((side, turns)): Path<(String, u8)>) -> Response {
     let Ok(side) = side.parse::<BlockSide>() else {
         return StatusCode::NOT_FOUND.into_response();
     };
     image(&state, move |shown| shown.face_jpeg(side, turns)).await
 }
 
-async fn page_image<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response {
+async fn page_image(State(state): CorrectionPage) -> Response {
     image(&state, |shown| Some(shown.page_jpeg())).await
 }
 
-async fn overlay<S: CorrectionStore>(
-    State(state): CorrectionPage<S>,
-    Path(id): Path<u64>,
-) -> Response {
+async fn overlay(State(state): CorrectionPage, Path(id): Path<u64>) -> Response {
     let tried = state.tried(id);
     image(&state, move |_| tried.map(|tried| tried.overlay.clone())).await
 }
 
 /// Aligns from points. An alignment that is accepted is kept for `save`.
-async fn try_points<S: CorrectionStore>(
-    State(state): CorrectionPage<S>,
+async fn try_points(
+    State(state): CorrectionPage,
     body: Result<Json<PointsBody>, JsonRejection>,
 ) -> Response {
     let body = match body {
@@ -239,8 +211,8 @@ async fn try_points<S: CorrectionStore>(
 }
 
 /// Stores the points of an alignment that was tried.
-async fn save<S: CorrectionStore>(
-    State(state): CorrectionPage<S>,
+async fn save(
+    State(state): CorrectionPage,
     body: Result<Json<SaveBody>, JsonRejection>,
 ) -> Response {
     let SaveBody { id, saved_hash } = match body {
@@ -254,13 +226,13 @@ async fn save<S: CorrectionStore>(
         }
         None => refused(
             StatusCode::CONFLICT,
-            "other points were tried meanwhile: try these again before saving them",
+            "the page was opened again, or other points were tried: try these again before saving them",
         ),
     }
 }
 
-async fn remove<S: CorrectionStore>(
-    State(state): CorrectionPage<S>,
+async fn remove(
+    State(state): CorrectionPage,
     body: Result<Json<RemoveBody>, JsonRejection>,
 ) -> Response {
     match body {
@@ -273,8 +245,8 @@ async fn remove<S: CorrectionStore>(
 }
 
 /// Reads the block, and responds with an image that is drawn from it.
-async fn image<S: CorrectionStore>(
-    state: &CorrectionState<S>,
+async fn image(
+    state: &CorrectionState,
     draw: impl FnOnce(&BlockCorrection) -> Option<Vec<u8>> + Send + 'static,
 ) -> Response {
     let shown = match state.shown().await {
