@@ -83,6 +83,9 @@ function update(part, fresh) {
   withFocus(part, () => part.replaceChildren(...fresh.childNodes));
 }
 
+/** Asks for a page; a failure is then explained in one too. */
+const PAGE = { headers: { accept: "text/html" } };
+
 /** Reads the page again and replaces its moving part. Without one, loads the page. */
 async function refresh(mustReload) {
   const part = document.querySelector("[data-live]");
@@ -91,7 +94,7 @@ async function refresh(mustReload) {
     return;
   }
   if (!mustReload && isInUse(part)) return;
-  const response = await fetch(location.href).catch(() => null);
+  const response = await fetch(location.href, PAGE).catch(() => null);
   offline.hidden = response?.ok === true;
   if (!response?.ok) return;
   const page = new DOMParser().parseFromString(await response.text(), "text/html");
@@ -114,7 +117,7 @@ if (live) {
 
 /** Loads the parts of a page that take long. */
 for (const part of document.querySelectorAll("[data-load]")) {
-  const response = await fetch(part.dataset.load).catch(() => null);
+  const response = await fetch(part.dataset.load, PAGE).catch(() => null);
   const text = await response?.text();
   const page = new DOMParser().parseFromString(text ?? "", "text/html");
   const shown = response?.ok ? page.body : page.querySelector("main") ?? page.body;

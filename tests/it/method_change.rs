@@ -5,7 +5,7 @@ use crate::cli::mocban;
 use crate::page::read_project;
 use crate::snapshots::assert_call;
 
-/// The sentence of `run` and `run --dry-run`.
+/// The sentence of `run`.
 const SENTENCE: &str = "this run replaces the results of the other method; to keep both, stop it now, import the pairs into a second project, and compare the two with `report --compare`";
 
 #[test]

@@ -42,7 +42,7 @@ fn written_differently(path: &Path) -> Option<PathBuf> {
 }
 
 /// Returns the path of an existing file or folder whose name has another Unicode form, or the path itself.
-pub(crate) fn in_existing_form(path: &Path) -> PathBuf {
+pub fn in_existing_form(path: &Path) -> PathBuf {
     let is_missing = matches!(path.try_exists(), Ok(false));
     let found = is_missing.then(|| in_any_form(path)).flatten();
     found.unwrap_or_else(|| path.to_owned())

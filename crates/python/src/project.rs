@@ -19,6 +19,7 @@ use mocban_export::{ExportFormat, ExportOptions};
 use mocban_project::events::{Listener, ProjectEvent};
 use mocban_project::import_blocks::ImportedBlock;
 use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
+use mocban_project::input_paths::in_existing_form;
 use mocban_project::location::Location;
 use mocban_project::report::{ReportOptions, report};
 use mocban_project::run::{PreparedRun, options};
@@ -333,7 +334,9 @@ impl NativeProject {
         })?;
         imported.map_err(|error| {
             // The import also finds files by other forms of their names.
-            let gone = |path: &PathBuf| py.detach(|| matches!(path.try_exists(), Ok(false)));
+            let gone = |path: &PathBuf| {
+                py.detach(|| matches!(in_existing_form(path).try_exists(), Ok(false)))
+            };
             let mut files = files.iter();
             let found = files.find_map(|(what, path)| Some((what, path.clone().filter(&gone)?)));
             let Some((what, path)) = found else {

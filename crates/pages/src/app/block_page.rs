@@ -9,7 +9,7 @@ use maud::{Markup, html};
 
 use super::address::encoded;
 use super::blocks_page::state_badge;
-use super::components::{NavSection, action_form, frame, grouped, score};
+use super::components::{NavSection, action_form, frame, grouped, score, stored_message};
 use super::failure::{AppFailure, AppResult};
 use super::pass_on::{pass_on, path_below};
 use super::projects::OpenProject;
@@ -17,6 +17,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
 use crate::on_thread::on_thread;
+use crate::review::Language;
 use crate::view::{BlockPoints, open_block};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{
@@ -66,7 +67,9 @@ pub(super) async fn pages(
         return Err(AppFailure::not_found());
     };
     let open = state.open(key).await?;
-    let id = [open.key.as_str(), block, ""].map(str::to_owned);
+    // Pages keep the language in which they were opened.
+    let language = state.language().map_or("", Language::name);
+    let id = [open.key.as_str(), block, language].map(str::to_owned);
     if path_below(&request).is_empty() {
         state.blocks.close(&id);
     }
@@ -115,7 +118,7 @@ fn state_part(visit: &Visit, detail: &BlockDetail) -> Markup {
         p { (state_badge(visit, state)) }
         @if let Some(stored) = &state.failure {
             div.notice.bad {
-                p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored.failure.message) }
+                p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored_message(&stored.failure.message)) }
                 p { (visit.block_remedy(stored.stage, stored.failure.class)) }
             }
         }
@@ -265,7 +268,7 @@ fn history(visit: &Visit, detail: &BlockDetail) -> Markup {
                     li {
                         (local(attempt.at)) " · " (visit.block_stage(attempt.stage)) " · "
                         @match &attempt.failure {
-                            Some(failure) => span.bad { (visit.class(failure.class)) ": " (failure.message) },
+                            Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(&failure.message)) },
                             None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (duration(ms)) ")" } },
                         }
                     }

@@ -4,6 +4,7 @@ use axum::response::Html;
 use maud::{Markup, html};
 
 use super::address::encoded;
+use super::sentence::without_commands;
 use super::visit::Visit;
 use crate::local_server::document;
 use crate::review::Language;
@@ -153,6 +154,11 @@ pub(super) fn grouped(number: u64) -> String {
         text.push(digit);
     }
     text
+}
+
+/// Returns the message of a stored failure, which is in English, without its commands.
+pub(super) fn stored_message(message: &str) -> Markup {
+    html! { span lang="en" { (one_line(&without_commands(message))) } }
 }
 
 /// Returns a score with three digits, or a dash.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::{FromRequestParts as _, Request, State};
-use axum::http::Method;
+use axum::http::{Method, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 use maud::html;
@@ -15,13 +15,18 @@ use super::failure::AppFailure;
 use super::state::AppState;
 use super::visit::Visit;
 
-/// Makes a page of a failure, or JSON if the request was an action.
+/// Makes a page of a failure, or JSON if the request was an action or comes from a script that reads no page.
 pub(super) async fn explain(
     State(state): State<Arc<AppState>>,
     request: Request,
     next: Next,
 ) -> Response {
-    let is_page = request.method() == Method::GET;
+    let accepted = request.headers().get(header::ACCEPT);
+    let reads_pages = accepted.is_none_or(|kinds| {
+        let kinds = kinds.to_str().unwrap_or_default();
+        kinds.contains("text/html")
+    });
+    let is_page = request.method() == Method::GET && reads_pages;
     let (mut head, body) = request.into_parts();
     let Ok(visit) = Visit::from_request_parts(&mut head, &state).await;
     let response = next.run(Request::from_parts(head, body)).await;

@@ -49,7 +49,7 @@ pub(super) async fn page(
             @if let Some(free) = platform::free_bytes(&open.dir) { p.muted { (free_space(&visit, free)) } }
             section.card {
                 h2 { (visit.t("Check", "Kiểm tra")) }
-                p { (visit.t("A check reads every file of results and compares it with the catalog. It changes nothing, and a run may go on. A repair needs the project for itself.", "Kiểm tra đọc mọi tệp kết quả và so với danh mục, không thay đổi gì, và vẫn có thể chạy. Sửa chữa cần dự án không có lần chạy nào.")) }
+                p { (visit.t("A check reads every file of results and compares it with the catalog. It changes nothing, and a run may go on. A repair needs the project for itself.", "Kiểm tra đọc mọi tệp kết quả và so với danh mục, không thay đổi gì, và vẫn có thể chạy. Chỉ sửa chữa được khi không có lần chạy nào đang diễn ra.")) }
                 (action_form("actions/check", "inline", &html! {
                     button.primary #check name="what" value="check" { (visit.t("Check now", "Kiểm tra ngay")) }
                     button #repair name="what" value="repair" data-confirm=(visit.t("Mend what can be mended? Damaged results are computed again by the next run.", "Sửa những gì sửa được? Kết quả bị hỏng sẽ được tính lại trong lần chạy sau.")) { (visit.t("Repair", "Sửa chữa")) }
@@ -143,9 +143,17 @@ async fn check_lines(location: Location, repair: bool) -> ProjectResult<TaskLine
 
 /// Returns what the findings of a check or a repair mean, and what to do.
 fn conclusion(summary: &CheckSummary, repair: bool) -> [&'static str; 2] {
+    let is_left = |kind: &Kind| {
+        let found = summary.damage.get(kind);
+        found.is_some_and(|found| found.left > 0)
+    };
     let needs_backup = [Kind::Database, Kind::Row, Kind::Reference]
         .iter()
-        .any(|kind| (summary.damage.get(kind)).is_some_and(|found| found.left > 0));
+        .any(is_left);
+    let lacks_files = summary.repaired.not_requeued > 0
+        || [Kind::FileMissing, Kind::FileUnreadable]
+            .iter()
+            .any(is_left);
     match (summary.found(), summary.left()) {
         (0, _) => ["All are sound.", "Tất cả đều tốt."],
         (_, 0) if summary.repaired.requeued + summary.repaired.requeued_blocks == 0 => [
@@ -164,11 +172,15 @@ fn conclusion(summary: &CheckSummary, repair: bool) -> [&'static str; 2] {
             "Some damage cannot be mended: put your last backup in place of the catalog. The damage was:",
             "Có hư hỏng không sửa được: hãy thay danh mục bằng bản sao lưu gần nhất. Các hư hỏng là:",
         ],
-        _ if repair => [
+        _ if repair && lacks_files => [
             "Some files cannot be read or are missing. Put them back, then press Repair again. The damage was:",
             "Một số tệp không đọc được hoặc bị thiếu. Hãy đưa chúng về chỗ cũ rồi bấm Sửa chữa lần nữa. Các hư hỏng là:",
         ],
-        _ if summary.is_repairable() => [
+        _ if needs_backup && !summary.is_repairable() => [
+            "Damage was found that Repair cannot mend: put your last backup in place of the catalog. The damage is:",
+            "Có hư hỏng mà Sửa chữa không sửa được: hãy thay danh mục bằng bản sao lưu gần nhất. Các hư hỏng là:",
+        ],
+        _ if !repair && summary.is_repairable() => [
             "Damage was found. Press Repair to mend what can be mended:",
             "Có hư hỏng. Hãy bấm Sửa chữa để sửa những gì sửa được:",
         ],

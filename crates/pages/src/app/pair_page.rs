@@ -7,7 +7,7 @@ use axum::response::{Html, IntoResponse as _, Response};
 use maud::{Markup, html};
 
 use super::address::encoded;
-use super::components::{NavSection, action_form, frame, score};
+use super::components::{NavSection, action_form, frame, score, stored_message};
 use super::failure::AppResult;
 use super::state::AppState;
 use super::visit::Visit;
@@ -122,7 +122,7 @@ fn state_line(visit: &Visit, overview: &PairOverview) -> Markup {
         }
         @if let Some(stored) = &results.failure {
             div.notice.bad {
-                p { b { (visit.class(stored.failure.class)) } " (" (visit.stage(stored.stage)) "): " (stored.failure.message) }
+                p { b { (visit.class(stored.failure.class)) } " (" (visit.stage(stored.stage)) "): " (stored_message(&stored.failure.message)) }
                 p { (visit.remedy(stored.failure.class)) }
             }
         }
@@ -301,7 +301,7 @@ fn history(visit: &Visit, detail: &PairDetail) -> Markup {
                         li {
                             (local(attempt.at)) " · " (visit.stage(attempt.stage)) " · "
                             @match &attempt.failure {
-                                Some(failure) => span.bad { (visit.class(failure.class)) ": " (failure.message) },
+                                Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(&failure.message)) },
                                 None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (ms) " ms)" } }
                             }
                         }

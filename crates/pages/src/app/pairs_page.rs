@@ -7,7 +7,9 @@ use axum::response::{IntoResponse as _, Redirect, Response};
 use maud::{Markup, html};
 
 use super::address::encoded;
-use super::components::{NavSection, action_form, choice, empty, frame, grouped, score};
+use super::components::{
+    NavSection, action_form, choice, empty, frame, grouped, score, stored_message,
+};
 use super::failure::AppResult;
 use super::pair_query::{PairQuery, cursor_text};
 use super::projects::OpenProject;
@@ -269,7 +271,7 @@ fn table_row(visit: &Visit, query: &PairQuery, pair: &PairResults) -> Markup {
             td.number { (score(scores.map(|scores| scores.ssim))) }
             td.number { (score(scores.map(|scores| scores.dice))) }
             td { (verdict_marks(visit, pair, query.metric)) }
-            td.reason { @if let Some(failure) = failure { (one_line(&failure.message)) } }
+            td.reason { @if let Some(failure) = failure { (stored_message(&failure.message)) } }
         }
     }
 }

@@ -6,15 +6,13 @@ use axum::extract::{Path, State};
 use axum::response::{Html, Response};
 use maud::{Markup, html};
 
-use super::components::{NavSection, empty, frame, grouped, number_table, score};
+use super::components::{NavSection, empty, frame, grouped, number_table, score, stored_message};
 use super::export_page::attachment;
 use super::failure::{AppFailure, AppResult};
 use super::report_sentences::{headline, limits};
-use super::sentence::without_commands;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
-use mocban_core::domain::one_line;
 use mocban_project::report::{ReportOptions, read, report};
 use mocban_report::{MetricRow, Report, ReportFormat};
 use mocban_results::IntervalMethod;
@@ -148,7 +146,7 @@ fn reasons(visit: &Visit, report: &Report) -> Markup {
                 li {
                     a href={ "pairs?view=table&state=failed&class=" (group.class) } { (grouped(group.count)) }
                     " · " (visit.class(group.class))
-                    @if let Some(first) = group.pairs.first() { span.muted lang="en" { " (" (one_line(&without_commands(&first.error))) ")" } }
+                    @if let Some(first) = group.pairs.first() { span.muted { " (" (stored_message(&first.error)) ")" } }
                 }
             } }
         }

@@ -79,7 +79,7 @@ fn accuracy(visit: &Visit, report: &Report) -> String {
     let found = rows.find_map(known);
     found.unwrap_or_else(|| {
         if report.has_verdicts() {
-            "Chưa có Acc, vì người đánh giá không chắc về kết quả nào đã đánh giá.".to_owned()
+            "Chưa có Acc, vì mọi kết quả đã đánh giá đều được ghi là chưa chắc.".to_owned()
         } else {
             "Chưa ai đánh giá kết quả nào, nên chưa có Acc: hãy bắt đầu ở trang Đánh giá."
                 .to_owned()

@@ -7,12 +7,12 @@ use axum::response::Html;
 use maud::{Markup, html};
 
 use super::child_run;
-use super::components::{NavSection, action_form, empty, figure, frame, grouped};
+use super::components::{NavSection, action_form, empty, figure, frame, grouped, stored_message};
 use super::failure::AppResult;
 use super::home::free_space;
 use super::pairs_page::pair_card;
 use super::projects::OpenProject;
-use super::sentence::{Sentence, without_commands};
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::review::Language;
@@ -356,7 +356,7 @@ fn example(pair: &PairResults) -> Markup {
     html! {
         li {
             a href={ "pair/" (super::address::encoded(name)) "/" } { (one_line(name)) }
-            @if let Some(message) = message { ": " span lang="en" { (one_line(&without_commands(message))) } }
+            @if let Some(message) = message { ": " (stored_message(message)) }
         }
     }
 }

@@ -78,16 +78,12 @@ impl Sentence {
                 ),
             ),
             ErrorCode::NoProject => Self::new(
-                format!("there is no project in {at}: make one on the page Import"),
-                format!("không có dự án trong {place}: hãy tạo dự án ở trang Nhập dữ liệu"),
+                "there is no such project any more: make one on the page Import",
+                "dự án này không còn: hãy tạo dự án ở trang Nhập dữ liệu",
             ),
             ErrorCode::Unavailable => Self::new(
-                format!(
-                    "the server of the project in {at} does not answer: check the network and try again"
-                ),
-                format!(
-                    "máy chủ của dự án trong {place} không trả lời: hãy kiểm tra mạng rồi thử lại"
-                ),
+                format!("the server of {at} does not answer: check the network and try again"),
+                format!("máy chủ của {place} không trả lời: hãy kiểm tra mạng rồi thử lại"),
             ),
             ErrorCode::TooManyFiles => Self::new(
                 format!("too many files are open to read {at}: close other programs and try again"),
@@ -205,6 +201,13 @@ mod tests {
                 .text(Language::Vietnamese)
                 .contains("Kiểm tra ngay")
         );
+        let unknown = Sentence::of_error(&error, Path::new(Sentence::UNKNOWN_FOLDER));
+        for (language, place) in Language::ALL
+            .into_iter()
+            .zip(["in this project", "trong dự án này"])
+        {
+            assert!(unknown.text(language).contains(place), "{unknown:?}");
+        }
         let error = ProjectError::from(Refusal::Usage("a = 7 is too large".to_owned()));
         let sentence = Sentence::of_error(&error, Path::new("p"));
         assert_eq!(

@@ -123,7 +123,7 @@ fn a_project_of_blocks_alone_can_be_run() {
     run.is_running = false;
     run.counts.jobs.clear();
     let shown = controls(&visit(Language::English), &run).into_string();
-    assert!(shown.contains("Align 1 block"), "{shown}");
+    assert!(shown.contains("Align 1 block<"), "{shown}");
     assert!(!shown.contains("disabled"), "{shown}");
     run.blocks = BlockStatus(Vec::new());
     let shown = controls(&visit(Language::English), &run).into_string();
