@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::accessible::axe;
 use crate::app::{app, open_app, text};
 use crate::app_browser::{enter, looks_right};
-use crate::block_correction::{Session, printed_side, refused_block, true_points};
+use crate::block_correction::{CorrectionSession, printed_side, refused_block, true_points};
 use crate::block_view::finished_block;
 use crate::browser::Browser;
 use crate::cli::mocban;
@@ -72,7 +72,7 @@ fn a_refused_block_is_aligned_by_places_chosen_on_its_page() {
     assert!(!before.contains("href=\"view/\""), "{before}");
     let opened = page.get(&format!("{BLOCK}view/"));
     assert_eq!(opened.header("location"), Some("correct"));
-    let session = Session::of(page, "/p/p/block/b1/view");
+    let session = CorrectionSession::of(page, "/p/p/block/b1/view");
     let block = session.block();
     let side = &block["sides"][printed_side(dir.path())]["side"];
     let tried = session.tried(side, &true_points(dir.path(), &block));

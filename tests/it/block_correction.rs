@@ -118,14 +118,14 @@ pub(crate) fn true_points(dir: &Path, block: &Value) -> Vec<Value> {
 }
 
 /// A page of the block whose session is open.
-pub(crate) struct Session {
+pub(crate) struct CorrectionSession {
     pub(crate) page: Page,
     /// Address of the block's pages.
     place: &'static str,
     token: String,
 }
 
-impl Session {
+impl CorrectionSession {
     fn open(dir: &Path) -> Self {
         let words = ["-C", "p", "--json", "view", "--no-open", "b1"];
         Self::of(
@@ -190,7 +190,7 @@ fn error(reply: &Reply) -> String {
 
 /// Checks the routes. Stores the points at the end.
 fn check_routes(dir: &Path) {
-    let session = Session::open(dir);
+    let session = CorrectionSession::open(dir);
     let page = &session.page;
     assert_eq!(page.get_path("/correct/block.json").status, 401);
     assert_eq!(page.get("/").header("location"), Some("correct"));
@@ -270,8 +270,8 @@ fn check_routes(dir: &Path) {
 
 /// Checks that a server replaces neither points of another one nor saves points of a file that was replaced.
 fn check_conflicts(dir: &Path) {
-    let [one, other] = [Session::open(dir), Session::open(dir)];
-    let [block, seen] = [&one, &other].map(Session::block);
+    let [one, other] = [CorrectionSession::open(dir), CorrectionSession::open(dir)];
+    let [block, seen] = [&one, &other].map(CorrectionSession::block);
     let (seen, side) = (
         &seen["saved_hash"],
         &block["sides"][printed_side(dir)]["side"],
