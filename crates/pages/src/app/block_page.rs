@@ -9,7 +9,9 @@ use maud::{Markup, html};
 
 use super::address::encoded;
 use super::blocks_page::state_badge;
-use super::components::{NavSection, action_form, frame, grouped, score, stored_message};
+use super::components::{
+    NavSection, action_form, frame, grouped, scan_file, score, stored_message,
+};
 use super::failure::{AppFailure, AppResult};
 use super::pass_on::{pass_on, path_below};
 use super::projects::OpenProject;
@@ -244,8 +246,7 @@ fn files(visit: &Visit, detail: &BlockDetail) -> Markup {
         section {
             h2 { (visit.t("Files", "Các tệp")) }
             dl {
-                dt { (visit.t("Scan", "Bản quét")) } dd { code { (one_line(&attributes.mesh_path)) }
-                    @if let Some(unit) = attributes.unit { " (" (unit) ")" } }
+                (scan_file(visit, &attributes.mesh_path, attributes.unit))
                 dt { (visit.t("Page", "Trang in")) } dd { code { (one_line(&attributes.page_path)) } }
                 dt { (visit.t("Labels", "Nhãn")) } dd {
                     @match &attributes.labels_path {

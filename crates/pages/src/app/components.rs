@@ -8,7 +8,7 @@ use super::sentence::without_commands;
 use super::visit::Visit;
 use crate::local_server::document;
 use crate::review::Language;
-use mocban_core::domain::one_line;
+use mocban_core::domain::{LengthUnit, one_line};
 
 /// A page in the navigation of a project.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,6 +154,13 @@ pub(super) fn grouped(number: u64) -> String {
         text.push(digit);
     }
     text
+}
+
+/// Returns the rows of a list of files with a scan and its unit.
+pub(super) fn scan_file(visit: &Visit, path: &str, unit: Option<LengthUnit>) -> Markup {
+    html! {
+        dt { (visit.t("Scan", "Bản quét")) } dd { code { (one_line(path)) } @if let Some(unit) = unit { " (" (unit) ")" } }
+    }
 }
 
 /// Returns the message of a stored failure, which is in English, without its commands.

@@ -51,8 +51,8 @@ impl OpenPages {
         self.lock().remove(id);
     }
 
-    /// Keeps pages, unless they were opened meanwhile, and returns the kept ones. Those that were not used for longest
-    /// are closed if there are too many.
+    /// Keeps pages, unless they were opened meanwhile, and returns the kept pages. If there are too many, closes the least
+    /// recently used.
     pub(super) fn keep(&self, id: PagesId, project: &Arc<OpenProject>, pages: Router) -> Router {
         let mut kept = self.lock();
         let used = next_use(&kept);

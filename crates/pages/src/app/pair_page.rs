@@ -7,7 +7,7 @@ use axum::response::{Html, IntoResponse as _, Response};
 use maud::{Markup, html};
 
 use super::address::encoded;
-use super::components::{NavSection, action_form, frame, score, stored_message};
+use super::components::{NavSection, action_form, frame, scan_file, score, stored_message};
 use super::failure::AppResult;
 use super::state::AppState;
 use super::visit::Visit;
@@ -279,8 +279,7 @@ fn files(visit: &Visit, detail: &PairDetail) -> Markup {
         section {
             h2 { (visit.t("Files", "Các tệp")) }
             dl {
-                dt { (visit.t("Scan", "Bản quét")) } dd { code { (one_line(&attributes.mesh_path)) }
-                    @if let Some(unit) = attributes.unit { " (" (unit) ")" } }
+                (scan_file(visit, &attributes.mesh_path, attributes.unit))
                 dt { (visit.t("Print", "Bản in")) } dd { code { (one_line(&attributes.print_path)) } }
                 @for (name, value) in &attributes.meta {
                     dt { (one_line(name)) } dd { (one_line(&value.as_str().map_or_else(|| value.to_string(), str::to_owned))) }

@@ -44,8 +44,8 @@ impl QueueOptions {
         words.join(" ")
     }
 
-    /// Returns the arguments with which `review` goes on with this queue. `name` is the reviewer as a shell takes it. What
-    /// has its default value is left out.
+    /// Returns the arguments with which `review` continues this queue. `name` is the reviewer, quoted for a shell. Options with
+    /// their default values are left out.
     pub fn to_continue(&self, name: &str) -> String {
         let mut words = vec![format!("review --reviewer {name}")];
         words.extend(self.metric_words());
@@ -61,7 +61,7 @@ impl QueueOptions {
             ("--duplicates", duplicates, plain.duplicates),
         ] {
             if rate != plain {
-                // A share such as 0.07 has no exact percentage.
+                // A fraction such as 0.07 has no exact percentage.
                 words.push(format!("{option} {}", (1e6 * rate).round() / 1e4));
             }
         }
