@@ -47,7 +47,7 @@ impl Artwork {
         let weight_mm = draw_stroke_weight(size_mm, rng);
         let frame = match crop {
             Crop::Character => SampleFrame::covering(size_mm / 2.0 + MARGIN_MM, STEP_MM),
-            Crop::WideMesh | Crop::WidePrint => {
+            Crop::WideMesh | Crop::WidePrint | Crop::WideRim => {
                 let half_mm = size_mm * (0.5 + WIDE_MARGIN) + MARGIN_MM;
                 SampleFrame::covering(half_mm, WIDE_STEP_MM)
             }
@@ -103,6 +103,7 @@ impl Artwork {
             .map(|[across, down]| [across * column, down * pitch]);
         let (offsets, probability) = match crop {
             Crop::Character => (beside.to_vec(), 0.75),
+            Crop::WideRim => return self.draw_rim(rng),
             Crop::WideMesh | Crop::WidePrint => ([beside, corners].concat(), 1.0),
         };
         for offset in offsets {
@@ -123,6 +124,20 @@ impl Artwork {
         }
         clear_around(&mut neighbours, &self.strokes);
         neighbours
+    }
+
+    /// Draws the uncarved wood around the carved area, as signed distances in mm, positive inside.
+    fn draw_rim(&self, rng: &mut ChaCha8Rng) -> ScalarField {
+        let carved_mm = self.size_mm * rng.random_range(0.1..0.6);
+        let carved = self.stroke_bounds.with_margin(carved_mm);
+        let edge = Noise::draw(rng);
+        ScalarField::from_fn(self.strokes.frame, |point, _, _| {
+            let [du, dv] = [0, 1].map(|k| {
+                let beyond = (carved.min[k] - point[k]).max(point[k] - carved.max[k]);
+                beyond + 0.3 * edge.at(point[0] / 2.0, point[1] / 2.0)
+            });
+            du.max(dv)
+        })
     }
 
     /// Adds a rule on either side of the character, so close that crops contain it.

@@ -6,6 +6,7 @@ use super::draw::{number_within, one_of, within};
 use super::kind::{Base, Crop, DemoKind, NumberRange};
 use super::noise::Noise;
 use super::paper_geometry::PaperGeometry;
+use super::slid_part::SlidPart;
 use super::slow_errors::SlowErrors;
 use super::weathering::Weathering;
 
@@ -33,6 +34,8 @@ pub(super) struct Conditions {
     pub crop: Crop,
     /// Height of neighbours and column rules above the character's tops, mm.
     pub raised_mm: f64,
+    /// The part of the block that slid along a crack, if any did.
+    pub slid: Option<SlidPart>,
 }
 
 /// Errors of a scan beyond those of every scan.
@@ -95,6 +98,7 @@ impl Default for Conditions {
             paper: None,
             crop: Crop::Character,
             raised_mm: 0.0,
+            slid: None,
         }
     }
 }
@@ -132,12 +136,14 @@ impl Conditions {
             paper: PaperGeometry::draw(kind, rng),
             crop: kind.crop,
             raised_mm: 0.0,
+            slid: None,
         };
         // Kinds without these draw no random numbers for them.
         conditions.scan.slow = SlowErrors::draw(kind, rng);
         if kind.raised_mm[1] > 0.0 {
             conditions.raised_mm = within(kind.raised_mm, rng);
         }
+        conditions.slid = SlidPart::draw(kind, rng);
         conditions
     }
 }

@@ -16,6 +16,8 @@ pub(super) enum Base {
     Table,
     /// Parts of a surface behind the block, seen through the holes of the scan.
     SeenThroughHoles,
+    /// One or two other carved pieces beside the block, each with another character.
+    OtherPieces,
 }
 
 /// Which of mesh and print shows all eight neighbouring characters, if either does.
@@ -27,6 +29,8 @@ pub(super) enum Crop {
     WideMesh,
     /// The print shows 3 x 3 characters, the mesh one.
     WidePrint,
+    /// The mesh shows the uncarved wood around the carved area, up to some distance. The print does not.
+    WideRim,
 }
 
 /// Ranges from which the conditions of a pair are drawn.
@@ -82,6 +86,8 @@ pub(super) struct DemoKind {
     pub shrink: NumberRange,
     /// Which of mesh and print shows all neighbours.
     pub crop: Crop,
+    /// Distance by which the part of the block beyond a crack slid along the crack, mm. 0 without a crack.
+    pub slid_mm: NumberRange,
 }
 
 /// A clean block, an ordinary scan and a good print.
@@ -111,6 +117,7 @@ const ORDINARY: DemoKind = DemoKind {
     warp_mm: [0.0, 0.0],
     shrink: [0.0, 0.0],
     crop: Crop::Character,
+    slid_mm: [0.0, 0.0],
 };
 
 /// A moderate mix of wear, dirt, scan errors, uneven ink and deformed sheets.
@@ -292,5 +299,25 @@ pub(super) const MIXED: DemoKind = DemoKind {
     tilt_deg: [0.0, 18.0],
     warp_mm: [0.0, 0.12],
     shrink: [0.0, 0.025],
+    ..ORDINARY
+};
+
+/// A small character, not in the middle of a wide and noisy scan with an uncarved rim.
+pub(super) const WIDE_RIM: DemoKind = DemoKind {
+    noise: [1.0, 5.0],
+    ripple_mm: [0.0, 0.05],
+    crop: Crop::WideRim,
+    ..ORDINARY
+};
+
+/// Several carved pieces in one scan.
+pub(super) const PIECES: DemoKind = DemoKind {
+    bases: &[Base::OtherPieces],
+    ..ORDINARY
+};
+
+/// A crack through the character, one side of which slid and sank.
+pub(super) const SLID: DemoKind = DemoKind {
+    slid_mm: [0.3, 2.0],
     ..ORDINARY
 };

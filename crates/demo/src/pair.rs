@@ -11,6 +11,7 @@ use super::carving::carve;
 use super::conditions::Conditions;
 use super::glyph::Glyphs;
 use super::kind::{Base, Crop};
+use super::other_pieces::add_other_pieces;
 use super::polygon::Polygon;
 use super::print_format::encode_print;
 use super::rendered_print::{PrintFrame, render_print};
@@ -121,6 +122,12 @@ pub(super) fn finish_pair(
     }
     let outline = cut_outline(scene, Crop::WideMesh, rng);
     let mut mesh = scan(block.scanned(), &outline, &style, rng);
+    if let Some(slid) = &scene.conditions.slid {
+        slid.slide(&mut mesh);
+    }
+    if scene.conditions.base == Base::OtherPieces {
+        add_other_pieces(&mut mesh, glyphs, scene, &style, rng);
+    }
     let pose = ScanPose::draw(scene.tier, rng);
     mesh.vertices
         .map_in_place(|vertex| pose.mesh_from_block(vertex));
@@ -145,7 +152,7 @@ pub(super) fn finish_pair(
 fn draw_body(glyphs: &Glyphs, scene: &Scene, rng: &mut ChaCha8Rng) -> BlockBody {
     let depth_mm = scene.conditions.thickness * scene.artwork.size_mm;
     match scene.conditions.base {
-        Base::Ordinary => BlockBody::Open,
+        Base::Ordinary | Base::OtherPieces => BlockBody::Open,
         Base::Foot => BlockBody::foot(depth_mm, rng),
         Base::SecondFace => {
             let back = Scene::draw_with(
@@ -170,6 +177,14 @@ fn draw_body(glyphs: &Glyphs, scene: &Scene, rng: &mut ChaCha8Rng) -> BlockBody 
 /// characters.
 fn cut_outline(scene: &Scene, wide: Crop, rng: &mut ChaCha8Rng) -> Polygon {
     let artwork = &scene.artwork;
+    if scene.conditions.crop == Crop::WideRim && wide == Crop::WideMesh {
+        let mut inner = artwork.stroke_bounds;
+        for k in 0..2 {
+            inner.min[k] -= artwork.size_mm * rng.random_range(0.2..WIDE_MARGIN);
+            inner.max[k] += artwork.size_mm * rng.random_range(0.2..WIDE_MARGIN);
+        }
+        return Polygon::around(inner, 0.0, 1.1, rng);
+    }
     let margin_mm = rng.random_range(0.3..0.75);
     if scene.conditions.crop == wide {
         let margin_mm = WIDE_MARGIN * artwork.size_mm;

@@ -67,7 +67,7 @@ impl PrintFrame {
             100.0 * 4.0_f64.powf(rng.random())
         };
         let longest_px = match scene.conditions.crop {
-            Crop::Character | Crop::WideMesh => longest_px,
+            Crop::Character | Crop::WideMesh | Crop::WideRim => longest_px,
             Crop::WidePrint => longest_px * (1.0 + 2.0 * WIDE_MARGIN),
         };
         let border = [0; 4].map(|_: i32| rng.random_range(0.0..0.02) * longest_px);

@@ -9,6 +9,7 @@ use super::artwork::Artwork;
 use super::conditions::Conditions;
 use super::damage::Damage;
 use super::glyph::Glyphs;
+use super::kind::Crop;
 use super::scalar_field::ScalarField;
 use super::tier::Tier;
 use mocban_core::domain::ContentHash;
@@ -84,7 +85,12 @@ impl Scene {
         } else {
             let lost = conditions.lost;
             let damage = lost.map(|share| Damage::draw_with(share, &artwork, rng));
-            (block_neighbours.clone(), damage.unwrap_or_default())
+            let on_print = if crop == Crop::WideRim {
+                artwork.empty_neighbours()
+            } else {
+                block_neighbours.clone()
+            };
+            (on_print, damage.unwrap_or_default())
         };
         Self {
             id,

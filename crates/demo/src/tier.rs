@@ -69,6 +69,12 @@ pub enum Tier {
     GridPrint,
     /// Several of these at once, most of them milder.
     Mixed,
+    /// A small character in a wide scan with an uncarved rim.
+    WideRim,
+    /// Several carved pieces in one scan; the print shows one.
+    Pieces,
+    /// A crack through the character, one side of which slid and sank.
+    Slid,
     /// All other tiers in turn.
     All,
 }
@@ -81,6 +87,7 @@ enum_names! { pub Tier, "a tier":
     Table = "table", Debris = "debris", Holes = "holes", Dry = "dry",
     Heavy = "heavy", Photo = "photo", Wavy = "wavy", Shrunk = "shrunk",
     Lost = "lost", GridMesh = "grid-mesh", GridPrint = "grid-print", Mixed = "mixed",
+    WideRim = "wide-rim", Pieces = "pieces", Slid = "slid",
     All = "all",
 }
 
@@ -127,6 +134,9 @@ impl Tier {
             Self::GridMesh => &kind::GRID_MESH,
             Self::GridPrint => &kind::GRID_PRINT,
             Self::Mixed => &kind::MIXED,
+            Self::WideRim => &kind::WIDE_RIM,
+            Self::Pieces => &kind::PIECES,
+            Self::Slid => &kind::SLID,
         })
     }
 
@@ -159,7 +169,7 @@ mod tests {
     fn all_takes_every_other_tier_in_turn() {
         let last = Tier::ALL.len() as u64 - 2;
         assert_eq!(Tier::All.tier_and_index(0), (Tier::Upright, 0));
-        assert_eq!(Tier::All.tier_and_index(last), (Tier::Mixed, 0));
+        assert_eq!(Tier::All.tier_and_index(last), (Tier::Slid, 0));
         assert_eq!(Tier::All.tier_and_index(last + 2), (Tier::Pose, 1));
         assert_eq!(Tier::Worn.tier_and_index(7), (Tier::Worn, 7));
     }

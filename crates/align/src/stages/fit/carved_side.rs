@@ -19,6 +19,10 @@ const BACK: f64 = 0.35;
 const BACK_ODDS: f64 = 4.0;
 /// Weight of the winding, from -1 (inward) to 1 (outward).
 const WINDING: f64 = 2.0;
+/// Nearly all faces point to one side if the winding exceeds this in either direction. If the agreements are low, the
+/// log-odds of that side are then higher by [`UNANIMOUS_ODDS`].
+const UNANIMOUS: f64 = 0.9;
+const UNANIMOUS_ODDS: f64 = 1.5;
 /// Weight of the logarithm of the ratio of the two layer widths.
 const SHARPNESS: f64 = 0.7;
 /// Weight of the logarithm of the ratio of the two agreements.
@@ -52,12 +56,25 @@ pub(super) struct CarvedSide {
     pub(super) evidence: SideEvidence,
     /// Agreement of this side with the print, from 0 to 1. `None` if it was not measured.
     pub(super) agreement: Option<f64>,
+    /// The side that was not chosen.
+    pub(super) other: Option<FittedSide>,
+}
+
+impl CarvedSide {
+    /// Returns the evidence for the side that was not chosen.
+    pub(super) fn evidence_of_other(&self, other: &FittedSide) -> SideEvidence {
+        SideEvidence {
+            winding: self.evidence.winding.map(|out| 1.0 - out),
+            flatness: other.surface.tops,
+            confidence: 0.0,
+        }
+    }
 }
 
 /// Chooses the carved side. Returns the side with the evidence for it, or `None` if neither side shows a surface.
 pub(super) fn choose(sides: [Option<FittedSide>; 2], inputs: SideInputs<'_>) -> Option<CarvedSide> {
     let winding = |side: &FittedSide| inputs.indexed.upward_facing_share(&side.plane_from_mesh);
-    let (side, confidence, winding, agreement) = match sides {
+    let (side, other, confidence, winding, agreement) = match sides {
         [Some(first), Some(second)] => {
             let winding = winding(&first);
             let SideOdds {
@@ -67,14 +84,15 @@ pub(super) fn choose(sides: [Option<FittedSide>; 2], inputs: SideInputs<'_>) -> 
             let confidence = (odds.abs() / 2.0).tanh();
             // Faces that point outward on one side point inward on the other.
             if odds >= 0.0 {
-                (first, confidence, winding, of_first)
+                (first, Some(second), confidence, winding, of_first)
             } else {
-                (second, confidence, winding.map(|out| 1.0 - out), of_second)
+                let winding = winding.map(|out| 1.0 - out);
+                (second, Some(first), confidence, winding, of_second)
             }
         }
         [Some(only), None] | [None, Some(only)] => {
             let winding = winding(&only);
-            (only, 1.0, winding, None)
+            (only, None, 1.0, winding, None)
         }
         [None, None] => return None,
     };
@@ -87,6 +105,7 @@ pub(super) fn choose(sides: [Option<FittedSide>; 2], inputs: SideInputs<'_>) -> 
         side,
         evidence,
         agreement,
+        other,
     })
 }
 
@@ -124,12 +143,23 @@ fn log_odds(
     let a = inks.agreement(likelier);
     let measured = (a < CERTAIN).then(|| inks.agreement(other));
     let advantage = AGREEMENT * (a / measured.unwrap_or(UNMEASURED)).ln();
+    let unanimous = measured.map_or(0.0, |b| unanimous_odds(winding, a.max(b)));
     let (odds, agreements) = if mesh_only >= 0.0 {
-        (mesh_only + advantage, [Some(a), measured])
+        (mesh_only + unanimous + advantage, [Some(a), measured])
     } else {
-        (mesh_only - advantage, [measured, Some(a)])
+        (mesh_only + unanimous - advantage, [measured, Some(a)])
     };
     SideOdds { odds, agreements }
+}
+
+/// Returns the log-odds of the first side, if nearly all faces point to one side and even the higher agreement is low:
+/// such agreements are no better than chance. `winding` is from -1 to 1.
+fn unanimous_odds(winding: f64, agreement: f64) -> f64 {
+    if agreement < CERTAIN && winding.abs() > UNANIMOUS {
+        UNANIMOUS_ODDS * winding.signum()
+    } else {
+        0.0
+    }
 }
 
 /// Returns the interquartile range of the heights near the stroke tops, as a fraction of the relief, 0.005 or more.
@@ -142,4 +172,21 @@ fn layer_width(side: &FittedSide) -> f64 {
     }
     let (low, high) = (quantile(&mut upper, 0.25), quantile(&mut upper, 0.75));
     ((high - low) / side.relief.max(f64::MIN_POSITIVE)).max(0.005)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{AGREEMENT, WINDING, unanimous_odds};
+
+    #[test]
+    fn unanimous_winding_outweighs_a_small_difference_of_low_agreements() {
+        // The side that all faces point away from agrees better by a fifth.
+        let advantage = AGREEMENT * (0.42_f64 / 0.35).ln();
+        assert!(advantage > WINDING);
+        assert!(advantage < WINDING + unanimous_odds(1.0, 0.42));
+        assert_eq!(unanimous_odds(-1.0, 0.42), -unanimous_odds(1.0, 0.42));
+        // An agreement that is seldom reached by chance, or faces that point both ways.
+        assert_eq!(unanimous_odds(1.0, 0.8), 0.0);
+        assert_eq!(unanimous_odds(0.6, 0.42), 0.0);
+    }
 }

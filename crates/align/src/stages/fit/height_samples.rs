@@ -5,7 +5,8 @@ use crate::stages::binarize;
 use crate::stages::face::{Face, PositionedHeight};
 use crate::stages::zbuffer::{NO_HIT, Viewport};
 use mocban_core::domain::Rigid3;
-use mocban_core::raster::Grid;
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{Grid, Mask};
 
 /// Fewer points do not determine a surface.
 const LEAST_POINTS: usize = 16;
@@ -16,6 +17,9 @@ pub(super) const DEEPEST: f64 = 1.8;
 pub(super) const DEEPEST_CARVING: f64 = 0.2;
 /// Least fraction of the points below the carving at which they are left out.
 const DEEP_SHARE: f64 = 0.01;
+
+/// A separate piece has at least this fraction of the visible area.
+const PIECE: f64 = 0.12;
 
 /// Heights of a view as points. Coordinates are divided by the view's longest side: u and v are about -0.5..=0.5.
 #[derive(Debug)]
@@ -88,6 +92,22 @@ impl HeightSamples {
             extent,
             is_cropped: false,
         }
+    }
+
+    /// Returns whether the rendering shows several separate pieces of similar area.
+    pub(super) fn shows_pieces(&self) -> bool {
+        let [width, height] = self.size;
+        let mut seen = Mask::new(width, height, false);
+        for place in &self.places {
+            seen.data_mut()[*place] = true;
+        }
+        let parts = ConnectedComponents::label(&seen).parts_of(&seen);
+        let least = PIECE * self.places.len() as f64;
+        parts
+            .iter()
+            .filter(|(_, area)| *area as f64 >= least)
+            .count()
+            > 1
     }
 
     /// Transforms the points to a frame that is only slightly rotated.

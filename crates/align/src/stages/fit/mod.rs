@@ -4,7 +4,8 @@
 //! foot or a table below the carved face are left out; if there are any, the outcome has a region. The plane of a
 //! side depends on the mesh only. The choice of the side also depends on the print. `src/lib.rs` explains why the
 //! side is chosen in this stage. If the chosen side does not resemble the print, all sides and parts of the scan are
-//! tried (`wider_search`), and parts of the print (`part_search`). The outcome of `wider_search` always has a region,
+//! tried (`wider_search`), and parts of the print (`part_search`). The likeliest of them are registered (`trials`), until one
+//! is sure. The outcome of `wider_search` always has a region,
 //! which is the part of the scan that the depth map shows. The outcome of `part_search` has an outline, which is the
 //! part of the print that shows the character. The paper's own fit is in `paper_method::fit`.
 
@@ -21,6 +22,7 @@ mod print_parts;
 mod scan_parts;
 mod side_surface;
 mod surface;
+mod trials;
 mod upper_surface;
 mod wider_search;
 
@@ -29,8 +31,9 @@ pub use params::{FitError, FitParams};
 pub(super) use pca::{Axes, frame};
 pub use upper_surface::fit;
 
-/// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 21;
+/// Raised by every change of the code that may change results. A candidate may be registered (`trials`), so a change of
+/// the depth, normalize or register stage may change results too.
+pub const REVISION: u32 = 22;
 
 #[cfg(test)]
 mod tests;

@@ -58,6 +58,7 @@ pub(super) fn search(
         region: None,
         print_outline: Some(parts.swap_remove(part)),
         agreement,
+        is_piece: false,
         side,
     })
 }

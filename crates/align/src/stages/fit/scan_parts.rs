@@ -1,5 +1,7 @@
 //! Finds the parts of a scan that may be the block. Debris and a table below the block are left out.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 
 use super::directions::{Facet, facets, large_planes};
@@ -10,6 +12,12 @@ use mocban_core::domain::cancel::{PollCounter, polled};
 use mocban_core::mesh::Mesh;
 use mocban_core::mesh::robust_bounds::is_in_box;
 
+/// A connected piece counts if its area is at least this fraction of the largest one's.
+const PIECE: f64 = 0.2;
+/// More pieces than this are strokes or repeated faces, not blocks.
+const MOST_PIECES: usize = 6;
+/// Number of points that show where a piece lies.
+const SOME: usize = 4000;
 /// Number of cells along the longest side of a scan. Surfaces in neighbouring cells are connected.
 const CELLS: f64 = 64.0;
 /// Approximate limit of the number of points at which cells are marked.
@@ -29,9 +37,16 @@ const THICKNESS: f64 = 1.6;
 /// A part with a smaller fraction of the scan's faces is not a block.
 const LEAST_PART: f64 = 0.02;
 
+/// A part of a scan that may be the block.
+pub(super) struct ScanPart {
+    pub(super) mesh: Mesh,
+    /// Some points of the other pieces, if the part is one of several connected pieces.
+    pub(super) beside: Vec<[f64; 3]>,
+}
+
 /// Returns the parts that may be the block: first the scan without spikes and debris, then the part above each large
-/// plane that may be a support.
-pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
+/// plane that may be a support, then the connected pieces.
+pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<ScanPart> {
     let whole = without_debris(&without_spikes(mesh), indexed);
     let all = facets(&whole);
     let mut parts = Vec::new();
@@ -45,7 +60,70 @@ pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
         }
     }
     parts.insert(0, whole);
+    let pieces = pieces(&parts[0]);
+    let alone = |mesh| ScanPart {
+        mesh,
+        beside: Vec::new(),
+    };
+    let mut parts: Vec<ScanPart> = parts.into_iter().map(alone).collect();
+    for (k, piece) in pieces.iter().enumerate() {
+        let others = (0..pieces.len()).filter(|other| *other != k);
+        parts.push(ScanPart {
+            mesh: piece.clone(),
+            beside: others
+                .flat_map(|other| some_points(&pieces[other]))
+                .collect(),
+        });
+    }
     parts
+}
+
+/// Returns at most [`SOME`] vertices of a mesh.
+pub(super) fn some_points(mesh: &Mesh) -> Vec<[f64; 3]> {
+    let step = mesh.vertices.len().div_ceil(SOME).max(1);
+    mesh.vertices.iter().step_by(step).collect()
+}
+
+/// Returns the connected pieces of a scan, the largest first, if there are several of similar area. Returns none for a
+/// scan of one piece, and for one of very many.
+fn pieces(mesh: &Mesh) -> Vec<Mesh> {
+    let points = mesh.position_numbers();
+    let mut roots: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+    for face in polled(&mesh.triangles) {
+        let [a, b, c] = face.map(|corner| root(&mut roots, points[corner as usize]));
+        let least = a.min(b).min(c);
+        for other in [a, b, c] {
+            roots[other as usize] = least;
+        }
+    }
+    let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
+    let mut piece_of = |face: &[u32; 3]| root(&mut roots, points[face[0] as usize]);
+    for face in polled(&mesh.triangles) {
+        let [a, b, c] = corners(mesh, face);
+        *areas.entry(piece_of(face)).or_default() += (b - a).cross(&(c - a)).norm();
+    }
+    let largest = areas.values().copied().fold(0.0, f64::max);
+    areas.retain(|_, area| *area >= PIECE * largest);
+    if !(2..=MOST_PIECES).contains(&areas.len()) {
+        return Vec::new();
+    }
+    let mut pieces: Vec<(u32, f64)> = areas.into_iter().collect();
+    pieces.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let part = |(piece, _): (u32, f64)| {
+        let faces = mesh.triangles.iter().filter(|face| piece_of(face) == piece);
+        of_faces(mesh, &faces.copied().collect::<Vec<_>>())
+    };
+    pieces.into_iter().map(part).collect()
+}
+
+/// Returns the root of a point in a forest, and shortens the way to it.
+fn root(roots: &mut [u32], mut at: u32) -> u32 {
+    while roots[at as usize] != at {
+        let next = roots[roots[at as usize] as usize];
+        roots[at as usize] = next;
+        at = next;
+    }
+    at
 }
 
 /// Finds a support: a plane, with about this normal, on which the rest of the scan stands. Returns the unit normal that
@@ -255,7 +333,7 @@ impl Cells {
 
 #[cfg(test)]
 mod tests {
-    use super::without_spikes;
+    use super::{pieces, without_spikes};
     use mocban_core::mesh::Mesh;
 
     const SIDE: u32 = 9;
@@ -300,5 +378,34 @@ mod tests {
             // Six faces meet at the spike.
             assert_eq!(kept.triangles.len(), mesh.triangles.len() - 6);
         }
+    }
+
+    /// Returns `count` sheets beside each other.
+    fn sheets(count: u32) -> Mesh {
+        let sheet = sheet_with_a_spike();
+        let mut all = Mesh::default();
+        for k in 0..count {
+            let first = all.vertices.len() as u32;
+            for [x, y, z] in sheet.vertices.iter() {
+                all.vertices.push([x + 9.0 * f64::from(k), y, z]);
+            }
+            let faces = sheet.triangles.iter().map(|face| face.map(|at| first + at));
+            all.triangles.extend(faces);
+        }
+        all
+    }
+
+    #[test]
+    fn separate_pieces_are_parts_whether_or_not_faces_share_vertices() {
+        for mesh in [sheets(3), with_unshared_vertices(&sheets(3))] {
+            let found = pieces(&mesh);
+            assert_eq!(found.len(), 3);
+            for piece in &found {
+                assert_eq!(3 * piece.triangles.len(), mesh.triangles.len());
+            }
+        }
+        assert!(pieces(&sheets(1)).is_empty());
+        // Many equal components are strokes or loose faces.
+        assert!(pieces(&sheets(20)).is_empty());
     }
 }

@@ -1,17 +1,18 @@
 //! Fits the surface of the stroke tops. Both sides of the mesh are rendered and fitted at a coarse resolution. The
 //! carved side is then fitted again at a finer resolution. If this side does not resemble the print, parts of the print
-//! are tried, and all sides of all parts of the scan.
+//! are tried, and all sides of all parts of the scan; the likeliest are registered (`trials`).
 
-use super::carved_side::{self, SideInputs};
+use super::carved_side::{self, CarvedSide, SideInputs};
 use super::params::{FitError, FitParams};
 use super::part_search;
 use super::pca::{Axes, frame};
 use super::print_agreement::InkPyramids;
 use super::side_surface::{FINE, FittedSide, coarse_sides, fit_view};
-use super::wider_search::{self, BETTER, LEAST};
+use super::trials::Trials;
+use super::wider_search::{self, BETTER, FoundSide, LEAST};
 use crate::stages::print::Print;
 use crate::stages::scan::Scan;
-use mocban_core::domain::{FitOutcome, SideEvidence};
+use mocban_core::domain::{FitOutcome, Rigid3, SideEvidence};
 use mocban_core::mesh::Mesh;
 
 /// Fits the surface on which the stroke tops lie, and finds the carved side.
@@ -65,19 +66,19 @@ pub fn fit(
         .as_ref()
         .filter(|_| fine.as_ref().is_some_and(is_carved));
     let agreement = carved.map_or(0.0, |carved| carved.agreement.unwrap_or(1.0));
+    let fitting = Fitting {
+        scan,
+        params,
+        start,
+    };
+    let shows_pieces = |usual: &CarvedSide| usual.side.samples.shows_pieces();
     if let (Some(print), Some(inks)) = (print, &inks)
-        && agreement < LEAST
+        && (agreement < LEAST || usual.as_ref().is_some_and(shows_pieces))
     {
-        let parts = part_search::search(indexed, &start, print, params)
-            .filter(|found| found.agreement > agreement * BETTER);
-        let wider = wider_search::search(mesh, indexed, inks, agreement, params);
-        let found = [parts, wider].into_iter().flatten();
-        if let Some(found) = found.max_by(|a, b| a.agreement.total_cmp(&b.agreement)) {
-            return Ok(FitOutcome {
-                region: found.region,
-                print_outline: found.print_outline,
-                ..outcome(&found.side, found.evidence, mesh)
-            });
+        let fine = fine.as_ref().filter(|fine| is_carved(fine));
+        let found = fitting.by_trials(print, inks, (usual.as_ref(), fine), agreement);
+        if let Some(found) = found {
+            return Ok(found);
         }
     }
     let (Some(usual), Some(fine)) = (usual, fine) else {
@@ -91,13 +92,84 @@ pub fn fit(
             searched: inks.is_some(),
         });
     }
-    // The rest of the scan is not the face: side walls, a foot or a table below it, or debris above it.
-    let is_part = fine.samples.is_cropped || wider_search::has_debris_above(&fine);
-    let region = is_part.then(|| wider_search::region(mesh, indexed, &fine, &start));
-    Ok(FitOutcome {
-        region,
-        ..outcome(&fine, usual.evidence, mesh)
-    })
+    Ok(fitting.of_whole(&fine, usual.evidence))
+}
+
+/// What is fitted, with the frame from which both sides are seen.
+struct Fitting<'a> {
+    scan: &'a Scan,
+    params: &'a FitParams,
+    start: Rigid3,
+}
+
+impl Fitting<'_> {
+    /// Returns the result of the stage for a side of the whole scan.
+    fn of_whole(&self, fine: &FittedSide, evidence: SideEvidence) -> FitOutcome {
+        let mesh = self.scan.mesh();
+        // The rest of the scan is not the face: side walls, a foot or a table below it, or debris above it.
+        let is_part = fine.samples.is_cropped || wider_search::has_debris_above(fine);
+        let indexed = self.scan.indexed();
+        let region = is_part.then(|| wider_search::region(mesh, indexed, fine, &self.start));
+        FitOutcome {
+            region,
+            ..outcome(fine, evidence, mesh)
+        }
+    }
+
+    /// Returns the result of the stage for a side of a part of the scan or for a part of the print.
+    fn of_part(&self, found: FoundSide) -> (FitOutcome, bool) {
+        let part = FitOutcome {
+            region: found.region,
+            print_outline: found.print_outline,
+            ..outcome(&found.side, found.evidence, self.scan.mesh())
+        };
+        (part, found.is_piece)
+    }
+
+    /// Registers candidates, the likeliest first, until one is sure: the side or part that resembles the print best, both
+    /// sides of the whole scan, and the other sides and parts. `usual` is the usual side with its fine fit, if that is
+    /// carved, and `agreement` its agreement with the print. Returns `None` if there is no candidate.
+    fn by_trials(
+        &self,
+        print: &Print,
+        inks: &InkPyramids,
+        usual: (Option<&CarvedSide>, Option<&FittedSide>),
+        agreement: f64,
+    ) -> Option<FitOutcome> {
+        let (scan, params) = (self.scan, self.params);
+        let (mesh, indexed) = (scan.mesh(), scan.indexed());
+        let parts = part_search::search(indexed, &self.start, print, params);
+        let parts = parts.filter(|found| found.agreement > agreement * BETTER);
+        let wider = wider_search::search(mesh, indexed, inks, params);
+        let best = [wider.best(agreement), parts].into_iter().flatten();
+        let mut best: Vec<FoundSide> = best.collect();
+        best.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
+        let (chosen, fine) = usual;
+        let has_first = !best.is_empty() || fine.is_some();
+        let of_usual = || Some(self.of_whole(fine?, chosen?.evidence));
+        let of_other = || {
+            let chosen = chosen?;
+            let plane = &chosen.other.as_ref()?.plane_from_mesh;
+            let fine = fit_view(indexed, plane, params.curved_blocks, FINE)?;
+            let is_carved = fine.relief >= params.min_relief * fine.extent;
+            is_carved.then(|| self.of_whole(&fine, chosen.evidence_of_other(&fine)))
+        };
+        let of_whole = std::iter::once_with(of_usual).chain(std::iter::once_with(of_other));
+        let of_part = |found| self.of_part(found);
+        let candidates = best
+            .into_iter()
+            .map(of_part)
+            .chain(of_whole.flatten().map(|whole| (whole, false)))
+            .chain(wider.distinct().map(of_part));
+        let mut trials = Trials::new(scan, print, params);
+        for (candidate, is_piece) in candidates {
+            trials.add(candidate, is_piece);
+            if trials.is_sure() {
+                break;
+            }
+        }
+        trials.into_best(has_first)
+    }
 }
 
 /// Returns the result of the stage for a surface, for the whole scan and the whole print.

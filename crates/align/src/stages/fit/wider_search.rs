@@ -15,7 +15,7 @@ use super::near_plane::near_plane;
 use super::params::FitParams;
 use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
-use super::scan_parts::{parts, without_spikes};
+use super::scan_parts::{ScanPart, parts, some_points, without_spikes};
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
 use crate::stages::scan::part_of;
 use crate::stages::zbuffer::IndexedSurface;
@@ -42,6 +42,14 @@ const HIGHEST: f64 = 1.0;
 const DEEP_AREA: f64 = 0.02;
 /// Fractions of the width and height of a grid of characters that are tried for the middle character.
 const MIDDLE: [f64; 2] = [0.38, 0.5];
+/// Largest number of distinct sides that are registered if the evidence is weak, and their least agreement.
+const MOST_TRIED: usize = 4;
+const LEAST_TRIED: f64 = 0.25;
+/// Two sides are alike if their normals differ by less than this angle, in radians, and their boxes by less than this
+/// fraction of their size.
+const LIKE: f64 = 0.2;
+/// The box of a piece is wider than some of its points by this fraction of its size.
+const SLACK: f64 = 0.005;
 /// Number of angles, from 0 to a right angle, that are tried to find the edges of a grid.
 const ANGLES: i32 = 30;
 
@@ -56,6 +64,8 @@ pub(super) struct FoundSide {
     pub(super) print_outline: Option<PrintOutline>,
     /// Agreement of the side with the print or its part, from 0 to 1.
     pub(super) agreement: f64,
+    /// Whether the side is one of several connected pieces of the scan.
+    pub(super) is_piece: bool,
 }
 
 /// A side with its agreement with the print.
@@ -63,63 +73,169 @@ struct JudgedSide {
     plane_from_mesh: Rigid3,
     agreement: f64,
     region: ScanRegion,
+    /// Whether the side is one of several connected pieces of the scan.
+    is_piece: bool,
 }
 
-/// Returns the side that resembles the print best. `usual` is the agreement of the usual side with the print. Returns
-/// `None` if the best agreement is below [`least_agreement`], or if the finer fit of the side finds no carving.
-pub(super) fn search(
-    mesh: &Mesh,
+/// The sides of all parts of a scan, the one that resembles the print best first.
+pub(super) struct WiderSearch<'a> {
+    mesh: &'a Mesh,
+    params: &'a FitParams,
+    found: Vec<JudgedSide>,
+}
+
+/// Compares the sides of all parts of a scan with the print.
+pub(super) fn search<'a>(
+    mesh: &'a Mesh,
     indexed: &IndexedSurface,
     inks: &InkPyramids,
-    usual: f64,
-    params: &FitParams,
-) -> Option<FoundSide> {
+    params: &'a FitParams,
+) -> WiderSearch<'a> {
     let search = SideSearch { inks, params };
     let blocks = parts(mesh, indexed);
     let mut found = Vec::new();
-    for block in blocks.iter().filter(|block| !block.vertices.is_empty()) {
-        let indexed = IndexedSurface::new(block);
-        let axes = Axes::of_surface(block, &indexed);
-        for normal in candidates(&axes, &facets(block)) {
+    for ScanPart { mesh, beside } in &blocks {
+        if mesh.vertices.is_empty() {
+            continue;
+        }
+        let indexed = IndexedSurface::new(mesh);
+        let axes = Axes::of_surface(mesh, &indexed);
+        for normal in candidates(&axes, &facets(mesh)) {
             let start = frame(normal, axes.centre);
-            found.extend(search.candidate(block, &indexed, &start));
+            let mut side = search.candidate(mesh, &indexed, &start);
+            if let Some(side) = side.as_mut().filter(|_| !beside.is_empty()) {
+                side.keep_apart(mesh, beside);
+            }
+            found.extend(side);
         }
     }
-    if let Some(whole) = blocks.first() {
+    let whole = blocks.first().map(|part| &part.mesh);
+    if let Some(whole) = whole {
         for share in MIDDLE {
             found.extend(search.middle_of_grid(whole, share));
         }
     }
     if found.iter().all(|side| side.agreement < LEAST)
-        && let Some(whole) = blocks.first()
+        && let Some(whole) = whole
     {
         found.extend(search.near_planes(whole));
     }
-    let best = found
-        .iter()
-        .max_by(|a, b| a.agreement.total_cmp(&b.agreement))?;
-    if best.agreement < least_agreement(usual) {
-        return None;
+    // Of equal sides, the last one found comes first.
+    found.reverse();
+    found.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
+    WiderSearch {
+        mesh,
+        params,
+        found,
     }
-    let normal = |of: &Rigid3| Vector3::new(of.0[2][0], of.0[2][1], of.0[2][2]);
-    let here = normal(&best.plane_from_mesh);
-    let rivals = found
-        .iter()
-        .filter(|other| normal(&other.plane_from_mesh).angle(&here) > RIVAL);
-    let rival = rivals.map(|other| other.agreement).fold(0.0, f64::max);
-    let part = without_spikes(&part_of(mesh, |corner| best.region.contains(corner)));
-    let indexed = IndexedSurface::new(&part);
-    let side = fit_view(&indexed, &best.plane_from_mesh, params.curved_blocks, FINE)?;
-    if side.relief < params.min_relief * side.extent {
-        return None;
+}
+
+impl WiderSearch<'_> {
+    /// Returns the side that resembles the print best. `usual` is the agreement of the usual side with the print. Returns
+    /// `None` if the best agreement is below [`least_agreement`], or if the finer fit of the side finds no carving.
+    pub(super) fn best(&self, usual: f64) -> Option<FoundSide> {
+        let best = self.found.first()?;
+        (best.agreement >= least_agreement(usual))
+            .then(|| self.fitted(best))
+            .flatten()
     }
-    Some(FoundSide {
-        evidence: evidence(&indexed, &side, best.agreement, rival),
-        region: Some(best.region),
-        print_outline: None,
-        agreement: best.agreement,
-        side,
-    })
+
+    /// Returns the best few of the sides that differ from each other, the best one first.
+    pub(super) fn distinct(&self) -> impl Iterator<Item = FoundSide> {
+        let mut chosen: Vec<&JudgedSide> = Vec::new();
+        for side in self
+            .found
+            .iter()
+            .filter(|side| side.agreement >= LEAST_TRIED)
+        {
+            if chosen.len() < MOST_TRIED && !chosen.iter().any(|other| side.is_like(other)) {
+                chosen.push(side);
+            }
+        }
+        chosen.into_iter().filter_map(|side| self.fitted(side))
+    }
+
+    /// Fits a side finely. Returns `None` if it has no carving.
+    fn fitted(&self, side: &JudgedSide) -> Option<FoundSide> {
+        let here = side.normal();
+        let rivals = self.found.iter();
+        let rivals = rivals.filter(|other| other.normal().angle(&here) > RIVAL);
+        let rival = rivals.map(|other| other.agreement).fold(0.0, f64::max);
+        let part = without_spikes(&part_of(self.mesh, |corner| side.region.contains(corner)));
+        let indexed = IndexedSurface::new(&part);
+        let curved = self.params.curved_blocks;
+        let fine = fit_view(&indexed, &side.plane_from_mesh, curved, FINE)?;
+        if fine.relief < self.params.min_relief * fine.extent {
+            return None;
+        }
+        Some(FoundSide {
+            evidence: evidence(&indexed, &fine, side.agreement, rival),
+            region: Some(side.region),
+            print_outline: None,
+            agreement: side.agreement,
+            is_piece: side.is_piece,
+            side: fine,
+        })
+    }
+}
+
+impl JudgedSide {
+    /// Returns the normal in mesh coordinates.
+    fn normal(&self) -> Vector3<f64> {
+        let [.., row, _] = self.plane_from_mesh.0;
+        Vector3::new(row[0], row[1], row[2])
+    }
+
+    /// Turns the box of a piece about its normal so that it contains as little of the other pieces as possible. `beside`
+    /// are points of the other pieces.
+    fn keep_apart(&mut self, piece: &Mesh, beside: &[[f64; 3]]) {
+        let points = some_points(piece);
+        let old = self.region.box_from_mesh;
+        let row = |k: usize| Vector3::new(old.0[k][0], old.0[k][1], old.0[k][2]);
+        let origin = Vector3::from(old.inverse().apply([0.0; 3]));
+        let slack = SLACK * self.size();
+        let turned = (0..ANGLES).map(|step| {
+            let angle = FRAC_PI_2 * f64::from(step) / f64::from(ANGLES);
+            let along = row(0) * angle.cos() + row(1) * angle.sin();
+            let box_from_mesh = frame_along(row(2), along, origin);
+            let mut bounds = self.region.bounds;
+            for k in 0..2 {
+                let at = || points.iter().map(|point| box_from_mesh.apply(*point)[k]);
+                bounds[0][k] = at().fold(f64::INFINITY, f64::min) - slack;
+                bounds[1][k] = at().fold(f64::NEG_INFINITY, f64::max) + slack;
+            }
+            let region = ScanRegion {
+                box_from_mesh,
+                bounds,
+            };
+            let inside = beside.iter().filter(|point| region.contains(**point));
+            (inside.count(), region)
+        });
+        if let Some((_, region)) = turned.min_by_key(|(inside, _)| *inside) {
+            self.region = region;
+        }
+        self.is_piece = true;
+    }
+
+    /// Returns the diagonal of the box across the normal, in mesh units.
+    fn size(&self) -> f64 {
+        let [low, high] = self.region.bounds;
+        (high[0] - low[0]).hypot(high[1] - low[1])
+    }
+
+    /// Returns whether two sides show about the same part of the scan from about the same direction.
+    fn is_like(&self, other: &Self) -> bool {
+        let middle = |side: &Self| {
+            let [low, high] = side.region.bounds;
+            let middle = [0, 1, 2].map(|k| f64::midpoint(low[k], high[k]));
+            Vector3::from(side.region.box_from_mesh.inverse().apply(middle))
+        };
+        let [a, b] = [self.size(), other.size()];
+        self.is_piece == other.is_piece
+            && self.normal().angle(&other.normal()) < LIKE
+            && (middle(self) - middle(other)).norm() < LIKE * a.min(b)
+            && (a / b).max(b / a) < 1.0 + LIKE
+    }
 }
 
 /// Returns the least agreement of a side that replaces the usual side, which has the agreement `usual`.
@@ -192,6 +308,7 @@ impl SideSearch<'_> {
             plane_from_mesh: side.plane_from_mesh,
             agreement: self.inks.agreement(side),
             region: region(mesh, indexed, side, start),
+            is_piece: false,
         })
     }
 

@@ -17,6 +17,7 @@ mod pyramid;
 mod refine;
 mod search;
 mod tiebreak;
+mod top_hat;
 
 pub(super) use border_mask::BorderStrokes;
 pub(super) use candidate::{BeamWidth, PoseCandidate, SearchRange};

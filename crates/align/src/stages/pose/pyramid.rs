@@ -1,5 +1,6 @@
 //! Image pyramid of a soft mask: one level per working size, smoothed and high-pass filtered.
 
+use super::top_hat::top_hat;
 use mocban_core::domain::Affine2;
 use mocban_core::raster::blur::{gaussian_blur, gaussian_blur_transposed};
 use mocban_core::raster::{Grid, Mask, resample, resample_transposed};
@@ -85,6 +86,18 @@ impl ImagePyramid {
                 if is_known { replaced } else { 0.0 }
             },
         ))
+    }
+
+    /// Returns the image without plateaus wider than `2 radius + 1` working pixels. Returns `None` if the plateaus hold less
+    /// than the fraction `least` of the amount.
+    pub(crate) fn without_plateaus(&self, radius: usize, least: f32) -> Option<Self> {
+        let hat = top_hat(&self.present, &self.known, radius);
+        let [before, after] = [&self.present, &hat].map(|of| of.data().iter().sum::<f32>());
+        (after < (1.0 - least) * before && after > 0.0).then(|| Self {
+            present: hat,
+            known: self.known.clone(),
+            ..*self
+        })
     }
 
     /// Computes the level with `size` working pixels along the longest side. The level is smoothed by a Gaussian whose

@@ -41,6 +41,8 @@ const LEAST_INK: f64 = 2.0;
 const UNSEEN_SPREAD: f64 = 0.002;
 /// Range to which the probability that a mask is right is clamped.
 const PROBABILITY: [f64; 2] = [0.02, 0.995];
+/// Fraction of the ink that must lie where the depth map has data.
+const LEAST_SEEN: f64 = 0.5;
 /// Lower bound of fractions before their logarithm is taken.
 const FLOOR: f64 = 0.02;
 /// Range to which the competitors' scores are clamped, as fractions of the best score.
@@ -215,6 +217,15 @@ pub(super) fn set_confidence(
         .zip(probabilities)
         .map(of_metric)
         .collect()
+}
+
+/// Lowers the confidence of an alignment under which less than [`LEAST_SEEN`] of the ink lies where the depth map has data:
+/// the strokes of a small part of the print fit many reliefs.
+pub(super) fn lower(metrics: &mut [MetricOutcome], seen_ink: f64) {
+    let factor = (seen_ink / LEAST_SEEN).clamp(0.0, 1.0);
+    for outcome in metrics {
+        outcome.confidence = outcome.confidence.map(|sure| factor * sure);
+    }
 }
 
 #[cfg(test)]

@@ -33,11 +33,11 @@ use super::normalize::{Normalized, relative_depths};
 use crate::stages::binarize::rim_share;
 use metric_thresholds::ChosenThreshold;
 use mocban_core::domain::{InkHypothesis, PoseFeatures};
-use mocban_core::raster::DepthMap;
+use mocban_core::raster::{DepthMap, Mask};
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 23;
+pub const REVISION: u32 = 24;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -149,9 +149,18 @@ pub fn register(
         search.prior,
         probabilities,
     );
+    let seen = seen_ink(&registered.canvas_print, &posed.canvas.ink);
+    confidence::lower(&mut registered.outcome.metrics, seen);
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
     Ok(registered)
+}
+
+/// Returns the fraction of the print's ink that lies where the depth map has data. `seen` is the ink with data on a canvas
+/// of half the side length.
+fn seen_ink(canvas_print: &Mask, seen: &Mask) -> f64 {
+    let scale = (canvas_print.width() as f64 / seen.width() as f64).powi(2);
+    scale * seen.count() as f64 / canvas_print.count().max(1) as f64
 }
 
 /// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character. Also

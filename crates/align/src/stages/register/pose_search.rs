@@ -36,6 +36,11 @@ const BASE_PX: usize = 72;
 /// fall from 1 at the tops to 0 at half the depth. This tolerates a wrong threshold and a tilted plane.
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
+/// If the best score is lower, the search is repeated without plateaus that are wider than `2 PLATEAU_PX + 1` pixels, if
+/// these hold at least the fraction `LEAST_PLATEAU` of the strokes.
+const WEAK: f64 = 0.42;
+const PLATEAU_PX: usize = 5;
+const LEAST_PLATEAU: f32 = 0.2;
 /// Number of poses that are refined.
 const KEEP: BeamWidth = keep(9, 3);
 /// Smallest correlation of a match. If the best correlation is smaller, the pair is refused.
@@ -76,6 +81,24 @@ pub(super) struct PoseSearch {
 }
 
 impl PoseSearch {
+    /// Returns the poses of a search without plateaus if they score higher, together with the best pose of this search.
+    fn or_surer(self, narrow: Self) -> Self {
+        if narrow.score() <= self.score() {
+            return self;
+        }
+        let mut poses = narrow.poses;
+        if narrow.ink == self.ink {
+            poses.truncate(1);
+            poses.extend(self.poses);
+        }
+        let mirrored = narrow.mirrored.into_iter().chain(self.mirrored);
+        Self {
+            poses,
+            mirrored: mirrored.max_by(|a, b| a.score.total_cmp(&b.score)),
+            ..narrow
+        }
+    }
+
     fn score(&self) -> f64 {
         self.poses.first().map_or(0.0, |pose| pose.score)
     }
@@ -98,15 +121,34 @@ pub(super) fn search(
     let wood = ImagePyramid::new(depths, BASE_PX).ok_or(RegisterError::NoPose)?;
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
     let depth_px = longest(depths.known.bounding_box());
-    let inks = prints.iter().enumerate();
-    let searches =
-        inks.map(|(ink, print)| find_poses(&wood, depth_px, ink, print, expected, params));
-    let best = searches.reduce(|best, other| match (&best, &other) {
-        (Ok(a), Ok(b)) if b.score() > a.score() => other,
-        (Err(_), Ok(_)) => other,
-        _ => best,
-    });
-    best.unwrap_or(Err(RegisterError::NoPose))
+    let on_inks = |wood: &ImagePyramid| {
+        let inks = prints.iter().enumerate();
+        let searches =
+            inks.map(|(ink, print)| find_poses(wood, depth_px, ink, print, expected, params));
+        let best = searches.reduce(|best, other| match (&best, &other) {
+            (Ok(a), Ok(b)) if b.score() > a.score() => other,
+            (Err(_), Ok(_)) => other,
+            _ => best,
+        });
+        best.unwrap_or(Err(RegisterError::NoPose))
+    };
+    let found = on_inks(&wood);
+    let is_weak = match &found {
+        Ok(found) => found.score() < WEAK && found.prior == 0.0,
+        Err(error) => matches!(error, RegisterError::NoCorrelation { .. }),
+    };
+    if !is_weak {
+        return found;
+    }
+    // A rim, walls or ground that count as tops hide the strokes.
+    let Some(narrow) = wood.without_plateaus(PLATEAU_PX, LEAST_PLATEAU) else {
+        return found;
+    };
+    match (found, on_inks(&narrow)) {
+        (Ok(found), Ok(narrow)) => Ok(found.or_surer(narrow)),
+        (Err(_), Ok(narrow)) => Ok(narrow),
+        (found, Err(_)) => found,
+    }
 }
 
 /// Searches for poses on one interpretation of the print. `depth_px` is the longest side of the depth map's data.

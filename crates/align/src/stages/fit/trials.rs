@@ -1,0 +1,311 @@
+//! Registers several candidates of a fit, if the evidence of the fit alone is weak.
+//!
+//! The coarse agreement with the print decides between sides and parts of a scan. If it is low for all of them, it is no
+//! better than chance: the back of a block or a window through the character may have the highest. The pose of a
+//! registration tells them apart, and shows whether the candidate's box cuts through the character.
+
+use super::params::FitParams;
+use super::side_surface::{FINE, fit_view};
+use crate::stages::depth::{self, DepthParams, ResolutionBy};
+use crate::stages::normalize::{self, NormalizeParams};
+use crate::stages::print::Print;
+use crate::stages::register::{self, RegisterParams};
+use crate::stages::scan::Scan;
+use crate::stages::score::SsimWindow;
+use crate::stages::zbuffer::IndexedSurface;
+use mocban_core::domain::{Affine2, FitOutcome, ScanRegion, ThresholdMetric};
+use mocban_core::raster::PixelBox;
+
+/// The trials end at a candidate with at least this confidence.
+const SURE: f64 = 0.8;
+/// A later candidate replaces the first one if its confidence exceeds that of the first by this.
+const SURER: f64 = 0.1;
+/// The box of a candidate is widened to the ink of the print with a margin of this fraction of the ink's longest side.
+const MARGIN: f64 = 0.06;
+/// A box cuts through the ink if the ink reaches beyond it by this fraction of the ink's longest side.
+const CUT: f64 = 0.02;
+/// Factor of the confidence of a candidate whose box cuts through the ink, if the widened candidate does not match.
+const CUT_CONFIDENCE: f64 = 0.4;
+
+/// Settings of the trials. They do not depend on the project's settings, so that the result of the fit does not either.
+const DEPTH: DepthParams = DepthParams {
+    resolution_by: ResolutionBy::LongestSide,
+    longest_px: 512,
+    px_per_mm: 10.0,
+};
+const NORMALIZE: NormalizeParams = NormalizeParams {
+    canvas_px: 256,
+    character_px: 192,
+    print_grey: 0,
+    density_greys: [0; 2],
+    structure_greys: [0; 2],
+    window: SsimWindow::Gaussian,
+};
+const REGISTER: RegisterParams = RegisterParams {
+    scale_band: 1.6,
+    working_px: 192,
+    smoothing_px: 1.22,
+    anisotropic_scale: true,
+    threshold_min: 0.01,
+    threshold_max: 0.6,
+    min_confidence: 0.3,
+    window: SsimWindow::Gaussian,
+    coarse_angles: 4,
+    fine_angles: 2,
+};
+
+/// Candidates that were registered.
+pub(super) struct Trials<'a> {
+    pub(super) scan: &'a Scan,
+    pub(super) print: &'a Print,
+    pub(super) params: &'a FitParams,
+    /// The best candidate so far, and its confidence.
+    best: Option<(FitOutcome, f64)>,
+    tried: Vec<FitOutcome>,
+}
+
+/// The pose of a registered candidate.
+struct TrialPose {
+    confidence: f64,
+    plane_from_print: Affine2,
+    /// Corners of the ink's box, in pixels of the print.
+    ink: [[f64; 2]; 4],
+}
+
+impl<'a> Trials<'a> {
+    pub(super) const fn new(scan: &'a Scan, print: &'a Print, params: &'a FitParams) -> Self {
+        Self {
+            scan,
+            print,
+            params,
+            best: None,
+            tried: Vec::new(),
+        }
+    }
+
+    /// Registers a candidate. Keeps it if it is the first one or surer than the best one so far. The box of a piece is not
+    /// widened: nothing of the piece lies beyond it.
+    pub(super) fn add(&mut self, candidate: FitOutcome, is_piece: bool) {
+        if self.tried.contains(&candidate) {
+            return;
+        }
+        self.tried.push(candidate.clone());
+        let (candidate, confidence) = if is_piece {
+            let pose = self.registered(&candidate);
+            (candidate, pose.map_or(0.0, |pose| pose.confidence))
+        } else {
+            self.widened(candidate)
+        };
+        let is_better = |(_, best): &(FitOutcome, f64)| confidence > best + SURER;
+        if self.best.as_ref().is_none_or(is_better) {
+            self.best = Some((candidate, confidence));
+        }
+    }
+
+    /// Returns whether the best candidate is so sure that no other one needs to be tried.
+    pub(super) fn is_sure(&self) -> bool {
+        let best = self.best.as_ref();
+        best.is_some_and(|(_, confidence)| *confidence >= SURE)
+    }
+
+    /// Returns the best candidate. `first` is whether the first one may be returned although it does not match.
+    pub(super) fn into_best(self, first: bool) -> Option<FitOutcome> {
+        let best = self
+            .best
+            .filter(|(_, confidence)| first || *confidence > 0.0);
+        best.map(|(candidate, _)| candidate)
+    }
+
+    /// Widens the box of a candidate that cuts through the ink. Returns the candidate with its confidence.
+    fn widened(&self, candidate: FitOutcome) -> (FitOutcome, f64) {
+        let Some(pose) = self.registered(&candidate) else {
+            return (candidate, 0.0);
+        };
+        let Some(region) = candidate
+            .region
+            .and_then(|region| pose.wider(&region, &candidate, self.scan))
+        else {
+            return (candidate, pose.confidence);
+        };
+        let along = FitOutcome {
+            region: Some(region),
+            ..candidate.clone()
+        };
+        let again = self.fitted_again(&along);
+        let tried = [Some(along), again].into_iter().flatten();
+        let tried = tried.filter_map(|wider| {
+            let confidence = self.registered(&wider)?.confidence;
+            Some((wider, confidence))
+        });
+        let best = tried.reduce(|best, other| if other.1 > best.1 { other } else { best });
+        let cut = CUT_CONFIDENCE * pose.confidence;
+        best.filter(|(_, confidence)| *confidence > cut)
+            .unwrap_or((candidate, cut))
+    }
+
+    /// Fits the surface of a candidate once more to all of its box.
+    fn fitted_again(&self, candidate: &FitOutcome) -> Option<FitOutcome> {
+        let part = self.scan.mesh_in(candidate.region.as_ref()?);
+        let indexed = IndexedSurface::new(&part);
+        let curved = self.params.curved_blocks;
+        let side = fit_view(&indexed, &candidate.plane_from_mesh, curved, FINE)?;
+        let is_carved = side.relief >= self.params.min_relief * side.extent;
+        is_carved.then(|| FitOutcome {
+            plane_from_mesh: side.plane_from_mesh,
+            curvature: side.curvature,
+            curvature_height: side.curvature_height,
+            inlier_ratio: side.surface.tops,
+            rms: side.surface.rms,
+            relief: side.relief,
+            ..candidate.clone()
+        })
+    }
+
+    /// Registers a candidate. Returns `None` if it does not match the print.
+    fn registered(&self, candidate: &FitOutcome) -> Option<TrialPose> {
+        let map = depth::depth(self.scan, candidate, None, &DEPTH).ok()?;
+        let part;
+        let print = if let Some(outline) = &candidate.print_outline {
+            part = self.print.clone().within(Some(outline));
+            &part
+        } else {
+            self.print
+        };
+        let normalized = normalize::normalize(&map, print, &NORMALIZE).ok()?;
+        let registered = register::register(&map, &normalized, None, &REGISTER).ok()?;
+        let outcome = &registered.outcome;
+        let mut metrics = outcome.metrics.iter();
+        let relief = metrics.find(|found| found.metric == ThresholdMetric::Relief)?;
+        let masks = &normalized.prints[outcome.ink];
+        let ink = masks.ink.bounding_box()?;
+        let print_from_plane = relief.print_from_depth.after(&map.scale.depth_from_plane);
+        Some(TrialPose {
+            confidence: relief.confidence?,
+            plane_from_print: print_from_plane.inverse()?,
+            ink: on_print(ink, &masks.print_from_masks()),
+        })
+    }
+}
+
+impl TrialPose {
+    /// Returns a box widened to the ink, if it cuts through the ink and the scan extends beyond it.
+    fn wider(
+        &self,
+        region: &ScanRegion,
+        candidate: &FitOutcome,
+        scan: &Scan,
+    ) -> Option<ScanRegion> {
+        let mesh_from_plane = candidate.plane_from_mesh.inverse();
+        let mut ink = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        for corner in self.ink {
+            let [x, y] = self.plane_from_print.apply(corner);
+            let at = region
+                .box_from_mesh
+                .apply(mesh_from_plane.apply([x, y, 0.0]));
+            for k in 0..2 {
+                ink[0][k] = ink[0][k].min(at[k]);
+                ink[1][k] = ink[1][k].max(at[k]);
+            }
+        }
+        let longest = (ink[1][0] - ink[0][0]).max(ink[1][1] - ink[0][1]);
+        let [whole_low, whole_high] = scan.indexed().bounds(&region.box_from_mesh);
+        let mut wider = *region;
+        let mut is_cut = false;
+        for k in 0..2 {
+            let [low, high] = [region.bounds[0][k], region.bounds[1][k]];
+            let to_low = (ink[0][k] - MARGIN * longest).max(whole_low[k]).min(low);
+            let to_high = (ink[1][k] + MARGIN * longest).min(whole_high[k]).max(high);
+            let is_in_ink = ink[0][k] < low - CUT * longest || ink[1][k] > high + CUT * longest;
+            is_cut |= is_in_ink && (low - to_low).max(to_high - high) > CUT * longest;
+            wider.bounds[0][k] = to_low;
+            wider.bounds[1][k] = to_high;
+        }
+        is_cut.then_some(wider)
+    }
+}
+
+/// Returns the corners of a box of masks in pixels of the print.
+fn on_print(ink: PixelBox, print_from_masks: &Affine2) -> [[f64; 2]; 4] {
+    let PixelBox { x0, y0, x1, y1 } = ink;
+    [[x0, y0], [x1, y0], [x0, y1], [x1, y1]]
+        .map(|corner| print_from_masks.apply(corner.map(|c| c as f64)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Trials;
+    use crate::stages::fit::fit;
+    use crate::stages::testing::settings;
+    use crate::stages::{Print, Scan};
+    use mocban_core::domain::{FitOutcome, ScanRegion};
+    use mocban_core::raster::{ImageLimits, decode};
+    use mocban_demo::{DemoPair, PairGenerator, Tier};
+    use nalgebra::Vector3;
+
+    fn read(pair: &DemoPair) -> (Scan, Print) {
+        let print = decode(&pair.print, &ImageLimits::SUGGESTED).expect("an image");
+        (Scan::from(pair.mesh.clone()), Print::from(print))
+    }
+
+    #[test]
+    fn a_box_that_cuts_through_the_character_is_widened() {
+        let pair = PairGenerator::new(Tier::Pose, 7).with_vertices(Some(20_000));
+        let pair = pair.pair(0).expect("a pair");
+        let (scan, print) = read(&pair);
+        let params = settings().fit;
+        let whole = fit(&scan, Some(&print), None, &params).expect("a plane");
+        let [low, high] = scan.indexed().bounds(&whole.plane_from_mesh);
+        let width = high[0] - low[0];
+        let cut = FitOutcome {
+            region: Some(ScanRegion {
+                box_from_mesh: whole.plane_from_mesh,
+                bounds: [
+                    [low[0], low[1], -width],
+                    [low[0] + 0.7 * width, high[1], width],
+                ],
+            }),
+            ..whole
+        };
+        let mut trials = Trials::new(&scan, &print, &params);
+        trials.add(cut, false);
+        assert!(trials.is_sure());
+        let region = trials.into_best(true).and_then(|found| found.region);
+        let [.., to] = region.expect("a box").bounds;
+        assert!(to[0] > low[0] + 0.9 * width, "{to:?} {low:?} {width}");
+    }
+
+    #[test]
+    fn the_piece_that_the_print_shows_is_found_among_others() {
+        for index in [3, 8] {
+            let pair = PairGenerator::new(Tier::Pieces, 1).with_vertices(Some(20_000));
+            let pair = pair.pair(index).expect("a pair");
+            let (scan, print) = read(&pair);
+            let found = fit(&scan, Some(&print), None, &settings().fit).expect("a plane");
+            let [x, y, z, _] = found.plane_from_mesh.0[2];
+            let turn = Vector3::new(x, y, z).angle(&Vector3::from(pair.truth.plane.n));
+            assert!(turn.to_degrees() < 4.0, "{turn} rad in pair {index}");
+            let region = found.region.expect("a box");
+            for landmark in &pair.truth.landmarks {
+                assert!(region.contains(*landmark), "pair {index}");
+            }
+            // The other pieces are as large.
+            let inside = scan.mesh_in(&region).triangles.len() as f64;
+            assert!(inside < 0.6 * scan.mesh().triangles.len() as f64);
+        }
+    }
+
+    #[test]
+    fn one_side_of_a_crack_is_found_if_both_do_not_fit_the_print() {
+        let pair = PairGenerator::new(Tier::Slid, 1).with_vertices(Some(20_000));
+        let pair = pair.pair(6).expect("a pair");
+        let (scan, print) = read(&pair);
+        let found = fit(&scan, Some(&print), None, &settings().fit).expect("a plane");
+        let [x, y, z, _] = found.plane_from_mesh.0[2];
+        let turn = Vector3::new(x, y, z).angle(&Vector3::from(pair.truth.plane.n));
+        assert!(turn.to_degrees() < 4.0, "{turn} rad");
+        let region = found.region.expect("a box");
+        for landmark in &pair.truth.landmarks {
+            assert!(region.contains(*landmark));
+        }
+    }
+}
