@@ -38,7 +38,7 @@ const THICKNESS: f64 = 1.6;
 const LEAST_PART: f64 = 0.02;
 
 /// A part of a scan that may be the block.
-pub(super) struct ScanPart {
+pub(super) struct CandidatePart {
     pub(super) mesh: Mesh,
     /// Some points of the other pieces, if the part is one of several connected pieces.
     pub(super) beside: Vec<[f64; 3]>,
@@ -46,7 +46,7 @@ pub(super) struct ScanPart {
 
 /// Returns the parts that may be the block: first the scan without spikes and debris, then the part above each large
 /// plane that may be a support, then the connected pieces.
-pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<ScanPart> {
+pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<CandidatePart> {
     let whole = without_debris(&without_spikes(mesh), indexed);
     let all = facets(&whole);
     let mut parts = Vec::new();
@@ -61,14 +61,14 @@ pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<ScanPart> {
     }
     parts.insert(0, whole);
     let pieces = pieces(&parts[0]);
-    let alone = |mesh| ScanPart {
+    let alone = |mesh| CandidatePart {
         mesh,
         beside: Vec::new(),
     };
-    let mut parts: Vec<ScanPart> = parts.into_iter().map(alone).collect();
+    let mut parts: Vec<CandidatePart> = parts.into_iter().map(alone).collect();
     for (k, piece) in pieces.iter().enumerate() {
         let others = (0..pieces.len()).filter(|other| *other != k);
-        parts.push(ScanPart {
+        parts.push(CandidatePart {
             mesh: piece.clone(),
             beside: others
                 .flat_map(|other| some_points(&pieces[other]))

@@ -2,7 +2,7 @@
 //!
 //! The coarse agreement with the print decides between sides and parts of a scan. If it is low for all of them, it is no
 //! better than chance: the back of a block or a window through the character may have the highest. The pose of a
-//! registration tells them apart, and shows whether the candidate's box cuts through the character.
+//! registration distinguishes them, and shows whether the candidate's box cuts through the character.
 
 use super::params::FitParams;
 use super::side_surface::{FINE, fit_view};

@@ -15,7 +15,7 @@ use super::near_plane::near_plane;
 use super::params::FitParams;
 use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
-use super::scan_parts::{ScanPart, parts, some_points, without_spikes};
+use super::scan_parts::{CandidatePart, parts, some_points, without_spikes};
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
 use crate::stages::scan::part_of;
 use crate::stages::zbuffer::IndexedSurface;
@@ -94,7 +94,7 @@ pub(super) fn search<'a>(
     let search = SideSearch { inks, params };
     let blocks = parts(mesh, indexed);
     let mut found = Vec::new();
-    for ScanPart { mesh, beside } in &blocks {
+    for CandidatePart { mesh, beside } in &blocks {
         if mesh.vertices.is_empty() {
             continue;
         }

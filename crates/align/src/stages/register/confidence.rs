@@ -219,20 +219,17 @@ pub(super) fn set_confidence(
         .collect()
 }
 
-/// Lowers the confidence of an alignment under which less than [`LEAST_SEEN`] of the ink lies where the depth map has data:
-/// the strokes of a small part of the print fit many reliefs.
-pub(super) fn lower(metrics: &mut [MetricOutcome], seen_ink: f64) {
-    let factor = (seen_ink / LEAST_SEEN).clamp(0.0, 1.0);
-    for outcome in metrics {
-        outcome.confidence = outcome.confidence.map(|sure| factor * sure);
-    }
+/// Returns the factor of the confidence if only the fraction `seen_ink` of the ink lies where the depth map has data: the
+/// strokes of a small part of the print fit many reliefs.
+pub(super) fn of_seen_ink(seen_ink: f64) -> f64 {
+    (seen_ink / LEAST_SEEN).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::{
         ConfidenceInputs, MASK, character_inputs, less_likely, logistic, mask_inputs, of_character,
-        of_pair_alone, of_pose, pose_inputs, prior_of,
+        of_pair_alone, of_pose, of_seen_ink, pose_inputs, prior_of,
     };
     use mocban_core::domain::PoseFeatures;
 
@@ -293,6 +290,11 @@ mod tests {
         };
         assert!(of_pose(&doubtful, prior_of(1.0)) > of_pose(&doubtful, 0.0));
         assert_eq!(prior_of(0.3), 0.0);
+    }
+
+    #[test]
+    fn little_ink_on_the_scan_lowers_the_confidence() {
+        assert_eq!([0.25, 0.5, 0.9].map(of_seen_ink), [0.5, 1.0, 1.0]);
     }
 
     #[test]

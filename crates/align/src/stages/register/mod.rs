@@ -150,7 +150,11 @@ pub fn register(
         probabilities,
     );
     let seen = seen_ink(&registered.canvas_print, &posed.canvas.ink);
-    confidence::lower(&mut registered.outcome.metrics, seen);
+    for found in &mut registered.outcome.metrics {
+        found.confidence = found
+            .confidence
+            .map(|sure| confidence::of_seen_ink(seen) * sure);
+    }
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
     Ok(registered)
