@@ -38,6 +38,7 @@ mod scanner;
 mod scene;
 mod slow_errors;
 mod solvable;
+mod tear;
 mod tier;
 mod truth_line;
 mod weathering;

@@ -69,6 +69,14 @@ pub enum Tier {
     GridPrint,
     /// Several of these at once, most of them milder.
     Mixed,
+    /// Coloured ink that is hardly darker than the coloured sheet.
+    Coloured,
+    /// Pictures of the print that were scaled unequally.
+    Stretched,
+    /// Sheets torn or folded through the character, whose parts do not meet.
+    Torn,
+    /// Torn halves of sheets on a dark ground.
+    HalfPrint,
     /// All other tiers in turn.
     All,
 }
@@ -81,6 +89,7 @@ enum_names! { pub Tier, "a tier":
     Table = "table", Debris = "debris", Holes = "holes", Dry = "dry",
     Heavy = "heavy", Photo = "photo", Wavy = "wavy", Shrunk = "shrunk",
     Lost = "lost", GridMesh = "grid-mesh", GridPrint = "grid-print", Mixed = "mixed",
+    Coloured = "coloured", Stretched = "stretched", Torn = "torn", HalfPrint = "half-print",
     All = "all",
 }
 
@@ -127,6 +136,10 @@ impl Tier {
             Self::GridMesh => &kind::GRID_MESH,
             Self::GridPrint => &kind::GRID_PRINT,
             Self::Mixed => &kind::MIXED,
+            Self::Coloured => &kind::COLOURED,
+            Self::Stretched => &kind::STRETCHED,
+            Self::Torn => &kind::TORN,
+            Self::HalfPrint => &kind::HALF_PRINT,
         })
     }
 
@@ -159,7 +172,7 @@ mod tests {
     fn all_takes_every_other_tier_in_turn() {
         let last = Tier::ALL.len() as u64 - 2;
         assert_eq!(Tier::All.tier_and_index(0), (Tier::Upright, 0));
-        assert_eq!(Tier::All.tier_and_index(last), (Tier::Mixed, 0));
+        assert_eq!(Tier::All.tier_and_index(last), (Tier::HalfPrint, 0));
         assert_eq!(Tier::All.tier_and_index(last + 2), (Tier::Pose, 1));
         assert_eq!(Tier::Worn.tier_and_index(7), (Tier::Worn, 7));
     }

@@ -1,6 +1,8 @@
 //! Finds the ink of a print: which pixels the print covers, whether ink is dark or light, and which pixels are ink.
 
 use super::background::{self, NARROW, STROKE};
+use super::colour::{self, ColourContrast};
+use super::ground::dark_ground;
 use super::polarity::polarity;
 use crate::stages::pose::SoftMask;
 use mocban_core::domain::cancel::poll;
@@ -96,13 +98,11 @@ pub(crate) struct InkMask {
     pub(crate) light_on_dark: bool,
 }
 
-fn grey_of(picture: &PrintImage) -> Grid<f32> {
-    picture.rgb.map(|c| luminance(*c))
-}
-
 /// Returns the Rec. 601 luma, 0..=1.
-fn luminance(c: [u16; 3]) -> f32 {
-    (0.299 * f32::from(c[0]) + 0.587 * f32::from(c[1]) + 0.114 * f32::from(c[2])) / 65_535.0
+fn grey_of(picture: &PrintImage) -> Grid<f32> {
+    picture.rgb.map(|[r, g, b]| {
+        (0.299 * f32::from(*r) + 0.587 * f32::from(*g) + 0.114 * f32::from(*b)) / 65_535.0
+    })
 }
 
 /// Binarizes as the paper does: pixels darker than `grey` are ink, without specks. The whole image is known.
@@ -126,11 +126,55 @@ pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeE
 
 /// Binarizes adaptively: leaves out the white around the print, divides by the background, and applies Otsu's
 /// threshold. Returns one interpretation for each possible polarity, the likelier first. If the print may be stained,
-/// adds an interpretation that treats wide dark areas as stains.
+/// adds an interpretation that treats wide dark areas as stains. If a sheet may lie on a dark ground, adds
+/// interpretations of the sheet alone. If the colours differ more than the brightness, adds interpretations by colour.
 pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
     let grey = &grey_of(picture);
-    let known = known(picture, grey);
-    let mut values = held(grey, &known);
+    let mut known = known(picture, grey);
+    let mut inks = by_brightness(grey, &known);
+    if let Some(ground) = dark_ground(grey, &known) {
+        known = known.zip_map(&ground, |known, ground| known && !ground);
+        add(&mut inks, by_brightness(grey, &known), false);
+    }
+    if let Some(found) = colour::contrast(picture, &known) {
+        add(&mut inks, by_colour(grey, &found, &known), found.is_clearer);
+    }
+    inks
+}
+
+/// Adds interpretations behind others, or before them.
+fn add(
+    inks: &mut Result<Vec<InkMask>, BinarizeError>,
+    more: Result<Vec<InkMask>, BinarizeError>,
+    before: bool,
+) {
+    match (&mut *inks, more) {
+        (Ok(inks), Ok(more)) => {
+            let at = if before { 0 } else { inks.len() };
+            inks.splice(at..at, more);
+        }
+        (Err(_), Ok(more)) => *inks = Ok(more),
+        (_, Err(_)) => {}
+    }
+}
+
+/// Binarizes by colour. Adds an interpretation that treats wide areas as stains.
+fn by_colour(
+    grey: &Grid<f32>,
+    found: &ColourContrast,
+    known: &Mask,
+) -> Result<Vec<InkMask>, BinarizeError> {
+    let mut values = held(&found.even, known);
+    let split = otsu::split(&mut values);
+    let mut inks = vec![binarize_even(grey, &found.even, split, known, false)?];
+    if may_be_stained(&values, split) {
+        inks.extend(binarize_narrow(grey, &found.even, known, STROKE, false));
+    }
+    Ok(inks)
+}
+
+fn by_brightness(grey: &Grid<f32>, known: &Mask) -> Result<Vec<InkMask>, BinarizeError> {
+    let mut values = held(grey, known);
     let split = otsu::split(&mut values).ok_or(BinarizeError::NoContrast { contrast: 0.0 })?;
     if split.high - split.low < (LEAST_CONTRAST * split.high).max(NOISE) {
         return Err(BinarizeError::NoContrast {
@@ -138,15 +182,15 @@ pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeE
         });
     }
     let dark = grey.map(|g| f64::from(*g) < split.threshold);
-    let even = evened(grey, &known, NARROW);
-    let mut values = held(&even, &known);
+    let even = evened(grey, known, NARROW);
+    let mut values = held(&even, known);
     let levelled = otsu::split(&mut values);
-    let (likelier, clear) = polarity(&even, levelled, &dark, &known);
+    let (likelier, clear) = polarity(&even, levelled, &dark, known);
     let of = |light_on_dark| {
         if light_on_dark {
-            binarize_narrow(grey, &grey.map(|g| 1.0 - *g), &known, NARROW, true)
+            binarize_narrow(grey, &grey.map(|g| 1.0 - *g), known, NARROW, true)
         } else {
-            binarize_even(grey, &even, levelled, &known, false)
+            binarize_even(grey, &even, levelled, known, false)
         }
     };
     let polarities: &[bool] = if clear {
@@ -158,7 +202,7 @@ pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeE
         polarities.iter().map(|light| of(*light)).collect();
     if polarities.contains(&false) && may_be_stained(&values, levelled) {
         // Dark areas wider than most strokes count as stains.
-        inks.push(binarize_narrow(grey, grey, &known, STROKE, false));
+        inks.push(binarize_narrow(grey, grey, known, STROKE, false));
     }
     // If none has ink, the error of the likeliest is reported.
     if inks.iter().all(Result::is_err) {

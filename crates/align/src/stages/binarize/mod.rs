@@ -1,6 +1,8 @@
-//! Binarization of the print: background, polarity, Otsu threshold, ink mask.
+//! Binarization of the print: dark ground, background, colour, polarity, Otsu threshold, ink mask.
 
 mod background;
+mod colour;
+mod ground;
 mod ink;
 mod outlined;
 mod polarity;

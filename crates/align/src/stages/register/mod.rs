@@ -9,6 +9,7 @@ mod anisotropic_scale;
 mod confidence;
 mod half_canvas;
 mod ink_edge;
+mod larger_part;
 mod levelling;
 mod metric_thresholds;
 mod observation;
@@ -37,7 +38,7 @@ use mocban_core::raster::DepthMap;
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 23;
+pub const REVISION: u32 = 24;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -47,6 +48,10 @@ const MIRROR_LIKELY: f64 = 1.04;
 /// fraction of `min_confidence`. The fraction is small because damaged blocks and dry prints of the right character
 /// have strokes without a partner too.
 const UNLIKELY: f64 = 0.05;
+
+/// A torn print is sought if the probability of the pose, multiplied by the probability of the same character, is below
+/// this.
+const DOUBTFUL: f64 = 0.75;
 
 /// A light print is refused if the tops cover more than this fraction of the rim of the depth map. Strokes do not
 /// surround a character, so these tops are the carved ground, seen from the back of the scanned surface.
@@ -99,9 +104,30 @@ pub fn register(
             .after(&expected.print_from_depth),
         ..*expected
     });
-    let search = pose_search::search(&depths, &normalized.prints, expected.as_ref(), params)?;
-    let single = Posed::new(depth, &depths, &relief, normalized, &search, params)?;
-    let levelled = Levelled::try_new(depth, &relief, &single, normalized, &search, params);
+    let mut search = pose_search::search(&depths, &normalized.prints, expected.as_ref(), params)?;
+    let mut single = Posed::new(depth, &depths, &relief, normalized, &search, params);
+    // A block shows where a character is, whether or not its print is torn.
+    let part = if expected.is_none() && single.as_ref().map_or(0.0, probability) < DOUBTFUL {
+        larger_part::find(&depths, &normalized.prints[search.ink], &search)
+    } else {
+        None
+    };
+    let mut of_part = None;
+    if let Some(part) = &part
+        && let Ok(found) = pose_search::search_part(&depths, &search, part, params)
+    {
+        let masks = normalized.with_masks(search.ink, part.masks.clone());
+        let posed = Posed::new(depth, &depths, &relief, &masks, &found, params);
+        if posed.as_ref().map_or(0.0, probability) > single.as_ref().map_or(0.0, probability) {
+            (search, single, of_part) = (found, posed, Some((masks, part.share)));
+        }
+    }
+    let single = single?;
+    let (masks, share) = match &of_part {
+        Some((masks, share)) => (masks, *share),
+        None => (normalized, 1.0),
+    };
+    let levelled = Levelled::try_new(depth, &relief, &single, masks, &search, params);
     let (depth, levelling, posed) = match &levelled {
         Some(found) => (&found.map, Some(found.levelling), &found.posed),
         None => (depth, None, &single),
@@ -149,9 +175,18 @@ pub fn register(
         search.prior,
         probabilities,
     );
+    // The other part of a torn print is no evidence.
+    for confidence in metrics.iter_mut().filter_map(|metric| metric.confidence.as_mut()) {
+        *confidence *= share;
+    }
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
     Ok(registered)
+}
+
+/// Returns the probability that the pose is right and that print and relief show the same character, by the pair alone.
+fn probability(posed: &Posed) -> f64 {
+    confidence::of_pose(&posed.features, 0.0) * confidence::of_character(&posed.features)
 }
 
 /// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character. Also
