@@ -66,15 +66,6 @@ impl Decoy {
         Self::Uncarved,
     ];
 
-    /// Returns whether the print shows nearly the same strokes as the mesh. Such a decoy must be doubted, and not all of
-    /// them can be refused.
-    pub(crate) const fn shows_same_strokes(self) -> bool {
-        matches!(
-            self,
-            Self::LookAlike | Self::AnotherHand | Self::BrushWriting
-        )
-    }
-
     /// Returns the name used in tables.
     pub(crate) const fn name(self) -> &'static str {
         match self {

@@ -119,7 +119,10 @@ fn print(scene: &Scene, rng: &mut ChaCha8Rng) -> Result<Option<Printed>, ImageEr
     if scene.tier.kind().is_some() && !is_legible(scene, &frame, tear.as_ref(), &picture) {
         return Ok(None);
     }
-    let has_colours = scene.tier.kind().is_some_and(|kind| !kind.colours.is_empty());
+    let has_colours = scene
+        .tier
+        .kind()
+        .is_some_and(|kind| !kind.colours.is_empty());
     let (bytes, extension) = encode_print(&picture, has_colours, rng)?;
     Ok(Some(Printed {
         frame,

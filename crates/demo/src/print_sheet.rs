@@ -81,12 +81,7 @@ impl PrintSheet {
     }
 
     /// Returns the sheet in another colour, with up to two stains of any colour.
-    pub(super) fn coloured(
-        self,
-        colour: [f64; 3],
-        half_mm: f64,
-        rng: &mut ChaCha8Rng,
-    ) -> Self {
+    pub(super) fn coloured(self, colour: [f64; 3], half_mm: f64, rng: &mut ChaCha8Rng) -> Self {
         let hue = [0; 3].map(|_: i32| within(STAIN_HUE, rng));
         let stains = (0..rng.random_range(0..3_u32)).map(|_| Stain {
             hue,

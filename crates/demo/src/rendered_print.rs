@@ -177,9 +177,8 @@ pub(super) fn render_print(
         let source = tear.map_or(Some(uv), |tear| tear.source(uv));
         source.filter(|source| outline.contains(*source))
     };
-    let is_ground = |x, y| {
-        tear.is_some_and(|tear| tear.is_half() || outline.contains(frame.uv(x, y)))
-    };
+    let is_ground =
+        |x, y| tear.is_some_and(|tear| tear.is_half() || outline.contains(frame.uv(x, y)));
     let inside_cut = Grid::from_fn(frame.width, frame.height, |x, y| {
         source(x, y).is_some() || is_ground(x, y)
     });

@@ -31,10 +31,7 @@ pub(super) fn is_legible(
         let is_stroke = scene.artwork.strokes.value(point) > 0.0;
         if is_stroke || scene.print_neighbours.value(point) < -0.2 {
             let ([r, g, b], to_ink) = (picture.rgb.at(x, y), picture.to_ink);
-            samples.push((
-                r * to_ink[0] + g * to_ink[1] + b * to_ink[2],
-                is_stroke,
-            ));
+            samples.push((r * to_ink[0] + g * to_ink[1] + b * to_ink[2], is_stroke));
         }
     }
     best_iou(samples) >= MIN_PRINT_IOU

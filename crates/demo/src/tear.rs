@@ -105,9 +105,7 @@ impl Tear {
 
 impl Displacement {
     fn applied(self, point: [f64; 2]) -> [f64; 2] {
-        let turned = self
-            .turn
-            .point([0, 1].map(|i| point[i] - self.middle[i]));
+        let turned = self.turn.point([0, 1].map(|i| point[i] - self.middle[i]));
         [0, 1].map(|i| turned[i] + self.middle[i] + self.shift_mm[i])
     }
 
@@ -128,4 +126,52 @@ fn offset_of(share: f64, line: Axis, strokes: &ScalarField) -> f64 {
     across.sort_by(f64::total_cmp);
     let at = (share * across.len() as f64) as usize;
     across.get(at).copied().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{Displacement, Tear};
+    use crate::ellipse::Axis;
+    use crate::noise::Noise;
+
+    fn tear(displaced: Option<Displacement>) -> Tear {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        Tear {
+            line: Axis::at(0.4),
+            offset_mm: 0.7,
+            ragged: Noise::draw(&mut rng),
+            displaced,
+            ground: 30.0,
+            texture: Noise::draw(&mut rng),
+        }
+    }
+
+    #[test]
+    fn displaced_points_are_seen_where_they_lie() {
+        let torn = tear(Some(Displacement {
+            turn: Axis::at(0.04),
+            middle: [0.2, 0.5],
+            shift_mm: [1.3, 1.9],
+        }));
+        for point in [[0.0, 4.0], [2.5, 3.0]] {
+            let placed = torn.place(point);
+            assert!((placed[0] - point[0]).hypot(placed[1] - point[1]) > 1.0);
+            let source = torn.source(placed).expect("the smaller part");
+            assert!((source[0] - point[0]).hypot(source[1] - point[1]) < 1e-9);
+        }
+        assert_eq!(torn.source([0.0, -3.0]), Some([0.0, -3.0]));
+        // The gap between the parts.
+        assert_eq!(torn.source([0.0, 1.6]), None);
+    }
+
+    #[test]
+    fn a_missing_part_shows_the_ground() {
+        let half = tear(None);
+        assert!(half.is_half());
+        assert_eq!(half.source([0.0, 4.0]), None);
+        assert_eq!(half.source([0.0, -3.0]), Some([0.0, -3.0]));
+    }
 }

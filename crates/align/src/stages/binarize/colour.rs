@@ -13,14 +13,17 @@ use mocban_core::raster::otsu;
 use mocban_core::raster::{Grid, Mask, PrintImage};
 
 /// Largest number of pixels from which the directions are found.
-const SAMPLES: usize = 6_000;
+const SAMPLES: usize = 2_500;
 /// Added to red, green and blue, as fractions of full white, before their logarithms are taken: dark pixels are noisy.
 const DARK: f64 = 0.04;
-/// Prints whose colours deviate less from grey, in natural logarithms, are grey.
-const LEAST_COLOUR: f64 = 0.02;
-/// Ink is sought by its colour if the brightness of the two classes differs by less than this, in natural logarithms.
-const LOW_CONTRAST: f64 = 0.45;
-/// Ink is sought by its colour if the classes lie at least this many times as far apart as those of the brightness.
+/// Colours that deviate less from their mean, in natural logarithms, are those of one sheet.
+const LEAST_COLOUR: f64 = 0.04;
+/// If the brightness of the two classes differs by at least this, in natural logarithms, coloured ink is sought in the
+/// lighter class only: the darker one is black ink, or a dark stain.
+const HIGH_CONTRAST: f64 = 0.45;
+/// Least fraction of the pixels in the lighter class.
+const LEAST_LIGHT: f64 = 0.25;
+/// The colours are clearer if their classes lie at least this many times as far apart as those of the brightness.
 const CLEARER: f64 = 1.6;
 /// Least distance between the classes, in standard deviations. One class that is cut in two has 2.7.
 const LEAST_APART: f64 = 4.0;
@@ -42,21 +45,27 @@ pub(super) struct ColourContrast {
 /// Returns the colours along the direction that separates ink from the sheet best, if the brightness separates them
 /// badly.
 pub(super) fn contrast(picture: &PrintImage, known: &Mask) -> Option<ColourContrast> {
-    let samples = samples(picture, known);
+    let mut samples = samples(picture, known);
     let brightness = Vector3::repeat(1.0 / f64::sqrt(3.0));
+    let plain = classes(&samples, &brightness)?;
+    let has_contrast = plain.gap / f64::sqrt(3.0) >= HIGH_CONTRAST;
+    if has_contrast {
+        let least = LEAST_LIGHT * samples.len() as f64;
+        samples.retain(|sample| brightness.dot(sample) >= plain.threshold);
+        if (samples.len() as f64) < least {
+            return None;
+        }
+    }
     if colour_deviation(&samples, &brightness) < LEAST_COLOUR {
         return None;
     }
-    let plain = classes(&samples, &brightness)?;
-    let has_contrast = plain.gap / f64::sqrt(3.0) >= LOW_CONTRAST;
-    let least = LEAST_APART.max(if has_contrast { CLEARER * plain.apart } else { 0.0 });
     let mut found: Vec<(Vector3<f64>, f64)> = Vec::new();
     for start in starts() {
         let Some((axis, apart)) = discriminant(&samples, start) else {
             continue;
         };
         let is_new = |other: &(Vector3<f64>, f64)| other.0.dot(&axis).abs() < SAME;
-        if apart > least && found.iter().all(is_new) {
+        if apart > LEAST_APART && found.iter().all(is_new) {
             found.push((axis, apart));
         }
     }
@@ -69,7 +78,7 @@ pub(super) fn contrast(picture: &PrintImage, known: &Mask) -> Option<ColourContr
     let (even, apart) = evened.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(ColourContrast {
         even,
-        is_clearer: apart > CLEARER * plain.apart,
+        is_clearer: !has_contrast && apart > CLEARER * plain.apart,
     })
 }
 
@@ -148,9 +157,8 @@ fn split_classes(values: Vec<f32>) -> Option<Classes> {
     let mean = |of: &[f32]| of.iter().map(|v| f64::from(*v)).sum::<f64>() / of.len().max(1) as f64;
     let (below, above) = sorted.split_at(cut);
     let means = [mean(below), mean(above)];
-    let squares = |of: &[f32], mean: f64| -> f64 {
-        of.iter().map(|v| (f64::from(*v) - mean).powi(2)).sum()
-    };
+    let squares =
+        |of: &[f32], mean: f64| -> f64 { of.iter().map(|v| (f64::from(*v) - mean).powi(2)).sum() };
     let within = (squares(below, means[0]) + squares(above, means[1])) / sorted.len() as f64;
     let gap = means[1] - means[0];
     Some(Classes {
@@ -161,20 +169,23 @@ fn split_classes(values: Vec<f32>) -> Option<Classes> {
 }
 
 fn classes(samples: &[Vector3<f64>], axis: &Vector3<f64>) -> Option<Classes> {
-    split_classes(samples.iter().map(|sample| axis.dot(sample) as f32).collect())
+    split_classes(
+        samples
+            .iter()
+            .map(|sample| axis.dot(sample) as f32)
+            .collect(),
+    )
 }
 
 /// Improves a direction: splits the samples along it and takes the direction in which the two classes lie farthest apart,
 /// some times. Returns the direction with the distance of the classes.
-fn discriminant(
-    samples: &[Vector3<f64>],
-    start: Vector3<f64>,
-) -> Option<(Vector3<f64>, f64)> {
+fn discriminant(samples: &[Vector3<f64>], start: Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let mut axis = start;
     for _ in 0..ROUNDS {
         let threshold = classes(samples, &axis)?.threshold;
-        let (low, high): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) =
-            samples.iter().partition(|sample| axis.dot(sample) < threshold);
+        let (low, high): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = samples
+            .iter()
+            .partition(|sample| axis.dot(sample) < threshold);
         let mut within = Matrix3::identity() * LEAST_VARIANCE * samples.len() as f64;
         let mut means = [Vector3::zeros(); 2];
         for (class, mean) in [low, high].iter().zip(&mut means) {
@@ -224,7 +235,11 @@ mod tests {
             } else {
                 [125.0, 136.0, 106.0]
             };
-            let stain = if is_stain(x, y) { [0.8, 0.7, 0.6] } else { [1.0; 3] };
+            let stain = if is_stain(x, y) {
+                [0.8, 0.7, 0.6]
+            } else {
+                [1.0; 3]
+            };
             [0, 1, 2].map(|i| colour[i] * stain[i])
         });
         let found = contrast(&coloured, &Mask::new(SIDE, SIDE, true)).expect("colours differ");

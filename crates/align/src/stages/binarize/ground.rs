@@ -10,14 +10,14 @@ const CELLS: f64 = 72.0;
 /// Half the least width of the ground, as a fraction of the longest side. Strokes and rules are narrower.
 const HALF_WIDTH: f64 = 0.065;
 /// Least fraction of the print that the ground covers, and least fraction that it leaves.
-const LEAST_GROUND: f64 = 0.05;
+const LEAST_GROUND: f64 = 0.1;
 const LEAST_LEFT: f64 = 0.2;
 /// Least fraction of what the ground leaves that is light: the sheet.
 const LEAST_SHEET: f64 = 0.5;
 /// Half the least width of a light area without strokes, as a fraction of the longest side, and the least fraction of the
 /// rest of the print that such areas cover. A rubbing has light strokes and no such area.
-const SHEET_HALF_WIDTH: f64 = 0.05;
-const LEAST_OPEN_SHEET: f64 = 0.25;
+const SHEET_HALF_WIDTH: f64 = 0.04;
+const LEAST_OPEN_SHEET: f64 = 0.08;
 /// Distance from the ground, in cells, at which pixels are a mixture of ground and sheet.
 const MIXED_CELLS: usize = 1;
 
@@ -32,15 +32,29 @@ pub(super) fn dark_ground(grey: &Grid<f32>, known: &Mask) -> Option<Mask> {
     let weight = known.to_weights();
     let present = grey.zip_map(&weight, |grey, weight| grey * weight);
     let [sums, weights] = [&present, &weight].map(|of| resample(of, scale, shift, sides));
-    let cells = sums.zip_map(&weights, |sum, weight| {
-        if weight > 0.5 { sum / weight } else { f32::NAN }
-    });
-    let mut values: Vec<f32> = cells.data().iter().copied().filter(|v| !v.is_nan()).collect();
+    let cells = sums.zip_map(
+        &weights,
+        |sum, weight| {
+            if weight > 0.5 { sum / weight } else { f32::NAN }
+        },
+    );
+    let mut values: Vec<f32> = cells
+        .data()
+        .iter()
+        .copied()
+        .filter(|v| !v.is_nan())
+        .collect();
     let all = values.len() as f64;
     let threshold = otsu::split(&mut values)?.threshold as f32;
     let reach = |share: f64| ((share * CELLS).round() as usize).max(1);
     let opened = |is_set: &dyn Fn(f32) -> bool, reach: usize| {
-        let set = cells.map(|v| if v.is_nan() { f32::NAN } else { f32::from(u8::from(is_set(*v))) });
+        let set = cells.map(|v| {
+            if v.is_nan() {
+                f32::NAN
+            } else {
+                f32::from(u8::from(is_set(*v)))
+            }
+        });
         let opened = extreme(&extreme(&set, reach, f32::min), reach, f32::max);
         opened.zip_map(&cells, |open, cell| open > 0.5 && !cell.is_nan())
     };

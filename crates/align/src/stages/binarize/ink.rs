@@ -1,8 +1,6 @@
 //! Finds the ink of a print: which pixels the print covers, whether ink is dark or light, and which pixels are ink.
 
 use super::background::{self, NARROW, STROKE};
-use super::colour::{self, ColourContrast};
-use super::ground::dark_ground;
 use super::polarity::polarity;
 use crate::stages::pose::SoftMask;
 use mocban_core::domain::cancel::poll;
@@ -99,7 +97,7 @@ pub(crate) struct InkMask {
 }
 
 /// Returns the Rec. 601 luma, 0..=1.
-fn grey_of(picture: &PrintImage) -> Grid<f32> {
+pub(super) fn grey_of(picture: &PrintImage) -> Grid<f32> {
     picture.rgb.map(|[r, g, b]| {
         (0.299 * f32::from(*r) + 0.587 * f32::from(*g) + 0.114 * f32::from(*b)) / 65_535.0
     })
@@ -124,56 +122,10 @@ pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeE
     })
 }
 
-/// Binarizes adaptively: leaves out the white around the print, divides by the background, and applies Otsu's
-/// threshold. Returns one interpretation for each possible polarity, the likelier first. If the print may be stained,
-/// adds an interpretation that treats wide dark areas as stains. If a sheet may lie on a dark ground, adds
-/// interpretations of the sheet alone. If the colours differ more than the brightness, adds interpretations by colour.
-pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
-    let grey = &grey_of(picture);
-    let mut known = known(picture, grey);
-    let mut inks = by_brightness(grey, &known);
-    if let Some(ground) = dark_ground(grey, &known) {
-        known = known.zip_map(&ground, |known, ground| known && !ground);
-        add(&mut inks, by_brightness(grey, &known), false);
-    }
-    if let Some(found) = colour::contrast(picture, &known) {
-        add(&mut inks, by_colour(grey, &found, &known), found.is_clearer);
-    }
-    inks
-}
-
-/// Adds interpretations behind others, or before them.
-fn add(
-    inks: &mut Result<Vec<InkMask>, BinarizeError>,
-    more: Result<Vec<InkMask>, BinarizeError>,
-    before: bool,
-) {
-    match (&mut *inks, more) {
-        (Ok(inks), Ok(more)) => {
-            let at = if before { 0 } else { inks.len() };
-            inks.splice(at..at, more);
-        }
-        (Err(_), Ok(more)) => *inks = Ok(more),
-        (_, Err(_)) => {}
-    }
-}
-
-/// Binarizes by colour. Adds an interpretation that treats wide areas as stains.
-fn by_colour(
-    grey: &Grid<f32>,
-    found: &ColourContrast,
-    known: &Mask,
-) -> Result<Vec<InkMask>, BinarizeError> {
-    let mut values = held(&found.even, known);
-    let split = otsu::split(&mut values);
-    let mut inks = vec![binarize_even(grey, &found.even, split, known, false)?];
-    if may_be_stained(&values, split) {
-        inks.extend(binarize_narrow(grey, &found.even, known, STROKE, false));
-    }
-    Ok(inks)
-}
-
-fn by_brightness(grey: &Grid<f32>, known: &Mask) -> Result<Vec<InkMask>, BinarizeError> {
+/// Binarizes the grey of the known pixels adaptively: divides by the background, and applies Otsu's threshold. Returns one
+/// interpretation for each possible polarity, the likelier first. If the print may be stained, adds an interpretation that
+/// treats wide dark areas as stains.
+pub(super) fn by_brightness(grey: &Grid<f32>, known: &Mask) -> Result<Vec<InkMask>, BinarizeError> {
     let mut values = held(grey, known);
     let split = otsu::split(&mut values).ok_or(BinarizeError::NoContrast { contrast: 0.0 })?;
     if split.high - split.low < (LEAST_CONTRAST * split.high).max(NOISE) {
@@ -213,7 +165,7 @@ fn by_brightness(grey: &Grid<f32>, known: &Mask) -> Result<Vec<InkMask>, Binariz
 }
 
 /// Returns whether enough of the dark values are pale to suggest stains. `sorted` is in ascending order.
-fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
+pub(super) fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     let Some(split) = split else { return false };
     let below = |limit: f64| sorted.partition_point(|v| f64::from(*v) < limit);
     let dark = below(split.threshold);
@@ -224,7 +176,7 @@ fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
 
 /// Binarizes `dark_ink`, which is the grey, or its inverse if ink is light. `narrow` is half the largest width of ink,
 /// as a fraction of the longest side.
-fn binarize_narrow(
+pub(super) fn binarize_narrow(
     grey: &Grid<f32>,
     dark_ink: &Grid<f32>,
     known: &Mask,
@@ -237,7 +189,7 @@ fn binarize_narrow(
 }
 
 /// Binarizes one polarity from the grey divided by the background.
-fn binarize_even(
+pub(super) fn binarize_even(
     grey: &Grid<f32>,
     even: &Grid<f32>,
     split: Option<Split>,
@@ -264,7 +216,7 @@ fn binarize_even(
 }
 
 /// Returns the values of the known pixels.
-fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
+pub(super) fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
     let mut values = Vec::new();
     for (y, greys) in grey.data().chunks(grey.width().max(1)).enumerate() {
         poll();
@@ -275,7 +227,7 @@ fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
 }
 
 /// Returns the mask of ink and background. White areas at the border are left out, unless the background is white too.
-fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
+pub(super) fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     let white = picture
         .rgb
         .map(|[r, g, b]| f32::from(*r.min(g).min(b)) / 65_535.0 > WHITE);
@@ -338,7 +290,8 @@ fn require_ink(
 
 #[cfg(test)]
 mod tests {
-    use super::{BinarizeError, InkMask, hypotheses};
+    use super::{BinarizeError, InkMask};
+    use crate::stages::binarize::hypotheses;
     use mocban_core::raster::{Grid, PrintImage};
 
     fn picture(grey: impl Fn(usize, usize) -> u16) -> PrintImage {

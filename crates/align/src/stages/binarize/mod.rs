@@ -3,12 +3,14 @@
 mod background;
 mod colour;
 mod ground;
+mod hypotheses;
 mod ink;
 mod outlined;
 mod polarity;
 
+pub(super) use hypotheses::hypotheses;
 pub(super) use ink::BinarizeError;
-pub(super) use ink::{InkMask, fixed, hypotheses, require_strokes};
+pub(super) use ink::{InkMask, fixed, require_strokes};
 pub(super) use mocban_core::raster::otsu::{Split, split, split_inner};
 pub(super) use outlined::{hypotheses_within, inside};
 pub(super) use polarity::rim_share;

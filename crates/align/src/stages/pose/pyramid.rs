@@ -217,7 +217,10 @@ impl PyramidLevel {
         let image_from_work = self.work_from_image.inverse()?;
         for y in 0..self.value.height() {
             for x in (0..self.value.width()).filter(|x| self.weight.at(*x, y) > 0.0) {
-                visit(image_from_work.apply([x as f64, y as f64]), self.amount.at(x, y));
+                visit(
+                    image_from_work.apply([x as f64, y as f64]),
+                    self.amount.at(x, y),
+                );
             }
         }
         Some(())

@@ -28,7 +28,7 @@ const STEPS: usize = 8;
 /// longest side. Least displacement that is told from a wavy sheet.
 const FARTHEST: f64 = 0.36;
 const STEP: f64 = 0.04;
-const LEAST_DISPLACED: f64 = 0.03;
+const LEAST_DISPLACED: f64 = 0.06;
 /// Largest rotation between the parts, degrees, and largest natural logarithm of the ratio of their scales.
 const LARGEST_TURN_DEG: f64 = 6.0;
 const LARGEST_RATIO: f64 = 0.08;
@@ -98,8 +98,12 @@ pub(super) fn find(
     let longest = print.known.bounding_box()?.longest_side() as f64;
     let starts: Vec<PoseCandidate> = search.poses.iter().take(STARTS).copied().collect();
     let whole = Refiner::new(&fixed, &moving);
-    let refined = starts.iter().map(|start| whole.refine(start, STEPS, Loss::Huber));
-    let of_whole = refined.map(|pose| whole.local_score(&pose)).fold(0.0, f64::max);
+    let refined = starts
+        .iter()
+        .map(|start| whole.refine(start, STEPS, Loss::Huber));
+    let of_whole = refined
+        .map(|pose| whole.local_score(&pose))
+        .fold(0.0, f64::max);
     let mut sides = posed_sides(&fixed, &moving, &starts)?;
     sides.sort_by(|a, b| b.score.total_cmp(&a.score));
     let parts = sides.iter().take(TRIED).filter_map(|larger| {
@@ -108,7 +112,6 @@ pub(super) fn find(
         Some((larger, smaller, sum))
     });
     let (larger, smaller, sum) = parts.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    if std::env::var_os("DBG50").is_some() { eprintln!("part whole {of_whole:.3} sum {sum:.3} larger {:.3} smaller {:.3}", larger.score, smaller.score); }
     if sum - of_whole < LEAST_GAIN * (1.0 - of_whole) {
         return None;
     }
@@ -168,7 +171,12 @@ fn posed_sides(
             let posed = starts.iter().map(|start| {
                 let pose = refiner.refine(start, STEPS, Loss::Huber);
                 let score = refiner.local_score(&pose);
-                PosedSide { side, pose, score, share }
+                PosedSide {
+                    side,
+                    pose,
+                    score,
+                    share,
+                }
             });
             sides.extend(posed.max_by(|a, b| a.score.total_cmp(&b.score)));
         }
@@ -258,16 +266,22 @@ fn best_line(
     let gains: Vec<([f64; 2], f64)> = squares(smaller)?
         .into_iter()
         .map(|(point, square)| (point, square))
-        .chain(squares(larger)?.into_iter().map(|(point, square)| (point, -square)))
+        .chain(
+            squares(larger)?
+                .into_iter()
+                .map(|(point, square)| (point, -square)),
+        )
         .collect();
     let mut best: Option<(f64, Side)> = None;
     for k in 0..FINE_DIRECTIONS {
         let (sin, cos) = (k as f64 * std::f64::consts::TAU / FINE_DIRECTIONS as f64).sin_cos();
         let along = |[x, y]: [f64; 2]| cos * x + sin * y;
-        let range = points.iter().fold([f64::MAX, f64::MIN], |[low, high], point| {
-            let at = along(*point);
-            [low.min(at), high.max(at)]
-        });
+        let range = points
+            .iter()
+            .fold([f64::MAX, f64::MIN], |[low, high], point| {
+                let at = along(*point);
+                [low.min(at), high.max(at)]
+            });
         let width = (range[1] - range[0]).max(1e-9);
         let mut bins = [0.0; FINE_OFFSETS];
         for (point, gain) in &gains {
@@ -286,4 +300,80 @@ fn best_line(
         }
     }
     best.map(|(_, side)| side)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LargerPart, find};
+    use crate::stages::normalize::PrintMasks;
+    use crate::stages::pose::{PoseCandidate, SoftMask};
+    use crate::stages::register::pose_search::PoseSearch;
+    use mocban_core::domain::{Affine2, MaskScale};
+    use mocban_core::raster::{Grid, Mask};
+
+    const SIDE: usize = 120;
+
+    /// Strokes of different lengths in two directions.
+    fn is_stroke(x: i64, y: i64) -> bool {
+        let down = [(20, 12, 100), (52, 20, 74), (80, 40, 108), (100, 14, 60)];
+        let across = [(18, 14, 66), (44, 30, 108), (70, 14, 90), (98, 36, 112)];
+        let on = |at: i64, along: i64, bars: [(i64, i64, i64); 4]| {
+            let mut bars = bars.into_iter();
+            bars.any(|(middle, from, to)| (at - middle).abs() < 5 && (from..to).contains(&along))
+        };
+        on(x, y, down) || on(y, x, across)
+    }
+
+    /// Seeks the larger part of a print whose part right of column 78 is displaced.
+    fn part(displaced: [i64; 2]) -> Option<LargerPart> {
+        let relief = SoftMask {
+            amount: Grid::from_fn(SIDE, SIDE, |x, y| {
+                f32::from(u8::from(!is_stroke(x as i64, y as i64)))
+            }),
+            known: Mask::new(SIDE, SIDE, true),
+        };
+        let print = PrintMasks {
+            ink: Mask::from_fn(SIDE, SIDE, |x, y| {
+                let (x, y) = (x as i64, y as i64);
+                let source = [x - displaced[0], y - displaced[1]];
+                if x < 78 {
+                    is_stroke(x, y)
+                } else {
+                    source[0] >= 78 && is_stroke(source[0], source[1])
+                }
+            }),
+            specks: Mask::new(SIDE, SIDE, false),
+            known: Mask::new(SIDE, SIDE, true),
+            scale: MaskScale::Same,
+        };
+        let pose = PoseCandidate {
+            fixed_from_moving: Affine2::IDENTITY,
+            score: 0.6,
+            mirrored: false,
+        };
+        let search = PoseSearch {
+            ink: 0,
+            poses: vec![pose],
+            mirrored: None,
+            at_bound: false,
+            prior: 0.0,
+            expected: None,
+        };
+        find(&relief, &print, &search)
+    }
+
+    #[test]
+    fn a_displaced_part_is_left_out() {
+        let part = part([3, 22]).expect("two parts");
+        assert!((0.5..0.8).contains(&part.share), "{}", part.share);
+        let known = &part.masks.known;
+        assert!(known.at(40, 60) && !known.at(95, 60) && !part.masks.ink.at(100, 60));
+        let moved = part.pose.fixed_from_moving.apply([60.0, 60.0]);
+        assert!((moved[0] - 60.0).hypot(moved[1] - 60.0) < 1.5, "{moved:?}");
+    }
+
+    #[test]
+    fn a_whole_print_has_no_parts() {
+        assert!(part([0, 0]).is_none());
+    }
 }

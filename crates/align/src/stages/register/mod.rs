@@ -12,6 +12,7 @@ mod ink_edge;
 mod larger_part;
 mod levelling;
 mod metric_thresholds;
+mod misfit;
 mod observation;
 mod params;
 mod pose_search;
@@ -176,8 +177,12 @@ pub fn register(
         probabilities,
     );
     // The other part of a torn print is no evidence.
-    for confidence in metrics.iter_mut().filter_map(|metric| metric.confidence.as_mut()) {
-        *confidence *= share;
+    let certainty = share * confidence::of_same_block(posed.smooth_misfit);
+    for confidence in metrics
+        .iter_mut()
+        .filter_map(|metric| metric.confidence.as_mut())
+    {
+        *confidence *= certainty;
     }
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
@@ -240,5 +245,7 @@ fn require_tops(
     Ok(())
 }
 
+#[cfg(test)]
+mod print_tests;
 #[cfg(test)]
 mod tests;

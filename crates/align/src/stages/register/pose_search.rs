@@ -59,9 +59,9 @@ const HOLDS: f64 = 0.85;
 /// may have been scaled unequally.
 const ASPECTS: [f64; 4] = [1.16, 1.32, 1.0 / 1.16, 1.0 / 1.32];
 /// A pose fits well if its score is at least this.
-const FITS_WELL: f64 = 0.74;
+const FITS_WELL: f64 = 0.82;
 /// Unequal scales are used if they bring the best upright score closer to 1 by at least this fraction.
-const LEAST_GAIN: f64 = 0.2;
+const LEAST_GAIN: f64 = 0.4;
 /// `at_bound` is set if the scale is this close to either end of the searched band, in natural logarithms.
 const BOUND: f64 = 0.02;
 
@@ -214,10 +214,7 @@ fn stretch(
         let with_aspect = |aspect: f64| {
             let [x, y] = pose.fixed_from_moving.apply(middle);
             let [across, down] = [aspect.sqrt(), 1.0 / aspect.sqrt()];
-            let about = Affine2([
-                [across, 0.0, x - across * x],
-                [0.0, down, y - down * y],
-            ]);
+            let about = Affine2([[across, 0.0, x - across * x], [0.0, down, y - down * y]]);
             let start = PoseCandidate {
                 fixed_from_moving: about.after(&pose.fixed_from_moving),
                 ..*pose
@@ -226,13 +223,16 @@ fn stretch(
         };
         let poses = ASPECTS.map(with_aspect).into_iter();
         poses.fold(*pose, |best, other| {
-            if other.score > best.score { other } else { best }
+            if other.score > best.score {
+                other
+            } else {
+                best
+            }
         })
     });
     let mut stretched: Vec<PoseCandidate> = stretched.collect();
     let upright = |poses: &[PoseCandidate]| best_score(poses.iter().filter(|pose| !pose.mirrored));
     let [before, after] = [upright(found), upright(&stretched)];
-    if std::env::var_os("DBG50").is_some() { eprintln!("stretch {before:.3} {after:.3} gain {:.3}", (after - before) / (1.0 - before)); }
     if after - before >= LEAST_GAIN * (1.0 - before) {
         stretched.sort_by(|a, b| b.score.total_cmp(&a.score));
         found.copy_from_slice(&stretched);
