@@ -18,7 +18,7 @@ use super::scan_pose::ScanPose;
 use super::scanner::{ScanStyle, scan};
 use super::scene::{Scene, pair_rng};
 use super::solvable::{is_legible, is_solvable};
-use super::tear::Tear;
+use super::tear::SheetTear;
 use super::tier::Tier;
 use super::truth_line::TruthLine;
 use mocban_core::domain::LengthUnit;
@@ -113,7 +113,7 @@ pub(super) fn print_by_another_hand(
 /// Prints the block and cuts the character out of the print. Returns `None` if a kind's print is not legible.
 fn print(scene: &Scene, rng: &mut ChaCha8Rng) -> Result<Option<Printed>, ImageError> {
     let outline = cut_outline(scene, Crop::WidePrint, rng);
-    let tear = Tear::draw(scene, rng);
+    let tear = SheetTear::draw(scene, rng);
     let frame = PrintFrame::draw(&outline, scene, tear.as_ref(), rng);
     let picture = render_print(scene, &outline, &frame, tear.as_ref(), rng);
     if scene.tier.kind().is_some() && !is_legible(scene, &frame, tear.as_ref(), &picture) {

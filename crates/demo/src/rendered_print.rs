@@ -12,7 +12,7 @@ use super::polygon::Polygon;
 use super::print_sheet::{ColouredPrint, PrintSheet};
 use super::scalar_field::ScalarField;
 use super::scene::Scene;
-use super::tear::Tear;
+use super::tear::SheetTear;
 use mocban_core::domain::Affine2;
 use mocban_core::raster::Grid;
 
@@ -50,7 +50,7 @@ impl PrintFrame {
     pub(super) fn draw(
         outline: &Polygon,
         scene: &Scene,
-        tear: Option<&Tear>,
+        tear: Option<&SheetTear>,
         rng: &mut ChaCha8Rng,
     ) -> Self {
         let paper = scene.conditions.paper;
@@ -151,7 +151,7 @@ pub(super) fn render_print(
     scene: &Scene,
     outline: &Polygon,
     frame: &PrintFrame,
-    tear: Option<&Tear>,
+    tear: Option<&SheetTear>,
     rng: &mut ChaCha8Rng,
 ) -> RenderedPrint {
     let inking = Inking::draw(scene, rng);

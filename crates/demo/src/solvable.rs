@@ -4,7 +4,7 @@
 use super::carved_block::CarvedBlock;
 use super::rendered_print::{PrintFrame, RenderedPrint};
 use super::scene::Scene;
-use super::tear::Tear;
+use super::tear::SheetTear;
 use super::truth_line::{IGNORED, STROKE_TOP};
 use mocban_core::raster::Grid;
 
@@ -19,7 +19,7 @@ const MIN_TOPS_IOU: f64 = 0.8;
 pub(super) fn is_legible(
     scene: &Scene,
     frame: &PrintFrame,
-    tear: Option<&Tear>,
+    tear: Option<&SheetTear>,
     picture: &RenderedPrint,
 ) -> bool {
     let mut samples = Vec::new();

@@ -20,7 +20,7 @@ const MAX_HIDDEN_MM: f64 = 1.2;
 const DARK_GROUND: f64 = 0.3;
 
 /// The line of the tear, and what lies beyond it.
-pub(super) struct Tear {
+pub(super) struct SheetTear {
     /// Direction of the line. The larger part lies on its negative side.
     line: Axis,
     offset_mm: f64,
@@ -39,7 +39,7 @@ struct Displacement {
     shift_mm: [f64; 2],
 }
 
-impl Tear {
+impl SheetTear {
     /// Draws the tear of a scene's kind. Returns `None` and draws no random numbers if the kind has whole sheets.
     pub(super) fn draw(scene: &Scene, rng: &mut ChaCha8Rng) -> Option<Self> {
         let kind = scene.tier.kind()?;
@@ -133,13 +133,13 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::{Displacement, Tear};
+    use super::{Displacement, SheetTear};
     use crate::ellipse::Axis;
     use crate::noise::Noise;
 
-    fn tear(displaced: Option<Displacement>) -> Tear {
+    fn tear(displaced: Option<Displacement>) -> SheetTear {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        Tear {
+        SheetTear {
             line: Axis::at(0.4),
             offset_mm: 0.7,
             ragged: Noise::draw(&mut rng),

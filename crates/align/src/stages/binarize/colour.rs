@@ -103,7 +103,7 @@ fn colour(rgb: [u16; 3]) -> Vector3<f64> {
     Vector3::from(rgb.map(|c| (f64::from(c) / 65_535.0 + DARK).ln()))
 }
 
-/// Returns every so many known pixels of a grid.
+/// Returns values of known pixels of a grid, about [`SAMPLES`] at equal distances.
 fn sampled<T: Copy, U>(grid: &Grid<T>, known: &Mask, value: impl Fn(T) -> U) -> Vec<U> {
     let step = (known.count() / SAMPLES).max(1);
     let pixels = grid.data().iter().zip(known.data());

@@ -16,7 +16,7 @@ const LEAST_LEFT: f64 = 0.2;
 const LEAST_SHEET: f64 = 0.5;
 /// Half the least width of a light area without strokes, as a fraction of the longest side, and the least fraction of the
 /// rest of the print that such areas cover. A rubbing has light strokes and no such area.
-const SHEET_HALF_WIDTH: f64 = 0.04;
+const SHEET_HALF_WIDTH: f64 = 0.05;
 const LEAST_OPEN_SHEET: f64 = 0.08;
 /// Distance from the ground, in cells, at which pixels are a mixture of ground and sheet.
 const MIXED_CELLS: usize = 1;
@@ -46,17 +46,17 @@ pub(super) fn dark_ground(grey: &Grid<f32>, known: &Mask) -> Option<Mask> {
         .collect();
     let all = values.len() as f64;
     let threshold = otsu::split(&mut values)?.threshold as f32;
-    let reach = |share: f64| ((share * CELLS).round() as usize).max(1);
+    let reach = |share: f64| ((share * sides[0].max(sides[1]) as f64).round() as usize).max(1);
     let opened = |is_set: &dyn Fn(f32) -> bool, reach: usize| {
-        let set = cells.map(|v| {
-            if v.is_nan() {
-                f32::NAN
-            } else {
-                f32::from(u8::from(is_set(*v)))
-            }
+        // Cells without data and beyond the print are not set: a stroke that is cut at the border is no ground.
+        let padded = Grid::from_fn(sides[0] + 2 * reach, sides[1] + 2 * reach, |x, y| {
+            let cell = cells.get(x as i64 - reach as i64, y as i64 - reach as i64);
+            f32::from(u8::from(cell.is_some_and(is_set)))
         });
-        let opened = extreme(&extreme(&set, reach, f32::min), reach, f32::max);
-        opened.zip_map(&cells, |open, cell| open > 0.5 && !cell.is_nan())
+        let opened = extreme(&extreme(&padded, reach, f32::min), reach, f32::max);
+        Mask::from_fn(sides[0], sides[1], |x, y| {
+            opened.at(x + reach, y + reach) > 0.5
+        })
     };
     let dark = opened(&|value| value < threshold, reach(HALF_WIDTH));
     let beyond = Mask::from_fn(sides[0] + 2, sides[1] + 2, |x, y| {
@@ -133,5 +133,13 @@ mod tests {
         let print = |x, y| if is_stroke(x, y) || x < 8 { 0.15 } else { 0.8 };
         assert!(ground(print).is_none());
         assert!(ground(|x, y| 0.95 - print(x, y)).is_none());
+        let cut = |x, y| {
+            if is_stroke(x, y) || x >= 136 {
+                0.15
+            } else {
+                0.8
+            }
+        };
+        assert!(ground(cut).is_none());
     }
 }

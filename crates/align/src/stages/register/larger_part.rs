@@ -3,7 +3,6 @@
 //! A pose is refined on one side of each of several lines. If the other side fits a displaced pose, and both sides together
 //! fit much better than the whole print fits any pose, the line is placed where both poses predict the ink best.
 
-use super::pose_search::PoseSearch;
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{ImagePyramid, Loss, PoseCandidate, PyramidLevel, Refiner, SoftMask};
 use mocban_core::domain::Affine2;
@@ -24,8 +23,8 @@ const STARTS: usize = 3;
 const TRIED: usize = 5;
 /// Steps of a refinement.
 const STEPS: usize = 8;
-/// Largest displacement of the smaller part, and the step between those that are tried, as fractions of the print's
-/// longest side. Least displacement that is told from a wavy sheet.
+/// Largest displacement of the smaller part, and the step between tried ones, as fractions of the print's
+/// longest side. The least displacement is larger than that of wavy sheets.
 const FARTHEST: f64 = 0.36;
 const STEP: f64 = 0.04;
 const LEAST_DISPLACED: f64 = 0.06;
@@ -83,12 +82,12 @@ struct PosedSide {
     share: f64,
 }
 
-/// Finds the larger part of a print that shows a displaced part. Returns `None` if one pose fits the whole print about as
+/// Finds the larger part of a print that shows a displaced part. `poses` are poses on the whole print, best first. Returns `None` if one pose fits the whole print about as
 /// well.
 pub(super) fn find(
     depths: &SoftMask,
     print: &PrintMasks,
-    search: &PoseSearch,
+    poses: &[PoseCandidate],
 ) -> Option<LargerPart> {
     let wood = ImagePyramid::new(depths, PX)?.map(|d| soft_stroke(d, CUT, SOFTNESS));
     let (moving, fixed) = (
@@ -96,7 +95,7 @@ pub(super) fn find(
         ImagePyramid::new(&print.soft_ink(), PX)?.level(PX, SIGMA),
     );
     let longest = print.known.bounding_box()?.longest_side() as f64;
-    let starts: Vec<PoseCandidate> = search.poses.iter().take(STARTS).copied().collect();
+    let starts: Vec<PoseCandidate> = poses.iter().take(STARTS).copied().collect();
     let whole = Refiner::new(&fixed, &moving);
     let refined = starts
         .iter()
@@ -307,7 +306,6 @@ mod tests {
     use super::{LargerPart, find};
     use crate::stages::normalize::PrintMasks;
     use crate::stages::pose::{PoseCandidate, SoftMask};
-    use crate::stages::register::pose_search::PoseSearch;
     use mocban_core::domain::{Affine2, MaskScale};
     use mocban_core::raster::{Grid, Mask};
 
@@ -351,15 +349,7 @@ mod tests {
             score: 0.6,
             mirrored: false,
         };
-        let search = PoseSearch {
-            ink: 0,
-            poses: vec![pose],
-            mirrored: None,
-            at_bound: false,
-            prior: 0.0,
-            expected: None,
-        };
-        find(&relief, &print, &search)
+        find(&relief, &print, &[pose])
     }
 
     #[test]

@@ -109,7 +109,7 @@ pub fn register(
     let mut single = Posed::new(depth, &depths, &relief, normalized, &search, params);
     // A block shows where a character is, whether or not its print is torn.
     let part = if expected.is_none() && single.as_ref().map_or(0.0, probability) < DOUBTFUL {
-        larger_part::find(&depths, &normalized.prints[search.ink], &search)
+        larger_part::find(&depths, &normalized.prints[search.ink], &search.poses)
     } else {
         None
     };
