@@ -26,8 +26,9 @@ fn align(decoy: &DecoyPair, settings: &Settings) -> Result<(), StageError> {
 #[test]
 fn pairs_that_do_not_belong_together_are_refused() {
     let settings = settings();
-    // Not every look-alike is refused.
-    let is_refused = |kind: &Decoy| *kind != Decoy::LookAlike;
+    // Not every print with nearly the same strokes is refused.
+    let doubted = [Decoy::LookAlike, Decoy::AnotherHand, Decoy::BrushWriting];
+    let is_refused = |kind: &Decoy| !doubted.contains(kind);
     let kinds = || Decoy::ALL.into_iter().filter(is_refused);
     let cases: Vec<(Tier, Decoy, u64)> = [Tier::Upright, Tier::Pose]
         .into_iter()

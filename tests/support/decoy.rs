@@ -1,7 +1,7 @@
 //! Pairs without a correct alignment, which the stages must refuse. Used by tests and by the accuracy bench.
 
 use image::ImageError;
-use mocban::demo::{DemoPair, PairGenerator};
+use mocban::demo::{DemoPair, PairGenerator, Tier};
 use mocban::mesh::Mesh;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -35,6 +35,9 @@ const LOOK_ALIKES: [[char; 2]; 20] = [
     ['史', '吏'],
 ];
 
+/// Distance to the index of another block with the same character.
+const OTHER_BLOCK: u64 = 1_000_000;
+
 /// A kind of pair without a correct alignment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Decoy {
@@ -42,6 +45,10 @@ pub(crate) enum Decoy {
     WrongPrint,
     /// The print of another character with nearly the same strokes. The mesh shows a character that has such a partner.
     LookAlike,
+    /// The print of another block with the same character, which another hand wrote.
+    AnotherHand,
+    /// The character in brush writing. The mesh shows a character of which there is a photograph.
+    BrushWriting,
     /// A mesh that is not in mirror writing, with outward faces.
     Mirrored,
     /// A flat plate with scanner noise instead of the carved block.
@@ -50,9 +57,11 @@ pub(crate) enum Decoy {
 
 impl Decoy {
     /// All kinds.
-    pub(crate) const ALL: [Self; 4] = [
+    pub(crate) const ALL: [Self; 6] = [
         Self::WrongPrint,
         Self::LookAlike,
+        Self::AnotherHand,
+        Self::BrushWriting,
         Self::Mirrored,
         Self::Uncarved,
     ];
@@ -62,6 +71,8 @@ impl Decoy {
         match self {
             Self::WrongPrint => "wrong print",
             Self::LookAlike => "look-alike print",
+            Self::AnotherHand => "another hand",
+            Self::BrushWriting => "brush writing",
             Self::Mirrored => "mirrored mesh",
             Self::Uncarved => "uncarved mesh",
         }
@@ -89,6 +100,11 @@ pub(crate) fn decoy_pair(
     let pair = pairs.pair(index)?;
     Ok(match kind {
         Decoy::LookAlike => look_alike(pairs, index)?,
+        Decoy::AnotherHand => DecoyPair {
+            print: by_another_hand(pairs, &pair.character, index)?,
+            mesh: pair.mesh,
+        },
+        Decoy::BrushWriting => brush_writing(pairs, index)?,
         Decoy::WrongPrint => DecoyPair {
             print: print_of_another_character(pairs, &pair.character, index)?,
             mesh: pair.mesh,
@@ -114,6 +130,28 @@ fn look_alike(pairs: &PairGenerator, index: u64) -> Result<DecoyPair, ImageError
     Ok(DecoyPair {
         mesh: pairs.pair_of(carved, index)?.mesh,
         print: pairs.pair_of(printed, index + 1)?.print,
+    })
+}
+
+/// Returns a print of another block with the same character.
+fn by_another_hand(
+    pairs: &PairGenerator,
+    character: &str,
+    index: u64,
+) -> Result<Vec<u8>, ImageError> {
+    let character = character.chars().next();
+    let character = character.expect("a pair shows a character");
+    pairs.print_by_another_hand(character, index + OTHER_BLOCK)
+}
+
+/// Makes the mesh of a character of the font and a photograph of the character in brush writing.
+fn brush_writing(pairs: &PairGenerator, index: u64) -> Result<DecoyPair, ImageError> {
+    let photographed = PairGenerator::new(Tier::Real, 1).pair(index)?;
+    let character = photographed.character.chars().next();
+    let character = character.expect("a pair shows a character");
+    Ok(DecoyPair {
+        mesh: pairs.pair_of(character, index)?.mesh,
+        print: photographed.print,
     })
 }
 

@@ -85,6 +85,19 @@ impl Artwork {
         }
     }
 
+    /// Returns the character as another hand writes it: its strokes have other widths, lengths and places.
+    pub(super) fn by_another_hand(&self, rng: &mut ChaCha8Rng) -> Self {
+        let (place, weight) = ([Noise::draw(rng), Noise::draw(rng)], Noise::draw(rng));
+        let place_mm = rng.random_range(0.4..0.9);
+        let size_mm = rng.random_range(2.0..4.5);
+        let weight_mm = rng.random_range(0.03..0.1);
+        let strokes = ScalarField::from_fn(self.strokes.frame, |[u, v], _, _| {
+            let [du, dv] = place.map(|noise| place_mm * noise.at(u / size_mm, v / size_mm));
+            self.strokes.value([u + du, v + dv]) + weight_mm * weight.at(u / 1.2, v / 1.2)
+        });
+        Self::new(strokes, self.size_mm)
+    }
+
     /// Draws the neighbouring characters and the column rules. Returns the signed distance to their outlines in mm,
     /// positive inside. Each of the four nearest neighbours and each rule is present with a fixed probability. If mesh
     /// or print shows 3 x 3 characters, all eight neighbours are present.

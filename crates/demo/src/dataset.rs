@@ -15,7 +15,7 @@ use mocban_core::domain::Explained;
 use mocban_core::raster::png_grey8;
 
 /// Increased whenever the same options produce different bytes.
-const REVISION: u32 = 2;
+const REVISION: u32 = 3;
 /// Number of consecutive pairs with the same block in the manifest.
 const PAIRS_PER_BLOCK: u64 = 12;
 /// Written last; its presence marks a complete dataset.

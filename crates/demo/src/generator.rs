@@ -4,7 +4,7 @@ use image::ImageError;
 
 use super::calligraphy;
 use super::glyph::Glyphs;
-use super::pair::{DemoPair, drawn_pair};
+use super::pair::{DemoPair, drawn_pair, print_by_another_hand};
 use super::tier::Tier;
 
 /// Generates the pairs of a tier from a seed. Each pair depends only on its index and the generator's settings.
@@ -51,6 +51,17 @@ impl PairGenerator {
     pub fn pair_of(&self, character: char, index: u64) -> Result<DemoPair, ImageError> {
         let (kind, index) = self.tier.tier_and_index(index);
         self.drawn(kind, index, &[character])
+    }
+
+    /// Makes the encoded print of a character, which must be in the font, as another hand writes it: with strokes of
+    /// other widths, lengths and places. No pair has this print.
+    pub fn print_by_another_hand(
+        &self,
+        character: char,
+        index: u64,
+    ) -> Result<Vec<u8>, ImageError> {
+        let (kind, index) = self.tier.tier_and_index(index);
+        print_by_another_hand(&self.glyphs, character, kind, self.seed, index)
     }
 
     fn drawn(&self, kind: Tier, index: u64, characters: &[char]) -> Result<DemoPair, ImageError> {

@@ -33,6 +33,14 @@ pub(super) enum Crop {
     WideRim,
 }
 
+/// Colours of a sheet and of the ink on it, red, green and blue, 0..=255. The ink is made lighter or darker, so that its
+/// brightness has the drawn distance from the sheet's.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct InkColours {
+    pub sheet: [f64; 3],
+    pub ink: [f64; 3],
+}
+
 /// Ranges from which the conditions of a pair are drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DemoKind {
@@ -88,6 +96,14 @@ pub(super) struct DemoKind {
     pub crop: Crop,
     /// Distance by which the part of the block beyond a crack slid along the crack, mm. 0 without a crack.
     pub slid_mm: NumberRange,
+    /// Ratio of the picture's scales along its two sides, minus 1.
+    pub stretch: NumberRange,
+    /// Distance by which the smaller part of a torn or folded sheet is displaced, mm. 0 for a whole sheet.
+    pub displaced_mm: NumberRange,
+    /// Whether only one part of a torn sheet is left, on a dark ground.
+    pub is_half: bool,
+    /// Colours of sheet and ink; each is as likely as the others. Empty for black ink on an ordinary sheet.
+    pub colours: &'static [InkColours],
 }
 
 /// A clean block, an ordinary scan and a good print.
@@ -118,6 +134,10 @@ const ORDINARY: DemoKind = DemoKind {
     shrink: [0.0, 0.0],
     crop: Crop::Character,
     slid_mm: [0.0, 0.0],
+    stretch: [0.0, 0.0],
+    displaced_mm: [0.0, 0.0],
+    is_half: false,
+    colours: &[],
 };
 
 /// A moderate mix of wear, dirt, scan errors, uneven ink and deformed sheets.
@@ -319,5 +339,55 @@ pub(super) const PIECES: DemoKind = DemoKind {
 /// A crack through the character, one side of which slid and sank.
 pub(super) const SLID: DemoKind = DemoKind {
     slid_mm: [0.3, 2.0],
+    ..ORDINARY
+};
+
+/// Coloured ink that is hardly darker than the coloured sheet.
+pub(super) const COLOURED: DemoKind = DemoKind {
+    colours: &[
+        // Red seal ink on brown paper.
+        InkColours {
+            sheet: [158.0, 118.0, 76.0],
+            ink: [190.0, 60.0, 48.0],
+        },
+        // Brown ink on the blue paper of a proof.
+        InkColours {
+            sheet: [82.0, 120.0, 190.0],
+            ink: [150.0, 96.0, 62.0],
+        },
+        // Red ink on greenish paper.
+        InkColours {
+            sheet: [140.0, 156.0, 120.0],
+            ink: [192.0, 104.0, 84.0],
+        },
+        // Blue ink on yellow paper.
+        InkColours {
+            sheet: [216.0, 192.0, 126.0],
+            ink: [120.0, 160.0, 214.0],
+        },
+        // Green ink on pink paper.
+        InkColours {
+            sheet: [222.0, 172.0, 164.0],
+            ink: [112.0, 176.0, 132.0],
+        },
+    ],
+    ..ORDINARY
+};
+
+/// Pictures that were scaled unequally.
+pub(super) const STRETCHED: DemoKind = DemoKind {
+    stretch: [0.2, 0.35],
+    ..ORDINARY
+};
+
+/// Sheets torn or folded through the character, whose parts do not meet.
+pub(super) const TORN: DemoKind = DemoKind {
+    displaced_mm: [1.0, 3.0],
+    ..ORDINARY
+};
+
+/// Torn halves of sheets on a dark ground.
+pub(super) const HALF_PRINT: DemoKind = DemoKind {
+    is_half: true,
     ..ORDINARY
 };

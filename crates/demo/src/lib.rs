@@ -40,6 +40,7 @@ mod scene;
 mod slid_part;
 mod slow_errors;
 mod solvable;
+mod tear;
 mod tier;
 mod truth_line;
 mod weathering;

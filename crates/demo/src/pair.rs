@@ -19,6 +19,7 @@ use super::scan_pose::ScanPose;
 use super::scanner::{ScanStyle, scan};
 use super::scene::{Scene, pair_rng};
 use super::solvable::{is_legible, is_solvable};
+use super::tear::SheetTear;
 use super::tier::Tier;
 use super::truth_line::TruthLine;
 use mocban_core::domain::LengthUnit;
@@ -90,15 +91,40 @@ pub(super) fn drawn_pair(
     }
 }
 
+/// Prints what another hand wrote: the character of a pair with strokes of other widths, lengths and places.
+pub(super) fn print_by_another_hand(
+    glyphs: &Glyphs,
+    character: char,
+    tier: Tier,
+    seed: u64,
+    index: u64,
+) -> Result<Vec<u8>, ImageError> {
+    let mut attempt = 0;
+    loop {
+        let mut rng = pair_rng(seed, tier, index, attempt);
+        let mut scene = Scene::draw(glyphs, &[character], tier, index, &mut rng);
+        scene.artwork = scene.artwork.by_another_hand(&mut rng);
+        if let Some(printed) = print(&scene, &mut rng)? {
+            return Ok(printed.bytes);
+        }
+        attempt += 1;
+    }
+}
+
 /// Prints the block and cuts the character out of the print. Returns `None` if a kind's print is not legible.
 fn print(scene: &Scene, rng: &mut ChaCha8Rng) -> Result<Option<Printed>, ImageError> {
     let outline = cut_outline(scene, Crop::WidePrint, rng);
-    let frame = PrintFrame::draw(&outline, scene, rng);
-    let picture = render_print(scene, &outline, &frame, rng);
-    if scene.tier.kind().is_some() && !is_legible(scene, &frame, &picture) {
+    let tear = SheetTear::draw(scene, rng);
+    let frame = PrintFrame::draw(&outline, scene, tear.as_ref(), rng);
+    let picture = render_print(scene, &outline, &frame, tear.as_ref(), rng);
+    if scene.tier.kind().is_some() && !is_legible(scene, &frame, tear.as_ref(), &picture) {
         return Ok(None);
     }
-    let (bytes, extension) = encode_print(&picture, rng)?;
+    let has_colours = scene
+        .tier
+        .kind()
+        .is_some_and(|kind| !kind.colours.is_empty());
+    let (bytes, extension) = encode_print(&picture, has_colours, rng)?;
     Ok(Some(Printed {
         frame,
         bytes,

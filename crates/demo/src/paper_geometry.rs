@@ -15,7 +15,7 @@ const WARP_SIZE_MM: [f64; 2] = [4.5, 9.0];
 /// Distance of the camera from the sheet, mm.
 const CAMERA_MM: [f64; 2] = [70.0, 300.0];
 
-/// A smooth warp, then a shrinkage, then a perspective view. All of them keep the character's centre nearly in place.
+/// A smooth warp, then a shrinkage, then a perspective view, then a picture with unequal scales. All of them keep the character's centre nearly in place.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PaperGeometry {
     warp_mm: f64,
@@ -27,12 +27,19 @@ pub(super) struct PaperGeometry {
     tilt_axis: Axis,
     tilt_rad: f64,
     camera_mm: f64,
+    /// Factors of the picture along its sides.
+    picture: [f64; 2],
 }
 
 impl PaperGeometry {
     /// Draws the geometry of a kind. Returns `None` if the kind has flat sheets that are scanned and not photographed.
     pub(super) fn draw(kind: &DemoKind, rng: &mut ChaCha8Rng) -> Option<Self> {
-        let most = [kind.warp_mm[1], kind.shrink[1], kind.tilt_deg[1]];
+        let most = [
+            kind.warp_mm[1],
+            kind.shrink[1],
+            kind.tilt_deg[1],
+            kind.stretch[1],
+        ];
         most.iter().any(|value| *value > 0.0).then(|| {
             let shrink = within(kind.shrink, rng);
             Self {
@@ -44,6 +51,7 @@ impl PaperGeometry {
                 tilt_axis: Axis::at(rng.random_range(0.0..std::f64::consts::TAU)),
                 tilt_rad: within(kind.tilt_deg, rng).to_radians(),
                 camera_mm: within(CAMERA_MM, rng),
+                picture: draw_stretch(kind, rng),
             }
         })
     }
@@ -57,11 +65,13 @@ impl PaperGeometry {
         let [along, across] = self.tilt_axis.along_across(self.shrink_axis.point(shrunk));
         let (sin, cos) = self.tilt_rad.sin_cos();
         let scale = self.camera_mm / (self.camera_mm + along * sin);
-        self.tilt_axis.point([along * cos * scale, across * scale])
+        let [x, y] = self.tilt_axis.point([along * cos * scale, across * scale]);
+        [x * self.picture[0], y * self.picture[1]]
     }
 
     /// Returns which point of the block's plane appears at a point of the image plane.
     pub(super) fn uv_from_image(&self, image: [f64; 2]) -> [f64; 2] {
+        let image = [0, 1].map(|i| image[i] / self.picture[i]);
         let [along, across] = self.tilt_axis.along_across(image);
         let (sin, cos) = self.tilt_rad.sin_cos();
         let along = along * self.camera_mm / (cos * self.camera_mm - along * sin);
@@ -80,6 +90,19 @@ impl PaperGeometry {
         let size = self.warp_size_mm;
         self.warp
             .map(|noise| self.warp_mm * noise.at(u / size, v / size))
+    }
+}
+
+/// Draws the factors of a picture along its sides. Draws no random numbers for a kind with equal scales.
+fn draw_stretch(kind: &DemoKind, rng: &mut ChaCha8Rng) -> [f64; 2] {
+    if kind.stretch[1] <= 0.0 {
+        return [1.0; 2];
+    }
+    let side = (1.0 + within(kind.stretch, rng)).sqrt();
+    if rng.random_bool(0.5) {
+        [side, 1.0 / side]
+    } else {
+        [1.0 / side, side]
     }
 }
 

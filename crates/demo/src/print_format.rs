@@ -9,9 +9,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::rendered_print::RenderedPrint;
 
-/// Encodes a print in a random format, mostly colour PNG or JPEG. Returns the bytes and the file name extension.
+/// Encodes a print in a random format, mostly colour PNG or JPEG, and always in colour if `keep_colours` is set. Returns
+/// the bytes and the file name extension.
 pub(super) fn encode_print(
     print: &RenderedPrint,
+    keep_colours: bool,
     rng: &mut ChaCha8Rng,
 ) -> Result<(Vec<u8>, &'static str), ImageError> {
     let mut bytes = Cursor::new(Vec::new());
@@ -20,6 +22,7 @@ pub(super) fn encode_print(
         0..=7 => rgb,
         8 => rgb.to_rgb16().into(),
         9 => transparent_outside(print, &rgb),
+        10..=12 if keep_colours => rgb,
         10..=11 => rgb.to_luma8().into(),
         12 => rgb.to_luma16().into(),
         _ => {

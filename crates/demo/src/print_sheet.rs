@@ -3,7 +3,18 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::draw::{one_of, within};
+use super::kind::{DemoKind, NumberRange};
 use super::noise::{Noise, lerp, smoothstep};
+
+/// What stains of an ordinary sheet leave of red, green and blue: they are brown and absorb blue most.
+const BROWN: [f64; 3] = [1.0, 0.94, 0.82];
+/// Range of what stains of a coloured sheet leave of red, green and blue.
+const STAIN_HUE: NumberRange = [0.7, 1.0];
+/// Range of the brightness of a coloured sheet minus that of its ink, of 255.
+const CONTRAST: NumberRange = [-6.0, 24.0];
+/// Weights of red, green and blue in the brightness.
+const BRIGHTNESS: [f64; 3] = [0.299, 0.587, 0.114];
 
 /// A sheet of old paper.
 pub(super) struct PrintSheet {
@@ -15,12 +26,39 @@ pub(super) struct PrintSheet {
     stains: Vec<Stain>,
 }
 
-/// A brown stain with a ragged edge.
+/// A stain with a ragged edge.
 struct Stain {
     centre: [f64; 2],
     radius_mm: f64,
     min_transmittance: f64,
     edge_noise: Noise,
+    /// What it leaves of red, green and blue.
+    hue: [f64; 3],
+}
+
+/// Colours of coloured ink on a coloured sheet, 0..=255.
+pub(super) struct ColouredPrint {
+    pub sheet: [f64; 3],
+    pub ink: [f64; 3],
+}
+
+impl ColouredPrint {
+    /// Draws the colours of a kind. Returns `None` and draws no random numbers if the kind has none.
+    pub(super) fn draw(kind: Option<&DemoKind>, rng: &mut ChaCha8Rng) -> Option<Self> {
+        let colours = kind?.colours;
+        if colours.is_empty() {
+            return None;
+        }
+        let of = one_of(colours, rng);
+        let brightness =
+            |colour: [f64; 3]| -> f64 { (0..3).map(|i| BRIGHTNESS[i] * colour[i]).sum() };
+        let sheet = of.sheet.map(|c: f64| c + rng.random_range(-12.0..12.0));
+        let lighter = brightness(sheet) - within(CONTRAST, rng) - brightness(of.ink);
+        Some(Self {
+            sheet,
+            ink: of.ink.map(|c| c + lighter),
+        })
+    }
 }
 
 impl PrintSheet {
@@ -42,6 +80,20 @@ impl PrintSheet {
         }
     }
 
+    /// Returns the sheet in another colour, with up to two stains of any colour.
+    pub(super) fn coloured(self, colour: [f64; 3], half_mm: f64, rng: &mut ChaCha8Rng) -> Self {
+        let hue = [0; 3].map(|_: i32| within(STAIN_HUE, rng));
+        let stains = (0..rng.random_range(0..3_u32)).map(|_| Stain {
+            hue,
+            ..Stain::draw(half_mm, rng)
+        });
+        Self {
+            stains: stains.collect(),
+            colour,
+            ..self
+        }
+    }
+
     /// Returns the colour at a point, 0..=255 per channel.
     pub(super) fn at(&self, [u, v]: [f64; 2]) -> [f64; 3] {
         let shade = self.slope[0] * u
@@ -54,8 +106,8 @@ impl PrintSheet {
             .iter()
             .map(|stain| stain.transmittance([u, v]))
             .product();
-        // Stains are brown: they absorb blue most.
-        let hues = [1.0, 0.94, 0.82].map(|hue| lerp(hue, 1.0, smoothstep(0.6, 1.0, stained)));
+        let hue = self.stains.first().map_or(BROWN, |stain| stain.hue);
+        let hues = hue.map(|hue| lerp(hue, 1.0, smoothstep(0.6, 1.0, stained)));
         [0, 1, 2].map(|i| (self.colour[i] + shade) * hues[i] * stained)
     }
 }
@@ -67,6 +119,7 @@ impl Stain {
             radius_mm: rng.random_range(1.0..3.5),
             min_transmittance: rng.random_range(0.68..0.88),
             edge_noise: Noise::draw(rng),
+            hue: BROWN,
         }
     }
 

@@ -9,9 +9,10 @@ use super::kind::Crop;
 use super::noise::{Noise, lerp};
 use super::paper_geometry::PaperGeometry;
 use super::polygon::Polygon;
-use super::print_sheet::PrintSheet;
+use super::print_sheet::{ColouredPrint, PrintSheet};
 use super::scalar_field::ScalarField;
 use super::scene::Scene;
+use super::tear::SheetTear;
 use mocban_core::domain::Affine2;
 use mocban_core::raster::Grid;
 
@@ -46,7 +47,12 @@ impl PrintFrame {
 
     /// Draws the size, scale and rotation (up to 4 degrees) of a print of the outline. Its longest side is 100-400 px,
     /// or more if the print shows 3 x 3 characters.
-    pub(super) fn draw(outline: &Polygon, scene: &Scene, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw(
+        outline: &Polygon,
+        scene: &Scene,
+        tear: Option<&SheetTear>,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
         let paper = scene.conditions.paper;
         let angle = rng.random_range(-4.0..4.0_f64).to_radians();
         let rotation = Affine2::similarity(1.0, angle, [0.0, 0.0]);
@@ -54,7 +60,8 @@ impl PrintFrame {
             corners: outline
                 .corners
                 .iter()
-                .map(|corner| paper.map_or(*corner, |paper| paper.image_from_uv(*corner)))
+                .flat_map(|corner| [*corner, tear.map_or(*corner, |tear| tear.place(*corner))])
+                .map(|corner| paper.map_or(corner, |paper| paper.image_from_uv(corner)))
                 .map(|corner| rotation.apply(corner))
                 .collect(),
         };
@@ -135,6 +142,8 @@ pub(super) struct RenderedPrint {
     pub rgb: Grid<[f64; 3]>,
     /// Whether each pixel lies inside the cut outline. Pixels outside are white.
     pub inside_cut: Grid<bool>,
+    /// Direction of the colours from the sheet to the ink.
+    pub to_ink: [f64; 3],
 }
 
 /// Prints the scene and cuts the print along an outline.
@@ -142,6 +151,7 @@ pub(super) fn render_print(
     scene: &Scene,
     outline: &Polygon,
     frame: &PrintFrame,
+    tear: Option<&SheetTear>,
     rng: &mut ChaCha8Rng,
 ) -> RenderedPrint {
     let inking = Inking::draw(scene, rng);
@@ -150,20 +160,33 @@ pub(super) fn render_print(
     } else {
         0
     };
-    let sheet = PrintSheet::draw(stains, 6.0, rng);
+    let mut sheet = PrintSheet::draw(stains, 6.0, rng);
     let ink_grey = rng.random_range(20.0..44.0);
-    let ink_colour = [0; 3].map(|_: i32| ink_grey + rng.random_range(-4.0..4.0));
+    let mut ink_colour = [0; 3].map(|_: i32| ink_grey + rng.random_range(-4.0..4.0));
     // Cracks may be older than the print.
     let cracks_print = rng.random_bool(0.5);
     let stretch = [Noise::draw(rng), Noise::draw(rng)];
+    let mut to_ink = [-1.0; 3];
+    if let Some(colours) = ColouredPrint::draw(scene.tier.kind(), rng) {
+        sheet = sheet.coloured(colours.sheet, 6.0, rng);
+        ink_colour = colours.ink;
+        to_ink = [0, 1, 2].map(|i| colours.ink[i] - colours.sheet[i]);
+    }
+    let source = |x, y| {
+        let uv = frame.uv(x, y);
+        let source = tear.map_or(Some(uv), |tear| tear.source(uv));
+        source.filter(|source| outline.contains(*source))
+    };
+    let is_ground =
+        |x, y| tear.is_some_and(|tear| tear.is_half() || outline.contains(frame.uv(x, y)));
     let inside_cut = Grid::from_fn(frame.width, frame.height, |x, y| {
-        outline.contains(frame.uv(x, y))
+        source(x, y).is_some() || is_ground(x, y)
     });
     let rgb = Grid::from_fn(frame.width, frame.height, |x, y| {
-        let [u, v] = frame.uv(x, y);
-        if !inside_cut.at(x, y) {
-            return [255.0; 3];
-        }
+        let Some([u, v]) = source(x, y) else {
+            let ground = tear.filter(|_| inside_cut.at(x, y));
+            return [ground.map_or(255.0, |tear| tear.ground_at(frame.uv(x, y))); 3];
+        };
         // A damp sheet stretches unevenly by a few hundredths of a millimetre.
         let [su, sv] = stretch.map(|noise| 0.035 * noise.at(u / 4.0, v / 4.0));
         let point = [u + su, v + sv];
@@ -174,5 +197,9 @@ pub(super) fn render_print(
         let sheet_colour = sheet.at([u, v]);
         [0, 1, 2].map(|i| lerp(sheet_colour[i], ink_colour[i], ink).clamp(0.0, 255.0))
     });
-    RenderedPrint { rgb, inside_cut }
+    RenderedPrint {
+        rgb,
+        inside_cut,
+        to_ink,
+    }
 }

@@ -4,6 +4,7 @@
 use super::carved_block::CarvedBlock;
 use super::rendered_print::{PrintFrame, RenderedPrint};
 use super::scene::Scene;
+use super::tear::SheetTear;
 use super::truth_line::{IGNORED, STROKE_TOP};
 use mocban_core::raster::Grid;
 
@@ -13,16 +14,24 @@ const MIN_PRINT_IOU: f64 = 0.6;
 /// the 0.7 from which a mask counts as right.
 const MIN_TOPS_IOU: f64 = 0.8;
 
-/// Returns whether some threshold of the print's brightness reproduces the strokes. Ignores pixels on or near
-/// neighbours.
-pub(super) fn is_legible(scene: &Scene, frame: &PrintFrame, picture: &RenderedPrint) -> bool {
+/// Returns whether some threshold of the print's colours, in the direction from sheet to ink, reproduces the strokes.
+/// Ignores pixels on or near neighbours and on the ground beside a torn sheet.
+pub(super) fn is_legible(
+    scene: &Scene,
+    frame: &PrintFrame,
+    tear: Option<&SheetTear>,
+    picture: &RenderedPrint,
+) -> bool {
     let mut samples = Vec::new();
     for (y, x) in pixels(frame) {
         let point = frame.uv(x, y);
+        let Some(point) = tear.map_or(Some(point), |tear| tear.source(point)) else {
+            continue;
+        };
         let is_stroke = scene.artwork.strokes.value(point) > 0.0;
         if is_stroke || scene.print_neighbours.value(point) < -0.2 {
-            let [r, g, b] = picture.rgb.at(x, y);
-            samples.push((-(r + g + b), is_stroke));
+            let ([r, g, b], to_ink) = (picture.rgb.at(x, y), picture.to_ink);
+            samples.push((r * to_ink[0] + g * to_ink[1] + b * to_ink[2], is_stroke));
         }
     }
     best_iou(samples) >= MIN_PRINT_IOU

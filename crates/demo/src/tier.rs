@@ -75,6 +75,14 @@ pub enum Tier {
     Pieces,
     /// A crack through the character, one side of which slid and sank.
     Slid,
+    /// Coloured ink that is hardly darker than the coloured sheet.
+    Coloured,
+    /// Pictures of the print that were scaled unequally.
+    Stretched,
+    /// Sheets torn or folded through the character, whose parts do not meet.
+    Torn,
+    /// Torn halves of sheets on a dark ground.
+    HalfPrint,
     /// All other tiers in turn.
     All,
 }
@@ -88,6 +96,7 @@ enum_names! { pub Tier, "a tier":
     Heavy = "heavy", Photo = "photo", Wavy = "wavy", Shrunk = "shrunk",
     Lost = "lost", GridMesh = "grid-mesh", GridPrint = "grid-print", Mixed = "mixed",
     WideRim = "wide-rim", Pieces = "pieces", Slid = "slid",
+    Coloured = "coloured", Stretched = "stretched", Torn = "torn", HalfPrint = "half-print",
     All = "all",
 }
 
@@ -137,6 +146,10 @@ impl Tier {
             Self::WideRim => &kind::WIDE_RIM,
             Self::Pieces => &kind::PIECES,
             Self::Slid => &kind::SLID,
+            Self::Coloured => &kind::COLOURED,
+            Self::Stretched => &kind::STRETCHED,
+            Self::Torn => &kind::TORN,
+            Self::HalfPrint => &kind::HALF_PRINT,
         })
     }
 
@@ -169,7 +182,7 @@ mod tests {
     fn all_takes_every_other_tier_in_turn() {
         let last = Tier::ALL.len() as u64 - 2;
         assert_eq!(Tier::All.tier_and_index(0), (Tier::Upright, 0));
-        assert_eq!(Tier::All.tier_and_index(last), (Tier::Slid, 0));
+        assert_eq!(Tier::All.tier_and_index(last), (Tier::HalfPrint, 0));
         assert_eq!(Tier::All.tier_and_index(last + 2), (Tier::Pose, 1));
         assert_eq!(Tier::Worn.tier_and_index(7), (Tier::Worn, 7));
     }

@@ -52,7 +52,11 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
 }
 
 /// Returns the extreme value in a square around each cell. `pick` ignores cells without data.
-fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> Grid<f32> {
+pub(super) fn extreme(
+    cells: &Grid<f32>,
+    reach: usize,
+    pick: impl Fn(f32, f32) -> f32,
+) -> Grid<f32> {
     // Transposes the result, so that two calls cover both axes.
     let along_rows = |cells: &Grid<f32>| {
         let rows = (0..cells.height()).flat_map(|y| doubled(cells.row(y), reach, &pick));

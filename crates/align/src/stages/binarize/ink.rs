@@ -96,13 +96,11 @@ pub(crate) struct InkMask {
     pub(crate) light_on_dark: bool,
 }
 
-fn grey_of(picture: &PrintImage) -> Grid<f32> {
-    picture.rgb.map(|c| luminance(*c))
-}
-
 /// Returns the Rec. 601 luma, 0..=1.
-fn luminance(c: [u16; 3]) -> f32 {
-    (0.299 * f32::from(c[0]) + 0.587 * f32::from(c[1]) + 0.114 * f32::from(c[2])) / 65_535.0
+pub(super) fn grey_of(picture: &PrintImage) -> Grid<f32> {
+    picture.rgb.map(|[r, g, b]| {
+        (0.299 * f32::from(*r) + 0.587 * f32::from(*g) + 0.114 * f32::from(*b)) / 65_535.0
+    })
 }
 
 /// Binarizes as the paper does: pixels darker than `grey` are ink, without specks. The whole image is known.
@@ -124,13 +122,11 @@ pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeE
     })
 }
 
-/// Binarizes adaptively: leaves out the white around the print, divides by the background, and applies Otsu's
-/// threshold. Returns one interpretation for each possible polarity, the likelier first. If the print may be stained,
-/// adds an interpretation that treats wide dark areas as stains.
-pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
-    let grey = &grey_of(picture);
-    let known = known(picture, grey);
-    let mut values = held(grey, &known);
+/// Binarizes the grey of the known pixels adaptively: divides by the background, and applies Otsu's threshold. Returns one
+/// interpretation for each possible polarity, the likelier first. If the print may be stained, adds an interpretation that
+/// treats wide dark areas as stains.
+pub(super) fn by_brightness(grey: &Grid<f32>, known: &Mask) -> Result<Vec<InkMask>, BinarizeError> {
+    let mut values = held(grey, known);
     let split = otsu::split(&mut values).ok_or(BinarizeError::NoContrast { contrast: 0.0 })?;
     if split.high - split.low < (LEAST_CONTRAST * split.high).max(NOISE) {
         return Err(BinarizeError::NoContrast {
@@ -138,15 +134,15 @@ pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeE
         });
     }
     let dark = grey.map(|g| f64::from(*g) < split.threshold);
-    let even = evened(grey, &known, NARROW);
-    let mut values = held(&even, &known);
+    let even = evened(grey, known, NARROW);
+    let mut values = held(&even, known);
     let levelled = otsu::split(&mut values);
-    let (likelier, clear) = polarity(&even, levelled, &dark, &known);
+    let (likelier, clear) = polarity(&even, levelled, &dark, known);
     let of = |light_on_dark| {
         if light_on_dark {
-            binarize_narrow(grey, &grey.map(|g| 1.0 - *g), &known, NARROW, true)
+            binarize_narrow(grey, &grey.map(|g| 1.0 - *g), known, NARROW, true)
         } else {
-            binarize_even(grey, &even, levelled, &known, false)
+            binarize_even(grey, &even, levelled, known, false)
         }
     };
     let polarities: &[bool] = if clear {
@@ -158,7 +154,7 @@ pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeE
         polarities.iter().map(|light| of(*light)).collect();
     if polarities.contains(&false) && may_be_stained(&values, levelled) {
         // Dark areas wider than most strokes count as stains.
-        inks.push(binarize_narrow(grey, grey, &known, STROKE, false));
+        inks.push(binarize_narrow(grey, grey, known, STROKE, false));
     }
     // If none has ink, the error of the likeliest is reported.
     if inks.iter().all(Result::is_err) {
@@ -169,7 +165,7 @@ pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeE
 }
 
 /// Returns whether enough of the dark values are pale to suggest stains. `sorted` is in ascending order.
-fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
+pub(super) fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     let Some(split) = split else { return false };
     let below = |limit: f64| sorted.partition_point(|v| f64::from(*v) < limit);
     let dark = below(split.threshold);
@@ -180,7 +176,7 @@ fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
 
 /// Binarizes `dark_ink`, which is the grey, or its inverse if ink is light. `narrow` is half the largest width of ink,
 /// as a fraction of the longest side.
-fn binarize_narrow(
+pub(super) fn binarize_narrow(
     grey: &Grid<f32>,
     dark_ink: &Grid<f32>,
     known: &Mask,
@@ -193,7 +189,7 @@ fn binarize_narrow(
 }
 
 /// Binarizes one polarity from the grey divided by the background.
-fn binarize_even(
+pub(super) fn binarize_even(
     grey: &Grid<f32>,
     even: &Grid<f32>,
     split: Option<Split>,
@@ -220,7 +216,7 @@ fn binarize_even(
 }
 
 /// Returns the values of the known pixels.
-fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
+pub(super) fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
     let mut values = Vec::new();
     for (y, greys) in grey.data().chunks(grey.width().max(1)).enumerate() {
         poll();
@@ -231,7 +227,7 @@ fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
 }
 
 /// Returns the mask of ink and background. White areas at the border are left out, unless the background is white too.
-fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
+pub(super) fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     let white = picture
         .rgb
         .map(|[r, g, b]| f32::from(*r.min(g).min(b)) / 65_535.0 > WHITE);
@@ -294,7 +290,8 @@ fn require_ink(
 
 #[cfg(test)]
 mod tests {
-    use super::{BinarizeError, InkMask, hypotheses};
+    use super::{BinarizeError, InkMask};
+    use crate::stages::binarize::hypotheses;
     use mocban_core::raster::{Grid, PrintImage};
 
     fn picture(grey: impl Fn(usize, usize) -> u16) -> PrintImage {

@@ -1,6 +1,7 @@
 //! Binarizes the part of a print inside an outline.
 
-use super::ink::{BinarizeError, InkMask, hypotheses};
+use super::hypotheses::hypotheses;
+use super::ink::{BinarizeError, InkMask};
 use crate::stages::pose::SoftMask;
 use mocban_core::domain::PrintOutline;
 use mocban_core::raster::{Grid, Mask, PrintImage};

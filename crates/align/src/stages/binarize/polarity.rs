@@ -31,7 +31,7 @@ pub(super) fn polarity(
 /// Returns evidence that is positive if the dark class is the background, and negative if it is ink. The background is
 /// assumed to be the larger class (weight 2) and to cover most of the rim (weight 1). Heavy ink breaks the first
 /// assumption, and border lines break the second.
-fn background_darkness(dark: &Mask, known: &Mask) -> f64 {
+pub(super) fn background_darkness(dark: &Mask, known: &Mask) -> f64 {
     let of_known = known.count().max(1) as f64;
     let pairs = dark.data().iter().zip(known.data());
     let share = pairs.filter(|(d, k)| **d && **k).count() as f64 / of_known;

@@ -33,7 +33,7 @@ pub use upper_surface::fit;
 
 /// Raised by every change of the code that may change results. A candidate may be registered (`trials`), so a change of
 /// the depth, normalize or register stage may change results too.
-pub const REVISION: u32 = 22;
+pub const REVISION: u32 = 23;
 
 #[cfg(test)]
 mod tests;

@@ -91,6 +91,13 @@ pub struct Normalized {
 }
 
 impl Normalized {
+    /// Returns the result with the masks of one interpretation replaced.
+    pub(crate) fn with_masks(&self, ink: usize, masks: PrintMasks) -> Self {
+        let mut replaced = self.clone();
+        replaced.prints[ink] = masks;
+        replaced
+    }
+
     /// Collects the interpretations of a print, each with its map to the canvas. `scale` is that of the masks.
     ///
     /// # Errors

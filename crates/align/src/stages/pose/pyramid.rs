@@ -214,6 +214,31 @@ fn fit_grid(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f6
 }
 
 impl PyramidLevel {
+    /// Returns the level where a function of the image pixel is true.
+    pub(crate) fn restricted(&self, keep: impl Fn([f64; 2]) -> bool) -> Option<Self> {
+        let image_from_work = self.work_from_image.inverse()?;
+        let (width, height) = (self.value.width(), self.value.height());
+        let valid = Grid::from_fn(width, height, |x, y| {
+            let is_kept = keep(image_from_work.apply([x as f64, y as f64]));
+            if is_kept { self.weight.at(x, y) } else { 0.0 }
+        });
+        Some(self.restricted_to(valid))
+    }
+
+    /// Calls a function with the position in the image and the amount of each known pixel.
+    pub(crate) fn each_amount(&self, mut visit: impl FnMut([f64; 2], f32)) -> Option<()> {
+        let image_from_work = self.work_from_image.inverse()?;
+        for y in 0..self.value.height() {
+            for x in (0..self.value.width()).filter(|x| self.weight.at(*x, y) > 0.0) {
+                visit(
+                    image_from_work.apply([x as f64, y as f64]),
+                    self.amount.at(x, y),
+                );
+            }
+        }
+        Some(())
+    }
+
     /// Returns the level masked by `valid` (1 or 0 a pixel).
     pub(super) fn restricted_to(&self, valid: Grid<f32>) -> Self {
         let over = |values: &Grid<f32>| values.zip_map(&valid, |value, valid| value * valid);

@@ -151,6 +151,27 @@ impl<'a> Refiner<'a> {
         }
     }
 
+    /// Scores a pose on the pixels that are valid for it, see [`Self::tiebreak_scores`].
+    pub(crate) fn local_score(&self, pose: &PoseCandidate) -> f64 {
+        self.tiebreak_scores(pose, self, pose)[0]
+    }
+
+    /// Calls a function with the position in the fixed image of each pixel that is valid in both levels, and the difference
+    /// of the amounts there, fixed minus moving.
+    pub(crate) fn each_difference(
+        &self,
+        pose: &PoseCandidate,
+        mut visit: impl FnMut([f64; 2], f32),
+    ) -> Option<()> {
+        let image_from_work = self.fixed.work_from_image.inverse()?;
+        let placed = self.placed(pose)?;
+        for (x, y, cell) in placed.common_pixels(&self.fixed.weight) {
+            let difference = self.fixed.amount.at(x, y) - cell.value(&self.moving.amount);
+            visit(image_from_work.apply([x as f64, y as f64]), difference);
+        }
+        Some(())
+    }
+
     /// Returns the moving level at a pose; `None` if the pose has no inverse.
     fn placed(&self, pose: &PoseCandidate) -> Option<PlacedLevel<'_>> {
         let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));

@@ -9,8 +9,10 @@ mod anisotropic_scale;
 mod confidence;
 mod half_canvas;
 mod ink_edge;
+mod larger_part;
 mod levelling;
 mod metric_thresholds;
+mod misfit;
 mod observation;
 mod params;
 mod pose_search;
@@ -37,7 +39,7 @@ use mocban_core::raster::{DepthMap, Mask};
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 24;
+pub const REVISION: u32 = 25;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -47,6 +49,10 @@ const MIRROR_LIKELY: f64 = 1.04;
 /// fraction of `min_confidence`. The fraction is small because damaged blocks and dry prints of the right character
 /// have strokes without a partner too.
 const UNLIKELY: f64 = 0.05;
+
+/// A torn print is sought if the probability of the pose, multiplied by the probability of the same character, is below
+/// this.
+const DOUBTFUL: f64 = 0.75;
 
 /// A light print is refused if the tops cover more than this fraction of the rim of the depth map. Strokes do not
 /// surround a character, so these tops are the carved ground, seen from the back of the scanned surface.
@@ -99,9 +105,37 @@ pub fn register(
             .after(&expected.print_from_depth),
         ..*expected
     });
-    let search = pose_search::search(&depths, &normalized.prints, expected.as_ref(), params)?;
-    let single = Posed::new(depth, &depths, &relief, normalized, &search, params)?;
-    let levelled = Levelled::try_new(depth, &relief, &single, normalized, &search, params);
+    let mut search = pose_search::search(&depths, &normalized.prints, expected.as_ref(), params)?;
+    let mut single = Posed::new(depth, &depths, &relief, normalized, &search, params);
+    // A block shows where a character is, whether or not its print is torn.
+    // A mirrored relief may match a part of the print that is symmetric.
+    let is_mirrored = |posed: &Posed| posed.features.mirrored > MIRROR_LIKELY;
+    let part = if expected.is_none()
+        && single.as_ref().map_or(0.0, probability) < DOUBTFUL
+        && !single.as_ref().is_ok_and(is_mirrored)
+    {
+        larger_part::find(&depths, &normalized.prints[search.ink], &search.poses)
+    } else {
+        None
+    };
+    let mut of_part = None;
+    if let Some(part) = &part
+        && let Ok(found) = pose_search::search_part(&depths, &search, part, params)
+    {
+        let masks = normalized.with_masks(search.ink, part.masks.clone());
+        let posed = Posed::new(depth, &depths, &relief, &masks, &found, params);
+        // What misfits is left out, so a part agrees better than a whole by chance too.
+        let of_whole = single.as_ref().map_or(0.0, probability);
+        if part.share * posed.as_ref().map_or(0.0, probability) > of_whole {
+            (search, single, of_part) = (found, posed, Some((masks, part.share)));
+        }
+    }
+    let single = single?;
+    let (masks, share) = match &of_part {
+        Some((masks, share)) => (masks, *share),
+        None => (normalized, 1.0),
+    };
+    let levelled = Levelled::try_new(depth, &relief, &single, masks, &search, params);
     let (depth, levelling, posed) = match &levelled {
         Some(found) => (&found.map, Some(found.levelling), &found.posed),
         None => (depth, None, &single),
@@ -128,7 +162,7 @@ pub fn register(
             at_bound: search.at_bound || choice.at_bound,
         })
         .collect();
-    let canvas_print = canvas_print(normalized, search.ink);
+    let whole_print = canvas_print(normalized, search.ink);
     let stroke_map = |alignment: &Alignment| {
         StrokeMap::of(&posed.canvas, alignment.level, normalized.outcome.canvas_px)
     };
@@ -136,7 +170,7 @@ pub fn register(
         depth,
         normalized,
         search.ink,
-        canvas_print,
+        whole_print,
         &alignments,
         stroke_map,
         params.window,
@@ -149,11 +183,20 @@ pub fn register(
         search.prior,
         probabilities,
     );
-    let seen = seen_ink(&registered.canvas_print, &posed.canvas.ink);
-    for found in &mut registered.outcome.metrics {
-        found.confidence = found
-            .confidence
-            .map(|sure| confidence::of_seen_ink(seen) * sure);
+    // The other part of a torn print is no evidence. Heights of a levelling are chosen from the ink, so the worse of both
+    // tells whether the block is another one.
+    let of_part = of_part
+        .as_ref()
+        .map(|(masks, _)| canvas_print(masks, search.ink));
+    let print = of_part.as_ref().unwrap_or(&registered.canvas_print);
+    let seen = seen_ink(print, &posed.canvas.ink);
+    let misfit = posed.smooth_misfit.max(single.smooth_misfit);
+    let certainty = share * confidence::of_same_block(misfit) * confidence::of_seen_ink(seen);
+    for confidence in metrics
+        .iter_mut()
+        .filter_map(|metric| metric.confidence.as_mut())
+    {
+        *confidence *= certainty;
     }
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
@@ -165,6 +208,11 @@ pub fn register(
 fn seen_ink(canvas_print: &Mask, seen: &Mask) -> f64 {
     let scale = (canvas_print.width() as f64 / seen.width() as f64).powi(2);
     scale * seen.count() as f64 / canvas_print.count().max(1) as f64
+}
+
+/// Returns the probability that the pose is right and that print and relief show the same character, by the pair alone.
+fn probability(posed: &Posed) -> f64 {
+    confidence::of_pose(&posed.features, 0.0) * confidence::of_character(&posed.features)
 }
 
 /// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character. Also
@@ -218,5 +266,7 @@ fn require_tops(
     Ok(())
 }
 
+#[cfg(test)]
+mod print_tests;
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,7 @@
 //! Coarse-to-fine search of the pose on soft strokes, without an exact threshold.
 
 use super::confidence;
+use super::larger_part::LargerPart;
 use super::params::{ExpectedPose, RegisterError, RegisterParams};
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{
@@ -59,6 +60,13 @@ const UNEXPECTED_WINS: f64 = 1.5;
 const CONVINCING: f64 = 0.45;
 /// The expected pose holds if its score is at least this part of the best one near it.
 const HOLDS: f64 = 0.85;
+/// Scales along the columns of the print relative to those along its rows that are tried, if no pose fits well: a picture
+/// may have been scaled unequally.
+const ASPECTS: [f64; 4] = [1.16, 1.32, 1.0 / 1.16, 1.0 / 1.32];
+/// A pose fits well if its score is at least this.
+const FITS_WELL: f64 = 0.82;
+/// Unequal scales are used if they bring the best upright score closer to 1 by at least this fraction.
+const LEAST_GAIN: f64 = 0.4;
 /// `at_bound` is set if the scale is this close to either end of the searched band, in natural logarithms.
 const BOUND: f64 = 0.02;
 
@@ -120,11 +128,14 @@ pub(super) fn search(
 ) -> Result<PoseSearch, RegisterError> {
     let wood = ImagePyramid::new(depths, BASE_PX).ok_or(RegisterError::NoPose)?;
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
-    let depth_px = longest(depths.known.bounding_box());
+    let wood_px = WoodPx {
+        longest: longest(depths.known.bounding_box()),
+        middle: [depths.known.width(), depths.known.height()].map(|side| side as f64 / 2.0),
+    };
     let on_inks = |wood: &ImagePyramid| {
         let inks = prints.iter().enumerate();
         let searches =
-            inks.map(|(ink, print)| find_poses(wood, depth_px, ink, print, expected, params));
+            inks.map(|(ink, print)| find_poses(wood, wood_px, ink, print, expected, params));
         let best = searches.reduce(|best, other| match (&best, &other) {
             (Ok(a), Ok(b)) if b.score() > a.score() => other,
             (Err(_), Ok(_)) => other,
@@ -151,10 +162,38 @@ pub(super) fn search(
     }
 }
 
-/// Searches for poses on one interpretation of the print. `depth_px` is the longest side of the depth map's data.
+/// Searches for poses on the larger part of a torn print, the pose that was found with it first. `whole` are the poses on
+/// the whole print.
+///
+/// # Errors
+/// Returns an error like [`search`].
+pub(super) fn search_part(
+    depths: &SoftMask,
+    whole: &PoseSearch,
+    part: &LargerPart,
+    params: &RegisterParams,
+) -> Result<PoseSearch, RegisterError> {
+    let mut found = search(depths, std::slice::from_ref(&part.masks), None, params)?;
+    found.poses.insert(0, part.pose);
+    Ok(PoseSearch {
+        ink: whole.ink,
+        ..found
+    })
+}
+
+/// Measures of a depth map in pixels.
+#[derive(Debug, Clone, Copy)]
+struct WoodPx {
+    /// Longest side of the area with data.
+    longest: f64,
+    /// Middle of the map.
+    middle: [f64; 2],
+}
+
+/// Searches for poses on one interpretation of the print.
 fn find_poses(
     wood: &ImagePyramid,
-    depth_px: f64,
+    wood_px: WoodPx,
     ink: usize,
     print: &PrintMasks,
     expected: Option<&ExpectedPose>,
@@ -166,6 +205,9 @@ fn find_poses(
         beam_width: KEEP,
     };
     let mut found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
+    if params.anisotropic_scale && best_score(&found) < FITS_WELL {
+        stretch(&mut found, &print_base, wood, wood_px.middle);
+    }
     let print_bounds = print.known.bounding_box();
     let print_px = longest(print_bounds);
     let (mut prior, mut kept) = (0.0, None);
@@ -184,7 +226,7 @@ fn find_poses(
     }
     require_upright(&found)?;
     let is_at_bound = |pose: &PoseCandidate| {
-        let ratio = pose.fixed_from_moving.scale() * depth_px / print_px;
+        let ratio = pose.fixed_from_moving.scale() * wood_px.longest / print_px;
         params.scale_band > 1.0 && ratio.ln().abs() > params.scale_band.ln() - BOUND
     };
     let (mirrored, poses): (Vec<PoseCandidate>, Vec<PoseCandidate>) =
@@ -197,6 +239,46 @@ fn find_poses(
         prior,
         expected: kept,
     })
+}
+
+/// Replaces each pose by the best of those with unequal scales that are refined from it, if the best upright pose gains
+/// much by this. `middle` is the centre of the scaling, in pixels of the depth map.
+fn stretch(
+    found: &mut [PoseCandidate],
+    print: &ImagePyramid,
+    wood: &ImagePyramid,
+    middle: [f64; 2],
+) {
+    let (size, sigma) = (LAST_PASS.size_px, LAST_PASS.sigma_px);
+    let (fixed, moving) = (print.level(size, sigma), wood.level(size, sigma));
+    let refiner = Refiner::new(&fixed, &moving);
+    let stretched = found.iter().map(|pose| {
+        let with_aspect = |aspect: f64| {
+            let [x, y] = pose.fixed_from_moving.apply(middle);
+            let [across, down] = [aspect.sqrt(), 1.0 / aspect.sqrt()];
+            let about = Affine2([[across, 0.0, x - across * x], [0.0, down, y - down * y]]);
+            let start = PoseCandidate {
+                fixed_from_moving: about.after(&pose.fixed_from_moving),
+                ..*pose
+            };
+            refiner.refine(&start, LAST_PASS.max_steps, Loss::Huber)
+        };
+        let poses = ASPECTS.map(with_aspect).into_iter();
+        poses.fold(*pose, |best, other| {
+            if other.score > best.score {
+                other
+            } else {
+                best
+            }
+        })
+    });
+    let mut stretched: Vec<PoseCandidate> = stretched.collect();
+    let upright = |poses: &[PoseCandidate]| best_score(poses.iter().filter(|pose| !pose.mirrored));
+    let [before, after] = [upright(found), upright(&stretched)];
+    if after - before >= LEAST_GAIN * (1.0 - before) {
+        stretched.sort_by(|a, b| b.score.total_cmp(&a.score));
+        found.copy_from_slice(&stretched);
+    }
 }
 
 /// The best pose near the expected one, and the score of the expected pose itself.

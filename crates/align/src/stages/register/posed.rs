@@ -33,6 +33,8 @@ pub(super) struct Posed {
     pub(super) thresholds: Vec<ChosenThreshold>,
     /// Evidence for and against the pose.
     pub(super) features: PoseFeatures,
+    /// Displacement of whole edges of the ink, see `misfit`, as a fraction of the stroke width.
+    pub(super) smooth_misfit: f64,
     /// Heights of the relief.
     relief: ReliefHeights,
     /// Distance by which the ink spreads over the strokes, in pixels of the half canvas.
@@ -63,8 +65,12 @@ impl Posed {
             .map_err(|error| error.with(|| observe(depth, relief, &canvas())))?;
         let canvas = canvas();
         let (thresholds, spread) = metric_thresholds::choose(depth, relief, &canvas, params)?;
+        let levels = || thresholds.iter().map(|chosen| chosen.choice.level);
+        let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
+        let unmatched = Unmatched::of(&canvas, range);
         Ok(Self {
-            features: with_unmatched(refined.features, &canvas, &thresholds),
+            features: with_unmatched(refined.features, &unmatched),
+            smooth_misfit: unmatched.smooth_misfit,
             refined,
             canvas,
             thresholds,
@@ -146,14 +152,7 @@ fn scatters_less(
 }
 
 /// Adds the strokes without a partner to the evidence for the pose.
-fn with_unmatched(
-    features: PoseFeatures,
-    canvas: &HalfCanvas,
-    thresholds: &[ChosenThreshold],
-) -> PoseFeatures {
-    let levels = || thresholds.iter().map(|chosen| chosen.choice.level);
-    let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
-    let unmatched = Unmatched::of(canvas, range);
+fn with_unmatched(features: PoseFeatures, unmatched: &Unmatched) -> PoseFeatures {
     PoseFeatures {
         unmatched_tops: unmatched.tops,
         unmatched_ink: unmatched.ink,

@@ -5,6 +5,7 @@
 
 use super::half_canvas::HalfCanvas;
 use super::ink_edge::{InkEdge, REACH};
+use super::misfit::smooth_misfit;
 use mocban_core::raster::Mask;
 use mocban_core::raster::components::ConnectedComponents;
 
@@ -38,6 +39,8 @@ pub(super) struct Unmatched {
     pub(super) edge_scatter: f64,
     /// Area of the ink, in squares of the stroke width.
     pub(super) ink_area: f64,
+    /// Displacement of whole edges, see [`smooth_misfit`].
+    pub(super) smooth_misfit: f64,
 }
 
 impl Unmatched {
@@ -70,6 +73,7 @@ impl Unmatched {
             ink: squares(&ink),
             edge_scatter: edge_scatter(canvas, &wood),
             ink_area: canvas.ink.count() as f64 / (width * width),
+            smooth_misfit: smooth_misfit(canvas, &wood),
         }
     }
 }

@@ -1,0 +1,70 @@
+//! Prints with unusual colours, shapes and parts, and prints of other blocks.
+
+use crate::stages::testing::settings;
+use crate::stages::{AlignedPair, Print, Scan};
+use mocban_core::mesh::Mesh;
+use mocban_core::raster::{ImageLimits, decode};
+use mocban_demo::{PairGenerator, Tier};
+
+fn align(mesh: Mesh, print: &[u8]) -> AlignedPair {
+    let print = decode(print, &ImageLimits::SUGGESTED).expect("an image");
+    let aligned = AlignedPair::new(&Scan::from(mesh), &Print::from(print), &settings());
+    aligned.expect("an alignment")
+}
+
+/// Aligns a pair, checks its landmarks, and returns the confidence.
+fn confidence(tier: Tier, index: u64) -> f64 {
+    let pair = PairGenerator::new(tier, 1).pair(index);
+    let pair = pair.expect("images encode");
+    let aligned = align(pair.mesh, &pair.print);
+    let outcome = aligned.first_metric();
+    let [found, wanted] = [aligned.print_from_mesh(outcome), pair.truth.print_from_mesh];
+    for landmark in &pair.truth.landmarks {
+        let [a, b] = [found, wanted].map(|map| map.apply(*landmark));
+        let apart = (a[0] - b[0]).hypot(a[1] - b[1]) / pair.truth.char_height_px;
+        assert!(apart < 0.03, "{}: {apart}", pair.id);
+    }
+    outcome.confidence.expect("a confidence")
+}
+
+#[test]
+fn coloured_ink_as_bright_as_the_sheet_is_aligned() {
+    assert!(confidence(Tier::Coloured, 3) > 0.9);
+}
+
+#[test]
+fn ink_beside_a_dark_stain_is_read_by_its_colour() {
+    assert!(confidence(Tier::Coloured, 10) > 0.9);
+}
+
+#[test]
+fn a_picture_that_was_scaled_unequally_is_aligned() {
+    assert!(confidence(Tier::Stretched, 0) > 0.9);
+}
+
+#[test]
+fn the_larger_part_of_a_torn_print_is_aligned_and_trusted_less() {
+    let confidence = confidence(Tier::Torn, 9);
+    assert!((0.5..0.9).contains(&confidence), "{confidence}");
+}
+
+#[test]
+fn a_torn_half_on_a_dark_ground_is_aligned() {
+    assert!(confidence(Tier::HalfPrint, 8) > 0.5);
+}
+
+#[test]
+fn another_block_with_the_same_character_is_doubted() {
+    let pairs = PairGenerator::new(Tier::Pose, 4);
+    let pair = pairs.pair(ANOTHER).expect("images encode");
+    let character = pair.character.chars().next().expect("a character");
+    let print = pairs.print_by_another_hand(character, ANOTHER + 1_000_000);
+    let other = align(pair.mesh.clone(), &print.expect("images encode"));
+    let own = align(pair.mesh, &pair.print);
+    let [other, own] = [other, own].map(|aligned| aligned.first_metric().confidence);
+    assert!(other.expect("a confidence") < 0.5, "{other:?}");
+    assert!(own.expect("a confidence") > 0.9, "{own:?}");
+}
+
+/// A pair whose print by another hand is aligned.
+const ANOTHER: u64 = 10;
