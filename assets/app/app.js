@@ -57,6 +57,13 @@ document.addEventListener("submit", async (event) => {
   }
 });
 
+document.addEventListener("click", async (event) => {
+  const button = event.target.closest("[data-copy]");
+  if (!button) return;
+  await navigator.clipboard.writeText(button.dataset.copy);
+  button.textContent = button.dataset.copied;
+});
+
 /** Returns whether a part can be replaced without taking something away from the user. */
 function isInUse(part) {
   const active = document.activeElement;

@@ -55,7 +55,7 @@ const WRONG_HOST: Rejection = (
 /// The path or the cookie of the session is missing or of an earlier start.
 const NO_SESSION: Rejection = (
     StatusCode::UNAUTHORIZED,
-    "open the address that the command printed; it works once",
+    "open the address that you were given; it works once",
 );
 /// `Origin` is missing or of another site.
 const WRONG_ORIGIN: Rejection = (StatusCode::FORBIDDEN, "only the page itself may write here");
@@ -99,7 +99,7 @@ pub(super) async fn guard(
     let mut response = match checked {
         Ok(request) => next.run(request).await,
         Err((status, _)) if shows_html && status == NO_SESSION.0 => {
-            (status, Html(closed_page().into_string())).into_response()
+            (status, Html(closed_page(access.entrance).into_string())).into_response()
         }
         Err(rejection) => rejection.into_response(),
     };

@@ -8,10 +8,13 @@ use axum::response::{Html, IntoResponse as _, Response};
 use axum::routing::get;
 use axum::{Router, middleware};
 
-use super::access_control::AccessControl;
+use super::access_control::{AccessControl, Entrance};
 use super::guard::guard;
 use super::page_frame::{closed_page, forward_page};
 use super::session::{ICON, SESSION_SCRIPT, START};
+
+/// Lifetime of the cookie of a guest in seconds: a reviewer continues on another day, in a browser that was closed.
+const GUEST_COOKIE_S: u32 = 30 * 24 * 60 * 60;
 
 impl AccessControl {
     /// Returns the router of a server: the start address, and `pages` for requests of the session. The paths of `pages`
@@ -43,13 +46,24 @@ async fn start(
         return StatusCode::METHOD_NOT_ALLOWED.into_response();
     }
     let session = &access.session;
-    let token = query
-        .as_deref()
-        .and_then(|query| query.strip_prefix("token="));
-    if session.open(token.unwrap_or_default()) {
-        let cookie = [(header::SET_COOKIE, session.set_cookie())];
+    if session.open(start_token(query.as_deref())) {
+        let mut cookie = session.set_cookie();
+        if access.entrance == Entrance::Invitation {
+            cookie.extend([format!("; Max-Age={GUEST_COOKIE_S}")]);
+        }
+        let cookie = [(header::SET_COOKIE, cookie)];
         return (cookie, Html(forward_page(&session.path).into_string())).into_response();
     }
     // The script of this page leads a browser that has opened the session on to it.
-    (StatusCode::FORBIDDEN, Html(closed_page().into_string())).into_response()
+    (
+        StatusCode::FORBIDDEN,
+        Html(closed_page(access.entrance).into_string()),
+    )
+        .into_response()
+}
+
+/// Returns the token in the query of a start address.
+pub(super) fn start_token(query: Option<&str>) -> &str {
+    let token = query.and_then(|query| query.strip_prefix("token="));
+    token.unwrap_or_default()
 }

@@ -10,6 +10,7 @@ mod connection;
 mod connections;
 mod guard;
 mod guarded_pages;
+mod guest_server;
 mod host_check;
 mod page_frame;
 mod server;
@@ -34,9 +35,10 @@ pub(crate) fn assert_loads_nothing(name: &str, text: &str) {
 }
 
 pub use access_control::AccessControl;
-pub use address::listen;
+pub use address::{listen, network_address};
 pub use connection::ConnectionLimits;
 pub use connections::serve;
+pub use guest_server::{Guest, GuestServer};
 pub use host_check::ServedNames;
 pub use page_frame::document;
 pub use server::{LocalServer, ServerError};

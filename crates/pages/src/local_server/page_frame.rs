@@ -2,6 +2,7 @@
 
 use maud::{DOCTYPE, Markup, html};
 
+use super::access_control::Entrance;
 use super::session::{ICON, SESSION_SCRIPT};
 
 /// Returns a whole document. `body` is the `body` element.
@@ -36,21 +37,29 @@ pub(super) fn forward_page(path: &str) -> Markup {
 }
 
 /// Returns the page for a browser without a session. Its script opens the session that the browser remembers.
-pub(super) fn closed_page() -> Markup {
+pub(super) fn closed_page(entrance: Entrance) -> Markup {
+    let [english, vietnamese] = match entrance {
+        Entrance::Command => [
+            "Open the address that the command printed. It works once, in one browser. If it has been used, end the command \
+             with Ctrl-C and run it again to get a new one: nothing is lost.",
+            "Hãy mở địa chỉ mà lệnh đã in ra. Địa chỉ chỉ dùng được một lần, trong một trình duyệt. Nếu địa chỉ đã được sử \
+             dụng, hãy dừng lệnh bằng Ctrl-C rồi chạy lại để nhận địa chỉ mới: không mất gì cả.",
+        ],
+        Entrance::Invitation => [
+            "Open the link of your invitation. It works once, in one browser. If it has been used, or was withdrawn, ask the \
+             person who invited you for a new one: your answers are stored.",
+            "Hãy mở liên kết trong lời mời. Liên kết chỉ dùng được một lần, trong một trình duyệt. Nếu liên kết đã được sử \
+             dụng hoặc đã bị thu hồi, hãy xin người mời một liên kết mới: các câu trả lời của bạn đã được lưu.",
+        ],
+    };
     with_script(&html! {
         body {
             main {
                 h1 { "This page is not open in this browser" }
-                p {
-                    "Open the address that the command printed. It works once, in one browser. If it has been used, end the "
-                    "command with Ctrl-C and run it again to get a new one: nothing is lost."
-                }
+                p { (english) }
                 div lang="vi" {
                     h1 { "Trang này chưa được mở trong trình duyệt này" }
-                    p {
-                        "Hãy mở địa chỉ mà lệnh đã in ra. Địa chỉ chỉ dùng được một lần, trong một trình duyệt. Nếu địa chỉ đã "
-                        "được sử dụng, hãy dừng lệnh bằng Ctrl-C rồi chạy lại để nhận địa chỉ mới: không mất gì cả."
-                    }
+                    p { (vietnamese) }
                 }
             }
         }
@@ -66,11 +75,15 @@ fn with_script(body: &Markup) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use super::{closed_page, forward_page};
+    use super::{Entrance, closed_page, forward_page};
 
     #[test]
     fn pages_without_a_session() {
-        let pages = [forward_page("/s/12ab"), closed_page()];
+        let pages = [
+            forward_page("/s/12ab"),
+            closed_page(Entrance::Command),
+            closed_page(Entrance::Invitation),
+        ];
         let pages = pages.map(|page| page.into_string().replace("><", ">\n<"));
         insta::assert_snapshot!(pages.join("\n\n"));
     }

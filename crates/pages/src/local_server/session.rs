@@ -48,7 +48,7 @@ impl Session {
 
     /// Accepts the one-time token. Returns `false` if the token is wrong or was already used.
     pub(super) fn open(&self, token: &str) -> bool {
-        is_equal(token, &self.token) && !self.is_opened.swap(true, Ordering::SeqCst)
+        self.has_token(token) && !self.is_opened.swap(true, Ordering::SeqCst)
     }
 
     /// Returns the value of the `Set-Cookie` header. The browser sends the cookie only with the path of the session, so
@@ -56,6 +56,16 @@ impl Session {
     pub(super) fn set_cookie(&self) -> String {
         let (name, value, path) = (&self.cookie_name, &self.cookie, &self.path);
         format!("{name}={value}; HttpOnly; SameSite=Strict; Path={path}")
+    }
+
+    /// Returns whether the one-time token has been used.
+    pub(super) fn is_opened(&self) -> bool {
+        self.is_opened.load(Ordering::SeqCst)
+    }
+
+    /// Returns whether a token is that of this session, used or not.
+    pub(super) fn has_token(&self, token: &str) -> bool {
+        is_equal(token, &self.token)
     }
 
     /// Returns whether a `Cookie` header contains the session cookie.
