@@ -47,7 +47,7 @@ fn links(page: &Page) -> Vec<String> {
 /// Opens a link as a browser does.
 fn open(url: &str) -> Site {
     let mut site = Site::closed(url);
-    site.enter_review();
+    site.enter_as_guest();
     site
 }
 
@@ -106,6 +106,14 @@ fn a_link_works_once_for_one_guest_on_one_server() {
     assert_eq!(reply(&mixed), 401, "the cookie of another guest");
     let again = lan.get_path(lan.start_path());
     assert_eq!(again.status, 403);
+    let twice = act(&page, "/p/p/actions/review", &invitation("lan"), |_| {});
+    assert_eq!(
+        twice.status,
+        422,
+        "an invitation that is in use stays: {}",
+        text(&twice)
+    );
+    assert_eq!(reply(&lan), 200);
     assert!(
         text(&again).contains("ask the person who invited you"),
         "{}",
@@ -123,6 +131,17 @@ fn a_link_works_once_for_one_guest_on_one_server() {
         let reply = send(lan.address(), "POST", &path, &headers, b"{}").expect("a reply");
         assert_eq!(reply.status, status, "{name}");
     }
+    // A preview of a chat program fetches a link, and another page cannot press its button.
+    let fresh = Site::closed(&invite(&page, "chi")[0]);
+    for _ in 0..2 {
+        assert_eq!(fresh.get_path(fresh.start_path()).status, 200);
+    }
+    let headers = [
+        ("host", fresh.host.clone()),
+        ("origin", "http://evil.example".to_owned()),
+    ];
+    let pressed = send(fresh.address(), "POST", fresh.start_path(), &headers, b"");
+    assert_eq!(pressed.expect("a reply").status, 403);
     let wrong = Site::closed(&format!("http://{}/start?token=0", lan.host));
     assert_eq!(wrong.get_path(wrong.start_path()).status, 403);
 }
@@ -157,13 +176,22 @@ fn a_new_link_ends_the_session_before_and_a_withdrawn_one_ends() {
 }
 
 #[test]
-fn a_guest_of_a_project_that_was_made_anew_judges_nothing() {
+fn answers_of_a_guest_wait_while_another_project_is_in_its_place() {
     let (dir, page) = start_entered();
     let guest = open(&invite(&page, "lan")[0]);
+    let item = guest.queue()[0].clone();
     std::fs::rename(dir.path().join("p"), dir.path().join("old")).expect("moved");
     read_project(&dir);
     let reply = guest.get("/api/queue");
-    assert_eq!(reply.status, 410, "{}", text(&reply));
+    assert_eq!(reply.status, 503, "{}", text(&reply));
+    assert!(reply.json()["error"].is_string());
+    // The page keeps an answer that gets such a reply, and sends it again.
+    let sent = guest.post("/api/answer", &answer("e-1", &item, "pass"));
+    assert_eq!(sent.expect("a reply").status, 503);
+    std::fs::remove_dir_all(dir.path().join("p")).expect("removed");
+    std::fs::rename(dir.path().join("old"), dir.path().join("p")).expect("moved back");
+    let sent = guest.post("/api/answer", &answer("e-1", &item, "pass"));
+    assert_eq!(sent.expect("a reply").status, 200);
 }
 
 #[test]
@@ -183,7 +211,12 @@ fn a_curator_invites_and_a_colleague_judges_in_a_browser() {
     }
     let link = tab.eval("document.querySelector('.invitation .link').value");
     let guest = browser.tab(400, 800);
+    // A page of another computer without encryption has no such function.
+    guest.before_scripts("delete Crypto.prototype.randomUUID");
     guest.open(link.as_str().expect("a link"));
+    guest.wait("document.querySelector('form button')");
+    guest.screenshot("app_welcome");
+    guest.eval("document.querySelector('form button').click(), null");
     guest.wait("document.body?.dataset.ready && document.body.dataset.shown");
     assert_eq!(
         guest.eval("document.querySelector('header a[href*=\"..\"]')"),
@@ -197,4 +230,37 @@ fn a_curator_invites_and_a_colleague_judges_in_a_browser() {
     // The page in the background does not follow by itself.
     tab.reload();
     tab.wait("document.querySelector('.invitation .good')");
+}
+
+#[test]
+fn guests_who_share_a_browser_keep_their_sessions_apart() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let (_dir, page) = start_entered();
+    invite(&page, "lan");
+    let sent = invite(&page, "minh");
+    let enter = |link: &str| {
+        let tab = browser.tab(1024, 768);
+        tab.open(link);
+        tab.wait("document.querySelector('form button')");
+        tab.eval("document.querySelector('form button').click(), null");
+        tab.wait("document.body?.dataset.ready && document.body.dataset.shown");
+        tab.key("Escape");
+        tab.wait("!document.querySelector('dialog[open]')");
+        tab
+    };
+    let lan = enter(&sent[0]);
+    // The session that was opened last is Minh's.
+    let _minh = enter(&sent[1]);
+    let renew = json!({"reviewer": "lan", "choice": "metric=relief&sample=3&order=random", "change": "renew"});
+    let reply = act(&page, "/p/p/actions/invitation", &renew, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    lan.eval("document.querySelector('.verdict[data-action=pass]').click(), null");
+    lan.wait("document.body.innerText.includes('Your link has ended')");
+    // Her page moves to her new link only, and sends what it kept.
+    let _again = enter(&links(&page)[0]);
+    lan.wait("document.getElementById('saved')?.textContent.includes('✓')");
+    let name = lan.eval("document.querySelector('header b').textContent");
+    assert_eq!(name, "lan");
 }

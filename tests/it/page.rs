@@ -113,7 +113,8 @@ impl Page {
     /// Opens a session as a browser does, and reads the CSRF token of a review.
     pub(crate) fn with_session(self) -> Self {
         let mut page = self;
-        page.site.enter_review();
+        page.site.enter();
+        page.site.read_csrf_token();
         page
     }
 
@@ -164,6 +165,20 @@ impl Site {
     /// Opens a session as a browser does.
     fn enter(&mut self) {
         let reply = self.get_path(self.start_path());
+        self.keep_session(reply);
+    }
+
+    /// Opens the session of an invitation, as its button does.
+    fn press_begin(&mut self) {
+        let headers = [
+            ("host", self.host.clone()),
+            ("origin", format!("http://{}", self.host)),
+        ];
+        let reply = send(self.address(), "POST", self.start_path(), &headers, b"");
+        self.keep_session(reply.expect("a reply"));
+    }
+
+    fn keep_session(&mut self, reply: Reply) {
         let cookie = reply.header("set-cookie").expect("a cookie");
         let cookie = cookie.split(';').next().expect("a value").to_owned();
         let html = String::from_utf8(reply.body).expect("UTF-8");
@@ -172,9 +187,13 @@ impl Site {
         (self.cookie, self.session) = (cookie, session);
     }
 
-    /// Opens a session as a browser does, and reads the CSRF token of a review.
-    pub(crate) fn enter_review(&mut self) {
-        self.enter();
+    /// Opens the session of an invitation, and reads the CSRF token of the review.
+    pub(crate) fn enter_as_guest(&mut self) {
+        self.press_begin();
+        self.read_csrf_token();
+    }
+
+    fn read_csrf_token(&mut self) {
         let boot = self.get("/api/config").json();
         let token = boot["csrf_token"].as_str().expect("a token");
         token.clone_into(&mut self.csrf_token);

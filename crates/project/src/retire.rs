@@ -46,6 +46,21 @@ impl RetireChoice {
         }
         Ok(added.into_iter().map(|pair| pair.name).collect())
     }
+
+    /// Returns the pairs that come back. Of an import, only the pairs of the last command come back:
+    /// others were retired for their own reasons.
+    async fn names_to_restore(&self, catalog: &Catalog) -> ProjectResult<Vec<PairName>> {
+        let names = self.names(catalog).await?;
+        if matches!(self, Self::Ids(_)) {
+            return Ok(names);
+        }
+        let names: BTreeSet<PairName> = names.into_iter().collect();
+        let mut retired = catalog.retired_pairs().await?;
+        retired.retain(|pair| names.contains(&pair.name));
+        let last = retired.iter().map(|pair| pair.at).max();
+        let retired = retired.into_iter().filter(|pair| Some(pair.at) == last);
+        Ok(retired.map(|pair| pair.name).collect())
+    }
 }
 
 /// Takes pairs out of every count. A process that works on one of them stores nothing more of it.
@@ -68,7 +83,7 @@ pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult
 /// blocks.
 pub async fn undo(choice: &RetireChoice, location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
-    let names = choice.names(&catalog).await?;
+    let names = choice.names_to_restore(&catalog).await?;
     let changed = catalog.restore_pairs(&names).await?;
     let still_retired = still_retired(&catalog, &names).await?;
     catalog.close().await;

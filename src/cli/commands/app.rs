@@ -47,6 +47,12 @@ pub(crate) async fn app(args: AppArgs, context: &Context) -> ProjectResult<ExitC
         let text = format!("there is no folder {}", folder.display());
         return Err(Refusal::Usage(text).into());
     }
+    if let Some(address) = args.listen {
+        // A wrong address is refused now, not at the first invitation.
+        std::net::TcpListener::bind((address, 0)).with_context(|| {
+            format!("cannot listen on {address}; name an address of this computer")
+        })?;
+    }
     let whole = folder.canonicalize();
     let name = whole
         .unwrap_or_else(|_| folder.clone())

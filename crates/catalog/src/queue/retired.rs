@@ -72,8 +72,8 @@ SELECT j.pair FROM job AS j WHERE NOT EXISTS (SELECT 1 FROM block_character AS c
 /// The pairs that the newest import of a list or of folders added. Those that were retired have no job.
 const LAST_IMPORT: &str = "
 SELECT p.name, p.imported, (SELECT count(*) FROM job AS j WHERE j.pair = p.id) AS jobs FROM pair AS p
-WHERE p.imported = (SELECT max(q.imported) FROM pair AS q
-        WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id))
+WHERE p.imported = (SELECT q.imported FROM pair AS q
+        WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id) ORDER BY q.id DESC LIMIT 1)
     AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
 ORDER BY p.name";
 

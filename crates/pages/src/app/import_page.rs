@@ -146,7 +146,8 @@ pub(super) async fn page(
             let roots = PickerRoots::new(&folder);
             let path = path.unwrap_or_else(|| folder.clone());
             let picked = roots.read(&path);
-            let is_known = chosen.dir(&folder).is_ok_and(|dir| is_project(&dir));
+            let found = find(&folder).into_iter();
+            let is_known = found.into_iter().any(|found| found.key == chosen.project);
             (picked, chosen.plan(&folder, &roots), roots, is_known)
         }
     };

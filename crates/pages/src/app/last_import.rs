@@ -13,6 +13,7 @@ use super::action_body::ActionBody;
 use super::address::encoded;
 use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
@@ -35,27 +36,29 @@ pub(super) async fn part(
 fn undo_part(visit: &Visit, key: &str, added: &[ImportedPair]) -> Markup {
     let counted = added.iter().filter(|pair| pair.jobs > 0).count();
     let (change, text, button) = if counted > 0 {
-        let text = visit.t(
-            "pairs were added by the newest import",
-            "cặp được thêm trong lần nhập mới nhất",
-        );
         (
             "retire",
-            text,
+            visit.t(
+                "Pairs added by the newest import",
+                "Số cặp được thêm trong lần nhập mới nhất",
+            ),
             visit.t("Undo this import", "Hoàn tác lần nhập này"),
         )
     } else {
-        let text = visit.t(
-            "pairs of the newest import are in no count",
-            "cặp của lần nhập mới nhất không được tính",
-        );
-        ("restore", text, visit.t("Bring them back", "Đưa trở lại"))
+        (
+            "restore",
+            visit.t(
+                "Pairs of the newest import, which are in no count",
+                "Số cặp của lần nhập mới nhất, hiện không được tính",
+            ),
+            visit.t("Bring them back", "Đưa trở lại"),
+        )
     };
     let number = if counted > 0 { counted } else { added.len() };
     html! {
         @if let Some(first) = added.first() {
             h2 { (visit.t("Newest import", "Lần nhập mới nhất")) }
-            p { b { (grouped(number as u64)) } " " (text) ", " (local(first.imported)) ". "
+            p { (text) " (" (local(first.imported)) "): " b { (grouped(number as u64)) } ". "
                 span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
             }
             // The part stands on the page of imports, so the address is relative to that page.
@@ -99,6 +102,13 @@ pub(super) async fn change(
         .at
         .parse()
         .map_err(|_invalid| AppFailure::not_found())?;
+    let newest = open.catalog.last_import().await?;
+    if newest.first().is_none_or(|pair| pair.imported != at) {
+        return Err(AppFailure::refused(Sentence::new(
+            "another import has added pairs meanwhile: reload the page and look at it first",
+            "một lần nhập khác vừa thêm cặp: hãy tải lại trang và xem lần nhập đó trước",
+        )));
+    }
     let (choice, location) = (RetireChoice::LastImport(Some(at)), open.location());
     let changed = on_thread(async move || match body.change {
         ImportChange::Retire => retire(&choice, &location).await,

@@ -1,13 +1,15 @@
 //! The pages of one reviewer, opened with a new reading of the queue.
 
+use std::path::Path;
+
 use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use crate::on_thread::on_thread;
 use crate::review::{CheckRates, Language, QueueOptions, ReviewOptions, ReviewPages, key_map};
+use mocban_catalog::CatalogError;
 use mocban_core::domain::ReviewOrder;
-use mocban_project::error::explanation;
 use mocban_project::location::{Location, now};
 use mocban_project::{ProjectResult, Refusal};
 
@@ -15,13 +17,29 @@ use mocban_project::{ProjectResult, Refusal};
 const MIN_VIEW_MS: u64 = 250;
 
 /// Where a reviewer judges: in this app, or as a guest with an invitation.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct ReviewPlace {
     pub(super) language: Option<Language>,
     /// The command line that names the project.
     pub(super) command: Option<String>,
+    /// Returns the sentence that explains an error of the catalog.
+    pub(super) explain: fn(&CatalogError, &Path) -> String,
     /// Relative address of the pages of the project.
     pub(super) project_page: Option<&'static str>,
+}
+
+impl ReviewPlace {
+    /// Returns the place of a guest, whose page has the language of the browser and names no file and no command.
+    pub(super) fn of_guest() -> Self {
+        Self {
+            language: None,
+            command: None,
+            explain: |_error, _dir| {
+                "the project cannot be read now: tell the person who invited you, and keep this page open".to_owned()
+            },
+            project_page: None,
+        }
+    }
 }
 
 /// Opens the pages of a reviewer.
@@ -75,7 +93,7 @@ async fn review_pages(
         min_view_ms: MIN_VIEW_MS,
         opens_guide: true,
         limits: settings.config.limits,
-        explain: explanation,
+        explain: place.explain,
         now,
         queue: QueueOptions {
             reviewer,

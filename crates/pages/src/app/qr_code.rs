@@ -23,7 +23,7 @@ pub(super) fn qr_code(text: &str, label: &str) -> Result<Markup, QrError> {
     }
     let side = width + 2 * QUIET_ZONE;
     Ok(html! {
-        svg.qr viewBox={ "0 0 " (side) " " (side) } role="img" aria-label=(label) { path d=(path) {} }
+        svg.qr viewBox={ "0 0 " (side) " " (side) } role="img" aria-label=(label) { rect width="100%" height="100%" {} path d=(path) {} }
     })
 }
 

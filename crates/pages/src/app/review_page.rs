@@ -24,6 +24,7 @@ use super::visit::Visit;
 use crate::local_server::AccessControl;
 use mocban_catalog::reviewer_name;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
+use mocban_project::error::explanation;
 use mocban_project::reviewers::similar_names;
 use mocban_project::shell::shell_quoted;
 
@@ -59,7 +60,7 @@ pub(super) async fn page(
             "Câu hỏi luôn như nhau: góc xoay có lệch không quá 5 độ, và chữ có đủ không? Kết quả xuất hiện theo thứ tự ngẫu nhiên, không kèm điểm, và mỗi câu trả lời được lưu ngay.",
         )) }
         (start_form(&visit))
-        div #live data-live="3000" { (invitation_list(&visit, &invited)) }
+        div #live data-live="3000" role="status" { (invitation_list(&visit, &invited)) }
         div #reviewers data-load="review/agreement" aria-live="polite" {}
     };
     let title = visit.t("Review", "Đánh giá");
@@ -73,7 +74,7 @@ fn start_form(visit: &Visit) -> Markup {
         "card fields",
         &html! {
             label { span { (visit.t("Name of the reviewer", "Tên người đánh giá")) }
-                input #reviewer name="reviewer" required maxlength="100" autocomplete="name";
+                input #reviewer name="reviewer" required maxlength="100" autocomplete="off";
             }
             label { span { (visit.t("Results of", "Kết quả của")) }
                 select name="metric" {
@@ -183,6 +184,7 @@ async fn review(
             "mocban -C {}",
             shell_quoted(&open.dir.to_string_lossy())
         )),
+        explain: explanation,
         project_page: Some("../../../"),
     };
     let opened = open_review(open, reviewer, &PageQuery::parse(choice), of_app).await?;

@@ -7,16 +7,15 @@ use axum::extract::{Request, State};
 use axum::http::Uri;
 use axum::response::Response;
 use axum::{Extension, Router};
-use hyper::service::Service as _;
-use hyper_util::service::TowerToHyperService;
 
 use super::access_control::{AccessControl, Entrance};
 use super::address::listen;
 use super::connection::ConnectionLimits;
 use super::connections::serve;
-use super::guarded_pages::start_token;
+use super::guarded_pages::{respond, start_token};
 use super::server::ServerError;
 use super::session::START;
+use mocban_core::domain::ContentHash;
 
 /// Name of the cookies.
 const COOKIE: &str = "guest";
@@ -54,16 +53,19 @@ impl GuestServer {
         let listener = listen(address, name).await.map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         // Its token is told to nobody.
-        let nobody = AccessControl::new(COOKIE, address, Entrance::Invitation);
+        let entrance = Entrance::Invitation {
+            place: String::new(),
+        };
+        let nobody = AccessControl::new(COOKIE, address, entrance);
         let nobody = Arc::new(nobody.map_err(ServerError::Token)?);
         let sessions = Arc::new(GuestSessions {
             nobody: nobody.guarded(Router::new()),
             guests: Mutex::default(),
         });
         let router = Router::new()
-            .fallback(pass_on)
+            .fallback(of_guest)
             .with_state(Arc::clone(&sessions));
-        let limits = ConnectionLimits::system();
+        let limits = ConnectionLimits::of_guests();
         let serving = tokio::spawn(serve(listener, router, limits, std::future::pending()));
         Ok(Self {
             address,
@@ -77,12 +79,15 @@ impl GuestServer {
         self.address
     }
 
-    /// Returns a new guest, whose session sees `pages` and nothing else. Handlers find the [`AccessControl`] as an extension.
+    /// Returns a new guest, whose session sees `pages` and nothing else. Guests of the same `name` have the same place.
+    /// Handlers find the [`AccessControl`] as an extension.
     ///
     /// # Errors
     /// Returns an error if the system provides no randomness.
-    pub fn invite(&self, pages: Router) -> Result<Guest, ServerError> {
-        let access = AccessControl::new(COOKIE, self.address, Entrance::Invitation);
+    pub fn invite(&self, name: &str, pages: Router) -> Result<Guest, ServerError> {
+        let mut place = ContentHash::of(name.as_bytes()).to_hex();
+        place.truncate(16);
+        let access = AccessControl::new(COOKIE, self.address, Entrance::Invitation { place });
         let access = Arc::new(access.map_err(ServerError::Token)?);
         let router = access.guarded(pages.layer(Extension(Arc::clone(&access))));
         let guest = (Arc::clone(&access), router);
@@ -138,8 +143,6 @@ impl GuestSessions {
     }
 }
 
-async fn pass_on(State(sessions): State<Arc<GuestSessions>>, request: Request) -> Response {
-    let pages = TowerToHyperService::new(sessions.pages(request.uri()));
-    let Ok(response) = pages.call(request).await;
-    response
+async fn of_guest(State(sessions): State<Arc<GuestSessions>>, request: Request) -> Response {
+    respond(sessions.pages(request.uri()), request).await
 }

@@ -17,7 +17,7 @@ pub(super) const ICON: &str = "/icon.svg";
 /// Start of the paths of all sessions.
 const PATHS: &str = "/s/";
 
-/// Secrets of one start of the server.
+/// Secrets of one session: of a start of the server, or of a guest.
 ///
 /// A request needs both the cookie and the path. Browsers send a cookie to all ports of a host, but send the
 /// path of a page to no other server. The history of the browser has the path, but not the cookie.
@@ -35,10 +35,16 @@ pub(super) struct Session {
 
 impl Session {
     /// Draws new secrets from the operating system. Cookies are named after the page and its port.
-    pub(super) fn new(page: &str, port: u16) -> std::io::Result<Self> {
+    /// The path ends with `place`, if it has any.
+    pub(super) fn new(page: &str, port: u16, place: &str) -> std::io::Result<Self> {
+        let place = if place.is_empty() {
+            String::new()
+        } else {
+            format!("/{place}")
+        };
         Ok(Self {
             token: secret()?,
-            path: format!("{PATHS}{}", secret()?),
+            path: format!("{PATHS}{}{place}", secret()?),
             cookie: secret()?,
             csrf_token: secret()?,
             cookie_name: format!("mocban_{page}_{port}"),
@@ -61,6 +67,11 @@ impl Session {
     /// Returns whether the one-time token has been used.
     pub(super) fn is_opened(&self) -> bool {
         self.is_opened.load(Ordering::SeqCst)
+    }
+
+    /// Returns whether a token would open the session now.
+    pub(super) fn is_open_to(&self, token: &str) -> bool {
+        self.has_token(token) && !self.is_opened()
     }
 
     /// Returns whether a token is that of this session, used or not.
@@ -107,7 +118,7 @@ mod tests {
     use super::Session;
 
     fn session() -> Session {
-        Session::new("review", 8000).expect("secrets")
+        Session::new("review", 8000, "").expect("secrets")
     }
 
     #[test]
