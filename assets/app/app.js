@@ -57,10 +57,22 @@ document.addEventListener("submit", async (event) => {
   }
 });
 
+document.addEventListener("click", async (event) => {
+  const button = event.target.closest("[data-copy]");
+  if (!button) return;
+  try {
+    await navigator.clipboard.writeText(button.dataset.copy);
+    button.textContent = button.dataset.copied;
+  } catch {
+    // The browser forbids it; then the user copies the selected text.
+    button.parentElement.querySelector("input").select();
+  }
+});
+
 /** Returns whether a part can be replaced without taking something away from the user. */
 function isInUse(part) {
   const active = document.activeElement;
-  const isTyping = active && part.contains(active) && active.matches("input, select, textarea");
+  const isTyping = active && part.contains(active) && active.matches("input:not([readonly]), select, textarea");
   return isTyping || part.querySelector('[aria-busy="true"], .problem:not([hidden])') !== null;
 }
 

@@ -25,6 +25,24 @@ function lines({ results, reviewer, is_inattentive: isInattentive, others }) {
   return texts;
 }
 
+/** Returns what a reviewer does next: with the app, with commands, or, if invited, nothing. */
+function nextSteps(summary) {
+  if (summary.project_page) {
+    const page = (name, text) => {
+      const link = create("a", text);
+      link.href = `${summary.project_page}${name}`;
+      return create("p", "", link);
+    };
+    return [page("report", translate("open_report")), page("review", translate("open_review"))];
+  }
+  if (!summary.command) return [create("p", translate("invited_end"))];
+  const command = (text) => create("code", `${summary.command} ${text}`);
+  return [
+    create("p", `${translate("next_report")} `, command("report -o report.html")),
+    create("p", `${translate("next_reviewer")} `, command(summary.next_reviewer)),
+  ];
+}
+
 /** Shows a heading, and the summary once the server has it. */
 export async function showEnd(heading, hasItems) {
   element.hidden = false;
@@ -35,22 +53,11 @@ export async function showEnd(heading, hasItems) {
   const response = await fetch("api/summary").catch(() => null);
   if (!response?.ok || element.hidden) return;
   const summary = await response.json();
-  const command = (text) => create("code", `${summary.command} ${text}`);
-  const page = (name, text) => {
-    const link = create("a", text);
-    link.href = `${summary.project_page}${name}`;
-    return create("p", "", link);
-  };
   element.replaceChildren(
     create("h2", translate("summary")),
     create("ul", "", ...lines(summary).map((text) => create("li", text))),
     create("h3", translate("next_steps")),
-    ...(summary.project_page
-      ? [page("report", translate("open_report")), page("review", translate("open_review"))]
-      : [
-        create("p", `${translate("next_report")} `, command("report -o report.html")),
-        create("p", `${translate("next_reviewer")} `, command(summary.next_reviewer)),
-      ]),
+    ...nextSteps(summary),
   );
   element.dataset.ready = "true";
 }

@@ -154,10 +154,16 @@ function answer(verdict, reason, pressedAt) {
   send(item, body);
 }
 
+/** Returns a new id. `crypto.randomUUID` does not exist on a page that another computer serves without encryption. */
+function eventId() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
 /** Returns the answer to send, with the note and rotation currently on the page. */
 function answerBody(item, verdict, reason) {
   const angle = viewer.rotation === 0 ? null : Number(viewer.rotation.toFixed(2));
-  return { event: crypto.randomUUID(), item: item.id, verdict, reason, note, angle_read_deg: angle };
+  return { event: eventId(), item: item.id, verdict, reason, note, angle_read_deg: angle };
 }
 
 function send(item, body) {
@@ -246,7 +252,7 @@ async function saveAlignment() {
   const { item, map, scores, startScores } = editor;
   if (scores.iou < startScores.iou && !(await ui.confirmWorse(startScores.iou, scores.iou))) return;
   if (!editor || editor.item !== item) return;
-  const stored = await requests.push("api/align", editor.body(crypto.randomUUID(), note));
+  const stored = await requests.push("api/align", editor.body(eventId(), note));
   item.manual_alignment = { ...stored, map };
   ui.announce(`${translate("alignment_saved")}: ${translate("iou")} ${localNumber(stored.iou, 3)}, ${translate("dice")} ${localNumber(stored.dice, 3)}`);
   closeEditor();

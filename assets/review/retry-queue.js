@@ -7,13 +7,13 @@ const STORAGE_KEY = "mocban-pending";
 export const MAX_PENDING = 3;
 const FIRST_DELAY_MS = 300;
 const MAX_DELAY_MS = 4000;
-/** Path of the review below that of the session: empty, or that of a project in the app. */
-const PLACE = location.pathname.replace(/^\/s\/[0-9a-f]{64}\//, "");
+/** Place of the invitation in the path of the session, if there is one, and path of the review below the session. */
+const [, GUEST = "", BELOW = ""] = location.pathname.match(/^\/s\/[0-9a-f]{64}\/([0-9a-f]{16}\/)?(.*)$/) ?? [];
 
 export class RetryQueue {
   /** Calls `onChange(pendingCount, problem)` when either changes, and `onReject(request, why)` if the server refuses. */
   constructor(reviewer, onChange, onReject) {
-    this.storageKey = [STORAGE_KEY, reviewer, PLACE].filter(Boolean).join(":");
+    this.storageKey = [STORAGE_KEY, reviewer, GUEST + BELOW].filter(Boolean).join(":");
     this.onChange = onChange;
     this.onReject = onReject;
     this.requests = this.restore();
@@ -86,7 +86,7 @@ export class RetryQueue {
     if (response.ok) return { stored };
     if (response.status === 401) {
       this.moveToNewSession();
-      return { retry: "restarted" };
+      return { retry: GUEST ? "invitation_ended" : "restarted" };
     }
     if (response.status >= 500) return { retry: "disconnected" };
     const { error } = await response.json().catch(() => ({}));
@@ -94,14 +94,14 @@ export class RetryQueue {
   }
 
   /**
-   * A restarted server has a new session, which the user may have opened in another tab. This page then moves there; the
-   * unsaved requests are in the session storage, and are sent from there.
+   * A restarted server has a new session, which the user may have opened in another tab, and so has an invitation with a new
+   * link. This page then moves there; the unsaved requests are in the session storage, and are sent from there.
    */
   moveToNewSession() {
-    const session = localStorage.getItem("mocban-session");
+    const session = localStorage.getItem(GUEST ? `mocban-session:${GUEST}` : "mocban-session");
     if (!session || location.pathname.startsWith(session)) return;
     this.isMoving = true;
-    location.replace(session + PLACE);
+    location.replace(session + BELOW);
   }
 
   wait(ms) {

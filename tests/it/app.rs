@@ -73,6 +73,7 @@ fn every_page_is_shown_and_links_only_to_this_server() {
         "/p/p/report",
         "/p/p/report/numbers",
         "/p/p/review/agreement",
+        "/p/p/last-import",
         "/p/p/export",
         "/p/p/settings",
         "/p/p/settings?key=run.workers&value=3",
@@ -83,7 +84,7 @@ fn every_page_is_shown_and_links_only_to_this_server() {
             let reply = page.get(&format!("{path}{join}language={language}"));
             let html = text(&reply);
             assert_eq!(reply.status, 200, "{path}: {html}");
-            let is_part = ["numbers", "agreement"]
+            let is_part = ["numbers", "agreement", "last-import"]
                 .iter()
                 .any(|end| path.ends_with(end));
             assert!(
@@ -160,6 +161,35 @@ fn an_address_leads_to_nothing_outside_the_folder() {
         let reply = act(&page, "/actions/import", &chosen, |_| {});
         assert_eq!(reply.status, 422, "{name}: {}", text(&reply));
     }
+}
+
+#[test]
+fn the_newest_import_is_undone_unless_another_followed() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    let counted = || mocban(&project, &["status", "--json"]).expect(0).json()["pairs"].clone();
+    let all = counted();
+    let part = || text(&page.get("/p/p/last-import"));
+    let at = part();
+    let at = at
+        .split("name=\"at\" value=\"")
+        .nth(1)
+        .and_then(|rest| rest.split('"').next());
+    let at = at.expect("a time").to_owned();
+    let path = "/p/p/actions/last-import";
+    let change = |at: &str, change: &str| {
+        act(&page, path, &json!({"at": at, "change": change}), |_| {}).status
+    };
+    assert_eq!(
+        change("1", "retire"),
+        422,
+        "not the import that the page showed"
+    );
+    assert_eq!(counted(), all);
+    assert_eq!((change(&at, "retire"), counted()), (200, json!(0)));
+    assert!(part().contains("Bring them back"), "{}", part());
+    assert_eq!((change(&at, "restore"), counted()), (200, all));
+    assert!(text(&page.get("/import?project=p")).contains("data-load=\"p/p/last-import\""));
 }
 
 #[test]

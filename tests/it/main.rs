@@ -8,6 +8,7 @@ mod all_pages;
 mod app;
 mod app_blocks;
 mod app_browser;
+mod app_invitations;
 mod app_sentences;
 #[cfg(target_os = "linux")]
 mod attacks;

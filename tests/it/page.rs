@@ -101,14 +101,7 @@ impl Page {
         BufReader::new(out).read_line(&mut line).expect("a line");
         let message: Value = serde_json::from_str(&line).expect("JSON on stdout");
         let url = message["url"].as_str().expect("an address").to_owned();
-        let host = url["http://".len()..].split('/').next().expect("a host");
-        let site = Site {
-            host: host.to_owned(),
-            url,
-            session: String::new(),
-            cookie: String::new(),
-            csrf_token: String::new(),
-        };
+        let site = Site::closed(&url);
         Self { child, site }
     }
 
@@ -119,25 +112,16 @@ impl Page {
 
     /// Opens a session as a browser does, and reads the CSRF token of a review.
     pub(crate) fn with_session(self) -> Self {
-        let mut page = self.entered();
-        let boot = page.get("/api/config").json();
-        boot["csrf_token"]
-            .as_str()
-            .expect("a token")
-            .clone_into(&mut page.site.csrf_token);
+        let mut page = self;
+        page.site.enter();
+        page.site.read_csrf_token();
         page
     }
 
     /// Opens a session as a browser does.
     pub(crate) fn entered(self) -> Self {
         let mut page = self;
-        let reply = page.get_path(page.start_path());
-        let cookie = reply.header("set-cookie").expect("a cookie");
-        let cookie = cookie.split(';').next().expect("a value").to_owned();
-        let html = String::from_utf8(reply.body).expect("UTF-8");
-        let session = html.split("data-session=\"").nth(1).expect("a session");
-        let session = session.split("/\"").next().expect("a path").to_owned();
-        (page.site.cookie, page.site.session) = (cookie, session);
+        page.site.enter();
         page
     }
 
@@ -166,6 +150,55 @@ impl Page {
 }
 
 impl Site {
+    /// Returns the server of a start URL, without a session.
+    pub(crate) fn closed(url: &str) -> Self {
+        let host = url["http://".len()..].split('/').next().expect("a host");
+        Self {
+            host: host.to_owned(),
+            url: url.to_owned(),
+            session: String::new(),
+            cookie: String::new(),
+            csrf_token: String::new(),
+        }
+    }
+
+    /// Opens a session as a browser does.
+    fn enter(&mut self) {
+        let reply = self.get_path(self.start_path());
+        self.keep_session(reply);
+    }
+
+    /// Opens the session of an invitation, as its button does.
+    fn press_begin(&mut self) {
+        let headers = [
+            ("host", self.host.clone()),
+            ("origin", format!("http://{}", self.host)),
+        ];
+        let reply = send(self.address(), "POST", self.start_path(), &headers, b"");
+        self.keep_session(reply.expect("a reply"));
+    }
+
+    fn keep_session(&mut self, reply: Reply) {
+        let cookie = reply.header("set-cookie").expect("a cookie");
+        let cookie = cookie.split(';').next().expect("a value").to_owned();
+        let html = String::from_utf8(reply.body).expect("UTF-8");
+        let session = html.split("data-session=\"").nth(1).expect("a session");
+        let session = session.split("/\"").next().expect("a path").to_owned();
+        (self.cookie, self.session) = (cookie, session);
+    }
+
+    /// Opens the session of an invitation, and reads the CSRF token of the review.
+    pub(crate) fn enter_as_guest(&mut self) {
+        self.press_begin();
+        self.read_csrf_token();
+    }
+
+    fn read_csrf_token(&mut self) {
+        let boot = self.get("/api/config").json();
+        let token = boot["csrf_token"].as_str().expect("a token");
+        token.clone_into(&mut self.csrf_token);
+    }
+
     /// Returns the socket address.
     pub(crate) fn address(&self) -> SocketAddr {
         self.host.parse().expect("an address")

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::block_view::finished_block;
 use crate::cli::{call, mocban};
@@ -113,6 +113,32 @@ fn retired_pairs_are_in_no_count_and_come_back() {
         (&1.into(), &0.into())
     );
     assert_eq!(counts(dir.path()), before);
+}
+
+#[test]
+fn the_newest_import_is_undone_and_done_again() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    mocban(dir.path(), &["demo", "p", "--pairs", "3"]).expect(0);
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
+    let pairs = || at(&["status", "--json"]).expect(0).json()["pairs"].clone();
+    let list = fs::read_to_string(dir.path().join("p/data/manifest.csv")).expect("a list");
+    let again = list
+        .replace("upright-", "again-")
+        .replace("/again-", "/upright-");
+    fs::write(dir.path().join("p/data/again.csv"), again).expect("written");
+    at(&["import", "p/data/again.csv"]).expect(0);
+    assert_eq!(pairs(), 6);
+    // An import that adds nothing is not the newest one.
+    at(&["import", "p/data/manifest.csv"]).expect(0);
+    let undone = at(&["retire", "--last-import", "--json"]).expect(0).json();
+    assert_eq!((&undone["retired"], &pairs()), (&json!(3), &json!(3)));
+    at(&["show", PAIRS[0]]).expect(0);
+    // A second call does not undo the import before.
+    let twice = at(&["retire", "--last-import", "--json"]).expect(0).json();
+    assert_eq!((&twice["unchanged"], &pairs()), (&json!(3), &json!(3)));
+    at(&["retire", "--undo", "--last-import"]).expect(0);
+    assert_eq!(pairs(), 6);
+    at(&["retire", "--last-import", PAIRS[0]]).expect(2);
 }
 
 #[test]

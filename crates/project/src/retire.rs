@@ -7,7 +7,7 @@ use crate::exit::Refusal;
 use crate::location::{Location, now};
 use crate::selection;
 use mocban_catalog::{Catalog, CatalogError};
-use mocban_core::domain::PairName;
+use mocban_core::domain::{PairName, UnixMillis};
 
 /// What became of some pairs.
 #[derive(Debug)]
@@ -20,11 +20,53 @@ pub struct RetireOutcome {
     pub warnings: Vec<String>,
 }
 
-/// Takes pairs out of every count; the id of a block stands for the pairs that it has now. A process that works on one of
-/// them stores nothing more of it.
-pub async fn retire(typed: &[String], location: &Location) -> ProjectResult<RetireOutcome> {
+/// Which pairs are retired or brought back.
+#[derive(Debug, Clone)]
+pub enum RetireChoice {
+    /// These ids; the id of a block stands for the pairs that it has now.
+    Ids(Vec<String>),
+    /// The pairs that the newest import of a list or of folders added. With a time, only if that import was then.
+    LastImport(Option<UnixMillis>),
+}
+
+impl RetireChoice {
+    async fn names(&self, catalog: &Catalog) -> ProjectResult<Vec<PairName>> {
+        let at = match self {
+            Self::Ids(typed) => return selection::known_pairs_of(catalog, typed).await,
+            Self::LastImport(at) => *at,
+        };
+        let added = catalog.last_import().await?;
+        let Some(first) = added.first() else {
+            let text = "no list or folder has added a pair yet";
+            return Err(Refusal::NothingSelected(text.to_owned()).into());
+        };
+        if at.is_some_and(|at| at != first.imported) {
+            let text = "another import has added pairs meanwhile; look at it before you undo it";
+            return Err(Refusal::Usage(text.to_owned()).into());
+        }
+        Ok(added.into_iter().map(|pair| pair.name).collect())
+    }
+
+    /// Returns the pairs that come back. Of an import, only the pairs of the last command come back:
+    /// others were retired for their own reasons.
+    async fn names_to_restore(&self, catalog: &Catalog) -> ProjectResult<Vec<PairName>> {
+        let names = self.names(catalog).await?;
+        if matches!(self, Self::Ids(_)) {
+            return Ok(names);
+        }
+        let names: BTreeSet<PairName> = names.into_iter().collect();
+        let mut retired = catalog.retired_pairs().await?;
+        retired.retain(|pair| names.contains(&pair.name));
+        let last = retired.iter().map(|pair| pair.at).max();
+        let retired = retired.into_iter().filter(|pair| Some(pair.at) == last);
+        Ok(retired.map(|pair| pair.name).collect())
+    }
+}
+
+/// Takes pairs out of every count. A process that works on one of them stores nothing more of it.
+pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
-    let names = selection::known_pairs_of(&catalog, typed).await?;
+    let names = choice.names(&catalog).await?;
     let changed = catalog.retire_pairs(&names, now()).await?;
     catalog.close().await;
     Ok(RetireOutcome {
@@ -34,14 +76,14 @@ pub async fn retire(typed: &[String], location: &Location) -> ProjectResult<Reti
     })
 }
 
-/// Brings retired pairs back, with their results and verdicts; the id of a block stands for its pairs.
+/// Brings retired pairs back, with their results and verdicts.
 ///
 /// # Errors
 /// Returns an error if none comes back, because none is retired or they have no boxes any more in the labels of their
 /// blocks.
-pub async fn undo(typed: &[String], location: &Location) -> ProjectResult<RetireOutcome> {
+pub async fn undo(choice: &RetireChoice, location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
-    let names = selection::known_pairs_of(&catalog, typed).await?;
+    let names = choice.names_to_restore(&catalog).await?;
     let changed = catalog.restore_pairs(&names).await?;
     let still_retired = still_retired(&catalog, &names).await?;
     catalog.close().await;

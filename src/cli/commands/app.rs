@@ -1,10 +1,12 @@
 //! `app`: serves the pages of all projects of a folder on this machine.
 
+use std::net::IpAddr;
 use std::path::PathBuf;
 
 use clap::Args;
 
 use crate::cli::input::language::language_of_system;
+use crate::cli::input::listen_address::listen_address;
 use crate::cli::output::context::Context;
 use crate::cli::output::served_pages::ServedPages;
 use mocban_core::page_vec;
@@ -22,6 +24,9 @@ pub(crate) struct AppArgs {
     /// Port on this machine; 0 chooses the same port each time for a folder, or any free port
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
+    /// Address of this computer at which invited reviewers reach it [default: its address in its network]
+    #[arg(long, value_name = "ADDRESS", value_parser = listen_address)]
+    listen: Option<IpAddr>,
     /// Language of the pages, en or vi [default: vi if LANG is Vietnamese, else that of the browser]
     #[arg(long)]
     lang: Option<Language>,
@@ -42,6 +47,12 @@ pub(crate) async fn app(args: AppArgs, context: &Context) -> ProjectResult<ExitC
         let text = format!("there is no folder {}", folder.display());
         return Err(Refusal::Usage(text).into());
     }
+    if let Some(address) = args.listen {
+        // A wrong address is refused now, not at the first invitation.
+        std::net::TcpListener::bind((address, 0)).with_context(|| {
+            format!("cannot listen on {address}; name an address of this computer")
+        })?;
+    }
     let whole = folder.canonicalize();
     let name = whole
         .unwrap_or_else(|_| folder.clone())
@@ -50,6 +61,7 @@ pub(crate) async fn app(args: AppArgs, context: &Context) -> ProjectResult<ExitC
     let program = std::env::current_exe();
     let options = AppOptions {
         folder,
+        listen: args.listen,
         language: args.lang.or_else(language_of_system),
         program: program.with_context(|| "cannot find this program, to start runs".to_owned())?,
     };

@@ -8,6 +8,7 @@ use clap::Args;
 use serde_json::json;
 
 use crate::cli::input::language::language_of_system;
+use crate::cli::input::listen_address::listen_address;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::page_address::{open_page, print_address};
@@ -75,7 +76,7 @@ pub(crate) struct ReviewArgs {
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
     /// Listen on this address instead of 127.0.0.1; anyone who can reach it sees that the page exists
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, value_name = "ADDRESS", value_parser = listen_address)]
     listen: Option<IpAddr>,
     /// Language of the page, en or vi [default: vi if LANG is Vietnamese, else that of the browser]
     #[arg(long)]
@@ -108,11 +109,6 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     let settings = context.location.settings()?;
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
-    if args.listen.is_some_and(|address| address.is_unspecified()) {
-        // The page accepts only requests for one address, but 0.0.0.0 stands for all addresses of the machine.
-        let text = "--listen needs the address of this machine at which the page will be opened";
-        return Err(Refusal::Usage(text.to_owned()).into());
-    }
     let (project, catalog) = context.location.open().await?;
     let rights = catalog.review_rights().await?;
     rights.require_review(Some(&args.reviewer))?;
@@ -124,11 +120,13 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     context.warn_about_set_apart(&SetApart::of(&damaged));
     let language = args.lang.or_else(language_of_system);
     let options = ReviewOptions {
-        command: context
-            .without_setting_flags()
-            .command("")
-            .trim_end()
-            .to_owned(),
+        command: Some(
+            context
+                .without_setting_flags()
+                .command("")
+                .trim_end()
+                .to_owned(),
+        ),
         project_page: None,
         language,
         keys,

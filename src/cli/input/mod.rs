@@ -4,6 +4,7 @@ pub(crate) mod browser;
 pub(crate) mod examples;
 pub(crate) mod global;
 pub(crate) mod language;
+pub(crate) mod listen_address;
 pub(crate) mod name_request;
 pub(crate) mod nearby_projects;
 pub(crate) mod signals;

@@ -69,6 +69,14 @@ SELECT p.name, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.p
 const LISTED_JOBS: &str = "
 SELECT j.pair FROM job AS j WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = j.pair) ORDER BY j.pair";
 
+/// The pairs that the newest import of a list or of folders added. Those that were retired have no job.
+const LAST_IMPORT: &str = "
+SELECT p.name, p.imported, (SELECT count(*) FROM job AS j WHERE j.pair = p.id) AS jobs FROM pair AS p
+WHERE p.imported = (SELECT q.imported FROM pair AS q
+        WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id) ORDER BY q.id DESC LIMIT 1)
+    AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
+ORDER BY p.name";
+
 /// Number of pairs in one statement.
 const CHUNK: usize = 2_000;
 
@@ -84,6 +92,19 @@ pub struct RetiredPair {
 }
 
 from_row! { RetiredPair { name, cause, at } }
+
+/// A pair that an import of a list or of folders added.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImportedPair {
+    /// The pair.
+    pub name: PairName,
+    /// When it was imported for the first time.
+    pub imported: UnixMillis,
+    /// 0 if it is retired, else 1.
+    pub jobs: i64,
+}
+
+from_row! { ImportedPair { name, imported, jobs } }
 
 /// A removed job.
 struct RemovedJob {
@@ -110,6 +131,12 @@ impl Catalog {
     pub async fn retired_pairs(&self) -> Result<Vec<RetiredPair>> {
         let mut conn = self.read_conn().await?;
         query_as(RETIRED).fetch_all(&mut conn).await
+    }
+
+    /// Returns the pairs that the newest import of a list or of folders added, sorted by name.
+    pub async fn last_import(&self) -> Result<Vec<ImportedPair>> {
+        let mut conn = self.read_conn().await?;
+        query_as(LAST_IMPORT).fetch_all(&mut conn).await
     }
 
     /// Retires pairs for a person. Their leases end. Returns how many were not retired before.

@@ -146,10 +146,12 @@ pub(super) async fn page(
             let roots = PickerRoots::new(&folder);
             let path = path.unwrap_or_else(|| folder.clone());
             let picked = roots.read(&path);
-            (picked, chosen.plan(&folder, &roots), roots)
+            let found = find(&folder).into_iter();
+            let is_known = found.into_iter().any(|found| found.key == chosen.project);
+            (picked, chosen.plan(&folder, &roots), roots, is_known)
         }
     };
-    let (picked, planned, roots) = tokio::task::spawn_blocking(read)
+    let (picked, planned, roots, is_known) = tokio::task::spawn_blocking(read)
         .await
         .map_err(|error| ProjectError::from(mocban_project::error::TaskStopped(error)))?;
     let body = html! {
@@ -158,6 +160,9 @@ pub(super) async fn page(
             Err(failure) => p.notice.bad role="alert" { (failure.text(visit.language)) },
             Ok(None) => {},
             Ok(Some(planned)) => (plan_part(&visit, &chosen, &planned)),
+        }
+        @if is_known {
+            div data-load={ "p/" (encoded(&chosen.project)) "/last-import" } aria-live="polite" {}
         }
         h2 { (visit.t("Folders of this computer", "Thư mục trên máy này")) }
         @match picked {

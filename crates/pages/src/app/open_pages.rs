@@ -8,7 +8,7 @@ use axum::Router;
 use super::projects::OpenProject;
 
 /// Project, reviewer or block, and what the pages show.
-type PagesId = [String; 3];
+pub(super) type PagesId = [String; 3];
 
 /// The pages of reviews or of blocks.
 #[derive(Debug)]

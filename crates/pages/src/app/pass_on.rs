@@ -5,12 +5,10 @@ use std::sync::Arc;
 use axum::Router;
 use axum::extract::Request;
 use axum::http::Extensions;
-use axum::response::{IntoResponse as _, Response};
-use hyper::service::Service as _;
-use hyper_util::service::TowerToHyperService;
+use axum::response::Response;
 
 use super::failure::{AppFailure, AppResult};
-use crate::local_server::AccessControl;
+use crate::local_server::{AccessControl, respond};
 
 /// Returns the path below an address of five segments, such as `/p/PROJECT/review/REVIEWER/CHOICE/`.
 pub(super) fn path_below(request: &Request) -> &str {
@@ -39,6 +37,5 @@ pub(super) async fn pass_on(
     head.extensions = Extensions::new();
     head.extensions.insert(access);
     let request = Request::from_parts(head, body);
-    let Ok(response) = TowerToHyperService::new(router).call(request).await;
-    Ok(response.into_response())
+    Ok(respond(router, request).await)
 }

@@ -14,27 +14,22 @@ use super::action_body::ActionBody;
 use super::address::{PageQuery, encoded};
 use super::components::{NavSection, action_form, choice, frame};
 use super::failure::{AppFailure, AppResult};
+use super::invitation_cards::{invitation_list, invite};
+use super::opened_review::{ReviewPlace, open_review};
 use super::pass_on::pass_on;
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
-use crate::on_thread::on_thread;
-use crate::review::{CheckRates, Language, QueueOptions, ReviewOptions, ReviewPages, key_map};
 use mocban_catalog::reviewer_name;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_project::error::explanation;
-use mocban_project::location::{Location, now};
 use mocban_project::reviewers::similar_names;
 use mocban_project::shell::shell_quoted;
-use mocban_project::{ProjectResult, Refusal};
 
 /// Size of the sample that the page suggests.
 const SAMPLE: usize = 50;
-/// Shortest time that an image is shown before a verdict is accepted, as in `review`.
-const MIN_VIEW_MS: u64 = 250;
-
 /// The fields of the form that starts a review.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -46,6 +41,9 @@ pub(super) struct StartBody {
     /// Whether a name that looks like another is that of another person.
     #[serde(default)]
     is_new: String,
+    /// Whether the reviewer is invited instead of judging in this browser.
+    #[serde(default)]
+    invite: String,
 }
 
 /// Shows the form that starts a review; a script then asks for the reviewers.
@@ -55,12 +53,14 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     state.open(&key).await?;
+    let invited = state.invitations.of_project(&key).await;
     let body = html! {
         p { (visit.t(
             "The question is always the same: is the rotation within 5 degrees, and is the whole character there? Results come in random order, without scores, and each answer is stored at once.",
             "Câu hỏi luôn như nhau: góc xoay có lệch không quá 5 độ, và chữ có đủ không? Kết quả xuất hiện theo thứ tự ngẫu nhiên, không kèm điểm, và mỗi câu trả lời được lưu ngay.",
         )) }
         (start_form(&visit))
+        div #live data-live="3000" role="status" { (invitation_list(&visit, &invited)) }
         div #reviewers data-load="review/agreement" aria-live="polite" {}
     };
     let title = visit.t("Review", "Đánh giá");
@@ -73,8 +73,8 @@ fn start_form(visit: &Visit) -> Markup {
         "actions/review",
         "card fields",
         &html! {
-            label { span { (visit.t("Your name", "Tên của bạn")) }
-                input #reviewer name="reviewer" required maxlength="100" autocomplete="name";
+            label { span { (visit.t("Name of the reviewer", "Tên người đánh giá")) }
+                input #reviewer name="reviewer" required maxlength="100" autocomplete="off";
             }
             label { span { (visit.t("Results of", "Kết quả của")) }
                 select name="metric" {
@@ -94,11 +94,16 @@ fn start_form(visit: &Visit) -> Markup {
             }
             label.check { input type="checkbox" name="is_new" value="yes"; " " (visit.t("another person with a similar name", "người khác có tên gần giống")) }
             button.primary { (visit.t("Start or continue", "Bắt đầu hoặc tiếp tục")) }
+            button name="invite" value="yes" { (visit.t("Invite", "Mời")) }
+            p.muted { (visit.t(
+                "\"Invite\" makes a link for another computer, tablet or phone of your network. Whoever opens it can judge under this name, and do nothing else. The connection is not encrypted.",
+                "\"Mời\" tạo một liên kết cho máy tính, máy tính bảng hoặc điện thoại khác trong mạng của bạn. Ai mở liên kết có thể đánh giá dưới tên này, và không làm được gì khác. Kết nối không được mã hóa.",
+            )) }
         },
     )
 }
 
-/// Checks the fields of a review and replies with its address.
+/// Checks the fields of a review and replies with its address, or makes an invitation.
 pub(super) async fn start(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
@@ -117,6 +122,10 @@ pub(super) async fn start(
         .with("order", &body.order);
     let text = query.text();
     let choice = text.trim_start_matches('?');
+    if !body.invite.is_empty() {
+        invite(&state, &open, &reviewer, choice).await?;
+        return Ok(Json(json!({ "reload": true })));
+    }
     // Opening refuses a queue without items before the page is left.
     let _router = review(&state, &open, &reviewer, choice).await?;
     let go = format!("review/{}/{}/", encoded(&reviewer), encoded(choice));
@@ -169,74 +178,15 @@ async fn review(
         return Ok(router);
     }
     // Two requests at once may both open it; both get the same pages.
-    let opened = open_review(state, open, reviewer, &PageQuery::parse(choice)).await?;
-    Ok(state.reviews.keep(id, open, opened))
-}
-
-/// Opens the pages of a reviewer.
-async fn open_review(
-    state: &AppState,
-    open: &OpenProject,
-    reviewer: &str,
-    query: &PageQuery,
-) -> AppResult<axum::Router> {
-    let (location, reviewer) = (open.location(), reviewer.to_owned());
-    let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
-    let (language, query) = (state.language(), query.clone());
-    let opened = on_thread(async move || review_pages(&location, language, reviewer, &query).await);
-    let pages = opened
-        .await
-        .map_err(|error| AppFailure::of(error, &open.dir))?;
-    if pages.counts().items == 0 {
-        return Err(AppFailure::refused(if is_settling {
-            Sentence::new(
-                "no two reviewers disagree on a result of this metric",
-                "không có hai người đánh giá nào bất đồng về kết quả của phương pháp này",
-            )
-        } else {
-            Sentence::new(
-                "there is no result to judge yet: press Align on the page Run first",
-                "chưa có kết quả nào để đánh giá: trước hết hãy bấm Căn chỉnh ở trang Căn chỉnh",
-            )
-        }));
-    }
-    Ok(pages.routes())
-}
-
-async fn review_pages(
-    location: &Location,
-    language: Option<Language>,
-    reviewer: String,
-    query: &PageQuery,
-) -> ProjectResult<ReviewPages> {
-    let settings = location.settings()?;
-    let keys = key_map(&settings.config.review.keys);
-    let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
-    let (project, catalog) = location.open().await?;
-    let rights = catalog.review_rights().await?;
-    rights.require_review(Some(&reviewer))?;
-    let (catalog, _) = catalog.without_faulty_rows().await?;
-    let options = ReviewOptions {
-        command: format!(
+    let of_app = ReviewPlace {
+        language: state.language(),
+        command: Some(format!(
             "mocban -C {}",
-            shell_quoted(&location.dir.to_string_lossy())
-        ),
-        project_page: Some("../../../"),
-        language,
-        keys,
-        min_view_ms: MIN_VIEW_MS,
-        opens_guide: true,
-        limits: settings.config.limits,
+            shell_quoted(&open.dir.to_string_lossy())
+        )),
         explain: explanation,
-        now,
-        queue: QueueOptions {
-            reviewer,
-            metrics: query.parsed("metric").into_iter().collect(),
-            order: query.parsed("order").unwrap_or(ReviewOrder::Random),
-            seed: QueueOptions::DEFAULT_SEED,
-            sample: query.parsed::<usize>("sample").filter(|sample| *sample > 0),
-            rates: CheckRates::default(),
-        },
+        project_page: Some("../../../"),
     };
-    Ok(ReviewPages::open(catalog, project, options).await?)
+    let opened = open_review(open, reviewer, &PageQuery::parse(choice), of_app).await?;
+    Ok(state.reviews.keep(id, open, opened))
 }

@@ -8,8 +8,8 @@ use axum::{Router, middleware};
 use super::state::{AppOptions, AppState};
 use super::{
     assets, block_page, blocks_page, export_page, failure_page, health_page, home, import_page,
-    pair_page, pairs_page, pictures, report_page, review_agreement, review_page, run_actions,
-    run_page, settings_page,
+    invitation_cards, last_import, pair_page, pairs_page, pictures, report_page, review_agreement,
+    review_page, run_actions, run_page, settings_page,
 };
 
 /// Returns the routes of the app, for a server.
@@ -37,6 +37,11 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/p/{project}/review/agreement", get(review_agreement::part))
         .route("/import", get(import_page::page))
         .route("/actions/import", post(import_page::import))
+        .route("/p/{project}/last-import", get(last_import::part))
+        .route(
+            "/p/{project}/actions/last-import",
+            post(last_import::change),
+        )
         .route("/actions/demo", post(run_actions::demo))
         .route("/p/{project}/report", get(report_page::page))
         .route("/p/{project}/report/numbers", get(report_page::numbers))
@@ -65,6 +70,10 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/p/{project}/actions/retry", post(run_actions::retry))
         .route("/p/{project}/actions/retire", post(run_actions::retire))
         .route("/p/{project}/actions/review", post(review_page::start))
+        .route(
+            "/p/{project}/actions/invitation",
+            post(invitation_cards::change),
+        )
         .route(&format!("{block}/view/"), any(block_page::pages))
         .route(&format!("{block}/view/{{*rest}}"), any(block_page::pages))
         .route(&format!("{review}/"), any(review_page::pages))

@@ -19,7 +19,7 @@ use crate::on_thread::on_thread;
 use mocban_core::domain::{ErrorCode, FailureClass};
 use mocban_project::ProjectError;
 use mocban_project::location::now;
-use mocban_project::retire::retire as retire_pairs;
+use mocban_project::retire::{RetireChoice, retire as retire_pairs};
 use mocban_project::retry::{RetryRequest, retry as retry_pairs};
 use mocban_runner::is_running;
 
@@ -207,7 +207,9 @@ pub(super) async fn retire(
     let open = state.open(&key).await?;
     let pair = body.pair.ok_or_else(AppFailure::not_found)?;
     let location = open.location();
-    let retired = on_thread(async move || retire_pairs(&[pair], &location).await).await;
+    let retired =
+        on_thread(async move || retire_pairs(&RetireChoice::Ids(vec![pair]), &location).await)
+            .await;
     retired.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(Json(json!({ "go": "../../pairs" })))
 }

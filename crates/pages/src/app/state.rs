@@ -1,11 +1,13 @@
 //! What the handlers of the app share.
 
 use std::collections::BTreeMap;
+use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
+use super::invitations::Invitations;
 use super::open_pages::OpenPages;
 use super::projects::{OpenProject, find};
 use super::tasks::AppTasks;
@@ -22,6 +24,8 @@ pub struct AppOptions {
     pub language: Option<Language>,
     /// The program, which runs are started with.
     pub program: PathBuf,
+    /// Address of this computer at which invited reviewers reach the app; `None` for its address in its network.
+    pub listen: Option<IpAddr>,
 }
 
 /// State of the app.
@@ -34,6 +38,8 @@ pub(super) struct AppState {
     projects: Mutex<BTreeMap<String, Arc<OpenProject>>>,
     /// The reviews that are open.
     pub(super) reviews: OpenPages,
+    /// The reviewers who were invited.
+    pub(super) invitations: Invitations,
     /// The blocks that are open, each with its picture and heights.
     pub(super) blocks: OpenPages,
     /// Exports, checks and backups.
@@ -49,6 +55,7 @@ impl AppState {
     pub(super) fn new(options: AppOptions) -> Self {
         Self {
             language: Mutex::new(options.language),
+            invitations: Invitations::new(options.listen, &options.folder),
             options,
             projects: Mutex::default(),
             reviews: OpenPages::new(32),

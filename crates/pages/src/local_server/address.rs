@@ -1,6 +1,6 @@
 //! Binds the port of a server.
 
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr, UdpSocket};
 
 use tokio::net::TcpListener;
 
@@ -19,6 +19,17 @@ pub async fn listen(address: SocketAddr, name: &str) -> std::io::Result<TcpListe
         return Ok(listener);
     }
     TcpListener::bind(address).await
+}
+
+/// Returns the address of this computer in its network; `None` without a network. Nothing is sent: connecting a datagram
+/// socket only chooses a route. The targets are reserved for documentation (RFC 5737 and 3849).
+pub fn network_address() -> Option<IpAddr> {
+    let routes = [("0.0.0.0:0", "192.0.2.1:9"), ("[::]:0", "[2001:db8::1]:9")];
+    routes.into_iter().find_map(|(from, to)| {
+        let socket = UdpSocket::bind(from).ok()?;
+        socket.connect(to).ok()?;
+        Some(socket.local_addr().ok()?.ip())
+    })
 }
 
 /// Returns a port of the dynamic range that is the same for equal names.

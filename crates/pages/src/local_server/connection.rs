@@ -50,6 +50,15 @@ impl ConnectionLimits {
         }
     }
 
+    /// Returns the limits of a second server in a process.
+    pub(super) fn of_guests() -> Self {
+        let system = Self::system();
+        Self {
+            connections: (system.connections / 2).max(4),
+            ..system
+        }
+    }
+
     /// Returns the limits of a server beside other work, which few clients ask once in some seconds. A connection has one
     /// request, because a client may send many without waiting for the responses.
     pub fn of_rare_requests() -> Self {

@@ -55,7 +55,7 @@ const WRONG_HOST: Rejection = (
 /// The path or the cookie of the session is missing or of an earlier start.
 const NO_SESSION: Rejection = (
     StatusCode::UNAUTHORIZED,
-    "open the address that the command printed; it works once",
+    "open the address that you were given; it works once",
 );
 /// `Origin` is missing or of another site.
 const WRONG_ORIGIN: Rejection = (StatusCode::FORBIDDEN, "only the page itself may write here");
@@ -99,7 +99,7 @@ pub(super) async fn guard(
     let mut response = match checked {
         Ok(request) => next.run(request).await,
         Err((status, _)) if shows_html && status == NO_SESSION.0 => {
-            (status, Html(closed_page().into_string())).into_response()
+            (status, Html(closed_page(&access.entrance).into_string())).into_response()
         }
         Err(rejection) => rejection.into_response(),
     };
@@ -122,6 +122,17 @@ fn check(access: &AccessControl, request: &Request) -> Result<Uri, Rejection> {
     if is_read && [START, SESSION_SCRIPT, ICON].contains(&path) {
         return Ok(request.uri().clone());
     }
+    let is_own = || {
+        let origin = text(headers, header::ORIGIN);
+        origin.and_then(|origin| origin.strip_prefix("http://")) == Some(host)
+    };
+    // The button of an invitation. Its secret is the token, and a form of a page without referrer sends the origin `null`.
+    if access.is_guest() && *request.method() == Method::POST && path == START {
+        let is_null = text(headers, header::ORIGIN) == Some("null");
+        return (is_null || is_own())
+            .then(|| request.uri().clone())
+            .ok_or(WRONG_ORIGIN);
+    }
     let page = access.session.page(path).ok_or(NO_SESSION)?;
     if !text(headers, header::COOKIE).is_some_and(|cookie| access.session.has_cookie(cookie)) {
         return Err(NO_SESSION);
@@ -130,8 +141,7 @@ fn check(access: &AccessControl, request: &Request) -> Result<Uri, Rejection> {
     if is_read {
         return Ok(uri);
     }
-    let origin = text(headers, header::ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
-    if origin != Some(host) {
+    if !is_own() {
         return Err(WRONG_ORIGIN);
     }
     let kind = text(headers, header::CONTENT_TYPE).and_then(|kind| kind.split(';').next());

@@ -1,8 +1,8 @@
-//! A web server for one user's browser on this machine: checked requests, limited connections, and one session.
+//! Web servers of this machine: checked requests, limited connections, and sessions.
 //!
-//! [`LocalServer`] binds a port and serves the routes of pages behind the guard of a session. The session opens
-//! at the start address, which works once; its pages are below a secret path. A server without a session, such as that of the
-//! metrics, wraps its routes with [`ServedNames::guarded`].
+//! [`LocalServer`] binds a port and serves the routes of pages behind the guard of one session. The session opens
+//! at the start address, which works once; its pages are below a secret path. [`GuestServer`] has a session for each person who
+//! was invited. A server without a session, such as that of the metrics, wraps its routes with [`ServedNames::guarded`].
 
 mod access_control;
 mod address;
@@ -10,6 +10,7 @@ mod connection;
 mod connections;
 mod guard;
 mod guarded_pages;
+mod guest_server;
 mod host_check;
 mod page_frame;
 mod server;
@@ -34,9 +35,11 @@ pub(crate) fn assert_loads_nothing(name: &str, text: &str) {
 }
 
 pub use access_control::AccessControl;
-pub use address::listen;
+pub use address::{listen, network_address};
 pub use connection::ConnectionLimits;
 pub use connections::serve;
+pub use guarded_pages::respond;
+pub use guest_server::{Guest, GuestServer};
 pub use host_check::ServedNames;
 pub use page_frame::document;
 pub use server::{LocalServer, ServerError};

@@ -2,7 +2,8 @@
 
 use maud::{DOCTYPE, Markup, html};
 
-use super::session::{ICON, SESSION_SCRIPT};
+use super::access_control::Entrance;
+use super::session::{ICON, SESSION_SCRIPT, START};
 
 /// Returns a whole document. `body` is the `body` element.
 pub fn document(language: &str, title: &str, head: &Markup, body: &Markup) -> Markup {
@@ -35,22 +36,57 @@ pub(super) fn forward_page(path: &str) -> Markup {
     })
 }
 
-/// Returns the page for a browser without a session. Its script opens the session that the browser remembers.
-pub(super) fn closed_page() -> Markup {
+/// Returns the page at the link of an invitation. Its button opens the session.
+pub(super) fn welcome_page(token: &str) -> Markup {
+    document(
+        "en",
+        "mocban",
+        &html! {},
+        &html! {
+            body {
+                main {
+                    h1 { "You are invited to judge alignments" }
+                    p { "The link works once, in this browser. You can stop at any time and continue later." }
+                    div lang="vi" {
+                        h1 { "Bạn được mời đánh giá kết quả căn chỉnh" }
+                        p { "Liên kết dùng được một lần, trong trình duyệt này. Bạn có thể dừng bất cứ lúc nào và tiếp tục sau." }
+                    }
+                    form method="post" action={ (START) "?token=" (token) } {
+                        button { "Begin / " span lang="vi" { "Bắt đầu" } }
+                    }
+                }
+            }
+        },
+    )
+}
+
+/// Returns the page for a browser without a session. Its script opens the session that the browser remembers, for an
+/// invitation only that of its place.
+pub(super) fn closed_page(entrance: &Entrance) -> Markup {
+    let [english, vietnamese] = match entrance {
+        Entrance::Command => [
+            "Open the address that the command printed. It works once, in one browser. If it has been used, end the command \
+             with Ctrl-C and run it again to get a new one: nothing is lost.",
+            "Hãy mở địa chỉ mà lệnh đã in ra. Địa chỉ chỉ dùng được một lần, trong một trình duyệt. Nếu địa chỉ đã được sử \
+             dụng, hãy dừng lệnh bằng Ctrl-C rồi chạy lại để nhận địa chỉ mới: không mất gì cả.",
+        ],
+        Entrance::Invitation { .. } => [
+            "Open the link of your invitation. It works once, in one browser. If it has been used, or was withdrawn, ask the \
+             person who invited you for a new one, and open it in this browser. The answers that were sent are stored.",
+            "Hãy mở liên kết trong lời mời. Liên kết chỉ dùng được một lần, trong một trình duyệt. Nếu liên kết đã được sử \
+             dụng hoặc đã bị thu hồi, hãy xin người mời một liên kết mới và mở nó trong trình duyệt này. Các câu trả lời đã \
+             gửi vẫn được lưu.",
+        ],
+    };
+    let place = entrance.place();
     with_script(&html! {
-        body {
+        body data-place=[(!place.is_empty()).then_some(place)] data-guest[matches!(entrance, Entrance::Invitation { .. })] {
             main {
                 h1 { "This page is not open in this browser" }
-                p {
-                    "Open the address that the command printed. It works once, in one browser. If it has been used, end the "
-                    "command with Ctrl-C and run it again to get a new one: nothing is lost."
-                }
+                p { (english) }
                 div lang="vi" {
                     h1 { "Trang này chưa được mở trong trình duyệt này" }
-                    p {
-                        "Hãy mở địa chỉ mà lệnh đã in ra. Địa chỉ chỉ dùng được một lần, trong một trình duyệt. Nếu địa chỉ đã "
-                        "được sử dụng, hãy dừng lệnh bằng Ctrl-C rồi chạy lại để nhận địa chỉ mới: không mất gì cả."
-                    }
+                    p { (vietnamese) }
                 }
             }
         }
@@ -66,11 +102,19 @@ fn with_script(body: &Markup) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use super::{closed_page, forward_page};
+    use super::{Entrance, closed_page, forward_page, welcome_page};
 
     #[test]
     fn pages_without_a_session() {
-        let pages = [forward_page("/s/12ab"), closed_page()];
+        let guest = Entrance::Invitation {
+            place: "0123456789abcdef".to_owned(),
+        };
+        let pages = [
+            forward_page("/s/12ab"),
+            closed_page(&Entrance::Command),
+            closed_page(&guest),
+            welcome_page("34cd"),
+        ];
         let pages = pages.map(|page| page.into_string().replace("><", ">\n<"));
         insta::assert_snapshot!(pages.join("\n\n"));
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use axum::{Extension, Router};
 use tokio::net::TcpListener;
 
-use super::access_control::AccessControl;
+use super::access_control::{AccessControl, Entrance};
 use super::address::listen;
 use super::connection::ConnectionLimits;
 use super::connections::serve;
@@ -47,7 +47,8 @@ impl LocalServer {
         let failed = |source| ServerError::Listen { address, source };
         let listener = listen(address, name).await.map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        let access = AccessControl::new(page, address).map_err(ServerError::Token)?;
+        let access =
+            AccessControl::new(page, address, Entrance::Command).map_err(ServerError::Token)?;
         Ok(Self {
             listener,
             access: Arc::new(access),

@@ -17,7 +17,7 @@ pub(super) const ICON: &str = "/icon.svg";
 /// Start of the paths of all sessions.
 const PATHS: &str = "/s/";
 
-/// Secrets of one start of the server.
+/// Secrets of one session: of a start of the server, or of a guest.
 ///
 /// A request needs both the cookie and the path. Browsers send a cookie to all ports of a host, but send the
 /// path of a page to no other server. The history of the browser has the path, but not the cookie.
@@ -35,10 +35,16 @@ pub(super) struct Session {
 
 impl Session {
     /// Draws new secrets from the operating system. Cookies are named after the page and its port.
-    pub(super) fn new(page: &str, port: u16) -> std::io::Result<Self> {
+    /// The path ends with `place`, if it has any.
+    pub(super) fn new(page: &str, port: u16, place: &str) -> std::io::Result<Self> {
+        let place = if place.is_empty() {
+            String::new()
+        } else {
+            format!("/{place}")
+        };
         Ok(Self {
             token: secret()?,
-            path: format!("{PATHS}{}", secret()?),
+            path: format!("{PATHS}{}{place}", secret()?),
             cookie: secret()?,
             csrf_token: secret()?,
             cookie_name: format!("mocban_{page}_{port}"),
@@ -48,7 +54,7 @@ impl Session {
 
     /// Accepts the one-time token. Returns `false` if the token is wrong or was already used.
     pub(super) fn open(&self, token: &str) -> bool {
-        is_equal(token, &self.token) && !self.is_opened.swap(true, Ordering::SeqCst)
+        self.has_token(token) && !self.is_opened.swap(true, Ordering::SeqCst)
     }
 
     /// Returns the value of the `Set-Cookie` header. The browser sends the cookie only with the path of the session, so
@@ -56,6 +62,21 @@ impl Session {
     pub(super) fn set_cookie(&self) -> String {
         let (name, value, path) = (&self.cookie_name, &self.cookie, &self.path);
         format!("{name}={value}; HttpOnly; SameSite=Strict; Path={path}")
+    }
+
+    /// Returns whether the one-time token has been used.
+    pub(super) fn is_opened(&self) -> bool {
+        self.is_opened.load(Ordering::SeqCst)
+    }
+
+    /// Returns whether a token would open the session now.
+    pub(super) fn is_open_to(&self, token: &str) -> bool {
+        self.has_token(token) && !self.is_opened()
+    }
+
+    /// Returns whether a token is that of this session, used or not.
+    pub(super) fn has_token(&self, token: &str) -> bool {
+        is_equal(token, &self.token)
     }
 
     /// Returns whether a `Cookie` header contains the session cookie.
@@ -97,7 +118,7 @@ mod tests {
     use super::Session;
 
     fn session() -> Session {
-        Session::new("review", 8000).expect("secrets")
+        Session::new("review", 8000, "").expect("secrets")
     }
 
     #[test]

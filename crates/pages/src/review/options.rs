@@ -94,8 +94,9 @@ impl QueueOptions {
 pub struct ReviewOptions {
     /// Whose queue is served, and what it contains.
     pub queue: QueueOptions,
-    /// The command line that names this project, such as `mocban -C blocks`. The last page shows the next commands.
-    pub command: String,
+    /// The command line that names this project, such as `mocban -C blocks`. The last page shows the next commands. `None` if
+    /// the reviewer was invited and uses none.
+    pub command: Option<String>,
     /// Relative address of the pages of the project in the app, if the review is part of it. The last page then links there
     /// instead of showing commands.
     pub project_page: Option<&'static str>,

@@ -19,8 +19,8 @@ pub(super) struct ReviewSummary {
     is_inattentive: bool,
     /// Agreement with every other reviewer who judged the same results.
     others: Vec<ReviewerPair>,
-    /// The command line that names this project, for the next commands.
-    command: String,
+    /// The command line that names this project, for the next commands. `None` if the reviewer was invited.
+    command: Option<String>,
     /// Relative address of the project in the app, if the review is part of it.
     project_page: Option<&'static str>,
     /// The rest of the command with which another person judges the same results.

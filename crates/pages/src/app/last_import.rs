@@ -1,0 +1,120 @@
+//! The undo of the newest import of pairs.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::response::Html;
+use maud::{Markup, html};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::action_body::ActionBody;
+use super::address::encoded;
+use super::components::{action_form, grouped};
+use super::failure::{AppFailure, AppResult};
+use super::sentence::Sentence;
+use super::state::AppState;
+use super::visit::Visit;
+use crate::on_thread::on_thread;
+use mocban_catalog::ImportedPair;
+use mocban_core::domain::UnixMillis;
+use mocban_project::retire::{RetireChoice, retire, undo};
+use mocban_system::time_text::local;
+
+/// Responds with a part of the page of imports. It reads all pairs, so the page loads it afterwards.
+pub(super) async fn part(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let open = state.open(&key).await?;
+    let added = open.catalog.last_import().await?;
+    Ok(Html(undo_part(&visit, &key, &added).into_string()))
+}
+
+fn undo_part(visit: &Visit, key: &str, added: &[ImportedPair]) -> Markup {
+    let counted = added.iter().filter(|pair| pair.jobs > 0).count();
+    let (change, text, button) = if counted > 0 {
+        (
+            "retire",
+            visit.t(
+                "Pairs added by the newest import",
+                "Số cặp được thêm trong lần nhập mới nhất",
+            ),
+            visit.t("Undo this import", "Hoàn tác lần nhập này"),
+        )
+    } else {
+        (
+            "restore",
+            visit.t(
+                "Pairs of the newest import, which are in no count",
+                "Số cặp của lần nhập mới nhất, hiện không được tính",
+            ),
+            visit.t("Bring them back", "Đưa trở lại"),
+        )
+    };
+    let number = if counted > 0 { counted } else { added.len() };
+    html! {
+        @if let Some(first) = added.first() {
+            h2 { (visit.t("Newest import", "Lần nhập mới nhất")) }
+            p { (text) " (" (local(first.imported)) "): " b { (grouped(number as u64)) } ". "
+                span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
+            }
+            // The part stands on the page of imports, so the address is relative to that page.
+            (action_form(
+                &format!("p/{}/actions/last-import", encoded(key)),
+                "inline",
+                &html! {
+                    input type="hidden" name="at" value=(first.imported);
+                    button name="change" value=(change) { (button) }
+                },
+            ))
+        }
+    }
+}
+
+/// What is done to the pairs of the newest import.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum ImportChange {
+    Retire,
+    Restore,
+}
+
+/// The fields of the button.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LastImportBody {
+    /// Time of the import that the page showed.
+    at: String,
+    change: ImportChange,
+}
+
+/// Takes the pairs of the newest import out of every count, or brings them back.
+pub(super) async fn change(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    ActionBody(body): ActionBody<LastImportBody>,
+) -> AppResult<Json<Value>> {
+    let open = state.open(&key).await?;
+    let at: UnixMillis = body
+        .at
+        .parse()
+        .map_err(|_invalid| AppFailure::not_found())?;
+    let newest = open.catalog.last_import().await?;
+    if newest.first().is_none_or(|pair| pair.imported != at) {
+        return Err(AppFailure::refused(Sentence::new(
+            "another import has added pairs meanwhile: reload the page and look at it first",
+            "một lần nhập khác vừa thêm cặp: hãy tải lại trang và xem lần nhập đó trước",
+        )));
+    }
+    let (choice, location) = (RetireChoice::LastImport(Some(at)), open.location());
+    let changed = on_thread(async move || match body.change {
+        ImportChange::Retire => retire(&choice, &location).await,
+        ImportChange::Restore => undo(&choice, &location).await,
+    });
+    let changed = changed.await;
+    changed.map_err(|error| AppFailure::of(error, &open.dir))?;
+    Ok(Json(json!({ "reload": true })))
+}

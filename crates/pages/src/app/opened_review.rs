@@ -1,0 +1,108 @@
+//! The pages of one reviewer, opened with a new reading of the queue.
+
+use std::path::Path;
+
+use super::address::PageQuery;
+use super::failure::{AppFailure, AppResult};
+use super::projects::OpenProject;
+use super::sentence::Sentence;
+use crate::on_thread::on_thread;
+use crate::review::{CheckRates, Language, QueueOptions, ReviewOptions, ReviewPages, key_map};
+use mocban_catalog::CatalogError;
+use mocban_core::domain::ReviewOrder;
+use mocban_project::location::{Location, now};
+use mocban_project::{ProjectResult, Refusal};
+
+/// Shortest time that an image is shown before a verdict is accepted, as in `review`.
+const MIN_VIEW_MS: u64 = 250;
+
+/// Where a reviewer judges: in this app, or as a guest with an invitation.
+#[derive(Debug)]
+pub(super) struct ReviewPlace {
+    pub(super) language: Option<Language>,
+    /// The command line that names the project.
+    pub(super) command: Option<String>,
+    /// Returns the sentence that explains an error of the catalog.
+    pub(super) explain: fn(&CatalogError, &Path) -> String,
+    /// Relative address of the pages of the project.
+    pub(super) project_page: Option<&'static str>,
+}
+
+impl ReviewPlace {
+    /// Returns the place of a guest, whose page has the language of the browser and names no file and no command.
+    pub(super) fn of_guest() -> Self {
+        Self {
+            language: None,
+            command: None,
+            explain: |_error, _dir| {
+                "the project cannot be read now: tell the person who invited you, and keep this page open".to_owned()
+            },
+            project_page: None,
+        }
+    }
+}
+
+/// Opens the pages of a reviewer.
+pub(super) async fn open_review(
+    open: &OpenProject,
+    reviewer: &str,
+    query: &PageQuery,
+    place: ReviewPlace,
+) -> AppResult<axum::Router> {
+    let (location, reviewer) = (open.location(), reviewer.to_owned());
+    let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
+    let query = query.clone();
+    let opened = on_thread(async move || review_pages(&location, place, reviewer, &query).await);
+    let pages = opened
+        .await
+        .map_err(|error| AppFailure::of(error, &open.dir))?;
+    if pages.counts().items == 0 {
+        return Err(AppFailure::refused(if is_settling {
+            Sentence::new(
+                "no two reviewers disagree on a result of this metric",
+                "không có hai người đánh giá nào bất đồng về kết quả của phương pháp này",
+            )
+        } else {
+            Sentence::new(
+                "there is no result to judge yet: press Align on the page Run first",
+                "chưa có kết quả nào để đánh giá: trước hết hãy bấm Căn chỉnh ở trang Căn chỉnh",
+            )
+        }));
+    }
+    Ok(pages.routes())
+}
+
+async fn review_pages(
+    location: &Location,
+    place: ReviewPlace,
+    reviewer: String,
+    query: &PageQuery,
+) -> ProjectResult<ReviewPages> {
+    let settings = location.settings()?;
+    let keys = key_map(&settings.config.review.keys);
+    let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
+    let (project, catalog) = location.open().await?;
+    let rights = catalog.review_rights().await?;
+    rights.require_review(Some(&reviewer))?;
+    let (catalog, _) = catalog.without_faulty_rows().await?;
+    let options = ReviewOptions {
+        command: place.command,
+        project_page: place.project_page,
+        language: place.language,
+        keys,
+        min_view_ms: MIN_VIEW_MS,
+        opens_guide: true,
+        limits: settings.config.limits,
+        explain: place.explain,
+        now,
+        queue: QueueOptions {
+            reviewer,
+            metrics: query.parsed("metric").into_iter().collect(),
+            order: query.parsed("order").unwrap_or(ReviewOrder::Random),
+            seed: QueueOptions::DEFAULT_SEED,
+            sample: query.parsed::<usize>("sample").filter(|sample| *sample > 0),
+            rates: CheckRates::default(),
+        },
+    };
+    Ok(ReviewPages::open(catalog, project, options).await?)
+}
