@@ -14,7 +14,7 @@ use axum::response::{Html, IntoResponse as _, Response};
 
 use super::access_control::AccessControl;
 use super::page_frame::closed_page;
-use super::session::{ICON, SESSION_SCRIPT, START};
+use super::session::{ICON, SESSION_SCRIPT, SESSION_STYLE, START};
 
 /// Maximum size of a request body in bytes. A verdict with a note of ordinary length is far smaller.
 const BODY_LIMIT: usize = 16 * 1024;
@@ -119,7 +119,7 @@ fn check(access: &AccessControl, request: &Request) -> Result<Uri, Rejection> {
     }
     let is_read = matches!(*request.method(), Method::GET | Method::HEAD);
     let path = request.uri().path();
-    if is_read && [START, SESSION_SCRIPT, ICON].contains(&path) {
+    if is_read && [START, SESSION_SCRIPT, SESSION_STYLE, ICON].contains(&path) {
         return Ok(request.uri().clone());
     }
     let is_own = || {

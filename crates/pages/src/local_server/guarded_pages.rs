@@ -13,7 +13,7 @@ use hyper_util::service::TowerToHyperService;
 use super::access_control::AccessControl;
 use super::guard::guard;
 use super::page_frame::{closed_page, forward_page, welcome_page};
-use super::session::{ICON, SESSION_SCRIPT, START};
+use super::session::{ICON, SESSION_SCRIPT, SESSION_STYLE, START};
 
 /// Lifetime of the cookie of a guest in seconds: a reviewer continues on another day, in a browser that was closed.
 const GUEST_COOKIE_S: u32 = 30 * 24 * 60 * 60;
@@ -24,12 +24,15 @@ impl AccessControl {
     pub fn guarded(self: &Arc<Self>, pages: Router) -> Router {
         let script = [(header::CONTENT_TYPE, "text/javascript; charset=utf-8")];
         let text = include_str!("../../../../assets/local-server/session.js");
+        let css = [(header::CONTENT_TYPE, "text/css; charset=utf-8")];
+        let style = include_str!("../../../../assets/local-server/session.css");
         let drawing = [(header::CONTENT_TYPE, "image/svg+xml")];
         let icon = include_str!("../../../../assets/local-server/icon.svg");
         Router::new()
             .route(START, get(start).post(start))
             .with_state(Arc::clone(self))
             .route(SESSION_SCRIPT, get(async move || (script, text)))
+            .route(SESSION_STYLE, get(async move || (css, style)))
             .route(ICON, get(async move || (drawing, icon)))
             .fallback_service(pages)
             .layer(middleware::from_fn_with_state(Arc::clone(self), guard))

@@ -3,7 +3,7 @@
 use maud::{DOCTYPE, Markup, html};
 
 use super::access_control::Entrance;
-use super::session::{ICON, SESSION_SCRIPT, START};
+use super::session::{ICON, SESSION_SCRIPT, SESSION_STYLE, START};
 
 /// Returns a whole document. `body` is the `body` element.
 pub fn document(language: &str, title: &str, head: &Markup, body: &Markup) -> Markup {
@@ -41,7 +41,7 @@ pub(super) fn welcome_page(token: &str) -> Markup {
     document(
         "en",
         "mocban",
-        &html! {},
+        &html! { link rel="stylesheet" href=(SESSION_STYLE); },
         &html! {
             body {
                 main {
@@ -95,6 +95,7 @@ pub(super) fn closed_page(entrance: &Entrance) -> Markup {
 
 fn with_script(body: &Markup) -> Markup {
     let head = html! {
+        link rel="stylesheet" href=(SESSION_STYLE);
         script type="module" src=(SESSION_SCRIPT) {}
     };
     document("en", "mocban", &head, body)

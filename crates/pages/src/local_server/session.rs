@@ -11,6 +11,8 @@ use mocban_core::domain::ContentHash;
 pub(super) const START: &str = "/start";
 /// Path of the script that opens the page of the browser's session. It is no secret.
 pub(super) const SESSION_SCRIPT: &str = "/session.js";
+/// Path of the style of pages without a session. It is no secret.
+pub(super) const SESSION_STYLE: &str = "/session.css";
 /// Path of the icon of all pages. It is no secret.
 pub(super) const ICON: &str = "/icon.svg";
 
