@@ -63,7 +63,8 @@ pub struct Settings {
 
 impl Settings {
     /// Returns what a stage's result depends on besides its inputs: the revision of the stage, the settings of the
-    /// stage, and the method if the stage differs between methods.
+    /// stage, and the method if the stage differs between methods. A fit may register its candidates, so it depends on the
+    /// revisions of the other stages too, but not on their settings.
     ///
     /// # Examples
     /// ```
@@ -78,11 +79,33 @@ impl Settings {
     /// ```
     pub fn fingerprint_fields(&self, stage: Stage) -> serde_json::Value {
         let (revision, settings) = match stage {
-            Stage::Fit => (fit::REVISION, json!(self.fit)),
+            Stage::Fit => {
+                return json!({
+                    "revision": fit::REVISION,
+                    "trials": [depth::REVISION, normalize::REVISION, register::REVISION],
+                    "method": self.pipeline.method,
+                    "settings": self.fit,
+                });
+            }
             Stage::Depth => return json!({"revision": depth::REVISION, "settings": self.depth}),
             Stage::Normalize => (normalize::REVISION, json!(self.normalize)),
             Stage::Register => (register::REVISION, json!(self.register)),
         };
         json!({"revision": revision, "method": self.pipeline.method, "settings": settings})
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::stages::testing::settings;
+    use crate::stages::{depth, normalize, register};
+    use mocban_core::domain::Stage;
+    use serde_json::json;
+
+    #[test]
+    fn a_fit_depends_on_the_revisions_of_the_stages_that_its_trials_run() {
+        let fields = settings().fingerprint_fields(Stage::Fit);
+        let revisions = [depth::REVISION, normalize::REVISION, register::REVISION];
+        assert_eq!(fields["trials"], json!(revisions));
     }
 }

@@ -19,7 +19,7 @@ pub(super) const DEEPEST_CARVING: f64 = 0.2;
 const DEEP_SHARE: f64 = 0.01;
 
 /// A separate piece has at least this fraction of the visible area.
-const PIECE: f64 = 0.12;
+const LEAST_SEEN_PIECE: f64 = 0.12;
 
 /// Heights of a view as points. Coordinates are divided by the view's longest side: u and v are about -0.5..=0.5.
 #[derive(Debug)]
@@ -102,7 +102,7 @@ impl HeightSamples {
             seen.data_mut()[*place] = true;
         }
         let parts = ConnectedComponents::label(&seen).parts_of(&seen);
-        let least = PIECE * self.places.len() as f64;
+        let least = LEAST_SEEN_PIECE * self.places.len() as f64;
         parts
             .iter()
             .filter(|(_, area)| *area as f64 >= least)

@@ -3,11 +3,11 @@
 //! Both sides of the mesh are rendered, and a surface is fitted to the stroke tops of each rendering. Side walls, a
 //! foot or a table below the carved face are left out; if there are any, the outcome has a region. The plane of a
 //! side depends on the mesh only. The choice of the side also depends on the print. `src/lib.rs` explains why the
-//! side is chosen in this stage. If the chosen side does not resemble the print, all sides and parts of the scan are
-//! tried (`wider_search`), and parts of the print (`part_search`). The likeliest of them are registered (`trials`), until one
-//! is sure. The outcome of `wider_search` always has a region,
-//! which is the part of the scan that the depth map shows. The outcome of `part_search` has an outline, which is the
-//! part of the print that shows the character. The paper's own fit is in `paper_method::fit`.
+//! side is chosen in this stage. If the chosen side does not resemble the print, or if the scan shows several pieces,
+//! all sides and parts of the scan are tried (`wider_search`), and parts of the print (`part_search`). The likeliest of
+//! them are registered (`trials`), until one is sure. The outcome of `wider_search` always has a region, which is the
+//! part of the scan that the depth map shows. The outcome of `part_search` has an outline, which is the part of the
+//! print that shows the character. The paper's own fit is in `paper_method::fit`.
 
 mod carved_side;
 mod directions;
@@ -31,9 +31,9 @@ pub use params::{FitError, FitParams};
 pub(super) use pca::{Axes, frame};
 pub use upper_surface::fit;
 
-/// Raised by every change of the code that may change results. A candidate may be registered (`trials`), so a change of
-/// the depth, normalize or register stage may change results too.
-pub const REVISION: u32 = 23;
+/// Raised by every change of the code that may change results. A candidate may be registered (`trials`), so the
+/// fingerprint of this stage holds the revisions of the later stages too.
+pub const REVISION: u32 = 24;
 
 #[cfg(test)]
 mod tests;

@@ -13,7 +13,7 @@ use mocban_core::mesh::Mesh;
 use mocban_core::mesh::robust_bounds::is_in_box;
 
 /// A connected piece counts if its area is at least this fraction of the largest one's.
-const PIECE: f64 = 0.2;
+const LEAST_PIECE: f64 = 0.2;
 /// More pieces than this are strokes or repeated faces, not blocks.
 const MOST_PIECES: usize = 6;
 /// Number of points that show where a piece lies.
@@ -66,14 +66,11 @@ pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<CandidatePart>
         beside: Vec::new(),
     };
     let mut parts: Vec<CandidatePart> = parts.into_iter().map(alone).collect();
-    for (k, piece) in pieces.iter().enumerate() {
-        let others = (0..pieces.len()).filter(|other| *other != k);
-        parts.push(CandidatePart {
-            mesh: piece.clone(),
-            beside: others
-                .flat_map(|other| some_points(&pieces[other]))
-                .collect(),
-        });
+    let points: Vec<Vec<[f64; 3]>> = pieces.iter().map(some_points).collect();
+    for (k, mesh) in pieces.into_iter().enumerate() {
+        let others = points.iter().enumerate().filter(|(other, _)| *other != k);
+        let beside = others.flat_map(|(_, points)| points).copied().collect();
+        parts.push(CandidatePart { mesh, beside });
     }
     parts
 }
@@ -103,14 +100,14 @@ fn pieces(mesh: &Mesh) -> Vec<Mesh> {
         *areas.entry(piece_of(face)).or_default() += (b - a).cross(&(c - a)).norm();
     }
     let largest = areas.values().copied().fold(0.0, f64::max);
-    areas.retain(|_, area| *area >= PIECE * largest);
+    areas.retain(|_, area| *area >= LEAST_PIECE * largest);
     if !(2..=MOST_PIECES).contains(&areas.len()) {
         return Vec::new();
     }
     let mut pieces: Vec<(u32, f64)> = areas.into_iter().collect();
     pieces.sort_by(|a, b| b.1.total_cmp(&a.1));
     let part = |(piece, _): (u32, f64)| {
-        let faces = mesh.triangles.iter().filter(|face| piece_of(face) == piece);
+        let faces = polled(&mesh.triangles).filter(|face| piece_of(face) == piece);
         of_faces(mesh, &faces.copied().collect::<Vec<_>>())
     };
     pieces.into_iter().map(part).collect()

@@ -13,19 +13,22 @@ use crate::stages::register::{self, RegisterParams};
 use crate::stages::scan::Scan;
 use crate::stages::score::SsimWindow;
 use crate::stages::zbuffer::IndexedSurface;
+use mocban_core::domain::cancel::poll;
 use mocban_core::domain::{Affine2, FitOutcome, ScanRegion, ThresholdMetric};
-use mocban_core::raster::PixelBox;
+use mocban_core::raster::{DepthMap, Mask, PixelBox};
 
 /// The trials end at a candidate with at least this confidence.
 const SURE: f64 = 0.8;
-/// A later candidate replaces the first one if its confidence exceeds that of the first by this.
+/// The second candidate replaces the first one if its confidence exceeds that of the first by this.
 const SURER: f64 = 0.1;
+/// Each further candidate must exceed the best one by this more: the best of many chance matches is high.
+const DEMAND: f64 = 0.03;
 /// The box of a candidate is widened to the ink of the print with a margin of this fraction of the ink's longest side.
 const MARGIN: f64 = 0.06;
 /// A box cuts through the ink if the ink reaches beyond it by this fraction of the ink's longest side.
 const CUT: f64 = 0.02;
-/// Factor of the confidence of a candidate whose box cuts through the ink, if the widened candidate does not match.
-const CUT_CONFIDENCE: f64 = 0.4;
+/// The floor and the ceiling of a widened box recede by this fraction of the growth, as the plane may be tilted.
+const TILT: f64 = 0.05;
 
 /// Settings of the trials. They do not depend on the project's settings, so that the result of the fit does not either.
 const DEPTH: DepthParams = DepthParams {
@@ -56,9 +59,9 @@ const REGISTER: RegisterParams = RegisterParams {
 
 /// Candidates that were registered.
 pub(super) struct Trials<'a> {
-    pub(super) scan: &'a Scan,
-    pub(super) print: &'a Print,
-    pub(super) params: &'a FitParams,
+    scan: &'a Scan,
+    print: &'a Print,
+    params: &'a FitParams,
     /// The best candidate so far, and its confidence.
     best: Option<(FitOutcome, f64)>,
     tried: Vec<FitOutcome>,
@@ -68,6 +71,8 @@ pub(super) struct Trials<'a> {
 struct TrialPose {
     confidence: f64,
     plane_from_print: Affine2,
+    /// Fraction of the ink, from 0 to 1, that lies where the depth map of the candidate has data.
+    seen_ink: f64,
     /// Corners of the ink's box, in pixels of the print.
     ink: [[f64; 2]; 4],
 }
@@ -84,7 +89,8 @@ impl<'a> Trials<'a> {
     }
 
     /// Registers a candidate. Keeps it if it is the first one or surer than the best one so far. The box of a piece is not
-    /// widened: nothing of the piece lies beyond it.
+    /// widened: nothing of the piece lies beyond it. A piece that explains a part of the ink only is less sure, so that it
+    /// does not replace the whole of a broken character.
     pub(super) fn add(&mut self, candidate: FitOutcome, is_piece: bool) {
         if self.tried.contains(&candidate) {
             return;
@@ -92,11 +98,13 @@ impl<'a> Trials<'a> {
         self.tried.push(candidate.clone());
         let (candidate, confidence) = if is_piece {
             let pose = self.registered(&candidate);
-            (candidate, pose.map_or(0.0, |pose| pose.confidence))
+            let confidence = pose.map_or(0.0, |pose| pose.confidence * pose.seen_ink);
+            (candidate, confidence)
         } else {
             self.widened(candidate)
         };
-        let is_better = |(_, best): &(FitOutcome, f64)| confidence > best + SURER;
+        let before = self.tried.len() - 1;
+        let is_better = |(_, best): &(FitOutcome, f64)| replaces(confidence, *best, before);
         if self.best.as_ref().is_none_or(is_better) {
             self.best = Some((candidate, confidence));
         }
@@ -116,7 +124,8 @@ impl<'a> Trials<'a> {
         best.map(|(candidate, _)| candidate)
     }
 
-    /// Widens the box of a candidate that cuts through the ink. Returns the candidate with its confidence.
+    /// Widens the box of a candidate that cuts through the ink. Returns the candidate with its confidence. The wider box
+    /// replaces the box that cuts even if it matches worse: the narrow one hides what does not match.
     fn widened(&self, candidate: FitOutcome) -> (FitOutcome, f64) {
         let Some(pose) = self.registered(&candidate) else {
             return (candidate, 0.0);
@@ -131,16 +140,13 @@ impl<'a> Trials<'a> {
             region: Some(region),
             ..candidate.clone()
         };
-        let again = self.fitted_again(&along);
-        let tried = [Some(along), again].into_iter().flatten();
-        let tried = tried.filter_map(|wider| {
-            let confidence = self.registered(&wider)?.confidence;
-            Some((wider, confidence))
-        });
-        let best = tried.reduce(|best, other| if other.1 > best.1 { other } else { best });
-        let cut = CUT_CONFIDENCE * pose.confidence;
-        best.filter(|(_, confidence)| *confidence > cut)
-            .unwrap_or((candidate, cut))
+        let with_confidence = |wider: FitOutcome| {
+            let pose = self.registered(&wider);
+            (wider, pose.map_or(0.0, |pose| pose.confidence))
+        };
+        let again = self.fitted_again(&along).map(with_confidence);
+        let along = with_confidence(along);
+        again.filter(|again| again.1 > along.1).unwrap_or(along)
     }
 
     /// Fits the surface of a candidate once more to all of its box.
@@ -178,10 +184,12 @@ impl<'a> Trials<'a> {
         let relief = metrics.find(|found| found.metric == ThresholdMetric::Relief)?;
         let masks = &normalized.prints[outcome.ink];
         let ink = masks.ink.bounding_box()?;
+        let masks_from_depth = masks.masks_from_print().after(&relief.print_from_depth);
         let print_from_plane = relief.print_from_depth.after(&map.scale.depth_from_plane);
         Some(TrialPose {
             confidence: relief.confidence?,
             plane_from_print: print_from_plane.inverse()?,
+            seen_ink: seen_ink(&masks.ink, &map, &masks_from_depth.inverse()?),
             ink: on_print(ink, &masks.print_from_masks()),
         })
     }
@@ -211,17 +219,42 @@ impl TrialPose {
         let [whole_low, whole_high] = scan.indexed().bounds(&region.box_from_mesh);
         let mut wider = *region;
         let mut is_cut = false;
+        let mut growth: f64 = 0.0;
         for k in 0..2 {
             let [low, high] = [region.bounds[0][k], region.bounds[1][k]];
             let to_low = (ink[0][k] - MARGIN * longest).max(whole_low[k]).min(low);
             let to_high = (ink[1][k] + MARGIN * longest).min(whole_high[k]).max(high);
             let is_in_ink = ink[0][k] < low - CUT * longest || ink[1][k] > high + CUT * longest;
             is_cut |= is_in_ink && (low - to_low).max(to_high - high) > CUT * longest;
+            growth = growth.max(low - to_low).max(to_high - high);
             wider.bounds[0][k] = to_low;
             wider.bounds[1][k] = to_high;
         }
+        wider.bounds[0][2] -= TILT * growth;
+        wider.bounds[1][2] += TILT * growth;
         is_cut.then_some(wider)
     }
+}
+
+/// Returns whether a candidate replaces the best one of the `before` candidates that were registered earlier. One that
+/// matches is preferred to one that does not.
+fn replaces(confidence: f64, best: f64, before: usize) -> bool {
+    let demand = SURER + DEMAND * before.saturating_sub(1) as f64;
+    (best == 0.0 && confidence > 0.0) || confidence > best + demand
+}
+
+/// Returns the fraction of the ink that lies where a depth map has data.
+fn seen_ink(ink: &Mask, map: &DepthMap, depth_from_masks: &Affine2) -> f64 {
+    let mut seen = 0;
+    for y in 0..ink.height() {
+        poll();
+        for x in (0..ink.width()).filter(|x| ink.at(*x, y)) {
+            let [u, v] = depth_from_masks.apply([x as f64, y as f64]);
+            let level = map.levels.get(u.round() as i64, v.round() as i64);
+            seen += usize::from(level.is_some_and(|level| level != 0));
+        }
+    }
+    seen as f64 / ink.count().max(1) as f64
 }
 
 /// Returns the corners of a box of masks in pixels of the print.
@@ -233,7 +266,7 @@ fn on_print(ink: PixelBox, print_from_masks: &Affine2) -> [[f64; 2]; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::Trials;
+    use super::{Trials, replaces};
     use crate::stages::fit::fit;
     use crate::stages::testing::settings;
     use crate::stages::{Print, Scan};
@@ -247,10 +280,14 @@ mod tests {
         (Scan::from(pair.mesh.clone()), Print::from(print))
     }
 
+    fn upright_pair() -> DemoPair {
+        let pairs = PairGenerator::new(Tier::Pose, 7).with_vertices(Some(20_000));
+        pairs.pair(0).expect("a pair")
+    }
+
     #[test]
     fn a_box_that_cuts_through_the_character_is_widened() {
-        let pair = PairGenerator::new(Tier::Pose, 7).with_vertices(Some(20_000));
-        let pair = pair.pair(0).expect("a pair");
+        let pair = upright_pair();
         let (scan, print) = read(&pair);
         let params = settings().fit;
         let whole = fit(&scan, Some(&print), None, &params).expect("a plane");
@@ -272,6 +309,48 @@ mod tests {
         let region = trials.into_best(true).and_then(|found| found.region);
         let [.., to] = region.expect("a box").bounds;
         assert!(to[0] > low[0] + 0.9 * width, "{to:?} {low:?} {width}");
+    }
+
+    #[test]
+    fn a_candidate_that_matches_replaces_one_that_does_not() {
+        assert!(replaces(0.05, 0.0, 5));
+        assert!(!replaces(0.0, 0.0, 1));
+        assert!(replaces(0.5, 0.35, 1));
+        // The best of many draws must be surer.
+        assert!(!replaces(0.5, 0.35, 4));
+    }
+
+    #[test]
+    fn both_parts_of_a_broken_character_that_did_not_slide_are_kept() {
+        let mut pair = upright_pair();
+        let (scan, print) = read(&pair);
+        let params = settings().fit;
+        let whole = fit(&scan, Some(&print), None, &params).expect("a plane");
+        let [low, high] = scan.indexed().bounds(&whole.plane_from_mesh);
+        let middle = f64::midpoint(low[0], high[0]);
+        let is_left = |corner: &u32| {
+            let vertex = pair.mesh.vertices.at(*corner as usize);
+            whole.plane_from_mesh.apply(vertex)[0] < middle
+        };
+        let is_in_part = |face: &&[u32; 3]| {
+            let left = face.iter().filter(|corner| is_left(corner)).count();
+            left == 0 || left == 3
+        };
+        let faces: Vec<[u32; 3]> = pair
+            .mesh
+            .triangles
+            .iter()
+            .filter(is_in_part)
+            .copied()
+            .collect();
+        pair.mesh.triangles = faces.into();
+        let (scan, print) = read(&pair);
+        let found = fit(&scan, Some(&print), None, &params).expect("a plane");
+        let is_inside = |landmark: &[f64; 3]| {
+            let region = found.region.as_ref();
+            region.is_none_or(|region| region.contains(*landmark))
+        };
+        assert!(pair.truth.landmarks.iter().all(is_inside));
     }
 
     #[test]

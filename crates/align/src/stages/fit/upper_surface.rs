@@ -1,6 +1,7 @@
 //! Fits the surface of the stroke tops. Both sides of the mesh are rendered and fitted at a coarse resolution. The
-//! carved side is then fitted again at a finer resolution. If this side does not resemble the print, parts of the print
-//! are tried, and all sides of all parts of the scan; the likeliest are registered (`trials`).
+//! carved side is then fitted again at a finer resolution. If this side does not resemble the print, or if the scan shows
+//! several pieces, parts of the print are tried, and all sides of all parts of the scan; the likeliest are registered
+//! (`trials`).
 
 use super::carved_side::{self, CarvedSide, SideInputs};
 use super::params::{FitError, FitParams};
@@ -77,6 +78,9 @@ pub fn fit(
     {
         let fine = fine.as_ref().filter(|fine| is_carved(fine));
         let found = fitting.by_trials(print, inks, (usual.as_ref(), fine), agreement);
+        if indexed.overlaps_too_often() {
+            return Err(too_often());
+        }
         if let Some(found) = found {
             return Ok(found);
         }
@@ -128,7 +132,8 @@ impl Fitting<'_> {
 
     /// Registers candidates, the likeliest first, until one is sure: the side or part that resembles the print best, both
     /// sides of the whole scan, and the other sides and parts. `usual` is the usual side with its fine fit, if that is
-    /// carved, and `agreement` its agreement with the print. Returns `None` if there is no candidate.
+    /// carved, and `agreement` its agreement with the print. If it resembles the print, so that only separate pieces ask
+    /// for trials, it is registered first. Returns `None` if there is no candidate.
     fn by_trials(
         &self,
         print: &Print,
@@ -138,15 +143,24 @@ impl Fitting<'_> {
     ) -> Option<FitOutcome> {
         let (scan, params) = (self.scan, self.params);
         let (mesh, indexed) = (scan.mesh(), scan.indexed());
+        let (chosen, fine) = usual;
+        let of_usual = || Some(self.of_whole(fine?, chosen?.evidence));
+        let mut trials = Trials::new(scan, print, params);
+        if agreement >= LEAST {
+            if let Some(usual) = of_usual() {
+                trials.add(usual, false);
+            }
+            if trials.is_sure() {
+                return trials.into_best(true);
+            }
+        }
         let parts = part_search::search(indexed, &self.start, print, params);
         let parts = parts.filter(|found| found.agreement > agreement * BETTER);
         let wider = wider_search::search(mesh, indexed, inks, params);
         let best = [wider.best(agreement), parts].into_iter().flatten();
         let mut best: Vec<FoundSide> = best.collect();
         best.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
-        let (chosen, fine) = usual;
         let has_first = !best.is_empty() || fine.is_some();
-        let of_usual = || Some(self.of_whole(fine?, chosen?.evidence));
         let of_other = || {
             let chosen = chosen?;
             let plane = &chosen.other.as_ref()?.plane_from_mesh;
@@ -161,7 +175,6 @@ impl Fitting<'_> {
             .map(of_part)
             .chain(of_whole.flatten().map(|whole| (whole, false)))
             .chain(wider.distinct().map(of_part));
-        let mut trials = Trials::new(scan, print, params);
         for (candidate, is_piece) in candidates {
             trials.add(candidate, is_piece);
             if trials.is_sure() {

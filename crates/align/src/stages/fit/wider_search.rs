@@ -19,7 +19,7 @@ use super::scan_parts::{CandidatePart, parts, some_points, without_spikes};
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
 use crate::stages::scan::part_of;
 use crate::stages::zbuffer::IndexedSurface;
-use mocban_core::domain::cancel::polled;
+use mocban_core::domain::cancel::{poll, polled};
 use mocban_core::domain::{PrintOutline, Rigid3, ScanRegion, SideEvidence};
 use mocban_core::mesh::Mesh;
 
@@ -48,8 +48,9 @@ const LEAST_TRIED: f64 = 0.25;
 /// Two sides are alike if their normals differ by less than this angle, in radians, and their boxes by less than this
 /// fraction of their size.
 const LIKE: f64 = 0.2;
-/// The box of a piece is wider than some of its points by this fraction of its size.
-const SLACK: f64 = 0.005;
+/// A box is wider than its points by this fraction of their extent, so that corners on the boundary stay inside despite
+/// rounding.
+const SLACK: f64 = 1e-4;
 /// Number of angles, from 0 to a right angle, that are tried to find the edges of a grid.
 const ANGLES: i32 = 30;
 
@@ -193,16 +194,16 @@ impl JudgedSide {
         let old = self.region.box_from_mesh;
         let row = |k: usize| Vector3::new(old.0[k][0], old.0[k][1], old.0[k][2]);
         let origin = Vector3::from(old.inverse().apply([0.0; 3]));
-        let slack = SLACK * self.size();
         let turned = (0..ANGLES).map(|step| {
+            poll();
             let angle = FRAC_PI_2 * f64::from(step) / f64::from(ANGLES);
             let along = row(0) * angle.cos() + row(1) * angle.sin();
             let box_from_mesh = frame_along(row(2), along, origin);
             let mut bounds = self.region.bounds;
             for k in 0..2 {
                 let at = || points.iter().map(|point| box_from_mesh.apply(*point)[k]);
-                bounds[0][k] = at().fold(f64::INFINITY, f64::min) - slack;
-                bounds[1][k] = at().fold(f64::NEG_INFINITY, f64::max) + slack;
+                bounds[0][k] = at().fold(f64::INFINITY, f64::min);
+                bounds[1][k] = at().fold(f64::NEG_INFINITY, f64::max);
             }
             let region = ScanRegion {
                 box_from_mesh,
@@ -213,6 +214,12 @@ impl JudgedSide {
         });
         if let Some((_, region)) = turned.min_by_key(|(inside, _)| *inside) {
             self.region = region;
+            let slack = SLACK * self.size();
+            let [low, high] = bounds(piece, &region.box_from_mesh);
+            for k in 0..2 {
+                self.region.bounds[0][k] = low[k] - slack;
+                self.region.bounds[1][k] = high[k] + slack;
+            }
         }
         self.is_piece = true;
     }
@@ -252,12 +259,17 @@ pub(super) fn evidence(
     agreement: f64,
     rival: f64,
 ) -> SideEvidence {
-    let odds = AGREEMENT * (agreement / rival.max(LEAST_RIVAL)).ln();
     SideEvidence {
         winding: indexed.upward_facing_share(&side.plane_from_mesh),
         flatness: side.surface.tops,
-        confidence: (odds / 2.0).tanh(),
+        confidence: confidence(agreement, rival),
     }
+}
+
+/// Returns the confidence in a side, 0 if its rival agrees better with the print.
+fn confidence(agreement: f64, rival: f64) -> f64 {
+    let odds = AGREEMENT * (agreement / rival.max(LEAST_RIVAL)).ln();
+    (odds / 2.0).tanh().max(0.0)
 }
 
 /// What all sides are compared with.
@@ -408,8 +420,7 @@ pub(super) fn region(
     let normal = row(&side.plane_from_mesh, 2);
     let box_from_mesh = frame_along(normal, row(along, 0), Vector3::from(origin));
     let [low, high] = indexed.bounds(&box_from_mesh);
-    // Keeps corners of faces on the boundary inside despite rounding.
-    let slack = 1e-4 * side.extent;
+    let slack = SLACK * side.extent;
     // A table that was cut off lies below the lowest corner.
     let heights = mesh
         .vertices
@@ -423,5 +434,16 @@ pub(super) fn region(
             [low[0] - slack, low[1] - slack, down],
             [high[0] + slack, high[1] + slack, top(side)],
         ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::confidence;
+
+    #[test]
+    fn a_side_with_a_better_rival_has_no_confidence() {
+        assert_eq!(confidence(0.3, 0.6), 0.0);
+        assert!(confidence(0.6, 0.3) > 0.9);
     }
 }

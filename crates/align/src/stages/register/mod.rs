@@ -39,7 +39,7 @@ use mocban_core::raster::{DepthMap, Mask};
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 25;
+pub const REVISION: u32 = 26;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.

@@ -89,16 +89,22 @@ pub(super) struct PoseSearch {
 }
 
 impl PoseSearch {
-    /// Returns the poses of a search without plateaus if they score higher, together with the best pose of this search.
+    /// Returns the poses of a search without plateaus if the best of them scores higher. Those of this search on the same
+    /// interpretation of the print remain as competitors: the poses of both searches alternate.
     fn or_surer(self, narrow: Self) -> Self {
         if narrow.score() <= self.score() {
             return self;
         }
-        let mut poses = narrow.poses;
-        if narrow.ink == self.ink {
-            poses.truncate(1);
-            poses.extend(self.poses);
+        let mut poses = Vec::new();
+        let mut others = self.poses.into_iter();
+        if narrow.ink != self.ink {
+            others = Vec::new().into_iter();
         }
+        for pose in narrow.poses {
+            poses.push(pose);
+            poses.extend(others.next());
+        }
+        poses.extend(others);
         let mirrored = narrow.mirrored.into_iter().chain(self.mirrored);
         Self {
             poses,
@@ -155,10 +161,22 @@ pub(super) fn search(
     let Some(narrow) = wood.without_plateaus(PLATEAU_PX, LEAST_PLATEAU) else {
         return found;
     };
-    match (found, on_inks(&narrow)) {
+    combined(found, on_inks(&narrow))
+}
+
+/// Combines a search with one without plateaus. A pair that only the latter matches needs a score of [`WEAK`].
+///
+/// # Errors
+/// Returns the error of the first search, or that of the second one if this finds the pair mirrored.
+fn combined(
+    found: Result<PoseSearch, RegisterError>,
+    narrow: Result<PoseSearch, RegisterError>,
+) -> Result<PoseSearch, RegisterError> {
+    match (found, narrow) {
         (Ok(found), Ok(narrow)) => Ok(found.or_surer(narrow)),
-        (Err(_), Ok(narrow)) => Ok(narrow),
-        (found, Err(_)) => found,
+        (Err(_), Ok(narrow)) if narrow.score() >= WEAK => Ok(narrow),
+        (_, Err(error @ RegisterError::Mirrored { .. })) => Err(error),
+        (found, _) => found,
     }
 }
 
@@ -375,4 +393,58 @@ fn require_upright(found: &[PoseCandidate]) -> Result<(), RegisterError> {
         });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PoseSearch, combined};
+    use crate::stages::pose::PoseCandidate;
+    use crate::stages::register::RegisterError;
+    use mocban_core::domain::Affine2;
+
+    fn with_scores(scores: &[f64]) -> PoseSearch {
+        let pose = |score: &f64| PoseCandidate {
+            fixed_from_moving: Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+            score: *score,
+            mirrored: false,
+        };
+        PoseSearch {
+            ink: 0,
+            poses: scores.iter().map(pose).collect(),
+            mirrored: None,
+            at_bound: false,
+            prior: 0.0,
+            expected: None,
+        }
+    }
+
+    const NOTHING: RegisterError = RegisterError::NoCorrelation {
+        best: 0.1,
+        needs: 0.12,
+    };
+    const MIRRORED: RegisterError = RegisterError::Mirrored { times: 2.0 };
+
+    #[test]
+    fn the_competitors_of_both_searches_remain() {
+        let both = combined(
+            Ok(with_scores(&[0.4, 0.2])),
+            Ok(with_scores(&[0.6, 0.5, 0.1])),
+        );
+        let scores: Vec<f64> = both
+            .iter()
+            .flat_map(|both| &both.poses)
+            .map(|pose| pose.score)
+            .collect();
+        assert_eq!(scores, [0.6, 0.4, 0.5, 0.2, 0.1]);
+    }
+
+    #[test]
+    fn a_pose_without_plateaus_alone_must_match_well_and_not_mirrored() {
+        let [weak, good] = [0.3, 0.6].map(|score| with_scores(&[score, 0.1]));
+        assert_eq!(combined(Err(NOTHING), Ok(weak)).err(), Some(NOTHING));
+        assert!(combined(Err(NOTHING), Ok(good)).is_ok());
+        let found = with_scores(&[0.3]);
+        assert_eq!(combined(Ok(found), Err(MIRRORED)).err(), Some(MIRRORED));
+        assert!(combined(Ok(with_scores(&[0.3])), Err(NOTHING)).is_ok());
+    }
 }
