@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::background::{self, NARROW};
 use super::polarity::background_darkness;
+use mocban_core::domain::cancel::poll;
 use mocban_core::raster::otsu;
 use mocban_core::raster::{Grid, Mask, PrintImage};
 
@@ -103,12 +104,20 @@ fn colour(rgb: [u16; 3]) -> Vector3<f64> {
     Vector3::from(rgb.map(|c| (f64::from(c) / 65_535.0 + DARK).ln()))
 }
 
-/// Returns values of known pixels of a grid, about [`SAMPLES`] at equal distances.
+/// Returns values of known pixels of a grid, at most about [`SAMPLES`], at equal distances in both directions.
 fn sampled<T: Copy, U>(grid: &Grid<T>, known: &Mask, value: impl Fn(T) -> U) -> Vec<U> {
-    let step = (known.count() / SAMPLES).max(1);
-    let pixels = grid.data().iter().zip(known.data());
-    let held = pixels.filter(|(_, known)| **known).step_by(step);
-    held.map(|(pixel, _)| value(*pixel)).collect()
+    let step = (known.count().div_ceil(SAMPLES) as f64)
+        .sqrt()
+        .ceil()
+        .max(1.0) as usize;
+    let mut values = Vec::new();
+    for y in (step / 2..grid.height()).step_by(step) {
+        poll();
+        let pixels = grid.row(y).iter().zip(known.row(y)).skip(step / 2);
+        let held = pixels.step_by(step).filter(|(_, known)| **known);
+        values.extend(held.map(|(pixel, _)| value(*pixel)));
+    }
+    values
 }
 
 fn samples(picture: &PrintImage, known: &Mask) -> Vec<Vector3<f64>> {
@@ -203,7 +212,7 @@ fn discriminant(samples: &[Vector3<f64>], start: Vector3<f64>) -> Option<(Vector
 
 #[cfg(test)]
 mod tests {
-    use super::contrast;
+    use super::{contrast, sampled};
     use mocban_core::raster::{Grid, Mask, PrintImage};
 
     const SIDE: usize = 120;
@@ -248,6 +257,19 @@ mod tests {
         let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
         let wrong = pixels.filter(wrong).count();
         assert!(wrong < 150, "{wrong}");
+    }
+
+    #[test]
+    fn samples_spread_over_a_print_of_any_width() {
+        let grid = Grid::from_fn(500, 500, |x, y| (x, y));
+        let found = sampled(&grid, &Mask::new(500, 500, true), |at| at);
+        let distinct = |of: &dyn Fn(&(usize, usize)) -> usize| {
+            let places: std::collections::BTreeSet<usize> = found.iter().map(of).collect();
+            places.len()
+        };
+        let (columns, rows) = (distinct(&|at| at.0), distinct(&|at| at.1));
+        assert!(columns >= 45 && rows >= 45, "{columns} x {rows}");
+        assert!(found.len() <= 2_500, "{}", found.len());
     }
 
     #[test]

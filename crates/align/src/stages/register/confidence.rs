@@ -1,5 +1,5 @@
 //! Confidence of an alignment: the product of three logistic models, for the pose, for the mask, and for whether print
-//! and relief show the same character.
+//! and relief show the same character, and of the factor of [`Doubts`].
 //!
 //! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs: matching pairs of the
 //! chosen tiers (`--tiers all` for every tier), meshes paired with the print of another or a similar character,
@@ -8,6 +8,7 @@
 //! describes. `MASK` was set manually, because few masks are wrong. It lowers the confidence if the pose is a few
 //! percent off. On generated pairs, the mean confidence is slightly below the fraction that is right.
 
+use super::doubts::Doubts;
 use mocban_core::domain::{MetricOutcome, PoseFeatures};
 
 /// Number of inputs of the pose model: the constant 1, and the logarithms of the first five pose features.
@@ -39,21 +40,16 @@ const ROUGHEST: f64 = 0.12;
 const LEAST_INK: f64 = 2.0;
 /// `spread_input` divides the spread by this fraction of the depth map's longest side. Smaller spreads are invisible.
 const UNSEEN_SPREAD: f64 = 0.002;
-/// Displacement of whole edges at which it is as probable that print and relief come from two blocks as from one, and its
-/// deviation, both as fractions of the stroke width.
-const OTHER_BLOCK: f64 = 0.115;
-const OTHER_BLOCK_DEVIATION: f64 = 0.006;
 /// Range to which the probability that a mask is right is clamped.
 const PROBABILITY: [f64; 2] = [0.02, 0.995];
-/// Fraction of the ink that must lie where the depth map has data.
-const LEAST_SEEN: f64 = 0.5;
 /// Lower bound of fractions before their logarithm is taken.
 const FLOOR: f64 = 0.02;
 /// Range to which the competitors' scores are clamped, as fractions of the best score.
 const RATIO: [f64; 2] = [0.2, 1.5];
 
-/// Inputs of the three logistic models. The confidence of an alignment is the product of their probabilities. The block of a
-/// pair adds to that of the pose only: it knows where a character is, and not whether wood and print show the same one.
+/// Inputs of the confidence of an alignment: the product of the probabilities of three logistic models and of the factor of
+/// its doubts. The block of a pair adds to the probability of the pose only: it knows where a character is, and not whether
+/// wood and print show the same one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConfidenceInputs {
     /// Inputs of the model for the probability that the pose is right. A pose is right if its rotation is off by at
@@ -66,6 +62,8 @@ pub struct ConfidenceInputs {
     pub character: [f64; CHARACTER_INPUTS],
     /// Logarithm of the odds of the pose that the block gives, 0 for a pair that was not cut from one.
     pub prior: f64,
+    /// What lowers the confidence further.
+    pub doubts: Doubts,
 }
 
 impl ConfidenceInputs {
@@ -74,6 +72,7 @@ impl ConfidenceInputs {
         pose_probability(&self.pose, self.prior)
             * logistic(&MASK, &self.mask)
             * logistic(&CHARACTER, &self.character)
+            * self.doubts.factor()
     }
 }
 
@@ -129,13 +128,6 @@ fn pose_inputs(features: &PoseFeatures) -> [f64; POSE_INPUTS] {
 /// Returns the probability, 0..=1, that print and relief show the same character.
 pub(super) fn of_character(features: &PoseFeatures) -> f64 {
     logistic(&CHARACTER, &character_inputs(features))
-}
-
-/// Returns the probability, 0..=1, that print and relief come from the same block and not from another one with the same or
-/// a similar character. `smooth_misfit` is the displacement of whole edges, as a fraction of the stroke width. It is 0.03 to
-/// 0.1 on right pairs, 0.11 if much wood is lost, and 0.1 to 0.17 on prints of another hand.
-pub(super) fn of_same_block(smooth_misfit: f64) -> f64 {
-    1.0 / (1.0 + ((smooth_misfit - OTHER_BLOCK) / OTHER_BLOCK_DEVIATION).exp())
 }
 
 /// Returns the inputs of the character model. With `size(area) = ln(1 + area / SMALL_AREA)`, they are 1, the size of
@@ -209,6 +201,7 @@ pub(super) fn set_confidence(
     metrics: &mut [MetricOutcome],
     [features, rendered]: [&PoseFeatures; 2],
     prior: f64,
+    doubts: Doubts,
     probabilities: impl Iterator<Item = f64>,
 ) -> Vec<ConfidenceInputs> {
     let pose = pose_inputs(less_likely(of_pair_alone, [rendered, features]));
@@ -219,6 +212,7 @@ pub(super) fn set_confidence(
             mask: mask_inputs(features, probability),
             character,
             prior,
+            doubts,
         };
         outcome.confidence = Some(inputs.confidence());
         inputs
@@ -230,23 +224,24 @@ pub(super) fn set_confidence(
         .collect()
 }
 
-/// Returns the factor of the confidence if only the fraction `seen_ink` of the ink lies where the depth map has data: the
-/// strokes of a small part of the print fit many reliefs.
-pub(super) fn of_seen_ink(seen_ink: f64) -> f64 {
-    (seen_ink / LEAST_SEEN).clamp(0.0, 1.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::{
         ConfidenceInputs, MASK, character_inputs, less_likely, logistic, mask_inputs, of_character,
-        of_pair_alone, of_pose, of_same_block, of_seen_ink, pose_inputs, prior_of,
+        of_pair_alone, of_pose, pose_inputs, prior_of,
     };
+    use crate::stages::register::Doubts;
     use mocban_core::domain::PoseFeatures;
 
     fn of_mask(features: &PoseFeatures, probability_right: f64) -> f64 {
         logistic(&MASK, &mask_inputs(features, probability_right))
     }
+
+    const NO_DOUBTS: Doubts = Doubts {
+        share: 1.0,
+        smooth_misfit: 0.0,
+        seen_ink: 1.0,
+    };
 
     const PLAIN: PoseFeatures = PoseFeatures {
         correlation: 0.88,
@@ -304,8 +299,34 @@ mod tests {
     }
 
     #[test]
-    fn little_ink_on_the_scan_lowers_the_confidence() {
-        assert_eq!([0.25, 0.5, 0.9].map(of_seen_ink), [0.5, 1.0, 1.0]);
+    fn doubts_lower_the_confidence_of_the_inputs() {
+        let inputs = |doubts| ConfidenceInputs {
+            pose: pose_inputs(&PLAIN),
+            mask: mask_inputs(&PLAIN, 0.9),
+            character: character_inputs(&PLAIN),
+            prior: 0.0,
+            doubts,
+        };
+        let without = inputs(NO_DOUBTS).confidence();
+        let with = |doubts| inputs(doubts).confidence() / without;
+        let of_part = with(Doubts {
+            share: 0.6,
+            ..NO_DOUBTS
+        });
+        assert!((of_part - 0.6).abs() < 1e-9, "{of_part}");
+        let smooth_misfit = 0.14;
+        assert!(
+            with(Doubts {
+                smooth_misfit,
+                ..NO_DOUBTS
+            }) < 0.05
+        );
+        assert!(
+            with(Doubts {
+                seen_ink: 0.25,
+                ..NO_DOUBTS
+            }) < 0.51
+        );
     }
 
     #[test]
@@ -323,6 +344,7 @@ mod tests {
             mask: mask_inputs(&other_character, 0.9),
             character: character_inputs(&other_character),
             prior,
+            doubts: NO_DOUBTS,
         };
         assert!(inputs(prior_of(1.0)).confidence() < of_character(&other_character));
         assert!(of_character(&other_character) < 0.3);
@@ -393,12 +415,6 @@ mod tests {
             ..strokes
         };
         assert!(of_character(&close) < 0.3 * of_character(&strokes));
-    }
-
-    #[test]
-    fn edges_that_are_displaced_as_a_whole_are_evidence_against_the_block() {
-        assert!(of_same_block(0.07) > 0.99 && of_same_block(0.1) > 0.9);
-        assert!(of_same_block(0.14) < 0.05);
     }
 
     #[test]

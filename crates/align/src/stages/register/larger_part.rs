@@ -6,6 +6,8 @@
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{ImagePyramid, Loss, PoseCandidate, PyramidLevel, Refiner, SoftMask};
 use mocban_core::domain::Affine2;
+use mocban_core::domain::cancel::poll;
+use std::collections::HashMap;
 
 /// Working size of print and relief, pixels, and the smoothing there.
 const PX: usize = 60;
@@ -82,8 +84,8 @@ struct PosedSide {
     share: f64,
 }
 
-/// Finds the larger part of a print that shows a displaced part. `poses` are poses on the whole print, best first. Returns `None` if one pose fits the whole print about as
-/// well.
+/// Finds the larger part of a print that shows a displaced part. `poses` are poses on the whole print, best first. Returns
+/// `None` if one pose fits the whole print about as well, or if the line cuts off no print or most of it.
 pub(super) fn find(
     depths: &SoftMask,
     print: &PrintMasks,
@@ -123,7 +125,8 @@ pub(super) fn find(
     let pose = Refiner::new(&kept, &moving).refine(&larger.pose, STEPS, Loss::Tukey);
     let masks = within(print, &side);
     let share = masks.ink.count() as f64 / print.ink.count().max(1) as f64;
-    Some(LargerPart { masks, pose, share })
+    let is_cut = masks.known.count() < print.known.count();
+    (is_cut && share >= LARGER[0]).then_some(LargerPart { masks, pose, share })
 }
 
 /// Returns the masks of a print, unknown beyond a line.
@@ -151,6 +154,7 @@ fn posed_sides(
     let all: f64 = ink.iter().map(|(_, amount)| amount).sum();
     let mut sides = Vec::new();
     for k in 0..DIRECTIONS {
+        poll();
         let (sin, cos) = (k as f64 * std::f64::consts::TAU / DIRECTIONS as f64).sin_cos();
         let along = |[x, y]: [f64; 2]| cos * x + sin * y;
         let mut sorted: Vec<(f64, f64)> = ink.iter().map(|(at, ink)| (along(*at), *ink)).collect();
@@ -205,6 +209,7 @@ fn displaced(
     let mut tried: Vec<(f64, PoseCandidate)> = shifts
         .filter(|[x, y]| x.hypot(*y) <= FARTHEST * longest)
         .map(|shift| {
+            poll();
             let pose = shifted(shift);
             (refiner.evaluate(&pose).score, pose)
         })
@@ -215,13 +220,14 @@ fn displaced(
         (refiner.local_score(&pose), pose)
     });
     let (score, pose) = refined.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let in_place = refiner.local_score(&larger.pose);
+    let in_place = refiner.refine(&larger.pose, STEPS, Loss::Huber);
+    let in_place = refiner.local_score(&in_place);
     let is_rigid = pose.rotation_to(&larger.pose) < LARGEST_TURN_DEG
         && (pose.fixed_from_moving.scale() / larger.pose.fixed_from_moving.scale())
             .ln()
             .abs()
             < LARGEST_RATIO;
-    let middle = moving_middle(&larger.pose, fixed)?;
+    let middle = moving_middle(&larger.pose, &part)?;
     let [a, b] = [&pose, &larger.pose].map(|pose| pose.fixed_from_moving.apply(middle));
     let moved = (a[0] - b[0]).hypot(a[1] - b[1]) / longest;
     let is_better = score - in_place >= LEAST_GAIN_OF_SMALLER * (1.0 - in_place);
@@ -233,10 +239,10 @@ fn displaced(
     })
 }
 
-/// Returns the point of the depth map that lies at the middle of the print's ink.
-fn moving_middle(pose: &PoseCandidate, fixed: &PyramidLevel) -> Option<[f64; 2]> {
+/// Returns the point of the depth map that lies at the middle of the ink of a part of the print.
+fn moving_middle(pose: &PoseCandidate, part: &PyramidLevel) -> Option<[f64; 2]> {
     let (mut sum, mut all) = ([0.0; 2], 0.0);
-    fixed.each_amount(|point, amount| {
+    part.each_amount(|point, amount| {
         let amount = f64::from(amount);
         sum = [0, 1].map(|k| sum[k] + amount * point[k]);
         all += amount;
@@ -246,7 +252,7 @@ fn moving_middle(pose: &PoseCandidate, fixed: &PyramidLevel) -> Option<[f64; 2]>
 }
 
 /// Returns the side of the line on which `larger` predicts the ink, while `smaller` predicts it beyond the line, with the
-/// least squares of the differences.
+/// least squares of the differences. Only pixels count where the depth map has data in both poses.
 fn best_line(
     whole: &Refiner,
     fixed: &PyramidLevel,
@@ -256,23 +262,23 @@ fn best_line(
     let mut points = Vec::new();
     fixed.each_amount(|point, _| points.push(point))?;
     let squares = |pose: &PoseCandidate| {
-        let mut found = Vec::new();
+        let mut found = HashMap::new();
         whole.each_difference(pose, |point, difference| {
-            found.push((point, f64::from(difference).powi(2)));
+            found.insert(point.map(f64::to_bits), f64::from(difference).powi(2));
         })?;
         Some(found)
     };
-    let gains: Vec<([f64; 2], f64)> = squares(smaller)?
-        .into_iter()
-        .map(|(point, square)| (point, square))
-        .chain(
-            squares(larger)?
-                .into_iter()
-                .map(|(point, square)| (point, -square)),
-        )
+    let (of_smaller, of_larger) = (squares(smaller)?, squares(larger)?);
+    let gains: Vec<([f64; 2], f64)> = points
+        .iter()
+        .filter_map(|point| {
+            let key = point.map(f64::to_bits);
+            Some((*point, of_smaller.get(&key)? - of_larger.get(&key)?))
+        })
         .collect();
     let mut best: Option<(f64, Side)> = None;
     for k in 0..FINE_DIRECTIONS {
+        poll();
         let (sin, cos) = (k as f64 * std::f64::consts::TAU / FINE_DIRECTIONS as f64).sin_cos();
         let along = |[x, y]: [f64; 2]| cos * x + sin * y;
         let range = points

@@ -7,6 +7,7 @@
 
 mod anisotropic_scale;
 mod confidence;
+mod doubts;
 mod half_canvas;
 mod ink_edge;
 mod larger_part;
@@ -25,6 +26,7 @@ mod tops_edge;
 mod unmatched;
 
 pub use confidence::ConfidenceInputs;
+pub use doubts::Doubts;
 pub use observation::Observation;
 pub use params::{ExpectedPose, RegisterError, RegisterParams};
 pub use scoring::Registered;
@@ -120,7 +122,13 @@ pub fn register(
     };
     let mut of_part = None;
     if let Some(part) = &part
-        && let Ok(found) = pose_search::search_part(&depths, &search, part, params)
+        && let Ok(found) = pose_search::search_part(
+            &depths,
+            &normalized.prints[search.ink],
+            &search,
+            part,
+            params,
+        )
     {
         let masks = normalized.with_masks(search.ink, part.masks.clone());
         let posed = Posed::new(depth, &depths, &relief, &masks, &found, params);
@@ -175,29 +183,25 @@ pub fn register(
         stroke_map,
         params.window,
     )?;
-    let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);
-    let metrics = &mut registered.outcome.metrics;
-    registered.confidence_inputs = confidence::set_confidence(
-        metrics,
-        [features, &single.features],
-        search.prior,
-        probabilities,
-    );
     // The other part of a torn print is no evidence. Heights of a levelling are chosen from the ink, so the worse of both
     // tells whether the block is another one.
     let of_part = of_part
         .as_ref()
         .map(|(masks, _)| canvas_print(masks, search.ink));
     let print = of_part.as_ref().unwrap_or(&registered.canvas_print);
-    let seen = seen_ink(print, &posed.canvas.ink);
-    let misfit = posed.smooth_misfit.max(single.smooth_misfit);
-    let certainty = share * confidence::of_same_block(misfit) * confidence::of_seen_ink(seen);
-    for confidence in metrics
-        .iter_mut()
-        .filter_map(|metric| metric.confidence.as_mut())
-    {
-        *confidence *= certainty;
-    }
+    let doubts = Doubts {
+        share,
+        smooth_misfit: posed.smooth_misfit.max(single.smooth_misfit),
+        seen_ink: seen_ink(print, &posed.canvas.ink),
+    };
+    let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);
+    registered.confidence_inputs = confidence::set_confidence(
+        &mut registered.outcome.metrics,
+        [features, &single.features],
+        search.prior,
+        doubts,
+        probabilities,
+    );
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
     Ok(registered)

@@ -60,7 +60,7 @@ const UNEXPECTED_WINS: f64 = 1.5;
 const CONVINCING: f64 = 0.45;
 /// The expected pose holds if its score is at least this part of the best one near it.
 const HOLDS: f64 = 0.85;
-/// Scales along the columns of the print relative to those along its rows that are tried, if no pose fits well: a picture
+/// Scales along the rows of the print relative to those along its columns that are tried, if no pose fits well: a picture
 /// may have been scaled unequally.
 const ASPECTS: [f64; 4] = [1.16, 1.32, 1.0 / 1.16, 1.0 / 1.32];
 /// A pose fits well if its score is at least this.
@@ -113,6 +113,28 @@ impl PoseSearch {
         }
     }
 
+    /// Replaces the poses by better ones with unequal scales, see [`stretch`].
+    fn stretch(
+        &mut self,
+        print: &PrintMasks,
+        wood: &ImagePyramid,
+        wood_px: WoodPx,
+        params: &RegisterParams,
+    ) {
+        let Some(print_base) = ImagePyramid::new(&print.soft_ink(), BASE_PX) else {
+            return;
+        };
+        let mut found: Vec<PoseCandidate> =
+            self.poses.iter().copied().chain(self.mirrored).collect();
+        stretch(&mut found, &print_base, wood, wood_px.middle);
+        (self.mirrored, self.poses) = (
+            found.iter().copied().find(|pose| pose.mirrored),
+            found.into_iter().filter(|pose| !pose.mirrored).collect(),
+        );
+        let print_px = longest(print.known.bounding_box());
+        self.at_bound = is_at_bound(self.poses.first(), wood_px.longest / print_px, params);
+    }
+
     fn score(&self) -> f64 {
         self.poses.first().map_or(0.0, |pose| pose.score)
     }
@@ -147,7 +169,12 @@ pub(super) fn search(
             (Err(_), Ok(_)) => other,
             _ => best,
         });
-        best.unwrap_or(Err(RegisterError::NoPose))
+        let mut found = best.unwrap_or(Err(RegisterError::NoPose))?;
+        // A block shows how a picture was scaled.
+        if params.anisotropic_scale && expected.is_none() && found.score() < FITS_WELL {
+            found.stretch(&prints[found.ink], wood, wood_px, params);
+        }
+        Ok(found)
     };
     let found = on_inks(&wood);
     let is_weak = match &found {
@@ -181,21 +208,34 @@ fn combined(
 }
 
 /// Searches for poses on the larger part of a torn print, the pose that was found with it first. `whole` are the poses on
-/// the whole print.
+/// the whole print, `print`.
 ///
 /// # Errors
 /// Returns an error like [`search`].
 pub(super) fn search_part(
     depths: &SoftMask,
+    print: &PrintMasks,
     whole: &PoseSearch,
     part: &LargerPart,
     params: &RegisterParams,
 ) -> Result<PoseSearch, RegisterError> {
     let mut found = search(depths, std::slice::from_ref(&part.masks), None, params)?;
     found.poses.insert(0, part.pose);
+    let [of_wood, of_print] =
+        [&depths.known, &print.known].map(|known| longest(known.bounding_box()));
     Ok(PoseSearch {
         ink: whole.ink,
+        at_bound: is_at_bound(Some(&part.pose), of_wood / of_print, params),
         ..found
+    })
+}
+
+/// Returns whether a pose's scale lies at the end of the band. `ratio` is the longest side of the area with data of the depth
+/// map, divided by that of the print.
+fn is_at_bound(pose: Option<&PoseCandidate>, ratio: f64, params: &RegisterParams) -> bool {
+    pose.is_some_and(|pose| {
+        let ratio = pose.fixed_from_moving.scale() * ratio;
+        params.scale_band > 1.0 && ratio.ln().abs() > params.scale_band.ln() - BOUND
     })
 }
 
@@ -223,9 +263,6 @@ fn find_poses(
         beam_width: KEEP,
     };
     let mut found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
-    if params.anisotropic_scale && best_score(&found) < FITS_WELL {
-        stretch(&mut found, &print_base, wood, wood_px.middle);
-    }
     let print_bounds = print.known.bounding_box();
     let print_px = longest(print_bounds);
     let (mut prior, mut kept) = (0.0, None);
@@ -243,15 +280,11 @@ fn find_poses(
         }
     }
     require_upright(&found)?;
-    let is_at_bound = |pose: &PoseCandidate| {
-        let ratio = pose.fixed_from_moving.scale() * wood_px.longest / print_px;
-        params.scale_band > 1.0 && ratio.ln().abs() > params.scale_band.ln() - BOUND
-    };
     let (mirrored, poses): (Vec<PoseCandidate>, Vec<PoseCandidate>) =
         found.into_iter().partition(|pose| pose.mirrored);
     Ok(PoseSearch {
         ink,
-        at_bound: poses.first().is_some_and(is_at_bound),
+        at_bound: is_at_bound(poses.first(), wood_px.longest / print_px, params),
         poses,
         mirrored: mirrored.first().copied(),
         prior,
