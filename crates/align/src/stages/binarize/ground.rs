@@ -70,7 +70,7 @@ pub(super) fn dark_ground(grey: &Grid<f32>, known: &Mask) -> Option<Mask> {
     let ground = ConnectedComponents::label(&framed).touching(&beyond, 1);
     let ground = Mask::from_fn(sides[0], sides[1], |x, y| ground.at(x + 1, y + 1));
     let ground_share = ground.count() as f64 / all;
-    if ground_share < LEAST_GROUND || ground_share > 1.0 - LEAST_LEFT {
+    if !(LEAST_GROUND..=1.0 - LEAST_LEFT).contains(&ground_share) {
         return None;
     }
     let light = cells.map(|value| *value >= threshold);

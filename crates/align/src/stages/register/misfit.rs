@@ -49,7 +49,7 @@ pub(super) fn smooth_misfit(canvas: &HalfCanvas, strokes: &InkEdge) -> f64 {
     let before = squares(&edges);
     let cell = |edge: &Edge| {
         let [x, y] = edge.at.map(|at| {
-            let cell = (at + 1.0) / 2.0 * CELLS as f64;
+            let cell = at.midpoint(1.0) * CELLS as f64;
             (cell as usize).min(CELLS - 1)
         });
         y * CELLS + x

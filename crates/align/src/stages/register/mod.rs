@@ -35,13 +35,15 @@ pub use stroke_map::StrokeMap;
 
 use super::normalize::{Normalized, relative_depths};
 use crate::stages::binarize::rim_share;
+use crate::stages::pose::SoftMask;
 use metric_thresholds::ChosenThreshold;
 use mocban_core::domain::{InkHypothesis, PoseFeatures};
 use mocban_core::raster::{DepthMap, Mask};
+use pose_search::PoseSearch;
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 26;
+pub const REVISION: u32 = 27;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -110,33 +112,12 @@ pub fn register(
     let mut search = pose_search::search(&depths, &normalized.prints, expected.as_ref(), params)?;
     let mut single = Posed::new(depth, &depths, &relief, normalized, &search, params);
     // A block shows where a character is, whether or not its print is torn.
-    // A mirrored relief may match a part of the print that is symmetric.
-    let is_mirrored = |posed: &Posed| posed.features.mirrored > MIRROR_LIKELY;
-    let part = if expected.is_none()
-        && single.as_ref().map_or(0.0, probability) < DOUBTFUL
-        && !single.as_ref().is_ok_and(is_mirrored)
-    {
-        larger_part::find(&depths, &normalized.prints[search.ink], &search.poses)
-    } else {
-        None
-    };
     let mut of_part = None;
-    if let Some(part) = &part
-        && let Ok(found) = pose_search::search_part(
-            &depths,
-            &normalized.prints[search.ink],
-            &search,
-            part,
-            params,
-        )
+    if expected.is_none()
+        && let Some(found) = on_larger_part(depth, &depths, normalized, &search, &single, params)
     {
-        let masks = normalized.with_masks(search.ink, part.masks.clone());
-        let posed = Posed::new(depth, &depths, &relief, &masks, &found, params);
-        // What misfits is left out, so a part agrees better than a whole by chance too.
-        let of_whole = single.as_ref().map_or(0.0, probability);
-        if part.share * posed.as_ref().map_or(0.0, probability) > of_whole {
-            (search, single, of_part) = (found, posed, Some((masks, part.share)));
-        }
+        (search, single) = (found.search, Ok(found.posed));
+        of_part = Some((found.masks, found.share));
     }
     let single = single?;
     let (masks, share) = match &of_part {
@@ -205,6 +186,46 @@ pub fn register(
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
     Ok(registered)
+}
+
+/// What was found on the larger part of a torn print.
+struct PartFit {
+    search: PoseSearch,
+    posed: Posed,
+    /// The print without its other part.
+    masks: Normalized,
+    /// Fraction of the ink that is on the part.
+    share: f64,
+}
+
+/// Returns the pose on the larger part of a torn print, if that is more probable than `single`, the pose on the whole
+/// print. What misfits is left out, so a part agrees better than a whole by chance too: its probability counts by its share
+/// of the ink. A mirrored relief may match a part that is symmetric, so a print that matches the mirrored relief is whole.
+fn on_larger_part(
+    depth: &DepthMap,
+    depths: &SoftMask,
+    normalized: &Normalized,
+    search: &PoseSearch,
+    single: &Result<Posed, RegisterError>,
+    params: &RegisterParams,
+) -> Option<PartFit> {
+    let relief = normalized.outcome.relief?;
+    let of_whole = single.as_ref().map_or(0.0, probability);
+    let is_mirrored = |posed: &Posed| posed.features.mirrored > MIRROR_LIKELY;
+    if of_whole >= DOUBTFUL || single.as_ref().is_ok_and(is_mirrored) {
+        return None;
+    }
+    let print = &normalized.prints[search.ink];
+    let part = larger_part::find(depths, print, &search.poses)?;
+    let found = pose_search::search_part(depths, print, search, &part, params).ok()?;
+    let masks = normalized.with_masks(search.ink, part.masks.clone());
+    let posed = Posed::new(depth, depths, &relief, &masks, &found, params).ok()?;
+    (part.share * probability(&posed) > of_whole).then_some(PartFit {
+        search: found,
+        posed,
+        masks,
+        share: part.share,
+    })
 }
 
 /// Returns the fraction of the print's ink that lies where the depth map has data. `seen` is the ink with data on a canvas
