@@ -21,6 +21,7 @@ mod posed;
 mod refine;
 mod scoring;
 mod soft_thresholds;
+mod stretch;
 mod stroke_map;
 mod tops_edge;
 mod unmatched;
@@ -57,6 +58,10 @@ const UNLIKELY: f64 = 0.05;
 /// A torn print is sought if the probability of the pose, multiplied by the probability of the same character, is below
 /// this.
 const DOUBTFUL: f64 = 0.75;
+
+/// A pair is refused if the probability of the pose, of the same character and of all doubts together is below this. Right
+/// pairs of bold prints reach 0.003.
+const IMPOSSIBLE: f64 = 0.001;
 
 /// A light print is refused if the tops cover more than this fraction of the rim of the depth map. Strokes do not
 /// surround a character, so these tops are the carved ground, seen from the back of the scanned surface.
@@ -175,6 +180,8 @@ pub fn register(
         smooth_misfit: posed.smooth_misfit.max(single.smooth_misfit),
         seen_ink: seen_ink(print, &posed.canvas.ink),
     };
+    require_belief(features, search.prior, doubts, params)
+        .map_err(|error| error.with(|| posed.observe(depth)))?;
     let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);
     registered.confidence_inputs = confidence::set_confidence(
         &mut registered.outcome.metrics,
@@ -257,6 +264,25 @@ fn require_character(
         });
     }
     if pose * character < UNLIKELY * params.min_confidence {
+        return Err(RegisterError::OtherCharacter {
+            pose,
+            character,
+            seen: Observation::Nothing,
+        });
+    }
+    Ok(())
+}
+
+/// Refuses pairs whose doubts rule out that print and relief show the same character.
+fn require_belief(
+    features: &PoseFeatures,
+    prior: f64,
+    doubts: Doubts,
+    params: &RegisterParams,
+) -> Result<(), RegisterError> {
+    let pose = confidence::of_pose(features, prior);
+    let character = confidence::of_character(features) * doubts.factor();
+    if params.min_confidence > 0.0 && pose * character < IMPOSSIBLE {
         return Err(RegisterError::OtherCharacter {
             pose,
             character,

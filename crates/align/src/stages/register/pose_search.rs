@@ -3,6 +3,7 @@
 use super::confidence;
 use super::larger_part::LargerPart;
 use super::params::{ExpectedPose, RegisterError, RegisterParams};
+use super::stretch::{best_score, stretch};
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, Loss, PoseCandidate, RefinementPass, Refiner, SearchRange, SoftMask,
@@ -60,13 +61,8 @@ const UNEXPECTED_WINS: f64 = 1.5;
 const CONVINCING: f64 = 0.45;
 /// The expected pose holds if its score is at least this part of the best one near it.
 const HOLDS: f64 = 0.85;
-/// Scales along the rows of the print relative to those along its columns that are tried, if no pose fits well: a picture
-/// may have been scaled unequally.
-const ASPECTS: [f64; 4] = [1.16, 1.32, 1.0 / 1.16, 1.0 / 1.32];
 /// A pose fits well if its score is at least this.
 const FITS_WELL: f64 = 0.82;
-/// Unequal scales are used if they bring the best upright score closer to 1 by at least this fraction.
-const LEAST_GAIN: f64 = 0.4;
 /// `at_bound` is set if the scale is this close to either end of the searched band, in natural logarithms.
 const BOUND: f64 = 0.02;
 
@@ -126,7 +122,7 @@ impl PoseSearch {
         };
         let mut found: Vec<PoseCandidate> =
             self.poses.iter().copied().chain(self.mirrored).collect();
-        stretch(&mut found, &print_base, wood, wood_px.middle);
+        stretch(&mut found, &print_base, wood, wood_px.middle, LAST_PASS);
         (self.mirrored, self.poses) = (
             found.iter().copied().find(|pose| pose.mirrored),
             found.into_iter().filter(|pose| !pose.mirrored).collect(),
@@ -292,46 +288,6 @@ fn find_poses(
     })
 }
 
-/// Replaces each pose by the best of those with unequal scales that are refined from it, if the best upright pose gains
-/// much by this. `middle` is the centre of the scaling, in pixels of the depth map.
-fn stretch(
-    found: &mut [PoseCandidate],
-    print: &ImagePyramid,
-    wood: &ImagePyramid,
-    middle: [f64; 2],
-) {
-    let (size, sigma) = (LAST_PASS.size_px, LAST_PASS.sigma_px);
-    let (fixed, moving) = (print.level(size, sigma), wood.level(size, sigma));
-    let refiner = Refiner::new(&fixed, &moving);
-    let stretched = found.iter().map(|pose| {
-        let with_aspect = |aspect: f64| {
-            let [x, y] = pose.fixed_from_moving.apply(middle);
-            let [across, down] = [aspect.sqrt(), 1.0 / aspect.sqrt()];
-            let about = Affine2([[across, 0.0, x - across * x], [0.0, down, y - down * y]]);
-            let start = PoseCandidate {
-                fixed_from_moving: about.after(&pose.fixed_from_moving),
-                ..*pose
-            };
-            refiner.refine(&start, LAST_PASS.max_steps, Loss::Huber)
-        };
-        let poses = ASPECTS.map(with_aspect).into_iter();
-        poses.fold(*pose, |best, other| {
-            if other.score > best.score {
-                other
-            } else {
-                best
-            }
-        })
-    });
-    let mut stretched: Vec<PoseCandidate> = stretched.collect();
-    let upright = |poses: &[PoseCandidate]| best_score(poses.iter().filter(|pose| !pose.mirrored));
-    let [before, after] = [upright(found), upright(&stretched)];
-    if after - before >= LEAST_GAIN * (1.0 - before) {
-        stretched.sort_by(|a, b| b.score.total_cmp(&a.score));
-        found.copy_from_slice(&stretched);
-    }
-}
-
 /// The best pose near the expected one, and the score of the expected pose itself.
 #[derive(Clone, Copy)]
 struct NearPose {
@@ -381,11 +337,6 @@ fn near_expected(
         best,
         expected_score: evaluated.score,
     })
-}
-
-fn best_score<'a>(poses: impl IntoIterator<Item = &'a PoseCandidate>) -> f64 {
-    let scores = poses.into_iter().map(|pose| pose.score);
-    scores.fold(0.0, f64::max)
 }
 
 /// Keeps only the pose near the expected one, unless another one matches much better. Returns whether it was kept.
