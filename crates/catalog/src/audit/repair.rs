@@ -21,8 +21,9 @@ use mocban_core::domain::{PairId, Stage};
 /// Removes the results of the stages that are to run again, because their values may be invalid.
 const REMOVE_RESULTS: &str = "
 DELETE FROM stage_result WHERE (pair, stage) IN (
-    SELECT r.pair, r.stage FROM json_each(?1) AS item CROSS JOIN stage_result AS r
-    WHERE r.pair = CAST(item.value ->> 0 AS bigint) AND r.stage >= CAST(item.value ->> 1 AS bigint))";
+    SELECT CAST(item.value ->> 0 AS bigint), later.stage FROM json_each(?1) AS item,
+        (SELECT 0 AS stage UNION ALL SELECT 1 UNION ALL SELECT 2 UNION ALL SELECT 3) AS later
+    WHERE later.stage >= CAST(item.value ->> 1 AS bigint))";
 
 /// Keeps heartbeats, which move counters to other rows without the catalog's lock, out until the end of the transaction.
 const LOCK_COUNTERS: &str = "LOCK TABLE counter_part IN SHARE ROW EXCLUSIVE MODE";
