@@ -4,7 +4,6 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::carving::carve;
-use super::conditions::Conditions;
 use super::glyph::Glyphs;
 use super::polygon::Polygon;
 use super::scanner::{ScanStyle, scan};
@@ -23,14 +22,7 @@ pub(super) fn add_other_pieces(
     let block = mesh.clone();
     let first = rng.random_range(0.0..std::f64::consts::TAU);
     for k in 0..rng.random_range(1..3_u32) {
-        let other = Scene::draw_with(
-            glyphs,
-            glyphs.characters(),
-            scene.tier,
-            scene.id.clone(),
-            Conditions::default(),
-            rng,
-        );
+        let other = scene.another(glyphs, rng);
         let surface = carve(&other, &other.artwork.strokes, rng);
         let margin_mm = rng.random_range(0.3..0.75);
         let outline = Polygon::around(other.artwork.stroke_bounds, margin_mm, 1.1, rng);

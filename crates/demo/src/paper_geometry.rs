@@ -15,7 +15,8 @@ const WARP_SIZE_MM: [f64; 2] = [4.5, 9.0];
 /// Distance of the camera from the sheet, mm.
 const CAMERA_MM: [f64; 2] = [70.0, 300.0];
 
-/// A smooth warp, then a shrinkage, then a perspective view, then a picture with unequal scales. All of them keep the character's centre nearly in place.
+/// A smooth warp, then a shrinkage, then a perspective view, then unequal scales. All of them keep the character's centre
+/// nearly in place.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PaperGeometry {
     warp_mm: f64,
@@ -27,7 +28,7 @@ pub(super) struct PaperGeometry {
     tilt_axis: Axis,
     tilt_rad: f64,
     camera_mm: f64,
-    /// Factors of the picture along its sides.
+    /// Factors along the axes of the upright character.
     picture: [f64; 2],
 }
 
@@ -93,7 +94,7 @@ impl PaperGeometry {
     }
 }
 
-/// Draws the factors of a picture along its sides. Draws no random numbers for a kind with equal scales.
+/// Draws unequal scales along the axes of the upright character. Draws no random numbers for a kind with equal scales.
 fn draw_stretch(kind: &DemoKind, rng: &mut ChaCha8Rng) -> [f64; 2] {
     if kind.stretch[1] <= 0.0 {
         return [1.0; 2];

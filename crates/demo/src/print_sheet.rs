@@ -24,6 +24,8 @@ pub(super) struct PrintSheet {
     fibres: Noise,
     grain: Noise,
     stains: Vec<Stain>,
+    /// What the stains leave of red, green and blue.
+    stain_hue: [f64; 3],
 }
 
 /// A stain with a ragged edge.
@@ -32,8 +34,6 @@ struct Stain {
     radius_mm: f64,
     min_transmittance: f64,
     edge_noise: Noise,
-    /// What it leaves of red, green and blue.
-    hue: [f64; 3],
 }
 
 /// Colours of coloured ink on a coloured sheet, 0..=255.
@@ -77,18 +77,17 @@ impl PrintSheet {
             fibres: Noise::draw(rng),
             grain: Noise::draw(rng),
             stains: (0..stains).map(|_| Stain::draw(half_mm, rng)).collect(),
+            stain_hue: BROWN,
         }
     }
 
     /// Returns the sheet in another colour, with up to two stains of any colour.
     pub(super) fn coloured(self, colour: [f64; 3], half_mm: f64, rng: &mut ChaCha8Rng) -> Self {
-        let hue = [0; 3].map(|_: i32| within(STAIN_HUE, rng));
-        let stains = (0..rng.random_range(0..3_u32)).map(|_| Stain {
-            hue,
-            ..Stain::draw(half_mm, rng)
-        });
+        let stain_hue = [0; 3].map(|_: i32| within(STAIN_HUE, rng));
+        let stains = (0..rng.random_range(0..3_u32)).map(|_| Stain::draw(half_mm, rng));
         Self {
             stains: stains.collect(),
+            stain_hue,
             colour,
             ..self
         }
@@ -106,8 +105,9 @@ impl PrintSheet {
             .iter()
             .map(|stain| stain.transmittance([u, v]))
             .product();
-        let hue = self.stains.first().map_or(BROWN, |stain| stain.hue);
-        let hues = hue.map(|hue| lerp(hue, 1.0, smoothstep(0.6, 1.0, stained)));
+        let hues = self
+            .stain_hue
+            .map(|hue| lerp(hue, 1.0, smoothstep(0.6, 1.0, stained)));
         [0, 1, 2].map(|i| (self.colour[i] + shade) * hues[i] * stained)
     }
 }
@@ -119,7 +119,6 @@ impl Stain {
             radius_mm: rng.random_range(1.0..3.5),
             min_transmittance: rng.random_range(0.68..0.88),
             edge_noise: Noise::draw(rng),
-            hue: BROWN,
         }
     }
 

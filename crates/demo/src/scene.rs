@@ -63,8 +63,21 @@ impl Scene {
         Self::draw_with(glyphs, characters, tier, id, conditions, rng)
     }
 
+    /// Draws another scene of the same tier and id: one of all characters under plain conditions.
+    pub(super) fn another(&self, glyphs: &Glyphs, rng: &mut ChaCha8Rng) -> Self {
+        let (characters, id) = (glyphs.characters(), self.id.clone());
+        Self::draw_with(
+            glyphs,
+            characters,
+            self.tier,
+            id,
+            Conditions::default(),
+            rng,
+        )
+    }
+
     /// Draws one of the characters with neighbours and the damage of the tier under given conditions.
-    pub(super) fn draw_with(
+    fn draw_with(
         glyphs: &Glyphs,
         characters: &[char],
         tier: Tier,

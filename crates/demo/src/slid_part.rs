@@ -43,7 +43,7 @@ impl SlidPart {
     }
 
     /// Returns whether a point (u, v) of the print, mm, lies on the part before it slid.
-    pub(super) fn contains(&self, point: [f64; 2]) -> bool {
+    fn contains(&self, point: [f64; 2]) -> bool {
         self.crack.along_across(point)[1] > self.offset_mm
     }
 

@@ -8,7 +8,6 @@ use super::rendered_print::PrintFrame;
 use super::scalar_field::ScalarField;
 use super::scan_pose::{ScanPose, TopsPlane};
 use super::scene::Scene;
-use super::slid_part::SlidPart;
 use mocban_core::domain::PrintFromMesh;
 use mocban_core::raster::Grid;
 
@@ -80,10 +79,15 @@ impl TruthSource<'_> {
         Grid::from_fn(frame.width, frame.height, |x, y| self.label(frame.uv(x, y)))
     }
 
+    /// Returns whether a point of the print lies on a part that slid, or near it.
+    fn has_slid(&self, point: [f64; 2]) -> bool {
+        let slid = self.scene.conditions.slid;
+        slid.is_some_and(|slid| slid.is_near(point, SLID_MARGIN_MM))
+    }
+
     fn label(&self, point: [f64; 2]) -> u8 {
         let scene = self.scene;
-        let has_slid = |slid: &SlidPart| slid.is_near(point, SLID_MARGIN_MM);
-        if scene.conditions.slid.as_ref().is_some_and(has_slid) {
+        if self.has_slid(point) {
             return IGNORED;
         }
         let is_near = |field: &ScalarField| field.value(point) > -NEIGHBOUR_MARGIN_MM;
@@ -111,7 +115,6 @@ impl TruthSource<'_> {
     /// Draws 16 to 36 well-separated points on the remaining stroke tops, in mesh coordinates. Returns fewer points if
     /// the search finds no more.
     fn landmarks(&self, pose: &ScanPose, rng: &mut ChaCha8Rng) -> Vec<[f64; 3]> {
-        let slid = self.scene.conditions.slid;
         let wanted = rng.random_range(16..=36_usize);
         let mut chosen: Vec<[f64; 2]> = Vec::new();
         for (inside_mm, apart_mm) in [(0.12, 1.0), (0.08, 0.6), (0.04, 0.3), (0.02, 0.1)] {
@@ -124,7 +127,7 @@ impl TruthSource<'_> {
                     |other: &[f64; 2]| (other[0] - point[0]).hypot(other[1] - point[1]) > apart_mm;
                 if self.remaining.value(point) > inside_mm
                     && !self.scene.damage.is_cracked(point, 0.05)
-                    && !slid.is_some_and(|slid| slid.contains(point))
+                    && !self.has_slid(point)
                     && chosen.iter().all(is_far)
                 {
                     chosen.push(point);

@@ -69,7 +69,7 @@ SELECT p.name, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.p
 const LISTED_JOBS: &str = "
 SELECT j.pair FROM job AS j WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = j.pair) ORDER BY j.pair";
 
-/// The pairs that the newest import of a list or of folders added. Those that were retired have no job.
+/// The pairs that the newest import of a list or of folders added. Retired ones have no job.
 const LAST_IMPORT: &str = "
 SELECT p.name, p.imported, (SELECT count(*) FROM job AS j WHERE j.pair = p.id) AS jobs FROM pair AS p
 WHERE p.imported = (SELECT q.imported FROM pair AS q

@@ -14,6 +14,7 @@ use super::components::{NavSection, frame};
 use super::failure::AppFailure;
 use super::state::AppState;
 use super::visit::Visit;
+use crate::local_server::asks_for_page;
 
 /// Makes a page of a failure, or JSON if the request was an action or comes from a script that reads no page.
 pub(super) async fn explain(
@@ -21,11 +22,8 @@ pub(super) async fn explain(
     request: Request,
     next: Next,
 ) -> Response {
-    let accepted = request.headers().get(header::ACCEPT);
-    let reads_pages = accepted.is_none_or(|kinds| {
-        let kinds = kinds.to_str().unwrap_or_default();
-        kinds.contains("text/html")
-    });
+    let headers = request.headers();
+    let reads_pages = !headers.contains_key(header::ACCEPT) || asks_for_page(headers);
     let is_page = request.method() == Method::GET && reads_pages;
     let (mut head, body) = request.into_parts();
     let Ok(visit) = Visit::from_request_parts(&mut head, &state).await;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::{Extension, Path, Request, State};
-use axum::http::{StatusCode, header};
+use axum::http::StatusCode;
 use axum::response::{Html, IntoResponse as _, Response};
 use axum::{Json, Router};
 use maud::{Markup, html};
@@ -22,7 +22,7 @@ use super::qr_code::qr_code;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
-use crate::local_server::{document, respond};
+use crate::local_server::{asks_for_page, document, respond};
 use mocban_core::domain::{ReviewOrder, one_line};
 
 /// Invites a reviewer, unless the same invitation was sent before.
@@ -37,7 +37,7 @@ pub(super) async fn invite(
         None => {
             state.invitations.require_room().await?;
             let pages = guest_pages(open, reviewer, choice).await?;
-            state.invitations.send(id, open, pages).await
+            state.invitations.send(id, open, pages, false).await
         }
         Some(false) => Ok(()),
         Some(true) => Err(AppFailure::refused(Sentence::new(
@@ -81,12 +81,7 @@ async fn judge(
         return respond(pages, request).await;
     }
     let [english, vietnamese] = PROJECT_GONE;
-    let accepted = request.headers().get(header::ACCEPT);
-    let shows_page = accepted.is_some_and(|kinds| {
-        let kinds = kinds.to_str().unwrap_or_default();
-        kinds.contains("text/html")
-    });
-    if !shows_page {
+    if !asks_for_page(request.headers()) {
         let body = Json(json!({ "error": format!("{english} / {vietnamese}") }));
         return (StatusCode::SERVICE_UNAVAILABLE, body).into_response();
     }
@@ -129,7 +124,7 @@ pub(super) async fn change(
             let open = state.open(&key).await?;
             let pages = guest_pages(&open, &reviewer, &choice).await?;
             let id = invitation_id(&open, &reviewer, &choice);
-            state.invitations.renew(id, &open, pages).await?;
+            state.invitations.send(id, &open, pages, true).await?;
         }
     }
     Ok(Json(json!({ "reload": true })))

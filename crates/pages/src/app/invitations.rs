@@ -82,8 +82,10 @@ impl Invitations {
     /// Refuses another invitation if there are too many.
     pub(super) async fn require_room(&self) -> AppResult<()> {
         let mut sent = self.sent.lock().await;
-        // Guests of a project that is gone judge nothing, and no page shows them.
-        sent.guests.retain(|_, sent| sent.project.is_current());
+        if sent.guests.len() >= LIMIT {
+            // Guests of a project that is not in its place judge nothing, and no page shows them.
+            sent.guests.retain(|_, sent| sent.project.is_current());
+        }
         if sent.guests.len() < LIMIT {
             return Ok(());
         }
@@ -93,43 +95,24 @@ impl Invitations {
         )))
     }
 
-    /// Sends an invitation to `pages` of a project.
-    pub(super) async fn send(
-        &self,
-        id: PagesId,
-        project: &Arc<OpenProject>,
-        pages: Router,
-    ) -> AppResult<()> {
-        let mut sent = self.sent.lock().await;
-        self.add(&mut sent, id, project, pages).await
-    }
-
-    /// Replaces the link of an invitation, unless it was withdrawn meanwhile.
-    pub(super) async fn renew(
-        &self,
-        id: PagesId,
-        project: &Arc<OpenProject>,
-        pages: Router,
-    ) -> AppResult<()> {
-        let mut sent = self.sent.lock().await;
-        if !sent.guests.contains_key(&id) {
-            return Ok(());
-        }
-        self.add(&mut sent, id, project, pages).await
-    }
-
     /// Ends an invitation. Answers that were stored stay.
     pub(super) async fn withdraw(&self, id: &PagesId) {
         self.sent.lock().await.guests.remove(id);
     }
 
-    async fn add(
+    /// Sends an invitation to `pages` of a project. `replaces` is whether only the link of an earlier one is replaced: then
+    /// nothing is sent if that was withdrawn meanwhile.
+    pub(super) async fn send(
         &self,
-        sent: &mut SentInvitations,
         id: PagesId,
         project: &Arc<OpenProject>,
         pages: Router,
+        replaces: bool,
     ) -> AppResult<()> {
+        let mut sent = self.sent.lock().await;
+        if replaces && !sent.guests.contains_key(&id) {
+            return Ok(());
+        }
         let address = self.listen.or_else(network_address).ok_or_else(|| {
             AppFailure::refused(Sentence::new(
                 "no address of this computer was found: connect it to a network, or start the app with --listen and its address, such as 192.168.1.20",

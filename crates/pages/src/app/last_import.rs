@@ -102,6 +102,7 @@ pub(super) async fn change(
         .at
         .parse()
         .map_err(|_invalid| AppFailure::not_found())?;
+    // `retire` checks this again; the reason is given here in both languages.
     let newest = open.catalog.last_import().await?;
     if newest.first().is_none_or(|pair| pair.imported != at) {
         return Err(AppFailure::refused(Sentence::new(

@@ -96,8 +96,8 @@ fn start_form(visit: &Visit) -> Markup {
             button.primary { (visit.t("Start or continue", "Bắt đầu hoặc tiếp tục")) }
             button name="invite" value="yes" { (visit.t("Invite", "Mời")) }
             p.muted { (visit.t(
-                "\"Invite\" makes a link for another computer, tablet or phone of your network. Whoever opens it can judge under this name, and do nothing else. The connection is not encrypted.",
-                "\"Mời\" tạo một liên kết cho máy tính, máy tính bảng hoặc điện thoại khác trong mạng của bạn. Ai mở liên kết có thể đánh giá dưới tên này, và không làm được gì khác. Kết nối không được mã hóa.",
+                "\"Invite\" makes a link for another computer, tablet or phone of your network. Whoever opens it can judge and align by hand under this name, and see no other page. The connection is not encrypted.",
+                "\"Mời\" tạo một liên kết cho máy tính, máy tính bảng hoặc điện thoại khác trong mạng của bạn. Ai mở liên kết có thể đánh giá và căn chỉnh bằng tay dưới tên này, và không xem được trang nào khác. Kết nối không được mã hóa.",
             )) }
         },
     )

@@ -88,7 +88,7 @@ pub(super) async fn guard(
     mut request: Request,
     next: Next,
 ) -> Response {
-    let shows_html = text(request.headers(), header::ACCEPT).is_some_and(is_html);
+    let shows_html = asks_for_page(request.headers());
     let checked = match check(&access, &request) {
         Ok(uri) => {
             *request.uri_mut() = uri;
@@ -163,9 +163,9 @@ fn page_uri(page: &str, query: Option<&str>) -> Result<Uri, InvalidUri> {
     }
 }
 
-/// Returns whether an `Accept` header asks for a page, as browsers do for an address that a person opens.
-fn is_html(accepted: &str) -> bool {
-    accepted.contains("text/html")
+/// Returns whether the `Accept` header asks for a page, as browsers do for an address that a person opens.
+pub fn asks_for_page(headers: &HeaderMap) -> bool {
+    text(headers, header::ACCEPT).is_some_and(|accepted| accepted.contains("text/html"))
 }
 
 /// Reads the whole body first, so that no handler waits for a slow client.

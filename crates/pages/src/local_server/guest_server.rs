@@ -9,11 +9,10 @@ use axum::response::Response;
 use axum::{Extension, Router};
 
 use super::access_control::{AccessControl, Entrance};
-use super::address::listen;
 use super::connection::ConnectionLimits;
 use super::connections::serve;
 use super::guarded_pages::{respond, start_token};
-use super::server::ServerError;
+use super::server::{ServerError, bind};
 use super::session::START;
 use mocban_core::domain::ContentHash;
 
@@ -49,10 +48,8 @@ impl GuestServer {
     /// # Errors
     /// Returns an error if the address cannot be bound or the system provides no randomness.
     pub async fn start(address: SocketAddr, name: &str) -> Result<Self, ServerError> {
-        let failed = |source| ServerError::Listen { address, source };
-        let listener = listen(address, name).await.map_err(failed)?;
-        let address = listener.local_addr().map_err(failed)?;
-        // Its token is told to nobody.
+        let (listener, address) = bind(address, name).await?;
+        // No link contains its token.
         let entrance = Entrance::Invitation {
             place: String::new(),
         };

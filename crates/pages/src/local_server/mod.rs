@@ -38,6 +38,7 @@ pub use access_control::AccessControl;
 pub use address::{listen, network_address};
 pub use connection::ConnectionLimits;
 pub use connections::serve;
+pub use guard::asks_for_page;
 pub use guarded_pages::respond;
 pub use guest_server::{Guest, GuestServer};
 pub use host_check::ServedNames;

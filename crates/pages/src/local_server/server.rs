@@ -30,6 +30,17 @@ pub enum ServerError {
 
 impl Explained for ServerError {}
 
+/// Binds an address, see [`listen`]. Returns the bound address too.
+pub(super) async fn bind(
+    address: SocketAddr,
+    name: &str,
+) -> Result<(TcpListener, SocketAddr), ServerError> {
+    let failed = |source| ServerError::Listen { address, source };
+    let listener = listen(address, name).await.map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    Ok((listener, address))
+}
+
 /// A server that is bound and ready to serve.
 #[derive(Debug)]
 pub struct LocalServer {
@@ -44,9 +55,7 @@ impl LocalServer {
     /// # Errors
     /// Returns an error if the address cannot be bound or the system provides no randomness.
     pub async fn bind(address: SocketAddr, name: &str, page: &str) -> Result<Self, ServerError> {
-        let failed = |source| ServerError::Listen { address, source };
-        let listener = listen(address, name).await.map_err(failed)?;
-        let address = listener.local_addr().map_err(failed)?;
+        let (listener, address) = bind(address, name).await?;
         let access =
             AccessControl::new(page, address, Entrance::Command).map_err(ServerError::Token)?;
         Ok(Self {

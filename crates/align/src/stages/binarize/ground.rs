@@ -59,13 +59,13 @@ pub(super) fn dark_ground(grey: &Grid<f32>, known: &Mask) -> Option<Mask> {
         })
     };
     let dark = opened(&|value| value < threshold, reach(HALF_WIDTH));
+    // With a frame of one cell, which is beyond the print.
+    let is_inside = |x, y| (1..=sides[0]).contains(&x) && (1..=sides[1]).contains(&y);
     let beyond = Mask::from_fn(sides[0] + 2, sides[1] + 2, |x, y| {
-        let inside = (1..=sides[0]).contains(&x) && (1..=sides[1]).contains(&y);
-        !inside || cells.at(x - 1, y - 1).is_nan()
+        !is_inside(x, y) || cells.at(x - 1, y - 1).is_nan()
     });
     let framed = Mask::from_fn(sides[0] + 2, sides[1] + 2, |x, y| {
-        let inside = (1..=sides[0]).contains(&x) && (1..=sides[1]).contains(&y);
-        inside && dark.at(x - 1, y - 1)
+        is_inside(x, y) && dark.at(x - 1, y - 1)
     });
     let ground = ConnectedComponents::label(&framed).touching(&beyond, 1);
     let ground = Mask::from_fn(sides[0], sides[1], |x, y| ground.at(x + 1, y + 1));
@@ -94,14 +94,8 @@ pub(super) fn dark_ground(grey: &Grid<f32>, known: &Mask) -> Option<Mask> {
 #[cfg(test)]
 mod tests {
     use super::dark_ground;
+    use crate::stages::binarize::test_strokes::{SIDE, is_stroke};
     use mocban_core::raster::{Grid, Mask};
-
-    const SIDE: usize = 150;
-
-    fn is_stroke(x: usize, y: usize) -> bool {
-        (60..74).contains(&x) && (15..135).contains(&y)
-            || (20..130).contains(&x) && (40..52).contains(&y)
-    }
 
     fn ground(grey: impl Fn(usize, usize) -> f32) -> Option<Mask> {
         dark_ground(

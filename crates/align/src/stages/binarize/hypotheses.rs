@@ -82,14 +82,8 @@ fn by_colour(
 #[cfg(test)]
 mod tests {
     use super::hypotheses;
+    use crate::stages::binarize::test_strokes::{SIDE, is_stroke};
     use mocban_core::raster::{Grid, PrintImage};
-
-    const SIDE: usize = 150;
-
-    fn is_stroke(x: usize, y: usize) -> bool {
-        (60..74).contains(&x) && (15..135).contains(&y)
-            || (20..130).contains(&x) && (40..52).contains(&y)
-    }
 
     fn print(colour: impl Fn(usize, usize) -> [u16; 3]) -> PrintImage {
         PrintImage {

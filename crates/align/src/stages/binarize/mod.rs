@@ -7,6 +7,8 @@ mod hypotheses;
 mod ink;
 mod outlined;
 mod polarity;
+#[cfg(test)]
+mod test_strokes;
 
 pub(super) use hypotheses::hypotheses;
 pub(super) use ink::BinarizeError;

@@ -156,18 +156,23 @@ impl<'a> Refiner<'a> {
         self.tiebreak_scores(pose, self, pose)[0]
     }
 
-    /// Calls a function with the position in the fixed image of each pixel that is valid in both levels, and the difference
-    /// of the amounts there, fixed minus moving.
+    /// Calls a function with the position in the fixed image of each pixel that is valid in both levels at two poses, and
+    /// with the differences of the amounts there, fixed minus moving.
     pub(crate) fn each_difference(
         &self,
-        pose: &PoseCandidate,
-        mut visit: impl FnMut([f64; 2], f32),
+        poses: [&PoseCandidate; 2],
+        mut visit: impl FnMut([f64; 2], [f32; 2]),
     ) -> Option<()> {
         let image_from_work = self.fixed.work_from_image.inverse()?;
-        let placed = self.placed(pose)?;
-        for (x, y, cell) in placed.common_pixels(&self.fixed.weight) {
-            let difference = self.fixed.amount.at(x, y) - cell.value(&self.moving.amount);
-            visit(image_from_work.apply([x as f64, y as f64]), difference);
+        let [one, two] = poses.map(|pose| self.placed(pose));
+        let (one, two) = (one?, two?);
+        for (x, y, at_one) in one.common_pixels(&self.fixed.weight) {
+            let Some(at_two) = two.cell(x, y) else {
+                continue;
+            };
+            let amounts = [at_one, at_two].map(|cell| cell.value(&self.moving.amount));
+            let differences = amounts.map(|amount| self.fixed.amount.at(x, y) - amount);
+            visit(image_from_work.apply([x as f64, y as f64]), differences);
         }
         Some(())
     }

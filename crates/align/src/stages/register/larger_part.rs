@@ -7,7 +7,6 @@ use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{ImagePyramid, Loss, PoseCandidate, PyramidLevel, Refiner, SoftMask};
 use mocban_core::domain::Affine2;
 use mocban_core::domain::cancel::poll;
-use std::collections::HashMap;
 
 /// Working size of print and relief, pixels, and the smoothing there.
 const PX: usize = 60;
@@ -261,21 +260,11 @@ fn best_line(
 ) -> Option<Side> {
     let mut points = Vec::new();
     fixed.each_amount(|point, _| points.push(point))?;
-    let squares = |pose: &PoseCandidate| {
-        let mut found = HashMap::new();
-        whole.each_difference(pose, |point, difference| {
-            found.insert(point.map(f64::to_bits), f64::from(difference).powi(2));
-        })?;
-        Some(found)
-    };
-    let (of_smaller, of_larger) = (squares(smaller)?, squares(larger)?);
-    let gains: Vec<([f64; 2], f64)> = points
-        .iter()
-        .filter_map(|point| {
-            let key = point.map(f64::to_bits);
-            Some((*point, of_smaller.get(&key)? - of_larger.get(&key)?))
-        })
-        .collect();
+    let mut gains = Vec::new();
+    whole.each_difference([smaller, larger], |point, differences| {
+        let [of_smaller, of_larger] = differences.map(|of| f64::from(of).powi(2));
+        gains.push((point, of_smaller - of_larger));
+    })?;
     let mut best: Option<(f64, Side)> = None;
     for k in 0..FINE_DIRECTIONS {
         poll();

@@ -169,14 +169,14 @@ pub fn register(
         stroke_map,
         params.window,
     )?;
-    // The other part of a torn print is no evidence. Heights of a levelling are chosen from the ink, so the worse of both
-    // tells whether the block is another one.
-    let of_part = of_part
+    // The other part of a torn print is no evidence.
+    let part_print = of_part
         .as_ref()
         .map(|(masks, _)| canvas_print(masks, search.ink));
-    let print = of_part.as_ref().unwrap_or(&registered.canvas_print);
+    let print = part_print.as_ref().unwrap_or(&registered.canvas_print);
     let doubts = Doubts {
         share,
+        // A levelling chooses the heights from the ink, which hides displaced edges: the larger misfit counts.
         smooth_misfit: posed.smooth_misfit.max(single.smooth_misfit),
         seen_ink: seen_ink(print, &posed.canvas.ink),
     };

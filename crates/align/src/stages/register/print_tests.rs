@@ -55,16 +55,14 @@ fn a_torn_half_on_a_dark_ground_is_aligned() {
 
 #[test]
 fn another_block_with_the_same_character_is_doubted() {
-    let pairs = PairGenerator::new(Tier::Pose, 4);
-    let pair = pairs.pair(ANOTHER).expect("images encode");
+    // The print by another hand is aligned, not refused.
+    let (pairs, index) = (PairGenerator::new(Tier::Pose, 4), 10);
+    let pair = pairs.pair(index).expect("images encode");
     let character = pair.character.chars().next().expect("a character");
-    let print = pairs.print_by_another_hand(character, ANOTHER + 1_000_000);
+    let print = pairs.print_by_another_hand(character, index + 1_000_000);
     let other = align(pair.mesh.clone(), &print.expect("images encode"));
     let own = align(pair.mesh, &pair.print);
     let [other, own] = [other, own].map(|aligned| aligned.first_metric().confidence);
     assert!(other.expect("a confidence") < 0.5, "{other:?}");
     assert!(own.expect("a confidence") > 0.9, "{own:?}");
 }
-
-/// A pair whose print by another hand is aligned.
-const ANOTHER: u64 = 10;

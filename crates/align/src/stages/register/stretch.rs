@@ -50,6 +50,7 @@ pub(super) fn stretch(
     }
 }
 
+/// Returns the best score of some poses, 0 if there is none.
 pub(super) fn best_score<'a>(poses: impl IntoIterator<Item = &'a PoseCandidate>) -> f64 {
     let scores = poses.into_iter().map(|pose| pose.score);
     scores.fold(0.0, f64::max)
