@@ -92,6 +92,8 @@ mod tests {
     use std::collections::BTreeSet;
     use std::path::Path;
 
+    use percent_encoding::percent_decode_str;
+
     use super::{PAGES, PICTURES, web_files};
 
     fn files_below(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
@@ -150,6 +152,7 @@ mod tests {
                 }
                 links += 1;
                 let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+                let anchor = percent_decode_str(anchor).decode_utf8().expect("UTF-8");
                 let mut target = Vec::new();
                 for part in folder.join(file).components() {
                     match part.as_os_str().to_str().expect("UTF-8") {
@@ -164,7 +167,7 @@ mod tests {
                 };
                 let found = files.iter().find(|(path, _)| *path == target);
                 let (_, found) = found.unwrap_or_else(|| panic!("{path}: {link}"));
-                let is_there = anchor.is_empty() || values(&text(found), "id").contains(&anchor);
+                let is_there = anchor.is_empty() || values(&text(found), "id").contains(&&*anchor);
                 assert!(is_there, "{path}: {link}");
             }
         }

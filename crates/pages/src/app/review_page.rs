@@ -30,6 +30,7 @@ use mocban_project::shell::shell_quoted;
 
 /// Size of the sample that the page suggests.
 const SAMPLE: usize = 50;
+
 /// The fields of the form that starts a review.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
