@@ -1,4 +1,4 @@
-// Decodes the binary data of a scan: a JSON header and arrays; see src/export/scan_view/scan_data.rs.
+// Decodes the binary data of a scan: a JSON header and arrays; see crates/export/src/scan_view/scan_data.rs.
 
 /** Decodes a PNG without changing its values. */
 function bitmapOf(bytes) {

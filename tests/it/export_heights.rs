@@ -119,13 +119,19 @@ impl BentBlock {
         largest * self.number("mm_per_mesh_unit")
     }
 
-    /// Returns the distance of a point from the nearest triangle, mesh units.
+    /// Returns the distance of a point from the nearest triangle with a corner near the point, mesh units.
     fn distance(&self, point: [f64; 3]) -> f64 {
-        let triangles = self.mesh.triangles.iter();
-        let corners = triangles.map(|corners| corners.map(|i| self.mesh.vertices.at(i as usize)));
-        corners
-            .map(|corners| triangle_distance(point, corners))
-            .fold(f64::INFINITY, f64::min)
+        let near = 8.0 * self.number("mesh_unit_per_px");
+        let is_near = |corner: &[f64; 3]| (0..3).all(|k| (corner[k] - point[k]).abs() < near);
+        let mut nearest = f64::INFINITY;
+        for corners in self.mesh.triangles.iter() {
+            if !is_near(&self.mesh.vertices.at(corners[0] as usize)) {
+                continue;
+            }
+            let corners = corners.map(|i| self.mesh.vertices.at(i as usize));
+            nearest = nearest.min(triangle_distance(point, corners));
+        }
+        nearest
     }
 }
 

@@ -15,8 +15,8 @@
 //!
 //! Every call fails if a database operation fails. `# Errors` names other reasons, and what an error leaves behind.
 //!
-//! **Invariant:** no other crate contains SQL, what a worker stores for a job whose lease it has lost is refused, and every test of this crate runs
-//! on both databases.
+//! **Invariant:** no other crate contains SQL, and what a worker stores for a job whose lease it has lost is refused. Tests
+//! of what both databases do run on both, if a PostgreSQL server can be started.
 
 mod audit;
 mod blocks;

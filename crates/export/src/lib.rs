@@ -13,7 +13,7 @@
 //! Every call fails if the catalog, an input or an artifact cannot be read, or the output cannot be written. `# Errors` names
 //! other reasons, and what an error leaves behind.
 //!
-//! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs, and an earlier export is
+//! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs (except for labels of whole pages), and an earlier export is
 //! replaced as a whole or not at all.
 
 mod alignment_files;

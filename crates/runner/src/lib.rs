@@ -21,8 +21,8 @@
 //!     |   release        |  | | checkpoint: the deadline of the next stage; heartbeat of the worker: its leases stay valid
 //!     +------------------+  +-+
 //!     |                  |
-//!     |                  | the worker sends no heartbeat for 50 s (PostgreSQL: 7 s without lock and heartbeat, if it was seen
-//!     |                  | connected; SQLite: at once, if a run starts alone), or its stage is overdue: recovery; or a repair
+//!     |                  | the worker sends no heartbeat for 50 s (PostgreSQL: 7 s without lock and heartbeat, unless it
+//!     |                  | was never seen connected; SQLite: at once, if a run starts alone), or its stage is overdue: recovery; or a repair
 //!     |                  | or a new cut of its block resets the job
 //!     |   a new fencing token
 //!     +------------------+------------> quarantined, if the job has crashed too many workers
@@ -42,7 +42,7 @@
 //! | the catalog | files were written more than 30 minutes ago | pairs on PostgreSQL: `is_late` in `queue/commit/server_commit.rs`; blocks: `store` in `queue/checkpoint.rs`; pairs on SQLite: not checked | nothing is stored; the job stays leased to this worker, which claims it again. Here it is a refused checkpoint |
 //! | `checkpointer.rs`, `block/task.rs` | a release is refused | `RELEASE` in `queue/claim.rs` | the pair ends as `LeaseLost`, the block as `Released` |
 //!
-//! Except for this block, a pair or block that ran ends as `LeaseLost`, which counts neither as done nor as failed. Stages
+//! In the other rows, a pair or block that ran ends as `LeaseLost`, which counts neither as done nor as failed. Stages
 //! stored before stay. On PostgreSQL, `queue/commit/known_leases.rs` finds refused writes of pairs that an earlier commit
 //! without a reply has stored. The job of a retired pair is removed, which ends its lease too. A pair that another worker
 //! recovered may have killed the worker, so it runs with no other pair beside it (on PostgreSQL: on its host): in its process

@@ -39,7 +39,7 @@ struct Shared {
     failed: Counter,
     stage_seconds: Family<Label, Histogram, fn() -> Histogram>,
     /// The count and microseconds of each stage, because a histogram cannot be read.
-    stage_totals: [(AtomicU64, AtomicU64); 4],
+    stage_totals: [(AtomicU64, AtomicU64); Stage::COUNT],
     wait_seconds: Family<Label, Seconds>,
     jobs: Gauge,
     leased: Gauge,

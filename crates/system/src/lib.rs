@@ -6,7 +6,7 @@
 //!
 //! Every call fails if the operating system refuses it. `# Errors` names other reasons.
 //!
-//! **Invariant:** no other crate names an operating system in production code, apart from `cfg` of Linux.
+//! **Invariant:** other crates name an operating system only for the spelling of paths and to open the browser, and in `cfg` of Linux.
 
 pub mod failpoint;
 pub mod platform;

@@ -1,6 +1,6 @@
 //! Simplifies a mesh by merging the vertices in each cell of a grid.
 
-use std::collections::{HashMap, HashSet};
+use foldhash::{HashMap, HashMapExt, HashSet, HashSetExt};
 
 use super::robust_bounds::{Bounds, bulk_box, is_in_box};
 use super::triangle_mesh::{Mesh, Vertices};

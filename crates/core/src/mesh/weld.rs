@@ -1,6 +1,6 @@
 //! Finds and merges repeated vertices, which formats without shared corners (STL) produce.
 
-use std::collections::HashMap;
+use foldhash::{HashMap, HashMapExt};
 
 use super::{Mesh, Vertices};
 use crate::domain::cancel::polled;
