@@ -354,6 +354,8 @@ fn a_setting_is_saved_with_what_it_costs() {
         asked.contains("<b>15</b> pairs would be computed again"),
         "{asked}"
     );
+    let comma = text(&page.get("/p/p/settings?key=register.min_confidence&value=0,4"));
+    assert!(comma.contains("<code>0.4</code>"), "{comma}");
     let refused = text(&page.get("/p/p/settings?key=register.min_confidence&value=7"));
     assert!(refused.contains("is outside the range 0 to 1"), "{refused}");
     let body = json!({"key": "register.min_confidence", "value": "0.4"});

@@ -1,7 +1,7 @@
 //! Changes a setting in the file of a project, after saying what that costs.
 
 use mocban_config::{Origin, Setting, with_setting};
-use mocban_runner::{changes_method, fingerprints};
+use mocban_runner::fingerprints;
 use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
 
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
@@ -24,7 +24,8 @@ pub struct SettingChange {
     pub changes_method: bool,
 }
 
-/// Looks at a change of a setting. `value` is written as in a settings file; text needs no quotes.
+/// Looks at a change of a setting. `value` is written as in a settings file; text needs no quotes, and a number may have a
+/// decimal comma.
 ///
 /// # Errors
 /// Returns an error if there is no such setting, or its value is refused.
@@ -39,16 +40,22 @@ pub async fn preview(
     let before = find(current.tree.settings());
     let before = before.ok_or_else(|| Refusal::Usage(format!("there is no setting {key}")))?;
     let mut changed = location.with_saved_settings();
+    let value = if before.value.is_float() {
+        value.replacen(',', ".", 1)
+    } else {
+        value.to_owned()
+    };
     changed.sets = vec![format!("{key}={value}")];
     let changed = changed.settings()?;
     let after = find(changed.tree.settings()).unwrap_or_else(|| before.clone());
-    let stages = &changed.config.stages;
-    let changes_method = changes_method(catalog, stages, &options(&changed.config)).await?;
+    let rerun = options(&changed.config).rerun;
+    let current = fingerprints(&changed.config.stages);
+    let plan = catalog.plan(&current, None, rerun).await?;
     Ok(SettingChange {
         before,
         after,
-        stale: catalog.count_stale(&fingerprints(stages)).await?,
-        changes_method,
+        stale: plan.again(),
+        changes_method: plan.changes_method(),
     })
 }
 

@@ -86,6 +86,20 @@ impl Plan {
         self.entries.iter().map(|entry| entry.pairs).sum()
     }
 
+    /// Returns the number of pairs that would run although a run has finished or refused them before.
+    pub fn again(&self) -> u64 {
+        let waits = [
+            StaleReason::New,
+            StaleReason::Unfinished,
+            StaleReason::BackingOff,
+        ];
+        let again = self
+            .entries
+            .iter()
+            .filter(|entry| !waits.contains(&entry.why));
+        again.map(|entry| entry.pairs).sum()
+    }
+
     /// Returns whether pairs would run with another method than before.
     pub fn changes_method(&self) -> bool {
         let mut changes = self

@@ -31,6 +31,8 @@ use mocban_system::platform;
 const LATEST: usize = 12;
 /// Number of failed pairs that are shown as examples of each class.
 const EXAMPLES: usize = 3;
+/// Most failed pairs of which the page asks whether their settings or files have changed since.
+const MAX_INSPECTED: u64 = 1000;
 /// Most blocks in progress that are named.
 const MAX_BLOCKS: usize = 5;
 
@@ -63,9 +65,13 @@ impl RunState {
         // Read before the counts: a run that ends in between leaves no leases.
         let running = is_running(&open.project, catalog, now()).await?;
         let workers = child_run::workers(catalog).await;
-        let counts = catalog
-            .status(&fingerprints(&settings.config.stages))
-            .await?;
+        let current = fingerprints(&settings.config.stages);
+        let mut counts = catalog.status(&current).await?;
+        let failed = counts.jobs.get(&JobStatus::Quarantined).copied();
+        if !running && (1..=MAX_INSPECTED).contains(&failed.unwrap_or(0)) {
+            let rerun = mocban_project::run::options(&settings.config).rerun;
+            counts.stale = catalog.plan(&current, None, rerun).await?.again();
+        }
         let mut classes = catalog.failure_counts().await?;
         classes.sort_by_key(|(class, number)| (std::cmp::Reverse(*number), *class));
         let mut failures = Vec::new();
@@ -270,6 +276,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
     let waiting = run.outstanding() + run.counts.stale;
     let blocks = run.open_blocks();
     let is_idle = waiting + blocks == 0;
+    let is_empty = run.counts.pairs == 0 && run.blocks.is_empty();
     let failed = run.jobs(JobStatus::Quarantined);
     html! {
         @if run.counts.stale > 0 {
@@ -279,9 +286,13 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
             label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
             }
-            button.primary #start name="which" value="all" disabled[is_idle] {
-                (visit.t("Align", "Căn chỉnh")) " "
-                (to_align(visit, blocks, waiting))
+            button.primary #start name="which" value="all" disabled[is_empty] {
+                @if is_idle {
+                    (visit.t("Look for changed files", "Tìm tệp đã đổi"))
+                } @else {
+                    (visit.t("Align", "Căn chỉnh")) " "
+                    (to_align(visit, blocks, waiting))
+                }
             }
             @if failed > 0 {
                 button name="which" value="failed" { (visit.t("Try failed pairs again", "Thử lại các cặp lỗi")) }

@@ -98,7 +98,8 @@ pub enum RegisterError {
     },
     /// Relief and print show different characters, or the evidence for the best pose is too weak.
     #[error(
-        "relief and print do not match: confidence {confidence:.2} in the pose is below register.min_confidence {needs}; {seen}"
+        "relief and print do not match: confidence {:.2} in the pose is below register.min_confidence {needs}; {seen}",
+        rounded_down(*.confidence)
     )]
     NoMatch {
         /// Probability that the best pose is right.
@@ -108,6 +109,11 @@ pub enum RegisterError {
         /// What is unusual.
         seen: Observation,
     },
+}
+
+/// Rounds down to two decimals, so that what is below a bound is written so.
+fn rounded_down(value: f64) -> f64 {
+    (100.0 * value).floor() / 100.0
 }
 
 /// Largest ratio that is given as a number. A larger ratio means that the upright relief does not match at all.

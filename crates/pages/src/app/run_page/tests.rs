@@ -126,6 +126,17 @@ fn a_project_of_blocks_alone_can_be_run() {
     assert!(shown.contains("Align 1 block<"), "{shown}");
     assert!(!shown.contains("disabled"), "{shown}");
     run.blocks = BlockStatus(Vec::new());
+    run.counts.pairs = 0;
     let shown = controls(&visit(Language::English), &run).into_string();
     assert!(shown.contains("disabled"), "{shown}");
+}
+
+#[test]
+fn a_finished_project_can_be_searched_for_changed_files() {
+    let mut run = running(Vec::new());
+    run.is_running = false;
+    run.counts.jobs = BTreeMap::from([(JobStatus::Done, 20)]);
+    let shown = controls(&visit(Language::English), &run).into_string();
+    assert!(shown.contains("Look for changed files"), "{shown}");
+    assert!(!shown.contains("disabled"), "{shown}");
 }
