@@ -19,12 +19,19 @@ function showProblem(form, text) {
   problem.hidden = !text;
 }
 
+/** Returns the name under which this tab keeps the pairs that a form sends, if it sends any. */
+function keptName(form) {
+  return form.closest("[data-chosen]")?.dataset.chosen;
+}
+
 /** Sends an action. Its reply says which page follows. */
 async function send(form, button) {
+  const kept = keptName(form);
+  const pairs = kept && { pairs: JSON.parse(sessionStorage.getItem(kept) ?? "[]") };
   const response = await fetch(form.dataset.post, {
     method: "POST",
     headers: { "content-type": "application/json", "x-csrf-token": token },
-    body: JSON.stringify(fields(form, button)),
+    body: JSON.stringify({ ...fields(form, button), ...pairs }),
   });
   const text = await response.text();
   let reply = {};
@@ -34,6 +41,7 @@ async function send(form, button) {
     reply = { error: text };
   }
   if (!response.ok) throw new Error(reply.error || text || response.statusText);
+  if (kept) sessionStorage.removeItem(kept);
   return reply;
 }
 

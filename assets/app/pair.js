@@ -1,25 +1,41 @@
-// The pictures of a pair: one is shown large, and print and relief can blink. Arrow keys lead to the neighbours.
+// The pictures of a pair: one is shown large, under one metric or two. Print and relief, or the two metrics, can blink. Arrow
+// keys lead to the neighbours.
 
 const BLINK_MS = 600;
 const stage = document.getElementById("stage");
+const other = document.getElementById("other-stage");
 const blink = document.getElementById("blink");
 const layers = [...document.querySelectorAll("[data-layer]")];
+const captions = [...document.querySelectorAll("figcaption")].map((caption) => caption.textContent);
 let timer = 0;
 
 function show(layer) {
   for (const button of layers) button.setAttribute("aria-pressed", String(button === layer));
   stage.src = layer.dataset.src;
   stage.alt = layer.textContent.trim();
+  if (!other) return;
+  other.src = layer.dataset.other;
+  other.alt = stage.alt;
+  caption(0);
+}
+
+function caption(metric) {
+  stage.parentElement.querySelector("figcaption").textContent = captions[metric];
 }
 
 function layerNamed(name) {
   return layers.find((button) => button.dataset.layer === name);
 }
 
+function pressed() {
+  return layers.find((button) => button.getAttribute("aria-pressed") === "true");
+}
+
 function stopBlinking() {
   clearInterval(timer);
   timer = 0;
   blink?.setAttribute("aria-pressed", "false");
+  if (other) show(pressed());
 }
 
 function toggleBlinking() {
@@ -28,10 +44,16 @@ function toggleBlinking() {
     return;
   }
   blink.setAttribute("aria-pressed", "true");
-  let isPrint = true;
+  let isFirst = true;
   const turn = () => {
-    show(layerNamed(isPrint ? "print" : "relief"));
-    isPrint = !isPrint;
+    if (other) {
+      // The first picture changes; the second one stays beside it.
+      stage.src = isFirst ? pressed().dataset.other : pressed().dataset.src;
+      caption(Number(isFirst));
+    } else {
+      show(layerNamed(isFirst ? "print" : "relief"));
+    }
+    isFirst = !isFirst;
   };
   turn();
   timer = setInterval(turn, BLINK_MS);

@@ -138,6 +138,10 @@ fn no_written_page_has_a_fault() {
     for (path, shown) in [
         ("report.html", "document.querySelector('figure.item')"),
         (
+            "viewer/index.html",
+            "document.querySelector('li img')?.naturalWidth",
+        ),
+        (
             "viewer/pairs/upright-0001/viewer.html",
             "window.mocbanViewer",
         ),

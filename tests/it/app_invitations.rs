@@ -176,6 +176,34 @@ fn a_new_link_ends_the_session_before_and_a_withdrawn_one_ends() {
 }
 
 #[test]
+fn the_page_shows_how_far_each_guest_is() {
+    let (_dir, page) = start_entered();
+    let guest = open(&invite(&page, "lan")[0]);
+    let shown = || text(&page.get("/p/p/review"));
+    let items = guest.queue();
+    let count = items.len();
+    let answered = |number: usize| format!("Answered: <b>{number}</b> / {count}");
+    assert!(shown().contains(&answered(0)), "{}", shown());
+    assert!(shown().contains("Last seen: <time"), "{}", shown());
+    for (number, item) in items.iter().enumerate() {
+        let event = format!("e-{number}");
+        let reply = guest.post("/api/answer", &answer(&event, item, "pass"));
+        assert_eq!(reply.expect("a reply").status, 200);
+        let html = shown();
+        assert!(html.contains(&answered(number + 1)), "{html}");
+        assert_eq!(html.contains("finished"), number + 1 == count, "{html}");
+    }
+    let undo = json!({"event": format!("e-{}", count - 1)});
+    let reply = guest.post("/api/undo", &undo).expect("a reply");
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    assert!(shown().contains(&answered(count - 1)), "{}", shown());
+    assert!(!shown().contains("finished"));
+    // One who was invited and did not come yet.
+    invite(&page, "minh");
+    assert_eq!(shown().matches("Last seen").count(), 1);
+}
+
+#[test]
 fn answers_of_a_guest_wait_while_another_project_is_in_its_place() {
     let (dir, page) = start_entered();
     let guest = open(&invite(&page, "lan")[0]);

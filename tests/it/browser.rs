@@ -15,6 +15,9 @@ const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chro
 /// Maximum time until a condition holds.
 const TIMEOUT_MS: u32 = 60_000;
 
+/// The key Shift in events.
+const SHIFT: u8 = 8;
+
 /// A running browser.
 pub(crate) struct Browser {
     child: Child,
@@ -327,6 +330,56 @@ impl Tab<'_> {
             event["windowsVirtualKeyCode"] = json!(27);
         }
         self.call("Input.dispatchKeyEvent", &event);
+    }
+
+    /// Presses and releases a key of the keyboard as a person does, with Shift or without, so that controls react to it.
+    pub(crate) fn press(&self, code: &str, with_shift: bool) {
+        let (key, number) = match code {
+            "Space" => (" ", 32),
+            "ArrowLeft" => (code, 37),
+            "ArrowUp" => (code, 38),
+            "ArrowRight" => (code, 39),
+            "ArrowDown" => (code, 40),
+            other => panic!("no test presses {other}"),
+        };
+        for kind in ["rawKeyDown", "keyUp"] {
+            let event = json!({
+                "type": kind, "code": code, "key": key, "windowsVirtualKeyCode": number,
+                "modifiers": SHIFT * u8::from(with_shift),
+            });
+            self.call("Input.dispatchKeyEvent", &event);
+        }
+    }
+
+    /// Clicks into the middle of an element, with Shift or without.
+    pub(crate) fn click(&self, element: &str, with_shift: bool) {
+        let [x, y] = self.middle(element);
+        for kind in ["mousePressed", "mouseReleased"] {
+            let params = json!({
+                "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1,
+                "modifiers": SHIFT * u8::from(with_shift),
+            });
+            self.call("Input.dispatchMouseEvent", &params);
+        }
+    }
+
+    /// Taps on the middle of an element.
+    pub(crate) fn tap(&self, element: &str) {
+        let middle = [self.middle(element)];
+        self.touch(&middle, &middle);
+    }
+
+    /// Returns the middle of an element after it was scrolled into the middle of the window.
+    fn middle(&self, element: &str) -> [f64; 2] {
+        let middle = self.eval(&format!(
+            "(() => {{
+                const element = document.querySelector(`{element}`);
+                element.scrollIntoView({{ block: 'center' }});
+                const bounds = element.getBoundingClientRect();
+                return [bounds.x + bounds.width / 2, bounds.y + bounds.height / 2];
+            }})()"
+        ));
+        [0, 1].map(|index| middle[index].as_f64().expect("a number"))
     }
 
     /// Types text into the focused element.

@@ -8,6 +8,9 @@ mod all_pages;
 mod app;
 mod app_blocks;
 mod app_browser;
+mod app_choice;
+mod app_choice_browser;
+mod app_export_zip;
 mod app_invitations;
 mod app_sentences;
 #[cfg(target_os = "linux")]

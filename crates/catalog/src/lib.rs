@@ -92,12 +92,13 @@ pub use records::append_verdicts::{ImportedVerdicts, ListedVerdict};
 pub use records::checksums::ChecksummedTable;
 pub use records::faulty_rows::{FaultyRow, RowFault};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, ImportTerms, PairChange};
+pub use records::listed_names::ListedNames;
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageCounts,
     StageRecord, StatusCounts, StoredFailure,
 };
-pub use records::pair_list::{PairCursor, PairFilter, PairListPage, PairOrder};
+pub use records::pair_list::{MetricDifference, PairCursor, PairFilter, PairListPage, PairOrder};
 pub use records::pair_results::ResultPages;
 pub use records::pair_work::{KnownInputs, PairWork};
 pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};

@@ -15,12 +15,12 @@ use crate::queue::recovery;
 use crate::queue::requeue;
 use crate::queue::staleness;
 use crate::queue::workers;
-use crate::records::pair_list;
 use crate::records::pair_results;
 use crate::records::pair_work;
 use crate::records::stage_results;
 use crate::records::status;
 use crate::records::verdicts;
+use crate::records::{listed_names, pair_list};
 
 /// Returns the lines of the query plan.
 async fn plan(sql: impl Into<Sql>) -> Vec<String> {
@@ -211,6 +211,7 @@ async fn lists_of_pairs_read_part_of_an_index_in_its_order() {
         let sorts = plan.iter().any(|line| line.contains("TEMP B-TREE"));
         assert!(!sorts, "{name}: {plan:?}");
     }
+    assert_only(&plan(listed_names::NAMES).await, &["VIRTUAL TABLE"]);
 }
 
 /// Asserts that the plan contains only allowed scans.

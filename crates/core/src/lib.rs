@@ -5,6 +5,7 @@
 //! - [`raster`]: grids, masks, depth maps and print images, with decoders of PNG, JPEG and TIFF, and warps
 //! - [`page_vec`]: vectors on huge pages, with a cache of freed pages
 //! - [`simd`]: dispatch to the widest vector instructions of the processor
+//! - [`zip_records`]: the records of ZIP archives
 //!
 //! **Invariant:** no file is opened here, no clock is read and nothing is asynchronous. Readers and decoders take bytes,
 //! so each function returns the same for the same arguments.
@@ -15,5 +16,6 @@ pub mod mesh;
 pub mod page_vec;
 pub mod raster;
 pub mod simd;
+pub mod zip_records;
 
 pub use input_limits::InputLimits;

@@ -8,6 +8,7 @@
 //! - `block_lines.rs`, `block_grid.rs` and `page_labels.rs` write whole blocks, their maps and their boxes
 //! - `pictures` and `contact_sheet.rs` draw overlays and sheets; `block_view` draws any part of a page, of its relief, or of
 //!   both
+//! - `zip_folder.rs` writes an export as one ZIP archive
 //! - `scan_view` encodes a scan in the frame of its print for the viewer, on pages of a server and in files
 //!
 //! Every call fails if the catalog, an input or an artifact cannot be read, or the output cannot be written. `# Errors` names
@@ -50,6 +51,7 @@ mod source_print;
 mod split;
 mod stage_outcomes;
 mod table_columns;
+mod zip_folder;
 
 pub use alignment_files::{ALIGNMENT_FILES, alignment_files};
 pub use contact_sheet::{
@@ -69,3 +71,4 @@ pub use record::{
 };
 pub use source_print::{SourcePrint, SourcePrintError};
 pub use split::{SplitBy, SplitCounts, SplitSettings, SplitShares};
+pub use zip_folder::{ExportVersion, FolderZip, FolderZipError, zip_size};

@@ -1,5 +1,7 @@
 //! What to export: metrics, results, pictures and splits.
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 use serde_json::Value;
 
@@ -7,7 +9,7 @@ use super::format::ExportFormat;
 use super::split::SplitSettings;
 use mocban_catalog::MetricRecord;
 use mocban_core::InputLimits;
-use mocban_core::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
+use mocban_core::domain::{MetricOutcome, PairName, ThresholdMetric, Verdict, enum_names};
 use mocban_results::Consensus;
 
 /// Default size of shards in MiB.
@@ -40,6 +42,9 @@ enum_names! {
 pub struct ExportOptions {
     /// Metrics to export. A pair without a result still has one line for each of these metrics.
     pub metrics: Vec<ThresholdMetric>,
+    /// The only pairs that are exported; `None` for all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pairs: Option<BTreeSet<PairName>>,
     /// Which results are exported.
     pub only: ResultFilter,
     /// Lowest confidence of exported results, 0..=1.
@@ -82,6 +87,7 @@ impl ExportOptions {
     pub fn all_of(metrics: &[ThresholdMetric], limits: InputLimits) -> Self {
         Self {
             metrics: metrics.to_vec(),
+            pairs: None,
             only: ResultFilter::All,
             min_confidence: None,
             canvas_px: None,
@@ -166,7 +172,18 @@ impl ExportOptions {
 
     /// Returns whether pairs and results may be left out.
     pub fn is_filtered(&self) -> bool {
+        self.selects_results() || self.pairs.is_some()
+    }
+
+    /// Returns whether pairs without a selected result are left out.
+    fn selects_results(&self) -> bool {
         self.only != ResultFilter::All || self.min_confidence.is_some()
+    }
+
+    /// Returns whether a pair with these selected results is exported.
+    pub(super) fn keeps_pair(&self, name: &PairName, kept: &[&MetricRecord]) -> bool {
+        let is_chosen = self.pairs.as_ref().is_none_or(|pairs| pairs.contains(name));
+        is_chosen && !(self.selects_results() && kept.is_empty())
     }
 
     /// Returns whether a result is exported.

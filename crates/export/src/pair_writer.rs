@@ -85,7 +85,7 @@ impl PairWriter<'_> {
             .iter()
             .filter(|record| options.keeps(record))
             .collect();
-        if options.is_filtered() && kept.is_empty() {
+        if !options.keeps_pair(&pair.attributes.name, &kept) {
             return Ok(None);
         }
         let complete = |mut record: PairRecord| {

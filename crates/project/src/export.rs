@@ -42,6 +42,7 @@ pub async fn export(
     let is_chosen = |metric: &&ThresholdMetric| chosen.is_empty() || chosen.contains(metric);
     options.metrics = computed.iter().filter(is_chosen).copied().collect();
     options.settings = config.that_change_results()?;
+    let are_pairs_chosen = options.pairs.is_some();
     let checked = options.check(formats);
     checked.map_err(|unused| Refusal::Usage(unused.to_string()))?;
     warn_about_stale(&catalog, location, listener).await?;
@@ -51,10 +52,12 @@ pub async fn export(
     let summary = summary?;
     catalog.close().await;
     if summary.is_nothing_selected {
-        let text = format!(
-            "no result is selected by --only or --min-confidence; nothing was written to {}",
-            output.display()
-        );
+        let nothing = if are_pairs_chosen {
+            "none of the chosen pairs has a result to export"
+        } else {
+            "no result is selected by --only or --min-confidence"
+        };
+        let text = format!("{nothing}; nothing was written to {}", output.display());
         return Err(Refusal::NothingSelected(text).into());
     }
     warn_about_set_apart(listener, &summary.set_apart);

@@ -7,7 +7,7 @@ use crate::exit::Refusal;
 use crate::location::{Location, now};
 use crate::selection;
 use mocban_catalog::{Catalog, CatalogError};
-use mocban_core::domain::{PairName, UnixMillis};
+use mocban_core::domain::{PairName, RetireCause, UnixMillis};
 
 /// What became of some pairs.
 #[derive(Debug)]
@@ -16,6 +16,8 @@ pub struct RetireOutcome {
     pub names: Vec<PairName>,
     /// How many of them changed.
     pub changed: u64,
+    /// When they were retired. `None` if they were brought back.
+    pub at: Option<UnixMillis>,
     /// Why pairs did not come back, one line each.
     pub warnings: Vec<String>,
 }
@@ -27,12 +29,15 @@ pub enum RetireChoice {
     Ids(Vec<String>),
     /// The pairs that the newest import of a list or of folders added. With a time, only if that import was then.
     LastImport(Option<UnixMillis>),
+    /// The pairs that a person retired at this time, which are brought back.
+    RetiredAt(UnixMillis),
 }
 
 impl RetireChoice {
     async fn names(&self, catalog: &Catalog) -> ProjectResult<Vec<PairName>> {
         let at = match self {
             Self::Ids(typed) => return selection::known_pairs_of(catalog, typed).await,
+            Self::RetiredAt(at) => return retired_at(catalog, *at).await,
             Self::LastImport(at) => *at,
         };
         let added = catalog.last_import().await?;
@@ -51,7 +56,7 @@ impl RetireChoice {
     /// others were retired for their own reasons.
     async fn names_to_restore(&self, catalog: &Catalog) -> ProjectResult<Vec<PairName>> {
         let names = self.names(catalog).await?;
-        if matches!(self, Self::Ids(_)) {
+        if !matches!(self, Self::LastImport(_)) {
             return Ok(names);
         }
         let names: BTreeSet<PairName> = names.into_iter().collect();
@@ -67,11 +72,13 @@ impl RetireChoice {
 pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
     let names = choice.names(&catalog).await?;
-    let changed = catalog.retire_pairs(&names, now()).await?;
+    let at = now();
+    let changed = catalog.retire_pairs(&names, at).await?;
     catalog.close().await;
     Ok(RetireOutcome {
         names,
         changed,
+        at: Some(at),
         warnings: Vec::new(),
     })
 }
@@ -96,8 +103,16 @@ pub async fn undo(choice: &RetireChoice, location: &Location) -> ProjectResult<R
     Ok(RetireOutcome {
         names,
         changed,
+        at: None,
         warnings,
     })
+}
+
+/// Returns the pairs that a person retired at a time.
+pub async fn retired_at(catalog: &Catalog, at: UnixMillis) -> ProjectResult<Vec<PairName>> {
+    let mut retired = catalog.retired_pairs().await?;
+    retired.retain(|pair| pair.at == at && pair.cause == RetireCause::Person);
+    Ok(retired.into_iter().map(|pair| pair.name).collect())
 }
 
 /// Returns the pairs among `names` that are retired.

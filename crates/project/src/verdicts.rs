@@ -92,12 +92,12 @@ pub async fn import(
     let outcome = "no verdict was recorded";
     let is_jsonl = files::is_jsonl(file, &bytes);
     let list = VerdictList::new(bytes, is_jsonl).map_err(|error| error.in_file(file, outcome))?;
-    let ListedNames {
+    let NamesInList {
         first_lines,
         current_lines,
         reviewers,
         mut refused,
-    } = ListedNames::read(&list);
+    } = NamesInList::read(&list);
     let names: Vec<_> = first_lines.keys().cloned().collect();
     let unknown = catalog.unknown_names(&names).await?;
     if !unknown.is_empty() {
@@ -131,7 +131,7 @@ pub async fn import(
 
 /// Names in a list of verdicts, and its refused lines.
 #[derive(Debug, Default)]
-struct ListedNames {
+struct NamesInList {
     /// The first line of each pair.
     first_lines: BTreeMap<PairName, usize>,
     /// The first lines with verdicts on the current results, whatever these are.
@@ -140,7 +140,7 @@ struct ListedNames {
     refused: Vec<RefusedLine>,
 }
 
-impl ListedNames {
+impl NamesInList {
     fn read(list: &VerdictList) -> Self {
         let mut names = Self::default();
         for row in list.rows() {

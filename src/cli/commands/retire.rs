@@ -33,6 +33,7 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
         names,
         changed,
         warnings,
+        at: _,
     } = if args.undo {
         retire::undo(&choice, &context.location).await?
     } else {

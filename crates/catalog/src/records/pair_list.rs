@@ -4,20 +4,16 @@
 use std::cmp::Ordering;
 
 use crate::db::conn::Conn;
-use crate::db::query::{query_as, query_scalar};
+use crate::db::query::query_as;
 use crate::db::row::from_row;
 use crate::records::model::PairResults;
 use crate::records::reviewer_names::Spellings;
 use crate::records::status::{from_current_verdicts, person};
 use crate::{Catalog, Result};
-use mocban_core::domain::{
-    FailureClass, JobStatus, PairName, ThresholdMetric, UnixMillis, Verdict, enum_names,
-};
+use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict, enum_names};
 
 /// Maximum number of pairs that are looked at for one page.
 const MAX_SCANNED: usize = 4000;
-/// How many attempts are searched for the latest results.
-const RECENT_ATTEMPTS: usize = 2000;
 
 /// The order of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -52,7 +48,7 @@ impl PairOrder {
 }
 
 /// Which pairs are in a list. All conditions must hold.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PairFilter {
     /// Status of the job; with several, one of them.
     pub statuses: Vec<JobStatus>,
@@ -68,6 +64,17 @@ pub struct PairFilter {
     pub block: Option<String>,
     /// The character.
     pub character: Option<String>,
+    /// A metric whose IoU differs from that of the metric of the list.
+    pub differs: Option<MetricDifference>,
+}
+
+/// By how much the results of a pair under two metrics must differ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MetricDifference {
+    /// The other metric.
+    pub from: ThresholdMetric,
+    /// Smallest difference of IoU, above 0.
+    pub min_iou: f64,
 }
 
 /// Where a page of a list begins: behind the pair with this key.
@@ -92,8 +99,8 @@ pub struct PairListPage {
 
 /// A pair as found by a source.
 #[derive(Debug, Clone, Copy)]
-struct ListedRow {
-    id: i64,
+pub(super) struct ListedRow {
+    pub(super) id: i64,
     confidence: Option<f64>,
     iou: Option<f64>,
     passes: bool,
@@ -115,12 +122,14 @@ macro_rules! listed {
         AND (?11 = 0 OR NOT EXISTS (SELECT 1 ",
             from_current_verdicts!(),
             " AND v.pair = c.id AND v.metric = ?5))
-        AND (?12 = 0 OR j.status = 3 AND j.low_confidence = 1) AND (?13 = 0 OR j.status = 3) THEN 1 ELSE 0 END AS passes
+        AND (?12 = 0 OR j.status = 3 AND j.low_confidence = 1) AND (?13 = 0 OR j.status = 3)
+        AND (?14 IS NULL OR j.status = 3 AND abs(m.iou - o.iou) >= ?15) THEN 1 ELSE 0 END AS passes
 FROM (",
             $source,
             " LIMIT ?4) AS c CROSS JOIN pair AS p ON p.id = c.id LEFT JOIN job AS j ON j.pair = c.id
     LEFT JOIN failure AS f ON f.pair = c.id AND j.status = 4
-    LEFT JOIN metric_result AS m ON m.pair = c.id AND m.metric = ?5"
+    LEFT JOIN metric_result AS m ON m.pair = c.id AND m.metric = ?5
+    LEFT JOIN metric_result AS o ON o.pair = c.id AND o.metric = ?14"
         )
     };
 }
@@ -152,21 +161,6 @@ const BY_IOU: &str = listed!(
 const BY_IOU_DOWN: &str = listed!(
     "SELECT pair AS id FROM metric_result WHERE metric = ?5 AND (iou, pair) < (-?2, -?3) ORDER BY iou DESC, pair DESC"
 );
-
-/// Pairs whose last stage was stored most recently, the newest first.
-const RECENT: &str = "
-SELECT pair FROM attempt WHERE stage = 3 AND class IS NULL AND id > (SELECT coalesce(max(id), 0) - ?1 FROM attempt)
-ORDER BY id DESC LIMIT ?2";
-
-const LAST_ATTEMPT: &str = "SELECT at FROM attempt ORDER BY id DESC LIMIT 1";
-
-/// The pairs before and after a name.
-const NEIGHBOURS: [&str; 2] = [
-    "SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id WHERE p.name < ?1 ORDER BY p.name DESC LIMIT 1",
-    "SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id WHERE p.name > ?1 ORDER BY p.name LIMIT 1",
-];
-
-const NEXT_BLOCK: &str = "SELECT min(block) FROM pair WHERE block > ?1";
 
 /// Returns every statement of this list, with a name.
 #[cfg(test)]
@@ -228,14 +222,28 @@ const fn sorted_source(order: PairOrder) -> &'static str {
 }
 
 /// What a list is read with.
-struct ListReader<'l> {
+pub(super) struct ListReader<'l> {
     filter: &'l PairFilter,
     order: PairOrder,
     metric: ThresholdMetric,
     renamed: String,
 }
 
-impl ListReader<'_> {
+impl<'l> ListReader<'l> {
+    pub(super) async fn new(
+        conn: &mut Conn,
+        filter: &'l PairFilter,
+        order: PairOrder,
+        metric: ThresholdMetric,
+    ) -> Result<Self> {
+        Ok(Self {
+            filter,
+            order,
+            metric,
+            renamed: Spellings::read(conn).await?.renamed(),
+        })
+    }
+
     /// Reads at most `limit` rows of a source behind a pair.
     async fn read(
         &self,
@@ -274,7 +282,9 @@ impl ListReader<'_> {
             .bind(i64::from(filter.is_unjudged))
             .bind(i64::from(filter.is_low_confidence))
             // The scores of a pair that runs again are those of its last result.
-            .bind(i64::from(self.order != PairOrder::Imported));
+            .bind(i64::from(self.order != PairOrder::Imported))
+            .bind(filter.differs.map(|differs| differs.from.name()))
+            .bind(filter.differs.map_or(0.0, |differs| differs.min_iou));
         query.fetch_all(conn).await
     }
 
@@ -324,7 +334,7 @@ impl ListReader<'_> {
     }
 
     /// Returns the next pairs of the list, and where to continue. Reads more and more rows until the page is full.
-    async fn page(
+    pub(super) async fn page(
         &self,
         conn: &mut Conn,
         mut after: Option<PairCursor>,
@@ -384,12 +394,7 @@ impl Catalog {
         size: usize,
     ) -> Result<PairListPage> {
         let mut conn = self.snapshot().await?;
-        let reader = ListReader {
-            filter,
-            order,
-            metric,
-            renamed: Spellings::read(&mut conn).await?.renamed(),
-        };
+        let reader = ListReader::new(&mut conn, filter, order, metric).await?;
         let (rows, next, scanned) = reader.page(&mut conn, after, size).await?;
         let ids: Vec<i64> = rows.iter().map(|row| row.id).collect();
         Ok(PairListPage {
@@ -397,52 +402,5 @@ impl Catalog {
             next,
             scanned,
         })
-    }
-
-    /// Returns the pairs whose last stage was stored most recently, the newest first.
-    pub async fn recent_results(&self, limit: usize) -> Result<Vec<PairResults>> {
-        let mut conn = self.snapshot().await?;
-        let query = query_as(RECENT).bind(RECENT_ATTEMPTS as i64);
-        let ids: Vec<(i64,)> = query.bind(limit as i64).fetch_all(&mut conn).await?;
-        let mut distinct: Vec<i64> = Vec::new();
-        for (id,) in ids {
-            if !distinct.contains(&id) {
-                distinct.push(id);
-            }
-        }
-        self.results_of(&mut conn, &distinct).await
-    }
-
-    /// Returns when the last attempt at a stage ended.
-    pub async fn last_activity(&self) -> Result<Option<UnixMillis>> {
-        let mut conn = self.read_conn().await?;
-        query_scalar(LAST_ATTEMPT).fetch_optional(&mut conn).await
-    }
-
-    /// Returns the names of the pairs before and after a pair, by name.
-    pub async fn pair_neighbours(&self, name: &PairName) -> Result<[Option<PairName>; 2]> {
-        let mut conn = self.read_conn().await?;
-        let mut found = [None, None];
-        for (neighbour, sql) in found.iter_mut().zip(NEIGHBOURS) {
-            let query = query_scalar(sql).bind(name.as_str());
-            *neighbour = query.fetch_optional(&mut conn).await?;
-        }
-        Ok(found)
-    }
-
-    /// Returns the first blocks that lists of pairs name, sorted.
-    pub async fn first_listed_blocks(&self, limit: usize) -> Result<Vec<String>> {
-        let mut conn = self.snapshot().await?;
-        let mut blocks: Vec<String> = Vec::new();
-        while blocks.len() < limit {
-            let last = blocks.last().map_or("", String::as_str);
-            let next: Vec<(Option<String>,)> =
-                query_as(NEXT_BLOCK).bind(last).fetch_all(&mut conn).await?;
-            match next.into_iter().next() {
-                Some((Some(block),)) => blocks.push(block),
-                _ => break,
-            }
-        }
-        Ok(blocks)
     }
 }

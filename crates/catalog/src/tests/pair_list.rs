@@ -2,7 +2,8 @@
 
 use super::{Place, World, done, name, row};
 use crate::{
-    CheckpointOutcome, ImportRow, NewVerdict, PairCursor, PairFilter, PairOrder, StageCheckpoint,
+    CheckpointOutcome, ImportRow, ListedNames, MetricDifference, NewVerdict, PairCursor,
+    PairFilter, PairOrder, StageCheckpoint,
 };
 use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict};
 
@@ -38,7 +39,8 @@ fn confidence(n: usize) -> f64 {
 fn with_scores(mut checkpoint: StageCheckpoint, n: usize) -> StageCheckpoint {
     for metric in &mut checkpoint.metrics {
         metric.outcome.confidence = Some(confidence(n));
-        metric.outcome.scores.iou = n as f64 / 100.0;
+        let is_other = metric.outcome.metric == ThresholdMetric::Density;
+        metric.outcome.scores.iou = n as f64 / if is_other { 50.0 } else { 100.0 };
     }
     checkpoint
 }
@@ -183,4 +185,56 @@ async fn the_latest_results_come_first() {
     assert_eq!(names, ["p003", "p002", "p001"]);
     let blocks = world.catalog.first_listed_blocks(9).await.expect("blocks");
     assert_eq!(blocks, ["b0", "b1"]);
+}
+
+#[tokio::test]
+async fn pairs_whose_metrics_differ_are_found() {
+    let world = world(14, 11).await;
+    let filter = PairFilter {
+        differs: Some(MetricDifference {
+            from: ThresholdMetric::Density,
+            min_iou: 0.065,
+        }),
+        ..PairFilter::default()
+    };
+    let found = listed(&world, &filter, PairOrder::Imported, 2).await;
+    assert_eq!(found, [7, 8, 9, 10]);
+    let found = listed(&world, &filter, PairOrder::HighestIou, 3).await;
+    assert_eq!(found, [10, 9, 8, 7]);
+    let same = PairFilter {
+        differs: Some(MetricDifference {
+            from: ThresholdMetric::Relief,
+            min_iou: 0.001,
+        }),
+        ..PairFilter::default()
+    };
+    let found = listed(&world, &same, PairOrder::Imported, 50).await;
+    assert_eq!(found, [0; 0]);
+}
+
+#[tokio::test]
+async fn the_names_of_a_list_are_all_or_none() {
+    let world = world(14, 11).await;
+    let names = async |filter: &PairFilter, order, limit| {
+        let metric = ThresholdMetric::Ensemble;
+        let found = world.catalog.listed_names(filter, order, metric, limit);
+        found.await.expect("names")
+    };
+    let filter = PairFilter {
+        block: Some("b1".to_owned()),
+        ..PairFilter::default()
+    };
+    let expected = [1, 3, 5, 7, 9].map(|n| name(&format!("p{n:03}"))).to_vec();
+    for limit in [5, 6, 100] {
+        let found = names(&filter, PairOrder::HighestIou, limit).await;
+        assert_eq!(found, ListedNames::All(expected.clone()), "{limit}");
+    }
+    for limit in [1, 4] {
+        let found = names(&filter, PairOrder::HighestIou, limit).await;
+        assert_eq!(found, ListedNames::TooMany, "{limit}");
+    }
+    let found = names(&PairFilter::default(), PairOrder::Imported, 13).await;
+    assert_eq!(found, ListedNames::TooMany);
+    let found = names(&PairFilter::default(), PairOrder::Imported, 14).await;
+    assert!(matches!(found, ListedNames::All(all) if all.len() == 14));
 }

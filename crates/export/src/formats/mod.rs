@@ -9,6 +9,7 @@ mod mesh;
 mod parquet;
 mod single_results;
 mod viewer;
+mod viewer_index;
 mod webdataset;
 
 #[cfg(test)]
@@ -32,7 +33,7 @@ pub(super) fn begin(
         ExportFormat::WebDataset => Box::new(webdataset::WebDatasetWriter::begin(folder)?),
         ExportFormat::Mesh => single_result::<mesh::PlacedScanFormat>(&folder)?,
         ExportFormat::Fiji => single_result::<fiji::FijiFormat>(&folder)?,
-        ExportFormat::Viewer => single_result::<viewer::ViewerFormat>(&folder)?,
+        ExportFormat::Viewer => Box::new(viewer::ViewerWriter::begin(&folder)?),
         ExportFormat::Annotations => Box::new(annotations::AnnotationWriter::begin(folder)?),
     })
 }

@@ -3,24 +3,16 @@
 use std::collections::BTreeMap;
 use std::io::Read as _;
 
-use flate2::Crc;
 use flate2::read::DeflateDecoder;
 
 use super::error::WorkbookError;
+use mocban_core::zip_records::{Crc, END, END_BYTES, ENTRY, ENTRY_BYTES, FILE, FILE_BYTES};
 
 /// Largest size of a file after decompression, in bytes. Less in tests, which are not optimized.
 const MAX_PART_BYTES: u64 = if cfg!(test) { 4 << 20 } else { 256 << 20 };
 /// Maximum number of files. A workbook has a few for each sheet.
 const MAX_FILES: usize = 10_000;
 
-/// Signatures of the end of the archive, of an entry of its directory, and of a file.
-const END: &[u8] = b"PK\x05\x06";
-const ENTRY: &[u8] = b"PK\x01\x02";
-const FILE: &[u8] = b"PK\x03\x04";
-/// Lengths of these records without names and comments, in bytes.
-const END_BYTES: usize = 22;
-const ENTRY_BYTES: usize = 46;
-const FILE_BYTES: usize = 30;
 /// Longest comment at the end of an archive, in bytes.
 const MAX_COMMENT: usize = u16::MAX as usize;
 
@@ -150,5 +142,37 @@ fn offset(bytes: &[u8], at: usize) -> Result<usize, WorkbookError> {
     match number32(bytes, at)? {
         u32::MAX => Err(damaged("it is an archive of more than 4 GiB")),
         number => Ok(number as usize),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mocban_core::zip_records::{ArchiveLayout, Crc, StoredFile};
+
+    use super::Archive;
+
+    #[test]
+    fn a_stored_archive_is_read_back() {
+        let long = format!("{}/chữ số 1.csv", "x".repeat(300));
+        let files = [("a.txt", ""), ("b/ể.json", "{}"), (long.as_str(), "1,2\n")];
+        let mut layout = ArchiveLayout::default();
+        let (mut bytes, mut directory) = (Vec::new(), Vec::new());
+        for (name, content) in files {
+            let mut crc = Crc::new();
+            crc.update(content.as_bytes());
+            let (size, crc) = (content.len() as u64, crc.sum());
+            let file = StoredFile { name, size, crc };
+            bytes.extend(file.record());
+            bytes.extend(content.as_bytes());
+            directory.extend(layout.add(&file));
+        }
+        bytes.extend(directory);
+        bytes.extend(layout.end());
+        assert_eq!(layout.size(), bytes.len() as u64);
+        let read = Archive::open(&bytes).expect("an archive");
+        for (name, content) in files {
+            let found = read.text(name).expect("readable");
+            assert_eq!(found.as_deref(), Some(content), "{name}");
+        }
     }
 }

@@ -8,7 +8,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, content type and text of an asset.
-const ASSETS: [(&str, &str, &str); 4] = [
+const ASSETS: [(&str, &str, &str); 5] = [
     (
         "tokens.css",
         STYLE,
@@ -23,6 +23,11 @@ const ASSETS: [(&str, &str, &str); 4] = [
         "app.js",
         SCRIPT,
         include_str!("../../../../assets/app/app.js"),
+    ),
+    (
+        "choose.js",
+        SCRIPT,
+        include_str!("../../../../assets/app/choose.js"),
     ),
     (
         "pair.js",

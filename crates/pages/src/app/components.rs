@@ -156,6 +156,16 @@ pub(super) fn grouped(number: u64) -> String {
     text
 }
 
+/// Returns a number of bytes as a person reads it.
+pub(super) fn file_size(bytes: u64) -> String {
+    match bytes {
+        0..=9_999 => format!("{bytes} B"),
+        10_000..=999_999 => format!("{} kB", bytes / 1000),
+        1_000_000..=9_999_999_999 => format!("{:.1} MB", bytes as f64 / 1e6),
+        _ => format!("{} GB", grouped(bytes / 1_000_000_000)),
+    }
+}
+
 /// Returns the rows of a list of files with a scan and its unit.
 pub(super) fn scan_file(visit: &Visit, path: &str, unit: Option<LengthUnit>) -> Markup {
     html! {
@@ -173,6 +183,21 @@ pub(super) fn score(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.3}"))
 }
 
+/// Returns a number minus another one with its sign, or a dash if one is missing.
+pub(super) fn difference(value: Option<f64>, other: Option<f64>, digits: usize) -> String {
+    let Some((value, other)) = value.zip(other) else {
+        return "–".to_owned();
+    };
+    let text = format!("{:+.digits$}", value - other);
+    let is_zero = text
+        .bytes()
+        .all(|byte| matches!(byte, b'+' | b'-' | b'0' | b'.'));
+    if is_zero {
+        return text[1..].to_owned();
+    }
+    text.replace('-', "−")
+}
+
 /// Returns an option of a choice.
 pub(super) fn choice(value: &str, text: &str, selected: Option<&str>) -> Markup {
     html! {
@@ -182,7 +207,7 @@ pub(super) fn choice(value: &str, text: &str, selected: Option<&str>) -> Markup 
 
 #[cfg(test)]
 mod tests {
-    use super::{grouped, score};
+    use super::{difference, grouped, score};
 
     #[test]
     fn numbers_are_grouped() {
@@ -190,5 +215,9 @@ mod tests {
         assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(score(Some(0.98765)), "0.988");
         assert_eq!(score(None), "–");
+        assert_eq!(difference(Some(0.5), Some(0.75), 3), "−0.250");
+        assert_eq!(difference(Some(9.0), Some(2.5), 1), "+6.5");
+        assert_eq!(difference(Some(1.0), Some(1.0001), 2), "0.00");
+        assert_eq!(difference(None, Some(1.0), 2), "–");
     }
 }

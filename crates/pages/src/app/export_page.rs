@@ -1,100 +1,41 @@
 //! Exports: a question instead of a format, and the files of the last export.
 
-use std::path::{Path as FilePath, PathBuf};
+use std::collections::BTreeSet;
+use std::path::Path as FilePath;
 use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::header;
-use axum::response::{Html, IntoResponse as _, Response};
+use axum::response::{Html, Response};
 use maud::{Markup, html};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
 use super::address::encoded;
-use super::components::{NavSection, action_form, choice, frame};
+use super::attachment::attachment;
+use super::chosen_pairs::require_pairs;
+use super::components::{NavSection, action_form, choice, file_size, frame};
+use super::export_zip::zip_link;
+use super::exports::{OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, purpose_of};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
 use super::tasks::{TaskKind, TaskLines};
 use super::visit::Visit;
-use mocban_core::domain::{ThresholdMetric, one_line};
+use mocban_core::domain::{PairName, ThresholdMetric, one_line};
 use mocban_export::{ExportFormat, ExportOptions, ResultFilter};
 use mocban_project::ProjectResult;
 use mocban_project::export::export;
 use mocban_project::location::Location;
 
-/// Folder of exports in a project.
-const FOLDER: &str = "exports";
 /// Side of the pictures of a dataset for training, pixels.
 const CANVAS_PX: u32 = 256;
 /// Most files of an export that are listed.
 const SHOWN_FILES: usize = 100;
 /// Largest file that is offered for download, bytes. Larger ones are in the folder.
 const DOWNLOAD_BYTES: u64 = 64 << 20;
-
-/// A purpose: its name, its format, and the question in both languages.
-type Purpose = (&'static str, ExportFormat, [&'static str; 2]);
-
-const PURPOSES: [Purpose; 8] = [
-    (
-        "excel",
-        ExportFormat::Csv,
-        ["a table for Excel", "bảng cho Excel"],
-    ),
-    (
-        "excel-comma",
-        ExportFormat::Csv,
-        [
-            "a table for Excel with decimal commas",
-            "bảng cho Excel dùng dấu phẩy thập phân",
-        ],
-    ),
-    (
-        "table",
-        ExportFormat::Parquet,
-        ["a table for R or Python", "bảng cho R hoặc Python"],
-    ),
-    (
-        "training",
-        ExportFormat::HuggingFace,
-        [
-            "a dataset for training, 256 x 256 pixels",
-            "bộ dữ liệu để huấn luyện, 256 x 256 điểm ảnh",
-        ],
-    ),
-    (
-        "mesh",
-        ExportFormat::Mesh,
-        [
-            "scans with their prints for MeshLab or CloudCompare",
-            "bản quét kèm bản in cho MeshLab hoặc CloudCompare",
-        ],
-    ),
-    (
-        "fiji",
-        ExportFormat::Fiji,
-        [
-            "calibrated images for ImageJ or Fiji",
-            "ảnh đã hiệu chuẩn cho ImageJ hoặc Fiji",
-        ],
-    ),
-    (
-        "web",
-        ExportFormat::Viewer,
-        ["3D pages for a web site", "trang 3D cho website"],
-    ),
-    (
-        "all",
-        ExportFormat::Jsonl,
-        [
-            "all numbers, and pictures as files",
-            "mọi con số, hình ảnh thành tệp",
-        ],
-    ),
-];
 
 /// The fields of the form.
 #[derive(Debug, Deserialize)]
@@ -103,6 +44,9 @@ pub(super) struct ExportBody {
     purpose: String,
     only: String,
     metric: String,
+    /// Pairs that were chosen in a list. `None` for all.
+    #[serde(default)]
+    pairs: Option<Vec<String>>,
 }
 
 pub(super) async fn page(
@@ -117,7 +61,9 @@ pub(super) async fn page(
         (form(&visit))
         div #live data-live="1500" {
             (task_part(&visit, task.as_ref()))
-            @for (name, files) in &folders { (folder_part(&visit, &open.dir, name, files)) }
+            @for (name, files) in &folders {
+                (folder_part(&visit, &open.dir, name, files, &zip_link(&visit, &state.zip_sizes, &key, &exports_dir(&open.dir).join(name), name)))
+            }
         }
     };
     let title = visit.t("Export", "Xuất dữ liệu");
@@ -153,13 +99,12 @@ fn form(visit: &Visit) -> Markup {
 
 /// Returns the exports of a project with their files and sizes. An earlier export is replaced as a whole.
 fn exported(dir: &FilePath) -> Vec<(String, Vec<(String, u64)>)> {
-    let entries = std::fs::read_dir(dir.join(FOLDER)).into_iter().flatten();
+    let entries = std::fs::read_dir(exports_dir(dir)).into_iter().flatten();
     let mut found: Vec<_> = entries
         .flatten()
         .filter_map(|entry| {
             let name = entry.file_name().into_string().ok()?;
-            let is_known = PURPOSES.iter().any(|(known, ..)| *known == name);
-            is_known.then(|| (name, files(&entry.path())))
+            is_export(&name).then(|| (name, files(&entry.path())))
         })
         .collect();
     found.sort();
@@ -181,33 +126,32 @@ fn files(folder: &FilePath) -> Vec<(String, u64)> {
     files
 }
 
-fn folder_part(visit: &Visit, dir: &FilePath, name: &str, files: &[(String, u64)]) -> Markup {
-    let purpose = PURPOSES.iter().find(|(known, ..)| *known == name);
-    let title = purpose.map_or(name, |(.., texts)| texts[visit.index()]);
-    let folder = dir.join(FOLDER).join(name);
+fn folder_part(
+    visit: &Visit,
+    dir: &FilePath,
+    name: &str,
+    files: &[(String, u64)],
+    zip: &Markup,
+) -> Markup {
+    let purpose = purpose_of(name);
+    let title = purpose.map_or(name, |((.., texts), _)| texts[visit.index()]);
+    let is_of_chosen = purpose.is_some_and(|(_, is_of_chosen)| is_of_chosen);
+    let folder = exports_dir(dir).join(name);
     let folder = std::path::absolute(&folder).unwrap_or(folder);
     html! {
         section.card {
-            h3 { (title) }
+            h3 { (title) @if is_of_chosen { " (" (visit.t("chosen pairs", "các cặp đã chọn")) ")" } }
+            (zip)
             p.muted { (visit.t("Folder", "Thư mục")) ": " code { (one_line(&folder.to_string_lossy())) } }
             ul { @for (file, bytes) in files {
                 li {
                     @if *bytes <= DOWNLOAD_BYTES {
                         a href={ "exports/" (name) "/" (encoded(file)) } download { (one_line(file)) }
                     } @else { (one_line(file)) }
-                    " " span.muted { (size(*bytes)) }
+                    " " span.muted { (file_size(*bytes)) }
                 }
             } }
         }
-    }
-}
-
-/// Returns a number of bytes as a person reads it.
-pub(super) fn size(bytes: u64) -> String {
-    match bytes {
-        0..=9_999 => format!("{bytes} B"),
-        10_000..=999_999 => format!("{} kB", bytes / 1000),
-        _ => format!("{:.1} MB", bytes as f64 / 1e6),
     }
 }
 
@@ -225,27 +169,41 @@ pub(super) async fn start(
         .parse()
         .map_err(|text: String| AppFailure::refused(Sentence::of_program(&text)))?;
     let metric = body.metric.parse::<ThresholdMetric>().ok();
-    let work = move |location| run(purpose, only, metric, location);
+    let pairs = match body.pairs {
+        None => None,
+        Some(typed) => Some(require_pairs(&open, &typed).await?),
+    };
+    // The page of a list does not show the export.
+    let reply = if pairs.is_some() {
+        json!({ "go": "export" })
+    } else {
+        json!({ "reload": true })
+    };
+    let pairs = pairs.map(BTreeSet::from_iter);
+    let work = move |location| run(purpose, only, metric, pairs, location);
     state.tasks.start(TaskKind::Export, &open, work)?;
-    Ok(Json(json!({ "reload": true })))
+    Ok(Json(reply))
 }
 
 async fn run(
     (name, format, _): Purpose,
     only: ResultFilter,
     metric: Option<ThresholdMetric>,
+    pairs: Option<BTreeSet<PairName>>,
     location: Location,
 ) -> ProjectResult<TaskLines> {
+    let of_chosen = if pairs.is_some() { OF_CHOSEN } else { "" };
     let limits = location.settings()?.config.limits;
     let metrics: Vec<ThresholdMetric> = metric.into_iter().collect();
     let options = ExportOptions {
+        pairs,
         only,
         csv_bom: format == ExportFormat::Csv,
         csv_decimal_comma: name == "excel-comma",
         canvas_px: (name == "training").then_some(CANVAS_PX),
         ..ExportOptions::all_of(&metrics, limits)
     };
-    let output: PathBuf = location.dir.join(FOLDER).join(name);
+    let output = exports_dir(&location.dir).join(format!("{name}{of_chosen}"));
     let summary = export(&output, &[format], options, &location, &()).await?;
     let done = summary.pairs.done;
     let mut lines = vec![[
@@ -279,7 +237,7 @@ pub(super) async fn download(
     if !files.iter().any(is_listed) {
         return Err(AppFailure::not_found());
     }
-    let path = open.dir.join(FOLDER).join(&name).join(&file);
+    let path = exports_dir(&open.dir).join(&name).join(&file);
     let read = tokio::task::spawn_blocking(move || std::fs::read(path)).await;
     let bytes = read
         .ok()
@@ -288,19 +246,10 @@ pub(super) async fn download(
     Ok(attachment(&file, "application/octet-stream", bytes))
 }
 
-/// Returns a response that a browser saves as a file.
-pub(super) fn attachment(file: &str, kind: &'static str, bytes: Vec<u8>) -> Response {
-    let disposition = format!("attachment; filename*=UTF-8''{}", encoded(file));
-    let headers = [
-        (header::CONTENT_TYPE, kind.to_owned()),
-        (header::CONTENT_DISPOSITION, disposition),
-    ];
-    (headers, bytes).into_response()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{exported, size};
+    use super::exported;
+    use crate::app::components::file_size;
 
     #[test]
     fn only_plain_files_of_known_exports_are_listed() {
@@ -321,7 +270,8 @@ mod tests {
             found,
             [("excel".to_owned(), vec![("pairs.csv".to_owned(), 3)])]
         );
-        assert_eq!(size(12_345), "12 kB");
-        assert_eq!(size(2_500_000), "2.5 MB");
+        assert_eq!(file_size(12_345), "12 kB");
+        assert_eq!(file_size(2_500_000), "2.5 MB");
+        assert_eq!(file_size(12_500_000_000), "12 GB");
     }
 }

@@ -10,8 +10,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
-use super::components::{NavSection, action_form, frame};
-use super::export_page::{attachment, size};
+use super::attachment::attachment;
+use super::components::{NavSection, action_form, file_size, frame};
 use super::failure::{AppFailure, AppResult};
 use super::home::free_space;
 use super::state::AppState;
@@ -62,7 +62,7 @@ pub(super) async fn page(
                 (action_form("actions/backup", "inline", &html! { button #backup { (visit.t("Back up now", "Sao lưu ngay")) } }))
                 (task_part(&visit, stored.as_ref()))
                 @if let Some(meta) = meta {
-                    p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (size(meta.len())) } " "
+                    p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (file_size(meta.len())) } " "
                         @if meta.len() <= DOWNLOAD_BYTES { a.button href="backup.sqlite" download { (visit.t("Save a copy", "Lưu một bản")) } }
                     }
                 }
@@ -223,7 +223,7 @@ pub(super) async fn start_backup(
 
 async fn backup_lines(location: Location) -> ProjectResult<TaskLines> {
     let stored = backup(&location.dir.join(BACKUP), &location, &()).await?;
-    let (pairs, verdicts, bytes) = (stored.pairs, stored.verdicts, size(stored.bytes));
+    let (pairs, verdicts, bytes) = (stored.pairs, stored.verdicts, file_size(stored.bytes));
     Ok(vec![[
         format!("{pairs} pairs and {verdicts} verdicts are in the backup ({bytes})."),
         format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({bytes})."),

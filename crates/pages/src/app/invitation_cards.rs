@@ -14,7 +14,7 @@ use super::action_body::ActionBody;
 use super::address::PageQuery;
 use super::components::action_form;
 use super::failure::{AppFailure, AppResult};
-use super::invitations::SentInvitation;
+use super::invitations::{GuestReview, SentInvitation};
 use super::open_pages::PagesId;
 use super::opened_review::{ReviewPlace, open_review};
 use super::projects::OpenProject;
@@ -24,6 +24,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::{asks_for_page, document, respond};
 use mocban_core::domain::{ReviewOrder, one_line};
+use mocban_system::time_text::local;
 
 /// Invites a reviewer, unless the same invitation was sent before.
 pub(super) async fn invite(
@@ -55,14 +56,22 @@ fn invitation_id(open: &OpenProject, reviewer: &str, choice: &str) -> PagesId {
     [open.key.as_str(), reviewer, choice].map(str::to_owned)
 }
 
-/// Returns what a guest sees.
-async fn guest_pages(open: &Arc<OpenProject>, reviewer: &str, choice: &str) -> AppResult<Router> {
+/// Returns what a guest sees, and the review, which says how far the guest is.
+async fn guest_pages(
+    open: &Arc<OpenProject>,
+    reviewer: &str,
+    choice: &str,
+) -> AppResult<(Router, Arc<GuestReview>)> {
     let query = PageQuery::parse(choice);
     let pages = open_review(open, reviewer, &query, ReviewPlace::of_guest()).await?;
-    Ok(Router::new()
+    let routes = pages.routes();
+    let review = Arc::new(GuestReview::new(pages));
+    let router = Router::new()
         .fallback(judge)
-        .layer(Extension(pages))
-        .layer(Extension(Arc::clone(open))))
+        .layer(Extension(routes))
+        .layer(Extension(Arc::clone(&review)))
+        .layer(Extension(Arc::clone(open)));
+    Ok((router, review))
 }
 
 /// Says that the project is not there; the page of a guest keeps its answers.
@@ -75,8 +84,10 @@ const PROJECT_GONE: [&str; 2] = [
 async fn judge(
     Extension(open): Extension<Arc<OpenProject>>,
     Extension(pages): Extension<Router>,
+    Extension(review): Extension<Arc<GuestReview>>,
     request: Request,
 ) -> Response {
+    review.see();
     if open.is_current() {
         return respond(pages, request).await;
     }
@@ -181,6 +192,7 @@ fn card(visit: &Visit, invitation: &SentInvitation) -> Markup {
         div.card.invitation role="group" aria-label={ (reviewer) ", " (metric) ", " (order) } {
             h3 { (reviewer) }
             p.muted { (metric) @if let Some(sample) = judged.get("sample") { ", " (sample) " " (results) } ", " (order) }
+            (progress(visit, invitation))
             @match &invitation.url {
                 Some(url) => {
                     input.link readonly value=(url) aria-label=(visit.t("Link", "Liên kết"));
@@ -193,6 +205,22 @@ fn card(visit: &Visit, invitation: &SentInvitation) -> Markup {
                 (form("renew", visit.t("New link", "Liên kết mới")))
                 (form("withdraw", visit.t("Withdraw", "Thu hồi")))
             }
+        }
+    }
+}
+
+/// Says how much of the sample a guest has answered, and when the guest was last seen.
+fn progress(visit: &Visit, invitation: &SentInvitation) -> Markup {
+    html! {
+        @if let Some(counts) = invitation.progress {
+            p.answered {
+                (visit.t("Answered", "Đã trả lời")) ": " b { (counts.answered) } " / " (counts.items)
+                @if counts.answered >= counts.items { " · " span.good { (visit.t("finished", "đã xong")) } }
+            }
+            progress value=(counts.answered) max=(counts.items.max(1)) aria-label=(visit.t("Answered", "Đã trả lời")) {}
+        }
+        @if let Some(seen) = invitation.seen {
+            p.muted { (visit.t("Last seen", "Hoạt động gần nhất")) ": " time.seen { (local(seen)) } }
         }
     }
 }

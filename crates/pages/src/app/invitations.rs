@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 
 use axum::Router;
 use tokio::sync::Mutex;
@@ -13,6 +14,9 @@ use super::open_pages::PagesId;
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use crate::local_server::{Guest, GuestServer, ServerError, network_address};
+use crate::review::{QueueCounts, ReviewPages};
+use mocban_core::domain::UnixMillis;
+use mocban_project::location::now;
 
 /// Most invitations at a time. Each has connections to the catalog and pictures in memory.
 const LIMIT: usize = 16;
@@ -37,6 +41,29 @@ struct SentInvitations {
 struct SentGuest {
     guest: Guest,
     project: Arc<OpenProject>,
+    review: Arc<GuestReview>,
+}
+
+/// The review of a guest, and when the guest was last seen.
+#[derive(Debug)]
+pub(super) struct GuestReview {
+    pages: ReviewPages,
+    /// Time of the last request; 0 if there was none.
+    seen: AtomicI64,
+}
+
+impl GuestReview {
+    pub(super) const fn new(pages: ReviewPages) -> Self {
+        Self {
+            pages,
+            seen: AtomicI64::new(0),
+        }
+    }
+
+    /// Notes a request of the guest.
+    pub(super) fn see(&self) {
+        self.seen.store(now(), Ordering::Relaxed);
+    }
 }
 
 /// An invitation as the page shows it.
@@ -46,6 +73,10 @@ pub(super) struct SentInvitation {
     pub(super) choice: String,
     /// `None` if it has been opened.
     pub(super) url: Option<String>,
+    /// What the guest has answered. `None` if it cannot be read now.
+    pub(super) progress: Option<QueueCounts>,
+    /// When the guest was last seen.
+    pub(super) seen: Option<UnixMillis>,
 }
 
 impl Invitations {
@@ -61,16 +92,29 @@ impl Invitations {
         }
     }
 
-    /// Returns the invitations to a project.
+    /// Returns the invitations to a project, with what the guests have answered by now.
     pub(super) async fn of_project(&self, key: &str) -> Vec<SentInvitation> {
-        let sent = self.sent.lock().await;
-        let of_project = sent.guests.iter().filter(|([of, ..], _)| of == key);
-        let invitation = |([_, reviewer, choice], sent): (&PagesId, &SentGuest)| SentInvitation {
-            reviewer: reviewer.clone(),
-            choice: choice.clone(),
-            url: (!sent.guest.is_opened()).then(|| sent.guest.url()),
-        };
-        of_project.map(invitation).collect()
+        let mut found = Vec::new();
+        for ([of, reviewer, choice], sent) in &self.sent.lock().await.guests {
+            if of == key {
+                let seen = sent.review.seen.load(Ordering::Relaxed);
+                let invitation = SentInvitation {
+                    reviewer: reviewer.clone(),
+                    choice: choice.clone(),
+                    url: (!sent.guest.is_opened()).then(|| sent.guest.url()),
+                    progress: None,
+                    seen: (seen > 0).then_some(seen),
+                };
+                found.push((invitation, Arc::clone(&sent.review)));
+            }
+        }
+        // The catalog may take long to answer, and invitations do not wait for it.
+        let mut invitations = Vec::new();
+        for (mut invitation, review) in found {
+            invitation.progress = review.pages.progress().await.ok();
+            invitations.push(invitation);
+        }
+        invitations
     }
 
     /// Returns whether an invitation was sent and not withdrawn, and if so, whether its link has been opened.
@@ -106,7 +150,7 @@ impl Invitations {
         &self,
         id: PagesId,
         project: &Arc<OpenProject>,
-        pages: Router,
+        (pages, review): (Router, Arc<GuestReview>),
         replaces: bool,
     ) -> AppResult<()> {
         let mut sent = self.sent.lock().await;
@@ -137,7 +181,12 @@ impl Invitations {
         let guest = sent.server.insert(server).invite(&id.join("\0"), pages);
         let guest = guest.map_err(|error| refused(&error))?;
         let project = Arc::clone(project);
-        sent.guests.insert(id, SentGuest { guest, project });
+        let invited = SentGuest {
+            guest,
+            project,
+            review,
+        };
+        sent.guests.insert(id, invited);
         Ok(())
     }
 }

@@ -48,7 +48,7 @@ pub(super) async fn open_review(
     reviewer: &str,
     query: &PageQuery,
     place: ReviewPlace,
-) -> AppResult<axum::Router> {
+) -> AppResult<ReviewPages> {
     let (location, reviewer) = (open.location(), reviewer.to_owned());
     let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
     let query = query.clone();
@@ -69,7 +69,7 @@ pub(super) async fn open_review(
             )
         }));
     }
-    Ok(pages.routes())
+    Ok(pages)
 }
 
 async fn review_pages(

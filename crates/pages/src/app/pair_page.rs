@@ -7,12 +7,13 @@ use axum::response::{Html, IntoResponse as _, Response};
 use maud::{Markup, html};
 
 use super::address::encoded;
-use super::components::{NavSection, action_form, frame, scan_file, score, stored_message};
+use super::components::{NavSection, action_form, frame, scan_file, stored_message};
 use super::failure::AppResult;
+use super::pair_numbers::numbers;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::view::{page as scan_page, scan_asset};
-use mocban_catalog::{MetricRecord, PairDetail};
+use mocban_catalog::PairDetail;
 use mocban_core::domain::{FailureClass, JobStatus, PairName, ThresholdMetric, one_line};
 use mocban_project::details::{self, Details, PairOverview};
 use mocban_system::time_text::local;
@@ -50,15 +51,20 @@ pub(super) async fn page(
         .unwrap_or(ThresholdMetric::DEFAULT);
     let record = overview.detail.results.metric(chosen);
     let record = record.or_else(|| overview.detail.results.metrics.first());
+    let shown = record.map(|record| record.outcome.metric);
+    let compared = visit.query.parsed::<ThresholdMetric>("compare");
+    let compared = compared.filter(|other| Some(*other) != shown);
+    let other = compared.and_then(|other| overview.detail.results.metric(other));
     let body = html! {
         (neighbour_links(&visit, &neighbours))
         (state_line(&visit, &overview))
         @if let Some(record) = record {
-            (metric_links(&visit, &overview.detail, record.outcome.metric))
-            (pictures(&visit, record.outcome.metric, true))
-            (numbers(&visit, record))
+            @let (metric, other_metric) = (record.outcome.metric, other.map(|other| other.outcome.metric));
+            (metric_links(&visit, &overview.detail, metric, other_metric))
+            (pictures(&visit, Some(metric), other_metric))
+            (numbers(&visit, record, other))
         } @else {
-            (pictures(&visit, chosen, false))
+            (pictures(&visit, None, None))
         }
         (files(&visit, &overview.detail))
         (history(&visit, &overview.detail))
@@ -129,23 +135,45 @@ fn state_line(visit: &Visit, overview: &PairOverview) -> Markup {
     }
 }
 
-fn metric_links(visit: &Visit, detail: &PairDetail, shown: ThresholdMetric) -> Markup {
+/// Returns the links that choose the metric, and another one to compare it with.
+fn metric_links(
+    visit: &Visit,
+    detail: &PairDetail,
+    shown: ThresholdMetric,
+    other: Option<ThresholdMetric>,
+) -> Markup {
+    let metrics = detail.results.metrics.iter();
+    let metrics: Vec<_> = metrics.map(|record| record.outcome.metric).collect();
+    let link = |name: &str, value: &str, is_shown: bool, text: &str| {
+        html! {
+            a href={ "./" (visit.query.with(name, value).text()) } aria-current=[is_shown.then_some("true")] { (text) } " "
+        }
+    };
     html! {
         p.views {
             (visit.t("Threshold", "Ngưỡng")) ": "
-            @for record in &detail.results.metrics {
-                @let metric = record.outcome.metric;
-                a href={ "./" (visit.query.with("metric", metric.name()).text()) } aria-current=[(metric == shown).then_some("true")] {
-                    (visit.metric(metric))
-                } " "
+            @for metric in &metrics { (link("metric", metric.name(), *metric == shown, visit.metric(*metric))) }
+        }
+        @if metrics.len() > 1 {
+            p.views #compare {
+                (visit.t("Compare with", "So sánh với")) ": "
+                (link("compare", "", other.is_none(), visit.t("none", "không")))
+                @for metric in metrics.iter().filter(|metric| **metric != shown) {
+                    (link("compare", metric.name(), Some(*metric) == other, visit.metric(*metric)))
+                }
             }
         }
     }
 }
 
-/// Returns the pictures. A pair without a result has only its print.
-fn pictures(visit: &Visit, metric: ThresholdMetric, has_result: bool) -> Markup {
-    let (shown, alt) = if has_result {
+/// Returns the pictures of the result of a metric, and of another one beside it. A pair without a result has only its
+/// print.
+fn pictures(
+    visit: &Visit,
+    metric: Option<ThresholdMetric>,
+    other: Option<ThresholdMetric>,
+) -> Markup {
+    let (shown, alt) = if metric.is_some() {
         let alt = visit.t(
             "Print with the outline of the aligned relief",
             "Bản in và đường viền của mặt khắc đã căn chỉnh",
@@ -154,120 +182,61 @@ fn pictures(visit: &Visit, metric: ThresholdMetric, has_result: bool) -> Markup 
     } else {
         ("print", visit.t("Print", "Bản in"))
     };
-    let layers = &LAYERS[..if has_result { LAYERS.len() } else { 1 }];
+    let layers = &LAYERS[..if metric.is_some() { LAYERS.len() } else { 1 }];
+    let blink = match other {
+        Some(_) => visit.t("Blink the two metrics", "Nháy hai độ đo"),
+        None => visit.t("Blink print and relief", "Nháy bản in và mặt khắc"),
+    };
+    let first = metric.unwrap_or(ThresholdMetric::DEFAULT);
     html! {
         section.viewer #viewer aria-label=(visit.t("Pictures", "Hình ảnh")) {
-            div.stage { img #stage src={ "picture/" (shown) "-" (metric) } alt=(alt) width="640" height="640"; }
+            div.stages {
+                (stage(visit, "stage", shown, alt, first, other.is_some()))
+                @if let Some(other) = other { (stage(visit, "other-stage", shown, alt, other, true)) }
+            }
             div.controls {
-                @if has_result {
-                    button #blink type="button" aria-pressed="false" { (visit.t("Blink print and relief", "Nháy bản in và mặt khắc")) " " kbd { "B" } }
+                @if metric.is_some() {
+                    button #blink type="button" aria-pressed="false" { (blink) " " kbd { "B" } }
                     a.button href="3d/" { (visit.t("3D view", "Xem 3D")) }
                 }
-                @for (layer, names) in layers { (layer_button(visit, layer, names, metric, *layer == shown)) }
+                @for (layer, names) in layers { (layer_button(visit, layer, names, [Some(first), other], *layer == shown)) }
             }
         }
     }
 }
 
-/// Returns a small picture that is shown large when it is pressed.
+/// Returns a large picture, with its metric below it if there are two.
+fn stage(
+    visit: &Visit,
+    id: &str,
+    shown: &str,
+    alt: &str,
+    metric: ThresholdMetric,
+    is_named: bool,
+) -> Markup {
+    html! {
+        figure.stage {
+            img id=(id) src={ "picture/" (shown) "-" (metric) } alt=(alt) width="640" height="640";
+            @if is_named { figcaption { (visit.metric(metric)) } }
+        }
+    }
+}
+
+/// Returns a small picture that is shown large when it is pressed, also under another metric.
 fn layer_button(
     visit: &Visit,
     layer: &str,
     names: &[&str; 2],
-    metric: ThresholdMetric,
+    metrics: [Option<ThresholdMetric>; 2],
     is_shown: bool,
 ) -> Markup {
-    let picture = format!("picture/{layer}-{metric}");
+    let [picture, other] =
+        metrics.map(|metric| metric.map(|metric| format!("picture/{layer}-{metric}")));
     html! {
         figure {
-            button.layer type="button" data-layer=(layer) data-src=(picture) aria-pressed=(is_shown.to_string()) {
-                img src=(picture) alt="" loading="lazy" width="150" height="150";
+            button.layer type="button" data-layer=(layer) data-src=[&picture] data-other=[other] aria-pressed=(is_shown.to_string()) {
+                img src=[picture] alt="" loading="lazy" width="150" height="150";
                 span { (names[visit.index()]) }
-            }
-        }
-    }
-}
-
-/// Returns the rows of the table of numbers: name, value, meaning.
-fn number_rows(visit: &Visit, record: &MetricRecord) -> Vec<(String, String, &'static str)> {
-    let outcome = &record.outcome;
-    let scores = &outcome.scores;
-    let row = |name: &str, value: String, meaning| (name.to_owned(), value, meaning);
-    let score = |value| score(Some(value));
-    vec![
-        row(
-            visit.t("Confidence", "Độ tin cậy"),
-            super::components::score(outcome.confidence),
-            MEANINGS[6][visit.index()],
-        ),
-        row("IoU", score(scores.iou), MEANINGS[0][visit.index()]),
-        row("Dice", score(scores.dice), MEANINGS[1][visit.index()]),
-        row("SSIM", score(scores.ssim), MEANINGS[2][visit.index()]),
-        row(
-            visit.t("Rotation", "Góc xoay"),
-            format!("{:.1}°", outcome.angle_deg),
-            MEANINGS[3][visit.index()],
-        ),
-        row(
-            visit.t("Scale", "Tỉ lệ"),
-            format!("{:.3}", outcome.scale),
-            MEANINGS[4][visit.index()],
-        ),
-        row(
-            visit.t("Margin", "Khoảng cách điểm"),
-            score(outcome.margin),
-            MEANINGS[5][visit.index()],
-        ),
-    ]
-}
-
-/// What the numbers mean, in both languages.
-const MEANINGS: [[&str; 2]; 7] = [
-    [
-        "Common part of the two stroke masks, divided by all of both. Ink spreads, so the true alignment stays below 1.",
-        "Phần chung của hai mặt nạ nét chia cho toàn bộ hai mặt nạ. Mực loang nên căn chỉnh đúng vẫn dưới 1.",
-    ],
-    [
-        "The same comparison, in which the common part counts twice.",
-        "Phép so sánh tương tự, trong đó phần chung được tính hai lần.",
-    ],
-    [
-        "Structural similarity of the two masks.",
-        "Độ tương đồng cấu trúc của hai mặt nạ.",
-    ],
-    [
-        "How far the relief is turned to lie on the print, clockwise.",
-        "Mặt khắc được xoay bao nhiêu để khớp bản in, theo chiều kim đồng hồ.",
-    ],
-    [
-        "Pixels of the print per pixel of the depth map.",
-        "Số điểm ảnh của bản in trên một điểm ảnh của bản đồ độ sâu.",
-    ],
-    [
-        "Score of this pose minus that of the best other pose. A small margin means a close decision.",
-        "Điểm của tư thế này trừ điểm của tư thế tốt nhất còn lại. Khoảng cách nhỏ nghĩa là khó phân định.",
-    ],
-    [
-        "Calibrated probability that this alignment is right. If it is low, look at the pictures yourself.",
-        "Xác suất đã hiệu chuẩn rằng cách căn chỉnh này đúng. Nếu thấp, hãy tự xem hình.",
-    ],
-];
-
-fn numbers(visit: &Visit, record: &MetricRecord) -> Markup {
-    html! {
-        section {
-            h2 { (visit.t("Numbers", "Các con số")) }
-            div.scroll tabindex="0" role="region" aria-label=(visit.t("Numbers", "Các con số")) {
-                table.meanings { tbody { @for (name, value, meaning) in number_rows(visit, record) {
-                    tr { th scope="row" { (name) } td.number { (value) } td.muted { (meaning) } }
-                } } }
-            }
-            @for given in &record.verdicts {
-                p {
-                    span.verdict.(given.verdict.name()) { (visit.verdict(given.verdict)) }
-                    " " (one_line(&given.reviewer))
-                    @if let Some(reason) = given.reason { ": " (visit.reason(reason)) }
-                }
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The address of a list of pairs: its filter, its order and where its page begins.
 
 use super::address::PageQuery;
-use mocban_catalog::{PairCursor, PairFilter, PairOrder};
+use mocban_catalog::{MetricDifference, PairCursor, PairFilter, PairOrder};
 use mocban_core::domain::{JobStatus, ThresholdMetric, Verdict};
 
 /// States that a list can be filtered by, with the statuses of their jobs.
@@ -12,6 +12,9 @@ const STATES: [(&str, &[JobStatus]); 4] = [
     ("running", &[JobStatus::Leased]),
 ];
 
+/// Differences of IoU that a list can ask for.
+pub(super) const DIFFERENCES: [&str; 4] = ["0.01", "0.03", "0.1", "0.3"];
+
 /// Number of cards on a page, and of rows.
 const PAGE_SIZES: [usize; 2] = [48, 100];
 
@@ -21,6 +24,8 @@ pub(super) struct PairQuery {
     pub(super) filter: PairFilter,
     pub(super) order: PairOrder,
     pub(super) metric: ThresholdMetric,
+    /// Another metric, whose results are shown beside those of the first.
+    pub(super) compared: Option<ThresholdMetric>,
     pub(super) is_table: bool,
     pub(super) after: Option<PairCursor>,
 }
@@ -35,6 +40,16 @@ impl PairQuery {
         // Pairs without a result have no score by which they could be sorted.
         let has_results = class.is_none() && statuses.is_none_or(|(name, _)| *name == "aligned");
         let order = query.parsed("sort").filter(|_| has_results);
+        let metric = query.parsed("metric").unwrap_or(ThresholdMetric::DEFAULT);
+        let compared = query
+            .parsed::<ThresholdMetric>("compare")
+            .filter(|other| *other != metric);
+        let differs = compared.and_then(|from| {
+            let wanted = query.get("differs")?;
+            let min_iou = DIFFERENCES.into_iter().find(|known| *known == wanted)?;
+            let min_iou = min_iou.parse().ok()?;
+            Some(MetricDifference { from, min_iou })
+        });
         Self {
             filter: PairFilter {
                 statuses: statuses.map_or_else(Vec::new, |(_, statuses)| statuses.to_vec()),
@@ -44,12 +59,24 @@ impl PairQuery {
                 is_low_confidence: query.get("confidence") == Some("low"),
                 block: query.get("block").map(str::to_owned),
                 character: query.get("character").map(str::to_owned),
+                differs,
             },
             order: order.unwrap_or_default(),
-            metric: query.parsed("metric").unwrap_or(ThresholdMetric::DEFAULT),
+            metric,
+            compared,
             is_table: query.get("view") == Some("table"),
             after: query.get("after").and_then(cursor),
         }
+    }
+
+    /// Returns the query of the page of a pair, which shows the same metrics.
+    pub(super) fn of_pair(&self) -> PageQuery {
+        let chosen = Some(self.metric).filter(|metric| *metric != ThresholdMetric::DEFAULT);
+        let metric = chosen.map_or("", ThresholdMetric::name);
+        let compared = self.compared.map_or("", ThresholdMetric::name);
+        PageQuery::default()
+            .with("metric", metric)
+            .with("compare", compared)
     }
 
     /// Returns how many pairs a page has.
@@ -97,6 +124,10 @@ mod tests {
             [JobStatus::Ready, JobStatus::Backoff]
         );
         assert_eq!(failed.order, PairOrder::Imported, "no scores to sort by");
+        let compared = of("metric=relief&compare=density&differs=0.1");
+        assert_eq!(compared.compared, Some(ThresholdMetric::Density));
+        let differs = compared.filter.differs.map(|differs| differs.min_iou);
+        assert_eq!(differs, Some(0.1));
         let plain = of("");
         for bad in [
             "state=x",
@@ -104,6 +135,9 @@ mod tests {
             "sort=a&after=NaN,1",
             "after=1,-2",
             "after=1",
+            "compare=ensemble&differs=0.1",
+            "differs=0.1",
+            "compare=x",
         ] {
             assert_eq!(of(bad), plain, "{bad}");
         }

@@ -6,12 +6,14 @@ use axum::extract::{Path, State};
 use axum::response::{IntoResponse as _, Redirect, Response};
 use maud::{Markup, html};
 
-use super::address::encoded;
+use super::address::{PageQuery, encoded};
+use super::choice_bar::{choice_bar, choice_box};
+use super::chosen_pairs::{done_notice, without_done};
 use super::components::{
-    NavSection, action_form, choice, empty, frame, grouped, score, stored_message,
+    NavSection, choice, difference, empty, frame, grouped, score, stored_message,
 };
 use super::failure::AppResult;
-use super::pair_query::{PairQuery, cursor_text};
+use super::pair_query::{DIFFERENCES, PairQuery, cursor_text};
 use super::projects::OpenProject;
 use super::state::AppState;
 use super::visit::Visit;
@@ -30,9 +32,12 @@ const SUGGESTED_IDS: usize = 20;
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
-    visit: Visit,
+    mut visit: Visit,
 ) -> AppResult<Response> {
     let open = state.open(&key).await?;
+    let done = done_notice(&visit, &open).await?;
+    let after = visit.query.get("after").unwrap_or_default().to_owned();
+    visit.query = without_done(&visit.query).with("after", &after);
     if let Some(typed) = visit.query.get("id") {
         return jump(&visit, &open, typed.trim()).await;
     }
@@ -47,6 +52,7 @@ pub(super) async fn page(
     let list = list.await?;
     let blocks = open.catalog.first_listed_blocks(SUGGESTED_BLOCKS).await?;
     let body = html! {
+        (done)
         (jump_form(&visit))
         (filter_form(&visit, &blocks))
         (views(&visit, &query))
@@ -59,32 +65,18 @@ pub(super) async fn page(
         } @else if query.is_table {
             (table(&visit, &query, &list.pairs))
         } @else {
-            div.gallery { @for pair in &list.pairs { (pair_card(&visit, &visit.project_page(&key, ""), pair, query.metric)) } }
+            div.gallery { @for pair in &list.pairs {
+                div.pick-card {
+                    (pair_card(&visit, &visit.project_page(&key, ""), pair, query.metric, &query.of_pair()))
+                    (choice_box(&visit, pair.attributes.name.as_str()))
+                }
+            } }
         }
         (pager(&visit, &query, &list))
-        @if !list.pairs.is_empty() && has_outstanding(&list.pairs) { (run_form(&visit)) }
+        @if !list.pairs.is_empty() { (choice_bar(&visit, &key)) }
     };
     let title = visit.t("Pairs", "Các cặp");
     Ok(frame(&visit, title, Some(&key), NavSection::Pairs, &body).into_response())
-}
-
-/// Returns whether a run would do something with one of these pairs.
-fn has_outstanding(pairs: &[PairResults]) -> bool {
-    let mut pairs = pairs.iter();
-    pairs.any(|pair| !matches!(pair.status, JobStatus::Done | JobStatus::Leased))
-}
-
-/// Returns the form that runs the pairs of the list.
-fn run_form(visit: &Visit) -> Markup {
-    let list = visit.query.with("after", "").text();
-    action_form(
-        "actions/run-list",
-        "inline",
-        &html! {
-            input type="hidden" name="list" value=(list.trim_start_matches('?'));
-            button #run-list { (visit.t("Run the waiting and failed pairs of this list", "Chạy các cặp đang chờ và bị lỗi trong danh sách này")) }
-        },
-    )
 }
 
 /// Opens the page of a pair, or lists similar ids.
@@ -176,9 +168,23 @@ fn filter_form(visit: &Visit, blocks: &[String]) -> Markup {
             label { span { (visit.t("Metric", "Độ đo")) }
                 select name="metric" { @for (value, text) in metrics { (choice(value, text, Some(metric))) } }
             }
+            (comparison_fields(visit, &metrics))
             button.primary { (visit.t("Show", "Hiện")) }
             a href=(visit.here) { (visit.t("Reset", "Đặt lại")) }
         }
+    }
+}
+
+/// Returns the choices of another metric, and of a difference of IoU.
+fn comparison_fields(visit: &Visit, metrics: &[(&str, &str)]) -> Markup {
+    let none = [("", visit.t("none", "không"))];
+    let others: Vec<_> = none.iter().chain(metrics).copied().collect();
+    let any = [("", visit.t("any", "bất kỳ"))];
+    let differences = DIFFERENCES.map(|text| (text, text));
+    let differences: Vec<_> = any.into_iter().chain(differences).collect();
+    html! {
+        (field(visit, "compare", visit.t("Compare with", "So sánh với"), &others))
+        (field(visit, "differs", visit.t("IoU differs by", "IoU lệch ít nhất"), &differences))
     }
 }
 
@@ -198,19 +204,20 @@ fn views(visit: &Visit, query: &PairQuery) -> Markup {
     }
 }
 
-/// Returns the card of a pair. `base` is the relative address of its project.
+/// Returns the card of a pair. `base` is the relative address of its project, `shown` the query of its page.
 pub(super) fn pair_card(
     visit: &Visit,
     base: &str,
     pair: &PairResults,
     metric: ThresholdMetric,
+    shown: &PageQuery,
 ) -> Markup {
     let name = pair.attributes.name.as_str();
     let path = format!("{base}pair/{}/", encoded(name));
     let outcome = pair.metric(metric).map(|record| &record.outcome);
     let is_low = outcome.is_some_and(MetricOutcome::is_low_confidence);
     html! {
-        a.pair-card href=(path) {
+        a.pair-card href={ (path) (shown.text()) } {
             img src={ (path) "picture/thumb-" (metric) } alt="" loading="lazy" width="180" height="180";
             span.name { (one_line(name)) @if let Some(character) = &pair.attributes.character { " " span.character { (one_line(character)) } } }
             @match outcome {
@@ -243,11 +250,16 @@ fn table(visit: &Visit, query: &PairQuery, pairs: &[PairResults]) -> Markup {
         div.scroll tabindex="0" role="region" aria-label=(visit.t("Pairs", "Các cặp")) {
             table {
                 thead { tr {
+                    th scope="col" { span.visually-hidden { (visit.t("Choose", "Chọn")) } }
                     @for (index, title) in [
                         visit.t("Id", "Mã"), visit.t("Character", "Chữ"), visit.t("Block", "Ván"), visit.t("State", "Trạng thái"),
                         visit.t("Confidence", "Độ tin cậy"), "IoU", "SSIM", "Dice", visit.t("Verdict", "Đánh giá"),
                         visit.t("Why failed", "Lý do lỗi"),
                     ].into_iter().enumerate() { th.number[NUMBER_COLUMNS.contains(&index)] scope="col" { (title) } }
+                    @if let Some(other) = query.compared {
+                        th.number scope="col" { "IoU, " (visit.metric(other)) }
+                        th.number scope="col" { (visit.t("Difference", "Chênh lệch")) }
+                    }
                 } }
                 tbody { @for pair in pairs { (table_row(visit, query, pair)) } }
             }
@@ -262,7 +274,8 @@ fn table_row(visit: &Visit, query: &PairQuery, pair: &PairResults) -> Markup {
     let failure = pair.failure.as_ref().map(|stored| &stored.failure);
     html! {
         tr {
-            th scope="row" { a href={ "pair/" (encoded(name)) "/" } { (one_line(name)) } }
+            td { (choice_box(visit, name)) }
+            th scope="row" { a href={ "pair/" (encoded(name)) "/" (query.of_pair().text()) } { (one_line(name)) } }
             td { (pair.attributes.character.as_deref().map(one_line).unwrap_or_default()) }
             td { (pair.attributes.block.as_deref().map(one_line).unwrap_or_default()) }
             td { span.state.(pair.status.name()) { (visit.status(pair.status)) } }
@@ -272,6 +285,11 @@ fn table_row(visit: &Visit, query: &PairQuery, pair: &PairResults) -> Markup {
             td.number { (score(scores.map(|scores| scores.dice))) }
             td { (verdict_marks(visit, pair, query.metric)) }
             td.reason { @if let Some(failure) = failure { (stored_message(&failure.message)) } }
+            @if let Some(other) = query.compared {
+                @let iou = pair.metric(other).map(|record| record.outcome.scores.iou);
+                td.number { (score(iou)) }
+                td.number { (difference(scores.map(|scores| scores.iou), iou, 3)) }
+            }
         }
     }
 }

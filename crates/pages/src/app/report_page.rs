@@ -6,8 +6,8 @@ use axum::extract::{Path, State};
 use axum::response::{Html, Response};
 use maud::{Markup, html};
 
+use super::attachment::attachment;
 use super::components::{NavSection, empty, frame, grouped, number_table, score, stored_message};
-use super::export_page::attachment;
 use super::failure::{AppFailure, AppResult};
 use super::report_sentences::{headline, limits};
 use super::state::AppState;

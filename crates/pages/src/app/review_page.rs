@@ -189,5 +189,5 @@ async fn review(
         project_page: Some("../../../"),
     };
     let opened = open_review(open, reviewer, &PageQuery::parse(choice), of_app).await?;
-    Ok(state.reviews.keep(id, open, opened))
+    Ok(state.reviews.keep(id, open, opened.routes()))
 }

@@ -7,9 +7,9 @@ use axum::{Router, middleware};
 
 use super::state::{AppOptions, AppState};
 use super::{
-    assets, block_page, blocks_page, export_page, failure_page, health_page, home, import_page,
-    invitation_cards, last_import, pair_page, pairs_page, pictures, report_page, review_agreement,
-    review_page, run_actions, run_page, settings_page,
+    assets, block_page, blocks_page, chosen_pairs, export_page, export_zip, failure_page,
+    health_page, home, import_page, invitation_cards, last_import, pair_page, pairs_page, pictures,
+    report_page, review_agreement, review_page, run_actions, run_page, settings_page,
 };
 
 /// Returns the routes of the app, for a server.
@@ -51,6 +51,7 @@ pub fn app_pages(options: AppOptions) -> Router {
         )
         .route("/p/{project}/export", get(export_page::page))
         .route("/p/{project}/actions/export", post(export_page::start))
+        .route("/p/{project}/exports/{archive}", get(export_zip::download))
         .route(
             "/p/{project}/exports/{name}/{file}",
             get(export_page::download),
@@ -65,7 +66,9 @@ pub fn app_pages(options: AppOptions) -> Router {
         )
         .route("/p/{project}/backup.sqlite", get(health_page::download))
         .route("/p/{project}/actions/run", post(run_actions::run))
-        .route("/p/{project}/actions/run-list", post(run_actions::run_list))
+        .route("/p/{project}/pairs/listed", get(chosen_pairs::listed))
+        .route("/p/{project}/actions/chosen", post(chosen_pairs::change))
+        .route("/p/{project}/actions/restore", post(chosen_pairs::restore))
         .route("/p/{project}/actions/stop", post(run_actions::stop))
         .route("/p/{project}/actions/retry", post(run_actions::retry))
         .route("/p/{project}/actions/retire", post(run_actions::retire))

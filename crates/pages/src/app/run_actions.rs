@@ -8,16 +8,13 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
-use super::address::PageQuery;
 use super::child_run;
 use super::failure::{AppFailure, AppResult};
-use super::pair_query::PairQuery;
 use super::projects::{OpenProject, is_project};
 use super::sentence::Sentence;
 use super::state::AppState;
 use crate::on_thread::on_thread;
-use mocban_core::domain::{ErrorCode, FailureClass};
-use mocban_project::ProjectError;
+use mocban_core::domain::FailureClass;
 use mocban_project::location::now;
 use mocban_project::retire::{RetireChoice, retire as retire_pairs};
 use mocban_project::retry::{RetryRequest, retry as retry_pairs};
@@ -25,8 +22,6 @@ use mocban_runner::is_running;
 
 /// Name of the project that is made of the built-in dataset.
 const DEMO: &str = "mocban-demo";
-/// Most pairs of a list that are run by their names.
-const MAX_LIST: usize = 1000;
 /// Largest number of pairs at the same time.
 const MAX_JOBS: u16 = 1024;
 
@@ -101,72 +96,6 @@ pub(super) async fn demo(State(state): State<Arc<AppState>>) -> AppResult<Json<V
     Ok(Json(json!({ "go": format!("p/{DEMO}/") })))
 }
 
-/// The list whose pairs run, as its address names it.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ListBody {
-    list: String,
-}
-
-/// Runs the pairs of a list, also failed ones.
-pub(super) async fn run_list(
-    State(state): State<Arc<AppState>>,
-    Path(key): Path<String>,
-    ActionBody(body): ActionBody<ListBody>,
-) -> AppResult<Json<Value>> {
-    let open = state.open(&key).await?;
-    let query = PairQuery::of(&PageQuery::parse(&body.list));
-    let mut names: Vec<String> = Vec::new();
-    let mut after = None;
-    loop {
-        let page = open.catalog.pair_list(
-            &query.filter,
-            query.order,
-            query.metric,
-            after,
-            query.page_size(),
-        );
-        let page = page.await?;
-        names.extend(
-            page.pairs
-                .iter()
-                .map(|pair| pair.attributes.name.to_string()),
-        );
-        after = page.next;
-        if names.len() > MAX_LIST {
-            return Err(AppFailure::refused(Sentence::new(
-                format!(
-                    "the list has more than {MAX_LIST} pairs: narrow the filter, or run all pairs"
-                ),
-                format!("danh sách có hơn {MAX_LIST} cặp: hãy lọc bớt, hoặc chạy mọi cặp"),
-            )));
-        }
-        if after.is_none() {
-            break;
-        }
-    }
-    if names.is_empty() {
-        return Err(AppFailure::refused(Sentence::new(
-            "the list has no pairs",
-            "danh sách không có cặp nào",
-        )));
-    }
-    let (request, location) = (RetryRequest::Names(names.clone()), open.location());
-    let retried = on_thread(async move || retry_pairs(&request, &location).await).await;
-    // None of them may have failed.
-    let is_none_failed = |error: &ProjectError| error.code() == ErrorCode::NothingSelected;
-    if let Err(error) = retried
-        && !is_none_failed(&error)
-    {
-        return Err(AppFailure::of(error, &open.dir));
-    }
-    if !runs(&open).await? {
-        names.insert(0, "--".to_owned());
-        child_run::start(&state, &open.dir, &names).await?;
-    }
-    Ok(Json(json!({ "go": "./" })))
-}
-
 /// Stops the run on this computer.
 pub(super) async fn stop(
     State(state): State<Arc<AppState>>,
@@ -210,11 +139,14 @@ pub(super) async fn retire(
     let retired =
         on_thread(async move || retire_pairs(&RetireChoice::Ids(vec![pair]), &location).await)
             .await;
-    retired.map_err(|error| AppFailure::of(error, &open.dir))?;
-    Ok(Json(json!({ "go": "../../pairs" })))
+    let retired = retired.map_err(|error| AppFailure::of(error, &open.dir))?;
+    let at = retired.at.unwrap_or_default();
+    let go = format!("../../pairs?done=retire&at={at}");
+    Ok(Json(json!({ "go": go })))
 }
 
-async fn runs(open: &OpenProject) -> AppResult<bool> {
+/// Returns whether a run works on a project.
+pub(super) async fn runs(open: &OpenProject) -> AppResult<bool> {
     let running = is_running(&open.project, &open.catalog, now()).await;
     running.map_err(|error| AppFailure::of(error, &open.dir))
 }

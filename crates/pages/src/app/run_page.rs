@@ -6,6 +6,7 @@ use axum::extract::{Path, State};
 use axum::response::Html;
 use maud::{Markup, html};
 
+use super::address::PageQuery;
 use super::child_run;
 use super::components::{NavSection, action_form, empty, figure, frame, grouped, stored_message};
 use super::failure::AppResult;
@@ -331,7 +332,7 @@ fn latest(visit: &Visit, run: &RunState) -> Markup {
             @if run.latest.is_empty() {
                 (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! {}))
             } @else {
-                div.gallery { @for pair in &run.latest { (pair_card(visit, "", pair, ThresholdMetric::DEFAULT)) } }
+                div.gallery { @for pair in &run.latest { (pair_card(visit, "", pair, ThresholdMetric::DEFAULT, &PageQuery::default())) } }
             }
         }
     }

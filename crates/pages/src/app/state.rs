@@ -12,6 +12,7 @@ use super::open_pages::OpenPages;
 use super::projects::{OpenProject, find};
 use super::tasks::AppTasks;
 use super::thumb_cache::ThumbCache;
+use super::zip_sizes::ZipSizes;
 use crate::local_server::WorkThread;
 use crate::review::Language;
 
@@ -47,6 +48,7 @@ pub(super) struct AppState {
     /// Why runs that the app started failed.
     pub(super) failed_runs: FailedRuns,
     pub(super) thumbs: ThumbCache,
+    pub(super) zip_sizes: ZipSizes,
     /// Draws pictures.
     pub(super) work: WorkThread,
 }
@@ -63,6 +65,7 @@ impl AppState {
             tasks: AppTasks::default(),
             failed_runs: FailedRuns::default(),
             thumbs: ThumbCache::default(),
+            zip_sizes: ZipSizes::default(),
             work: WorkThread::default(),
         }
     }

@@ -1,12 +1,15 @@
 //! Serves one connection within time limits.
 
+use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll};
 use std::time::Duration;
 
 use axum::Router;
+use axum::body::{Body, HttpBody};
 use axum::extract::Request;
 use axum::response::Response;
-use hyper::body::Incoming;
+use hyper::body::{Frame, Incoming, SizeHint};
 use hyper::server::conn::http1;
 use hyper::service::Service;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -27,7 +30,8 @@ pub struct ConnectionLimits {
     pub(super) connections: usize,
     /// Maximum time to receive a complete request header. It also applies if the client sends nothing.
     pub(super) header: Duration,
-    /// Maximum time from the creation of a response to the next request. A client that does not read is cut off.
+    /// Maximum time from the creation of a response, or from its last part that was sent, to the next request. A client that
+    /// does not read is cut off.
     pub(super) response: Duration,
     /// Maximum time that the shutdown waits for a response.
     pub(super) shutdown: Duration,
@@ -109,6 +113,14 @@ impl Activity {
     fn begin(self: &Arc<Self>) -> RequestInProgress {
         *self.lock() = None;
         RequestInProgress(Arc::clone(self))
+    }
+
+    /// Begins the idle time anew, because a part of a response was sent.
+    fn proceed(&self) {
+        let mut idle_since = self.lock();
+        if idle_since.is_some() {
+            *idle_since = Some(Instant::now());
+        }
     }
 
     /// Completes if the connection has been idle for `limit`.
@@ -200,10 +212,42 @@ impl Service<Request<Incoming>> for RequestCounter {
     fn call(&self, request: Request<Incoming>) -> Self::Future {
         let in_progress = self.activity.begin();
         let response = self.service.call(request);
+        let activity = Arc::clone(&self.activity);
         Box::pin(async move {
-            let response = response.await;
+            let Ok(response) = response.await;
             drop(in_progress);
-            response
+            Ok(response.map(|body| Body::new(SentBody { body, activity })))
         })
+    }
+}
+
+/// The body of a response, whose parts are asked for as fast as the client reads them.
+#[derive(Debug)]
+struct SentBody {
+    body: Body,
+    activity: Arc<Activity>,
+}
+
+impl HttpBody for SentBody {
+    type Data = <Body as HttpBody>::Data;
+    type Error = <Body as HttpBody>::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Self::Data>, Self::Error>>> {
+        let polled = Pin::new(&mut self.body).poll_frame(context);
+        if polled.is_ready() {
+            self.activity.proceed();
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
     }
 }

@@ -16,8 +16,10 @@ use super::access_control::AccessControl;
 use super::page_frame::closed_page;
 use super::session::{ICON, SESSION_SCRIPT, SESSION_STYLE, START};
 
-/// Maximum size of a request body in bytes. A verdict with a note of ordinary length is far smaller.
-const BODY_LIMIT: usize = 16 * 1024;
+/// Maximum size of a request body of a guest in bytes. A verdict with a note of ordinary length is far smaller.
+const GUEST_BODY_LIMIT: usize = 16 * 1024;
+/// Maximum size of a request body of the user in bytes. A thousand ids of pairs are smaller.
+const BODY_LIMIT: usize = 256 * 1024;
 /// Maximum time in which the body arrives.
 const BODY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Request header that carries the CSRF token.
@@ -71,10 +73,7 @@ const WRONG_TOKEN: Rejection = (
 );
 
 /// The body is too large.
-const TOO_LARGE: Rejection = (
-    StatusCode::PAYLOAD_TOO_LARGE,
-    "a request may have at most 16 KiB",
-);
+const TOO_LARGE: Rejection = (StatusCode::PAYLOAD_TOO_LARGE, "the request is too large");
 /// The body did not arrive in time.
 const TOO_SLOW: Rejection = (
     StatusCode::REQUEST_TIMEOUT,
@@ -92,7 +91,12 @@ pub(super) async fn guard(
     let checked = match check(&access, &request) {
         Ok(uri) => {
             *request.uri_mut() = uri;
-            with_whole_body(request).await
+            let limit = if access.is_guest() {
+                GUEST_BODY_LIMIT
+            } else {
+                BODY_LIMIT
+            };
+            with_whole_body(request, limit).await
         }
         Err(rejection) => Err(rejection),
     };
@@ -169,9 +173,9 @@ pub fn asks_for_page(headers: &HeaderMap) -> bool {
 }
 
 /// Reads the whole body first, so that no handler waits for a slow client.
-async fn with_whole_body(request: Request) -> Result<Request, Rejection> {
+async fn with_whole_body(request: Request, limit: usize) -> Result<Request, Rejection> {
     let (head, body) = request.into_parts();
-    match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, BODY_LIMIT)).await {
+    match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, limit)).await {
         Ok(Ok(body)) => Ok(Request::from_parts(head, body.into())),
         // Also returned if the client closed the connection, but then nobody reads it.
         Ok(Err(_)) => Err(TOO_LARGE),

@@ -24,7 +24,7 @@ impl ReviewerHistory {
         catalog: &Catalog,
         options: &QueueOptions,
     ) -> Result<Self, CatalogError> {
-        let answers = catalog.answers(&options.reviewer).await?.into_iter();
+        let answered = Self::answers(catalog, &options.reviewer).await?;
         let alignments = catalog.manual_alignments().await?.into_iter();
         let checks = catalog.attention_check_answers().await?.into_iter();
         let own_faults = checks
@@ -37,13 +37,22 @@ impl ReviewerHistory {
                 && stored.undone_at.is_none()
         });
         Ok(Self {
-            // Oldest first, so that the latest one replaces the others.
-            answers: answers.map(|answer| (answer.on, answer)).collect(),
             alignments: current
                 .map(|stored| (stored.made.seen, stored.made))
                 .collect(),
             faulty_results: own_faults.collect(),
             shows_all_alignments: !options.has_attention_checks(),
+            ..answered
+        })
+    }
+
+    /// Reads only the reviewer's current answers.
+    pub(super) async fn answers(catalog: &Catalog, reviewer: &str) -> Result<Self, CatalogError> {
+        let answers = catalog.answers(reviewer).await?.into_iter();
+        Ok(Self {
+            // Oldest first, so that the latest one replaces the others.
+            answers: answers.map(|answer| (answer.on, answer)).collect(),
+            ..Self::default()
         })
     }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use axum::Router;
 
+use super::history::ReviewerHistory;
 use super::item::ReviewItem;
 use super::item_images::ImageCache;
 use super::options::ReviewOptions;
@@ -48,6 +49,17 @@ pub struct QueueCounts {
     pub answered: usize,
 }
 
+impl QueueCounts {
+    fn of(items: &[Arc<ReviewItem>], history: &ReviewerHistory) -> Self {
+        let count = |is: &dyn Fn(&ReviewItem) -> bool| items.iter().filter(|item| is(item)).count();
+        Self {
+            items: items.len(),
+            results: count(&|item| item.check.is_none()),
+            answered: count(&|item| history.answer(item).is_some()),
+        }
+    }
+}
+
 impl ReviewPages {
     /// Reads the queue of a reviewer.
     ///
@@ -68,20 +80,15 @@ impl ReviewPages {
             options,
             unstored: UnstoredEvents::default(),
             served_items: std::sync::Mutex::default(),
+            current_items: std::sync::Mutex::default(),
         };
         // Loads the items now: after a restart, a page may resend an answer before it requests the queue.
         let queue = state.load_queue().await.map_err(|error| match error {
             QueueError::Catalog(error) => ReviewError::Catalog(error),
             QueueError::Stopped(error) => ReviewError::Fault(error),
         })?;
-        let count =
-            |is: &dyn Fn(&ReviewItem) -> bool| queue.items.iter().filter(|item| is(item)).count();
         Ok(Self {
-            counts: QueueCounts {
-                items: queue.items.len(),
-                results: count(&|item| item.check.is_none()),
-                answered: count(&|item| queue.history.answer(item).is_some()),
-            },
+            counts: QueueCounts::of(&queue.items, &queue.history),
             shortage: queue.shortage,
             state: Arc::new(state),
         })
@@ -90,6 +97,19 @@ impl ReviewPages {
     /// Returns the number of items in the queue.
     pub const fn counts(&self) -> QueueCounts {
         self.counts
+    }
+
+    /// Returns how many items of the queue that was read last the reviewer has answered by now.
+    ///
+    /// # Errors
+    /// Returns an error if the answers cannot be read.
+    pub async fn progress(&self) -> Result<QueueCounts, CatalogError> {
+        let (items, reviewer) = (
+            self.state.current_items(),
+            &self.state.options.queue.reviewer,
+        );
+        let history = ReviewerHistory::answers(&self.state.catalog, reviewer).await?;
+        Ok(QueueCounts::of(&items, &history))
     }
 
     /// Returns whether the reviewer has answered every item by now. Returns `false` if that cannot be read.

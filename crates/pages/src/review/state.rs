@@ -24,6 +24,8 @@ pub(super) struct ServerState {
     /// Every item served since the server started, by id. Answers to these items are accepted even if their results
     /// were replaced.
     pub(super) served_items: Mutex<BTreeMap<String, Arc<ReviewItem>>>,
+    /// The items of the queue that was read last.
+    pub(super) current_items: Mutex<Vec<Arc<ReviewItem>>>,
 }
 
 impl ServerState {
@@ -34,7 +36,21 @@ impl ServerState {
         for item in &queue.items {
             served.insert(item.id.clone(), Arc::clone(item));
         }
+        drop(served);
+        self.lock_current().clone_from(&queue.items);
         Ok(queue)
+    }
+
+    /// Returns the items of the queue that was read last.
+    pub(super) fn current_items(&self) -> Vec<Arc<ReviewItem>> {
+        self.lock_current().clone()
+    }
+
+    fn lock_current(&self) -> MutexGuard<'_, Vec<Arc<ReviewItem>>> {
+        // Each change is a single assignment.
+        self.current_items
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns a served item by its id.

@@ -1,0 +1,280 @@
+//! Actions on pairs that were chosen in a list, and what the list then says was done.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, State};
+use maud::{Markup, html};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::action_body::ActionBody;
+use super::address::PageQuery;
+use super::child_run;
+use super::components::{action_form, grouped};
+use super::failure::{AppFailure, AppResult};
+use super::pair_query::PairQuery;
+use super::projects::OpenProject;
+use super::run_actions::runs;
+use super::sentence::Sentence;
+use super::state::AppState;
+use super::visit::Visit;
+use crate::on_thread::on_thread;
+use mocban_catalog::ListedNames;
+use mocban_core::domain::{ErrorCode, PairName, UnixMillis};
+use mocban_project::ProjectError;
+use mocban_project::retire::{RetireChoice, retire, retired_at, undo};
+use mocban_project::retry::{RetryRequest, retry};
+use mocban_project::selection;
+
+/// Most pairs that are chosen at a time. A run gets their ids as arguments.
+pub(super) const MAX_CHOSEN: usize = 1000;
+
+/// Parts of the address of a list that say what was done.
+const DONE: [&str; 3] = ["done", "count", "at"];
+
+/// What is done to pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum ChosenChange {
+    /// Computes all their results again.
+    Compute,
+    /// Runs the waiting and the failed ones.
+    Resume,
+    /// Takes them out of every count.
+    Retire,
+}
+
+/// The fields of the form.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ChosenBody {
+    pairs: Vec<String>,
+    change: ChosenChange,
+    /// The list that the page shows, as its address names it.
+    #[serde(default)]
+    list: String,
+}
+
+/// The time at which pairs were retired.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RestoreBody {
+    at: String,
+    /// The list that the page shows, as its address names it.
+    list: String,
+}
+
+/// Responds with the ids of all pairs of a list, which the page then chooses.
+pub(super) async fn listed(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    visit: Visit,
+) -> AppResult<Json<Value>> {
+    let open = state.open(&key).await?;
+    let query = PairQuery::of(&visit.query);
+    let (filter, order, metric) = (&query.filter, query.order, query.metric);
+    let names = open.catalog.listed_names(filter, order, metric, MAX_CHOSEN);
+    let refusal = match names.await? {
+        ListedNames::All(names) => return Ok(Json(json!({ "pairs": names }))),
+        ListedNames::TooMany => Sentence::new(
+            format!(
+                "more than {MAX_CHOSEN} pairs match, and at most {MAX_CHOSEN} can be chosen: narrow the filter"
+            ),
+            format!(
+                "có hơn {MAX_CHOSEN} cặp phù hợp, và chỉ có thể chọn tối đa {MAX_CHOSEN}: hãy lọc bớt"
+            ),
+        ),
+        ListedNames::NotSearched { searched } => Sentence::new(
+            format!(
+                "only {searched} pairs were looked at, and more may match: narrow the filter by state or block"
+            ),
+            format!(
+                "mới xem {searched} cặp và có thể còn cặp phù hợp: hãy lọc bớt theo trạng thái hoặc ván"
+            ),
+        ),
+    };
+    Err(AppFailure::refused(refusal))
+}
+
+/// Checks that pairs exist and are not retired, and that they are few enough.
+///
+/// # Errors
+/// Names the pair that does not.
+pub(super) async fn require_pairs(
+    open: &OpenProject,
+    typed: &[String],
+) -> AppResult<Vec<PairName>> {
+    if typed.is_empty() {
+        return Err(AppFailure::refused(Sentence::new(
+            "no pair is chosen",
+            "chưa chọn cặp nào",
+        )));
+    }
+    if typed.len() > MAX_CHOSEN {
+        return Err(AppFailure::refused(Sentence::new(
+            format!("at most {MAX_CHOSEN} pairs can be chosen"),
+            format!("chỉ có thể chọn tối đa {MAX_CHOSEN} cặp"),
+        )));
+    }
+    let names = selection::pairs(&open.catalog, typed).await;
+    names.map_err(|error| AppFailure::of(error, &open.dir))
+}
+
+/// Does something with chosen pairs, and replies with the list that says what was done.
+pub(super) async fn change(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    ActionBody(body): ActionBody<ChosenBody>,
+) -> AppResult<Json<Value>> {
+    let open = state.open(&key).await?;
+    let names = require_pairs(&open, &body.pairs).await?;
+    let names: Vec<String> = names.iter().map(PairName::to_string).collect();
+    let list = without_done(&PageQuery::parse(&body.list));
+    let (done, counted) = match body.change {
+        ChosenChange::Compute => {
+            let count = names.len();
+            compute(&state, &open, names).await?;
+            ("compute", ["count", &count.to_string()].map(str::to_owned))
+        }
+        ChosenChange::Resume => {
+            let count = names.len();
+            resume(&state, &open, names).await?;
+            ("resume", ["count", &count.to_string()].map(str::to_owned))
+        }
+        ChosenChange::Retire => {
+            let at = retire_pairs(&open, names).await?;
+            ("retire", ["at", &at.to_string()].map(str::to_owned))
+        }
+    };
+    let [name, value] = counted;
+    let list = list.with("done", done).with(&name, &value);
+    Ok(Json(json!({ "go": format!("pairs{}", list.text()) })))
+}
+
+/// Computes the results of pairs again.
+async fn compute(state: &AppState, open: &OpenProject, names: Vec<String>) -> AppResult<()> {
+    if runs(open).await? {
+        return Err(AppFailure::refused(Sentence::new(
+            "a run is in progress: wait for its end, or press Stop on the page Run",
+            "đang có một lần chạy: hãy chờ, hoặc bấm Dừng ở trang Căn chỉnh",
+        )));
+    }
+    let options = ["--rerun", "all", "--"].map(str::to_owned);
+    let args: Vec<String> = options.into_iter().chain(names).collect();
+    child_run::start(state, &open.dir, &args).await
+}
+
+/// Runs the waiting and failed ones of some pairs. A run in progress takes them up.
+async fn resume(state: &AppState, open: &OpenProject, mut names: Vec<String>) -> AppResult<()> {
+    let (request, location) = (RetryRequest::Names(names.clone()), open.location());
+    let retried = on_thread(async move || retry(&request, &location).await).await;
+    // None of them may have failed.
+    let is_none_failed = |error: &ProjectError| error.code() == ErrorCode::NothingSelected;
+    if let Err(error) = retried
+        && !is_none_failed(&error)
+    {
+        return Err(AppFailure::of(error, &open.dir));
+    }
+    if runs(open).await? {
+        return Ok(());
+    }
+    names.insert(0, "--".to_owned());
+    child_run::start(state, &open.dir, &names).await
+}
+
+/// Takes pairs out of every count. Returns when.
+async fn retire_pairs(open: &OpenProject, names: Vec<String>) -> AppResult<UnixMillis> {
+    let location = open.location();
+    let choice = RetireChoice::Ids(names);
+    let retired = on_thread(async move || retire(&choice, &location).await).await;
+    let retired = retired.map_err(|error| AppFailure::of(error, &open.dir))?;
+    Ok(retired.at.unwrap_or_default())
+}
+
+/// Brings pairs back that were taken out of every count at the same time.
+pub(super) async fn restore(
+    State(state): State<Arc<AppState>>,
+    Path(key): Path<String>,
+    ActionBody(body): ActionBody<RestoreBody>,
+) -> AppResult<Json<Value>> {
+    let open = state.open(&key).await?;
+    let at = body.at.parse::<UnixMillis>();
+    let at = at.map_err(|_invalid| AppFailure::not_found())?;
+    let choice = RetireChoice::RetiredAt(at);
+    let location = open.location();
+    let restored = on_thread(async move || undo(&choice, &location).await).await;
+    let restored = restored.map_err(|error| AppFailure::of(error, &open.dir))?;
+    let done = without_done(&PageQuery::parse(&body.list))
+        .with("done", "restore")
+        .with("count", &restored.changed.to_string());
+    Ok(Json(json!({ "go": format!("pairs{}", done.text()) })))
+}
+
+/// Returns the address of a list without what was done.
+pub(super) fn without_done(query: &PageQuery) -> PageQuery {
+    let names = DONE.into_iter().chain(["after"]);
+    names.fold(query.clone(), |query, name| query.with(name, ""))
+}
+
+/// Says what was done to chosen pairs, as the address has it, and how it is undone.
+pub(super) async fn done_notice(visit: &Visit, open: &OpenProject) -> AppResult<Markup> {
+    let query = &visit.query;
+    let count = query.parsed::<u64>("count").unwrap_or_default();
+    let running = html! { a href="./" { (visit.t("Follow the run", "Theo dõi lần chạy")) } };
+    let (text, count, next) = match query.get("done") {
+        Some("compute") => (
+            visit.t("Pairs that are computed again", "Số cặp được tính lại"),
+            count,
+            running,
+        ),
+        Some("resume") => (
+            visit.t(
+                "Chosen pairs, of which those that wait or failed run now",
+                "Số cặp đã chọn, trong đó các cặp đang chờ hoặc bị lỗi được chạy",
+            ),
+            count,
+            running,
+        ),
+        Some("restore") => (
+            visit.t(
+                "Pairs that are in every count again",
+                "Số cặp đã được tính trở lại",
+            ),
+            count,
+            html! {},
+        ),
+        Some("retire") => {
+            let at = query.parsed("at").unwrap_or_default();
+            let retired = retired_at(&open.catalog, at).await?.len() as u64;
+            let undo = html! { @if retired > 0 { (restore_form(visit, at)) } };
+            let text = visit.t(
+                "Pairs that were taken out of every count; their results and verdicts are kept",
+                "Số cặp đã được đưa ra khỏi mọi thống kê; kết quả và đánh giá vẫn được giữ",
+            );
+            (text, retired, undo)
+        }
+        _ => return Ok(html! {}),
+    };
+    Ok(html! {
+        div #done.notice.good role="status" { p { (text) ": " b { (grouped(count)) } } (next) }
+    })
+}
+
+/// Returns the hidden field that names the list of the page.
+pub(super) fn list_field(visit: &Visit) -> Markup {
+    let list = without_done(&visit.query).text();
+    html! { input type="hidden" name="list" value=(list.trim_start_matches('?')); }
+}
+
+fn restore_form(visit: &Visit, at: UnixMillis) -> Markup {
+    action_form(
+        "actions/restore",
+        "inline",
+        &html! {
+            input type="hidden" name="at" value=(at);
+            (list_field(visit))
+            button #undo { (visit.t("Bring them back", "Đưa trở lại")) }
+        },
+    )
+}
