@@ -1,6 +1,7 @@
 // Actions, and parts of pages that are read again while they are shown.
 
-const token = document.querySelector('meta[name="csrf-token"]').content;
+import { act } from "./action.js";
+
 const offline = document.getElementById("offline");
 
 /** Returns the fields of a form, with the button that sent it. A name that occurs twice has a list. */
@@ -19,24 +20,6 @@ function showProblem(form, text) {
   problem.hidden = !text;
 }
 
-/** Sends an action. Its reply says which page follows. */
-async function send(form, button) {
-  const response = await fetch(form.dataset.post, {
-    method: "POST",
-    headers: { "content-type": "application/json", "x-csrf-token": token },
-    body: JSON.stringify(fields(form, button)),
-  });
-  const text = await response.text();
-  let reply = {};
-  try {
-    reply = JSON.parse(text);
-  } catch {
-    reply = { error: text };
-  }
-  if (!response.ok) throw new Error(reply.error || text || response.statusText);
-  return reply;
-}
-
 document.addEventListener("submit", async (event) => {
   const form = event.target;
   if (!form.dataset.post) return;
@@ -47,7 +30,7 @@ document.addEventListener("submit", async (event) => {
   form.setAttribute("aria-busy", "true");
   showProblem(form, "");
   try {
-    const reply = await send(form, event.submitter);
+    const reply = await act(form.dataset.post, fields(form, event.submitter));
     if (reply.go) location.assign(reply.go);
     else if (reply.reload) await refresh(true);
   } catch (error) {

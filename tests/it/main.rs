@@ -8,8 +8,12 @@ mod all_pages;
 mod app;
 mod app_blocks;
 mod app_browser;
+mod app_import;
 mod app_invitations;
 mod app_sentences;
+mod app_upload_archives;
+mod app_upload_browser;
+mod app_uploads;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;

@@ -8,7 +8,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, content type and text of an asset.
-const ASSETS: [(&str, &str, &str); 4] = [
+const ASSETS: [(&str, &str, &str); 6] = [
     (
         "tokens.css",
         STYLE,
@@ -20,6 +20,11 @@ const ASSETS: [(&str, &str, &str); 4] = [
         include_str!("../../../../assets/app/app.css"),
     ),
     (
+        "action.js",
+        SCRIPT,
+        include_str!("../../../../assets/app/action.js"),
+    ),
+    (
         "app.js",
         SCRIPT,
         include_str!("../../../../assets/app/app.js"),
@@ -28,6 +33,11 @@ const ASSETS: [(&str, &str, &str); 4] = [
         "pair.js",
         SCRIPT,
         include_str!("../../../../assets/app/pair.js"),
+    ),
+    (
+        "upload.js",
+        SCRIPT,
+        include_str!("../../../../assets/app/upload.js"),
     ),
 ];
 

@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
 use super::address::encoded;
+use super::byte_size::size;
 use super::components::{NavSection, action_form, choice, frame};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
@@ -202,15 +203,6 @@ fn folder_part(visit: &Visit, dir: &FilePath, name: &str, files: &[(String, u64)
     }
 }
 
-/// Returns a number of bytes as a person reads it.
-pub(super) fn size(bytes: u64) -> String {
-    match bytes {
-        0..=9_999 => format!("{bytes} B"),
-        10_000..=999_999 => format!("{} kB", bytes / 1000),
-        _ => format!("{:.1} MB", bytes as f64 / 1e6),
-    }
-}
-
 /// Starts an export.
 pub(super) async fn start(
     State(state): State<Arc<AppState>>,
@@ -300,7 +292,7 @@ pub(super) fn attachment(file: &str, kind: &'static str, bytes: Vec<u8>) -> Resp
 
 #[cfg(test)]
 mod tests {
-    use super::{exported, size};
+    use super::exported;
 
     #[test]
     fn only_plain_files_of_known_exports_are_listed() {
@@ -321,7 +313,5 @@ mod tests {
             found,
             [("excel".to_owned(), vec![("pairs.csv".to_owned(), 3)])]
         );
-        assert_eq!(size(12_345), "12 kB");
-        assert_eq!(size(2_500_000), "2.5 MB");
     }
 }

@@ -10,8 +10,9 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
+use super::byte_size::size;
 use super::components::{NavSection, action_form, frame};
-use super::export_page::{attachment, size};
+use super::export_page::attachment;
 use super::failure::{AppFailure, AppResult};
 use super::home::free_space;
 use super::state::AppState;

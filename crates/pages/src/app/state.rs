@@ -9,9 +9,11 @@ use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
 use super::invitations::Invitations;
 use super::open_pages::OpenPages;
+use super::plan_cache::PlanCache;
 use super::projects::{OpenProject, find};
 use super::tasks::AppTasks;
 use super::thumb_cache::ThumbCache;
+use super::uploads::Uploads;
 use crate::local_server::WorkThread;
 use crate::review::Language;
 
@@ -47,6 +49,10 @@ pub(super) struct AppState {
     /// Why runs that the app started failed.
     pub(super) failed_runs: FailedRuns,
     pub(super) thumbs: ThumbCache,
+    /// What the last import would store.
+    pub(super) plans: PlanCache,
+    /// Files that the browser sends.
+    pub(super) uploads: Uploads,
     /// Draws pictures.
     pub(super) work: WorkThread,
 }
@@ -56,6 +62,7 @@ impl AppState {
         Self {
             language: Mutex::new(options.language),
             invitations: Invitations::new(options.listen, &options.folder),
+            uploads: Uploads::new(&options.folder),
             options,
             projects: Mutex::default(),
             reviews: OpenPages::new(32),
@@ -63,6 +70,7 @@ impl AppState {
             tasks: AppTasks::default(),
             failed_runs: FailedRuns::default(),
             thumbs: ThumbCache::default(),
+            plans: PlanCache::default(),
             work: WorkThread::default(),
         }
     }
