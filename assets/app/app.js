@@ -1,6 +1,7 @@
 // Actions, and parts of pages that are read again while they are shown.
 
-const token = document.querySelector('meta[name="csrf-token"]').content;
+import { act } from "./action.js";
+
 const offline = document.getElementById("offline");
 
 /** Returns the fields of a form, with the button that sent it. A name that occurs twice has a list. */
@@ -24,27 +25,6 @@ function keptName(form) {
   return form.closest("[data-chosen]")?.dataset.chosen;
 }
 
-/** Sends an action. Its reply says which page follows. */
-async function send(form, button) {
-  const kept = keptName(form);
-  const pairs = kept && { pairs: JSON.parse(sessionStorage.getItem(kept) ?? "[]") };
-  const response = await fetch(form.dataset.post, {
-    method: "POST",
-    headers: { "content-type": "application/json", "x-csrf-token": token },
-    body: JSON.stringify({ ...fields(form, button), ...pairs }),
-  });
-  const text = await response.text();
-  let reply = {};
-  try {
-    reply = JSON.parse(text);
-  } catch {
-    reply = { error: text };
-  }
-  if (!response.ok) throw new Error(reply.error || text || response.statusText);
-  if (kept) sessionStorage.removeItem(kept);
-  return reply;
-}
-
 document.addEventListener("submit", async (event) => {
   const form = event.target;
   if (!form.dataset.post) return;
@@ -55,7 +35,10 @@ document.addEventListener("submit", async (event) => {
   form.setAttribute("aria-busy", "true");
   showProblem(form, "");
   try {
-    const reply = await send(form, event.submitter);
+    const kept = keptName(form);
+    const pairs = kept && { pairs: JSON.parse(sessionStorage.getItem(kept) ?? "[]") };
+    const reply = await act(form.dataset.post, { ...fields(form, event.submitter), ...pairs });
+    if (kept) sessionStorage.removeItem(kept);
     if (reply.go) location.assign(reply.go);
     else if (reply.reload) await refresh(true);
   } catch (error) {

@@ -82,6 +82,19 @@ fn a_guest_judges_under_the_name_of_the_invitation_and_does_nothing_else() {
         let reply = guest.post(path, &json!({"pair": "upright-0000"}));
         assert_eq!(reply.expect("a reply").status, 404, "{path}");
     }
+    // A guest can send no files.
+    let begin = guest.post(
+        "/actions/upload",
+        &json!({"name": "x", "files": 1, "bytes": 1}),
+    );
+    assert_eq!(begin.expect("a reply").status, 404);
+    let mut headers = guest.headers();
+    headers.retain(|(name, _)| *name != "content-type");
+    headers.push(("content-type", "application/octet-stream".to_owned()));
+    let path = format!("{}/uploads/1/1.stl", guest.session);
+    let sent = send(guest.address(), "POST", &path, &headers, b"solid");
+    assert_eq!(sent.expect("a reply").status, 415);
+    assert!(!dir.path().join("uploads").exists());
     // The session of the app does not exist on the server for guests.
     let elsewhere = Site {
         host: guest.host.clone(),

@@ -267,6 +267,14 @@ impl Tab<'_> {
         response["result"]["value"].clone()
     }
 
+    /// Chooses files in an input, as a person does in the dialog of the browser.
+    pub(crate) fn choose_files(&self, query: &str, files: &[PathBuf]) {
+        let element = json!({ "expression": format!("document.querySelector('{query}')") });
+        let element = self.call("Runtime.evaluate", &element);
+        let params = json!({ "files": files, "objectId": element["result"]["objectId"] });
+        self.call("DOM.setFileInputFiles", &params);
+    }
+
     /// Waits until an expression is true, also across navigation.
     #[track_caller]
     pub(crate) fn wait(&self, condition: &str) {

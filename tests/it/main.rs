@@ -11,8 +11,12 @@ mod app_browser;
 mod app_choice;
 mod app_choice_browser;
 mod app_export_zip;
+mod app_import;
 mod app_invitations;
 mod app_sentences;
+mod app_upload_archives;
+mod app_upload_browser;
+mod app_uploads;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;

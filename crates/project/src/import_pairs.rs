@@ -11,9 +11,10 @@ use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files;
 use crate::location::{Location, now};
-use crate::manifest_file::Listing;
+use crate::manifest_file::{Listing, list_content};
 use crate::missing_files::MissingFiles;
 use crate::new_project::import_with;
+use crate::pair_choices::{PairChoices, RowsHash};
 use crate::row_spool::RowSpool;
 use crate::truth_file::{self, TruthRow};
 use mocban_catalog::{Catalog, ImportRow, ImportSummary, ImportTerms};
@@ -28,6 +29,12 @@ const WAITING_CHUNKS: usize = 2;
 
 /// End of the message when the file of true alignments is refused.
 const NOT_IMPORTED: &str = "nothing was imported";
+
+/// Refuses other pairs than were shown.
+const CHANGED: &str = "the files or the list changed after the pairs were shown; nothing was imported: look at the pairs again";
+
+/// Refuses an import without pairs.
+const ALL_LEFT_OUT: &str = "all pairs are left out, so there is nothing to import";
 
 /// Where the pairs of an import are named.
 #[derive(Debug)]
@@ -59,6 +66,8 @@ pub struct PairImport {
     pub truth: Option<PathBuf>,
     /// What is accepted.
     pub allowed: AllowedChanges,
+    /// What a person chose before.
+    pub choices: PairChoices,
 }
 
 /// Changes that an import makes only if the user allows them.
@@ -95,7 +104,10 @@ pub async fn import_pairs(
     listener: &dyn Listener,
 ) -> ProjectResult<ImportOutcome> {
     let _work = LongWork::begin(listener, "importing");
-    let mut listing = listing(import.source)?;
+    let mut listing = listing(import.source, &import.choices)?;
+    if let Some(why) = listing.no_pair.take() {
+        return Err(why.into());
+    }
     let warnings = std::mem::take(&mut listing.warnings);
     let renamed = listing.renamed.take();
     let truths = match &import.truth {
@@ -109,7 +121,7 @@ pub async fn import_pairs(
     let looked_at = project.clone();
     let token = ThreadToken::current();
     let spooled = tokio::task::spawn_blocking(move || {
-        token.scope(|| spool(&listing, &looked_at, import.allowed))
+        token.scope(|| spool(&listing, &looked_at, import.allowed, &import.choices))
     });
     let (rows, missing) = spooled.await.map_err(TaskStopped)??;
     let (rows, terms) = (
@@ -159,13 +171,17 @@ fn spool(
     listing: &Listing,
     project: &Project,
     allowed: AllowedChanges,
+    choices: &PairChoices,
 ) -> ProjectResult<(RowSpool, MissingFiles)> {
     let failed = || "cannot write a temporary file for the list".to_owned();
     let mut spool = RowSpool::new().with_context(failed)?;
     let mut missing = MissingFiles::default();
     let mut outcome = Ok(());
+    let (mut hash, mut count) = (RowsHash::new(), 0_u64);
     listing.rows(project, |row, lines| {
         poll();
+        hash.add(&row, lines.len(), listing.has_unit());
+        count += 1;
         failpoint::hit("import", Point::Computed, Some(&row.name));
         for line in lines {
             missing.add(line);
@@ -176,25 +192,31 @@ fn spool(
         }
     });
     outcome?;
+    let is_other = |shown| shown != hash.value();
+    if choices.shown.is_some_and(is_other) {
+        return Err(Refusal::Usage(CHANGED.to_owned()).into());
+    }
+    if count == 0 {
+        return Err(Refusal::Usage(ALL_LEFT_OUT.to_owned()).into());
+    }
     if missing.count > 0 && !allowed.missing {
         return Err(missing.refusal().into());
     }
     Ok((spool, missing))
 }
 
-/// Reads what a source names.
-pub(crate) fn listing(source: PairSource) -> ProjectResult<Listing> {
+/// Reads what a source names, as a person has chosen.
+pub(crate) fn listing(source: PairSource, choices: &PairChoices) -> ProjectResult<Listing> {
     match source {
-        PairSource::List {
-            file,
-            bytes: Some(bytes),
-        } => Listing::from_bytes(&file, bytes),
-        PairSource::List { file, bytes: None } => Listing::from_file(&file),
+        PairSource::List { file, bytes } => {
+            let bytes = bytes.map_or_else(|| list_content(&file), Ok)?;
+            Listing::from_bytes(&file, bytes, choices)
+        }
         PairSource::Folders {
             meshes,
             prints,
             unit,
-        } => Listing::from_folders(&meshes, &prints, unit),
+        } => Listing::from_folders(&meshes, &prints, unit, &choices.changes),
     }
 }
 

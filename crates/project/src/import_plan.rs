@@ -1,11 +1,14 @@
 //! What an import of pairs would store, without storing anything.
 
+use std::ops::Range;
 use std::path::PathBuf;
 
 use crate::error::ProjectResult;
 use crate::import_pairs::{PairSource, listing};
+use crate::location::Location;
 use crate::missing_files::MissingFiles;
-use mocban_core::domain::PairName;
+use crate::pair_choices::{PairChoices, RowsHash};
+use mocban_core::domain::{ContentHash, PairName};
 use mocban_store::Project;
 
 /// A pair that would be imported.
@@ -26,12 +29,18 @@ pub struct PlannedPair {
 }
 
 /// What an import would do.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct ImportPlan {
     /// Number of pairs.
     pub pairs: u64,
-    /// The first pairs.
-    pub first: Vec<PlannedPair>,
+    /// Hash of all pairs. An import of others can be refused.
+    pub hash: ContentHash,
+    /// The pairs that were asked for.
+    pub shown: Vec<PlannedPair>,
+    /// Meshes and prints of folders without a partner, by their paths below the folders.
+    pub alone: [Vec<String>; 2],
+    /// Says why folders have no pair.
+    pub no_pair: Option<String>,
     /// Files that do not exist.
     pub missing: MissingFiles,
     /// Files without a partner, formats that cannot be read and names that look alike, one line each.
@@ -40,46 +49,58 @@ pub struct ImportPlan {
     pub renamed: Option<String>,
 }
 
-/// Reads a list or folders and looks at the files, as an import does before it stores the pairs. `shown` is the number of
-/// pairs that are returned.
+/// Reads a list or folders and looks at the files, as an import into a project does before it stores the pairs. Folders
+/// may have no pair. `shown` has the positions of the pairs that are returned.
 ///
 /// # Errors
 /// Returns an error if an import would refuse the list or the folders.
 pub fn plan_import(
     source: PairSource,
-    project: &Project,
-    shown: usize,
+    choices: &PairChoices,
+    location: &Location,
+    shown: &Range<u64>,
 ) -> ProjectResult<ImportPlan> {
-    let mut listing = listing(source)?;
-    let mut plan = ImportPlan {
-        warnings: std::mem::take(&mut listing.warnings),
-        renamed: listing.renamed.take(),
-        ..ImportPlan::default()
-    };
-    listing.rows(project, |row, missing| {
-        plan.pairs += 1;
-        for line in &missing {
-            plan.missing.add(line.clone());
+    let (storage, _) = location.data_locations()?;
+    let project = Project::at(&location.dir).with_storage(storage);
+    let listing = listing(source, choices)?;
+    let (mut pairs, mut hash) = (0, RowsHash::new());
+    let (mut planned, mut missing) = (Vec::new(), MissingFiles::default());
+    listing.rows(&project, |row, lines| {
+        hash.add(&row, lines.len(), listing.has_unit());
+        for line in &lines {
+            missing.add(line.clone());
         }
-        if plan.first.len() < shown {
-            plan.first.push(PlannedPair {
+        if shown.contains(&pairs) {
+            planned.push(PlannedPair {
                 name: row.name,
                 mesh: row.mesh,
                 print: row.print,
                 character: row.character,
                 block: row.block,
-                missing,
+                missing: lines,
             });
         }
+        pairs += 1;
     });
-    Ok(plan)
+    Ok(ImportPlan {
+        pairs,
+        hash: hash.value(),
+        shown: planned,
+        missing,
+        alone: listing.alone,
+        no_pair: listing.no_pair.map(|why| why.to_string()),
+        warnings: listing.warnings,
+        renamed: listing.renamed,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::plan_import;
-    use crate::import_pairs::PairSource;
-    use mocban_store::Project;
+    use crate::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
+    use crate::location::Location;
+    use crate::pair_choices::PairChoices;
+    use mocban_lists::manifest::PairingChanges;
 
     #[test]
     fn a_plan_counts_pairs_and_stores_nothing() {
@@ -94,30 +115,101 @@ mod tests {
                 std::fs::write(folder.join(name), "x").expect("written");
             }
         }
-        let project = Project::at(&dir.path().join("project"));
-        let source = PairSource::Folders {
-            meshes,
-            prints,
-            unit: None,
+        let location = Location::new(dir.path().join("project"));
+        let plan = |left_out: &[&str], shown| {
+            let source = PairSource::Folders {
+                meshes: meshes.clone(),
+                prints: prints.clone(),
+                unit: None,
+            };
+            let changes = PairingChanges {
+                left_out: left_out.iter().map(|id| (*id).to_owned()).collect(),
+                joined: Vec::new(),
+            };
+            let choices = PairChoices {
+                changes,
+                ..PairChoices::default()
+            };
+            plan_import(source, &choices, &location, &shown).expect("a plan")
         };
-        let plan = plan_import(source, &project, 1).expect("a plan");
-        assert_eq!((plan.pairs, plan.first.len()), (2, 1));
-        assert_eq!(plan.first[0].name.as_str(), "1");
-        assert_eq!(plan.missing.count, 0);
-        assert!(plan.warnings.iter().any(|line| line.contains("alone.stl")));
-        assert!(!project.dir().exists(), "nothing is stored");
+        let first = plan(&[], 0..1);
+        assert_eq!((first.pairs, first.shown.len()), (2, 1));
+        assert_eq!(first.shown[0].name.as_str(), "1");
+        assert_eq!(first.missing.count, 0);
+        assert!(first.warnings.iter().any(|line| line.contains("alone.stl")));
+        assert_eq!(first.alone, [vec!["alone.stl".to_owned()], Vec::new()]);
+        let second = plan(&[], 1..9);
+        assert_eq!(
+            (second.shown[0].name.as_str(), second.hash),
+            ("2", first.hash)
+        );
+        let fewer = plan(&["1"], 0..9);
+        assert_eq!(
+            (fewer.pairs, fewer.alone[1].as_slice()),
+            (1, &["1.png".to_owned()][..])
+        );
+        assert_ne!(fewer.hash, first.hash);
+        let none = plan(&["1", "2"], 0..9);
+        assert!(none.pairs == 0 && none.no_pair.is_some());
+        assert!(!location.dir.exists(), "nothing is stored");
+    }
+
+    #[tokio::test]
+    async fn only_the_pairs_that_were_shown_are_stored() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let file = dir.path().join("pairs.csv");
+        for name in ["a.stl", "a.png", "b.stl", "b.png"] {
+            std::fs::write(dir.path().join(name), "x").expect("written");
+        }
+        let location = Location::new(dir.path().join("project"));
+        let list = |text: &str| {
+            std::fs::write(&file, text).expect("written");
+            let file = file.clone();
+            PairSource::List { file, bytes: None }
+        };
+        let rows = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
+        let mut choices = PairChoices::default();
+        choices.changes.left_out = vec!["b".to_owned()];
+        let plan = plan_import(list(rows), &choices, &location, &(0..9)).expect("a plan");
+        assert_eq!(plan.pairs, 1);
+        choices.shown = Some(plan.hash);
+        let import = async |source, choices: &PairChoices| {
+            let import = PairImport {
+                source,
+                truth: None,
+                allowed: AllowedChanges::default(),
+                choices: choices.clone(),
+            };
+            let outcome = import_pairs(import, &location, &()).await;
+            outcome
+                .map(|outcome| outcome.summary.added)
+                .map_err(|error| error.to_string())
+        };
+        let other = "id,mesh,print\na,b.stl,a.png\nb,b.stl,b.png\n";
+        let refused = import(list(other), &choices).await.expect_err("changed");
+        assert!(
+            refused.contains("changed after the pairs were shown"),
+            "{refused}"
+        );
+        assert!(!location.dir.exists(), "nothing is stored");
+        assert_eq!(import(list(rows), &choices).await, Ok(1));
+        choices.changes.left_out.push("c".to_owned());
+        let refused = import(list(rows), &choices)
+            .await
+            .expect_err("no such pair");
+        assert!(refused.contains("there is no pair \"c\""), "{refused}");
     }
 
     #[test]
     fn formats_of_a_list_that_are_not_read_get_one_sentence_each() {
         let dir = tempfile::tempdir().expect("a temporary directory");
-        let project = Project::at(&dir.path().join("project"));
+        let location = Location::new(dir.path().join("project"));
         let plan = |list: String| {
             let source = PairSource::List {
                 file: dir.path().join("pairs.csv"),
                 bytes: Some(list.into_bytes()),
             };
-            plan_import(source, &project, 1)
+            plan_import(source, &PairChoices::default(), &location, &(0..1))
         };
         let list = "id,mesh,print\n1,a.glb,a.png\n2,b.glb,b.bmp\n".to_owned();
         let sentences = [

@@ -3,7 +3,7 @@
 //! - [`location`]: a project folder with the settings that say where its catalog and its files are; opens both
 //! - [`align`]: one scan with one print, without a project
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
-//! - [`import_plan`]: what an import of pairs would store
+//! - [`import_plan`]: what an import of pairs would store; [`pair_choices`]: what a person changes in it
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
 //! - [`retire`]: takes pairs out of every count, and brings them back
 //! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
@@ -54,6 +54,7 @@ pub mod missing_files;
 pub mod missing_inputs;
 pub mod new_project;
 pub mod own_files;
+pub mod pair_choices;
 pub mod pair_table;
 pub mod report;
 pub mod restore;

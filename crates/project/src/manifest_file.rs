@@ -1,5 +1,6 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -9,10 +10,11 @@ use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form, is_window
 use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
-use mocban_core::domain::{FileKind, LengthUnit, first_names, sanitize};
+use crate::pair_choices::PairChoices;
+use mocban_core::domain::{FileKind, LengthUnit, PairName, first_names, sanitize};
 use mocban_lists::manifest::{
-    ListedFolder, ManifestError, ManifestRow, MisspeltColumns, ReadRows, RowIds, pair_folders,
-    read_csv, read_jsonl,
+    ChosenColumns, ListedFolder, ManifestError, ManifestRow, MisspeltColumns, PairingChanges,
+    ReadRows, RowIds, pair_folders_with, read_csv_as, read_jsonl,
 };
 use mocban_store::Project;
 
@@ -26,6 +28,10 @@ pub struct Listing {
     pub warnings: Vec<String>,
     /// Which columns were read under other names.
     pub renamed: Option<String>,
+    /// Meshes and prints of directories without a partner, by their paths below the directories.
+    pub alone: [Vec<String>; 2],
+    /// Says why directories have no pair.
+    pub no_pair: Option<Refusal>,
     /// Label of row numbers in messages: `pairs.csv: line`, or `pair` for directories.
     row_label: String,
 }
@@ -37,6 +43,9 @@ enum ListingSource {
     List {
         bytes: Vec<u8>,
         parse: RowParser,
+        columns: ChosenColumns,
+        /// Ids that are left out.
+        left_out: BTreeSet<String>,
         folder: PathBuf,
     },
     /// Two directories.
@@ -44,7 +53,8 @@ enum ListingSource {
 }
 
 /// Calls a function for each row; returns the ids of all rows, and which columns have other names.
-type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<ReadRows, ManifestError>;
+type RowParser =
+    fn(&[u8], &ChosenColumns, &mut dyn FnMut(ManifestRow)) -> Result<ReadRows, ManifestError>;
 
 /// Refuses a manifest as a whole.
 pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
@@ -58,58 +68,68 @@ pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
 impl Listing {
     /// Reads a CSV or JSON Lines file. If its extension is unknown, the first character decides the format.
     pub fn from_file(file: &Path) -> ProjectResult<Self> {
-        let shown = file.display();
-        if file.is_dir() {
-            let text =
-                format!("{shown} is a directory; name two directories with --meshes and --prints");
-            return Err(Refusal::Usage(text).into());
-        }
-        Self::from_bytes(file, files::read(file)?)
+        Self::from_bytes(file, list_content(file)?, &PairChoices::default())
     }
 
-    /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`].
+    /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`], as a person has chosen.
     ///
     /// # Errors
-    /// Returns an error if the content is no list, or the names of its files say that none of its pairs can be read.
-    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> ProjectResult<Self> {
+    /// Returns an error if the content is no list, the names of its files say that none of its pairs can be read, or there is
+    /// nothing of what was chosen.
+    pub fn from_bytes(file: &Path, bytes: Vec<u8>, choices: &PairChoices) -> ProjectResult<Self> {
         let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {
-            read_jsonl
+            |bytes, _columns, each| read_jsonl(bytes, each)
         } else {
-            read_csv
+            read_csv_as
         };
         let (mut misspelt, mut unread) = (MisspeltColumns::default(), UnreadRows::default());
         let mut each = |row: ManifestRow| {
             misspelt.add(&row);
             unread.add(&row);
         };
-        let read = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
+        let columns = choices.columns.clone();
+        let read =
+            parse(&bytes, &columns, &mut each).map_err(|problems| refuse(file, &problems))?;
         let mut warnings = misspelt.warnings();
         let unread = unread.warnings();
         warnings.extend(unread.map_err(|sentences| refuse(file, &sentences))?);
         let renamed = renamed(&read);
+        let left_out: BTreeSet<String> = choices.changes.left_out.iter().cloned().collect();
+        let has = |id: &&String| PairName::new(id).is_ok_and(|name| read.ids.contains(&name));
+        if let Some(id) = left_out.iter().find(|id| !has(id)) {
+            let text = format!("there is no pair {id:?} to leave out");
+            return Err(refuse(file, &text).into());
+        }
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
                 bytes,
                 parse,
+                columns,
+                left_out,
                 folder,
             },
             ids: read.ids,
             warnings,
             renamed,
+            alone: [Vec::new(), Vec::new()],
+            no_pair: None,
             row_label: format!("{shown}: line"),
         })
     }
 
-    /// Pairs each mesh of one directory with the print of the same folder and file stem in the other directory.
+    /// Pairs each mesh of one directory with the print of the same folder and file stem in the other directory, except for
+    /// changes. There may be no pair.
     ///
     /// # Errors
-    /// Returns an error if a directory cannot be listed, or two files of one directory have the same stem.
+    /// Returns an error if a directory cannot be listed, two files of one directory have the same stem, or the files of a
+    /// change are not there.
     pub fn from_folders(
         meshes: &Path,
         prints: &Path,
         unit: Option<LengthUnit>,
+        changes: &PairingChanges,
     ) -> ProjectResult<Self> {
         let listed = |root: &Path| {
             let root = in_existing_form(root);
@@ -121,10 +141,13 @@ impl Listing {
             &print_folder.files,
             FileKind::image_advice,
         ));
-        let found = pair_folders(&mesh_folder, &print_folder).map_err(|problems| {
+        let refuse_both = |problems: ManifestError| {
             let lines = [&[problems.to_string()][..], &unread.sentences].concat();
             refuse(meshes, &lines.join("\n"))
-        })?;
+        };
+        let found =
+            pair_folders_with(&mesh_folder, &print_folder, changes).map_err(&refuse_both)?;
+        let no_pair = found.no_pair.map(refuse_both);
         let mut others = found.ignored;
         others.retain(|path| !unread.paths.contains(path));
         let mut rows = found.rows;
@@ -137,13 +160,24 @@ impl Listing {
             ignored_files("neither mesh nor print", &others),
         ];
         let warnings = warnings.into_iter().flatten().chain(unread.sentences);
+        let alone = [
+            below(&found.meshes_alone, &mesh_folder.root),
+            below(&found.prints_alone, &print_folder.root),
+        ];
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
             warnings: warnings.chain(found.similar).collect(),
             renamed: None,
+            alone,
+            no_pair,
             row_label: "pair".to_owned(),
         })
+    }
+
+    /// Returns whether the unit of the scans is in the list, and not chosen with the import.
+    pub(crate) const fn has_unit(&self) -> bool {
+        matches!(self.source, ListingSource::List { .. })
     }
 
     /// Calls `each` for every row, with a message for each missing file. Paths start with the manifest's directory.
@@ -169,9 +203,14 @@ impl Listing {
             ListingSource::List {
                 bytes,
                 parse,
+                columns,
+                left_out,
                 folder,
             } => {
-                let parsed = parse(bytes, &mut |mut row| {
+                let parsed = parse(bytes, columns, &mut |mut row| {
+                    if left_out.contains(row.name.as_str()) {
+                        return;
+                    }
                     for path in [&mut row.mesh, &mut row.print] {
                         if !is_below_root(path) {
                             *path = folder.join(&*path);
@@ -183,6 +222,25 @@ impl Listing {
             }
         }
     }
+}
+
+/// Reads a list of pairs.
+pub(crate) fn list_content(file: &Path) -> ProjectResult<Vec<u8>> {
+    let shown = file.display();
+    if file.is_dir() {
+        let text =
+            format!("{shown} is a directory; name two directories with --meshes and --prints");
+        return Err(Refusal::Usage(text).into());
+    }
+    Ok(files::read(file)?)
+}
+
+/// Returns paths below a folder that are UTF-8.
+fn below(paths: &[PathBuf], root: &Path) -> Vec<String> {
+    let paths = paths.iter().filter_map(|path| path.strip_prefix(root).ok());
+    paths
+        .filter_map(|path| path.to_str().map(str::to_owned))
+        .collect()
 }
 
 /// Says which columns were read under other names.

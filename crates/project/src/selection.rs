@@ -216,6 +216,7 @@ mod tests {
     use super::{no_such, pairs_and_blocks};
     use crate::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
     use crate::location::Location;
+    use crate::pair_choices::PairChoices;
     use mocban_core::domain::PairName;
 
     #[tokio::test]
@@ -233,6 +234,7 @@ mod tests {
                 missing: true,
                 ..AllowedChanges::default()
             },
+            choices: PairChoices::default(),
         };
         import_pairs(import, &location, &())
             .await

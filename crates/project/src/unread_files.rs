@@ -114,6 +114,7 @@ mod tests {
     use std::path::PathBuf;
 
     use crate::manifest_file::Listing;
+    use mocban_lists::manifest::PairingChanges;
 
     #[test]
     fn files_that_are_not_read_get_one_sentence_per_format() {
@@ -146,15 +147,14 @@ mod tests {
                 prints.join("d.pdf").display()
             ),
         ];
-        let refused = Listing::from_folders(&meshes, &prints, None).expect_err("no pair");
+        let listed = || Listing::from_folders(&meshes, &prints, None, &PairingChanges::default());
+        let refused = listed().expect("two folders").no_pair.expect("no pair");
         let refused = refused.to_string();
         for sentence in &sentences {
             assert_eq!(refused.matches(sentence).count(), 1, "{refused}");
         }
         write(prints.join("a.png"));
-        let warnings = Listing::from_folders(&meshes, &prints, None)
-            .expect("a pair")
-            .warnings;
+        let warnings = listed().expect("a pair").warnings;
         let other = format!(
             "neither mesh nor print: {}, {}",
             meshes.join("d.bmp").display(),

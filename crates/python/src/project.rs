@@ -21,6 +21,7 @@ use mocban_project::import_blocks::ImportedBlock;
 use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
 use mocban_project::input_paths::in_existing_form;
 use mocban_project::location::Location;
+use mocban_project::pair_choices::PairChoices;
 use mocban_project::report::{ReportOptions, report};
 use mocban_project::run::{PreparedRun, options};
 use mocban_project::status::ProjectStatus;
@@ -287,6 +288,7 @@ impl NativeProject {
                     files: allow_changed_files,
                     replace,
                 },
+                choices: PairChoices::default(),
             };
             let outcome = import_pairs(import, &location, &hearing).await?;
             let summary = outcome.summary;

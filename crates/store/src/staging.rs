@@ -73,6 +73,11 @@ impl StagingFolder {
         Err(Error::other(text))
     }
 
+    /// Removes folders of dead processes that wrote this output. Returns how many there were.
+    pub fn remove_stale(target: &Path) -> usize {
+        Self::stale(target).len()
+    }
+
     /// Returns the folders of dead processes that wrote this output. Dropping a folder removes it from the disk.
     pub(super) fn stale(target: &Path) -> Vec<Self> {
         let Ok(entries) = fs::read_dir(parent_folder(target)) else {

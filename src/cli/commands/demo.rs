@@ -28,6 +28,7 @@ use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::import_blocks::import_blocks;
 use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
+use mocban_project::pair_choices::PairChoices;
 use mocban_project::run::{PreparedRun, options};
 use mocban_project::sheets::contact_sheet;
 use mocban_project::{ExitCode, ProjectResult};
@@ -90,6 +91,7 @@ pub(crate) async fn demo(args: DemoArgs, context: &Context) -> ProjectResult<Exi
         source,
         truth: Some(files.truth),
         allowed: AllowedChanges::default(),
+        choices: PairChoices::default(),
     };
     let outcome = import_pairs(import, &context.location, &()).await?;
     import::print_outcome(&outcome, context);

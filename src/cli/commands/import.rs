@@ -15,6 +15,7 @@ use mocban_project::import_blocks::{ListedItems, import_blocks};
 use mocban_project::import_pairs::{
     AllowedChanges, ImportOutcome, PairImport, PairSource, import_pairs,
 };
+use mocban_project::pair_choices::PairChoices;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// The three ways to name what is imported.
@@ -88,6 +89,7 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult
                 source,
                 truth: args.truth,
                 allowed,
+                choices: PairChoices::default(),
             };
             let outcome = import_pairs(import, location, &terminal).await;
             if let (Err(_), Some(warning)) = (&outcome, &warning) {

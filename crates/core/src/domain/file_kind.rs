@@ -200,6 +200,12 @@ impl FileKind {
         found.map(|(_, kind)| kind)
     }
 
+    /// Returns the extensions of files that are not read, and for which there is advice.
+    pub fn unread_extensions() -> impl Iterator<Item = &'static str> {
+        let types = UNREAD_MESHES.into_iter().chain(UNREAD_IMAGES);
+        types.flat_map(|(extensions, _)| extensions.iter().copied())
+    }
+
     /// Returns what to do with files of this type where images are needed, if that does not depend on the file.
     pub fn image_advice(self) -> Option<String> {
         let mut images = UNREAD_IMAGES.into_iter();

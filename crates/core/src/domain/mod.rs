@@ -73,7 +73,7 @@ pub use outcome::{
     NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
     SideEvidence, ThresholdChoice,
 };
-pub use pair_name::{NO_BREAK_SPACES, PairName, PairNameError};
+pub use pair_name::{NO_BREAK_SPACES, PairName, PairNameError, is_device};
 pub use print_outline::PrintOutline;
 pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;

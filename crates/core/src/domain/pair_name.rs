@@ -155,7 +155,7 @@ impl PairName {
 }
 
 /// Returns whether a file of this name is a device on Windows.
-fn is_device(text: &str) -> bool {
+pub fn is_device(text: &str) -> bool {
     let stem = text.split('.').next().unwrap_or(text).trim_end();
     let stem = stem.to_ascii_lowercase();
     let numbered = || {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::chosen_columns::ChosenColumns;
 use super::column_names::missing_column;
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, Problem, at_line, of_list};
@@ -33,6 +34,18 @@ pub fn read_csv(
     bytes: &[u8],
     each: &mut dyn FnMut(ManifestRow),
 ) -> Result<ReadRows, ManifestError> {
+    read_csv_as(bytes, &ChosenColumns::default(), each)
+}
+
+/// Parses a CSV list like [`read_csv`], with columns that a person has chosen.
+///
+/// # Errors
+/// Returns an error like [`read_csv`], and if a chosen column is not there.
+pub fn read_csv_as(
+    bytes: &[u8],
+    chosen: &ChosenColumns,
+    each: &mut dyn FnMut(ManifestRow),
+) -> Result<ReadRows, ManifestError> {
     let text = CsvText::new(bytes).map_err(|error| of_list(&error.to_string()))?;
     let (bytes, delimiter) = (&*text.bytes, text.delimiter);
     check_quotes(bytes, delimiter).map_err(|error| at_line(error.line, &error.to_string()))?;
@@ -57,7 +70,7 @@ pub fn read_csv(
             (Ok(false), None) => return Err(of_list("the list is empty").into()),
             (Ok(true), Some(header)) => rows.push(line, header.draft(line, &record)),
             (Ok(true), None) => {
-                let mut parsed = CsvHeader::parse(line, &record, (bytes, delimiter))?;
+                let mut parsed = CsvHeader::parse(line, &record, (bytes, delimiter), chosen)?;
                 rows.add_renamed(std::mem::take(&mut parsed.renamed));
                 header = Some(parsed);
             }
@@ -71,14 +84,14 @@ pub fn read_csv(
 }
 
 /// Reads a list, and fails in a row that is longer than [`MAX_ROW_BYTES`].
-struct BoundedRows<'a> {
+pub(super) struct BoundedRows<'a> {
     rest: &'a [u8],
     /// Number of bytes that may still be read for the current row.
     left: usize,
 }
 
 impl<'a> BoundedRows<'a> {
-    const fn new(rest: &'a [u8]) -> Self {
+    pub(super) const fn new(rest: &'a [u8]) -> Self {
         Self {
             rest,
             left: MAX_ROW_BYTES,
@@ -189,6 +202,7 @@ impl CsvHeader {
         line: usize,
         record: &::csv::ByteRecord,
         (list, delimiter): (&[u8], u8),
+        chosen: &ChosenColumns,
     ) -> Result<Self, ManifestError> {
         let encoding_hint = match std::str::from_utf8(list) {
             Ok(_) => String::new(),
@@ -196,7 +210,8 @@ impl CsvHeader {
         };
         let names = column_names(line, record, &encoding_hint)?;
         let refuse = |same: SameColumn| at_line(line, &same.reason(&names));
-        let HeaderColumns { columns, renamed } = COLUMNS.assign(&names).map_err(refuse)?;
+        let found = chosen.assign(&names);
+        let HeaderColumns { columns, renamed } = found.map_err(|reason| at_line(line, &reason))?;
         let mut others = BTreeMap::new();
         for (k, name) in names.iter().enumerate() {
             if columns[k].is_none()

@@ -1,10 +1,11 @@
 //! Pairs from two directories. Files with the same stem form a pair, such as `stl/12.stl` and `print/12.png`, also in
-//! folders of the same name, such as `stl/block-4/12.stl` and `print/block-4/12.png`.
+//! folders of the same name, such as `stl/block-4/12.stl` and `print/block-4/12.png`. A person may change that.
 
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
 use unicode_normalization::UnicodeNormalization as _;
 
 use super::error::{ManifestError, at_file, of_list};
@@ -12,8 +13,10 @@ use super::row::ManifestRow;
 use mocban_core::domain::PairName;
 use mocban_core::domain::spelling::{fold_case, plain_form};
 
-const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
-const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
+/// Extensions of meshes.
+pub const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
+/// Extensions of prints.
+pub const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
 /// Folders that name a kind of file, such as `stl` in `block-4/stl/12.stl`. They are no part of ids.
 const KIND_FOLDERS: [&str; 22] = [
@@ -68,6 +71,16 @@ pub struct ListedFolder {
     pub files: Vec<PathBuf>,
 }
 
+/// What a person changes in the pairs of two directories. First pairs are left out, then other files are joined.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PairingChanges {
+    /// Ids of pairs of files with equal names that are left out. Their files are then without a partner.
+    pub left_out: Vec<String>,
+    /// Meshes and prints without a partner that become pairs, by their paths below the directories.
+    pub joined: Vec<(String, String)>,
+}
+
 /// The content of two directories.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FolderPairs {
@@ -81,6 +94,8 @@ pub struct FolderPairs {
     pub ignored: Vec<PathBuf>,
     /// Meshes and prints whose names differ only in accents or in zeros before a number: the first ones, as text.
     pub similar: Vec<String>,
+    /// Says why there is no pair.
+    pub no_pair: Option<ManifestError>,
 }
 
 /// Pairs mesh files with print files of the same folder and stem; upper and lower case are equal. The id of a pair in
@@ -95,20 +110,36 @@ pub fn pair_folders(
     meshes: &ListedFolder,
     prints: &ListedFolder,
 ) -> Result<FolderPairs, ManifestError> {
+    let mut found = pair_folders_with(meshes, prints, &PairingChanges::default())?;
+    match found.no_pair.take() {
+        Some(why) => Err(why),
+        None => Ok(found),
+    }
+}
+
+/// Pairs files like [`pair_folders`], with changes. There may be no pair.
+///
+/// # Errors
+/// Returns an error if two meshes or two prints have the same id, the id of a pair is not valid, or the files of a change
+/// are not there.
+pub fn pair_folders_with(
+    meshes: &ListedFolder,
+    prints: &ListedFolder,
+    changes: &PairingChanges,
+) -> Result<FolderPairs, ManifestError> {
     let mut problems = ManifestError::default();
     let is_same = meshes.root == prints.root;
     let roots = [&meshes.root, &prints.root];
     let (meshes, other_meshes) = by_id(meshes, is_named_like_mesh, "meshes", &mut problems);
-    let (mut prints, other_prints) = by_id(prints, is_named_like_print, "prints", &mut problems);
+    let (prints, other_prints) = by_id(prints, is_named_like_print, "prints", &mut problems);
     let are_empty = [meshes.is_empty(), prints.is_empty()];
-    let (mut pairs, mut meshes_alone) = (Vec::new(), Vec::new());
-    for (id, mesh) in meshes {
-        match prints.remove(&id) {
-            Some(print) => pairs.push((mesh, print)),
-            None => meshes_alone.push(mesh),
-        }
-    }
-    let mut prints_alone: Vec<FolderFile> = prints.into_values().collect();
+    let mut matched = matched(meshes, prints);
+    matched.change(changes, roots, &mut problems);
+    let Matched {
+        mut pairs,
+        mut meshes_alone,
+        mut prints_alone,
+    } = matched;
     pairs.sort_by_key(|(mesh, _)| mesh.place());
     let mut rows = Vec::new();
     for (mesh, print) in pairs {
@@ -121,11 +152,11 @@ pub fn pair_folders(
     let is_swapped = other_meshes.iter().any(|path| is_named_like_print(path))
         && other_prints.iter().any(|path| is_named_like_mesh(path));
     let similar = similar(&meshes_alone, &prints_alone);
-    if rows.is_empty() {
+    let no_pair = rows.is_empty().then(|| {
         let is_swapped = is_swapped && meshes_alone.is_empty();
         let without = without_files(roots, are_empty);
-        return Err(of_list(&no_pair(is_swapped, without, &similar)).into());
-    }
+        of_list(&no_pair(is_swapped, without, &similar)).into()
+    });
     for alone in [&mut meshes_alone, &mut prints_alone] {
         alone.sort_by_key(FolderFile::place);
     }
@@ -141,7 +172,78 @@ pub fn pair_folders(
             [other_meshes, other_prints].concat()
         },
         similar,
+        no_pair,
     })
+}
+
+/// Files with a partner and without.
+struct Matched {
+    pairs: Vec<(FolderFile, FolderFile)>,
+    meshes_alone: Vec<FolderFile>,
+    prints_alone: Vec<FolderFile>,
+}
+
+/// Matches files with equal ids.
+fn matched(
+    meshes: BTreeMap<String, FolderFile>,
+    mut prints: BTreeMap<String, FolderFile>,
+) -> Matched {
+    let (mut pairs, mut meshes_alone) = (Vec::new(), Vec::new());
+    for (id, mesh) in meshes {
+        match prints.remove(&id) {
+            Some(print) => pairs.push((mesh, print)),
+            None => meshes_alone.push(mesh),
+        }
+    }
+    Matched {
+        pairs,
+        meshes_alone,
+        prints_alone: prints.into_values().collect(),
+    }
+}
+
+impl Matched {
+    /// Leaves pairs out and joins files. Records changes whose files are not there.
+    fn change(
+        &mut self,
+        changes: &PairingChanges,
+        [meshes, prints]: [&PathBuf; 2],
+        problems: &mut ManifestError,
+    ) {
+        let mut left_out: BTreeSet<&str> = changes.left_out.iter().map(String::as_str).collect();
+        if !left_out.is_empty() {
+            for (mesh, print) in std::mem::take(&mut self.pairs) {
+                let name = PairName::new(&mesh.id());
+                if name.is_ok_and(|name| left_out.remove(name.as_str())) {
+                    self.meshes_alone.push(mesh);
+                    self.prints_alone.push(print);
+                } else {
+                    self.pairs.push((mesh, print));
+                }
+            }
+        }
+        for id in left_out {
+            problems.add(of_list(&format!("there is no pair {id:?} to leave out")));
+        }
+        for (mesh, print) in &changes.joined {
+            let (mesh, print) = (meshes.join(mesh), prints.join(print));
+            match (
+                position(&self.meshes_alone, &mesh),
+                position(&self.prints_alone, &print),
+            ) {
+                (Some(mesh), Some(print)) => self.pairs.push((
+                    self.meshes_alone.swap_remove(mesh),
+                    self.prints_alone.swap_remove(print),
+                )),
+                (None, _) => problems.add(at_file(&mesh, "there is no such mesh without a print")),
+                (_, None) => problems.add(at_file(&print, "there is no such print without a mesh")),
+            }
+        }
+    }
+}
+
+fn position(files: &[FolderFile], path: &Path) -> Option<usize> {
+    files.iter().position(|file| file.path == path)
 }
 
 /// Says which folder has no files of its kind, such as `scans holds no meshes`.

@@ -2,6 +2,7 @@
 //! parse text or lists of paths and read no files. All problems of a list are reported together.
 
 mod block_list;
+mod chosen_columns;
 mod column_names;
 mod csv;
 mod draft;
@@ -9,18 +10,21 @@ mod error;
 mod folders;
 mod json_array;
 mod jsonl;
+mod list_head;
 mod misspelt_columns;
 mod row;
 mod text;
 
-pub use self::csv::{parse_csv, read_csv};
+pub use self::csv::{parse_csv, read_csv, read_csv_as};
 pub use block_list::{BlockRow, is_block_list, parse_blocks};
+pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;
 pub use folders::{
-    FolderPairs, ListedFolder, is_named_like_input, is_named_like_mesh, is_named_like_print,
-    pair_folders,
+    FolderPairs, ListedFolder, MESH_EXTENSIONS, PRINT_EXTENSIONS, PairingChanges,
+    is_named_like_input, is_named_like_mesh, is_named_like_print, pair_folders, pair_folders_with,
 };
 pub use jsonl::{parse_jsonl, read_jsonl};
+pub use list_head::{ListHead, read_head};
 pub use misspelt_columns::MisspeltColumns;
 pub(crate) use row::is_text_column;
 pub use row::{ManifestRow, ReadRows, RowIds};

@@ -10,7 +10,7 @@ pub mod test_helpers;
 #[cfg(test)]
 mod tests;
 
-use self::archive::Archive;
+use self::archive::WorkbookArchive;
 use self::error::list;
 use self::parts::Workbook;
 pub use error::WorkbookError;
@@ -39,7 +39,7 @@ pub fn is_workbook(bytes: &[u8]) -> bool {
 /// Returns an error if the bytes are not those of an XLSX workbook, it is damaged or too large, has no such sheet, or if a
 /// cell holds the error of a formula.
 pub fn read_sheet(bytes: &[u8], name: Option<&str>) -> Result<SheetTable, WorkbookError> {
-    let archive = Archive::open(bytes)?;
+    let archive = WorkbookArchive::open(bytes)?;
     let workbook = Workbook::read(&archive)?;
     if workbook.sheets.is_empty() {
         return Err(archive::damaged("it has no sheets"));

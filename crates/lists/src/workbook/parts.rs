@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use quick_xml::events::BytesStart;
 
-use super::archive::{Archive, damaged};
+use super::archive::{WorkbookArchive, damaged};
 use super::error::WorkbookError;
 use super::number_format::NumberFormat;
 use crate::xml::{XmlFault, XmlPart, attribute, local_name, read_xml};
@@ -69,7 +69,7 @@ pub(super) struct Workbook {
 
 impl Workbook {
     /// Reads all parts but the sheets.
-    pub(super) fn read(archive: &Archive<'_>) -> Result<Self, WorkbookError> {
+    pub(super) fn read(archive: &WorkbookArchive<'_>) -> Result<Self, WorkbookError> {
         let Some(text) = archive.text(WORKBOOK)? else {
             return Err(WorkbookError::OtherArchive(other_kind(archive)));
         };
@@ -108,7 +108,7 @@ impl Workbook {
 }
 
 /// Returns what an archive without a workbook of Excel is.
-fn other_kind(archive: &Archive<'_>) -> &'static str {
+fn other_kind(archive: &WorkbookArchive<'_>) -> &'static str {
     if archive.has("xl/workbook.bin") {
         "a binary workbook (XLSB)"
     } else if archive.has("content.xml") {

@@ -59,6 +59,11 @@ impl PageQuery {
         Self(pairs)
     }
 
+    /// Returns the names and values that are not empty.
+    pub(super) fn pairs(&self) -> impl Iterator<Item = &(String, String)> {
+        self.0.iter().filter(|(_, value)| !value.is_empty())
+    }
+
     /// Returns the query as text that begins with `?`, or nothing if it is empty.
     pub(super) fn text(&self) -> String {
         let mut text = String::new();

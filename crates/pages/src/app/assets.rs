@@ -8,7 +8,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, content type and text of an asset.
-const ASSETS: [(&str, &str, &str); 5] = [
+const ASSETS: [(&str, &str, &str); 7] = [
     (
         "tokens.css",
         STYLE,
@@ -18,6 +18,11 @@ const ASSETS: [(&str, &str, &str); 5] = [
         "app.css",
         STYLE,
         include_str!("../../../../assets/app/app.css"),
+    ),
+    (
+        "action.js",
+        SCRIPT,
+        include_str!("../../../../assets/app/action.js"),
     ),
     (
         "app.js",
@@ -33,6 +38,11 @@ const ASSETS: [(&str, &str, &str); 5] = [
         "pair.js",
         SCRIPT,
         include_str!("../../../../assets/app/pair.js"),
+    ),
+    (
+        "upload.js",
+        SCRIPT,
+        include_str!("../../../../assets/app/upload.js"),
     ),
 ];
 

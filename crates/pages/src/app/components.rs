@@ -156,16 +156,6 @@ pub(super) fn grouped(number: u64) -> String {
     text
 }
 
-/// Returns a number of bytes as a person reads it.
-pub(super) fn file_size(bytes: u64) -> String {
-    match bytes {
-        0..=9_999 => format!("{bytes} B"),
-        10_000..=999_999 => format!("{} kB", bytes / 1000),
-        1_000_000..=9_999_999_999 => format!("{:.1} MB", bytes as f64 / 1e6),
-        _ => format!("{} GB", grouped(bytes / 1_000_000_000)),
-    }
-}
-
 /// Returns the rows of a list of files with a scan and its unit.
 pub(super) fn scan_file(visit: &Visit, path: &str, unit: Option<LengthUnit>) -> Markup {
     html! {

@@ -13,7 +13,7 @@ use maud::{Markup, html};
 use tokio::sync::mpsc;
 
 use super::attachment::disposition;
-use super::components::file_size;
+use super::byte_size::file_size;
 use super::exports::{exports_dir, is_export};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
 use super::attachment::attachment;
-use super::components::{NavSection, action_form, file_size, frame};
+use super::byte_size::file_size;
+use super::components::{NavSection, action_form, frame};
 use super::failure::{AppFailure, AppResult};
 use super::home::free_space;
 use super::state::AppState;

@@ -10,6 +10,7 @@ use super::{
     assets, block_page, blocks_page, chosen_pairs, export_page, export_zip, failure_page,
     health_page, home, import_page, invitation_cards, last_import, pair_page, pairs_page, pictures,
     report_page, review_agreement, review_page, run_actions, run_page, settings_page,
+    upload_actions,
 };
 
 /// Returns the routes of the app, for a server.
@@ -37,6 +38,10 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/p/{project}/review/agreement", get(review_agreement::part))
         .route("/import", get(import_page::page))
         .route("/actions/import", post(import_page::import))
+        .route("/actions/upload", post(upload_actions::begin))
+        .route("/actions/upload-end", post(upload_actions::end))
+        .route("/uploads/{upload}", get(upload_actions::progress))
+        .route("/uploads/{upload}/{path}", post(upload_actions::receive))
         .route("/p/{project}/last-import", get(last_import::part))
         .route(
             "/p/{project}/actions/last-import",

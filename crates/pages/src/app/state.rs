@@ -9,9 +9,11 @@ use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
 use super::invitations::Invitations;
 use super::open_pages::OpenPages;
+use super::plan_cache::PlanCache;
 use super::projects::{OpenProject, find};
 use super::tasks::AppTasks;
 use super::thumb_cache::ThumbCache;
+use super::uploads::Uploads;
 use super::zip_sizes::ZipSizes;
 use crate::local_server::WorkThread;
 use crate::review::Language;
@@ -49,6 +51,10 @@ pub(super) struct AppState {
     pub(super) failed_runs: FailedRuns,
     pub(super) thumbs: ThumbCache,
     pub(super) zip_sizes: ZipSizes,
+    /// What the last import would store.
+    pub(super) plans: PlanCache,
+    /// Files that the browser sends.
+    pub(super) uploads: Uploads,
     /// Draws pictures.
     pub(super) work: WorkThread,
 }
@@ -58,6 +64,7 @@ impl AppState {
         Self {
             language: Mutex::new(options.language),
             invitations: Invitations::new(options.listen, &options.folder),
+            uploads: Uploads::new(&options.folder),
             options,
             projects: Mutex::default(),
             reviews: OpenPages::new(32),
@@ -66,6 +73,7 @@ impl AppState {
             failed_runs: FailedRuns::default(),
             thumbs: ThumbCache::default(),
             zip_sizes: ZipSizes::default(),
+            plans: PlanCache::default(),
             work: WorkThread::default(),
         }
     }

@@ -1,5 +1,6 @@
 //! Checks every request before it reaches a handler. All requests need a valid `Host`, and all but the start address
-//! need the session: its path and its cookie. Writes also need a valid `Origin`, a JSON body and the CSRF token.
+//! need the session: its path and its cookie. Writes also need a valid `Origin`, a JSON body and the CSRF token. Bodies are
+//! read whole before, except for files, which handlers read as they arrive.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,6 +23,8 @@ const GUEST_BODY_LIMIT: usize = 16 * 1024;
 const BODY_LIMIT: usize = 256 * 1024;
 /// Maximum time in which the body arrives.
 const BODY_TIMEOUT: Duration = Duration::from_secs(10);
+/// Pages of a session, other than that of a guest, to which a browser sends files.
+const FILES: &str = "/uploads/";
 /// Request header that carries the CSRF token.
 const CSRF_HEADER: &str = "x-csrf-token";
 
@@ -66,6 +69,11 @@ const NO_JSON: Rejection = (
     StatusCode::UNSUPPORTED_MEDIA_TYPE,
     "only application/json is accepted",
 );
+/// The body is not marked as a file. A form on another site could send such a body.
+const NO_FILE: Rejection = (
+    StatusCode::UNSUPPORTED_MEDIA_TYPE,
+    "only application/octet-stream is accepted",
+);
 /// The CSRF token is missing or wrong.
 const WRONG_TOKEN: Rejection = (
     StatusCode::FORBIDDEN,
@@ -90,13 +98,18 @@ pub(super) async fn guard(
     let shows_html = asks_for_page(request.headers());
     let checked = match check(&access, &request) {
         Ok(uri) => {
+            let is_file = takes_files(&access, &uri);
             *request.uri_mut() = uri;
             let limit = if access.is_guest() {
                 GUEST_BODY_LIMIT
             } else {
                 BODY_LIMIT
             };
-            with_whole_body(request, limit).await
+            if is_file {
+                Ok(request)
+            } else {
+                with_whole_body(request, limit).await
+            }
         }
         Err(rejection) => Err(rejection),
     };
@@ -149,14 +162,24 @@ fn check(access: &AccessControl, request: &Request) -> Result<Uri, Rejection> {
         return Err(WRONG_ORIGIN);
     }
     let kind = text(headers, header::CONTENT_TYPE).and_then(|kind| kind.split(';').next());
-    if kind.map(str::trim) != Some("application/json") {
-        return Err(NO_JSON);
+    let (wanted, other_kind) = if takes_files(access, &uri) {
+        ("application/octet-stream", NO_FILE)
+    } else {
+        ("application/json", NO_JSON)
+    };
+    if kind.map(str::trim) != Some(wanted) {
+        return Err(other_kind);
     }
     let token = text(headers, CSRF_HEADER);
     if !token.is_some_and(|token| access.session.is_csrf_token(token)) {
         return Err(WRONG_TOKEN);
     }
     Ok(uri)
+}
+
+/// Returns whether the body of a request for a page is passed on as it arrives.
+fn takes_files(access: &AccessControl, page: &Uri) -> bool {
+    !access.is_guest() && page.path().starts_with(FILES)
 }
 
 /// Returns the address of a page with the query of a request.

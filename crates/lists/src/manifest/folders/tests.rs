@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{FolderPairs, ListedFolder, ManifestError};
+use super::{FolderPairs, ListedFolder, ManifestError, PairingChanges};
 
 fn files(names: &[&str]) -> Vec<PathBuf> {
     names.iter().map(PathBuf::from).collect()
@@ -186,4 +186,56 @@ fn stems_that_are_not_valid_ids_are_reported_by_file() {
         none.expect_err("no pair").to_string(),
         "no mesh has the same file name as a print"
     );
+}
+
+#[test]
+fn a_person_leaves_pairs_out_and_joins_files_without_a_partner() {
+    let [meshes, prints] = [
+        ("m", ["m/1.stl", "m/2.stl", "m/b/a.stl"]),
+        ("p", ["p/1.png", "p/2.png", "p/x.png"]),
+    ]
+    .map(|(root, paths)| ListedFolder {
+        root: root.into(),
+        files: files(&paths),
+    });
+    let pairs = |left_out: &[&str], joined: &[(&str, &str)]| {
+        let changes = PairingChanges {
+            left_out: left_out.iter().map(|id| (*id).to_owned()).collect(),
+            joined: joined
+                .iter()
+                .map(|(mesh, print)| ((*mesh).to_owned(), (*print).to_owned()))
+                .collect(),
+        };
+        let found = super::pair_folders_with(&meshes, &prints, &changes);
+        let found = found.map_err(|error| error.to_string())?;
+        let rows = found.rows.iter();
+        let rows = rows.map(|row| format!("{} {}", row.name, row.print.display()));
+        Ok::<_, String>((rows.collect::<Vec<_>>().join(", "), found.no_pair))
+    };
+    let plain = |text: &str| Ok((text.to_owned(), None));
+    assert_eq!(pairs(&[], &[]), plain("1 p/1.png, 2 p/2.png"));
+    assert_eq!(pairs(&["1"], &[]), plain("2 p/2.png"));
+    let joined = pairs(&[], &[("b/a.stl", "x.png")]);
+    assert_eq!(joined, plain("1 p/1.png, 2 p/2.png, b_a p/x.png"));
+    // Two pairs whose prints were named the wrong way round.
+    let swapped = pairs(&["1", "2"], &[("1.stl", "2.png"), ("2.stl", "1.png")]);
+    assert_eq!(swapped, plain("1 p/2.png, 2 p/1.png"));
+    let (none, why) = pairs(&["1", "2"], &[]).expect("no pair");
+    assert!(none.is_empty() && why.is_some());
+    for (left_out, joined, expected) in [
+        (&["7"][..], &[][..], "there is no pair \"7\" to leave out"),
+        (
+            &[],
+            &[("1.stl", "x.png")],
+            "m/1.stl: there is no such mesh without a print",
+        ),
+        (
+            &[],
+            &[("b/a.stl", "../x.png")],
+            "p/../x.png: there is no such print without a mesh",
+        ),
+    ] {
+        let refused = pairs(left_out, joined).expect_err("not there");
+        assert!(refused.contains(expected), "{refused}");
+    }
 }

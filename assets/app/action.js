@@ -1,0 +1,27 @@
+// Requests that change something.
+
+/** The token that they carry. */
+export const token = document.querySelector('meta[name="csrf-token"]').content;
+
+/** Returns what a reply says; throws the sentence of a refusal. */
+export function read(status, text) {
+  let reply = {};
+  try {
+    reply = JSON.parse(text);
+  } catch {
+    reply = { error: text };
+  }
+  if (status !== 200) throw new Error(reply.error || text || String(status));
+  return reply;
+}
+
+/** Sends an action. Its reply says which page follows. With `isLast`, it is sent even if the page is closed. */
+export async function act(address, fields, isLast = false) {
+  const response = await fetch(address, {
+    method: "POST",
+    headers: { "content-type": "application/json", "x-csrf-token": token },
+    body: JSON.stringify(fields),
+    keepalive: isLast,
+  });
+  return read(response.status, await response.text());
+}

@@ -1,0 +1,199 @@
+// Files from the browser: they are chosen or dragged, and sent one after another.
+
+import { act, read, token } from "./action.js";
+
+const form = document.getElementById("upload");
+const texts = form.dataset;
+const extensions = new Set(texts.extensions.split(" "));
+const choice = document.getElementById("upload-choice");
+const state = document.getElementById("upload-state");
+const bar = state.querySelector("progress");
+const done = document.getElementById("upload-done");
+const phase = document.getElementById("upload-phase");
+const problem = document.getElementById("upload-problem");
+
+/** The upload in progress: its id, and the request of its current file. */
+let current = null;
+
+/** Returns whether an import can use a file. Hidden files and those of systems are left out. */
+function isWanted({ path }) {
+  const names = path.split("/");
+  const extension = names.at(-1).split(".").at(-1).toLowerCase();
+  return extensions.has(extension) && !names.some((name) => name.startsWith(".") || name === "__MACOSX");
+}
+
+/** Returns a number of bytes as a person reads it. */
+function size(bytes) {
+  return bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+}
+
+function show(files, count, sent, bytes) {
+  bar.max = Math.max(bytes, 1);
+  bar.value = sent;
+  done.textContent = `${files} / ${count} ${texts.files}, ${size(sent)} / ${size(bytes)}`;
+}
+
+/** Sends a file; `sent` hears how much of it is on its way. */
+function sendFile(upload, { path, file }, sent) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    upload.request = request;
+    request.open("POST", `uploads/${upload.id}/${encodeURIComponent(path)}`);
+    request.setRequestHeader("content-type", "application/octet-stream");
+    request.setRequestHeader("x-csrf-token", token);
+    request.upload.onprogress = (event) => sent(event.loaded);
+    request.upload.onload = () => {
+      if (path.toLowerCase().endsWith(".zip")) phase.textContent = texts.unpacking;
+    };
+    request.onload = () => {
+      try {
+        resolve(read(request.status, request.responseText));
+      } catch (error) {
+        reject(error);
+      }
+    };
+    request.onerror = () => reject(null);
+    request.onabort = () => reject(null);
+    request.send(file);
+  });
+}
+
+/** Asks how far an archive is unpacked. */
+async function follow(upload) {
+  if (upload !== current || phase.textContent !== texts.unpacking) return;
+  const reply = await fetch(`uploads/${upload.id}`, { headers: { accept: "application/json" } }).catch(() => null);
+  const count = reply?.ok ? await reply.json() : null;
+  if (count && upload === current) done.textContent = `${count.files} ${texts.files}, ${size(count.bytes)}`;
+}
+
+/** Returns why an upload was cut off. */
+async function reason(upload) {
+  const reply = await fetch(`uploads/${upload.id}`, { headers: { accept: "application/json" } }).catch(() => null);
+  const text = (await reply?.json().catch(() => null))?.error;
+  return text ?? texts.cut;
+}
+
+/** Sends all files, and opens the page on which their pairs are shown. */
+async function sendAll(files, name) {
+  const bytes = files.reduce((sum, { file }) => sum + file.size, 0);
+  const begun = await act("actions/upload", { name, files: files.length, bytes });
+  const upload = { id: begun.upload, isCancelled: false };
+  current = upload;
+  const timer = setInterval(() => follow(upload), 500);
+  try {
+    let sent = 0;
+    for (const [index, file] of files.entries()) {
+      phase.textContent = texts.sending;
+      show(index, files.length, sent, bytes);
+      await sendFile(upload, file, (loaded) => show(index, files.length, sent + loaded, bytes));
+      if (upload.isCancelled) throw null;
+      sent += file.file.size;
+    }
+    show(files.length, files.length, sent, bytes);
+    phase.textContent = texts.storing;
+    const reply = await act("actions/upload-end", { upload: upload.id, end: "finish", project: texts.project });
+    current = null;
+    location.assign(reply.go);
+  } catch (error) {
+    current = null;
+    if (upload.isCancelled) throw new Error(texts.cancelled);
+    throw error ?? new Error(await reason(upload));
+  } finally {
+    clearInterval(timer);
+  }
+}
+
+/** Begins an upload of what was chosen, unless one is in progress. */
+async function start(chosen, name) {
+  if (current || form.getAttribute("aria-busy") === "true") return;
+  const files = chosen.filter(isWanted);
+  problem.textContent = files.length > 0 ? "" : texts.nothing;
+  problem.hidden = files.length > 0;
+  if (files.length === 0) return;
+  form.setAttribute("aria-busy", "true");
+  phase.textContent = texts.sending;
+  show(0, files.length, 0, 0);
+  choice.hidden = true;
+  state.hidden = false;
+  try {
+    await sendAll(files, name);
+  } catch (error) {
+    problem.textContent = error.message;
+    problem.hidden = false;
+    state.hidden = true;
+    choice.hidden = false;
+  } finally {
+    form.removeAttribute("aria-busy");
+  }
+}
+
+/** Returns the name that the folder of the files gets: that of the only folder or archive. */
+function nameOf(files) {
+  const tops = new Set(files.map(({ path }) => path.split("/")[0]));
+  const [top] = tops;
+  if (tops.size !== 1) return "";
+  const isArchive = top.toLowerCase().endsWith(".zip") && files.length === 1;
+  if (isArchive) return top.slice(0, -".zip".length);
+  return files[0].path.includes("/") ? top : "";
+}
+
+function chosenIn(input) {
+  return [...input.files].map((file) => ({ path: file.webkitRelativePath || file.name, file }));
+}
+
+form.addEventListener("change", async (event) => {
+  const files = chosenIn(event.target);
+  await start(files, nameOf(files));
+  event.target.value = "";
+});
+
+/** Returns the files of an entry that was dragged, also those in folders. */
+async function below(entry, path) {
+  if (entry.isFile) {
+    const file = await new Promise((resolve, reject) => entry.file(resolve, reject));
+    return [{ path: path + file.name, file }];
+  }
+  const reader = entry.createReader();
+  const found = [];
+  for (;;) {
+    const entries = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+    if (entries.length === 0) return found;
+    for (const next of entries) found.push(...(await below(next, `${path}${entry.name}/`)));
+  }
+}
+
+form.addEventListener("dragover", (event) => {
+  event.preventDefault();
+  form.classList.add("over");
+});
+form.addEventListener("dragleave", () => form.classList.remove("over"));
+form.addEventListener("drop", async (event) => {
+  event.preventDefault();
+  form.classList.remove("over");
+  const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry()).filter(Boolean);
+  try {
+    const found = await Promise.all(entries.map((entry) => below(entry, "")));
+    await start(found.flat(), nameOf(found.flat()));
+  } catch (error) {
+    problem.textContent = error.message;
+    problem.hidden = false;
+  }
+});
+
+document.getElementById("upload-cancel").addEventListener("click", async () => {
+  const upload = current;
+  if (!upload) return;
+  upload.isCancelled = true;
+  await act("actions/upload-end", { upload: upload.id, end: "cancel", project: "" }).catch(() => null);
+  upload.request?.abort();
+});
+
+// A page that is closed sends nothing more.
+window.addEventListener("pagehide", () => {
+  if (current) act("actions/upload-end", { upload: current.id, end: "cancel", project: "" }, true).catch(() => null);
+});
+window.addEventListener("beforeunload", (event) => {
+  if (current) event.preventDefault();
+});
+
+form.dataset.ready = "true";

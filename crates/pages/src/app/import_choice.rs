@@ -1,0 +1,335 @@
+//! What a person has chosen to import, as the address and the form of the page of imports have it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::Deserialize;
+
+use super::address::PageQuery;
+use super::failure::{AppFailure, AppResult};
+use super::folder_picker::PickerRoots;
+use super::plan_cache::{KEPT_PAIRS, PlanCache};
+use super::projects::{find, is_project};
+use super::sentence::Sentence;
+use super::uploads::FOLDER as UPLOADS;
+use mocban_core::domain::LengthUnit;
+use mocban_lists::manifest::{ChosenColumns, ListHead, PairingChanges, read_head};
+use mocban_project::files::is_jsonl;
+use mocban_project::import_blocks::ListedItems;
+use mocban_project::import_pairs::PairSource;
+use mocban_project::import_plan::{ImportPlan, plan_import};
+use mocban_project::location::Location;
+use mocban_project::pair_choices::PairChoices;
+
+/// Longest name of a new project, characters.
+pub(super) const NAME_CHARS: usize = 60;
+/// Number of pairs that are shown at once before an import.
+pub(super) const SHOWN_PAIRS: u64 = 20;
+/// Rows of a list that are shown to choose its columns.
+const SHOWN_ROWS: usize = 3;
+/// Longest changes of pairs, in bytes: they are part of addresses, and of an action.
+const MAX_CHANGES: usize = 4000;
+
+/// What the user has chosen, as the address has it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ImportChoice {
+    /// Name of the project.
+    pub(super) project: String,
+    /// Folder of scans.
+    pub(super) meshes: String,
+    /// Folder of prints.
+    pub(super) prints: String,
+    /// A list.
+    pub(super) list: String,
+    pub(super) unit: String,
+    /// Whether files may be missing.
+    pub(super) missing: String,
+    /// Whether most known pairs may get other files.
+    pub(super) changed: String,
+    /// Changes of the pairs, in JSON.
+    pub(super) matches: String,
+    /// Hash of the pairs that were shown.
+    pub(super) shown: String,
+    id_column: String,
+    mesh_column: String,
+    print_column: String,
+    character_column: String,
+    block_column: String,
+    unit_column: String,
+}
+
+/// What would be imported.
+#[derive(Debug)]
+pub(super) enum Planned {
+    /// Pairs. The page shows some from a position in the plan.
+    Pairs(Arc<ImportPlan>, usize),
+    /// A list of whole blocks, whose pairs a run finds.
+    Blocks,
+}
+
+/// What the page shows of a choice.
+#[derive(Debug)]
+pub(super) struct ImportPreview {
+    /// The header of a list of pairs.
+    pub(super) head: Option<ListHead>,
+    pub(super) planned: AppResult<Planned>,
+}
+
+impl ImportChoice {
+    /// Reads the address.
+    pub(super) fn of(query: &PageQuery) -> Self {
+        let get = |name| query.get(name).unwrap_or_default().to_owned();
+        Self {
+            project: get("project"),
+            meshes: get("meshes"),
+            prints: get("prints"),
+            list: get("list"),
+            unit: get("unit"),
+            matches: get("matches"),
+            id_column: get("id_column"),
+            mesh_column: get("mesh_column"),
+            print_column: get("print_column"),
+            character_column: get("character_column"),
+            block_column: get("block_column"),
+            unit_column: get("unit_column"),
+            ..Self::default()
+        }
+    }
+
+    /// Returns the columns of a list that are chosen, each with the name of its field in the address.
+    pub(super) fn columns(&self) -> [(&'static str, &'static str, &str); 6] {
+        [
+            ("id", "id_column", &*self.id_column),
+            ("mesh", "mesh_column", &*self.mesh_column),
+            ("print", "print_column", &*self.print_column),
+            ("character", "character_column", &*self.character_column),
+            ("block", "block_column", &*self.block_column),
+            ("unit", "unit_column", &*self.unit_column),
+        ]
+    }
+
+    /// Returns the fields that an import needs beside those of its form.
+    pub(super) fn hidden_fields(&self) -> Vec<(&'static str, &str)> {
+        let columns = self.columns().map(|(_, name, value)| (name, value));
+        let others = [
+            ("meshes", &*self.meshes),
+            ("prints", &*self.prints),
+            ("list", &*self.list),
+            ("matches", &*self.matches),
+        ];
+        let all = others.into_iter().chain(columns);
+        all.filter(|(_, value)| !value.is_empty()).collect()
+    }
+
+    /// Returns the changes of the pairs.
+    ///
+    /// # Errors
+    /// Refuses a text that is not one of the page's.
+    pub(super) fn changes(&self) -> AppResult<PairingChanges> {
+        changes(&self.matches)
+    }
+
+    /// Returns the choices for an import or its plan.
+    ///
+    /// # Errors
+    /// Refuses changes or a hash that are not those of the page.
+    pub(super) fn choices(&self) -> AppResult<PairChoices> {
+        let mut columns = ChosenColumns::default();
+        for (field, _, value) in self.columns() {
+            columns.choose(field, value);
+        }
+        let shown = (!self.shown.is_empty()).then(|| self.shown.parse());
+        Ok(PairChoices {
+            columns,
+            changes: self.changes()?,
+            shown: shown.transpose().map_err(|_invalid| not_of_page())?,
+        })
+    }
+
+    /// Returns what is imported, once enough is chosen.
+    pub(super) fn items(&self, roots: &PickerRoots) -> AppResult<Option<ListedItems>> {
+        if !self.list.is_empty() {
+            let list = roots.allowed(Path::new(&self.list))?;
+            let (items, _) = ListedItems::of(&list, None).map_err(AppFailure::from)?;
+            return Ok(Some(items));
+        }
+        if self.meshes.is_empty() || self.prints.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(ListedItems::Pairs(PairSource::Folders {
+            meshes: roots.allowed(Path::new(&self.meshes))?,
+            prints: roots.allowed(Path::new(&self.prints))?,
+            unit: self.unit.parse::<LengthUnit>().ok(),
+        })))
+    }
+
+    /// Returns the folder of the project, which need not exist.
+    pub(super) fn dir(&self, folder: &Path) -> AppResult<PathBuf> {
+        let found = find(folder).into_iter();
+        if let Some(found) = found.into_iter().find(|found| found.key == self.project) {
+            return Ok(found.dir);
+        }
+        if is_project(folder) {
+            return Err(AppFailure::refused(Sentence::new(
+                "the folder of the app is a project itself: start the app in the folder above it for a new one",
+                "thư mục của ứng dụng đã là một dự án: hãy mở ứng dụng ở thư mục bên trên để tạo dự án mới",
+            )));
+        }
+        let name = self.project.trim();
+        if name.eq_ignore_ascii_case(UPLOADS) {
+            return Err(AppFailure::refused(Sentence::new(
+                format!(
+                    "{name:?} is the folder of files from browsers: give the project another name"
+                ),
+                format!(
+                    "{name:?} là thư mục của các tệp từ trình duyệt: hãy đặt tên khác cho dự án"
+                ),
+            )));
+        }
+        let is_plain = !name.starts_with('.') && !name.contains(['/', '\\', ':']);
+        let is_short = name.chars().count() <= NAME_CHARS && !name.is_empty();
+        if is_plain && is_short && !name.contains(char::is_control) {
+            return Ok(folder.join(name));
+        }
+        let name = &self.project;
+        Err(AppFailure::refused(Sentence::new(
+            format!(
+                "{name:?} cannot be the name of a project: give a name of at most {NAME_CHARS} characters without / and :"
+            ),
+            format!(
+                "{name:?} không thể là tên dự án: hãy đặt tên tối đa {NAME_CHARS} ký tự, không có / và :"
+            ),
+        )))
+    }
+
+    /// Returns what an import would store; `None` if not enough is chosen. Pairs are shown from the position `from`.
+    pub(super) fn preview(
+        &self,
+        folder: &Path,
+        roots: &PickerRoots,
+        from: u64,
+        plans: &PlanCache,
+    ) -> Option<ImportPreview> {
+        let (mut head, items) = (None, self.items(roots).transpose()?);
+        let planned = items.and_then(|items| match items {
+            ListedItems::Blocks(_) => Ok(Planned::Blocks),
+            ListedItems::Pairs(source) => {
+                let choices = self.choices()?;
+                if let PairSource::List { file, bytes } = &source {
+                    let table = bytes.as_ref().filter(|bytes| !is_jsonl(file, bytes));
+                    head = table.and_then(|bytes| read_head(bytes, &choices.columns, SHOWN_ROWS));
+                }
+                let dir = self.dir(folder).unwrap_or_else(|_| folder.join("new"));
+                let is_kept = from < KEPT_PAIRS;
+                let start = if is_kept { 0 } else { from };
+                let shown = start..start.saturating_add(KEPT_PAIRS);
+                let key = format!("{} {start} {}", dir.display(), self.matches);
+                let location = Location::new(dir);
+                let plan = plans.plan(source, &key, |source| {
+                    plan_import(source, &choices, &location, &shown)
+                });
+                let plan = plan.map_err(AppFailure::from)?;
+                Ok(Planned::Pairs(plan, (from - start) as usize))
+            }
+        });
+        Some(ImportPreview { head, planned })
+    }
+}
+
+fn not_of_page() -> AppFailure {
+    AppFailure::refused(Sentence::new(
+        "this address was not made by the page: choose the files again",
+        "địa chỉ này không phải do trang tạo ra: hãy chọn lại các tệp",
+    ))
+}
+
+fn changes(text: &str) -> AppResult<PairingChanges> {
+    if text.is_empty() {
+        return Ok(PairingChanges::default());
+    }
+    serde_json::from_str(text).map_err(|_invalid| not_of_page())
+}
+
+/// Returns the address with the change of the pairs that a link or a form has added to it. The same address gives the same.
+///
+/// # Errors
+/// Refuses more changes than an address can have.
+pub(super) fn with_change(query: &PageQuery) -> AppResult<PageQuery> {
+    let before = query.get("matches").unwrap_or_default();
+    let mut changes = changes(before)?;
+    if let (Some(scan), Some(print)) = (query.get("scan"), query.get("print")) {
+        let joined = (scan.to_owned(), print.to_owned());
+        if !changes.joined.contains(&joined) {
+            changes.joined.push(joined);
+        }
+    }
+    if let Some(id) = query.get("leave").map(str::to_owned)
+        && !changes.left_out.contains(&id)
+    {
+        changes.left_out.push(id);
+    }
+    if let Some(id) = query.get("take") {
+        changes.left_out.retain(|known| known != id);
+    }
+    if let Some(at) = query.parsed::<usize>("split")
+        && at < changes.joined.len()
+    {
+        changes.joined.remove(at);
+    }
+    let text = if changes == PairingChanges::default() {
+        String::new()
+    } else {
+        // Texts always have a JSON form.
+        serde_json::to_string(&changes).unwrap_or_default()
+    };
+    if text.len() > MAX_CHANGES && text.len() > before.len() {
+        return Err(AppFailure::refused(Sentence::new(
+            "too many pairs are changed for one import: import these first, or rename the files",
+            "quá nhiều cặp được thay đổi trong một lần nhập: hãy nhập các cặp này trước, hoặc đổi tên các tệp",
+        )));
+    }
+    let plain = ["scan", "print", "leave", "take", "split"]
+        .iter()
+        .fold(query.clone(), |query, name| query.with(name, ""));
+    Ok(plain.with("matches", &text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ImportChoice, with_change};
+    use crate::app::address::PageQuery;
+
+    fn changed(query: &str) -> String {
+        let query = with_change(&PageQuery::parse(query)).expect("few changes");
+        query.get("matches").unwrap_or_default().to_owned()
+    }
+
+    #[test]
+    fn changes_are_added_to_the_address_and_taken_back() {
+        let one = r#"{"left_out":["1"],"joined":[["a.stl","b.png"]]}"#;
+        let added = changed("leave=1&scan=a.stl&print=b.png");
+        assert_eq!(added, one);
+        let again = PageQuery::parse("leave=1&scan=a.stl&print=b.png").with("matches", one);
+        let again = with_change(&again).expect("few changes");
+        assert_eq!(again.get("matches"), Some(one), "a reload changes nothing");
+        assert_eq!((again.get("leave"), again.get("scan")), (None, None));
+        let back = with_change(&again.with("take", "1").with("split", "0"));
+        assert_eq!(back.expect("no changes").text(), "");
+        assert_eq!(changed("scan=a.stl"), "");
+        with_change(&PageQuery::parse("matches=x")).expect_err("not of the page");
+        let many = "x".repeat(5000);
+        with_change(&PageQuery::parse(&format!("leave={many}"))).expect_err("too many");
+    }
+
+    #[test]
+    fn only_what_is_chosen_is_sent_with_an_import() {
+        let query = PageQuery::parse("meshes=/a&prints=/b&id_column=Nr&path=/c&matches=");
+        let chosen = ImportChoice::of(&query);
+        let fields = chosen.hidden_fields();
+        assert_eq!(
+            fields,
+            [("meshes", "/a"), ("prints", "/b"), ("id_column", "Nr")]
+        );
+    }
+}

@@ -1,0 +1,70 @@
+//! The columns of a list: which one is the id, the scan, the print, and so on, with the first rows.
+
+use maud::{Markup, html};
+
+use super::components::choice;
+use super::import_choice::ImportChoice;
+use super::visit::Visit;
+use mocban_core::domain::one_line;
+use mocban_lists::manifest::ListHead;
+
+/// Names of the columns in English and Vietnamese, in the order of [`ImportChoice::columns`].
+const NAMES: [[&str; 2]; 6] = [
+    ["Id (needed)", "Mã (cần có)"],
+    ["Scan (needed)", "Bản quét (cần có)"],
+    ["Print (needed)", "Bản in (cần có)"],
+    ["Character", "Chữ"],
+    ["Block", "Ván"],
+    ["Unit of the scan", "Đơn vị của bản quét"],
+];
+
+/// Returns the form that chooses the columns. It is open while a column is missing.
+pub(super) fn columns_part(visit: &Visit, chosen: &ImportChoice, head: &ListHead) -> Markup {
+    let columns = chosen.columns();
+    let others = columns.iter().fold(visit.query.clone(), |query, column| {
+        query.with(column.1, "")
+    });
+    let is_complete = head.is_complete();
+    html! {
+        details #columns.card open[!is_complete] {
+            summary { h2 { (visit.t("Columns of the list", "Các cột của danh sách")) } }
+            @if !is_complete {
+                p.notice.bad role="alert" { (visit.t("A list needs an id, a scan and a print, and the names of its columns do not say which these are. Choose them:", "Danh sách cần mã, bản quét và bản in, nhưng tên các cột không cho biết cột nào. Hãy chọn:")) }
+            }
+            form.fields method="get" action=(visit.here) {
+                @for (name, value) in others.pairs() { input type="hidden" name=(name) value=(value); }
+                @for ((field, name, value), names) in columns.into_iter().zip(NAMES) {
+                    (column_choice(visit, head, (field, name, value), names[visit.index()]))
+                }
+                button { (visit.t("Use these columns", "Dùng các cột này")) }
+            }
+            div.scroll tabindex="0" role="region" aria-label=(visit.t("First rows", "Các dòng đầu")) {
+                table {
+                    thead { tr { @for name in &head.header { th scope="col" { (one_line(name)) } } } }
+                    tbody { @for row in &head.rows { tr { @for cell in row { td { (cell) } } } } }
+                }
+            }
+        }
+    }
+}
+
+fn column_choice(
+    visit: &Visit,
+    head: &ListHead,
+    (field, name, value): (&str, &str, &str),
+    label: &str,
+) -> Markup {
+    let known = head.columns.iter().position(|known| *known == Some(field));
+    let known = known.and_then(|at| head.header.get(at));
+    let selected = known.map_or(value, |header| header.as_str());
+    html! {
+        label { span { (label) }
+            select name=(name) {
+                (choice("", visit.t("no column", "không có cột"), Some(selected)))
+                @for header in head.header.iter().filter(|header| !header.is_empty()) {
+                    (choice(header, &one_line(header), Some(selected)))
+                }
+            }
+        }
+    }
+}

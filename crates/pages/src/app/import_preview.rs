@@ -1,0 +1,214 @@
+//! The pairs that would be imported, and what a person can change in them.
+
+use std::path::Path;
+
+use maud::{Markup, html};
+
+use super::components::{action_form, choice, grouped};
+use super::import_choice::{ImportChoice, NAME_CHARS, Planned, SHOWN_PAIRS};
+use super::sentence::Sentence;
+use super::visit::Visit;
+use mocban_core::domain::{LengthUnit, one_line};
+use mocban_lists::manifest::PairingChanges;
+use mocban_project::import_plan::{ImportPlan, PlannedPair};
+
+/// Number of warnings and missing files that are shown.
+const SHOWN_LINES: usize = 12;
+/// Number of files without a partner from which one is chosen.
+const SHOWN_FILES: usize = 500;
+
+/// Returns what would be imported, with the form that imports it. `from` is the position of the first pair that is shown.
+pub(super) fn plan_part(
+    visit: &Visit,
+    chosen: &ImportChoice,
+    planned: &Planned,
+    from: u64,
+) -> Markup {
+    html! {
+        section.card {
+            h2 { (visit.t("What would be imported", "Sẽ nhập những gì")) }
+            @match planned {
+                Planned::Blocks => p { (visit.t("A list of whole blocks with their pages. A run finds the characters and makes the pairs.", "Một danh sách ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) },
+                Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
+            }
+            (import_form(visit, chosen, planned))
+        }
+    }
+}
+
+fn pairs_part(
+    visit: &Visit,
+    chosen: &ImportChoice,
+    plan: &ImportPlan,
+    at: usize,
+    from: u64,
+) -> Markup {
+    let shown = plan.shown.iter().skip(at).take(SHOWN_PAIRS as usize);
+    let changes = chosen.changes().unwrap_or_default();
+    let no_pair = plan.no_pair.as_deref().map(Sentence::of_program);
+    html! {
+        p { b { (grouped(plan.pairs)) } " " (visit.t("pairs", "cặp"))
+            @if plan.missing.count > 0 { " · " span.bad { (grouped(plan.missing.count as u64)) " " (visit.t("missing files", "tệp không có")) } }
+        }
+        @if let Some(why) = no_pair { p.notice.bad { (why.text(visit.language)) } }
+        @for line in plan.missing.lines.iter().take(SHOWN_LINES) { p.notice.bad { (one_line(line)) } }
+        @for line in plan.warnings.iter().take(SHOWN_LINES) { p.notice { (one_line(line)) } }
+        @if let Some(renamed) = &plan.renamed { p.muted { (one_line(renamed)) } }
+        @if shown.len() > 0 {
+            div.scroll tabindex="0" role="region" aria-label=(visit.t("Pairs", "Các cặp")) {
+                table {
+                    thead { tr {
+                        @for title in [visit.t("Id", "Mã"), visit.t("Scan", "Bản quét"), visit.t("Print", "Bản in"), visit.t("Character", "Chữ"), visit.t("Block", "Ván"), visit.t("Change", "Thay đổi")] {
+                            th scope="col" { (title) }
+                        }
+                    } }
+                    tbody { @for pair in shown { (pair_row(visit, chosen, &changes, pair)) } }
+                }
+            }
+            (pager(visit, plan.pairs, from))
+        }
+        (changes_part(visit, &changes))
+        (join_form(visit, plan))
+    }
+}
+
+fn pair_row(
+    visit: &Visit,
+    chosen: &ImportChoice,
+    changes: &PairingChanges,
+    pair: &PlannedPair,
+) -> Markup {
+    let folder = Path::new(&chosen.meshes);
+    let is_joined = chosen.list.is_empty()
+        && pair.mesh.strip_prefix(folder).is_ok_and(|mesh| {
+            let mut joined = changes.joined.iter();
+            joined.any(|(known, _)| Path::new(known) == mesh)
+        });
+    let name = pair.name.as_str();
+    let leave = visit.query.with("leave", name).text();
+    html! {
+        tr {
+            th scope="row" { (one_line(name)) }
+            td { (file_name(&pair.mesh)) } td { (file_name(&pair.print)) }
+            td { (pair.character.as_deref().map(one_line).unwrap_or_default()) }
+            td { (pair.block.as_deref().map(one_line).unwrap_or_default()) }
+            td {
+                @if is_joined { (visit.t("joined by you", "do bạn ghép")) }
+                @else {
+                    a href={ (visit.here) (leave) } aria-label={ (visit.t("leave out", "bỏ ra")) " " (one_line(name)) } { (visit.t("leave out", "bỏ ra")) }
+                }
+            }
+        }
+    }
+}
+
+/// Returns the last two parts of a path.
+fn file_name(path: &Path) -> String {
+    let parts: Vec<_> = path.components().rev().take(2).collect();
+    let parts = parts
+        .iter()
+        .rev()
+        .map(|part| part.as_os_str().to_string_lossy());
+    one_line(&parts.collect::<Vec<_>>().join("/")).to_string()
+}
+
+/// Returns links to the pairs before and after.
+fn pager(visit: &Visit, pairs: u64, from: u64) -> Markup {
+    let last = pairs.min(from + SHOWN_PAIRS);
+    let link = |from: u64, text: &str| {
+        let from = (from > 0).then(|| from.to_string());
+        let query = visit.query.with("from", &from.unwrap_or_default());
+        html! { a.button href={ (visit.here) (query.text()) } { (text) } " " }
+    };
+    html! {
+        @if pairs > SHOWN_PAIRS {
+            p.pager {
+                @if from > 0 { (link(from.saturating_sub(SHOWN_PAIRS), visit.t("Previous pairs", "Các cặp trước"))) }
+                span.muted { (grouped(from + 1)) "–" (grouped(last)) " / " (grouped(pairs)) }
+                @if last < pairs { (link(last, visit.t("Next pairs", "Các cặp sau"))) }
+            }
+        }
+    }
+}
+
+/// Returns the changes that were made, each with a link that takes it back.
+fn changes_part(visit: &Visit, changes: &PairingChanges) -> Markup {
+    let undo = |name: &str, value: &str| {
+        let query = visit.query.with(name, value);
+        html! { a href={ (visit.here) (query.text()) } aria-label={ (visit.t("take back", "hoàn lại")) " " (one_line(value)) } { (visit.t("take back", "hoàn lại")) } }
+    };
+    html! {
+        @if *changes != PairingChanges::default() {
+            h3 { (visit.t("Your changes", "Các thay đổi của bạn")) }
+            ul #changes {
+                @for (index, (scan, print)) in changes.joined.iter().enumerate() {
+                    li { (visit.t("joined", "ghép")) ": " (one_line(scan)) " + " (one_line(print)) " " (undo("split", &index.to_string())) }
+                }
+                @for id in &changes.left_out {
+                    li { (visit.t("left out", "bỏ ra")) ": " (one_line(id)) " " (undo("take", id)) }
+                }
+            }
+        }
+    }
+}
+
+/// Returns the form that joins a scan and a print without a partner.
+fn join_form(visit: &Visit, plan: &ImportPlan) -> Markup {
+    let [meshes, prints] = &plan.alone;
+    let files = |name: &str, label: &str, files: &[String]| {
+        html! {
+            label { span { (label) }
+                select name=(name) required {
+                    option value="" { (visit.t("choose", "chọn")) }
+                    @for file in files.iter().take(SHOWN_FILES) { (choice(file, &one_line(file), None)) }
+                }
+            }
+        }
+    };
+    let is_long = meshes.len().max(prints.len()) > SHOWN_FILES;
+    html! {
+        @if !meshes.is_empty() && !prints.is_empty() {
+            h3 { (visit.t("Files without a partner", "Các tệp không có đôi")) }
+            form #join.fields method="get" action=(visit.here) {
+                @for (name, value) in visit.query.pairs() { input type="hidden" name=(name) value=(value); }
+                (files("scan", visit.t("Scan", "Bản quét"), meshes))
+                (files("print", visit.t("Print", "Bản in"), prints))
+                button { (visit.t("Join to a pair", "Ghép thành cặp")) }
+            }
+            @if is_long { p.muted { (visit.t("Only the first files are listed.", "Chỉ liệt kê các tệp đầu.")) } }
+        }
+    }
+}
+
+fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Markup {
+    let plan = match planned {
+        Planned::Pairs(plan, _) => Some(plan),
+        Planned::Blocks => None,
+    };
+    let missing = plan.is_some_and(|plan| plan.missing.count > 0);
+    let is_nothing = plan.is_some_and(|plan| plan.pairs == 0);
+    action_form(
+        &format!("{}actions/import", visit.root),
+        "fields",
+        &html! {
+            @for (name, value) in chosen.hidden_fields() { input type="hidden" name=(name) value=(value); }
+            @if let Some(plan) = plan { input type="hidden" name="shown" value=(plan.hash); }
+            label { span { (visit.t("Project (new or known name)", "Dự án (tên mới hoặc đã có)")) }
+                input #project name="project" value=(chosen.project) required maxlength=(NAME_CHARS);
+            }
+            @if chosen.list.is_empty() {
+                label { span { (visit.t("Unit of the scans", "Đơn vị của bản quét")) }
+                    select name="unit" {
+                        (choice("", visit.t("not known", "không rõ"), Some(&chosen.unit)))
+                        @for unit in LengthUnit::ALL { (choice(unit.name(), unit.name(), Some(&chosen.unit))) }
+                    }
+                }
+            }
+            @if missing {
+                label.check { input type="checkbox" name="missing" value="yes"; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
+            }
+            label.check { input type="checkbox" name="changed" value="yes"; " " (visit.t("Known pairs may get other files", "Các cặp đã có được đổi tệp")) }
+            button.primary #import disabled[is_nothing] { (visit.t("Import", "Nhập")) }
+        },
+    )
+}

@@ -1,0 +1,74 @@
+//! The files of a ZIP archive of an upload: all are checked before the first is unpacked.
+
+use std::fs::File;
+use std::sync::atomic::Ordering;
+
+use super::received_files::{ReceivedFiles, is_importable};
+use super::sentence::Sentence;
+use super::upload_sentence::{
+    MAX_FILES, MAX_RATIO, bomb, link, not_utf8, refused_archive, refused_path,
+};
+use mocban_core::domain::cancel::poll;
+use mocban_lists::relative_path::RelativePath;
+use mocban_lists::zip::{ZipArchive, ZippedFile};
+
+/// Archives that unpack to fewer bytes are never refused for their size.
+const HARMLESS_BYTES: u64 = 64 << 20;
+
+/// Unpacks the scans, images and lists of an archive beside its own path. Polls for a cancellation.
+///
+/// # Errors
+/// Returns the reason if the archive is damaged or too large, or a file in it is refused or cannot be written.
+pub(super) fn unpack(
+    received: &mut ReceivedFiles,
+    archive: &File,
+    at: &RelativePath,
+) -> Result<(), Sentence> {
+    let refuse = |error| refused_archive(at.as_str(), &error);
+    let zip = ZipArchive::open(archive, MAX_FILES as usize).map_err(refuse)?;
+    let (mut files, mut bytes) = (Vec::new(), 0_u64);
+    for file in zip.files() {
+        poll();
+        if let Some(path) = checked(file, at)? {
+            if !is_importable(&path) {
+                received.count.left_out.fetch_add(1, Ordering::Relaxed);
+                continue;
+            }
+            file.check().map_err(refuse)?;
+            received.add(&path)?;
+            bytes = bytes.saturating_add(file.size());
+            files.push((file, path));
+        }
+    }
+    if bytes > HARMLESS_BYTES.max(zip.packed_len().saturating_mul(MAX_RATIO)) {
+        return Err(bomb(at.as_str()));
+    }
+    received.check_room(bytes)?;
+    for (file, path) in files {
+        let mut target = received
+            .create(&path)
+            .map_err(|error| refuse(error.into()))?;
+        let unpacked = zip.unpack(file, file.size(), &mut |piece| {
+            poll();
+            received.append(&mut target, piece)
+        });
+        unpacked.map_err(refuse)?;
+        received.finish_file(&path);
+    }
+    Ok(())
+}
+
+/// Returns the path of a file in an archive, or `None` for folders and files that a system keeps for itself.
+fn checked(file: &ZippedFile, at: &RelativePath) -> Result<Option<RelativePath>, Sentence> {
+    if file.is_folder() {
+        return Ok(None);
+    }
+    let name = file.name();
+    let name = name.ok_or_else(|| not_utf8(at.as_str(), &file.shown_name()))?;
+    let path = at.beside(name);
+    let path = path.map_err(|fault| refused_path(name, &fault))?;
+    if file.is_link() {
+        return Err(link(at.as_str(), name));
+    }
+    Ok((!path.is_of_system()).then_some(path))
+}

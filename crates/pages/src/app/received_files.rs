@@ -1,0 +1,215 @@
+//! The files of an upload: their names, their number, and room for them on the disk.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use axum::body::Bytes;
+use tokio::sync::mpsc;
+
+use super::sentence::Sentence;
+use super::upload_sentence::{
+    MAX_FILES, RESERVE_BYTES, cut, no_room, not_written, nothing, other_file, refused_path,
+    too_many,
+};
+use mocban_core::domain::FileKind;
+use mocban_lists::manifest::{MESH_EXTENSIONS, PRINT_EXTENSIONS};
+use mocban_lists::relative_path::{RelativePath, TakenPaths};
+use mocban_store::NewFolder;
+use mocban_system::failpoint::{self, Point};
+use mocban_system::platform;
+
+/// Extensions of lists, and of boxes of characters on a page.
+const LIST_EXTENSIONS: [&str; 7] = ["csv", "tsv", "xlsx", "jsonl", "json", "xml", "txt"];
+/// Extension of archives, which are unpacked.
+pub(super) const ARCHIVE: &str = "zip";
+/// Bytes that are written between two looks at the room on the disk.
+const BYTES_PER_LOOK: u64 = 16 << 20;
+/// An archive in the folder of files that do not stay.
+const ARCHIVE_FILE: &str = "archive";
+
+/// Returns the extensions of files that an import reads, or names as unread.
+pub(super) fn importable_extensions() -> impl Iterator<Item = &'static str> {
+    MESH_EXTENSIONS
+        .into_iter()
+        .chain(PRINT_EXTENSIONS)
+        .chain(LIST_EXTENSIONS)
+        .chain(FileKind::unread_extensions())
+}
+
+/// A piece of a file as it arrives, or its end.
+#[derive(Debug)]
+pub(super) enum FilePiece {
+    Bytes(Bytes),
+    End,
+}
+
+/// What has arrived, for the page.
+#[derive(Debug, Default)]
+pub(super) struct ReceivedCount {
+    pub(super) files: AtomicU64,
+    pub(super) bytes: AtomicU64,
+    pub(super) left_out: AtomicU64,
+}
+
+/// The files of an upload under a hidden name. They are removed if this is dropped before it has its name.
+#[derive(Debug)]
+pub(super) struct ReceivedFiles {
+    folder: NewFolder,
+    taken: TakenPaths,
+    /// Files in `taken`.
+    names: u64,
+    unlooked_bytes: u64,
+    pub(super) count: Arc<ReceivedCount>,
+}
+
+impl ReceivedFiles {
+    /// Starts without files.
+    pub(super) fn new(folder: NewFolder, count: Arc<ReceivedCount>) -> Self {
+        Self {
+            folder,
+            taken: TakenPaths::default(),
+            names: 0,
+            unlooked_bytes: 0,
+            count,
+        }
+    }
+
+    /// Writes a file as it arrives.
+    ///
+    /// # Errors
+    /// Returns the reason if the path is refused, the disk is full, or the file does not arrive whole.
+    pub(super) fn receive(
+        &mut self,
+        path: &RelativePath,
+        pieces: mpsc::Receiver<FilePiece>,
+    ) -> Result<(), Sentence> {
+        if !is_importable(path) {
+            return Err(other_file(path.as_str()));
+        }
+        self.add(path)?;
+        let file = self.create(path).map_err(|error| not_written(&error))?;
+        self.write(file, pieces)?;
+        self.finish_file(path);
+        Ok(())
+    }
+
+    /// Writes an archive as it arrives, to a file that does not stay. Returns it.
+    ///
+    /// # Errors
+    /// Returns the reason if the disk is full, or the file does not arrive whole.
+    pub(super) fn receive_archive(
+        &mut self,
+        pieces: mpsc::Receiver<FilePiece>,
+    ) -> Result<File, Sentence> {
+        let path = self.folder.scratch().join(ARCHIVE_FILE);
+        let mut options = OpenOptions::new();
+        options.create(true).truncate(true).read(true).write(true);
+        let file = options.open(path).map_err(|error| not_written(&error))?;
+        self.write(file, pieces)
+    }
+
+    fn write(
+        &mut self,
+        mut file: File,
+        mut pieces: mpsc::Receiver<FilePiece>,
+    ) -> Result<File, Sentence> {
+        loop {
+            match pieces.blocking_recv() {
+                Some(FilePiece::Bytes(bytes)) => self
+                    .append(&mut file, &bytes)
+                    .map_err(|error| not_written(&error))?,
+                Some(FilePiece::End) => return Ok(file),
+                None => return Err(cut()),
+            }
+        }
+    }
+
+    /// Adds the name of a file that will be written.
+    ///
+    /// # Errors
+    /// Returns the reason if there are too many files, or there is such a name already.
+    pub(super) fn add(&mut self, path: &RelativePath) -> Result<(), Sentence> {
+        self.names += 1;
+        if self.names > MAX_FILES {
+            return Err(too_many());
+        }
+        let added = self.taken.insert(path);
+        added.map_err(|fault| refused_path(path.as_str(), &fault))
+    }
+
+    /// Creates a file and its folders.
+    pub(super) fn create(&self, path: &RelativePath) -> io::Result<File> {
+        let path = path.below(self.folder.path());
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        File::create_new(path)
+    }
+
+    /// Appends bytes to a file.
+    ///
+    /// # Errors
+    /// Returns an error if the disk is full or will be soon.
+    pub(super) fn append(&mut self, file: &mut File, bytes: &[u8]) -> io::Result<()> {
+        file.write_all(bytes)?;
+        let len = bytes.len() as u64;
+        self.count.bytes.fetch_add(len, Ordering::Relaxed);
+        self.unlooked_bytes += len;
+        if self.unlooked_bytes < BYTES_PER_LOOK {
+            return Ok(());
+        }
+        self.unlooked_bytes = 0;
+        match platform::free_bytes(self.folder.path()) {
+            Some(free) if free < RESERVE_BYTES => Err(ErrorKind::StorageFull.into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Counts a file that is whole.
+    pub(super) fn finish_file(&self, path: &RelativePath) {
+        self.count.files.fetch_add(1, Ordering::Relaxed);
+        failpoint::hit("upload", Point::Written, Some(&path.as_str()));
+    }
+
+    /// Refuses files for which the disk has no room.
+    ///
+    /// # Errors
+    /// Returns the reason if less than the reserve would stay free.
+    pub(super) fn check_room(&self, bytes: u64) -> Result<(), Sentence> {
+        check_room(self.folder.path(), bytes)
+    }
+
+    /// Gives the files their folder, and returns its path.
+    ///
+    /// # Errors
+    /// Returns the reason if there are no files, or the folder cannot be renamed.
+    pub(super) fn place(self, name: &str) -> Result<PathBuf, Sentence> {
+        if self.count.files.load(Ordering::Relaxed) == 0 {
+            return Err(nothing());
+        }
+        let _ = std::fs::remove_file(self.folder.scratch().join(ARCHIVE_FILE));
+        failpoint::hit("upload", Point::Synced, None);
+        self.folder.place(name).map_err(|error| not_written(&error))
+    }
+}
+
+/// Refuses files for which the disk of a folder has no room.
+///
+/// # Errors
+/// Returns the reason if less than the reserve would stay free.
+pub(super) fn check_room(folder: &Path, bytes: u64) -> Result<(), Sentence> {
+    match platform::free_bytes(folder) {
+        Some(free) if free < bytes.saturating_add(RESERVE_BYTES) => Err(no_room(bytes, free)),
+        _ => Ok(()),
+    }
+}
+
+/// Returns whether an import reads a file, or names it as unread.
+pub(super) fn is_importable(path: &RelativePath) -> bool {
+    let extension = path.extension();
+    let is_known = |extension: String| importable_extensions().any(|known| known == extension);
+    !path.is_of_system() && extension.is_some_and(is_known)
+}

@@ -1,0 +1,187 @@
+//! What a browser asks for to send files: an upload, each of its files, and its end.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use axum::Json;
+use axum::extract::{Path, Request, State};
+use futures_util::StreamExt as _;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tokio::task::spawn_blocking;
+
+use super::action_body::ActionBody;
+use super::address::PageQuery;
+use super::failure::{AppFailure, AppResult};
+use super::folder_picker::PickerRoots;
+use super::received_files::FilePiece;
+use super::sentence::Sentence;
+use super::state::AppState;
+use crate::local_server::WorkFailed;
+use mocban_lists::relative_path::RelativePath;
+use mocban_project::location::now;
+use mocban_system::time_text::day;
+
+/// Longest time in which a browser sends nothing of a file.
+const MAX_PAUSE: Duration = Duration::from_mins(1);
+/// Longest name of the folder of an upload, characters.
+const MAX_NAME: usize = 60;
+
+/// What a browser will send.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct UploadBody {
+    /// Name of the folder or archive that was chosen; empty for several files.
+    name: String,
+    files: u64,
+    bytes: u64,
+}
+
+/// Begins an upload.
+pub(super) async fn begin(
+    State(state): State<Arc<AppState>>,
+    ActionBody(body): ActionBody<UploadBody>,
+) -> AppResult<Json<Value>> {
+    let name = folder_name(&body.name);
+    let begun = spawn_blocking(move || state.uploads.begin(name, body.files, body.bytes)).await;
+    let id = begun.map_err(|_panicked| WorkFailed)??;
+    Ok(Json(json!({ "upload": id })))
+}
+
+/// Returns the name of the folder for an upload.
+fn folder_name(chosen: &str) -> String {
+    let name = RelativePath::new(chosen.trim()).ok();
+    let is_name = |name: &RelativePath| {
+        let text = name.as_str();
+        !text.contains('/') && !name.is_of_system() && text.chars().count() <= MAX_NAME
+    };
+    let name = name.filter(is_name);
+    name.map_or_else(
+        || format!("files {}", day(now())),
+        |name| name.as_str().to_owned(),
+    )
+}
+
+/// Receives a file. Its body is written as it arrives.
+pub(super) async fn receive(
+    State(state): State<Arc<AppState>>,
+    Path((id, path)): Path<(u64, String)>,
+    request: Request,
+) -> AppResult<Json<Value>> {
+    let file = state.uploads.find(id)?.start(&path)?;
+    let mut body = request.into_body().into_data_stream();
+    // Without an end, the file counts as cut off.
+    while let Ok(next) = tokio::time::timeout(MAX_PAUSE, body.next()).await {
+        let piece = match next {
+            Some(Ok(bytes)) => FilePiece::Bytes(bytes),
+            Some(Err(_cut)) => break,
+            None => FilePiece::End,
+        };
+        let is_end = matches!(piece, FilePiece::End);
+        // Nobody receives if the file was refused; `finish` has the reason.
+        if file.pieces.send(piece).await.is_err() || is_end {
+            break;
+        }
+    }
+    file.finish().await?;
+    Ok(Json(json!({})))
+}
+
+/// Responds with what has arrived, and why the upload failed.
+pub(super) async fn progress(
+    State(state): State<Arc<AppState>>,
+    Path(id): Path<u64>,
+) -> AppResult<Json<Value>> {
+    let upload = state.uploads.find(id)?;
+    if let Some(why) = upload.problem() {
+        return Err(AppFailure::refused(why));
+    }
+    let [files, bytes] =
+        [&upload.count.files, &upload.count.bytes].map(|count| count.load(Ordering::Relaxed));
+    Ok(Json(json!({ "files": files, "bytes": bytes })))
+}
+
+/// How an upload ends.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum UploadEnd {
+    Finish,
+    Cancel,
+}
+
+/// The end of an upload.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct UploadEndBody {
+    upload: u64,
+    end: UploadEnd,
+    /// The project into which the files will be imported; may be empty.
+    project: String,
+}
+
+/// Gives the files of an upload their folder, or removes them.
+pub(super) async fn end(
+    State(state): State<Arc<AppState>>,
+    ActionBody(body): ActionBody<UploadEndBody>,
+) -> AppResult<Json<Value>> {
+    let upload = state.uploads.find(body.upload)?;
+    match body.end {
+        UploadEnd::Cancel => {
+            let cancelled = spawn_blocking(move || upload.cancel()).await;
+            cancelled.map_err(|_panicked| WorkFailed)?;
+            Ok(Json(json!({})))
+        }
+        UploadEnd::Finish => {
+            let placed = upload.finish().await?;
+            let left_out = upload.count.left_out.load(Ordering::Relaxed);
+            let query = PageQuery::default().with("project", &body.project);
+            let folder = state.options.folder.clone();
+            let chosen = spawn_blocking(move || chosen(&folder, placed, query)).await;
+            let chosen = chosen.map_err(|_panicked| WorkFailed)??;
+            let left_out = (left_out > 0).then(|| left_out.to_string());
+            let query = chosen.with("left_out", &left_out.unwrap_or_default());
+            Ok(Json(json!({ "go": format!("import{}", query.text()) })))
+        }
+    }
+}
+
+/// Chooses the files of a folder for an import: its list, if it has one, or else its scans and prints.
+fn chosen(folder: &std::path::Path, placed: PathBuf, query: PageQuery) -> AppResult<PageQuery> {
+    let roots = PickerRoots::new(folder);
+    let picked = roots.read(&placed)?;
+    let path = |path: &std::path::Path| {
+        let text = path.to_str().map(str::to_owned);
+        text.ok_or_else(|| {
+            let shown = path.display();
+            AppFailure::refused(Sentence::new(
+                format!("{shown} is not UTF-8: rename the folder of the app"),
+                format!("{shown} không phải UTF-8: hãy đổi tên thư mục của ứng dụng"),
+            ))
+        })
+    };
+    let at = path(&picked.path)?;
+    let query = query.with("path", &at);
+    Ok(match picked.lists.as_slice() {
+        [list] => query.with("list", &path(&picked.path.join(list))?),
+        _ if picked.counts.meshes > 0 && picked.counts.prints > 0 => {
+            query.with("meshes", &at).with("prints", &at)
+        }
+        _ => query,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::folder_name;
+
+    #[test]
+    fn an_upload_is_named_like_its_folder_or_by_its_day() {
+        assert_eq!(folder_name(" ván 4 "), "ván 4");
+        for other in ["", "a/b", "../x", ".git", "con", "a?", &"a".repeat(61)] {
+            let name = folder_name(other);
+            assert!(name.starts_with("files 2"), "{name}");
+        }
+    }
+}

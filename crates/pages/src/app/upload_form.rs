@@ -1,0 +1,61 @@
+//! The part of the page of imports with which a browser sends files.
+
+use maud::{Markup, html};
+
+use super::byte_size::file_size;
+use super::components::grouped;
+use super::home::free_space;
+use super::received_files::{ARCHIVE, importable_extensions};
+use super::upload_sentence::{MAX_FILES, RESERVE_BYTES};
+use super::uploads::Uploads;
+use super::visit::Visit;
+use mocban_core::domain::one_line;
+use mocban_system::platform;
+
+/// Returns the part. The files will be imported into `project`, which may be empty.
+pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Markup {
+    let extensions: Vec<&str> = importable_extensions().chain([ARCHIVE]).collect();
+    let free = uploads.folder().parent().and_then(platform::free_bytes);
+    html! {
+        h2 { (visit.t("Files from this browser", "Tệp từ trình duyệt này")) }
+        @if let Some(problem) = uploads.problem() {
+            p #upload-last.notice.bad role="status" { (visit.t("The last upload did not end well: ", "Lần gửi trước không thành công: ")) (problem.text(visit.language)) }
+        }
+        form #upload.card.upload
+            data-project=(project)
+            data-extensions=(extensions.join(" "))
+            data-files=(visit.t("files", "tệp"))
+            data-sending=(visit.t("Receiving the files", "Đang nhận các tệp"))
+            data-unpacking=(visit.t("Unpacking", "Đang giải nén"))
+            data-storing=(visit.t("Storing", "Đang lưu"))
+            data-cancelled=(visit.t("The upload was cancelled. Nothing of it was kept.", "Đã hủy. Không tệp nào được giữ lại."))
+            data-cut=(visit.t("The program did not take all files, and nothing of them was kept. Choose them again.", "Chương trình không nhận hết các tệp, và không tệp nào được giữ lại. Hãy chọn lại."))
+            data-nothing=(visit.t("None of the files is a scan, an image, a list or a ZIP.", "Không có tệp nào là bản quét, hình ảnh, danh sách hay ZIP."))
+        {
+            div #upload-choice {
+                p { (visit.t("Drag files, a folder or a ZIP here, or choose them:", "Kéo tệp, thư mục hoặc ZIP vào đây, hoặc chọn:")) }
+                div.fields {
+                    label { span { (visit.t("Files or a ZIP", "Các tệp hoặc ZIP")) } input #upload-files type="file" multiple; }
+                    label { span { (visit.t("A folder", "Một thư mục")) } input #upload-folder type="file" webkitdirectory; }
+                }
+                p.muted {
+                    (visit.t("They are copied to a new folder in", "Chúng được chép vào một thư mục mới trong")) " "
+                    code { (one_line(&uploads.folder().to_string_lossy())) }
+                    (visit.t(", from which the project reads them, so keep it. ", ", nơi dự án sẽ đọc chúng, vì vậy hãy giữ thư mục đó. "))
+                    (visit.t("At most", "Tối đa")) " " (grouped(MAX_FILES)) " " (visit.t("files", "tệp")) "; "
+                    (file_size(RESERVE_BYTES)) " " (visit.t("of the disk stays free", "của đĩa được để trống"))
+                    @if let Some(free) = free { " (" (free_space(visit, free)) ")" }
+                    "."
+                }
+            }
+            div #upload-state hidden {
+                p #upload-phase role="status" {}
+                progress aria-label=(visit.t("Files that were received", "Các tệp đã nhận")) {}
+                p #upload-done {}
+                button #upload-cancel type="button" { (visit.t("Cancel", "Hủy")) }
+            }
+            p #upload-problem.problem role="alert" hidden {}
+        }
+        script type="module" src={ (visit.root) "assets/upload.js" } {}
+    }
+}

@@ -1,0 +1,236 @@
+//! Why files from a browser are refused, in both languages.
+
+use std::io::{self, ErrorKind};
+
+use super::byte_size::file_size;
+use super::sentence::Sentence;
+use mocban_core::domain::sanitize;
+use mocban_lists::relative_path::PathFault;
+use mocban_lists::zip::ZipError;
+
+/// Most files of an upload.
+pub(super) const MAX_FILES: u64 = 50_000;
+/// Bytes of the disk that an upload leaves free.
+pub(super) const RESERVE_BYTES: u64 = 1_000_000_000;
+/// Most bytes that an archive unpacks to, as a multiple of its own.
+pub(super) const MAX_RATIO: u64 = 200;
+/// Longest path in a sentence, in characters.
+const MAX_SHOWN: usize = 120;
+
+fn shown(path: &str) -> String {
+    sanitize(path, MAX_SHOWN)
+}
+
+/// Says why the path of a file is refused.
+pub(super) fn refused_path(path: &str, fault: &PathFault) -> Sentence {
+    let path = shown(path);
+    let why = match fault {
+        PathFault::Outside => "đường dẫn dẫn đến thư mục khác".to_owned(),
+        PathFault::TooLong => "tên quá dài".to_owned(),
+        PathFault::Character(c) => format!("tên có ký tự {c:?}"),
+        PathFault::Ends => {
+            "tên bắt đầu hoặc kết thúc bằng dấu cách, hoặc kết thúc bằng dấu chấm".to_owned()
+        }
+        PathFault::Device => "tên là tên thiết bị của Windows".to_owned(),
+        PathFault::Twice => "tệp này có hai lần".to_owned(),
+        PathFault::Similar(other) => {
+            format!("tên chỉ khác {} ở chữ hoa và chữ thường", shown(other))
+        }
+    };
+    Sentence::new(
+        format!("{path:?} is refused, because {fault}: rename it and choose the files again"),
+        format!("{path:?} bị từ chối vì {why}: hãy đổi tên rồi chọn lại các tệp"),
+    )
+}
+
+/// Says why a file cannot be written.
+pub(super) fn not_written(error: &io::Error) -> Sentence {
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Sentence::new(
+            format!(
+                "the disk is full, or less than {} of it would stay free, so nothing of the files was kept: make room and choose them again",
+                file_size(RESERVE_BYTES)
+            ),
+            format!(
+                "đĩa đã đầy, hoặc sẽ còn trống ít hơn {}, nên không tệp nào được giữ lại: hãy dọn chỗ rồi chọn lại các tệp",
+                file_size(RESERVE_BYTES)
+            ),
+        ),
+        _ => Sentence::new(
+            format!(
+                "the files cannot be written ({error}), so nothing of them was kept: check the folder and its disk, and choose them again"
+            ),
+            format!(
+                "không ghi được các tệp ({error}), nên không tệp nào được giữ lại: hãy kiểm tra thư mục và ổ đĩa, rồi chọn lại các tệp"
+            ),
+        ),
+    }
+}
+
+/// Says that files need more room than the disk has.
+pub(super) fn no_room(bytes: u64, free: u64) -> Sentence {
+    let [bytes, free, reserve] = [bytes, free, RESERVE_BYTES].map(size);
+    Sentence::new(
+        format!(
+            "the files need {bytes}, the disk has {free}, and {reserve} must stay free: make room or choose fewer files"
+        ),
+        format!(
+            "các tệp cần {bytes}, đĩa còn {free}, và phải để trống {reserve}: hãy dọn chỗ hoặc chọn ít tệp hơn"
+        ),
+    )
+}
+
+/// Says that there are too many files.
+pub(super) fn too_many() -> Sentence {
+    Sentence::new(
+        format!("more than {MAX_FILES} files were chosen: choose fewer at once"),
+        format!("đã chọn hơn {MAX_FILES} tệp: hãy chọn ít tệp hơn mỗi lần"),
+    )
+}
+
+/// Says that there is nothing to import.
+pub(super) fn nothing() -> Sentence {
+    Sentence::new(
+        "none of the files is a scan, an image or a list: choose other files",
+        "không có tệp nào là bản quét, hình ảnh hay danh sách: hãy chọn các tệp khác",
+    )
+}
+
+/// Says that a file has an extension that an import does not know.
+pub(super) fn other_file(path: &str) -> Sentence {
+    let path = shown(path);
+    Sentence::new(
+        format!("{path:?} is no scan, image or list: leave it out"),
+        format!("{path:?} không phải là bản quét, hình ảnh hay danh sách: hãy bỏ tệp này ra"),
+    )
+}
+
+/// Says that the browser stopped sending.
+pub(super) fn cut() -> Sentence {
+    Sentence::new(
+        "the connection was cut before all files had arrived, so nothing of them was kept: choose them again",
+        "kết nối bị ngắt trước khi mọi tệp đến nơi, nên không tệp nào được giữ lại: hãy chọn lại các tệp",
+    )
+}
+
+/// Says that not all files of an upload have arrived.
+pub(super) fn incomplete(arrived: u64, announced: u64) -> Sentence {
+    Sentence::new(
+        format!(
+            "only {arrived} of {announced} files have arrived, so nothing of them was kept: choose them again"
+        ),
+        format!(
+            "mới nhận được {arrived} trên {announced} tệp, nên không tệp nào được giữ lại: hãy chọn lại các tệp"
+        ),
+    )
+}
+
+/// Says that an earlier program ended during an upload.
+pub(super) fn left_over() -> Sentence {
+    Sentence::new(
+        "the program ended before all files of the last upload had arrived; what had arrived was removed: choose the files again",
+        "chương trình dừng trước khi mọi tệp của lần gửi trước đến nơi; phần đã nhận đã được xóa: hãy chọn lại các tệp",
+    )
+}
+
+/// Says that an upload is not known any more.
+pub(super) fn ended() -> Sentence {
+    Sentence::new(
+        "this upload has ended: choose the files again",
+        "lần gửi tệp này đã kết thúc: hãy chọn lại các tệp",
+    )
+}
+
+/// Says that files of the same upload are still arriving.
+pub(super) fn busy() -> Sentence {
+    Sentence::new(
+        "another file of this upload is still arriving: wait for its end",
+        "một tệp khác của lần gửi này vẫn đang đến: hãy chờ đến khi xong",
+    )
+}
+
+/// Says that too many uploads are in progress.
+pub(super) fn too_many_uploads() -> Sentence {
+    Sentence::new(
+        "other uploads are in progress: wait for their end, or cancel one on its page",
+        "đang có các lần gửi tệp khác: hãy chờ đến khi xong, hoặc hủy một lần ở trang của nó",
+    )
+}
+
+/// Says why an archive cannot be unpacked.
+pub(super) fn refused_archive(archive: &str, error: &ZipError) -> Sentence {
+    let archive = shown(archive);
+    let because = |english: &str, vietnamese: &str| {
+        Sentence::new(
+            format!("{archive} cannot be unpacked: {english}"),
+            format!("không giải nén được {archive}: {vietnamese}"),
+        )
+    };
+    match error {
+        ZipError::Io(error) => not_written(error),
+        ZipError::TooManyFiles => because(
+            &format!("it has more than {MAX_FILES} files; pack fewer"),
+            &format!("có hơn {MAX_FILES} tệp; hãy nén ít tệp hơn"),
+        ),
+        ZipError::Large => because(
+            "it has more than 4 GiB or more than 65,535 files (ZIP64); unpack it yourself and choose the folder",
+            "tệp lớn hơn 4 GiB hoặc có hơn 65.535 tệp (ZIP64); hãy tự giải nén rồi chọn thư mục",
+        ),
+        ZipError::Encrypted(name) => because(
+            &format!("{} has a password; pack the files without one", shown(name)),
+            &format!(
+                "{} có mật khẩu; hãy nén lại không dùng mật khẩu",
+                shown(name)
+            ),
+        ),
+        ZipError::Method(name) => because(
+            &format!(
+                "{} is compressed in an unusual way; pack the files as an ordinary ZIP",
+                shown(name)
+            ),
+            &format!(
+                "{} được nén theo cách lạ; hãy nén lại thành ZIP thông thường",
+                shown(name)
+            ),
+        ),
+        error => because(
+            &format!("the archive is damaged: {error}; pack the files again"),
+            &format!("tệp nén bị hỏng ({error}); hãy nén lại"),
+        ),
+    }
+}
+
+/// Says that a file in an archive is a link.
+pub(super) fn link(archive: &str, path: &str) -> Sentence {
+    let [archive, path] = [archive, path].map(shown);
+    Sentence::new(
+        format!("{archive} cannot be unpacked: {path} is a link; pack the file that it leads to"),
+        format!("không giải nén được {archive}: {path} là một liên kết; hãy nén chính tệp đó"),
+    )
+}
+
+/// Says that the name of a file in an archive is not UTF-8.
+pub(super) fn not_utf8(archive: &str, path: &str) -> Sentence {
+    let [archive, path] = [archive, path].map(shown);
+    Sentence::new(
+        format!(
+            "{archive} cannot be unpacked: the name {path} is not UTF-8; pack the files with another program, or choose the folder"
+        ),
+        format!(
+            "không giải nén được {archive}: tên {path} không phải UTF-8; hãy nén bằng chương trình khác hoặc chọn thư mục"
+        ),
+    )
+}
+
+/// Says that an archive would unpack to far more bytes than it has.
+pub(super) fn bomb(archive: &str) -> Sentence {
+    let archive = shown(archive);
+    Sentence::new(
+        format!(
+            "{archive} is refused, because it would unpack to more than {MAX_RATIO} times its size: unpack it yourself and choose the folder"
+        ),
+        format!(
+            "{archive} bị từ chối vì sẽ giải nén thành hơn {MAX_RATIO} lần dung lượng: hãy tự giải nén rồi chọn thư mục"
+        ),
+    )
+}

@@ -1,0 +1,311 @@
+//! Uploads of files from a browser: their files are written one after another, and get their folder when all are there.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use tokio::sync::mpsc;
+use tokio::task::spawn_blocking;
+
+use super::failure::{AppFailure, AppResult};
+use super::received_archive::unpack;
+use super::received_files::{ARCHIVE, FilePiece, ReceivedCount, ReceivedFiles, check_room};
+use super::sentence::Sentence;
+use super::upload_sentence::{
+    MAX_FILES, busy, cut, ended, incomplete, left_over, not_written, nothing, refused_path,
+    too_many, too_many_uploads,
+};
+use crate::local_server::WorkFailed;
+use mocban_core::domain::cancel::{CancelGuard, CancelToken};
+use mocban_lists::relative_path::RelativePath;
+use mocban_store::NewFolder;
+
+/// Folder of uploads in the folder of the app.
+pub(super) const FOLDER: &str = "uploads";
+/// Most uploads that are open at the same time.
+const MAX_OPEN: usize = 4;
+/// A browser that has sent nothing for this long between two files is closed.
+const MAX_IDLE: Duration = Duration::from_secs(30);
+/// Pieces of a file that wait to be written. A piece has at most 64 KiB.
+const WAITING_PIECES: usize = 4;
+
+/// The uploads of this process.
+#[derive(Debug)]
+pub(super) struct Uploads {
+    folder: PathBuf,
+    open: Mutex<BTreeMap<u64, Arc<FileUpload>>>,
+    next: AtomicU64,
+    /// Whether an earlier process left an upload.
+    has_left_over: bool,
+}
+
+/// Files that a browser sends.
+#[derive(Debug)]
+pub(super) struct FileUpload {
+    name: String,
+    /// Number of files and archives that the browser will send, and that have arrived.
+    announced: u64,
+    arrived: AtomicU64,
+    pub(super) count: Arc<ReceivedCount>,
+    state: Mutex<UploadState>,
+}
+
+#[derive(Debug)]
+enum UploadState {
+    /// Waits for the next file since then.
+    Ready(Box<ReceivedFiles>, Instant),
+    /// A thread has the files.
+    Busy(CancelToken),
+    /// Nothing is kept, or all has its folder. Says why if it failed.
+    Ended(Option<Sentence>),
+}
+
+/// A file that is being received.
+#[derive(Debug)]
+pub(super) struct FileInProgress {
+    pub(super) pieces: mpsc::Sender<FilePiece>,
+    written: tokio::task::JoinHandle<Result<(), Sentence>>,
+    upload: Arc<FileUpload>,
+    /// Ends the work if nobody waits for it any more.
+    cancels: CancelGuard,
+}
+
+impl Uploads {
+    /// Returns the uploads for an app of a folder. Removes what an earlier process left.
+    pub(super) fn new(folder: &Path) -> Self {
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let folder = folder.join(FOLDER);
+        let has_left_over = NewFolder::remove_unfinished(&folder) > 0;
+        Self {
+            folder,
+            open: Mutex::default(),
+            next: AtomicU64::new(1),
+            has_left_over,
+        }
+    }
+
+    /// Returns the folder in which the folders of uploads are.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Begins an upload, and removes uploads that ended or were left. Waits for the disk.
+    ///
+    /// # Errors
+    /// Refuses too many files, and more bytes than the disk has room for.
+    pub(super) fn begin(&self, name: String, files: u64, bytes: u64) -> AppResult<u64> {
+        let refuse = |sentence| Err(AppFailure::refused(sentence));
+        if files == 0 {
+            return refuse(nothing());
+        }
+        if files > MAX_FILES {
+            return refuse(too_many());
+        }
+        if let Some(parent) = self.folder.parent() {
+            check_room(parent, bytes).map_err(AppFailure::refused)?;
+        }
+        if !self.make_place() {
+            return refuse(too_many_uploads());
+        }
+        let folder = NewFolder::begin(&self.folder);
+        let folder = folder.map_err(|error| AppFailure::refused(not_written(&error)))?;
+        let count = Arc::<ReceivedCount>::default();
+        let received = Box::new(ReceivedFiles::new(folder, Arc::clone(&count)));
+        let upload = FileUpload {
+            name,
+            announced: files,
+            arrived: AtomicU64::new(0),
+            count,
+            state: Mutex::new(UploadState::Ready(received, Instant::now())),
+        };
+        let id = self.next.fetch_add(1, Ordering::Relaxed);
+        self.lock().insert(id, Arc::new(upload));
+        Ok(id)
+    }
+
+    /// Removes uploads that ended, and those whose browser is closed. Returns whether there is place for another.
+    fn make_place(&self) -> bool {
+        let removed: Vec<_> = {
+            let mut open = self.lock();
+            let is_over = |_: &u64, upload: &mut Arc<FileUpload>| upload.is_over();
+            open.extract_if(.., is_over).collect()
+        };
+        // Their files are removed without the lock.
+        drop(removed);
+        self.lock().len() < MAX_OPEN
+    }
+
+    /// Returns an upload.
+    ///
+    /// # Errors
+    /// Returns an error if there is none any more.
+    pub(super) fn find(&self, id: u64) -> AppResult<Arc<FileUpload>> {
+        let found = self.lock().get(&id).cloned();
+        found.ok_or_else(|| AppFailure::refused(ended()))
+    }
+
+    /// Says why the last upload failed, until the next one begins.
+    pub(super) fn problem(&self) -> Option<Sentence> {
+        let open = self.lock();
+        let last = open.values().rev().find_map(|upload| upload.problem());
+        let is_first = open.is_empty() && self.next.load(Ordering::Relaxed) == 1;
+        last.or_else(|| (self.has_left_over && is_first).then(left_over))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Arc<FileUpload>>> {
+        // Each change is a single insertion or removal.
+        self.open.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl FileUpload {
+    /// Starts to write a file on a thread of its own.
+    ///
+    /// # Errors
+    /// Refuses a file whose path is not safe, or while another file of the upload is arriving. After a refused path, nothing
+    /// of the upload is kept.
+    pub(super) fn start(self: &Arc<Self>, path: &str) -> AppResult<FileInProgress> {
+        let token = CancelToken::default();
+        let mut received = self.take(&token)?;
+        let (pieces, arriving) = mpsc::channel(WAITING_PIECES);
+        let cancels = CancelGuard(token.clone());
+        let (upload, path) = (Arc::clone(self), path.to_owned());
+        let written = spawn_blocking(move || {
+            let work = token.run(|| {
+                let safe = RelativePath::new(&path);
+                let safe = safe.map_err(|fault| refused_path(&path, &fault))?;
+                if safe.extension().as_deref() == Some(ARCHIVE) {
+                    let archive = received.receive_archive(arriving)?;
+                    unpack(&mut received, &archive, &safe)?;
+                } else {
+                    received.receive(&safe, arriving)?;
+                }
+                Ok::<_, Sentence>(received)
+            });
+            // What is not kept was removed before this.
+            let (next, outcome) = match work {
+                Ok(Ok(received)) => {
+                    upload.arrived.fetch_add(1, Ordering::Relaxed);
+                    (UploadState::Ready(received, Instant::now()), Ok(()))
+                }
+                Ok(Err(why)) => (UploadState::Ended(Some(why.clone())), Err(why)),
+                Err(_cancelled) => (UploadState::Ended(Some(cut())), Err(cut())),
+            };
+            upload.settle(next);
+            outcome
+        });
+        Ok(FileInProgress {
+            pieces,
+            written,
+            upload: Arc::clone(self),
+            cancels,
+        })
+    }
+
+    /// Gives the files their folder. Returns its path.
+    ///
+    /// # Errors
+    /// Refuses an upload of which files are missing. Nothing of it is kept then.
+    pub(super) async fn finish(self: &Arc<Self>) -> AppResult<PathBuf> {
+        let received = self.take(&CancelToken::default())?;
+        let upload = Arc::clone(self);
+        let placed = spawn_blocking(move || {
+            let arrived = upload.arrived.load(Ordering::Relaxed);
+            let placed = if arrived == upload.announced {
+                received.place(&upload.name)
+            } else {
+                drop(received);
+                Err(incomplete(arrived, upload.announced))
+            };
+            upload.settle(UploadState::Ended(placed.as_ref().err().cloned()));
+            placed
+        });
+        let placed = placed.await.map_err(|_panicked| WorkFailed)?;
+        placed.map_err(AppFailure::refused)
+    }
+
+    /// Ends the upload, and removes its files.
+    pub(super) fn cancel(&self) {
+        let before = std::mem::replace(&mut *self.lock(), UploadState::Ended(None));
+        if let UploadState::Busy(token) = &before {
+            token.cancel();
+        }
+    }
+
+    /// Says why the upload failed.
+    pub(super) fn problem(&self) -> Option<Sentence> {
+        match &*self.lock() {
+            UploadState::Ended(why) => why.clone(),
+            UploadState::Ready(..) | UploadState::Busy(_) => None,
+        }
+    }
+
+    /// Takes the files for a thread that works on them.
+    fn take(&self, token: &CancelToken) -> AppResult<Box<ReceivedFiles>> {
+        let mut state = self.lock();
+        match std::mem::replace(&mut *state, UploadState::Busy(token.clone())) {
+            UploadState::Ready(received, _) => Ok(received),
+            other => {
+                let why = match &other {
+                    UploadState::Ended(Some(why)) => why.clone(),
+                    UploadState::Ended(None) => ended(),
+                    UploadState::Ready(..) | UploadState::Busy(_) => busy(),
+                };
+                *state = other;
+                Err(AppFailure::refused(why))
+            }
+        }
+    }
+
+    /// Stores what became of the files, unless the upload was cancelled meanwhile.
+    fn settle(&self, next: UploadState) {
+        let mut state = self.lock();
+        let unused = match &*state {
+            UploadState::Busy(_) => std::mem::replace(&mut *state, next),
+            UploadState::Ready(..) | UploadState::Ended(_) => next,
+        };
+        drop(state);
+        // Removes files of an upload that was cancelled.
+        drop(unused);
+    }
+
+    fn is_over(&self) -> bool {
+        match &*self.lock() {
+            UploadState::Ready(_, since) => since.elapsed() > MAX_IDLE,
+            UploadState::Busy(_) => false,
+            UploadState::Ended(_) => true,
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, UploadState> {
+        // Each change is a single assignment.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl FileInProgress {
+    /// Waits until the file is written.
+    ///
+    /// # Errors
+    /// Returns why the file is refused. Nothing of the upload is kept then.
+    pub(super) async fn finish(self) -> AppResult<()> {
+        let Self {
+            pieces,
+            written,
+            upload,
+            cancels,
+        } = self;
+        drop(pieces);
+        let written = written.await;
+        drop(cancels);
+        match written {
+            Ok(written) => written.map_err(AppFailure::refused),
+            Err(_panicked) => {
+                upload.settle(UploadState::Ended(None));
+                Err(WorkFailed.into())
+            }
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! What a person chose on the page that shows the pairs of an import before they are stored.
+
+use mocban_core::domain::ContentHash;
+use mocban_lists::manifest::{ChosenColumns, ManifestRow, PairingChanges};
+
+/// Choices for an import of pairs.
+#[derive(Debug, Clone, Default)]
+pub struct PairChoices {
+    /// Columns of a list.
+    pub columns: ChosenColumns,
+    /// Pairs that are left out; files of folders that are joined.
+    pub changes: PairingChanges,
+    /// Hash of the pairs that were shown. Others are refused.
+    pub shown: Option<ContentHash>,
+}
+
+/// Hashes the pairs of an import in their order.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RowsHash(ContentHash);
+
+impl RowsHash {
+    pub(crate) fn new() -> Self {
+        Self(ContentHash::of(b""))
+    }
+
+    /// Adds a pair, with the number of its files that are missing. The unit counts unless it is chosen with the import.
+    pub(crate) fn add(&mut self, row: &ManifestRow, missing: usize, has_unit: bool) {
+        let attributes = (&row.character, &row.block, row.scanned_face_down, &row.meta);
+        let unit = row.unit.filter(|_| has_unit);
+        let row = (&row.name, &row.mesh, &row.print, attributes, unit, missing);
+        let row = format!("{row:?}");
+        self.0 = ContentHash::of(&[self.0.as_bytes(), row.as_bytes()].concat());
+    }
+
+    pub(crate) const fn value(self) -> ContentHash {
+        self.0
+    }
+}
