@@ -36,7 +36,7 @@ impl std::fmt::Display for MissingInputs {
         } = self;
         write!(
             f,
-            "{missing} of {looked_at} input files that were looked at are missing or have moved, first {}; `check` lists all",
+            "{missing} of {looked_at} input files that were looked at are missing or have moved, first {}; `check --json` lists all",
             one_line(first)
         )
     }

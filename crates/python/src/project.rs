@@ -299,6 +299,7 @@ impl NativeProject {
                 "unchanged": summary.unchanged,
                 "retired": summary.retired,
                 "restored": summary.restored,
+                "still_retired": summary.still_retired,
                 "missing_files": outcome.missing.lines,
                 "warnings": outcome.warnings,
             });

@@ -10,7 +10,9 @@ use super::adjudication::AdjudicationRules;
 use super::comparison::{Basis, ComparisonSums};
 use super::fail_reasons::FailReasonSums;
 use super::headline::headline;
-use super::model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
+use super::model::{
+    BlockCounts, FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA,
+};
 use super::provenance::ProvenanceSums;
 use super::risk_coverage::RiskCoverageCurve;
 use super::score_bootstrap::{MeanIntervals, ScoreSample};
@@ -40,6 +42,7 @@ pub struct ReportAccumulator {
     /// Computing times of each stage, in milliseconds.
     times_ms: [Vec<f64>; Stage::ALL.len()],
     attention_checks: Option<AttentionCheckRates>,
+    block_progress: Option<BlockCounts>,
     truth_problems: TruthProblems,
     provenance: ProvenanceSums,
 }
@@ -105,6 +108,11 @@ impl ReportAccumulator {
     /// Sets the rates at which reviewers detected planted faults, unless no planted fault was judged.
     pub fn set_attention_checks(&mut self, rates: AttentionCheckRates) {
         self.attention_checks = (rates.all.n > 0).then_some(rates);
+    }
+
+    /// Sets how many whole blocks are finished.
+    pub fn set_block_progress(&mut self, blocks: Option<BlockCounts>) {
+        self.block_progress = blocks;
     }
 
     fn count_status(&mut self, pair: &PairResults) {
@@ -185,6 +193,7 @@ impl ReportAccumulator {
                 .filter_map(|(stage, ms)| StageTimes::of(stage, ms))
                 .collect(),
             attention_checks: self.attention_checks,
+            block_progress: self.block_progress,
             blocks: Vec::new(),
             unusable_truth: self.truth_problems.first,
             set_apart: SetApart::default(),

@@ -26,7 +26,17 @@ pub(super) fn accuracy(report: &Report) -> String {
         ) + &undecided(row)
             + &inattentive(report),
         None if report.has_verdicts() => {
-            "There is no Acc, because reviewers were unsure about every judged result.".to_owned()
+            let [unsure, conflicts] = [|row: &MetricRow| row.unsure, |row| row.conflicts]
+                .map(|number| report.rows.iter().map(number).sum::<u64>());
+            let why = match conflicts {
+                0 => "were unsure about every judged result",
+                all if all == unsure => "disagree about every judged result",
+                _ => "were unsure about every judged result, or disagree about it",
+            };
+            format!("There is no Acc, because reviewers {why}.")
+        }
+        None if report.rows.iter().any(|row| row.stale > 0) => {
+            "There is no Acc, because every verdict is on an earlier result.".to_owned()
         }
         None => "Nobody has judged a result yet, so there is no Acc (`mocban review --reviewer NAME` starts judging)."
             .to_owned(),

@@ -2,7 +2,7 @@
 
 use super::accumulate::ReportAccumulator;
 use super::block_accuracy::BlockSums;
-use super::model::Report;
+use super::model::{BlockCounts, Report};
 use super::report_error::ReportError;
 use mocban_catalog::{Catalog, PairResults, SetApart};
 use mocban_results::attention_checks;
@@ -37,6 +37,8 @@ pub async fn build_with(
     let (catalog, damaged) = catalog.without_faulty_rows().await?;
     let mut report = ReportAccumulator::default();
     report.set_attention_checks(attention_checks::project_rates(&catalog).await?);
+    let states = catalog.block_states().await?;
+    report.set_block_progress(BlockCounts::of(states.iter().map(|block| block.status)));
     let mut blocks = BlockSums::of_true_boxes(&catalog).await?;
     let manual_alignments = catalog.newest_manual_alignments().await?;
     let mut pages = catalog.result_pages(PAIRS_PER_PAGE);

@@ -36,7 +36,9 @@ pub use block_accuracy::{BlockAccuracy, BoxAccuracy, PrecisionRecall};
 pub use build::{build, build_with};
 pub use comparison::{Basis, COMPARED_METRICS, Comparison};
 pub use fail_reasons::FailReasonCount;
-pub use model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
+pub use model::{
+    BlockCounts, FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA,
+};
 pub use provenance::{ChangedSetting, Provenance, UsedSettings};
 pub use render::{Cover, MAX_PAGE_BYTES, ReportFormat, agreement_text, page, render, summary};
 pub use report_error::ReportError;

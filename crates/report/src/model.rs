@@ -14,7 +14,7 @@ use super::stage_times::StageTimes;
 use super::thresholds::ThresholdDistribution;
 use super::truth_summary::TruthSummary;
 use mocban_catalog::SetApart;
-use mocban_core::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
+use mocban_core::domain::{FailureClass, JobStatus, PairName, Reason, Stage, ThresholdMetric};
 use mocban_results::attention_checks::AttentionCheckRates;
 use mocban_results::manual_alignment::ManualAlignmentErrors;
 use mocban_results::number_format::count_list;
@@ -57,6 +57,9 @@ pub struct Report {
     /// Rates at which reviewers detected planted faults. `None` if no planted fault was judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attention_checks: Option<AttentionCheckRates>,
+    /// How many whole blocks are finished. `None` if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block_progress: Option<BlockCounts>,
     /// Whole blocks whose true boxes are known, by name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockAccuracy>,
@@ -81,6 +84,33 @@ pub struct PairProgress {
     pub failed: u64,
     /// Waiting, running or backing off.
     pub pending: u64,
+}
+
+/// Numbers of whole blocks by state.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct BlockCounts {
+    /// All of their pairs are known.
+    pub done: u64,
+    /// Failed until somebody retries them.
+    pub failed: u64,
+    /// Waiting, running or backing off.
+    pub pending: u64,
+}
+
+impl BlockCounts {
+    /// Counts the blocks of a project. Returns `None` if it has none.
+    pub(super) fn of(states: impl IntoIterator<Item = JobStatus>) -> Option<Self> {
+        let mut counted = None;
+        for status in states {
+            let numbers: &mut Self = counted.get_or_insert_default();
+            *match status {
+                JobStatus::Done => &mut numbers.done,
+                JobStatus::Quarantined => &mut numbers.failed,
+                JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => &mut numbers.pending,
+            } += 1;
+        }
+        counted
+    }
 }
 
 impl PairProgress {

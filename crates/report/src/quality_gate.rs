@@ -24,7 +24,7 @@ pub fn below(report: &Report, least: f64) -> Vec<String> {
 
 /// Returns the reasons why a report is incomplete. The list is empty if the report is complete.
 ///
-/// A report is complete if the project has pairs, every pair is done, every result was passed or failed, and no stored row
+/// A report is complete if the project has pairs, every block and every pair is done, every result was passed or failed, and no stored row
 /// is damaged.
 pub fn missing(report: &Report) -> Vec<String> {
     let mut missing = Vec::new();
@@ -33,6 +33,9 @@ pub fn missing(report: &Report) -> Vec<String> {
     };
     add("failed pairs".to_owned(), report.progress.failed);
     add("unfinished pairs".to_owned(), report.progress.pending);
+    let blocks = report.block_progress.unwrap_or_default();
+    add("failed blocks".to_owned(), blocks.failed);
+    add("unfinished blocks".to_owned(), blocks.pending);
     add("damaged rows set apart".to_owned(), report.set_apart.count);
     for row in &report.rows {
         add(

@@ -250,7 +250,7 @@ fn notes(notes: &Notes, problem: &str) -> Option<String> {
 
 fn unreferenced(found: Option<&Unreferenced>, args: &CheckArgs) -> Option<String> {
     let Some(found) = found else {
-        let text = "unreferenced files were not searched for, because a run may be writing";
+        let text = "unreferenced files were not searched for, because a run may be writing, or results are missing or cannot be read";
         return Some(text.to_owned());
     };
     let artifacts = (found.files > 0).then(|| {

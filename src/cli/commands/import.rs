@@ -173,6 +173,10 @@ pub(crate) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
             "retired, not in the list; results and verdicts are kept",
         ),
         (summary.restored, "back in every count"),
+        (
+            summary.still_retired,
+            "of the list retired earlier; they stay out of every count until `retire --undo`",
+        ),
     ] {
         if number > 0 {
             context.info(&format!("{} {text}", count(number, "pair")));
@@ -198,6 +202,7 @@ fn as_json(outcome: &ImportOutcome) -> Value {
         "unchanged": summary.unchanged,
         "retired": summary.retired,
         "restored": summary.restored,
+        "still_retired": summary.still_retired,
         "truths": outcome.truths,
         "missing_files": outcome.missing.lines,
         "more_missing_files": outcome.missing.count - outcome.missing.lines.len(),

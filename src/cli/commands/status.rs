@@ -412,7 +412,7 @@ mod tests {
             "{text}"
         );
         assert!(
-            text.contains("inputs       3 of 8 input files that were looked at are missing or have moved, first d/1.stl; `check` lists all\n"),
+            text.contains("inputs       3 of 8 input files that were looked at are missing or have moved, first d/1.stl; `check --json` lists all\n"),
             "{text}"
         );
     }

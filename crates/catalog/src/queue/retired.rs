@@ -226,6 +226,13 @@ pub(crate) async fn retire_unlisted(
     Ok(retired)
 }
 
+/// Returns how many of these pairs are retired.
+pub(crate) async fn count_retired(conn: &mut Conn, pairs: &[i64]) -> Result<u64> {
+    let retired = query_scalar(RETIRED_AMONG).bind(json_array(pairs.iter().copied()));
+    let retired: Vec<PairId> = retired.fetch_all(conn).await?;
+    Ok(retired.len() as u64)
+}
+
 /// Gives the retired pairs among these names, a JSON array, their jobs back: for a person, those with a box if they were
 /// cut from a block; otherwise those without a person as cause. Returns how many there were.
 pub(crate) async fn restore(

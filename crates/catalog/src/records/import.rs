@@ -62,6 +62,8 @@ pub struct ImportSummary {
     pub retired: u64,
     /// Number of retired pairs that came back. They are also counted as changed or unchanged.
     pub restored: u64,
+    /// Number of listed pairs that a person has retired, so that they stay out of every count.
+    pub still_retired: u64,
 }
 
 /// A pair whose values an import changed.
@@ -325,8 +327,9 @@ pub(crate) async fn import_chunk(
     requeue::retry::<PairJob>(conn, &RetrySelection::Names(moved), deltas).await?;
     query(NEW_JOBS)
         .bind(json_array(ids.iter().copied()))
-        .execute(conn)
+        .execute(&mut *conn)
         .await?;
+    summary.still_retired += retired::count_retired(conn, &ids).await?;
     Ok(ids)
 }
 

@@ -226,3 +226,12 @@ async fn pairs_of_blocks_are_retired_by_people_and_not_by_lists() {
     assert_eq!(state().await, (2, 0));
     world.assert_counters().await;
 }
+
+#[tokio::test]
+async fn an_import_counts_the_listed_pairs_that_a_person_retired() {
+    let world = World::new(2).await;
+    let retired = world.catalog.retire_pairs(&[name("p0")], 9).await;
+    assert_eq!(retired.expect("retired"), 1);
+    let summary = replace(&world, &["p0", "p1"]).await;
+    assert_eq!((summary.restored, summary.still_retired), (0, 1));
+}

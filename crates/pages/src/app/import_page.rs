@@ -252,7 +252,12 @@ pub(super) async fn import(
     };
     let at = Location::new(dir.clone());
     let stored = on_thread(async move || store(items, choices, allowed, &at).await).await;
-    stored.map_err(|error| AppFailure::of(error, &dir))?;
+    if stored.map_err(|error| AppFailure::of(error, &dir))? {
+        return Err(AppFailure::refused(Sentence::new(
+            "nothing was imported: all these pairs were taken out of every count, and stay out until they are brought back",
+            "chưa nhập gì: tất cả các cặp này đã được đưa ra khỏi mọi thống kê, và vẫn ở ngoài cho đến khi được đưa trở lại",
+        )));
+    }
     let found = find(&folder).into_iter();
     let key = found.into_iter().find(|found| found.dir == dir);
     let key = key.map_or_else(|| chosen.project.clone(), |found| found.key);
@@ -276,16 +281,18 @@ fn check_shown(chosen: &ImportChoice, folder: &Path, roots: &PickerRoots) -> App
     }
 }
 
+/// Imports pairs or blocks. Returns whether a person has retired all of the pairs.
 async fn store(
     items: ListedItems,
     choices: PairChoices,
     allowed: AllowedChanges,
     location: &Location,
-) -> ProjectResult<()> {
+) -> ProjectResult<bool> {
     match items {
         ListedItems::Blocks(source) => {
             let source: BlockSource = source;
             import_blocks(&source, allowed, location, &()).await?;
+            Ok(false)
         }
         ListedItems::Pairs(source) => {
             let import = PairImport {
@@ -294,8 +301,9 @@ async fn store(
                 allowed,
                 choices,
             };
-            import_pairs(import, location, &()).await?;
+            let summary = import_pairs(import, location, &()).await?.summary;
+            let listed = summary.added + summary.unchanged + summary.changed.len() as u64;
+            Ok(listed > 0 && summary.still_retired == listed)
         }
     }
-    Ok(())
 }
