@@ -159,7 +159,15 @@ pub(super) fn grouped(number: u64) -> String {
 /// Returns the rows of a list of files with a scan and its unit.
 pub(super) fn scan_file(visit: &Visit, path: &str, unit: Option<LengthUnit>) -> Markup {
     html! {
-        dt { (visit.t("Scan", "Bản quét")) } dd { code { (one_line(path)) } @if let Some(unit) = unit { " (" (unit) ")" } }
+        dt { (visit.t("Scan", "Bản quét")) } dd { code { (one_line(path)) } @if let Some(unit) = unit { " (" (unit_name(visit, unit)) ")" } }
+    }
+}
+
+/// Returns the name of a unit. In Vietnamese, `in` means to print.
+fn unit_name(visit: &Visit, unit: LengthUnit) -> &'static str {
+    match unit {
+        LengthUnit::In => visit.t("in", "inch"),
+        _ => unit.name(),
     }
 }
 

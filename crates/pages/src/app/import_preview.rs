@@ -207,7 +207,7 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
             @if missing {
                 label.check { input type="checkbox" name="missing" value="yes"; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
             }
-            label.check { input type="checkbox" name="changed" value="yes"; " " (visit.t("Known pairs may get other files", "Các cặp đã có được đổi tệp")) }
+            label.check { input type="checkbox" name="changed" value="yes"; " " (visit.t("Known pairs may get other files", "Cho phép đổi tệp của các cặp đã có")) }
             button.primary #import disabled[is_nothing] { (visit.t("Import", "Nhập")) }
         },
     )
