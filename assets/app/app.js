@@ -43,6 +43,7 @@ document.addEventListener("submit", async (event) => {
     else if (reply.reload) await refresh(true);
   } catch (error) {
     showProblem(form, error.message);
+    if (keptName(form)) document.dispatchEvent(new CustomEvent("refused", { detail: error.message }));
   } finally {
     form.removeAttribute("aria-busy");
   }
@@ -128,10 +129,13 @@ for (const part of document.querySelectorAll("[data-load]")) {
   part.dataset.loaded = "true";
 }
 
-// The language was chosen with this address; a later one may be chosen on another page.
+// The language was chosen with this address; a later one may be chosen on another page. What was done is said once, except
+// for retired pairs, whose number is read anew.
 const here = new URL(location.href);
-if (here.searchParams.has("language")) {
-  here.searchParams.delete("language");
+const once = ["language"];
+if (here.searchParams.get("done") !== "retire") once.push("done", "count", "still_out");
+if (once.some((name) => here.searchParams.has(name))) {
+  for (const name of once) here.searchParams.delete(name);
   history.replaceState(null, "", here);
 }
 

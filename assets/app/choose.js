@@ -109,5 +109,15 @@ all.addEventListener("click", async () => {
   }
 });
 
+// Pairs that were retired meanwhile are not in the list any more, so the user cannot remove them from the choice.
+document.addEventListener("refused", ({ detail }) => {
+  change([], [...chosen].filter((name) => ["was", "is"].some((verb) => detail.includes(`pair ${name} ${verb} retired`))));
+});
+
+// A page that the browser kept shows the choice as it was.
+addEventListener("pageshow", (event) => {
+  if (event.persisted) location.reload();
+});
+
 show();
 bar.dataset.ready = "true";

@@ -5,12 +5,14 @@ import { act, read, token } from "./action.js";
 const form = document.getElementById("upload");
 const texts = form.dataset;
 const extensions = new Set(texts.extensions.split(" "));
+const systemFolders = new Set(texts.systemFolders.split(" "));
 const choice = document.getElementById("upload-choice");
 const state = document.getElementById("upload-state");
 const bar = state.querySelector("progress");
 const done = document.getElementById("upload-done");
 const phase = document.getElementById("upload-phase");
 const problem = document.getElementById("upload-problem");
+const cancel = document.getElementById("upload-cancel");
 
 /** The upload in progress: its id, and the request of its current file. */
 let current = null;
@@ -18,8 +20,9 @@ let current = null;
 /** Returns whether an import can use a file. Hidden files and those of systems are left out. */
 function isWanted({ path }) {
   const names = path.split("/");
-  const extension = names.at(-1).split(".").at(-1).toLowerCase();
-  return extensions.has(extension) && !names.some((name) => name.startsWith(".") || name === "__MACOSX");
+  const [, extension] = /\.([^.]*)$/.exec(names.at(-1)) ?? [];
+  const isOfSystem = names.some((name) => name.startsWith(".") || systemFolders.has(name));
+  return !isOfSystem && extensions.has(extension?.toLowerCase());
 }
 
 /** Returns a number of bytes as a person reads it. */
@@ -91,6 +94,7 @@ async function sendAll(files, name) {
     }
     show(files.length, files.length, sent, bytes);
     phase.textContent = texts.storing;
+    cancel.disabled = true;
     const reply = await act("actions/upload-end", { upload: upload.id, end: "finish", project: texts.project });
     current = null;
     location.assign(reply.go);
@@ -111,6 +115,7 @@ async function start(chosen, name) {
   problem.hidden = files.length > 0;
   if (files.length === 0) return;
   form.setAttribute("aria-busy", "true");
+  cancel.disabled = false;
   phase.textContent = texts.sending;
   show(0, files.length, 0, 0);
   choice.hidden = true;
@@ -180,7 +185,7 @@ form.addEventListener("drop", async (event) => {
   }
 });
 
-document.getElementById("upload-cancel").addEventListener("click", async () => {
+cancel.addEventListener("click", async () => {
   const upload = current;
   if (!upload) return;
   upload.isCancelled = true;

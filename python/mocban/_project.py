@@ -350,7 +350,8 @@ class Project:
         Returns
         -------
         dict
-            Numbers ``added``, ``unchanged``, ``retired`` and ``restored``, ids ``changed``, and ``missing_files``.
+            Numbers ``added``, ``unchanged``, ``retired``, ``restored`` and ``still_retired`` (listed pairs that a person
+            retired), ids ``changed``, and ``missing_files``.
         """
         records = enumerate(_records(rows), 1)
         lines = "".join(json.dumps(_row(row, line), ensure_ascii=False, default=str) + "\n" for line, row in records)

@@ -2,14 +2,13 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
 use crate::app::{act, app, text, with_project};
 use crate::cli::mocban;
 use crate::page::{Page, Site, read_project};
-use crate::waiting::pause;
+use crate::waiting::wait_until;
 
 const CHOSEN: &str = "/p/p/actions/chosen";
 
@@ -31,16 +30,6 @@ fn status(dir: &Path) -> Value {
     mocban(&dir.join("p"), &["status", "--json"])
         .expect(0)
         .json()
-}
-
-/// Waits until something is so.
-#[track_caller]
-pub(crate) fn wait_until(what: &str, is_so: impl Fn() -> bool) {
-    let deadline = Instant::now() + Duration::from_mins(1);
-    while !is_so() {
-        assert!(Instant::now() < deadline, "never: {what}");
-        pause();
-    }
 }
 
 /// Imports pairs with the files of the first one.
@@ -72,7 +61,7 @@ fn chosen_pairs_leave_every_count_and_come_back() {
         html.contains("Pairs that were taken out of every count; their results and verdicts are kept: <b>2</b>"),
         "{html}"
     );
-    assert!(html.contains("view=table"), "the list stays as it was");
+    assert!(html.contains("<table"), "the list stays as it was");
     assert_eq!(status(dir.path())["retired"], 2);
     let again = act(&page, CHOSEN, &body, |_| {});
     assert_eq!(again.status, 422, "they changed meanwhile");
@@ -127,7 +116,7 @@ fn only_the_page_itself_acts_on_known_pairs() {
         (&["upright-0001", "nobody"][..], 422, "nobody"),
         (&[], 422, "no pair is chosen"),
         (&many, 422, "at most 1000 pairs can be chosen"),
-        (&[large.as_str()], 413, "too large"),
+        (&[large.as_str()], 413, "at most 256 KiB"),
     ] {
         for change in ["retire", "compute", "resume"] {
             let reply = act(&page, CHOSEN, &chosen(change, pairs), |_| {});
@@ -141,6 +130,20 @@ fn only_the_page_itself_acts_on_known_pairs() {
     let reply = act(&page, "/p/p/actions/export", &body, |_| {});
     assert_eq!(reply.status, 422, "{}", text(&reply));
     assert_eq!(status(dir.path())["retired"], 0);
+}
+
+#[test]
+fn a_difference_of_iou_needs_another_metric() {
+    let (_dir, page) = with_project();
+    let query = "metric=density&compare=density&differs=0.3";
+    let html = text(&page.get(&format!("/p/p/pairs?{query}")));
+    assert!(
+        html.contains("a difference of IoU needs two metrics"),
+        "{html}"
+    );
+    assert!(!html.contains("data-pair="), "nothing is listed");
+    let all = page.get(&format!("/p/p/pairs/listed?{query}"));
+    assert_eq!(all.status, 422, "{}", text(&all));
 }
 
 #[test]
@@ -168,6 +171,7 @@ fn a_guest_acts_on_no_pair() {
     let large = json!({"note": "x".repeat(20_000)});
     let reply = guest.post("/api/answer", &large).expect("a reply");
     assert_eq!(reply.status, 413);
+    assert!(text(&reply).contains("at most 16 KiB"), "{}", text(&reply));
     assert_eq!(status(dir.path())["retired"], 0);
 }
 
@@ -227,9 +231,11 @@ fn chosen_pairs_are_computed_again_unless_a_run_is_in_progress() {
     assert_eq!(refused.status, 422);
     let said = text(&refused);
     assert!(said.contains("a run is in progress"), "{said}");
-    // A run in progress is no obstacle to the others.
+    // A run in progress is no obstacle to the others, but this one works on another pair only.
     let html = done(&page, CHOSEN, &chosen("resume", &["upright-0002"]));
-    assert!(html.contains("of which those that wait or failed run now: <b>1</b>"));
+    assert!(
+        html.contains("or, if it works on other pairs only, when you next press Align: <b>1</b>")
+    );
     done(&page, CHOSEN, &chosen("retire", &["upright-0003"]));
     std::fs::remove_file(&hold).expect("the run waits");
     assert!(run.wait().expect("its end").success());
@@ -275,4 +281,26 @@ fn chosen_pairs_are_exported_beside_the_export_of_all() {
     assert_eq!(ids("excel-chosen"), ["upright-0001", "upright-0003"]);
     let html = text(&page.get("/p/p/export"));
     assert!(html.contains("a table for Excel (chosen pairs)"), "{html}");
+}
+
+#[test]
+fn an_export_of_chosen_pairs_has_only_their_verdicts() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    for pair in ["upright-0001", "upright-0002"] {
+        let set = ["verdict", "set", pair, "pass", "--reviewer", "lan"];
+        mocban(&project, &set).expect(0);
+    }
+    let body = json!({"purpose": "all", "only": "all", "metric": "", "pairs": ["upright-0001"]});
+    let reply = act(&page, "/p/p/actions/export", &body, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    wait_until("the export is done", || {
+        text(&page.get("/p/p/export")).contains("data-task=\"done\"")
+    });
+    let log = std::fs::read_to_string(project.join("exports/all-chosen/verdicts.jsonl"));
+    let log = log.expect("a log");
+    assert!(
+        log.contains("upright-0001") && !log.contains("upright-0002"),
+        "{log}"
+    );
 }

@@ -9,8 +9,8 @@ use std::process::Command;
 use serde_json::json;
 
 use crate::app::{act, open_app, text, with_project};
-use crate::app_choice::wait_until;
 use crate::page::{Page, Reply, read_project};
+use crate::waiting::wait_until;
 
 /// Lists the files of an archive with their lengths, after it checked their checksums.
 const LIST: &str = "
@@ -157,7 +157,7 @@ fn the_name_of_an_archive_keeps_the_letters_of_its_project() {
         "{named}"
     );
     if let Some(found) = listed(&reply.body, dir.path()) {
-        assert_eq!(found, [(2, "bản khắc \"1\"-excel/export.json".to_owned())]);
+        assert_eq!(found, [(2, "bản khắc -1--excel/export.json".to_owned())]);
     }
 }
 
@@ -233,6 +233,17 @@ fn a_download_is_cut_off_if_the_export_is_replaced_or_loses_a_file() {
     assert_eq!(download(&page).status, 200, "the new export is whole");
 }
 
+#[test]
+fn a_folder_without_a_manifest_has_no_link_to_an_archive() {
+    let (dir, page) = with_project();
+    fs::create_dir_all(dir.path().join("p/exports/excel")).expect("folders");
+    let html = text(&page.get("/p/p/export"));
+    assert!(html.contains("cannot be downloaded as one ZIP"), "{html}");
+    assert!(!html.contains("excel.zip") && !html.contains("being worked out"));
+}
+
+/// Reads the memory of the app in `/proc`.
+#[cfg(target_os = "linux")]
 #[test]
 fn downloads_at_the_same_time_are_equal_and_take_little_memory() {
     const FILE: u64 = 100 << 20;

@@ -6,13 +6,9 @@ use mocban::workbook::test_helpers::{text_rows, workbook};
 use serde_json::{Value, json};
 
 use crate::app::{act, text, with_project};
+use crate::app_uploads::encode;
 use crate::cli::mocban;
 use crate::page::{Page, Reply};
-
-fn encode(text: &str) -> String {
-    let bytes = text.bytes().map(|byte| format!("%{byte:02X}"));
-    bytes.collect()
-}
 
 /// Copies inputs of the shared project to other names.
 fn copy_inputs(dir: &Path, files: &[(&str, &str)]) {
@@ -136,6 +132,7 @@ fn folders_without_a_pair_can_be_mended_too() {
         wrong.contains("there is no such mesh without a print"),
         "{wrong}"
     );
+    assert!(wrong.contains("&amp;split=0"), "a way back: {wrong}");
     let unknown = page.get("/import?matches=x&language=vi");
     assert_eq!(unknown.status, 422);
     assert!(text(&unknown).contains("địa chỉ này không phải do trang tạo ra"));
@@ -163,6 +160,11 @@ fn an_import_is_refused_if_the_files_changed_after_they_were_shown() {
         text(&refused).contains("hãy tải lại trang"),
         "{}",
         text(&refused)
+    );
+    let translated = folders(&page, dir, "");
+    assert!(
+        translated.contains("Bỏ qua, bản in không có bản quét: "),
+        "{translated}"
     );
     page.get("/?language=en");
     let now = fields(&folders(&page, dir, ""));
@@ -224,7 +226,10 @@ fn a_person_names_the_columns_of_a_list() {
         let pairs = mocban(&dir.join(project), &["status", "--json"]).expect(0);
         assert_eq!(pairs.json()["pairs"], 1);
         let wrong = page_of("&id_column=Number&mesh_column=Model&print_column=Image");
-        assert!(wrong.contains("Choose them:"), "{wrong}");
+        assert!(wrong.contains("there is no column"), "{wrong}");
+        assert!(!wrong.contains("Choose them:"), "said once: {wrong}");
+        let twice = page_of("&id_column=Nr&mesh_column=Nr");
+        assert!(twice.contains("is chosen for two columns"), "{twice}");
     }
 }
 
@@ -252,4 +257,6 @@ fn all_pairs_can_be_looked_at_before_the_import() {
         "{last}"
     );
     assert!(last.contains("<b>44</b> pairs"), "{last}");
+    let past = folders(&page, dir, "&from=60");
+    assert!(past.contains(&row(44)), "the last page: {past}");
 }

@@ -1,7 +1,7 @@
 //! Waits for other processes.
 
 use std::process::Child;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Pauses between two looks at what another process brings about. Without a pause, a test that waits takes a core from
 /// the processes that it waits for.
@@ -16,6 +16,16 @@ pub(crate) fn pause() {
 pub(crate) fn until(child: &mut Child, condition: impl Fn() -> bool) {
     while !condition() {
         assert_eq!(child.try_wait().expect("a child"), None, "it ended");
+        pause();
+    }
+}
+
+/// Waits until something is so.
+#[track_caller]
+pub(crate) fn wait_until(what: &str, is_so: impl Fn() -> bool) {
+    let deadline = Instant::now() + Duration::from_mins(1);
+    while !is_so() {
+        assert!(Instant::now() < deadline, "never: {what}");
         pause();
     }
 }

@@ -280,7 +280,8 @@ impl ExportRun {
             let mut files = BTreeSet::new();
             let mut unreadable = Vec::new();
             if format == ExportFormat::Jsonl {
-                files.extend(write_logs(catalog, &root).await?.map(str::to_owned));
+                let logs = write_logs(catalog, &root, options.pairs.as_ref()).await?;
+                files.extend(logs.into_iter().map(str::to_owned));
                 let (is_written, lost) = write_blocks(catalog, project, &root, only).await?;
                 files.extend(is_written.then(|| BLOCKS_FILE[0].to_owned()));
                 unreadable = lost;

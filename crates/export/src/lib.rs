@@ -8,14 +8,14 @@
 //! - `block_lines.rs`, `block_grid.rs` and `page_labels.rs` write whole blocks, their maps and their boxes
 //! - `pictures` and `contact_sheet.rs` draw overlays and sheets; `block_view` draws any part of a page, of its relief, or of
 //!   both
-//! - `zip_folder.rs` writes an export as one ZIP archive
+//! - `zip_folder.rs` writes an export as one ZIP archive, in the order of `zip_listing.rs`
 //! - `scan_view` encodes a scan in the frame of its print for the viewer, on pages of a server and in files
 //!
 //! Every call fails if the catalog, an input or an artifact cannot be read, or the output cannot be written. `# Errors` names
 //! other reasons, and what an error leaves behind.
 //!
-//! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs (except for labels of whole pages), and an earlier export is
-//! replaced as a whole or not at all.
+//! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs (except for labels of whole pages, and names of files for
+//! a ZIP archive), and an earlier export is replaced as a whole or not at all.
 
 mod alignment_files;
 mod annotations;
@@ -52,6 +52,7 @@ mod split;
 mod stage_outcomes;
 mod table_columns;
 mod zip_folder;
+mod zip_listing;
 
 pub use alignment_files::{ALIGNMENT_FILES, alignment_files};
 pub use contact_sheet::{

@@ -41,7 +41,7 @@ pub struct PairCounts {
     pub done: u64,
     /// Pairs without a result.
     pub without_result: u64,
-    /// Pairs that were left out because no result of theirs was selected.
+    /// Pairs that were left out because they were not chosen, or no result of theirs was selected.
     pub left_out: u64,
     /// Stored rows of any kind that are damaged, so that nothing of them is exported.
     #[serde(skip_serializing_if = "is_zero")]

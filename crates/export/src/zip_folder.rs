@@ -1,16 +1,16 @@
-//! An export as one ZIP archive, which is written as a stream. Lists of files are on disk, so memory does not grow.
+//! An export as one ZIP archive, which is written as a stream. Lists of files are on disk; only the names of one folder on
+//! each level are in memory.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Read, Seek as _, SeekFrom, Write};
+use std::io::{self, BufReader, BufWriter, Read as _, Seek as _, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use super::manifest::MANIFEST;
-use mocban_core::zip_records::{ArchiveLayout, Crc, MAX_NAME, StoredFile};
+use super::zip_listing::list_files;
+use mocban_core::zip_records::{ArchiveLayout, Crc, StoredFile};
 use mocban_system::platform::{FileId, stat};
 
-/// How deep the folders of an export are at most.
-const MAX_DEPTH: usize = 16;
 /// Files up to this length are read once; longer ones twice, first for their checksum, which stands before them.
 const READ_ONCE: u64 = 1 << 20;
 /// Bytes that are read at a time.
@@ -36,9 +36,12 @@ pub enum FolderZipError {
         /// Why.
         source: io::Error,
     },
-    /// The archive cannot be sent.
+    /// The folders are nested too deeply.
+    #[error("the folders in {0} are nested too deeply; remove it or export again")]
+    TooDeep(PathBuf),
+    /// The archive cannot be written to its destination.
     #[error("the archive cannot be written: {0}")]
-    Sent(io::Error),
+    Output(io::Error),
 }
 
 /// Which export a folder holds.
@@ -118,26 +121,36 @@ impl FolderZip {
             let crc = self.write_file(&name, size, &mut buffer, out)?;
             let name = name.as_str();
             let entry = layout.add(&StoredFile { name, size, crc });
-            directory.write_all(&entry).map_err(FolderZipError::Sent)?;
+            directory.write_all(&entry).map_err(temporary_error)?;
         }
         if ExportVersion::of(&self.dir) != Some(self.version) {
             return Err(FolderZipError::Changed(self.dir));
         }
-        io::copy(&mut reread(directory)?, out).map_err(FolderZipError::Sent)?;
-        out.write_all(&layout.end()).map_err(FolderZipError::Sent)?;
-        out.flush().map_err(FolderZipError::Sent)
+        let mut directory = reread(directory)?;
+        buffer.resize(BUFFER, 0);
+        loop {
+            let read = directory.read(&mut buffer).map_err(temporary_error)?;
+            if read == 0 {
+                break;
+            }
+            let part = &buffer[..read];
+            out.write_all(part).map_err(FolderZipError::Output)?;
+        }
+        out.write_all(&layout.end())
+            .map_err(FolderZipError::Output)?;
+        out.flush().map_err(FolderZipError::Output)
     }
 
     /// Reads the next file of the list.
     fn next_file(&mut self) -> Result<(String, u64), FolderZipError> {
         let (mut length, mut size) = ([0; 4], [0; 8]);
-        self.list.read_exact(&mut length).map_err(unlisted)?;
-        self.list.read_exact(&mut size).map_err(unlisted)?;
+        self.list.read_exact(&mut length).map_err(temporary_error)?;
+        self.list.read_exact(&mut size).map_err(temporary_error)?;
         let size = u64::from_le_bytes(size);
         let mut name = vec![0; u32::from_le_bytes(length) as usize];
-        self.list.read_exact(&mut name).map_err(unlisted)?;
+        self.list.read_exact(&mut name).map_err(temporary_error)?;
         let name = String::from_utf8(name);
-        let name = name.map_err(|error| unlisted(io::Error::other(error)))?;
+        let name = name.map_err(|error| temporary_error(io::Error::other(error)))?;
         Ok((name, size))
     }
 
@@ -165,8 +178,8 @@ impl FolderZip {
             crc.update(buffer);
             let crc = crc.sum();
             let record = StoredFile { name, size, crc }.record();
-            out.write_all(&record).map_err(FolderZipError::Sent)?;
-            out.write_all(buffer).map_err(FolderZipError::Sent)?;
+            out.write_all(&record).map_err(FolderZipError::Output)?;
+            out.write_all(buffer).map_err(FolderZipError::Output)?;
             return Ok(crc);
         }
         buffer.resize(BUFFER, 0);
@@ -181,7 +194,7 @@ impl FolderZip {
                 }
                 crc.update(&buffer[..read]);
                 out.write_all(&buffer[..read])
-                    .map_err(FolderZipError::Sent)?;
+                    .map_err(FolderZipError::Output)?;
             }
         };
         if pass(&mut crc, &mut io::sink())? != size {
@@ -189,7 +202,7 @@ impl FolderZip {
         }
         let crc = crc.sum();
         let record = StoredFile { name, size, crc }.record();
-        out.write_all(&record).map_err(FolderZipError::Sent)?;
+        out.write_all(&record).map_err(FolderZipError::Output)?;
         let mut again = Crc::new();
         let total = pass(&mut again, out)?;
         if total != size || again.sum() != crc {
@@ -199,82 +212,25 @@ impl FolderZip {
     }
 }
 
-/// Lists the files below a folder, without hidden ones and links.
-fn list_files(
-    dir: &Path,
-    folder: &str,
-    layout: &mut ArchiveLayout,
-    list: &mut dyn Write,
-) -> Result<(), FolderZipError> {
-    if !dir.join(MANIFEST).is_file() {
-        return Err(FolderZipError::NoExport(dir.to_owned()));
-    }
-    let mut walk = FolderWalk { layout, list };
-    walk.add_folder(dir, folder, MAX_DEPTH)?;
-    list.flush().map_err(unlisted)
-}
-
-/// Collects files.
-struct FolderWalk<'l> {
-    layout: &'l mut ArchiveLayout,
-    list: &'l mut dyn Write,
-}
-
-impl FolderWalk<'_> {
-    fn add_folder(&mut self, dir: &Path, name: &str, depth: usize) -> Result<(), FolderZipError> {
-        for entry in fs::read_dir(dir).map_err(|source| file_error(dir, source))? {
-            let entry = entry.map_err(|source| file_error(dir, source))?;
-            let path = entry.path();
-            let meta = entry
-                .metadata()
-                .map_err(|source| file_error(&path, source))?;
-            let own = entry.file_name();
-            let own = own
-                .to_str()
-                .ok_or_else(|| FolderZipError::Name(path.clone()))?;
-            if own.starts_with('.') {
-                continue;
-            }
-            let name = format!("{name}/{own}");
-            if name.len() > MAX_NAME {
-                return Err(FolderZipError::Name(path));
-            }
-            if meta.is_dir() && depth > 1 {
-                self.add_folder(&path, &name, depth - 1)?;
-            } else if meta.is_file() {
-                self.add_file(&name, meta.len())?;
-            }
-        }
-        Ok(())
-    }
-
-    fn add_file(&mut self, name: &str, size: u64) -> Result<(), FolderZipError> {
-        self.layout.add(&StoredFile { name, size, crc: 0 });
-        let length = (name.len() as u32).to_le_bytes();
-        let parts = [&length[..], &size.to_le_bytes(), name.as_bytes()];
-        self.list.write_all(&parts.concat()).map_err(unlisted)
-    }
-}
-
 /// Opens a file without a name, so that nothing stays if the process is killed.
 fn temporary_file() -> Result<File, FolderZipError> {
-    tempfile::tempfile().map_err(unlisted)
+    tempfile::tempfile().map_err(temporary_error)
 }
 
 /// Returns a file that was written, from its start.
 fn reread(written: BufWriter<File>) -> Result<BufReader<File>, FolderZipError> {
     let file = written.into_inner();
-    let mut file = file.map_err(|error| unlisted(error.into_error()))?;
-    file.seek(SeekFrom::Start(0)).map_err(unlisted)?;
+    let mut file = file.map_err(|error| temporary_error(error.into_error()))?;
+    file.seek(SeekFrom::Start(0)).map_err(temporary_error)?;
     Ok(BufReader::new(file))
 }
 
 /// Explains an error of a temporary file.
-fn unlisted(source: io::Error) -> FolderZipError {
+pub(super) fn temporary_error(source: io::Error) -> FolderZipError {
     file_error(&std::env::temp_dir(), source)
 }
 
-fn file_error(path: &Path, source: io::Error) -> FolderZipError {
+pub(super) fn file_error(path: &Path, source: io::Error) -> FolderZipError {
     FolderZipError::File {
         path: path.to_owned(),
         source,
@@ -325,6 +281,12 @@ mod tests {
         };
         assert_eq!(has("p-web/pairs/chữ số 1/overlay.png"), 2);
         assert_eq!(has(".hidden"), 0);
+        let place = |name: &str| {
+            let mut parts = bytes.windows(name.len());
+            parts.position(|part| part == name.as_bytes())
+        };
+        let places = [MANIFEST, "large.bin", "pairs/"].map(place);
+        assert!(places.is_sorted() && places[0].is_some(), "{places:?}");
     }
 
     #[test]
@@ -352,6 +314,15 @@ mod tests {
                 "{index}"
             );
         }
+    }
+
+    #[test]
+    fn folders_that_are_nested_too_deeply_are_refused() {
+        let dir = export();
+        let deep = dir.path().join("a/".repeat(17));
+        fs::create_dir_all(&deep).expect("folders");
+        let found = zip_size(dir.path(), "p-web");
+        assert!(matches!(found, Err(FolderZipError::TooDeep(_))));
     }
 
     #[test]

@@ -11,10 +11,12 @@ use unicode_normalization::UnicodeNormalization as _;
 const MAX_NAME_BYTES: usize = 200;
 /// Longest path, in bytes.
 const MAX_PATH_BYTES: usize = 1000;
+/// Most names in a path.
+const MAX_PARTS: usize = 20;
 /// Characters that a name on Windows may not have.
 const FORBIDDEN: &str = "\\:\"*<>?|";
 /// Folders that hold no scans and prints of their own.
-const SYSTEM_FOLDERS: [&str; 2] = ["__MACOSX", "@eaDir"];
+pub const SYSTEM_FOLDERS: [&str; 2] = ["__MACOSX", "@eaDir"];
 /// Longest path in a message, in characters.
 const MAX_SHOWN: usize = 120;
 
@@ -27,6 +29,9 @@ pub enum PathFault {
     /// A name or the path is too long.
     #[error("its name is too long")]
     TooLong,
+    /// The path has too many folders.
+    #[error("it is in more than {} folders", MAX_PARTS - 1)]
+    TooDeep,
     /// A name has a character that another system does not allow.
     #[error("its name has {0:?}")]
     Character(char),
@@ -39,7 +44,10 @@ pub enum PathFault {
     /// There is such a file already.
     #[error("this file is there twice")]
     Twice,
-    /// Another name differs only in case, or is that of a folder.
+    /// A file and a folder have the same name.
+    #[error("{} is both a file and a folder", sanitize(.0, MAX_SHOWN))]
+    Folder(String),
+    /// Another name differs only in case.
     #[error("its name differs from {} only in upper and lower case", sanitize(.0, MAX_SHOWN))]
     Similar(String),
 }
@@ -67,6 +75,9 @@ impl RelativePath {
             return Err(PathFault::TooLong);
         }
         text.split('/').try_for_each(check_name)?;
+        if text.split('/').count() > MAX_PARTS {
+            return Err(PathFault::TooDeep);
+        }
         Ok(Self(text))
     }
 
@@ -93,15 +104,28 @@ impl RelativePath {
 
     /// Returns whether this is a hidden file, or one that a system keeps for itself.
     pub fn is_of_system(&self) -> bool {
-        let mut names = self.0.split('/');
-        names.any(|name| name.starts_with('.') || SYSTEM_FOLDERS.contains(&name))
+        is_of_system(&self.0)
     }
 
     /// Returns the extension in lower case.
     pub fn extension(&self) -> Option<String> {
-        let extension = Path::new(&self.0).extension()?.to_str()?;
-        Some(extension.to_ascii_lowercase())
+        extension_of(&self.0)
     }
+}
+
+/// Returns whether a path with slashes, which may be refused, is hidden or that of a file that a system keeps for itself.
+pub fn is_of_system(path: &str) -> bool {
+    // Such as `..` and `..\a`, which are not hidden but lead elsewhere.
+    let is_unsafe = |name: &str| matches!(name, "." | "..") || name.contains('\\');
+    let is_hidden = |name: &str| name.starts_with('.') && !is_unsafe(name);
+    let mut names = path.split('/');
+    names.any(|name| is_hidden(name) || SYSTEM_FOLDERS.contains(&name))
+}
+
+/// Returns the extension of a path in lower case. The path may be one that is refused.
+pub fn extension_of(path: &str) -> Option<String> {
+    let extension = Path::new(path).extension()?.to_str()?;
+    Some(extension.to_ascii_lowercase())
 }
 
 fn check_name(name: &str) -> Result<(), PathFault> {
@@ -132,7 +156,7 @@ impl TakenPaths {
     /// Adds the path of a file, and its folders.
     ///
     /// # Errors
-    /// Returns an error if the file is there, or a file or folder whose name differs only in case.
+    /// Returns an error if the file is there, a folder has its name, or a name differs only in case.
     pub fn insert(&mut self, path: &RelativePath) -> Result<(), PathFault> {
         let text = path.as_str();
         let ends = text.match_indices('/').map(|(end, _)| end);
@@ -140,11 +164,12 @@ impl TakenPaths {
             let (part, is_file) = (&text[..end], end == text.len());
             let folded = fold_case(part);
             match self.0.get(&folded) {
-                Some(taken) if is_file && taken.is_file && taken.path == part => {
-                    return Err(PathFault::Twice);
-                }
-                Some(taken) if is_file || taken.is_file || taken.path != part => {
+                Some(taken) if taken.path != part => {
                     return Err(PathFault::Similar(taken.path.clone()));
+                }
+                Some(taken) if is_file && taken.is_file => return Err(PathFault::Twice),
+                Some(taken) if is_file || taken.is_file => {
+                    return Err(PathFault::Folder(taken.path.clone()));
                 }
                 Some(_) => {}
                 None => {
@@ -154,6 +179,11 @@ impl TakenPaths {
             }
         }
         Ok(())
+    }
+
+    /// Returns the number of files and folders.
+    pub fn count(&self) -> usize {
+        self.0.len()
     }
 }
 
@@ -195,6 +225,9 @@ mod tests {
         ] {
             assert_eq!(RelativePath::new(&long), Err(PathFault::TooLong));
         }
+        RelativePath::new(&("a/".repeat(19) + "1.stl")).expect("not too deep");
+        let deep = RelativePath::new(&("a/".repeat(20) + "1.stl"));
+        assert_eq!(deep, Err(PathFault::TooDeep));
     }
 
     #[test]
@@ -215,6 +248,10 @@ mod tests {
             let path = RelativePath::new(path).expect("a path");
             assert_eq!(path.is_of_system(), is_of_system, "{path:?}");
         }
+        assert!(super::is_of_system("__MACOSX/._Icon\r"), "a refused name");
+        for path in ["../1.stl", "a/../1.stl", "..\\1.stl"] {
+            assert!(!super::is_of_system(path), "{path:?} leads elsewhere");
+        }
     }
 
     #[test]
@@ -224,13 +261,12 @@ mod tests {
         insert("Ván/1.stl").expect("new");
         insert("Ván/2.stl").expect("new");
         assert_eq!(insert("Ván/1.stl"), Err(PathFault::Twice));
-        for (path, other) in [
-            ("Ván/1.STL", "Ván/1.stl"),
-            ("ván/3.stl", "Ván"),
-            ("Ván", "Ván"),
-            ("Ván/1.stl/x.stl", "Ván/1.stl"),
-        ] {
+        for (path, other) in [("Ván/1.STL", "Ván/1.stl"), ("ván/3.stl", "Ván")] {
             assert_eq!(insert(path), Err(PathFault::Similar(other.to_owned())));
         }
+        for (path, other) in [("Ván", "Ván"), ("Ván/1.stl/x.stl", "Ván/1.stl")] {
+            assert_eq!(insert(path), Err(PathFault::Folder(other.to_owned())));
+        }
+        assert_eq!(taken.count(), 3, "a folder and two files");
     }
 }

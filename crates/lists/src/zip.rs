@@ -2,19 +2,18 @@
 //! below 4 GiB are read.
 
 use std::borrow::Cow;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
 
 use flate2::read::DeflateDecoder;
 
 use mocban_core::zip_records::{Crc, END, END_BYTES, ENTRY, ENTRY_BYTES, FILE, FILE_BYTES};
 
-/// Signature of the place of a larger directory, and the length of this record in bytes.
-const LARGE_END: &[u8] = b"PK\x06\x07";
-const LARGE_END_BYTES: usize = 20;
 /// Longest comment at the end of an archive, in bytes.
 const MAX_COMMENT: u64 = u16::MAX as u64;
 /// Longest name of a file, in bytes. No system has longer paths.
 const MAX_NAME_BYTES: usize = 4096;
+/// Most bytes of all names.
+const MAX_NAMES_BYTES: usize = 32 << 20;
 /// Bytes that are unpacked at once.
 const PIECE_BYTES: usize = 64 << 10;
 /// Systems whose archives have the kind of a file in its attributes: Unix and macOS.
@@ -32,6 +31,9 @@ pub enum ZipError {
     /// There are more files than allowed.
     #[error("it has too many files")]
     TooManyFiles,
+    /// The names of all files are longer than allowed.
+    #[error("the names of its files are too long")]
+    LongNames,
     /// The directory ends early or names no file.
     #[error("its directory is incomplete")]
     Directory,
@@ -56,9 +58,12 @@ pub enum ZipError {
     /// The packed bytes are damaged.
     #[error("{0} cannot be unpacked")]
     Damaged(String),
-    /// The archive cannot be read, or the unpacked bytes cannot be written.
+    /// The archive cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
+    /// The unpacked bytes cannot be written.
+    #[error("the unpacked bytes cannot be written: {0}")]
+    Write(io::Error),
 }
 
 /// An archive and its directory.
@@ -138,20 +143,26 @@ impl<R: Read + Seek + Clone> ZipArchive<R> {
             .read_to_end(&mut tail)?;
         let end_at = tail.windows(END.len()).rposition(|bytes| bytes == END);
         let end_at = end_at.ok_or(ZipError::NoEnd)?;
-        let (before, end) = tail.split_at(end_at);
-        let end = end.get(..END_BYTES).ok_or(ZipError::Truncated)?;
-        let large_at = before.len().checked_sub(LARGE_END_BYTES);
-        if large_at.is_some_and(|at| before[at..].starts_with(LARGE_END)) {
+        let end = tail.get(end_at..end_at + END_BYTES);
+        let end = end.ok_or(ZipError::Truncated)?;
+        let count = number16(end, 10);
+        if count == u16::MAX {
             return Err(ZipError::Large);
         }
-        let count = usize::from(number16(end, 10));
-        if count > max_files {
+        if usize::from(count) > max_files {
             return Err(ZipError::TooManyFiles);
         }
         reader.seek(SeekFrom::Start(offset(end, 16)?))?;
         let mut directory = BufReader::new(reader.clone());
-        let files = (0..count).map(|_| entry(&mut directory));
-        let files = files.collect::<Result<Vec<_>, _>>()?;
+        let (mut files, mut names) = (Vec::new(), 0);
+        for _ in 0..count {
+            let file = entry(&mut directory)?;
+            names += file.name.len();
+            if names > MAX_NAMES_BYTES {
+                return Err(ZipError::LongNames);
+            }
+            files.push(file);
+        }
         Ok(Self { reader, len, files })
     }
 
@@ -198,7 +209,12 @@ impl<R: Read + Seek + Clone> ZipArchive<R> {
         let (mut checksum, mut piece, mut size) = (Crc::new(), vec![0; PIECE_BYTES], 0);
         loop {
             let read = content.read(&mut piece);
-            let read = read.map_err(|_damaged| ZipError::Damaged(name()))?;
+            let read = read.map_err(|error| match error.kind() {
+                ErrorKind::InvalidInput | ErrorKind::InvalidData | ErrorKind::UnexpectedEof => {
+                    ZipError::Damaged(name())
+                }
+                _ => ZipError::Io(error),
+            })?;
             if read == 0 {
                 break;
             }
@@ -207,7 +223,7 @@ impl<R: Read + Seek + Clone> ZipArchive<R> {
                 return Err(ZipError::TooLarge(name()));
             }
             checksum.update(&piece[..read]);
-            write(&piece[..read])?;
+            write(&piece[..read]).map_err(ZipError::Write)?;
         }
         if checksum.sum() == file.checksum {
             Ok(())
@@ -337,6 +353,15 @@ mod tests {
         }
         let many = archive(&[("a", ""); 11], false);
         assert_eq!(says(&many), "it has too many files");
+        let end = bytes.windows(4).rposition(|four| four == b"PK\x05\x06");
+        let end = end.expect("an end");
+        // The place of a larger directory, which is not needed.
+        let locator = [&b"PK\x06\x07"[..], &[0; 16]].concat();
+        let with_locator = [&bytes[..end], &locator, &bytes[end..]].concat();
+        assert_eq!(says(&with_locator), "unpacked");
+        let mut large = bytes;
+        large[end + 10..end + 12].copy_from_slice(&[0xff; 2]);
+        assert_eq!(says(&large), "it is an archive of more than 4 GiB");
     }
 
     #[test]

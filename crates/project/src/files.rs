@@ -9,6 +9,7 @@ use super::input_paths::in_existing_form;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use mocban_core::domain::{ErrorCode, FileKind, pointer_of, sanitize};
 use mocban_export::EXPORT_MANIFEST;
+use mocban_lists::relative_path::SYSTEM_FOLDERS;
 use mocban_lists::workbook::{is_workbook, read_sheet};
 use mocban_store::{
     CATALOG_FILE, Project, create_folders, open_regular, read_file_or_pipe, write_atomic,
@@ -203,9 +204,6 @@ pub fn or_elsewhere(written: ProjectResult<()>, named: Option<&Path>) -> Project
     }
 }
 
-/// Folders that hold no scans and prints of their own.
-const SKIPPED_FOLDERS: [&str; 2] = ["__MACOSX", "@eaDir"];
-
 /// Lists the files of a directory and of the folders in it. Leaves out hidden folders, links to folders, exports, and
 /// the folder of results of a project.
 pub fn list_below(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
@@ -226,7 +224,7 @@ pub fn list_below(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
             let entry = entry.map_err(refuse)?;
             let (path, name) = (entry.path(), entry.file_name());
             let is_skipped = name.as_encoded_bytes().starts_with(b".")
-                || SKIPPED_FOLDERS.iter().any(|skipped| name == *skipped)
+                || SYSTEM_FOLDERS.iter().any(|skipped| name == *skipped)
                 || is_project && path == results;
             // The listing has the type already; only a link must be followed.
             match entry.file_type() {

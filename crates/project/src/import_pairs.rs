@@ -14,7 +14,7 @@ use crate::location::{Location, now};
 use crate::manifest_file::{Listing, list_content};
 use crate::missing_files::MissingFiles;
 use crate::new_project::import_with;
-use crate::pair_choices::{PairChoices, RowsHash};
+use crate::pair_choices::PairChoices;
 use crate::row_spool::RowSpool;
 use crate::truth_file::{self, TruthRow};
 use mocban_catalog::{Catalog, ImportRow, ImportSummary, ImportTerms};
@@ -177,10 +177,9 @@ fn spool(
     let mut spool = RowSpool::new().with_context(failed)?;
     let mut missing = MissingFiles::default();
     let mut outcome = Ok(());
-    let (mut hash, mut count) = (RowsHash::new(), 0_u64);
-    listing.rows(project, |row, lines| {
+    let mut count = 0_u64;
+    let hash = listing.rows(project, |row, lines| {
         poll();
-        hash.add(&row, lines.len(), listing.has_unit());
         count += 1;
         failpoint::hit("import", Point::Computed, Some(&row.name));
         for line in lines {
@@ -192,7 +191,7 @@ fn spool(
         }
     });
     outcome?;
-    let is_other = |shown| shown != hash.value();
+    let is_other = |shown| shown != hash;
     if choices.shown.is_some_and(is_other) {
         return Err(Refusal::Usage(CHANGED.to_owned()).into());
     }

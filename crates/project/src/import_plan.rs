@@ -7,7 +7,7 @@ use crate::error::ProjectResult;
 use crate::import_pairs::{PairSource, listing};
 use crate::location::Location;
 use crate::missing_files::MissingFiles;
-use crate::pair_choices::{PairChoices, RowsHash};
+use crate::pair_choices::PairChoices;
 use mocban_core::domain::{ContentHash, PairName};
 use mocban_store::Project;
 
@@ -63,10 +63,9 @@ pub fn plan_import(
     let (storage, _) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
     let listing = listing(source, choices)?;
-    let (mut pairs, mut hash) = (0, RowsHash::new());
-    let (mut planned, mut missing) = (Vec::new(), MissingFiles::default());
-    listing.rows(&project, |row, lines| {
-        hash.add(&row, lines.len(), listing.has_unit());
+    let (mut pairs, mut planned) = (0, Vec::new());
+    let mut missing = MissingFiles::default();
+    let hash = listing.rows(&project, |row, lines| {
         for line in &lines {
             missing.add(line.clone());
         }
@@ -84,7 +83,7 @@ pub fn plan_import(
     });
     Ok(ImportPlan {
         pairs,
-        hash: hash.value(),
+        hash,
         shown: planned,
         missing,
         alone: listing.alone,

@@ -10,13 +10,23 @@ use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form, is_window
 use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
-use crate::pair_choices::PairChoices;
-use mocban_core::domain::{FileKind, LengthUnit, PairName, first_names, sanitize};
+use crate::pair_choices::{PairChoices, RowsHash};
+use mocban_core::domain::{ContentHash, FileKind, LengthUnit, PairName, first_names, sanitize};
 use mocban_lists::manifest::{
     ChosenColumns, ListedFolder, ManifestError, ManifestRow, MisspeltColumns, PairingChanges,
-    ReadRows, RowIds, pair_folders_with, read_csv_as, read_jsonl,
+    ReadRows, RowIds, pair_folders, read_csv_as, read_jsonl,
 };
 use mocban_store::Project;
+
+/// Beginnings of the warnings about meshes alone, prints alone, and other files.
+pub const IGNORED: [&str; 3] = [
+    "ignored, mesh without print",
+    "ignored, print without mesh",
+    "ignored, neither mesh nor print",
+];
+
+/// Beginning of the sentence about columns that were read under other names.
+pub const RENAMED: &str = "columns with other names were read";
 
 /// Valid pairs to import. A manifest file is kept as text, and its rows are parsed again when they are needed.
 #[derive(Debug)]
@@ -66,12 +76,8 @@ pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
 }
 
 impl Listing {
-    /// Reads a CSV or JSON Lines file. If its extension is unknown, the first character decides the format.
-    pub fn from_file(file: &Path) -> ProjectResult<Self> {
-        Self::from_bytes(file, list_content(file)?, &PairChoices::default())
-    }
-
-    /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`], as a person has chosen.
+    /// Parses the content of a CSV or JSON Lines file as a person has chosen. If its extension is unknown, the first
+    /// character decides the format.
     ///
     /// # Errors
     /// Returns an error if the content is no list, the names of its files say that none of its pairs can be read, or there is
@@ -145,8 +151,7 @@ impl Listing {
             let lines = [&[problems.to_string()][..], &unread.sentences].concat();
             refuse(meshes, &lines.join("\n"))
         };
-        let found =
-            pair_folders_with(&mesh_folder, &print_folder, changes).map_err(&refuse_both)?;
+        let found = pair_folders(&mesh_folder, &print_folder, changes).map_err(&refuse_both)?;
         let no_pair = found.no_pair.map(refuse_both);
         let mut others = found.ignored;
         others.retain(|path| !unread.paths.contains(path));
@@ -155,9 +160,9 @@ impl Listing {
             row.unit = unit;
         }
         let warnings = [
-            ignored_files("mesh without print", &found.meshes_alone),
-            ignored_files("print without mesh", &found.prints_alone),
-            ignored_files("neither mesh nor print", &others),
+            ignored_files(IGNORED[0], &found.meshes_alone),
+            ignored_files(IGNORED[1], &found.prints_alone),
+            ignored_files(IGNORED[2], &others),
         ];
         let warnings = warnings.into_iter().flatten().chain(unread.sentences);
         let alone = [
@@ -175,14 +180,13 @@ impl Listing {
         })
     }
 
-    /// Returns whether the unit of the scans is in the list, and not chosen with the import.
-    pub(crate) const fn has_unit(&self) -> bool {
-        matches!(self.source, ListingSource::List { .. })
-    }
-
     /// Calls `each` for every row, with a message for each missing file. Paths start with the manifest's directory.
-    /// Paths below a named root of `project` stay as they are.
-    pub fn rows(&self, project: &Project, mut each: impl FnMut(ManifestRow, Vec<String>)) {
+    /// Paths below a named root of `project` stay as they are. Returns a hash of all rows as they are listed.
+    pub fn rows(
+        &self,
+        project: &Project,
+        mut each: impl FnMut(ManifestRow, Vec<String>),
+    ) -> ContentHash {
         let is_below_root = |path: &Path| {
             path.to_str()
                 .is_some_and(|path| project.is_below_root(path))
@@ -199,7 +203,15 @@ impl Listing {
             each(row, missing);
         };
         match &self.source {
-            ListingSource::Folders(rows) => rows.iter().cloned().for_each(each),
+            ListingSource::Folders(rows) => {
+                let mut hash = RowsHash::new(Path::new(""));
+                for row in rows {
+                    // Their unit is chosen with the import.
+                    hash.add(row, false);
+                    each(row.clone());
+                }
+                hash.value()
+            }
             ListingSource::List {
                 bytes,
                 parse,
@@ -207,10 +219,12 @@ impl Listing {
                 left_out,
                 folder,
             } => {
+                let mut hash = RowsHash::new(folder);
                 let parsed = parse(bytes, columns, &mut |mut row| {
                     if left_out.contains(row.name.as_str()) {
                         return;
                     }
+                    hash.add(&row, true);
                     for path in [&mut row.mesh, &mut row.print] {
                         if !is_below_root(path) {
                             *path = folder.join(&*path);
@@ -219,6 +233,7 @@ impl Listing {
                     each(row);
                 });
                 parsed.expect("the same bytes were parsed before");
+                hash.value()
             }
         }
     }
@@ -249,8 +264,7 @@ fn renamed(read: &ReadRows) -> Option<String> {
     let columns =
         columns.map(|(written, name)| format!("{:?} as {name}", sanitize(written, MAX_NAME_CHARS)));
     let columns: Vec<String> = columns.collect();
-    (!columns.is_empty())
-        .then(|| format!("columns with other names were read: {}", columns.join(", ")))
+    (!columns.is_empty()).then(|| format!("{RENAMED}: {}", columns.join(", ")))
 }
 
 /// Longest name of a column in a message, in characters.
@@ -309,17 +323,23 @@ fn has_scheme(path: &Path, scheme: &str) -> bool {
     path.to_string_lossy().contains(scheme)
 }
 
-/// Returns `ignored, mesh without print: a.stl, b.stl and 3 more`.
+/// Returns a reason with the first paths: `ignored, mesh without print: a.stl, b.stl and 3 more`.
 fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {
     const MAX_NAMES: usize = 5;
     let names = paths.iter().map(|path| path.display().to_string());
     let names = first_names(&names.collect::<Vec<_>>(), MAX_NAMES);
-    (!paths.is_empty()).then(|| format!("ignored, {reason}: {names}"))
+    (!paths.is_empty()).then(|| format!("{reason}: {names}"))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Listing, Project};
+    use std::path::Path;
+
+    use super::{Listing, PairChoices, Project, ProjectResult, list_content};
+
+    fn from_file(file: &Path) -> ProjectResult<Listing> {
+        Listing::from_bytes(file, list_content(file)?, &PairChoices::default())
+    }
 
     #[test]
     fn a_long_path_is_cut_in_messages() {
@@ -327,7 +347,7 @@ mod tests {
         let file = dir.path().join("pairs.csv");
         let path = "d/".repeat(2000);
         std::fs::write(&file, format!("id,mesh,print\na,{path}a,{path}b\n")).expect("written");
-        let listing = Listing::from_file(&file).expect("valid");
+        let listing = from_file(&file).expect("valid");
         let mut missing = Vec::new();
         listing.rows(&Project::at(dir.path()), |_, lines| missing.extend(lines));
         assert_eq!(missing.len(), 2);
@@ -341,7 +361,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let file = dir.path().join("pairs.csv");
         std::fs::write(&file, "id,mesh,print\na,a.stl,pairs.csv\n").expect("a small file");
-        let listing = Listing::from_file(&file).expect("valid");
+        let listing = from_file(&file).expect("valid");
         let (mut meshes, mut missing) = (Vec::new(), Vec::new());
         listing.rows(&Project::at(dir.path()), |row, lines| {
             meshes.push(row.mesh);
@@ -363,7 +383,7 @@ mod tests {
         let list = "id,mesh,print\na,d.stl,https://museum.vn/1.png\nb,file:///d/1.stl,pairs.csv\n";
         std::fs::write(&file, list).expect("written");
         let mut odd = Vec::new();
-        let listing = Listing::from_file(&file).expect("valid");
+        let listing = from_file(&file).expect("valid");
         listing.rows(&Project::at(dir.path()), |_, lines| odd.extend(lines));
         for (line, end) in odd.iter().zip([
             "d.stl of a is a folder, not a file",
@@ -373,7 +393,7 @@ mod tests {
             assert!(line.ends_with(end), "{line}");
         }
         assert_eq!(odd.len(), 3, "{odd:?}");
-        let refused = Listing::from_file(dir.path()).expect_err("a directory");
+        let refused = from_file(dir.path()).expect_err("a directory");
         assert!(refused.to_string().contains("--meshes"), "{refused}");
     }
 }

@@ -1,5 +1,7 @@
 //! What a person chose on the page that shows the pairs of an import before they are stored.
 
+use std::path::Path;
+
 use mocban_core::domain::ContentHash;
 use mocban_lists::manifest::{ChosenColumns, ManifestRow, PairingChanges};
 
@@ -14,20 +16,21 @@ pub struct PairChoices {
     pub shown: Option<ContentHash>,
 }
 
-/// Hashes the pairs of an import in their order.
+/// Hashes the pairs of an import in their order, as they are listed: the project does not matter.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowsHash(ContentHash);
 
 impl RowsHash {
-    pub(crate) fn new() -> Self {
-        Self(ContentHash::of(b""))
+    /// Begins with the folder of a list.
+    pub(crate) fn new(folder: &Path) -> Self {
+        Self(ContentHash::of(folder.as_os_str().as_encoded_bytes()))
     }
 
-    /// Adds a pair, with the number of its files that are missing. The unit counts unless it is chosen with the import.
-    pub(crate) fn add(&mut self, row: &ManifestRow, missing: usize, has_unit: bool) {
+    /// Adds a pair. The unit counts unless it is chosen with the import.
+    pub(crate) fn add(&mut self, row: &ManifestRow, has_unit: bool) {
         let attributes = (&row.character, &row.block, row.scanned_face_down, &row.meta);
         let unit = row.unit.filter(|_| has_unit);
-        let row = (&row.name, &row.mesh, &row.print, attributes, unit, missing);
+        let row = (&row.name, &row.mesh, &row.print, attributes, unit);
         let row = format!("{row:?}");
         self.0 = ContentHash::of(&[self.0.as_bytes(), row.as_bytes()].concat());
     }

@@ -16,7 +16,7 @@ pub struct RetireOutcome {
     pub names: Vec<PairName>,
     /// How many of them changed.
     pub changed: u64,
-    /// When they were retired. `None` if they were brought back.
+    /// When they were retired. `None` if none changed, or if they were brought back.
     pub at: Option<UnixMillis>,
     /// Why pairs did not come back, one line each.
     pub warnings: Vec<String>,
@@ -78,7 +78,7 @@ pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult
     Ok(RetireOutcome {
         names,
         changed,
-        at: Some(at),
+        at: (changed > 0).then_some(at),
         warnings: Vec::new(),
     })
 }

@@ -26,8 +26,8 @@ pub(super) fn accuracy(report: &Report) -> String {
         ) + &undecided(row)
             + &inattentive(report),
         None if report.has_verdicts() => {
-            let [unsure, conflicts] = [|row: &MetricRow| row.unsure, |row| row.conflicts]
-                .map(|number| report.rows.iter().map(number).sum::<u64>());
+            let unsure: u64 = report.rows.iter().map(|row| row.unsure).sum();
+            let conflicts: u64 = report.rows.iter().map(|row| row.conflicts).sum();
             let why = match conflicts {
                 0 => "were unsure about every judged result",
                 all if all == unsure => "disagree about every judged result",

@@ -57,8 +57,7 @@ impl NewFolder {
     /// folder and nothing else, that folder gets the name. Returns its path.
     ///
     /// # Errors
-    /// Returns an error if the folder cannot be synced or renamed. It is then removed, unless only its name may be lost in a
-    /// power cut.
+    /// Returns an error if the folder cannot be synced or renamed. It is then removed.
     pub fn place(self, name: &str) -> io::Result<PathBuf> {
         sync_tree(&self.content)?;
         let from = only_folder(&self.content)?.unwrap_or_else(|| self.content.clone());
@@ -78,7 +77,11 @@ impl NewFolder {
                 Err(_) if target.symlink_metadata().is_ok() => {}
                 Err(error) => return Err(error),
                 Ok(()) => {
-                    sync_folder(&self.parent)?;
+                    if let Err(error) = sync_folder(&self.parent) {
+                        // Without its name, the folder is removed.
+                        let _ = rename(&target, &from);
+                        return Err(error);
+                    }
                     return Ok(target);
                 }
             }

@@ -15,6 +15,9 @@ use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict, enu
 /// Maximum number of pairs that are looked at for one page.
 const MAX_SCANNED: usize = 4000;
 
+/// Largest rounding error of a difference of two scores, so that 0.65 and 0.55 differ by 0.1.
+const ROUNDING: f64 = 1e-9;
+
 /// The order of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum PairOrder {
@@ -284,7 +287,11 @@ impl<'l> ListReader<'l> {
             // The scores of a pair that runs again are those of its last result.
             .bind(i64::from(self.order != PairOrder::Imported))
             .bind(filter.differs.map(|differs| differs.from.name()))
-            .bind(filter.differs.map_or(0.0, |differs| differs.min_iou));
+            .bind(
+                filter
+                    .differs
+                    .map_or(0.0, |differs| differs.min_iou - ROUNDING),
+            );
         query.fetch_all(conn).await
     }
 

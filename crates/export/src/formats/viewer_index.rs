@@ -1,4 +1,4 @@
-//! The index of the format `viewer`: pages with a picture of each pair, in the order of the catalog.
+//! The index of the format `viewer`: pages with a picture of each pair with a result, in the order of the catalog.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use crate::record::{MetricFields, PairFields};
 /// The first page of the index, and its meaning.
 pub(super) const INDEX: [&str; 2] = [
     "index.html",
-    "pictures of all pairs, each with a link to its page; `index-2.html` and so on continue it",
+    "pictures of all pairs with a result, each with a link to its page; `index-2.html` and so on continue it",
 ];
 /// Pairs on a page.
 const PAGE_PAIRS: u64 = 500;

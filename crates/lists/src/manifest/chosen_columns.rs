@@ -22,11 +22,6 @@ impl ChosenColumns {
         }
     }
 
-    /// Returns whether no column is chosen.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
     /// Returns what the columns of a header are.
     ///
     /// # Errors

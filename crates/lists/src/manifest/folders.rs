@@ -81,6 +81,20 @@ pub struct PairingChanges {
     pub joined: Vec<(String, String)>,
 }
 
+impl PairingChanges {
+    /// Takes back a pair that was left out. Its files are not joined to others any more.
+    pub fn take_back(&mut self, id: &str) {
+        self.left_out.retain(|known| known != id);
+        let folded = fold_case(id);
+        let is_of_pair = |path: &str| {
+            let file = FolderFile::new(Path::new(path), Path::new(""));
+            file.is_some_and(|file| fold_case(&file.id()) == folded)
+        };
+        self.joined
+            .retain(|(mesh, print)| !is_of_pair(mesh) && !is_of_pair(print));
+    }
+}
+
 /// The content of two directories.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FolderPairs {
@@ -99,30 +113,15 @@ pub struct FolderPairs {
 }
 
 /// Pairs mesh files with print files of the same folder and stem; upper and lower case are equal. The id of a pair in
-/// folders is `FOLDER_STEM`, and the folder is its block.
+/// folders is `FOLDER_STEM`, and the folder is its block. Then changes the pairs. There may be no pair.
 ///
 /// Hidden files are skipped. The format of a file is detected later, from its content. The result does not depend on
 /// the order of `meshes` and `prints`.
 ///
 /// # Errors
-/// Returns an error if two meshes or two prints have the same id, the id of a pair is not valid, or there is no pair.
-pub fn pair_folders(
-    meshes: &ListedFolder,
-    prints: &ListedFolder,
-) -> Result<FolderPairs, ManifestError> {
-    let mut found = pair_folders_with(meshes, prints, &PairingChanges::default())?;
-    match found.no_pair.take() {
-        Some(why) => Err(why),
-        None => Ok(found),
-    }
-}
-
-/// Pairs files like [`pair_folders`], with changes. There may be no pair.
-///
-/// # Errors
 /// Returns an error if two meshes or two prints have the same id, the id of a pair is not valid, or the files of a change
 /// are not there.
-pub fn pair_folders_with(
+pub fn pair_folders(
     meshes: &ListedFolder,
     prints: &ListedFolder,
     changes: &PairingChanges,
@@ -155,7 +154,16 @@ pub fn pair_folders_with(
     let no_pair = rows.is_empty().then(|| {
         let is_swapped = is_swapped && meshes_alone.is_empty();
         let without = without_files(roots, are_empty);
-        of_list(&no_pair(is_swapped, without, &similar)).into()
+        let reason = if is_swapped {
+            "--meshes holds images and --prints holds meshes; swap the two".to_owned()
+        } else if let Some(without) = without {
+            without
+        } else if changes.left_out.is_empty() {
+            no_equal_name(&meshes_alone, &prints_alone, &similar)
+        } else {
+            "all pairs are left out, so there is nothing to import".to_owned()
+        };
+        of_list(&reason).into()
     });
     for alone in [&mut meshes_alone, &mut prints_alone] {
         alone.sort_by_key(FolderFile::place);
@@ -260,19 +268,23 @@ fn without_files(roots: [&PathBuf; 2], are_empty: [bool; 2]) -> Option<String> {
     }
 }
 
-/// Returns why a list of folders has no pairs.
-fn no_pair(is_swapped: bool, without: Option<String>, similar: &[String]) -> String {
-    if is_swapped {
-        return "--meshes holds images and --prints holds meshes; swap the two".to_owned();
-    }
-    if let Some(without) = without {
-        return without;
-    }
+/// Says that no names are equal, or that only the folders of files with equal names differ.
+fn no_equal_name(meshes: &[FolderFile], prints: &[FolderFile], similar: &[String]) -> String {
     let reason = "no mesh has the same file name as a print";
-    match similar.first() {
-        Some(first) => format!("{reason}; {first}"),
-        None => reason.to_owned(),
+    if let Some(first) = similar.first() {
+        return format!("{reason}; {first}");
     }
+    let prints = prints.iter().map(|print| (fold_case(&print.stem), print));
+    let prints: BTreeMap<String, &FolderFile> = prints.collect();
+    let other_folder = meshes.iter().find_map(|mesh| {
+        let print = *prints.get(&fold_case(&mesh.stem))?;
+        let [mesh_folder, print_folder] = [mesh, print].map(|file| file.folders.join("/"));
+        let (mesh, print) = (mesh.path.display(), print.path.display());
+        Some(format!(
+            "{mesh} and {print} have the same name, but their folders {mesh_folder:?} and {print_folder:?} differ; give both one name, or name them scans and prints, or quét and in"
+        ))
+    });
+    other_folder.unwrap_or_else(|| reason.to_owned())
 }
 
 /// Describes meshes and prints without each other whose ids differ only in accents or in zeros before a number.

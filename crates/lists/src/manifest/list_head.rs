@@ -17,6 +17,10 @@ pub struct ListHead {
     pub header: Vec<String>,
     /// The standard name of each column, if it is known or chosen.
     pub columns: Vec<Option<&'static str>>,
+    /// The standard name of each column by its own name, if it is known.
+    pub by_name: Vec<Option<&'static str>>,
+    /// Says why the columns are refused, of which none is then known.
+    pub refused: Option<String>,
     /// The cells of the first rows, shortened.
     pub rows: Vec<Vec<String>>,
 }
@@ -45,9 +49,17 @@ pub fn read_head(bytes: &[u8], chosen: &ChosenColumns, rows: usize) -> Option<Li
         return None;
     }
     let names = column_names(1, &record, "").ok()?;
-    let columns = chosen.assign(&names).map(|found| found.columns);
+    let unknown = || vec![None; names.len()];
+    let by_name = ChosenColumns::default().assign(&names);
+    let by_name = by_name.map_or_else(|_refused| unknown(), |found| found.columns);
+    let (columns, refused) = match chosen.assign(&names) {
+        Ok(found) => (found.columns, None),
+        Err(why) => (unknown(), Some(why)),
+    };
     let mut head = ListHead {
-        columns: columns.unwrap_or_else(|_refused| vec![None; names.len()]),
+        columns,
+        by_name,
+        refused,
         header: names.iter().map(|name| (*name).to_owned()).collect(),
         rows: Vec::new(),
     };
@@ -122,6 +134,12 @@ mod tests {
         let head = read_head(LIST.as_bytes(), &all, 1).expect("a header");
         assert_eq!(head.columns[1], Some("mesh"));
         assert!(head.is_complete() && head.columns[3].is_none());
+        assert_eq!(head.by_name, [None, None, None, Some("mesh"), None]);
+        assert_eq!(head.refused, None);
+        let twice = chosen(&[("id", "Nr"), ("mesh", "Nr")]);
+        let refused = read_head(LIST.as_bytes(), &twice, 1).expect("a header");
+        let why = refused.refused.expect("refused");
+        assert!(why.contains("is chosen for two columns"), "{why}");
         let long = format!("a,b\n{},2\n", "x".repeat(500));
         let head = read_head(long.as_bytes(), &all, 1).expect("a header");
         assert!(head.rows[0][0].len() < 70);

@@ -21,7 +21,7 @@ pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;
 pub use folders::{
     FolderPairs, ListedFolder, MESH_EXTENSIONS, PRINT_EXTENSIONS, PairingChanges,
-    is_named_like_input, is_named_like_mesh, is_named_like_print, pair_folders, pair_folders_with,
+    is_named_like_input, is_named_like_mesh, is_named_like_print, pair_folders,
 };
 pub use jsonl::{parse_jsonl, read_jsonl};
 pub use list_head::{ListHead, read_head};

@@ -30,7 +30,7 @@ pub(super) fn disposition(file: &str) -> String {
 }
 
 /// Returns a name without characters that some file system refuses, shortened before its extension if it is too long.
-fn safe_name(file: &str) -> String {
+pub(super) fn safe_name(file: &str) -> String {
     let is_refused = |c: char| c.is_control() || r#"/\:*?"<>|"#.contains(c);
     let name = file.replace(is_refused, "-");
     let name = name.trim_start_matches('.');

@@ -23,15 +23,18 @@ use crate::on_thread::on_thread;
 use mocban_catalog::ListedNames;
 use mocban_core::domain::{ErrorCode, PairName, UnixMillis};
 use mocban_project::ProjectError;
-use mocban_project::retire::{RetireChoice, retire, retired_at, undo};
+use mocban_project::retire::{RetireChoice, RetireOutcome, retire, retired_at, undo};
 use mocban_project::retry::{RetryRequest, retry};
 use mocban_project::selection;
 
 /// Most pairs that are chosen at a time. A run gets their ids as arguments.
 pub(super) const MAX_CHOSEN: usize = 1000;
 
+/// Most bytes of the ids that a run gets on Windows, whose command lines have at most 32,767 characters.
+const MAX_ARGUMENT_BYTES: usize = 30_000;
+
 /// Parts of the address of a list that say what was done.
-const DONE: [&str; 3] = ["done", "count", "at"];
+const DONE: [&str; 4] = ["done", "count", "at", "still_out"];
 
 /// What is done to pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -73,6 +76,9 @@ pub(super) async fn listed(
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
     let query = PairQuery::of(&visit.query);
+    if query.lacks_compared {
+        return Err(AppFailure::refused(metric_is_lacking()));
+    }
     let (filter, order, metric) = (&query.filter, query.order, query.metric);
     let names = open.catalog.listed_names(filter, order, metric, MAX_CHOSEN);
     let refusal = match names.await? {
@@ -95,6 +101,14 @@ pub(super) async fn listed(
         ),
     };
     Err(AppFailure::refused(refusal))
+}
+
+/// Says that a difference of IoU needs another metric.
+pub(super) fn metric_is_lacking() -> Sentence {
+    Sentence::new(
+        "a difference of IoU needs two metrics: choose another one under Compare with",
+        "độ lệch IoU cần hai độ đo: hãy chọn độ đo khác ở mục So sánh với",
+    )
 }
 
 /// Checks that pairs exist and are not retired, and that they are few enough.
@@ -121,6 +135,19 @@ pub(super) async fn require_pairs(
     names.map_err(|error| AppFailure::of(error, &open.dir))
 }
 
+/// Checks that Windows can start a run with these ids as arguments.
+fn require_short(names: &[String]) -> AppResult<()> {
+    // An id with spaces is quoted.
+    let bytes: usize = names.iter().map(|name| name.len() + 3).sum();
+    if cfg!(windows) && bytes > MAX_ARGUMENT_BYTES {
+        return Err(AppFailure::refused(Sentence::new(
+            "the ids of these pairs are too long to start one run: choose fewer pairs",
+            "mã của các cặp này quá dài để bắt đầu một lần chạy: hãy chọn ít cặp hơn",
+        )));
+    }
+    Ok(())
+}
+
 /// Does something with chosen pairs, and replies with the list that says what was done.
 pub(super) async fn change(
     State(state): State<Arc<AppState>>,
@@ -133,14 +160,16 @@ pub(super) async fn change(
     let list = without_done(&PageQuery::parse(&body.list));
     let (done, counted) = match body.change {
         ChosenChange::Compute => {
+            require_short(&names)?;
             let count = names.len();
             compute(&state, &open, names).await?;
             ("compute", ["count", &count.to_string()].map(str::to_owned))
         }
         ChosenChange::Resume => {
+            require_short(&names)?;
             let count = names.len();
-            resume(&state, &open, names).await?;
-            ("resume", ["count", &count.to_string()].map(str::to_owned))
+            let done = resume(&state, &open, names).await?;
+            (done, ["count", &count.to_string()].map(str::to_owned))
         }
         ChosenChange::Retire => {
             let at = retire_pairs(&open, names).await?;
@@ -165,8 +194,13 @@ async fn compute(state: &AppState, open: &OpenProject, names: Vec<String>) -> Ap
     child_run::start(state, &open.dir, &args).await
 }
 
-/// Runs the waiting and failed ones of some pairs. A run in progress takes them up.
-async fn resume(state: &AppState, open: &OpenProject, mut names: Vec<String>) -> AppResult<()> {
+/// Runs the waiting and failed ones of some pairs. Starts no run beside one in progress, which takes them up unless it works
+/// on named pairs; then they wait for the next one. Returns what the list says was done.
+async fn resume(
+    state: &AppState,
+    open: &OpenProject,
+    mut names: Vec<String>,
+) -> AppResult<&'static str> {
     let (request, location) = (RetryRequest::Names(names.clone()), open.location());
     let retried = on_thread(async move || retry(&request, &location).await).await;
     // None of them may have failed.
@@ -177,10 +211,11 @@ async fn resume(state: &AppState, open: &OpenProject, mut names: Vec<String>) ->
         return Err(AppFailure::of(error, &open.dir));
     }
     if runs(open).await? {
-        return Ok(());
+        return Ok("resume-later");
     }
     names.insert(0, "--".to_owned());
-    child_run::start(state, &open.dir, &names).await
+    child_run::start(state, &open.dir, &names).await?;
+    Ok("resume")
 }
 
 /// Takes pairs out of every count. Returns when.
@@ -205,10 +240,20 @@ pub(super) async fn restore(
     let location = open.location();
     let restored = on_thread(async move || undo(&choice, &location).await).await;
     let restored = restored.map_err(|error| AppFailure::of(error, &open.dir))?;
-    let done = without_done(&PageQuery::parse(&body.list))
-        .with("done", "restore")
-        .with("count", &restored.changed.to_string());
+    let done = with_restored(&PageQuery::parse(&body.list), &restored);
     Ok(Json(json!({ "go": format!("pairs{}", done.text()) })))
+}
+
+/// Returns the address of a list that says how many pairs came back, and how many did not.
+pub(super) fn with_restored(list: &PageQuery, restored: &RetireOutcome) -> PageQuery {
+    let still_out = match restored.warnings.len() {
+        0 => String::new(),
+        count => count.to_string(),
+    };
+    without_done(list)
+        .with("done", "restore")
+        .with("count", &restored.changed.to_string())
+        .with("still_out", &still_out)
 }
 
 /// Returns the address of a list without what was done.
@@ -236,13 +281,21 @@ pub(super) async fn done_notice(visit: &Visit, open: &OpenProject) -> AppResult<
             count,
             running,
         ),
+        Some("resume-later") => (
+            visit.t(
+                "Chosen pairs, of which those that wait or failed run with the run in progress or, if it works on other pairs only, when you next press Align",
+                "Số cặp đã chọn, trong đó các cặp đang chờ hoặc bị lỗi sẽ chạy trong lần chạy hiện tại hoặc, nếu lần đó chỉ chạy các cặp khác, khi bạn bấm Căn chỉnh lần sau",
+            ),
+            count,
+            running,
+        ),
         Some("restore") => (
             visit.t(
                 "Pairs that are in every count again",
                 "Số cặp đã được tính trở lại",
             ),
             count,
-            html! {},
+            still_out(visit),
         ),
         Some("retire") => {
             let at = query.parsed("at").unwrap_or_default();
@@ -259,6 +312,19 @@ pub(super) async fn done_notice(visit: &Visit, open: &OpenProject) -> AppResult<
     Ok(html! {
         div #done.notice.good role="status" { p { (text) ": " b { (grouped(count)) } } (next) }
     })
+}
+
+/// Says how many pairs did not come back, and why.
+fn still_out(visit: &Visit) -> Markup {
+    let count = visit.query.parsed::<u64>("still_out");
+    html! {
+        @if let Some(count) = count {
+            p { (visit.t(
+                "Pairs that stay out of every count, because they have no box any more in the labels of their blocks",
+                "Số cặp vẫn không được tính vì không còn khung trong nhãn của ván",
+            )) ": " b { (grouped(count)) } }
+        }
+    }
 }
 
 /// Returns the hidden field that names the list of the page.

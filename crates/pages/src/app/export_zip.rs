@@ -12,14 +12,14 @@ use futures_util::stream;
 use maud::{Markup, html};
 use tokio::sync::mpsc;
 
-use super::attachment::disposition;
+use super::attachment::{disposition, safe_name};
 use super::byte_size::file_size;
 use super::exports::{exports_dir, is_export};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
-use super::zip_sizes::ZipSizes;
+use super::zip_sizes::{ZipSize, ZipSizes};
 use mocban_export::{FolderZip, FolderZipError};
 
 /// Bytes that are sent at a time.
@@ -30,12 +30,12 @@ const WAITING: usize = 4;
 /// Bytes of an archive, or the error that ends it.
 type ArchiveChunk = io::Result<Vec<u8>>;
 
-/// Returns the name of the archive of an export, and of the folder in it, without its extension.
+/// Returns the name of the archive of an export, and of the folder in it, without its extension. Every file system stores it.
 fn archive_name(key: &str, name: &str) -> String {
-    format!("{}-{name}", key.replace('/', "-"))
+    safe_name(&format!("{key}-{name}"))
 }
 
-/// Returns the link to the archive of an export, with its size.
+/// Returns the link to the archive of an export with its size, or says that there is none.
 pub(super) fn zip_link(
     visit: &Visit,
     sizes: &ZipSizes,
@@ -44,15 +44,23 @@ pub(super) fn zip_link(
     name: &str,
 ) -> Markup {
     let size = sizes.get(dir, &archive_name(key, name));
+    let size = match size {
+        ZipSize::InWork => visit
+            .t("The size is being worked out…", "Đang tính dung lượng…")
+            .to_owned(),
+        ZipSize::Bytes(bytes) => file_size(bytes),
+        ZipSize::NoArchive => {
+            let text = visit.t(
+                "This folder cannot be downloaded as one ZIP. Export again.",
+                "Không thể tải thư mục này về thành một tệp ZIP. Hãy xuất lại.",
+            );
+            return html! { p.muted { (text) } };
+        }
+    };
     html! {
         p.row {
             a.button.zip href={ "exports/" (name) ".zip" } download { (visit.t("Download as one ZIP", "Tải về thành một tệp ZIP")) }
-            span.muted {
-                @match size {
-                    Some(bytes) => { (file_size(bytes)) },
-                    None => { (visit.t("The size is being worked out…", "Đang tính dung lượng…")) },
-                }
-            }
+            span.muted { (size) }
         }
     }
 }
@@ -84,7 +92,7 @@ pub(super) async fn download(
         let mut out = BufWriter::with_capacity(CHUNK, ChunkSender(sender.clone()));
         if let Err(error) = zip.write(&mut out) {
             // The browser may end a download at any time.
-            if !matches!(error, FolderZipError::Sent(_)) {
+            if !matches!(error, FolderZipError::Output(_)) {
                 tracing::warn!("the download of an export ended: {error}");
             }
             // What is still in the buffer is of no use.

@@ -11,7 +11,7 @@ const COUNTED: usize = 20_000;
 /// Most folders and lists that a page shows.
 const SHOWN: usize = 500;
 /// Extensions of lists.
-const LISTS: [&str; 4] = ["csv", "xlsx", "jsonl", "tsv"];
+pub(super) const LISTS: [&str; 4] = ["csv", "xlsx", "jsonl", "tsv"];
 /// Folders in which other disks appear.
 const DISKS: [&str; 4] = ["/media", "/mnt", "/run/media", "/Volumes"];
 

@@ -74,6 +74,8 @@ pub(super) struct ImportPreview {
     /// The header of a list of pairs.
     pub(super) head: Option<ListHead>,
     pub(super) planned: AppResult<Planned>,
+    /// Position of the first pair that is shown.
+    pub(super) from: u64,
 }
 
 impl ImportChoice {
@@ -203,7 +205,8 @@ impl ImportChoice {
         )))
     }
 
-    /// Returns what an import would store; `None` if not enough is chosen. Pairs are shown from the position `from`.
+    /// Returns what an import would store; `None` if not enough is chosen. Pairs are shown from the position `from`, or from
+    /// the last page if there are fewer.
     pub(super) fn preview(
         &self,
         folder: &Path,
@@ -233,7 +236,18 @@ impl ImportChoice {
                 Ok(Planned::Pairs(plan, (from - start) as usize))
             }
         });
-        Some(ImportPreview { head, planned })
+        let last = match &planned {
+            Ok(Planned::Pairs(plan, _)) => plan.pairs.saturating_sub(1) / SHOWN_PAIRS * SHOWN_PAIRS,
+            Ok(Planned::Blocks) | Err(_) => from,
+        };
+        if from > last {
+            return self.preview(folder, roots, last, plans);
+        }
+        Some(ImportPreview {
+            head,
+            planned,
+            from,
+        })
     }
 }
 
@@ -270,7 +284,7 @@ pub(super) fn with_change(query: &PageQuery) -> AppResult<PageQuery> {
         changes.left_out.push(id);
     }
     if let Some(id) = query.get("take") {
-        changes.left_out.retain(|known| known != id);
+        changes.take_back(id);
     }
     if let Some(at) = query.parsed::<usize>("split")
         && at < changes.joined.len()
@@ -316,6 +330,10 @@ mod tests {
         assert_eq!((again.get("leave"), again.get("scan")), (None, None));
         let back = with_change(&again.with("take", "1").with("split", "0"));
         assert_eq!(back.expect("no changes").text(), "");
+        let joined = PageQuery::parse("leave=1&scan=1.stl&print=x.png");
+        let joined = with_change(&joined).expect("few changes");
+        let back = with_change(&joined.with("take", "1")).expect("no changes");
+        assert_eq!(back.text(), "", "files of the pair are not joined any more");
         assert_eq!(changed("scan=a.stl"), "");
         with_change(&PageQuery::parse("matches=x")).expect_err("not of the page");
         let many = "x".repeat(5000);

@@ -25,10 +25,11 @@ pub(super) fn columns_part(visit: &Visit, chosen: &ImportChoice, head: &ListHead
         query.with(column.1, "")
     });
     let is_complete = head.is_complete();
+    let is_missing = !is_complete && head.refused.is_none();
     html! {
         details #columns.card open[!is_complete] {
             summary { h2 { (visit.t("Columns of the list", "Các cột của danh sách")) } }
-            @if !is_complete {
+            @if is_missing {
                 p.notice.bad role="alert" { (visit.t("A list needs an id, a scan and a print, and the names of its columns do not say which these are. Choose them:", "Danh sách cần mã, bản quét và bản in, nhưng tên các cột không cho biết cột nào. Hãy chọn:")) }
             }
             form.fields method="get" action=(visit.here) {
@@ -56,11 +57,16 @@ fn column_choice(
 ) -> Markup {
     let known = head.columns.iter().position(|known| *known == Some(field));
     let known = known.and_then(|at| head.header.get(at));
+    let empty = if head.by_name.contains(&Some(field)) {
+        visit.t("by its name", "theo tên cột")
+    } else {
+        visit.t("no column", "không có cột")
+    };
     let selected = known.map_or(value, |header| header.as_str());
     html! {
         label { span { (label) }
             select name=(name) {
-                (choice("", visit.t("no column", "không có cột"), Some(selected)))
+                (choice("", empty, Some(selected)))
                 @for header in head.header.iter().filter(|header| !header.is_empty()) {
                     (choice(header, &one_line(header), Some(selected)))
                 }

@@ -16,7 +16,7 @@ use super::failure::{AppFailure, AppResult};
 use super::folder_picker::{FileCounts, PickedFolder, PickerRoots};
 use super::import_choice::{ImportChoice, ImportPreview, Planned, with_change};
 use super::import_columns::columns_part;
-use super::import_preview::plan_part;
+use super::import_preview::{changes_part, plan_part};
 use super::plan_cache::PlanCache;
 use super::projects::find;
 use super::sentence::Sentence;
@@ -31,18 +31,8 @@ use mocban_project::location::Location;
 use mocban_project::pair_choices::PairChoices;
 use mocban_project::{ProjectError, ProjectResult};
 
-/// Values of the address that belong to the files that were chosen.
-const OF_FILES: [&str; 9] = [
-    "matches",
-    "from",
-    "left_out",
-    "id_column",
-    "mesh_column",
-    "print_column",
-    "character_column",
-    "block_column",
-    "unit_column",
-];
+/// Values of the address that belong to the files that were chosen, beside the columns of a list.
+const OF_FILES: [&str; 3] = ["matches", "from", "left_out"];
 
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
@@ -71,7 +61,7 @@ pub(super) async fn page(
         .map_err(|error| ProjectError::from(mocban_project::error::TaskStopped(error)))?;
     let body = html! {
         (chosen_part(&visit, &chosen))
-        @if let Some(preview) = preview { (preview_part(&visit, &chosen, &preview, from)) }
+        @if let Some(preview) = preview { (preview_part(&visit, &chosen, &preview)) }
         (upload_part(&visit, &state.uploads, &chosen.project))
         @if is_known {
             div data-load={ "p/" (encoded(&chosen.project)) "/last-import" } aria-live="polite" {}
@@ -89,20 +79,18 @@ pub(super) async fn page(
 }
 
 /// Returns the columns of a list, and the pairs or why there are none.
-fn preview_part(
-    visit: &Visit,
-    chosen: &ImportChoice,
-    preview: &ImportPreview,
-    from: u64,
-) -> Markup {
+fn preview_part(visit: &Visit, chosen: &ImportChoice, preview: &ImportPreview) -> Markup {
     let head = preview.head.as_ref();
     // The form says what is missing, in both languages.
-    let asks_for_columns = head.is_some_and(|head| !head.is_complete());
+    let asks_for_columns = head.is_some_and(|head| !head.is_complete() && head.refused.is_none());
     html! {
         @match &preview.planned {
             Err(_) if asks_for_columns => {},
-            Err(failure) => p.notice.bad role="alert" { (failure.text(visit.language)) },
-            Ok(planned) => (plan_part(visit, chosen, planned, from)),
+            Err(failure) => {
+                p.notice.bad role="alert" { (failure.text(visit.language)) }
+                (changes_part(visit, &chosen.changes().unwrap_or_default()))
+            },
+            Ok(planned) => (plan_part(visit, chosen, planned, preview.from)),
         }
         @if let Some(head) = head { (columns_part(visit, chosen, head)) }
     }
@@ -110,7 +98,9 @@ fn preview_part(
 
 /// Returns an address without what belongs to files that were chosen before.
 fn for_other_files(query: &PageQuery) -> PageQuery {
-    let names = OF_FILES.iter();
+    let columns = ImportChoice::default();
+    let columns = columns.columns().map(|(_, name, _)| name);
+    let names = OF_FILES.into_iter().chain(columns);
     names.fold(query.clone(), |query, name| query.with(name, ""))
 }
 

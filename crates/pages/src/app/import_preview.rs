@@ -11,6 +11,7 @@ use super::visit::Visit;
 use mocban_core::domain::{LengthUnit, one_line};
 use mocban_lists::manifest::PairingChanges;
 use mocban_project::import_plan::{ImportPlan, PlannedPair};
+use mocban_project::manifest_file::{IGNORED, RENAMED};
 
 /// Number of warnings and missing files that are shown.
 const SHOWN_LINES: usize = 12;
@@ -52,8 +53,8 @@ fn pairs_part(
         }
         @if let Some(why) = no_pair { p.notice.bad { (why.text(visit.language)) } }
         @for line in plan.missing.lines.iter().take(SHOWN_LINES) { p.notice.bad { (one_line(line)) } }
-        @for line in plan.warnings.iter().take(SHOWN_LINES) { p.notice { (one_line(line)) } }
-        @if let Some(renamed) = &plan.renamed { p.muted { (one_line(renamed)) } }
+        @for line in plan.warnings.iter().take(SHOWN_LINES) { p.notice { (one_line(&warning(visit, line))) } }
+        @if let Some(renamed) = &plan.renamed { p.muted { (one_line(&warning(visit, renamed))) } }
         @if shown.len() > 0 {
             div.scroll tabindex="0" role="region" aria-label=(visit.t("Pairs", "Các cặp")) {
                 table {
@@ -70,6 +71,22 @@ fn pairs_part(
         (changes_part(visit, &changes))
         (join_form(visit, plan))
     }
+}
+
+/// Returns a warning of an import, whose beginning is translated if it is known.
+fn warning(visit: &Visit, line: &str) -> String {
+    let [mesh_alone, print_alone, other] = IGNORED;
+    let beginnings = [
+        (mesh_alone, "Bỏ qua, bản quét không có bản in"),
+        (print_alone, "Bỏ qua, bản in không có bản quét"),
+        (other, "Bỏ qua, không phải bản quét hay bản in"),
+        (RENAMED, "Đã hiểu các cột có tên khác"),
+    ];
+    let found = beginnings.into_iter().find_map(|(english, vietnamese)| {
+        let rest = line.strip_prefix(english)?;
+        Some(format!("{}{rest}", visit.t(english, vietnamese)))
+    });
+    found.unwrap_or_else(|| line.to_owned())
 }
 
 fn pair_row(
@@ -132,7 +149,7 @@ fn pager(visit: &Visit, pairs: u64, from: u64) -> Markup {
 }
 
 /// Returns the changes that were made, each with a link that takes it back.
-fn changes_part(visit: &Visit, changes: &PairingChanges) -> Markup {
+pub(super) fn changes_part(visit: &Visit, changes: &PairingChanges) -> Markup {
     let undo = |name: &str, value: &str| {
         let query = visit.query.with(name, value);
         html! { a href={ (visit.here) (query.text()) } aria-label={ (visit.t("take back", "hoàn lại")) " " (one_line(value)) } { (visit.t("take back", "hoàn lại")) } }

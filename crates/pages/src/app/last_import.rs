@@ -10,7 +10,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
-use super::address::encoded;
+use super::address::{PageQuery, encoded};
+use super::chosen_pairs::with_restored;
 use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
@@ -116,6 +117,13 @@ pub(super) async fn change(
         ImportChange::Restore => undo(&choice, &location).await,
     });
     let changed = changed.await;
-    changed.map_err(|error| AppFailure::of(error, &open.dir))?;
-    Ok(Json(json!({ "reload": true })))
+    let changed = changed.map_err(|error| AppFailure::of(error, &open.dir))?;
+    if changed.warnings.is_empty() {
+        return Ok(Json(json!({ "reload": true })));
+    }
+    // The list says that some pairs did not come back.
+    let list = with_restored(&PageQuery::default(), &changed).text();
+    Ok(Json(
+        json!({ "go": format!("p/{}/pairs{list}", encoded(&key)) }),
+    ))
 }

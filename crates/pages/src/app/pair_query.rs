@@ -26,6 +26,8 @@ pub(super) struct PairQuery {
     pub(super) metric: ThresholdMetric,
     /// Another metric, whose results are shown beside those of the first.
     pub(super) compared: Option<ThresholdMetric>,
+    /// Whether the address asks for a difference of IoU without another metric. Then nothing is listed.
+    pub(super) lacks_compared: bool,
     pub(super) is_table: bool,
     pub(super) after: Option<PairCursor>,
 }
@@ -44,12 +46,13 @@ impl PairQuery {
         let compared = query
             .parsed::<ThresholdMetric>("compare")
             .filter(|other| *other != metric);
-        let differs = compared.and_then(|from| {
-            let wanted = query.get("differs")?;
-            let min_iou = DIFFERENCES.into_iter().find(|known| *known == wanted)?;
-            let min_iou = min_iou.parse().ok()?;
-            Some(MetricDifference { from, min_iou })
+        let min_iou = query.get("differs").and_then(|wanted| {
+            let known = DIFFERENCES.into_iter().find(|known| *known == wanted)?;
+            known.parse().ok()
         });
+        let differs = compared
+            .zip(min_iou)
+            .map(|(from, min_iou)| MetricDifference { from, min_iou });
         Self {
             filter: PairFilter {
                 statuses: statuses.map_or_else(Vec::new, |(_, statuses)| statuses.to_vec()),
@@ -64,6 +67,7 @@ impl PairQuery {
             order: order.unwrap_or_default(),
             metric,
             compared,
+            lacks_compared: min_iou.is_some() && compared.is_none(),
             is_table: query.get("view") == Some("table"),
             after: query.get("after").and_then(cursor),
         }
@@ -128,6 +132,10 @@ mod tests {
         assert_eq!(compared.compared, Some(ThresholdMetric::Density));
         let differs = compared.filter.differs.map(|differs| differs.min_iou);
         assert_eq!(differs, Some(0.1));
+        assert!(!compared.lacks_compared);
+        for lacking in ["differs=0.1", "compare=ensemble&differs=0.1"] {
+            assert!(of(lacking).lacks_compared, "{lacking}");
+        }
         let plain = of("");
         for bad in [
             "state=x",
@@ -135,8 +143,8 @@ mod tests {
             "sort=a&after=NaN,1",
             "after=1,-2",
             "after=1",
-            "compare=ensemble&differs=0.1",
-            "differs=0.1",
+            "compare=ensemble",
+            "differs=0.2",
             "compare=x",
         ] {
             assert_eq!(of(bad), plain, "{bad}");

@@ -8,7 +8,7 @@ use maud::{Markup, html};
 
 use super::address::{PageQuery, encoded};
 use super::choice_bar::{choice_bar, choice_box};
-use super::chosen_pairs::{done_notice, without_done};
+use super::chosen_pairs::{done_notice, metric_is_lacking, without_done};
 use super::components::{
     NavSection, choice, difference, empty, frame, grouped, score, stored_message,
 };
@@ -42,21 +42,28 @@ pub(super) async fn page(
         return jump(&visit, &open, typed.trim()).await;
     }
     let query = PairQuery::of(&visit.query);
-    let list = open.catalog.pair_list(
-        &query.filter,
-        query.order,
-        query.metric,
-        query.after,
-        query.page_size(),
-    );
-    let list = list.await?;
+    let list = if query.lacks_compared {
+        PairListPage {
+            pairs: Vec::new(),
+            next: None,
+            scanned: None,
+        }
+    } else {
+        let (filter, order, metric) = (&query.filter, query.order, query.metric);
+        let list = open
+            .catalog
+            .pair_list(filter, order, metric, query.after, query.page_size());
+        list.await?
+    };
     let blocks = open.catalog.first_listed_blocks(SUGGESTED_BLOCKS).await?;
     let body = html! {
         (done)
         (jump_form(&visit))
         (filter_form(&visit, &blocks))
         (views(&visit, &query))
-        @if list.pairs.is_empty() && list.next.is_some() {
+        @if query.lacks_compared {
+            p.notice role="alert" { (metric_is_lacking().text(visit.language)) }
+        } @else if list.pairs.is_empty() && list.next.is_some() {
             p.notice { (visit.t("None of the pairs that were looked at so far matches.", "Chưa có cặp nào phù hợp trong số các cặp đã xem.")) }
         } @else if list.pairs.is_empty() {
             (empty(visit.t("No pair matches.", "Không có cặp nào phù hợp."), &html! {
@@ -73,7 +80,7 @@ pub(super) async fn page(
             } }
         }
         (pager(&visit, &query, &list))
-        @if !list.pairs.is_empty() { (choice_bar(&visit, &key)) }
+        (choice_bar(&visit, &key))
     };
     let title = visit.t("Pairs", "Các cặp");
     Ok(frame(&visit, title, Some(&key), NavSection::Pairs, &body).into_response())
@@ -184,7 +191,7 @@ fn comparison_fields(visit: &Visit, metrics: &[(&str, &str)]) -> Markup {
     let differences: Vec<_> = any.into_iter().chain(differences).collect();
     html! {
         (field(visit, "compare", visit.t("Compare with", "So sánh với"), &others))
-        (field(visit, "differs", visit.t("IoU differs by", "IoU lệch ít nhất"), &differences))
+        (field(visit, "differs", visit.t("IoU differs by at least", "IoU lệch ít nhất"), &differences))
     }
 }
 

@@ -6,10 +6,10 @@ use std::sync::atomic::Ordering;
 use super::received_files::{ReceivedFiles, is_importable};
 use super::sentence::Sentence;
 use super::upload_sentence::{
-    MAX_FILES, MAX_RATIO, bomb, link, not_utf8, refused_archive, refused_path,
+    MAX_FILES, MAX_RATIO, bomb, link, not_utf8, not_written, refused_archive, refused_path,
 };
 use mocban_core::domain::cancel::poll;
-use mocban_lists::relative_path::RelativePath;
+use mocban_lists::relative_path::{RelativePath, is_of_system};
 use mocban_lists::zip::{ZipArchive, ZippedFile};
 
 /// Archives that unpack to fewer bytes are never refused for their size.
@@ -29,25 +29,28 @@ pub(super) fn unpack(
     let (mut files, mut bytes) = (Vec::new(), 0_u64);
     for file in zip.files() {
         poll();
-        if let Some(path) = checked(file, at)? {
-            if !is_importable(&path) {
-                received.count.left_out.fetch_add(1, Ordering::Relaxed);
-                continue;
-            }
-            file.check().map_err(refuse)?;
-            received.add(&path)?;
-            bytes = bytes.saturating_add(file.size());
-            files.push((file, path));
+        let name = file.shown_name();
+        // The name of a file that is left out need not be safe.
+        if file.is_folder() || is_of_system(&name) {
+            continue;
         }
+        if !is_importable(&name) {
+            received.count.left_out.fetch_add(1, Ordering::Relaxed);
+            continue;
+        }
+        let path = checked(file, at)?;
+        file.check().map_err(refuse)?;
+        received.add(&path)?;
+        bytes = bytes.saturating_add(file.size());
+        files.push((file, path));
     }
     if bytes > HARMLESS_BYTES.max(zip.packed_len().saturating_mul(MAX_RATIO)) {
         return Err(bomb(at.as_str()));
     }
     received.check_room(bytes)?;
     for (file, path) in files {
-        let mut target = received
-            .create(&path)
-            .map_err(|error| refuse(error.into()))?;
+        let target = received.create(&path);
+        let mut target = target.map_err(|error| not_written(&error))?;
         let unpacked = zip.unpack(file, file.size(), &mut |piece| {
             poll();
             received.append(&mut target, piece)
@@ -58,11 +61,8 @@ pub(super) fn unpack(
     Ok(())
 }
 
-/// Returns the path of a file in an archive, or `None` for folders and files that a system keeps for itself.
-fn checked(file: &ZippedFile, at: &RelativePath) -> Result<Option<RelativePath>, Sentence> {
-    if file.is_folder() {
-        return Ok(None);
-    }
+/// Returns the path of a file in an archive.
+fn checked(file: &ZippedFile, at: &RelativePath) -> Result<RelativePath, Sentence> {
     let name = file.name();
     let name = name.ok_or_else(|| not_utf8(at.as_str(), &file.shown_name()))?;
     let path = at.beside(name);
@@ -70,5 +70,5 @@ fn checked(file: &ZippedFile, at: &RelativePath) -> Result<Option<RelativePath>,
     if file.is_link() {
         return Err(link(at.as_str(), name));
     }
-    Ok((!path.is_of_system()).then_some(path))
+    Ok(path)
 }

@@ -9,20 +9,22 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use axum::body::Bytes;
 use tokio::sync::mpsc;
 
+use super::folder_picker::LISTS;
 use super::sentence::Sentence;
 use super::upload_sentence::{
     MAX_FILES, RESERVE_BYTES, cut, no_room, not_written, nothing, other_file, refused_path,
-    too_many,
+    too_many_names,
 };
 use mocban_core::domain::FileKind;
+use mocban_core::domain::cancel::poll;
 use mocban_lists::manifest::{MESH_EXTENSIONS, PRINT_EXTENSIONS};
-use mocban_lists::relative_path::{RelativePath, TakenPaths};
+use mocban_lists::relative_path::{RelativePath, TakenPaths, extension_of, is_of_system};
 use mocban_store::NewFolder;
 use mocban_system::failpoint::{self, Point};
 use mocban_system::platform;
 
-/// Extensions of lists, and of boxes of characters on a page.
-const LIST_EXTENSIONS: [&str; 7] = ["csv", "tsv", "xlsx", "jsonl", "json", "xml", "txt"];
+/// Extensions of boxes of characters on a page.
+const BOX_EXTENSIONS: [&str; 3] = ["json", "xml", "txt"];
 /// Extension of archives, which are unpacked.
 pub(super) const ARCHIVE: &str = "zip";
 /// Bytes that are written between two looks at the room on the disk.
@@ -35,7 +37,8 @@ pub(super) fn importable_extensions() -> impl Iterator<Item = &'static str> {
     MESH_EXTENSIONS
         .into_iter()
         .chain(PRINT_EXTENSIONS)
-        .chain(LIST_EXTENSIONS)
+        .chain(LISTS)
+        .chain(BOX_EXTENSIONS)
         .chain(FileKind::unread_extensions())
 }
 
@@ -59,8 +62,6 @@ pub(super) struct ReceivedCount {
 pub(super) struct ReceivedFiles {
     folder: NewFolder,
     taken: TakenPaths,
-    /// Files in `taken`.
-    names: u64,
     unlooked_bytes: u64,
     pub(super) count: Arc<ReceivedCount>,
 }
@@ -71,7 +72,6 @@ impl ReceivedFiles {
         Self {
             folder,
             taken: TakenPaths::default(),
-            names: 0,
             unlooked_bytes: 0,
             count,
         }
@@ -86,7 +86,7 @@ impl ReceivedFiles {
         path: &RelativePath,
         pieces: mpsc::Receiver<FilePiece>,
     ) -> Result<(), Sentence> {
-        if !is_importable(path) {
+        if !is_importable(path.as_str()) {
             return Err(other_file(path.as_str()));
         }
         self.add(path)?;
@@ -117,6 +117,7 @@ impl ReceivedFiles {
         mut pieces: mpsc::Receiver<FilePiece>,
     ) -> Result<File, Sentence> {
         loop {
+            poll();
             match pieces.blocking_recv() {
                 Some(FilePiece::Bytes(bytes)) => self
                     .append(&mut file, &bytes)
@@ -130,14 +131,14 @@ impl ReceivedFiles {
     /// Adds the name of a file that will be written.
     ///
     /// # Errors
-    /// Returns the reason if there are too many files, or there is such a name already.
+    /// Returns the reason if there are too many files and folders, or there is such a name already.
     pub(super) fn add(&mut self, path: &RelativePath) -> Result<(), Sentence> {
-        self.names += 1;
-        if self.names > MAX_FILES {
-            return Err(too_many());
-        }
         let added = self.taken.insert(path);
-        added.map_err(|fault| refused_path(path.as_str(), &fault))
+        added.map_err(|fault| refused_path(path.as_str(), &fault))?;
+        if self.taken.count() as u64 > MAX_FILES {
+            return Err(too_many_names());
+        }
+        Ok(())
     }
 
     /// Creates a file and its folders.
@@ -207,9 +208,23 @@ pub(super) fn check_room(folder: &Path, bytes: u64) -> Result<(), Sentence> {
     }
 }
 
-/// Returns whether an import reads a file, or names it as unread.
-pub(super) fn is_importable(path: &RelativePath) -> bool {
-    let extension = path.extension();
+/// Takes the pieces of a file that is left out, up to its end. Polls for a cancellation.
+///
+/// # Errors
+/// Returns the reason if the file does not arrive whole.
+pub(super) fn skip(mut pieces: mpsc::Receiver<FilePiece>) -> Result<(), Sentence> {
+    loop {
+        poll();
+        match pieces.blocking_recv() {
+            Some(FilePiece::Bytes(_)) => {}
+            Some(FilePiece::End) => return Ok(()),
+            None => return Err(cut()),
+        }
+    }
+}
+
+/// Returns whether an import reads a file, or names it as unread. Its path may be one that is refused.
+pub(super) fn is_importable(path: &str) -> bool {
     let is_known = |extension: String| importable_extensions().any(|known| known == extension);
-    !path.is_of_system() && extension.is_some_and(is_known)
+    !is_of_system(path) && extension_of(path).is_some_and(is_known)
 }

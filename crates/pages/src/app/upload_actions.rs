@@ -45,7 +45,13 @@ pub(super) async fn begin(
     ActionBody(body): ActionBody<UploadBody>,
 ) -> AppResult<Json<Value>> {
     let name = folder_name(&body.name);
-    let begun = spawn_blocking(move || state.uploads.begin(name, body.files, body.bytes)).await;
+    let begun = spawn_blocking(move || {
+        let folder = &state.options.folder;
+        // Otherwise the files could not be imported.
+        utf8(&PickerRoots::new(folder).allowed(folder)?)?;
+        state.uploads.begin(name, body.files, body.bytes)
+    });
+    let begun = begun.await;
     let id = begun.map_err(|_panicked| WorkFailed)??;
     Ok(Json(json!({ "upload": id })))
 }
@@ -130,7 +136,7 @@ pub(super) async fn end(
     match body.end {
         UploadEnd::Cancel => {
             let cancelled = spawn_blocking(move || upload.cancel()).await;
-            cancelled.map_err(|_panicked| WorkFailed)?;
+            cancelled.map_err(|_panicked| WorkFailed)??;
             Ok(Json(json!({})))
         }
         UploadEnd::Finish => {
@@ -151,24 +157,29 @@ pub(super) async fn end(
 fn chosen(folder: &std::path::Path, placed: PathBuf, query: PageQuery) -> AppResult<PageQuery> {
     let roots = PickerRoots::new(folder);
     let picked = roots.read(&placed)?;
-    let path = |path: &std::path::Path| {
-        let text = path.to_str().map(str::to_owned);
-        text.ok_or_else(|| {
-            let shown = path.display();
-            AppFailure::refused(Sentence::new(
-                format!("{shown} is not UTF-8: rename the folder of the app"),
-                format!("{shown} không phải UTF-8: hãy đổi tên thư mục của ứng dụng"),
-            ))
-        })
-    };
-    let at = path(&picked.path)?;
+    let at = utf8(&picked.path)?;
     let query = query.with("path", &at);
     Ok(match picked.lists.as_slice() {
-        [list] => query.with("list", &path(&picked.path.join(list))?),
+        [list] => query.with("list", &utf8(&picked.path.join(list))?),
         _ if picked.counts.meshes > 0 && picked.counts.prints > 0 => {
             query.with("meshes", &at).with("prints", &at)
         }
         _ => query,
+    })
+}
+
+/// Returns a path in the folder of the app as text.
+///
+/// # Errors
+/// Refuses a path that is not UTF-8.
+fn utf8(path: &std::path::Path) -> AppResult<String> {
+    let text = path.to_str().map(str::to_owned);
+    text.ok_or_else(|| {
+        let shown = path.display();
+        AppFailure::refused(Sentence::new(
+            format!("{shown} is not UTF-8: rename the folder of the app"),
+            format!("{shown} không phải UTF-8: hãy đổi tên thư mục của ứng dụng"),
+        ))
     })
 }
 

@@ -10,6 +10,7 @@ use super::upload_sentence::{MAX_FILES, RESERVE_BYTES};
 use super::uploads::Uploads;
 use super::visit::Visit;
 use mocban_core::domain::one_line;
+use mocban_lists::relative_path::SYSTEM_FOLDERS;
 use mocban_system::platform;
 
 /// Returns the part. The files will be imported into `project`, which may be empty.
@@ -24,6 +25,7 @@ pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Ma
         form #upload.card.upload
             data-project=(project)
             data-extensions=(extensions.join(" "))
+            data-system-folders=(SYSTEM_FOLDERS.join(" "))
             data-files=(visit.t("files", "tệp"))
             data-sending=(visit.t("Receiving the files", "Đang nhận các tệp"))
             data-unpacking=(visit.t("Unpacking", "Đang giải nén"))

@@ -3,6 +3,7 @@
 use std::io::{self, ErrorKind};
 
 use super::byte_size::file_size;
+use super::components::grouped;
 use super::sentence::Sentence;
 use mocban_core::domain::sanitize;
 use mocban_lists::relative_path::PathFault;
@@ -27,12 +28,14 @@ pub(super) fn refused_path(path: &str, fault: &PathFault) -> Sentence {
     let why = match fault {
         PathFault::Outside => "đường dẫn dẫn đến thư mục khác".to_owned(),
         PathFault::TooLong => "tên quá dài".to_owned(),
+        PathFault::TooDeep => "nằm trong quá nhiều thư mục lồng nhau".to_owned(),
         PathFault::Character(c) => format!("tên có ký tự {c:?}"),
         PathFault::Ends => {
             "tên bắt đầu hoặc kết thúc bằng dấu cách, hoặc kết thúc bằng dấu chấm".to_owned()
         }
         PathFault::Device => "tên là tên thiết bị của Windows".to_owned(),
-        PathFault::Twice => "tệp này có hai lần".to_owned(),
+        PathFault::Twice => "tệp này xuất hiện hai lần".to_owned(),
+        PathFault::Folder(other) => format!("{} vừa là tệp vừa là thư mục", shown(other)),
         PathFault::Similar(other) => {
             format!("tên chỉ khác {} ở chữ hoa và chữ thường", shown(other))
         }
@@ -52,7 +55,7 @@ pub(super) fn not_written(error: &io::Error) -> Sentence {
                 file_size(RESERVE_BYTES)
             ),
             format!(
-                "đĩa đã đầy, hoặc sẽ còn trống ít hơn {}, nên không tệp nào được giữ lại: hãy dọn chỗ rồi chọn lại các tệp",
+                "đĩa đã đầy, hoặc sẽ còn trống ít hơn {}, nên không tệp nào được giữ lại: hãy giải phóng dung lượng rồi chọn lại các tệp",
                 file_size(RESERVE_BYTES)
             ),
         ),
@@ -75,16 +78,26 @@ pub(super) fn no_room(bytes: u64, free: u64) -> Sentence {
             "the files need {bytes}, the disk has {free}, and {reserve} must stay free: make room or choose fewer files"
         ),
         format!(
-            "các tệp cần {bytes}, đĩa còn {free}, và phải để trống {reserve}: hãy dọn chỗ hoặc chọn ít tệp hơn"
+            "các tệp cần {bytes}, đĩa còn {free}, và phải để trống {reserve}: hãy giải phóng dung lượng hoặc chọn ít tệp hơn"
         ),
     )
 }
 
 /// Says that there are too many files.
 pub(super) fn too_many() -> Sentence {
+    let most = grouped(MAX_FILES);
     Sentence::new(
-        format!("more than {MAX_FILES} files were chosen: choose fewer at once"),
-        format!("đã chọn hơn {MAX_FILES} tệp: hãy chọn ít tệp hơn mỗi lần"),
+        format!("more than {most} files were chosen: choose fewer at once"),
+        format!("đã chọn hơn {most} tệp: hãy chọn ít tệp hơn mỗi lần"),
+    )
+}
+
+/// Says that files with their folders are too many.
+pub(super) fn too_many_names() -> Sentence {
+    let most = grouped(MAX_FILES);
+    Sentence::new(
+        format!("there are more than {most} files and folders: choose fewer at once"),
+        format!("có hơn {most} tệp và thư mục: hãy chọn ít hơn mỗi lần"),
     )
 }
 
@@ -115,6 +128,7 @@ pub(super) fn cut() -> Sentence {
 
 /// Says that not all files of an upload have arrived.
 pub(super) fn incomplete(arrived: u64, announced: u64) -> Sentence {
+    let [arrived, announced] = [arrived, announced].map(grouped);
     Sentence::new(
         format!(
             "only {arrived} of {announced} files have arrived, so nothing of them was kept: choose them again"
@@ -128,8 +142,8 @@ pub(super) fn incomplete(arrived: u64, announced: u64) -> Sentence {
 /// Says that an earlier program ended during an upload.
 pub(super) fn left_over() -> Sentence {
     Sentence::new(
-        "the program ended before all files of the last upload had arrived; what had arrived was removed: choose the files again",
-        "chương trình dừng trước khi mọi tệp của lần gửi trước đến nơi; phần đã nhận đã được xóa: hãy chọn lại các tệp",
+        "the program ended before the last upload was stored; what had arrived was removed: choose the files again",
+        "chương trình dừng trước khi lần gửi trước được lưu; phần đã nhận đã được xóa: hãy chọn lại các tệp",
     )
 }
 
@@ -146,6 +160,14 @@ pub(super) fn busy() -> Sentence {
     Sentence::new(
         "another file of this upload is still arriving: wait for its end",
         "một tệp khác của lần gửi này vẫn đang đến: hãy chờ đến khi xong",
+    )
+}
+
+/// Says that an upload is already being stored.
+pub(super) fn storing() -> Sentence {
+    Sentence::new(
+        "all files have arrived and are being stored: wait for the end",
+        "mọi tệp đã đến nơi và đang được lưu: hãy chờ đến khi xong",
     )
 }
 
@@ -166,11 +188,25 @@ pub(super) fn refused_archive(archive: &str, error: &ZipError) -> Sentence {
             format!("không giải nén được {archive}: {vietnamese}"),
         )
     };
+    let damaged = |english: &str, vietnamese: &str| {
+        because(
+            &format!("the archive is damaged: {english}; pack the files again"),
+            &format!("tệp nén bị hỏng: {vietnamese}; hãy nén lại"),
+        )
+    };
     match error {
-        ZipError::Io(error) => not_written(error),
+        ZipError::Write(error) => not_written(error),
+        ZipError::Io(error) => because(
+            &format!("it cannot be read ({error}); choose it again"),
+            &format!("không đọc được ({error}); hãy chọn lại"),
+        ),
         ZipError::TooManyFiles => because(
-            &format!("it has more than {MAX_FILES} files; pack fewer"),
-            &format!("có hơn {MAX_FILES} tệp; hãy nén ít tệp hơn"),
+            &format!("it has more than {} files; pack fewer", grouped(MAX_FILES)),
+            &format!("có hơn {} tệp; hãy nén ít tệp hơn", grouped(MAX_FILES)),
+        ),
+        ZipError::LongNames => because(
+            "the names of its files are too long; pack fewer files",
+            "tên các tệp quá dài; hãy nén ít tệp hơn",
         ),
         ZipError::Large => because(
             "it has more than 4 GiB or more than 65,535 files (ZIP64); unpack it yourself and choose the folder",
@@ -189,13 +225,24 @@ pub(super) fn refused_archive(archive: &str, error: &ZipError) -> Sentence {
                 shown(name)
             ),
             &format!(
-                "{} được nén theo cách lạ; hãy nén lại thành ZIP thông thường",
+                "{} được nén theo phương thức không được hỗ trợ; hãy nén lại thành ZIP thông thường",
                 shown(name)
             ),
         ),
-        error => because(
-            &format!("the archive is damaged: {error}; pack the files again"),
-            &format!("tệp nén bị hỏng ({error}); hãy nén lại"),
+        ZipError::NoEnd => damaged("its end is missing", "thiếu phần cuối"),
+        ZipError::Directory => damaged("its directory is incomplete", "mục lục không đầy đủ"),
+        ZipError::Truncated => damaged("it ends early", "bị cắt ngắn"),
+        ZipError::Misplaced(name) => damaged(
+            &format!("{} is not where its directory says", shown(name)),
+            &format!("{} không ở vị trí ghi trong mục lục", shown(name)),
+        ),
+        ZipError::TooLarge(name) => damaged(
+            &format!("{} is larger than its directory says", shown(name)),
+            &format!("{} lớn hơn kích thước ghi trong mục lục", shown(name)),
+        ),
+        ZipError::Damaged(name) => damaged(
+            &format!("the bytes of {} are wrong", shown(name)),
+            &format!("nội dung của {} bị sai", shown(name)),
         ),
     }
 }

@@ -11,15 +11,15 @@ use tokio::task::spawn_blocking;
 
 use super::failure::{AppFailure, AppResult};
 use super::received_archive::unpack;
-use super::received_files::{ARCHIVE, FilePiece, ReceivedCount, ReceivedFiles, check_room};
+use super::received_files::{ARCHIVE, FilePiece, ReceivedCount, ReceivedFiles, check_room, skip};
 use super::sentence::Sentence;
 use super::upload_sentence::{
     MAX_FILES, busy, cut, ended, incomplete, left_over, not_written, nothing, refused_path,
-    too_many, too_many_uploads,
+    storing, too_many, too_many_uploads,
 };
 use crate::local_server::WorkFailed;
 use mocban_core::domain::cancel::{CancelGuard, CancelToken};
-use mocban_lists::relative_path::RelativePath;
+use mocban_lists::relative_path::{RelativePath, is_of_system};
 use mocban_store::NewFolder;
 
 /// Folder of uploads in the folder of the app.
@@ -58,6 +58,8 @@ enum UploadState {
     Ready(Box<ReceivedFiles>, Instant),
     /// A thread has the files.
     Busy(CancelToken),
+    /// A thread gives the files their folder, which cannot be cancelled.
+    Storing,
     /// Nothing is kept, or all has its folder. Says why if it failed.
     Ended(Option<Sentence>),
 }
@@ -67,7 +69,6 @@ enum UploadState {
 pub(super) struct FileInProgress {
     pub(super) pieces: mpsc::Sender<FilePiece>,
     written: tokio::task::JoinHandle<Result<(), Sentence>>,
-    upload: Arc<FileUpload>,
     /// Ends the work if nobody waits for it any more.
     cancels: CancelGuard,
 }
@@ -120,8 +121,14 @@ impl Uploads {
             count,
             state: Mutex::new(UploadState::Ready(received, Instant::now())),
         };
+        let upload = Arc::new(upload);
+        let mut open = self.lock();
+        // Others may have begun meanwhile. The files are removed after the lock.
+        if open.len() >= MAX_OPEN {
+            return refuse(too_many_uploads());
+        }
         let id = self.next.fetch_add(1, Ordering::Relaxed);
-        self.lock().insert(id, Arc::new(upload));
+        open.insert(id, Arc::clone(&upload));
         Ok(id)
     }
 
@@ -149,7 +156,8 @@ impl Uploads {
     /// Says why the last upload failed, until the next one begins.
     pub(super) fn problem(&self) -> Option<Sentence> {
         let open = self.lock();
-        let last = open.values().rev().find_map(|upload| upload.problem());
+        let last = open.last_key_value();
+        let last = last.and_then(|(_, upload)| upload.problem());
         let is_first = open.is_empty() && self.next.load(Ordering::Relaxed) == 1;
         last.or_else(|| (self.has_left_over && is_first).then(left_over))
     }
@@ -168,12 +176,17 @@ impl FileUpload {
     /// of the upload is kept.
     pub(super) fn start(self: &Arc<Self>, path: &str) -> AppResult<FileInProgress> {
         let token = CancelToken::default();
-        let mut received = self.take(&token)?;
+        let mut received = self.take(UploadState::Busy(token.clone()))?;
         let (pieces, arriving) = mpsc::channel(WAITING_PIECES);
         let cancels = CancelGuard(token.clone());
         let (upload, path) = (Arc::clone(self), path.to_owned());
         let written = spawn_blocking(move || {
+            let mut ending = UploadEnding::of(upload);
             let work = token.run(|| {
+                if is_of_system(&path) {
+                    skip(arriving)?;
+                    return Ok(received);
+                }
                 let safe = RelativePath::new(&path);
                 let safe = safe.map_err(|fault| refused_path(&path, &fault))?;
                 if safe.extension().as_deref() == Some(ARCHIVE) {
@@ -187,19 +200,18 @@ impl FileUpload {
             // What is not kept was removed before this.
             let (next, outcome) = match work {
                 Ok(Ok(received)) => {
-                    upload.arrived.fetch_add(1, Ordering::Relaxed);
+                    ending.upload.arrived.fetch_add(1, Ordering::Relaxed);
                     (UploadState::Ready(received, Instant::now()), Ok(()))
                 }
                 Ok(Err(why)) => (UploadState::Ended(Some(why.clone())), Err(why)),
                 Err(_cancelled) => (UploadState::Ended(Some(cut())), Err(cut())),
             };
-            upload.settle(next);
+            ending.next = next;
             outcome
         });
         Ok(FileInProgress {
             pieces,
             written,
-            upload: Arc::clone(self),
             cancels,
         })
     }
@@ -209,9 +221,10 @@ impl FileUpload {
     /// # Errors
     /// Refuses an upload of which files are missing. Nothing of it is kept then.
     pub(super) async fn finish(self: &Arc<Self>) -> AppResult<PathBuf> {
-        let received = self.take(&CancelToken::default())?;
+        let received = self.take(UploadState::Storing)?;
         let upload = Arc::clone(self);
         let placed = spawn_blocking(move || {
+            let mut ending = UploadEnding::of(Arc::clone(&upload));
             let arrived = upload.arrived.load(Ordering::Relaxed);
             let placed = if arrived == upload.announced {
                 received.place(&upload.name)
@@ -219,7 +232,7 @@ impl FileUpload {
                 drop(received);
                 Err(incomplete(arrived, upload.announced))
             };
-            upload.settle(UploadState::Ended(placed.as_ref().err().cloned()));
+            ending.next = UploadState::Ended(placed.as_ref().err().cloned());
             placed
         });
         let placed = placed.await.map_err(|_panicked| WorkFailed)?;
@@ -227,30 +240,41 @@ impl FileUpload {
     }
 
     /// Ends the upload, and removes its files.
-    pub(super) fn cancel(&self) {
-        let before = std::mem::replace(&mut *self.lock(), UploadState::Ended(None));
+    ///
+    /// # Errors
+    /// Refuses an upload whose files get their folder.
+    pub(super) fn cancel(&self) -> AppResult<()> {
+        let before = {
+            let mut state = self.lock();
+            if matches!(*state, UploadState::Storing) {
+                return Err(AppFailure::refused(storing()));
+            }
+            std::mem::replace(&mut *state, UploadState::Ended(None))
+        };
         if let UploadState::Busy(token) = &before {
             token.cancel();
         }
+        Ok(())
     }
 
     /// Says why the upload failed.
     pub(super) fn problem(&self) -> Option<Sentence> {
         match &*self.lock() {
             UploadState::Ended(why) => why.clone(),
-            UploadState::Ready(..) | UploadState::Busy(_) => None,
+            UploadState::Ready(..) | UploadState::Busy(_) | UploadState::Storing => None,
         }
     }
 
-    /// Takes the files for a thread that works on them.
-    fn take(&self, token: &CancelToken) -> AppResult<Box<ReceivedFiles>> {
+    /// Takes the files for a thread that works on them, with the state of the upload meanwhile.
+    fn take(&self, meanwhile: UploadState) -> AppResult<Box<ReceivedFiles>> {
         let mut state = self.lock();
-        match std::mem::replace(&mut *state, UploadState::Busy(token.clone())) {
+        match std::mem::replace(&mut *state, meanwhile) {
             UploadState::Ready(received, _) => Ok(received),
             other => {
                 let why = match &other {
                     UploadState::Ended(Some(why)) => why.clone(),
                     UploadState::Ended(None) => ended(),
+                    UploadState::Storing => storing(),
                     UploadState::Ready(..) | UploadState::Busy(_) => busy(),
                 };
                 *state = other;
@@ -263,7 +287,7 @@ impl FileUpload {
     fn settle(&self, next: UploadState) {
         let mut state = self.lock();
         let unused = match &*state {
-            UploadState::Busy(_) => std::mem::replace(&mut *state, next),
+            UploadState::Busy(_) | UploadState::Storing => std::mem::replace(&mut *state, next),
             UploadState::Ready(..) | UploadState::Ended(_) => next,
         };
         drop(state);
@@ -274,7 +298,7 @@ impl FileUpload {
     fn is_over(&self) -> bool {
         match &*self.lock() {
             UploadState::Ready(_, since) => since.elapsed() > MAX_IDLE,
-            UploadState::Busy(_) => false,
+            UploadState::Busy(_) | UploadState::Storing => false,
             UploadState::Ended(_) => true,
         }
     }
@@ -282,6 +306,28 @@ impl FileUpload {
     fn lock(&self) -> MutexGuard<'_, UploadState> {
         // Each change is a single assignment.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Stores what became of the files of an upload when it is dropped, also after a panic.
+struct UploadEnding {
+    upload: Arc<FileUpload>,
+    next: UploadState,
+}
+
+impl UploadEnding {
+    const fn of(upload: Arc<FileUpload>) -> Self {
+        Self {
+            upload,
+            next: UploadState::Ended(None),
+        }
+    }
+}
+
+impl Drop for UploadEnding {
+    fn drop(&mut self) {
+        let next = std::mem::replace(&mut self.next, UploadState::Ended(None));
+        self.upload.settle(next);
     }
 }
 
@@ -294,18 +340,37 @@ impl FileInProgress {
         let Self {
             pieces,
             written,
-            upload,
             cancels,
         } = self;
         drop(pieces);
         let written = written.await;
         drop(cancels);
-        match written {
-            Ok(written) => written.map_err(AppFailure::refused),
-            Err(_panicked) => {
-                upload.settle(UploadState::Ended(None));
-                Err(WorkFailed.into())
-            }
-        }
+        let written = written.map_err(|_panicked| WorkFailed)?;
+        written.map_err(AppFailure::refused)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::{UploadEnding, UploadState, Uploads};
+
+    #[test]
+    fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let uploads = Uploads::new(dir.path());
+        let id = uploads.begin("x".to_owned(), 1, 1).expect("begun");
+        let upload = uploads.find(id).expect("an upload");
+        let received = upload.take(UploadState::Storing).expect("ready");
+        upload.cancel().expect_err("it is stored");
+        upload
+            .take(UploadState::Storing)
+            .expect_err("it is stored already");
+        assert!(!upload.is_over());
+        drop(received);
+        drop(UploadEnding::of(Arc::clone(&upload)));
+        assert!(upload.is_over(), "its place is free");
+        upload.cancel().expect("nothing to do");
     }
 }

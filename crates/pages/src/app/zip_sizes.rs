@@ -10,25 +10,38 @@ use mocban_export::{ExportVersion, zip_size};
 #[derive(Debug, Clone, Default)]
 pub(super) struct ZipSizes(Arc<Mutex<BTreeMap<PathBuf, KnownSize>>>);
 
-/// The size of the archive of an export in bytes; `None` while it is worked out, or if it has none.
-type KnownSize = (ExportVersion, Option<u64>);
+/// What is known about the size of the archive of an export.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ZipSize {
+    /// It is being worked out.
+    InWork,
+    /// In bytes.
+    Bytes(u64),
+    /// There is no archive, because the folder has no manifest or its files cannot be listed.
+    NoArchive,
+}
+
+/// An export, and the size of its archive.
+type KnownSize = (ExportVersion, ZipSize);
 
 impl ZipSizes {
-    /// Returns the size of the archive of an export in bytes. The first call for an export begins to work it out.
-    pub(super) fn get(&self, dir: &Path, folder: &str) -> Option<u64> {
-        let version = ExportVersion::of(dir)?;
+    /// Returns the size of the archive of an export. The first call for an export begins to work it out.
+    pub(super) fn get(&self, dir: &Path, folder: &str) -> ZipSize {
+        let Some(version) = ExportVersion::of(dir) else {
+            return ZipSize::NoArchive;
+        };
         let mut sizes = self.lock();
         if let Some((_, size)) = sizes.get(dir).filter(|(known, _)| *known == version) {
             return *size;
         }
         sizes.retain(|dir, _| dir.is_dir());
-        sizes.insert(dir.to_owned(), (version, None));
+        sizes.insert(dir.to_owned(), (version, ZipSize::InWork));
         let (sizes, dir, folder) = (self.clone(), dir.to_owned(), folder.to_owned());
         tokio::task::spawn_blocking(move || {
-            let size = zip_size(&dir, &folder).ok();
+            let size = zip_size(&dir, &folder).map_or(ZipSize::NoArchive, ZipSize::Bytes);
             sizes.lock().insert(dir, (version, size));
         });
-        None
+        ZipSize::InWork
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<PathBuf, KnownSize>> {

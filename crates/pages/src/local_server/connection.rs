@@ -87,7 +87,7 @@ pub(super) enum ConnectionEnd {
 /// What a connection is doing.
 #[derive(Debug)]
 pub(super) struct Activity {
-    /// Start of the idle time, or `None` while a request is served.
+    /// Start of the idle time, or `None` while a request is served or the next part of a response is created.
     idle_since: Mutex<Option<Instant>>,
     /// Notified if the connection must close once it is idle.
     pub(super) close: Notify,
@@ -104,7 +104,7 @@ impl Activity {
         }
     }
 
-    /// Returns the start of the idle time, or `None` while a request is served.
+    /// Returns the start of the idle time, or `None` while a request is served or the next part of a response is created.
     pub(super) fn idle_since(&self) -> Option<Instant> {
         *self.lock()
     }
@@ -216,16 +216,29 @@ impl Service<Request<Incoming>> for RequestCounter {
         Box::pin(async move {
             let Ok(response) = response.await;
             drop(in_progress);
-            Ok(response.map(|body| Body::new(SentBody { body, activity })))
+            Ok(response.map(|body| Body::new(SentBody::new(body, activity))))
         })
     }
 }
 
-/// The body of a response, whose parts are asked for as fast as the client reads them.
+/// The body of a response, whose parts are asked for as fast as the client reads them. Only the client's time counts as
+/// idle, not the time in which the server creates the next part.
 #[derive(Debug)]
 struct SentBody {
     body: Body,
     activity: Arc<Activity>,
+    /// The next part, while the server creates it.
+    next_part: Option<RequestInProgress>,
+}
+
+impl SentBody {
+    const fn new(body: Body, activity: Arc<Activity>) -> Self {
+        Self {
+            body,
+            activity,
+            next_part: None,
+        }
+    }
 }
 
 impl HttpBody for SentBody {
@@ -233,12 +246,16 @@ impl HttpBody for SentBody {
     type Error = <Body as HttpBody>::Error;
 
     fn poll_frame(
-        mut self: Pin<&mut Self>,
+        self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Self::Data>, Self::Error>>> {
-        let polled = Pin::new(&mut self.body).poll_frame(context);
+        let this = self.get_mut();
+        let polled = Pin::new(&mut this.body).poll_frame(context);
         if polled.is_ready() {
-            self.activity.proceed();
+            this.next_part = None;
+            this.activity.proceed();
+        } else if this.next_part.is_none() {
+            this.next_part = Some(this.activity.begin());
         }
         polled
     }
@@ -249,5 +266,60 @@ impl HttpBody for SentBody {
 
     fn size_hint(&self) -> SizeHint {
         self.body.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+    use std::pin::Pin;
+    use std::sync::Arc;
+    use std::task::{Context, Poll, Waker};
+    use std::time::Duration;
+
+    use axum::body::{Body, HttpBody as _};
+    use futures_util::stream;
+    use tokio::time::Instant;
+
+    use super::{Activity, SentBody};
+
+    #[test]
+    fn a_response_is_idle_only_while_the_client_reads_a_part() {
+        let activity = Arc::new(Activity::new(Arc::default()));
+        let mut polls = 0;
+        let parts = stream::poll_fn(move |_| {
+            polls += 1;
+            match polls {
+                2 => Poll::Ready(Some(Ok::<_, Infallible>("part"))),
+                4 => Poll::Ready(None),
+                _ => Poll::Pending,
+            }
+        });
+        let mut body = SentBody::new(Body::from_stream(parts), Arc::clone(&activity));
+        let mut poll = || Pin::new(&mut body).poll_frame(&mut Context::from_waker(Waker::noop()));
+        for is_ready in [false, true, false, true] {
+            assert_eq!(poll().is_ready(), is_ready);
+            assert_eq!(activity.idle_since().is_some(), is_ready);
+        }
+        // The client may be gone before the next part is there.
+        let never = stream::pending::<Result<&str, Infallible>>();
+        let mut body = SentBody::new(Body::from_stream(never), Arc::clone(&activity));
+        let polled = Pin::new(&mut body).poll_frame(&mut Context::from_waker(Waker::noop()));
+        assert!(polled.is_pending() && activity.idle_since().is_none());
+        drop(body);
+        assert!(activity.idle_since().is_some());
+    }
+
+    #[test]
+    fn a_part_that_was_sent_begins_the_idle_time_anew() {
+        let activity = Arc::new(Activity::new(Arc::default()));
+        let minute = Duration::from_mins(1);
+        let earlier = Instant::now().checked_sub(minute);
+        *activity.lock() = earlier;
+        activity.proceed();
+        assert!(activity.idle_since() > earlier);
+        *activity.lock() = None;
+        activity.proceed();
+        assert_eq!(activity.idle_since(), None, "a request is served");
     }
 }

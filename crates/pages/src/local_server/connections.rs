@@ -113,15 +113,12 @@ impl OpenConnections {
 
 #[cfg(test)]
 mod tests {
-    use std::convert::Infallible;
     use std::net::SocketAddr;
     use std::sync::Arc;
     use std::time::Duration;
 
     use axum::Router;
-    use axum::body::Body;
     use axum::routing::get;
-    use futures_util::{StreamExt as _, stream};
     use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
     use tokio::net::{TcpListener, TcpStream};
     use tokio::sync::{Notify, Semaphore, oneshot};
@@ -132,7 +129,7 @@ mod tests {
 
     const NEVER: Duration = Duration::from_hours(1);
 
-    /// A server for tests. `/` responds at once, `/wait` only after a permit was added, `/parts` sends a part for each permit.
+    /// A server for tests. `/` responds at once, `/wait` only after a permit was added.
     struct TestServer {
         address: SocketAddr,
         permits: Arc<Semaphore>,
@@ -145,28 +142,15 @@ mod tests {
     impl TestServer {
         async fn start(limits: ConnectionLimits) -> Self {
             let (permits, begun) = (Arc::new(Semaphore::new(0)), Arc::new(Notify::new()));
-            let (waits, tells) = (Arc::clone(&permits), Arc::clone(&begun));
+            let (waits, signal) = (Arc::clone(&permits), Arc::clone(&begun));
             let wait = get(async move || {
-                tells.notify_one();
+                signal.notify_one();
                 waits.acquire().await.expect("an open semaphore").forget();
                 "waited"
             });
-            let (waits, tells) = (Arc::clone(&permits), Arc::clone(&begun));
-            let parts = get(async move || {
-                let parts = stream::iter(0..9).then(move |_| {
-                    let (waits, tells) = (Arc::clone(&waits), Arc::clone(&tells));
-                    async move {
-                        tells.notify_one();
-                        waits.acquire().await.expect("an open semaphore").forget();
-                        Ok::<_, Infallible>("part")
-                    }
-                });
-                Body::from_stream(parts)
-            });
             let router = Router::new()
                 .route("/", get(async || "hello"))
-                .route("/wait", wait)
-                .route("/parts", parts);
+                .route("/wait", wait);
             let listener = TcpListener::bind("127.0.0.1:0").await.expect("a socket");
             let address = listener.local_addr().expect("an address");
             let (stop, stopped) = oneshot::channel();
@@ -296,22 +280,6 @@ mod tests {
         tokio::time::sleep(Duration::from_millis(60)).await;
         server.permits.add_permits(1);
         assert!(rest(slow).await.ends_with("waited"));
-    }
-
-    #[tokio::test]
-    async fn a_long_response_is_sent_while_the_client_reads_it() {
-        let server = TestServer::start(ConnectionLimits {
-            response: Duration::from_secs(1),
-            ..limits()
-        })
-        .await;
-        let slow = server.get("/parts").await;
-        for _ in 0..9 {
-            server.begun.notified().await;
-            tokio::time::sleep(Duration::from_millis(150)).await;
-            server.permits.add_permits(1);
-        }
-        assert_eq!(rest(slow).await.matches("part").count(), 9);
     }
 
     #[tokio::test]

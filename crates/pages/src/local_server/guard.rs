@@ -80,8 +80,16 @@ const WRONG_TOKEN: Rejection = (
     "the server was restarted; reload the page",
 );
 
-/// The body is too large.
-const TOO_LARGE: Rejection = (StatusCode::PAYLOAD_TOO_LARGE, "the request is too large");
+/// The body of a guest is larger than [`GUEST_BODY_LIMIT`].
+const GUEST_TOO_LARGE: Rejection = (
+    StatusCode::PAYLOAD_TOO_LARGE,
+    "the request is too large: at most 16 KiB are accepted",
+);
+/// The body of the user is larger than [`BODY_LIMIT`].
+const TOO_LARGE: Rejection = (
+    StatusCode::PAYLOAD_TOO_LARGE,
+    "the request is too large: at most 256 KiB are accepted",
+);
 /// The body did not arrive in time.
 const TOO_SLOW: Rejection = (
     StatusCode::REQUEST_TIMEOUT,
@@ -100,15 +108,15 @@ pub(super) async fn guard(
         Ok(uri) => {
             let is_file = takes_files(&access, &uri);
             *request.uri_mut() = uri;
-            let limit = if access.is_guest() {
-                GUEST_BODY_LIMIT
+            let (limit, too_large) = if access.is_guest() {
+                (GUEST_BODY_LIMIT, GUEST_TOO_LARGE)
             } else {
-                BODY_LIMIT
+                (BODY_LIMIT, TOO_LARGE)
             };
             if is_file {
                 Ok(request)
             } else {
-                with_whole_body(request, limit).await
+                with_whole_body(request, limit, too_large).await
             }
         }
         Err(rejection) => Err(rejection),
@@ -195,13 +203,17 @@ pub fn asks_for_page(headers: &HeaderMap) -> bool {
     text(headers, header::ACCEPT).is_some_and(|accepted| accepted.contains("text/html"))
 }
 
-/// Reads the whole body first, so that no handler waits for a slow client.
-async fn with_whole_body(request: Request, limit: usize) -> Result<Request, Rejection> {
+/// Reads the whole body first, so that no handler waits for a slow client. Rejects one beyond the limit with `too_large`.
+async fn with_whole_body(
+    request: Request,
+    limit: usize,
+    too_large: Rejection,
+) -> Result<Request, Rejection> {
     let (head, body) = request.into_parts();
     match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, limit)).await {
         Ok(Ok(body)) => Ok(Request::from_parts(head, body.into())),
         // Also returned if the client closed the connection, but then nobody reads it.
-        Ok(Err(_)) => Err(TOO_LARGE),
+        Ok(Err(_)) => Err(too_large),
         Err(_) => Err(TOO_SLOW),
     }
 }

@@ -13,7 +13,16 @@ fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPairs, M
         root: root.into(),
         files: files.to_vec(),
     };
-    super::pair_folders(&listed("m", meshes), &listed("p", prints))
+    paired(&listed("m", meshes), &listed("p", prints))
+}
+
+/// Pairs files without changes. Refuses folders without a pair.
+fn paired(meshes: &ListedFolder, prints: &ListedFolder) -> Result<FolderPairs, ManifestError> {
+    let mut found = super::pair_folders(meshes, prints, &PairingChanges::default())?;
+    match found.no_pair.take() {
+        Some(why) => Err(why),
+        None => Ok(found),
+    }
 }
 
 /// Returns ids and blocks.
@@ -67,7 +76,7 @@ fn meshes_and_prints_may_be_in_one_folder_per_block() {
         ["d/b1/que\u{301}t/1.stl", "d/b1/a\u{309}nh in/1.png"],
     ] {
         let both = root(&[mesh, print, "d/notes.txt"]);
-        let found = super::pair_folders(&both, &both).expect("a pair");
+        let found = paired(&both, &both).expect("a pair");
         assert_eq!(ids(&found), [("b1_1", "b1")], "{mesh}");
         assert_eq!(found.ignored, files(&["d/notes.txt"]));
         assert!(found.meshes_alone.is_empty() && found.prints_alone.is_empty());
@@ -186,6 +195,12 @@ fn stems_that_are_not_valid_ids_are_reported_by_file() {
         none.expect_err("no pair").to_string(),
         "no mesh has the same file name as a print"
     );
+    let apart = pair_folders(&files(&["m/F/3D/1.stl"]), &files(&["p/F/Anh/1.png"]));
+    let apart = apart.expect_err("no pair").to_string();
+    assert!(
+        apart.contains("their folders \"F/3D\" and \"F/Anh\" differ"),
+        "{apart}"
+    );
 }
 
 #[test]
@@ -206,7 +221,7 @@ fn a_person_leaves_pairs_out_and_joins_files_without_a_partner() {
                 .map(|(mesh, print)| ((*mesh).to_owned(), (*print).to_owned()))
                 .collect(),
         };
-        let found = super::pair_folders_with(&meshes, &prints, &changes);
+        let found = super::pair_folders(&meshes, &prints, &changes);
         let found = found.map_err(|error| error.to_string())?;
         let rows = found.rows.iter();
         let rows = rows.map(|row| format!("{} {}", row.name, row.print.display()));
@@ -221,7 +236,8 @@ fn a_person_leaves_pairs_out_and_joins_files_without_a_partner() {
     let swapped = pairs(&["1", "2"], &[("1.stl", "2.png"), ("2.stl", "1.png")]);
     assert_eq!(swapped, plain("1 p/2.png, 2 p/1.png"));
     let (none, why) = pairs(&["1", "2"], &[]).expect("no pair");
-    assert!(none.is_empty() && why.is_some());
+    let why = why.expect("a reason").to_string();
+    assert!(none.is_empty() && why.starts_with("all pairs are left out"));
     for (left_out, joined, expected) in [
         (&["7"][..], &[][..], "there is no pair \"7\" to leave out"),
         (
