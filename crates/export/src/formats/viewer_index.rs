@@ -86,7 +86,7 @@ pub(super) fn index_item(pair: &PairFields, shown: &MetricFields) -> String {
             img src={ (folder) "/overlay.jpg" } alt="" loading="lazy" width="190" height="190";
             span { b { (pair.id) } @if let Some(character) = &pair.character { " " span lang="zh-Hant" { (character) } } }
             @if let Some(block) = &pair.block { span { (block) } }
-            @if let Some(confidence) = shown.confidence { span { (format!("{confidence:.2}")) } }
+            @if let Some(confidence) = shown.confidence { span { "confidence " (format!("{confidence:.2}")) } }
         } }
     };
     item.into_string() + "\n"
