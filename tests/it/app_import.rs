@@ -47,16 +47,16 @@ fn import(page: &Page, fields: &Value) -> Reply {
 
 /// Returns ids and prints of a project.
 fn stored(dir: &Path) -> Vec<(String, String)> {
-    let listed = mocban(&dir.join("new"), &["status", "--pairs", "--json"]).expect(0);
-    let lines = listed.out.lines();
-    let rows = lines.filter_map(|line| serde_json::from_str::<Value>(line).ok());
-    let pairs = rows.filter_map(|row| {
-        let id = row["id"].as_str()?.to_owned();
+    let status = mocban(&dir.join("new"), &["status", "--pairs", "--json"]).expect(0);
+    let status = status.json();
+    let pairs = status["pair_list"].as_array().expect("pairs").iter();
+    let print = |pair: &Value| {
+        let id = pair["id"].as_str().expect("an id").to_owned();
         let shown = mocban(&dir.join("new"), &["show", &id, "--json"]).expect(0);
-        let print = shown.json()["print"]["path"].to_string();
-        Some((id, print))
-    });
-    pairs.collect()
+        let print = shown.json()["print_path"].to_string();
+        (id, print)
+    };
+    pairs.map(print).collect()
 }
 
 const INPUTS: [(&str, &str); 6] = [
