@@ -313,6 +313,11 @@ fn a_connection_that_is_cut_leaves_nothing_and_the_next_upload_starts_again() {
     assert!(second.contains("is still arriving"), "{second}");
     drop(stream);
     wait_for(dir.path(), &[]);
+    // The files are removed before the upload is known to have failed.
+    while page.get(&format!("/uploads/{upload}")).status != 422 {
+        assert!(Instant::now() < deadline, "the upload does not end");
+        pause();
+    }
     let refused = refusal(&put(&page, &upload, "1.stl", b"solid"));
     assert!(refused.contains("the connection was cut"), "{refused}");
     assert!(text(&page.get("/import")).contains("the connection was cut"));
