@@ -72,7 +72,7 @@ pub(super) fn not_written(error: &io::Error) -> Sentence {
 
 /// Says that files need more room than the disk has.
 pub(super) fn no_room(bytes: u64, free: u64) -> Sentence {
-    let [bytes, free, reserve] = [bytes, free, RESERVE_BYTES].map(size);
+    let [bytes, free, reserve] = [bytes, free, RESERVE_BYTES].map(file_size);
     Sentence::new(
         format!(
             "the files need {bytes}, the disk has {free}, and {reserve} must stay free: make room or choose fewer files"
