@@ -15,7 +15,8 @@ fn copy_inputs(dir: &Path, files: &[(&str, &str)]) {
     for (from, to) in files {
         let (from, to) = (dir.join("p/data").join(from), dir.join(to));
         std::fs::create_dir_all(to.parent().expect("a folder")).expect("created");
-        std::fs::copy(&from, to).unwrap_or_else(|error| panic!("{}: {error}", from.display()));
+        let copied = std::fs::copy(&from, to);
+        assert!(copied.is_ok(), "{}: {copied:?}", from.display());
     }
 }
 

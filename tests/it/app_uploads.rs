@@ -112,7 +112,7 @@ fn pair_files(dir: &Path) -> Vec<(String, PathBuf)> {
                 let is_it = path.file_stem().is_some_and(|stem| stem == pair);
                 is_it.then_some(path)
             });
-            let file = file.unwrap_or_else(|| panic!("{folder}/{pair}.{ending}"));
+            let file = file.unwrap_or_else(|| unreachable!("{folder}/{pair}.{ending}"));
             let ending = file.extension().and_then(|end| end.to_str());
             let name = format!("{folder}/chữ {pair}.{}", ending.expect("an extension"));
             found.push((name, file));
@@ -404,9 +404,12 @@ fn only_the_page_itself_may_send_files() {
         assert_eq!(reply.status, status, "{name}: {value}");
     }
     // Only the route of files takes more than an action has.
-    let large = json!({"name": "x".repeat(20_000), "files": 1, "bytes": 1});
+    let large = json!({"name": "x".repeat(300_000), "files": 1, "bytes": 1});
     assert_eq!(act(&page, "/actions/upload", &large, |_| {}).status, 413);
-    assert_eq!(put(&page, &upload, "1.stl", &[b'x'; 100_000]).status, 200);
+    assert_eq!(
+        put(&page, &upload, "1.stl", &vec![b'x'; 100_000]).status,
+        200
+    );
     assert_eq!(end(&page, &upload, "finish").status, 200);
     assert_eq!(stored(dir.path()), ["x/1.stl"]);
     assert_eq!(put(&page, &json!(99), "1.stl", b"x").status, 422);

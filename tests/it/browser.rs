@@ -348,7 +348,7 @@ impl Tab<'_> {
             "ArrowUp" => (code, 38),
             "ArrowRight" => (code, 39),
             "ArrowDown" => (code, 40),
-            other => panic!("no test presses {other}"),
+            other => unreachable!("no test presses {other}"),
         };
         for kind in ["rawKeyDown", "keyUp"] {
             let event = json!({

@@ -124,7 +124,7 @@ impl BentBlock {
         let near = 8.0 * self.number("mesh_unit_per_px");
         let is_near = |corner: &[f64; 3]| (0..3).all(|k| (corner[k] - point[k]).abs() < near);
         let mut nearest = f64::INFINITY;
-        for corners in self.mesh.triangles.iter() {
+        for corners in &self.mesh.triangles {
             if !is_near(&self.mesh.vertices.at(corners[0] as usize)) {
                 continue;
             }

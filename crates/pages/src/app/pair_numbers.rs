@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn numbers_and_their_difference_have_a_sign_and_a_unit() {
         let mut first = test_fixtures::metric(ThresholdMetric::Density, 0.5, &[]).outcome;
-        let mut second = first.clone();
+        let mut second = first;
         (first.angle_deg, second.angle_deg) = (-179.0, 178.5);
         (first.confidence, second.confidence) = (Some(0.25), None);
         let of = |name: &str| NUMBERS.iter().find(|number| number.name[0] == name);

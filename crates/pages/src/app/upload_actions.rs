@@ -1,6 +1,6 @@
 //! What a browser asks for to send files: an upload, each of its files, and its end.
 
-use std::path::PathBuf;
+use std::path::Path as FilePath;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -144,7 +144,7 @@ pub(super) async fn end(
             let left_out = upload.count.left_out.load(Ordering::Relaxed);
             let query = PageQuery::default().with("project", &body.project);
             let folder = state.options.folder.clone();
-            let chosen = spawn_blocking(move || chosen(&folder, placed, query)).await;
+            let chosen = spawn_blocking(move || chosen(&folder, &placed, &query)).await;
             let chosen = chosen.map_err(|_panicked| WorkFailed)??;
             let left_out = (left_out > 0).then(|| left_out.to_string());
             let query = chosen.with("left_out", &left_out.unwrap_or_default());
@@ -154,9 +154,9 @@ pub(super) async fn end(
 }
 
 /// Chooses the files of a folder for an import: its list, if it has one, or else its scans and prints.
-fn chosen(folder: &std::path::Path, placed: PathBuf, query: PageQuery) -> AppResult<PageQuery> {
+fn chosen(folder: &FilePath, placed: &FilePath, query: &PageQuery) -> AppResult<PageQuery> {
     let roots = PickerRoots::new(folder);
-    let picked = roots.read(&placed)?;
+    let picked = roots.read(placed)?;
     let at = utf8(&picked.path)?;
     let query = query.with("path", &at);
     Ok(match picked.lists.as_slice() {
@@ -172,7 +172,7 @@ fn chosen(folder: &std::path::Path, placed: PathBuf, query: PageQuery) -> AppRes
 ///
 /// # Errors
 /// Refuses a path that is not UTF-8.
-fn utf8(path: &std::path::Path) -> AppResult<String> {
+fn utf8(path: &FilePath) -> AppResult<String> {
     let text = path.to_str().map(str::to_owned);
     text.ok_or_else(|| {
         let shown = path.display();
