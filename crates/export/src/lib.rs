@@ -51,6 +51,7 @@ mod source_print;
 mod split;
 mod stage_outcomes;
 mod table_columns;
+mod zip_error;
 mod zip_folder;
 mod zip_listing;
 
@@ -72,4 +73,5 @@ pub use record::{
 };
 pub use source_print::{SourcePrint, SourcePrintError};
 pub use split::{SplitBy, SplitCounts, SplitSettings, SplitShares};
-pub use zip_folder::{ExportVersion, FolderZip, FolderZipError, zip_size};
+pub use zip_error::FolderZipError;
+pub use zip_folder::{ExportVersion, FolderZip, zip_size};

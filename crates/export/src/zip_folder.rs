@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use super::manifest::MANIFEST;
+use super::zip_error::{FolderZipError, file_error, temporary_error};
 use super::zip_listing::list_files;
 use mocban_core::zip_records::{ArchiveLayout, Crc, StoredFile};
 use mocban_system::platform::{FileId, stat};
@@ -15,34 +16,6 @@ use mocban_system::platform::{FileId, stat};
 const READ_ONCE: u64 = 1 << 20;
 /// Bytes that are read at a time.
 const BUFFER: usize = 128 * 1024;
-
-/// Why an export cannot be written as an archive.
-#[derive(Debug, thiserror::Error)]
-pub enum FolderZipError {
-    /// There is no export.
-    #[error("there is no export in {0}; export again")]
-    NoExport(PathBuf),
-    /// The name of a file cannot be stored.
-    #[error("the name of {0} is too long or not UTF-8; rename it or export again")]
-    Name(PathBuf),
-    /// The export or one of its files changed while it was read.
-    #[error("{0} was changed or replaced meanwhile; download again")]
-    Changed(PathBuf),
-    /// An operation on a file failed.
-    #[error("{path}: {source}")]
-    File {
-        /// Which file or folder.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The folders are nested too deeply.
-    #[error("the folders in {0} are nested too deeply; remove it or export again")]
-    TooDeep(PathBuf),
-    /// The archive cannot be written to its destination.
-    #[error("the archive cannot be written: {0}")]
-    Output(io::Error),
-}
 
 /// Which export a folder holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -223,18 +196,6 @@ fn reread(written: BufWriter<File>) -> Result<BufReader<File>, FolderZipError> {
     let mut file = file.map_err(|error| temporary_error(error.into_error()))?;
     file.seek(SeekFrom::Start(0)).map_err(temporary_error)?;
     Ok(BufReader::new(file))
-}
-
-/// Explains an error of a temporary file.
-pub(super) fn temporary_error(source: io::Error) -> FolderZipError {
-    file_error(&std::env::temp_dir(), source)
-}
-
-pub(super) fn file_error(path: &Path, source: io::Error) -> FolderZipError {
-    FolderZipError::File {
-        path: path.to_owned(),
-        source,
-    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::manifest::MANIFEST;
-use super::zip_folder::{FolderZipError, file_error, temporary_error};
+use super::zip_error::{FolderZipError, file_error, temporary_error};
 use mocban_core::zip_records::{ArchiveLayout, MAX_NAME, StoredFile};
 
 /// How deep the folders of an export are at most.

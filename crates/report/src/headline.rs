@@ -8,12 +8,12 @@ use super::accuracy_sentence::accuracy;
 use super::comparison::{Basis, Comparison, MIN_PAIRS, TOO_FEW_TO_ESTIMATE, sample_size};
 use super::model::{BlockCounts, MetricRow, Report};
 use mocban_core::domain::{MetricOutcome, ThresholdMetric};
-use mocban_results::number_format::{counted, format_count, format_p, joined};
+use mocban_results::number_format::{format_count, format_p, joined};
 use mocban_results::stats::SIGNIFICANCE_LEVEL;
 
 /// Returns the paragraphs, in order. There are fewer than three if there are no results.
 pub(super) fn headline(report: &Report) -> Vec<String> {
-    let blocks = report.block_progress.and_then(unfinished_blocks);
+    let blocks = report.block_progress.and_then(BlockCounts::unfinished);
     if report.pairs == 0 {
         let sentence = match blocks {
             Some(blocks) => format!("The project has no pairs yet: {blocks}."),
@@ -33,25 +33,6 @@ pub(super) fn headline(report: &Report) -> Vec<String> {
         sentences.push(significance(report));
     }
     sentences
-}
-
-/// Returns the clause on blocks whose pairs are not all known, or `None` if every block is done.
-fn unfinished_blocks(blocks: BlockCounts) -> Option<String> {
-    let parts = [
-        (blocks.failed, "failed", "failed"),
-        (blocks.pending, "is not finished", "are not finished"),
-    ];
-    let parts = parts.into_iter().filter(|(n, _, _)| *n > 0);
-    let parts: Vec<String> = parts
-        .map(|(n, one, more)| {
-            format!(
-                "{} {}",
-                counted(n, "block"),
-                if n == 1 { one } else { more }
-            )
-        })
-        .collect();
-    (!parts.is_empty()).then(|| parts.join(" and "))
 }
 
 /// Returns the sentence on how many pairs are aligned, failed and not finished.
@@ -232,11 +213,11 @@ fn without_basis(report: &Report) -> String {
 mod tests {
     use super::headline;
     use crate::test_fixtures::long_sentences;
-    use crate::{BlockCounts, Report, ReportAccumulator, test_fixtures};
+    use crate::{Report, ReportAccumulator, test_fixtures};
     use mocban_catalog::PairResults;
     use mocban_core::domain::ThresholdMetric::{Density, Ensemble};
     use mocban_core::domain::Verdict::{Fail, Pass};
-    use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict};
+    use mocban_core::domain::{FailureClass, ThresholdMetric, Verdict};
     use mocban_results::{AttentionCheckRates, IntervalMethod, Rate, TruthEvaluation};
 
     /// Returns a report on `n` pairs whose verdicts `verdict` chooses, by pair and metric.
@@ -337,27 +318,6 @@ mod tests {
             found[2].starts_with("Reviewers judged the results of one metric only"),
             "{found:?}"
         );
-    }
-
-    #[test]
-    fn blocks_whose_characters_are_missing_are_told() {
-        let mut report = ReportAccumulator::default();
-        let pair = test_fixtures::done("p", 0.8, &[Pass]);
-        report.add(&pair, &TruthEvaluation::default());
-        let states = [
-            JobStatus::Done,
-            JobStatus::Quarantined,
-            JobStatus::Ready,
-            JobStatus::Leased,
-        ];
-        report.set_block_progress(BlockCounts::of(states));
-        let first = &report.finish().headline[0];
-        let end = " Characters are missing: 1 block failed and 2 blocks are not finished.";
-        assert!(first.ends_with(end), "{first}");
-        let mut empty = ReportAccumulator::default();
-        empty.set_block_progress(BlockCounts::of([JobStatus::Quarantined]));
-        let expected = ["The project has no pairs yet: 1 block failed."];
-        assert_eq!(empty.finish().headline, expected);
     }
 
     #[test]

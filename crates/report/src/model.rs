@@ -17,7 +17,7 @@ use mocban_catalog::SetApart;
 use mocban_core::domain::{FailureClass, JobStatus, PairName, Reason, Stage, ThresholdMetric};
 use mocban_results::attention_checks::AttentionCheckRates;
 use mocban_results::manual_alignment::ManualAlignmentErrors;
-use mocban_results::number_format::count_list;
+use mocban_results::number_format::{count_list, counted};
 use mocban_results::stats::IntervalMethod;
 
 /// Version of the JSON form.
@@ -100,16 +100,30 @@ pub struct BlockCounts {
 impl BlockCounts {
     /// Counts the blocks of a project. Returns `None` if it has none.
     pub(super) fn of(states: impl IntoIterator<Item = JobStatus>) -> Option<Self> {
-        let mut counted = None;
+        let mut all = None;
         for status in states {
-            let numbers: &mut Self = counted.get_or_insert_default();
+            let numbers: &mut Self = all.get_or_insert_default();
             *match status {
                 JobStatus::Done => &mut numbers.done,
                 JobStatus::Quarantined => &mut numbers.failed,
                 JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => &mut numbers.pending,
             } += 1;
         }
-        counted
+        all
+    }
+
+    /// Returns the clause on blocks whose pairs are not all known, or `None` if every block is done.
+    pub(super) fn unfinished(self) -> Option<String> {
+        let parts = [
+            (self.failed, "failed", "failed"),
+            (self.pending, "is not finished", "are not finished"),
+        ];
+        let parts = parts.into_iter().filter(|(n, _, _)| *n > 0);
+        let verb = |n, one, more| if n == 1 { one } else { more };
+        let parts: Vec<String> = parts
+            .map(|(n, one, more)| format!("{} {}", counted(n, "block"), verb(n, one, more)))
+            .collect();
+        (!parts.is_empty()).then(|| parts.join(" and "))
     }
 }
 

@@ -54,8 +54,8 @@ pub fn missing(report: &Report) -> Vec<String> {
 mod tests {
     use super::{below, missing};
     use crate::test_fixtures;
-    use crate::{Report, ReportAccumulator};
-    use mocban_core::domain::{FailureClass, Verdict};
+    use crate::{BlockCounts, Report, ReportAccumulator};
+    use mocban_core::domain::{FailureClass, JobStatus, Verdict};
     use mocban_results::TruthEvaluation;
 
     fn report(verdicts: &[Option<Verdict>]) -> Report {
@@ -104,5 +104,30 @@ mod tests {
         tally.add(&test_fixtures::done("a", 0.8, &[Verdict::Pass]), &none);
         tally.add(&test_fixtures::failed("b", FailureClass::Io, "gone"), &none);
         assert_eq!(missing(&tally.finish()), ["failed pairs: 1"]);
+    }
+
+    #[test]
+    fn blocks_whose_characters_are_missing_are_told() {
+        let mut accumulated = ReportAccumulator::default();
+        let pair = test_fixtures::done("p", 0.8, &[Verdict::Pass]);
+        accumulated.add(&pair, &TruthEvaluation::default());
+        accumulated.set_block_progress(BlockCounts::of([
+            JobStatus::Done,
+            JobStatus::Quarantined,
+            JobStatus::Ready,
+            JobStatus::Leased,
+        ]));
+        let report = accumulated.finish();
+        assert_eq!(
+            missing(&report),
+            ["failed blocks: 1", "unfinished blocks: 2"]
+        );
+        let first = &report.headline[0];
+        let end = " Characters are missing: 1 block failed and 2 blocks are not finished.";
+        assert!(first.ends_with(end), "{first}");
+        let mut empty = ReportAccumulator::default();
+        empty.set_block_progress(BlockCounts::of([JobStatus::Quarantined]));
+        let expected = ["The project has no pairs yet: 1 block failed."];
+        assert_eq!(empty.finish().headline, expected);
     }
 }

@@ -4,6 +4,7 @@ use axum::response::Html;
 use maud::{Markup, html};
 
 use super::address::encoded;
+pub(super) use super::byte_size::grouped;
 use super::sentence::without_commands;
 use super::visit::Visit;
 use crate::local_server::document;
@@ -141,19 +142,6 @@ pub(super) fn figure(number: u64, name: &str, href: Option<&str>, tone: &str) ->
             _ => span class={ "figure " (tone) } { (content) },
         }
     }
-}
-
-/// Returns a number with a thin space between groups of three digits.
-pub(super) fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push('\u{202f}');
-        }
-        text.push(digit);
-    }
-    text
 }
 
 /// Returns the rows of a list of files with a scan and its unit.

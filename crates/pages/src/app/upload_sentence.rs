@@ -2,8 +2,7 @@
 
 use std::io::{self, ErrorKind};
 
-use super::byte_size::file_size;
-use super::components::grouped;
+use super::byte_size::{file_size, grouped};
 use super::sentence::Sentence;
 use mocban_core::domain::sanitize;
 use mocban_lists::relative_path::PathFault;
