@@ -21,6 +21,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("pulp", &["core"]),
     ("pyo3", &["python"]),
     ("quick-xml", &["lists"]),
+    ("rustfft", &["fft"]),
     ("sqlx", &["catalog"]),
     ("tiff", &["export"]),
     ("weezl", &["core"]),
@@ -28,7 +29,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
 ];
 
 /// Crates without files, processes, clocks and async code.
-const PURE_CRATES: &[&str] = &["core", "lists", "align"];
+const PURE_CRATES: &[&str] = &["core", "fft", "lists", "align"];
 const IMPURE: &[&str] = &[
     "tokio::",
     "std::fs",

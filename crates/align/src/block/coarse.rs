@@ -2,8 +2,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use mocban_fft::Complex32;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex32;
 
 use super::page_ink::PageInk;
 use super::square_fft::{SIZE, SquareFft, quarter_turned};

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use rustfft::algorithm::Radix4;
-use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftDirection, FftPlannerAvx};
+use mocban_fft::{Complex32, Fft};
 
 /// Side of the squares that are correlated, pixels.
 pub(super) const SIZE: usize = 256;
@@ -27,15 +25,11 @@ pub(super) struct SquareFft {
 }
 
 impl SquareFft {
-    /// Plans the transforms, with AVX if the processor has it.
+    /// Plans the transforms.
     pub(super) fn new() -> Self {
-        let plan = |direction: FftDirection| match FftPlannerAvx::new() {
-            Ok(mut planner) => planner.plan_fft(SIZE, direction),
-            Err(()) => Arc::new(Radix4::new(SIZE, direction)) as Arc<dyn Fft<f32>>,
-        };
         Self {
-            forward: plan(FftDirection::Forward),
-            inverse: plan(FftDirection::Inverse),
+            forward: mocban_fft::forward(SIZE),
+            inverse: mocban_fft::inverse(SIZE),
         }
     }
 

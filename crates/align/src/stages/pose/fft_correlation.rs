@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use rustfft::algorithm::butterflies::Butterfly32;
-use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftDirection, FftPlannerAvx};
+use mocban_fft::{Complex32, Fft};
 
 /// Side of the squares that are correlated, pixels.
 pub(super) const FFT_SIZE: usize = 32;
@@ -44,7 +42,7 @@ pub(super) struct FftCorrelator {
 impl FftCorrelator {
     pub(super) fn new() -> Self {
         // An FFT is rounded differently on different processors. This can only change the order of nearly equal peaks.
-        let (forward, inverse) = (fft(FftDirection::Forward), fft(FftDirection::Inverse));
+        let (forward, inverse) = (mocban_fft::forward(FFT_SIZE), mocban_fft::inverse(FFT_SIZE));
         let scratch_len = forward
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());
@@ -116,15 +114,6 @@ impl FftCorrelator {
         }
         fft_2d(&*self.inverse, &mut self.product, &mut self.scratch);
         &self.product
-    }
-}
-
-/// Returns the FFT of length [`FFT_SIZE`], with AVX if the processor has it. `FftPlanner` is not used, because it would
-/// compile every algorithm of the library into this crate.
-fn fft(direction: FftDirection) -> Arc<dyn Fft<f32>> {
-    match FftPlannerAvx::new() {
-        Ok(mut planner) => planner.plan_fft(FFT_SIZE, direction),
-        Err(()) => Arc::new(Butterfly32::new(direction)),
     }
 }
 
