@@ -10,8 +10,14 @@ use std::process::{Child, Command, Stdio};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};
 
-/// Names of the executable.
-const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+/// Names of the executable, the one that starts fastest first.
+const NAMES: [&str; 5] = [
+    "chromium-headless-shell",
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "chrome",
+];
 /// Maximum time until a condition holds.
 const TIMEOUT_MS: u32 = 60_000;
 
@@ -284,7 +290,7 @@ impl Tab<'_> {
                 const poll = () => {{
                     const found = Boolean({condition});
                     if (found || Date.now() > end) done(found);
-                    else setTimeout(poll, 5);
+                    else setTimeout(poll, 20);
                 }};
                 poll();
             }})"
