@@ -1,7 +1,7 @@
 //! `mocban app` in a browser: from an empty folder to a report without a typed command, every page in both themes, and the
 //! keyboard alone.
 
-use crate::accessible::{axe, no_violation};
+use crate::accessible::{axe, no_faint_text, no_violation};
 use crate::app::app;
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
@@ -132,11 +132,12 @@ pub(crate) fn looks_right(
     tab.resize([1440, 900]);
     tab.open(url);
     tab.wait("document.body?.dataset.ready");
-    for (size, dark) in [
-        ([1440, 900], false),
-        ([1366, 660], true),
-        ([400, 800], true),
-        ([400, 800], false),
+    // Rules that ask what an element is called or how elements nest have the same answer in both themes.
+    for (size, dark, all_rules) in [
+        ([1440, 900], false, true),
+        ([1366, 660], true, false),
+        ([400, 800], true, false),
+        ([400, 800], false, true),
     ] {
         tab.resize(size);
         tab.dark(dark);
@@ -148,10 +149,8 @@ pub(crate) fn looks_right(
         let theme = if dark { "dark" } else { "light" };
         let what = format!("app_{name}_{}_{theme}", size[0]);
         match axe {
-            Some(axe) => {
-                tab.eval(&format!("{axe}; null"));
-                no_violation(tab, &what);
-            }
+            Some(axe) if all_rules => no_violation(tab, axe, &what),
+            Some(axe) => no_faint_text(tab, axe, &what),
             None => tab.screenshot(&what),
         }
     }

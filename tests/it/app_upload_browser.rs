@@ -60,8 +60,7 @@ fn look(tab: &Tab<'_>, axe: Option<&str>, what: &str) {
         assert!(overflow.as_f64() <= Some(0.0), "{what}: {overflow}");
         let what = format!("app_{what}_{}", size[0]);
         if let Some(axe) = axe {
-            tab.eval(&format!("{axe}; null"));
-            no_violation(tab, &what);
+            no_violation(tab, axe, &what);
         }
     }
 }

@@ -124,9 +124,9 @@ fn a_pair_is_one_object_and_two_reads_and_the_results_are_those_of_local_files()
     // One more object names the owner of the results.
     assert_eq!(requests.put.load(Ordering::Relaxed), pairs + 1);
     // One list at the start shows that each bucket can be read. The owner is looked for, two lists show that there are no
-    // results yet, and the owner is read again.
+    // results yet, and the owner is read again; a slow run reads it a few times more, but less than once a pair.
     assert!(
-        requests.get.load(Ordering::Relaxed) <= 2 * pairs + 2 + 4,
+        requests.get.load(Ordering::Relaxed) < 3 * pairs + 2 + 4,
         "{requests:?}"
     );
     assert_eq!(remote.server.list("results/packs").len() as u64, pairs);
