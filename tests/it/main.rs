@@ -159,6 +159,7 @@ mod tiff_kinds;
 mod tls_to_server;
 mod uninterrupted;
 mod unusual_scans;
+mod verdict_files;
 mod waiting;
 #[cfg(unix)]
 mod watch_workers;

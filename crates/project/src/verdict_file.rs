@@ -8,12 +8,13 @@ use std::sync::Arc;
 
 use csv::StringRecord;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::files::{MAX_SHOWN, RefusedLine};
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
-use mocban_core::domain::{ContentHash, PairName, UnixMillis};
+use mocban_core::domain::{ContentHash, PairName, UnixMillis, sanitize};
 use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
 use mocban_lists::json_numbers::nan_as_null;
 use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, trimmed};
@@ -48,6 +49,27 @@ const COLUMNS: KnownColumns = KnownColumns {
 };
 const REQUIRED: usize = 3;
 
+/// The fields of the log of verdicts, which JSON Lines may have.
+const LOG_FIELDS: [&str; 17] = [
+    "id",
+    "act",
+    "pair",
+    "metric",
+    "result_hash",
+    "verdict",
+    "reviewer",
+    "reason",
+    "note",
+    "event",
+    "seen",
+    "shown_ms",
+    "angle_read_deg",
+    "review_order",
+    "at",
+    "undone_at",
+    "current",
+];
+
 /// One verdict and its line number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VerdictRow {
@@ -55,6 +77,8 @@ pub struct VerdictRow {
     pub line: usize,
     /// The verdict, and the result that it judges if the file names it.
     pub listed: ListedVerdict,
+    /// Fields of an object of JSON that no verdict has.
+    pub unread: Vec<String>,
 }
 
 /// The text of a verdict file. Its rows are parsed whenever they are needed, so that a long file takes little memory.
@@ -166,6 +190,20 @@ pub fn unknown_pairs(
     refused.collect()
 }
 
+/// Returns a warning about fields that are not read. They are given with the first line of each.
+pub fn unread_fields(first_lines: &BTreeMap<String, usize>) -> Option<String> {
+    let fields = first_lines.iter().take(MAX_SHOWN);
+    let fields = fields.map(|(field, line)| format!("{} (line {line})", sanitize(field, 100)));
+    let fields: Vec<String> = fields.collect();
+    let read = COLUMNS.names[REQUIRED..].join(", ");
+    (!fields.is_empty()).then(|| {
+        format!(
+            "fields that no verdict has are not read: {}; besides pair, verdict and reviewer, {read} and angle_read_deg are",
+            fields.join(", ")
+        )
+    })
+}
+
 /// Returns the position of each of [`COLUMNS`] in the file. The header is on this line.
 fn positions(headers: &StringRecord, line: usize) -> Result<[Option<usize>; 7], RefusedLine> {
     let names: Vec<&str> = headers.iter().map(trimmed).collect();
@@ -225,7 +263,7 @@ fn row(
         cell(column)
             .ok_or_else(|| RefusedLine::new(line, &format!("{} is empty", COLUMNS.names[column])))
     };
-    let metric = |text| at_line(line, verdict_words::word(text, &[]));
+    let metric = |text| at_line(line, verdict_words::metric(text));
     let reason = |text| at_line(line, verdict_words::reason(text));
     let verdict = NewVerdict {
         pair: value(required(0)?, line)?,
@@ -239,7 +277,12 @@ fn row(
     };
     let judged = None;
     let listed = ListedVerdict { verdict, judged };
-    Ok(VerdictRow { line, listed })
+    let unread = Vec::new();
+    Ok(VerdictRow {
+        line,
+        listed,
+        unread,
+    })
 }
 
 /// Names the line of what was not understood.
@@ -275,13 +318,15 @@ fn csv_error(error: &csv::Error, text: &ListText) -> RefusedLine {
     RefusedLine::new(line, &reason)
 }
 
-/// A line written by `verdict log --json` or an export. Unknown fields are ignored.
+/// A line written by `verdict log --json` or an export.
 #[derive(Debug, Deserialize)]
 struct VerdictLine {
     #[serde(flatten)]
     verdict: NewVerdict,
     result_hash: Option<ContentHash>,
     undone_at: Option<UnixMillis>,
+    #[serde(flatten)]
+    fields: BTreeMap<String, IgnoredAny>,
 }
 
 /// Parses a JSON Lines file. Undone verdicts are ignored.
@@ -316,13 +361,20 @@ fn json_row(
         mut verdict,
         result_hash: judged,
         undone_at,
+        fields,
     } = parsed.map_err(|error| RefusedLine::new(line, &json_error(&error)))?;
     verdict.reviewer = person_name(&verdict.reviewer);
     if verdict.reviewer.is_empty() {
         return Err(RefusedLine::new(line, "reviewer is empty"));
     }
     let listed = ListedVerdict { verdict, judged };
-    Ok(undone_at.is_none().then_some(VerdictRow { line, listed }))
+    let fields = fields.into_keys();
+    let unread = fields.filter(|field| !LOG_FIELDS.contains(&field.as_str()));
+    Ok(undone_at.is_none().then(|| VerdictRow {
+        line,
+        listed,
+        unread: unread.collect(),
+    }))
 }
 
 /// Returns the parser's message without its line number, which is always 1 because lines are parsed one by one.

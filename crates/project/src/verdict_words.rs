@@ -1,8 +1,9 @@
-//! Words for verdicts and reasons, as people type them: the names, and the words of the review page in English and Vietnamese.
+//! Words for verdicts, reasons and metrics, as people type them: the names, and the words of the review page in English and
+//! Vietnamese.
 
 use std::str::FromStr;
 
-use mocban_core::domain::{Reason, Verdict};
+use mocban_core::domain::{Reason, ThresholdMetric, Verdict};
 use mocban_lists::columns::plain_name;
 
 /// Verdicts with their other words, as [`plain_name`] writes them.
@@ -48,8 +49,16 @@ pub fn reason(text: &str) -> Result<Reason, String> {
     word(text, &REASONS)
 }
 
+/// Parses a metric.
+///
+/// # Errors
+/// Returns a sentence with the names of the metrics.
+pub fn metric(text: &str) -> Result<ThresholdMetric, String> {
+    word(text, &[])
+}
+
 /// Parses a name in any case and with blanks, or one of some other words.
-pub(crate) fn word<T>(text: &str, others: &[(T, &[&str])]) -> Result<T, String>
+fn word<T>(text: &str, others: &[(T, &[&str])]) -> Result<T, String>
 where
     T: FromStr<Err: std::fmt::Display> + Copy,
 {
@@ -67,8 +76,8 @@ where
 
 #[cfg(test)]
 mod tests {
-    use super::{reason, verdict};
-    use mocban_core::domain::{Reason, Verdict};
+    use super::{metric, reason, verdict};
+    use mocban_core::domain::{Reason, ThresholdMetric, Verdict};
 
     /// Texts of the review page.
     const PAGE: &str = include_str!("../../../assets/review/messages.json");
@@ -91,6 +100,20 @@ mod tests {
         assert_eq!(
             verdict("maybe").expect_err("unknown"),
             "\"maybe\" is not a verdict (pass, fail, unsure)"
+        );
+    }
+
+    #[test]
+    fn metrics_are_named_in_any_case() {
+        for expected in ThresholdMetric::ALL {
+            let name = expected.name();
+            for typed in [name.to_owned(), name.to_uppercase(), name.replace('_', "-")] {
+                assert_eq!(metric(&typed), Ok(expected), "{typed}");
+            }
+        }
+        assert_eq!(
+            metric("IOU").expect_err("unknown"),
+            "\"IOU\" is not a metric (nl_ssim, density, ensemble, relief)"
         );
     }
 }

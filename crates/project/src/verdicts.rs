@@ -78,15 +78,25 @@ pub async fn record_on(
     Ok((verdict, recorded))
 }
 
+/// What became of the verdicts of a file.
+#[derive(Debug)]
+pub struct VerdictFileImport {
+    /// Numbers of verdicts.
+    pub counts: ImportedVerdicts,
+    /// Line of the first verdict that was left out because its reviewer judged the same result later.
+    pub first_older: Option<usize>,
+    /// Sentences about parts of the file that were not read.
+    pub warnings: Vec<String>,
+}
+
 /// Records the verdicts of a file in CSV or JSON Lines, or of a sheet of a workbook. If a line is refused, no verdict is
-/// recorded. A new reviewer whose name is similar to another is refused unless `is_new_allowed`. Returns a warning about other
-/// sheets, too.
+/// recorded. A new reviewer whose name is similar to another is refused unless `is_new_allowed`.
 pub async fn import(
     file: &Path,
     sheet: Option<&str>,
     is_new_allowed: bool,
     location: &Location,
-) -> ProjectResult<(ImportedVerdicts, Option<String>)> {
+) -> ProjectResult<VerdictFileImport> {
     let ListFile { bytes, warning } = files::read_list(file, sheet)?;
     let (_project, catalog) = location.open().await?;
     let outcome = "no verdict was recorded";
@@ -97,6 +107,7 @@ pub async fn import(
         current_lines,
         reviewers,
         mut refused,
+        unread,
     } = NamesInList::read(&list);
     let names: Vec<_> = first_lines.keys().cloned().collect();
     let unknown = catalog.unknown_names(&names).await?;
@@ -124,9 +135,19 @@ pub async fn import(
         Ok(row) => Ok(row.listed),
         Err(_) => Err(CatalogError::CutShort),
     });
-    let imported = catalog.import_verdicts(rows, now()).await?;
+    let counts = catalog.import_verdicts(rows, now()).await?;
     catalog.close().await;
-    Ok((imported, warning))
+    let first_older = counts.first_older.and_then(|position| {
+        let row = list.rows().nth(usize::try_from(position).ok()?)?;
+        row.ok().map(|row| row.line)
+    });
+    let unread = verdict_file::unread_fields(&unread);
+    let unread = unread.map(|text| format!("{}: {text}", file.display()));
+    Ok(VerdictFileImport {
+        counts,
+        first_older,
+        warnings: warning.into_iter().chain(unread).collect(),
+    })
 }
 
 /// Names in a list of verdicts, and its refused lines.
@@ -138,6 +159,8 @@ struct NamesInList {
     current_lines: BTreeMap<PairName, usize>,
     reviewers: BTreeSet<String>,
     refused: Vec<RefusedLine>,
+    /// The first line of each field that is not read.
+    unread: BTreeMap<String, usize>,
 }
 
 impl NamesInList {
@@ -149,7 +172,14 @@ impl NamesInList {
                 Ok(row)
             });
             match checked {
-                Ok(VerdictRow { line, listed }) => {
+                Ok(VerdictRow {
+                    line,
+                    listed,
+                    unread,
+                }) => {
+                    for field in unread {
+                        names.unread.entry(field).or_insert(line);
+                    }
                     let NewVerdict { pair, reviewer, .. } = listed.verdict;
                     if listed.judged.is_none() {
                         names.current_lines.entry(pair.clone()).or_insert(line);

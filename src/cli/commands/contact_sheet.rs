@@ -11,6 +11,7 @@ use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{ContactSheetOptions, ContactSheetOrder};
 use mocban_project::sheets::{self, block_sheet};
+use mocban_project::verdict_words;
 use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `contact-sheet`.
@@ -28,7 +29,7 @@ pub(crate) struct ContactSheetArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// Metric whose results are drawn: `nl_ssim`, density, ensemble or relief [default: ensemble]
-    #[arg(long)]
+    #[arg(long, value_parser = verdict_words::metric)]
     pub(crate) metric: Option<ThresholdMetric>,
     /// Order of the pairs: worst, score, margin, confidence (least confident first) or name
     #[arg(long, default_value = "worst")]

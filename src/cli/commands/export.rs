@@ -28,6 +28,7 @@ pub(crate) struct ExportArgs {
         value_name = "FORMAT",
         default_value = "jsonl",
         value_delimiter = ',',
+        ignore_case = true,
         value_parser = one_of::<ExportFormat>(ExportFormat::ALL.map(described))
     )]
     pub(crate) to: Vec<ExportFormat>,
@@ -39,6 +40,7 @@ pub(crate) struct ExportArgs {
         long,
         value_name = "METRIC",
         value_delimiter = ',',
+        ignore_case = true,
         value_parser = one_of::<ThresholdMetric>(ThresholdMetric::ALL.map(ThresholdMetric::name))
     )]
     pub(crate) metric: Vec<ThresholdMetric>,
@@ -47,6 +49,7 @@ pub(crate) struct ExportArgs {
         long,
         value_name = "WHICH",
         default_value = "all",
+        ignore_case = true,
         value_parser = one_of::<ResultFilter>(ResultFilter::ALL.map(ResultFilter::name))
     )]
     pub(crate) only: ResultFilter,
@@ -65,6 +68,7 @@ pub(crate) struct ExportArgs {
         value_name = "GROUP",
         requires = "split",
         default_value = "block",
+        ignore_case = true,
         value_parser = one_of::<SplitBy>(SplitBy::ALL.map(SplitBy::name))
     )]
     pub(crate) by: SplitBy,
@@ -96,11 +100,11 @@ fn described(format: ExportFormat) -> PossibleValue {
     PossibleValue::new(format.name()).help(format.summary())
 }
 
-/// Returns a parser of names, which lists them in help, in errors and for completion.
+/// Returns a parser of names in any case, which lists them in help, in errors and for completion.
 fn one_of<T: FromStr<Err = String> + Clone + Send + Sync + 'static>(
     names: impl IntoIterator<Item = impl Into<PossibleValue>>,
 ) -> impl TypedValueParser<Value = T> {
-    PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
+    PossibleValuesParser::new(names).try_map(|name| name.to_lowercase().parse::<T>())
 }
 
 /// Parses a number from 0 to 1.

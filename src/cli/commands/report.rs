@@ -38,7 +38,7 @@ pub(crate) struct ReportArgs {
     /// Exit with code 20 unless every judged row has at least this Acc, such as 0.98
     #[arg(long, value_name = "ACC", value_parser = share)]
     pub(crate) fail_under: Option<f64>,
-    /// Exit with code 21 unless every pair is done and every result is judged pass or fail
+    /// Exit with code 21 unless every block and pair is done and every result is judged pass or fail
     #[arg(long)]
     pub(crate) require_complete: bool,
     /// Replace an earlier file even if the new one lacks images or true alignments

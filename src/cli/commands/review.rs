@@ -27,6 +27,7 @@ use mocban_project::error::explanation;
 use mocban_project::location::now;
 use mocban_project::reviewers;
 use mocban_project::shell::shell_quoted;
+use mocban_project::verdict_words;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
 
@@ -52,7 +53,7 @@ pub(crate) struct ReviewArgs {
     #[arg(long, conflicts_with = "order")]
     adjudicate: bool,
     /// Only results of this metric; may be repeated [default: all]
-    #[arg(long)]
+    #[arg(long, value_parser = verdict_words::metric)]
     metric: Vec<ThresholdMetric>,
     /// Seed of the random order
     #[arg(long, value_name = "N", default_value_t = QueueOptions::DEFAULT_SEED)]

@@ -15,7 +15,7 @@ use mocban_catalog::{
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
 use mocban_project::shell::shell_quoted;
 use mocban_project::verdict_words;
-use mocban_project::verdicts::{self, VerdictLog};
+use mocban_project::verdicts::{self, VerdictFileImport, VerdictLog};
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_system::time_text::{duration, local};
 
@@ -48,7 +48,7 @@ pub(crate) struct VerdictSetArgs {
     #[arg(long)]
     pub(crate) new_reviewer: bool,
     /// Only the result of this metric: `nl_ssim`, density, ensemble or relief [default: all]
-    #[arg(long)]
+    #[arg(long, value_parser = verdict_words::metric)]
     pub(crate) metric: Option<ThresholdMetric>,
     /// Reason of a failure: angle, `strokes_lost`, `background_in`, `shift_or_scale`, mirrored or `wrong_pair`
     #[arg(long, value_parser = verdict_words::reason)]
@@ -148,23 +148,34 @@ fn verdict_text(new: &NewVerdict) -> String {
 
 async fn import(args: VerdictImportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let sheet = args.sheet.as_deref();
-    let (imported, warning) =
-        verdicts::import(&args.file, sheet, args.new_reviewer, &context.location).await?;
-    if let Some(warning) = warning {
+    let VerdictFileImport {
+        counts,
+        first_older,
+        warnings,
+    } = verdicts::import(&args.file, sheet, args.new_reviewer, &context.location).await?;
+    for warning in warnings {
         context.warn(&warning);
     }
     let ImportedVerdicts {
         recorded: number,
         known,
         left_out,
-    } = imported;
+        older,
+        ..
+    } = counts;
     context.print_json(
-        &json!({"schema": 1, "recorded": number, "left_out": left_out, "known": known}),
+        &json!({"schema": 1, "recorded": number, "left_out": left_out, "known": known, "older": older}),
     )?;
     if left_out > 0 {
         let left_out = count(left_out, "verdict");
         context.warn(&format!(
             "{left_out} left out: the judged result is not the current one of the pair"
+        ));
+    }
+    if let Some(line) = first_older {
+        let older = count(older, "verdict");
+        context.warn(&format!(
+            "{older} left out where the reviewer judged the same result later, first on line {line}"
         ));
     }
     if known > 0 {

@@ -15,6 +15,7 @@ use mocban_pages::view::{BlockPoints, open_block, scan_page};
 use mocban_project::error::TaskStopped;
 use mocban_project::selection;
 use mocban_project::shell::shell_quoted;
+use mocban_project::verdict_words;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_store::Project;
 
@@ -24,7 +25,7 @@ pub(crate) struct ViewArgs {
     /// The pair, or a block
     pair: String,
     /// The metric whose result is shown [default: ensemble, or else the first that the pair has]
-    #[arg(long)]
+    #[arg(long, value_parser = verdict_words::metric)]
     metric: Option<ThresholdMetric>,
     /// Port on this machine; 0 chooses the same port each time for a name, or any free port
     #[arg(long, value_name = "N", default_value = "0")]

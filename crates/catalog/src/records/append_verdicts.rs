@@ -5,18 +5,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use crate::db::conn::Conn;
-use crate::db::dialect::Sql;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::json_array;
 use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::judged_results::{JudgedResult, current_results};
 use crate::records::review_context::ReviewContext;
 use crate::records::reviewer_names::{Spellings, person_name, to_store};
 use crate::records::verdicts::NewVerdict;
 use crate::{Catalog, CatalogError, Result};
-use mocban_core::domain::{
-    ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
-};
+use mocban_core::domain::{ContentHash, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict};
 
 /// Number of verdicts that are appended together.
 const CHUNK: usize = 1_000;
@@ -39,19 +37,11 @@ pub struct ImportedVerdicts {
     pub known: u64,
     /// Number of verdicts that name another result than the current one.
     pub left_out: u64,
+    /// Number of verdicts of which a row was not appended, because its reviewer judged the same result later.
+    pub older: u64,
+    /// Position of the first of these in the list, from 0.
+    pub first_older: Option<u64>,
 }
-
-/// Selects the current results of pairs. A pair that is not done, or is retired, has one row whose metric is NULL.
-const JUDGED: Sql = Sql::pair(
-    "
-SELECT p.name, p.id AS pair, m.metric, m.result_hash FROM pair AS p
-    LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
-WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id, m.metric",
-    "
-SELECT p.name, p.id AS pair, m.metric, m.result_hash FROM pair AS p
-    LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
-WHERE p.name = ANY (ARRAY(SELECT atom FROM json_each(?1))) ORDER BY p.id, m.metric",
-);
 
 /// Builds the condition that a row of `verdict` is on the result and by the reviewer of an item, and was not undone or
 /// set apart. The first elements of an item are its number, pair, metric, reviewer and result.
@@ -78,7 +68,7 @@ SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1) AS item WHERE EXISTS (SELE
 /// Selects the newest verdict on the result of each item by its reviewer, in one spelling of the name.
 const NEWEST: &str = concat!(
     "
-SELECT CAST(value ->> 0 AS bigint), last.id, last.verdict, last.reason, last.note FROM json_each(?1) AS item
+SELECT CAST(value ->> 0 AS bigint), last.id, last.verdict, last.reason, last.note, last.at FROM json_each(?1) AS item
     JOIN verdict AS last ON last.id = (SELECT v.id FROM verdict AS v WHERE ",
     is_of_item!(),
     " ORDER BY v.id DESC LIMIT 1)"
@@ -101,19 +91,21 @@ SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), value ->> 2, un
 FROM json_each(?1) ORDER BY key
 RETURNING id";
 
-/// A result that a verdict judges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct JudgedResult {
-    pair: i64,
-    metric: ThresholdMetric,
-    hash: ContentHash,
-}
-
 /// What a verdict says.
 type Content = (Verdict, Option<Reason>, Option<String>);
 
-/// Number of an item, and the id and content of the newest verdict on its result.
-type NewestVerdictRow = (i64, i64, Verdict, Option<Reason>, Option<String>);
+/// Number of an item, and the id, content and time of the newest verdict on its result.
+type NewestVerdictRow = (
+    i64,
+    i64,
+    Verdict,
+    Option<Reason>,
+    Option<String>,
+    UnixMillis,
+);
+
+/// What each reviewer's newest verdict on a result says, and its time, unless it is one without a time of the same list.
+type NewestVerdicts = BTreeMap<(JudgedResult, String), (Content, Option<UnixMillis>)>;
 
 /// A verdict on one result.
 struct VerdictRowDraft<'v> {
@@ -169,8 +161,8 @@ impl VerdictRowDraft<'_> {
 impl Catalog {
     /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
     /// the metric. Skips a verdict with `at` if a verdict with the same values, which was not undone, was stored before
-    /// this call. Skips a verdict without `at` and context if it equals the reviewer's newest one. Returns the number of
-    /// verdicts of which a row was appended.
+    /// this call, or if the reviewer's newest verdict on the result is later. Skips a verdict without `at` and context if
+    /// it equals the reviewer's newest one. Returns the number of verdicts of which a row was appended.
     ///
     /// # Errors
     /// As for [`Self::import_verdicts`].
@@ -199,6 +191,7 @@ impl Catalog {
             let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
             let mut stored_names = Spellings::read(conn).await?;
             let mut counts = ImportedVerdicts::default();
+            let mut position = 0;
             loop {
                 let part: Vec<_> = list.by_ref().take(CHUNK).collect::<Result<_>>()?;
                 if part.is_empty() {
@@ -208,6 +201,10 @@ impl Catalog {
                 counts.recorded += of_part.recorded;
                 counts.known += of_part.known;
                 counts.left_out += of_part.left_out;
+                counts.older += of_part.older;
+                let first_older = of_part.first_older.map(|row| position + row);
+                counts.first_older = counts.first_older.or(first_older);
+                position += part.len() as u64;
             }
         })
     }
@@ -225,7 +222,8 @@ async fn append(
     newest: i64,
     now: UnixMillis,
 ) -> Result<ImportedVerdicts> {
-    let results = current_results(conn, rows).await?;
+    let names = rows.iter().map(|row| row.verdict.pair.as_str()).collect();
+    let results = current_results(conn, names).await?;
     let mut counts = ImportedVerdicts::default();
     let mut candidates = Vec::with_capacity(rows.len());
     for (row, listed) in rows.iter().enumerate() {
@@ -239,12 +237,15 @@ async fn append(
             reviewer: person_name(&listed.verdict.reviewer),
         }));
     }
-    let new = without_stored(conn, candidates, stored_names, newest, now).await?;
+    let (new, older) = without_stored(conn, candidates, stored_names, newest, now).await?;
     let written = written_names(conn, &new).await?;
     stored_names.add(written.values());
     let acts = begin_acts(conn, &new, &written).await?;
     counts.recorded = acts.len() as u64;
-    counts.known = rows.len() as u64 - counts.left_out - counts.recorded;
+    counts.older = older.len() as u64;
+    counts.first_older = older.first().map(|row| *row as u64);
+    let only_older = older.iter().filter(|row| !acts.contains_key(row)).count();
+    counts.known = rows.len() as u64 - counts.left_out - counts.recorded - only_older as u64;
     let items = new
         .iter()
         .filter_map(|new| Some(new.item(*acts.get(&new.row)?, &written[&new.reviewer], now)));
@@ -255,28 +256,6 @@ async fn append(
     ids.sort_unstable();
     checksums::store(conn, ChecksummedTable::Verdict, &ids).await?;
     Ok(counts)
-}
-
-/// Returns the current results of the pairs, by name. A pair that is not done, or is retired, has none.
-async fn current_results(
-    conn: &mut Conn,
-    rows: &[ListedVerdict],
-) -> Result<BTreeMap<PairName, Vec<JudgedResult>>> {
-    let names: BTreeSet<_> = rows.iter().map(|row| row.verdict.pair.as_str()).collect();
-    let found: Vec<(PairName, i64, Option<ThresholdMetric>, Option<ContentHash>)> =
-        query_as(JUDGED)
-            .bind(json_array(names))
-            .fetch_all(conn)
-            .await?;
-    let mut results: BTreeMap<_, Vec<_>> = BTreeMap::new();
-    for (name, pair, metric, hash) in found {
-        results.entry(name).or_default().extend(
-            metric
-                .zip(hash)
-                .map(|(metric, hash)| JudgedResult { pair, metric, hash }),
-        );
-    }
-    Ok(results)
 }
 
 /// Returns the results that a verdict judges, or `None` if it names a result that is not current. `current` are the results
@@ -306,14 +285,15 @@ fn judged(
 }
 
 /// Removes the verdicts that are stored already: those whose event is stored for the metric; those with a time if the same
-/// values are stored; those without a time and a context that equal the reviewer's newest verdict on the result.
+/// values are stored; those without a time and a context that equal the reviewer's newest verdict on the result. Also removes
+/// those with an earlier time than this newest verdict, and returns their rows.
 async fn without_stored<'v>(
     conn: &mut Conn,
     candidates: Vec<VerdictRowDraft<'v>>,
     stored_names: &Spellings,
     newest: i64,
     now: UnixMillis,
-) -> Result<Vec<VerdictRowDraft<'v>>> {
+) -> Result<(Vec<VerdictRowDraft<'v>>, BTreeSet<usize>)> {
     let mut events = stored_events(conn, &candidates).await?;
     let with_time = (0..).zip(&candidates);
     let with_time = with_time.filter(|(_, new)| new.new.at.is_some());
@@ -325,18 +305,27 @@ async fn without_stored<'v>(
     let stored: BTreeSet<i64> = stored.fetch_all(&mut *conn).await?.into_iter().collect();
     let mut last = newest_contents(conn, &candidates, stored_names, now).await?;
     let mut new = Vec::with_capacity(candidates.len());
+    let mut older = BTreeSet::new();
     for (number, candidate) in (0..).zip(candidates) {
         let of_result = (candidate.result, candidate.reviewer.clone());
-        let content = candidate.content();
+        let (content, at) = (candidate.content(), candidate.new.at);
+        let newest = last.get(&of_result);
         let is_known = stored.contains(&number)
-            || candidate.is_compared_with_newest() && last.get(&of_result) == Some(&content);
+            || candidate.is_compared_with_newest()
+                && newest.is_some_and(|(newest, _)| *newest == content);
         let event = candidate.new.context.event.clone();
-        if !is_known && event.is_none_or(|event| events.insert((event, candidate.result.metric))) {
-            last.insert(of_result, content);
-            new.push(candidate);
+        if is_known || event.is_some_and(|event| !events.insert((event, candidate.result.metric))) {
+            continue;
         }
+        let newest_at = newest.and_then(|(_, at)| *at);
+        if at.zip(newest_at).is_some_and(|(at, newest)| at < newest) {
+            older.insert(candidate.row);
+            continue;
+        }
+        last.insert(of_result, (content, at));
+        new.push(candidate);
     }
-    Ok(new)
+    Ok((new, older))
 }
 
 /// Returns which events of the candidates are stored for which metrics.
@@ -361,10 +350,10 @@ async fn newest_contents(
     candidates: &[VerdictRowDraft<'_>],
     stored_names: &Spellings,
     now: UnixMillis,
-) -> Result<BTreeMap<(JudgedResult, String), Content>> {
+) -> Result<NewestVerdicts> {
     let compared: BTreeMap<_, _> = candidates
         .iter()
-        .filter(|new| new.is_compared_with_newest())
+        .filter(|new| new.new.at.is_some() || new.is_compared_with_newest())
         .map(|new| (new.key(), new))
         .collect();
     let compared: Vec<_> = compared.into_values().collect();
@@ -376,10 +365,12 @@ async fn newest_contents(
     let mut found: Vec<NewestVerdictRow> = query_as(NEWEST).bind(items).fetch_all(conn).await?;
     // The newest of all spellings replaces the others.
     found.sort_unstable_by_key(|(_, id, ..)| *id);
-    let found = found.into_iter().map(|(number, _, verdict, reason, note)| {
+    let found = found.into_iter();
+    let found = found.map(|(number, _, verdict, reason, note, at)| {
         let new = compared[number as usize];
         let of_result = (new.result, new.reviewer.clone());
-        (of_result, (verdict, reason, note))
+        let at = (at != now).then_some(at);
+        (of_result, ((verdict, reason, note), at))
     });
     Ok(found.collect())
 }

@@ -7,6 +7,7 @@ pub(crate) mod ground_truth;
 pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod input_paths;
+pub(crate) mod judged_results;
 pub(crate) mod left_out;
 pub(crate) mod listed_names;
 pub(crate) mod manual_alignments;

@@ -24,6 +24,7 @@ mod silence;
 mod staleness;
 mod state_machine;
 mod together;
+mod verdict_lists;
 mod verdicts;
 mod workers;
 

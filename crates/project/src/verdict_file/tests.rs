@@ -1,8 +1,9 @@
 //! Tests of the parsers of verdict files.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{RefusedLine, VerdictList, VerdictRow, check_values, unknown_pairs};
+use super::{RefusedLine, VerdictList, VerdictRow, check_values, unknown_pairs, unread_fields};
 use mocban_core::domain::{PairName, Reason, ThresholdMetric, Verdict};
 
 fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
@@ -253,6 +254,25 @@ fn json_lines_are_read_back_without_undone_verdicts() {
     assert_eq!(first.reason, Some(Reason::Angle));
     assert_eq!(first.note.as_deref(), Some("a, b"));
     assert_eq!(rows[1].listed.verdict.metric, None);
+}
+
+#[test]
+fn fields_that_no_verdict_has_are_named() {
+    let plain =
+        r#"{"pair":"1","verdict":"pass","reviewer":"lan","angle_read_deg":2.5,"at":5,"act":1}"#;
+    let other = r#"{"pair":"1","verdict":"pass","reviewer":"lan","angle":2.5,"who":null}"#;
+    let rows = parse_jsonl(format!("{plain}\n{other}\n").as_bytes()).expect("valid");
+    assert_eq!(rows[0].unread, [""; 0]);
+    assert_eq!(rows[1].unread, ["angle", "who"]);
+    assert_eq!(unread_fields(&BTreeMap::new()), None);
+    let fields = [("angle".to_owned(), 2), ("who".to_owned(), 3)];
+    assert_eq!(
+        unread_fields(&fields.into()).as_deref(),
+        Some(
+            "fields that no verdict has are not read: angle (line 2), who (line 3); besides pair, verdict and reviewer, \
+             metric, reason, note, at and angle_read_deg are"
+        )
+    );
 }
 
 #[test]

@@ -1,0 +1,64 @@
+//! Verdicts from files: what a file may have, and which of its verdicts count.
+
+use crate::check::{at, done};
+
+#[test]
+fn of_two_verdicts_of_a_reviewer_the_later_one_counts() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let import = |text: &str| {
+        std::fs::write(project.dir().join("v.csv"), text).expect("written");
+        at(&project, &["verdict", "import", "v.csv", "--json"]).expect(0)
+    };
+    let later = "pair,verdict,reviewer,at\nupright-0001,pass,hoa,2026-01-02\n\
+        upright-0001,fail,hoa,2026-01-01\n";
+    let taken = import(later);
+    let counts =
+        |taken: &serde_json::Value| ["recorded", "older", "known"].map(|key| taken[key].as_u64());
+    assert_eq!(counts(&taken.json()), [Some(1), Some(1), Some(0)]);
+    let says =
+        "1 verdict left out where the reviewer judged the same result later, first on line 3";
+    assert!(taken.err.contains(says), "{}", taken.err);
+    let again = import("pair,verdict,reviewer,at\nupright-0001,fail,hoa,2026-01-01\n");
+    assert_eq!(counts(&again.json()), [Some(0), Some(1), Some(0)]);
+    let status = at(&project, &["status", "--json"]).expect(0).json();
+    assert_eq!(status["verdicts"]["fail"], 0);
+}
+
+#[test]
+fn fields_that_are_not_read_are_named() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let line = r#"{"pair":"upright-0001","verdict":"fail","reviewer":"hoa","angle":5}"#;
+    std::fs::write(project.dir().join("v.jsonl"), line).expect("written");
+    let taken = at(&project, &["verdict", "import", "v.jsonl"]).expect(0);
+    let says = "v.jsonl: fields that no verdict has are not read: angle (line 1)";
+    assert!(taken.err.contains(says), "{}", taken.err);
+}
+
+#[test]
+fn metrics_are_named_in_any_case() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let set = [
+        "verdict",
+        "set",
+        "upright-0001",
+        "pass",
+        "--reviewer",
+        "hoa",
+    ];
+    let set = at(&project, &[&set[..], &["--metric", "Relief"]].concat()).expect(0);
+    assert!(
+        set.err.contains("upright-0001, relief: pass"),
+        "{}",
+        set.err
+    );
+    let place = |name: &str| dir.path().join(name).display().to_string();
+    for (command, output) in [
+        ("contact-sheet", place("sheet.png")),
+        ("export", place("out")),
+    ] {
+        at(&project, &[command, "--metric", "RELIEF", "-o", &output]).expect(0);
+    }
+}
