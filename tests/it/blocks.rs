@@ -151,6 +151,28 @@ fn a_refused_block_is_named_by_run_status_show_and_retry() {
 }
 
 #[test]
+fn a_block_whose_missing_file_is_back_runs_again() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    write_blocks(dir.path(), &["b1"]);
+    let (mesh, away) = (dir.path().join("b1.stl"), dir.path().join("away"));
+    fs::rename(&mesh, &away).expect("moved");
+    project(dir.path(), &["import", "blocks.csv", "--allow-missing"]).expect(0);
+    let failed_now = || {
+        let run = project(dir.path(), &["run", "--json"]).expect(3).json();
+        run["blocks"]["failed"].as_u64()
+    };
+    let error = || {
+        let status = project(dir.path(), &["status", "--json"]).expect(0).json();
+        status["blocks"]["failures"][0]["error"].to_string()
+    };
+    assert_eq!([failed_now(), failed_now()], [Some(1), Some(0)]);
+    assert!(error().contains("is not there"), "{}", error());
+    fs::rename(&away, &mesh).expect("moved back");
+    assert_eq!(failed_now(), Some(1));
+    assert!(!error().contains("is not there"), "{}", error());
+}
+
+#[test]
 fn a_backup_holds_blocks_and_finds_their_files_again() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     write_blocks(dir.path(), &["b1"]);

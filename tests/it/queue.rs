@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use mocban::domain::{FailureClass, JobStatus, Stage};
 use mocban::store::{Project, RunLock};
 
-use crate::cli::call;
+use crate::cli::{call, mocban};
 use crate::resume::{pairs, project, run};
 
 /// Returns how often each stage of each pair was finished.
@@ -82,6 +82,33 @@ fn only_affected_stages_run_again() {
         .map(|pair| pair.results.metrics)
         .collect();
     assert_eq!(before, after);
+}
+
+#[test]
+fn a_pair_whose_missing_file_is_back_runs_again() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "2");
+    let files = [mesh(&project, 0), print(&project, 1)];
+    for file in &files {
+        std::fs::rename(file, file.with_extension("away")).expect("moved");
+    }
+    for _ in 0..2 {
+        call(&mut run(&project, &[])).expect(3);
+    }
+    let attempts = pairs(&project)
+        .iter()
+        .map(|pair| pair.attempts.len())
+        .sum::<usize>();
+    assert_eq!(attempts, 2, "what is still missing is not tried again");
+    let status = mocban(project.dir(), &["status", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(status["missing_inputs"], serde_json::Value::Null);
+    for file in &files {
+        std::fs::rename(file.with_extension("away"), file).expect("moved back");
+    }
+    call(&mut run(&project, &[])).expect(0);
+    assert_eq!(finished(&project), [[1; 4]; 2]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::error::ProjectResult;
-use mocban_catalog::{Catalog, PairSelection};
+use mocban_catalog::{BlockInputVersions, Catalog, InputVersion, PairSelection};
 use mocban_core::domain::{ArtifactRef, PairId, one_line};
 use mocban_store::{InputError, Project, stat_input};
 
@@ -64,20 +64,26 @@ pub async fn find(
     known.retain(|known| !retired.contains(&known.pair));
     let mut paths = Vec::new();
     for known in known {
-        paths.extend(known.mesh.map(|_| known.mesh_path));
-        paths.extend(known.print.map(|_| known.print_path));
+        paths.extend(known.mesh.filter(was_read).map(|_| known.mesh_path));
+        paths.extend(known.print.filter(was_read).map(|_| known.print_path));
     }
     // The files of pairs that were cut from a block are artifacts.
     paths.retain(|path| ArtifactRef::at_path(path).is_none());
     let blocks = catalog.known_blocks().await?.into_iter().take(MAX_BLOCKS);
     for block in blocks {
-        paths.extend(block.inputs.mesh.map(|_| block.attributes.mesh_path));
-        paths.extend(block.inputs.page.map(|_| block.attributes.page_path));
+        let BlockInputVersions { mesh, page, .. } = block.inputs;
+        paths.extend(mesh.filter(was_read).map(|_| block.attributes.mesh_path));
+        paths.extend(page.filter(was_read).map(|_| block.attributes.page_path));
     }
     let project = project.clone();
     let look = tokio::task::spawn_blocking(move || among(&project, paths));
     let looked = tokio::time::timeout(MAX_TIME, look).await;
     Ok(looked.ok().and_then(Result::ok).flatten())
+}
+
+/// Returns whether a file was there. The pairs and blocks of others failed, which is said elsewhere.
+fn was_read(version: &InputVersion) -> bool {
+    !version.is_gone()
 }
 
 fn among(project: &Project, paths: Vec<String>) -> Option<MissingInputs> {

@@ -8,7 +8,8 @@ use mocban_align::stages::normalize::{Normalized, PrintMasks};
 use mocban_align::stages::{Print, Scan};
 use mocban_core::domain::artifact_role::{DEPTH, print_mask};
 use mocban_core::domain::{
-    DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage, WaitReason,
+    DepthOutcome, Failure, FailureClass, FitOutcome, InputVersion, NormalizeOutcome, Stage,
+    WaitReason,
 };
 use mocban_core::raster::{self, DepthMap};
 use mocban_core::{InputLimits, mesh};
@@ -145,7 +146,7 @@ impl StageInputs {
         pair.file_in_use.set(Some(input.path()));
         let open = || open_input(&input, limit, "limits.mesh.max_bytes");
         let opened = self.metrics.waiting(WaitReason::Inputs, open);
-        let mut file = opened.map_err(unreadable)?;
+        let mut file = opened.map_err(|error| unopened(error, &mut pair.inputs.mesh))?;
         let size = file.size();
         let mut timed = TimedRead::new(&mut file);
         let mesh = mesh::read_from(&mut timed, size, stored, &self.limits.mesh);
@@ -172,7 +173,7 @@ impl StageInputs {
         pair.file_in_use.set(Some(input.path()));
         let read = || read_input(&input, limit, "limits.image.max_bytes");
         let read = self.metrics.waiting(WaitReason::Inputs, read);
-        let file = read.map_err(unreadable)?;
+        let file = read.map_err(|error| unopened(error, &mut pair.inputs.print))?;
         pair.inputs.print = Some(file.version);
         pair.file_in_use.set(None);
         let image = raster::decode(&file.bytes, &self.limits.image).map_err(|error| {
@@ -184,6 +185,14 @@ impl StageInputs {
         }
         Ok(Print::from(image))
     }
+}
+
+/// Stores with the failure that a file is missing, so that a later run takes the pair up when it is there.
+fn unopened(error: InputError, version: &mut Option<InputVersion>) -> PairStageError {
+    if let InputError::NotThere(_) = error {
+        *version = Some(InputVersion::gone());
+    }
+    unreadable(error)
 }
 
 fn unreadable(error: InputError) -> PairStageError {

@@ -77,10 +77,7 @@ fn change(input: &Input, known: &InputVersion) -> Option<InputVersion> {
     match stat_input(input) {
         Ok(stat) if stat == known.stat => None,
         Ok(_) => hash_input(input).ok(),
-        Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion {
-            hash: ContentHash::of(b""),
-            stat: "gone".to_owned(),
-        }),
+        Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion::gone()),
         Err(_) => None,
     }
 }
@@ -132,6 +129,19 @@ impl BlockSources {
             page: page.transpose()?,
             labels: labels.transpose()?,
         })
+    }
+
+    /// Returns the versions of the files that are missing. May block.
+    pub(crate) fn missing(&self) -> BlockInputVersions {
+        let gone = |input: &Input| {
+            let is_gone = matches!(stat_input(input), Err(InputError::NotThere(_)));
+            is_gone.then(InputVersion::gone)
+        };
+        BlockInputVersions {
+            mesh: gone(&self.mesh),
+            page: gone(&self.page),
+            labels: self.labels.as_ref().and_then(gone),
+        }
     }
 
     /// Checks that no file has changed since its version was determined.

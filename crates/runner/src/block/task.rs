@@ -142,8 +142,22 @@ async fn run_stage(
     });
     let (sources, known) = (block.sources.clone(), block.inputs.clone());
     let worker = block.lease.worker();
-    let versions = on_thread(context, worker, move |_| sources.versions(stage, &known)).await?;
-    let versions = versions.map_err(|error| Interruption::of(error, None))?;
+    let read = move |_: &AtomicBool| {
+        let versions = sources.versions(stage, &known);
+        Ok(versions.map_err(|error| (error, sources.missing())))
+    };
+    let versions = on_thread(context, worker, read).await?;
+    let versions = match versions.map_err(|error| Interruption::of(error, None))? {
+        Ok(versions) => versions,
+        Err((error, missing)) => {
+            let BlockInputVersions { mesh, page, labels } = missing;
+            let seen = &mut block.inputs;
+            seen.mesh = mesh.or_else(|| seen.mesh.take());
+            seen.page = page.or_else(|| seen.page.take());
+            seen.labels = labels.or_else(|| seen.labels.take());
+            return Err(Interruption::of(error, None));
+        }
+    };
     let earlier = outdated(stage, &block.inputs, &versions);
     let BlockInputVersions { mesh, page, labels } = versions;
     let seen = BlockInputVersions {
