@@ -81,6 +81,17 @@ fn retired_pairs_are_in_no_count_and_come_back() {
         (2, before.exported * 2)
     );
     assert_eq!(at(&["status", "--json"]).expect(0).json()["retired"], 1);
+    let listed = at(&["status", "--retired"]).expect(0).out;
+    let line = listed.lines().last().expect("a line");
+    assert!(
+        line.starts_with(PAIRS[1]) && line.contains("by a person"),
+        "{listed}"
+    );
+    let listed = at(&["status", "--retired", "--json"]).expect(0).json();
+    let listed = &listed["retired_list"];
+    assert_eq!(listed[0]["id"], PAIRS[1]);
+    assert_eq!(listed[0]["cause"], "person");
+    assert_eq!(listed.as_array().map(Vec::len), Some(1));
     let log = at(&["verdict", "log", PAIRS[1], "--json"]).expect(0);
     assert_eq!(log.out.lines().count(), 4);
     for command in ["show", "run", "retry", "contact-sheet"] {

@@ -127,6 +127,7 @@ async fn stale_pairs_are_counted_by_counters_and_marks() {
         staleness::COUNT_STALE,
         staleness::MARKED,
         staleness::CLEAR_DIRTY,
+        status::OTHER_FILES,
     ] {
         let plan = plan(sql).await;
         let small = [

@@ -167,6 +167,12 @@ pub(crate) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
         summary.changed.len(),
         summary.unchanged
     ));
+    if summary.other_files > 0 {
+        let pairs = count(summary.other_files, "pair");
+        context.info(&format!(
+            "{pairs} with another mesh or print; the next run reads them"
+        ));
+    }
     for (number, text) in [
         (
             summary.retired,
@@ -199,6 +205,7 @@ fn as_json(outcome: &ImportOutcome) -> Value {
         "schema": 1,
         "added": summary.added,
         "changed": changed.collect::<Value>(),
+        "other_files": summary.other_files,
         "unchanged": summary.unchanged,
         "retired": summary.retired,
         "restored": summary.restored,

@@ -5,21 +5,20 @@ use std::io::IsTerminal;
 use std::time::Duration;
 
 use clap::Args;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::review::review_step;
 use super::run_text::failed_pair_steps;
 use super::status_hosts::table_text;
-use crate::cli::output::block_status::{blocks_line, failed_blocks_text};
 use crate::cli::output::context::Context;
-use crate::cli::output::failures::failures_text;
 use crate::cli::output::missing_results;
 use crate::cli::output::pair_table::pair_table as pair_table_text;
-use crate::cli::output::screen::{Palette, Tone, clear_code};
+use crate::cli::output::retired_table::retired_table;
+use crate::cli::output::screen::clear_code;
+use crate::cli::output::status_screen::screen;
 use crate::cli::output::streams;
-use crate::cli::output::table::{columns, count};
-use mocban_catalog::{Catalog, StageCounts, StatusCounts};
-use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
+use mocban_catalog::{Catalog, RetiredPair};
+use mocban_core::domain::JobStatus;
 use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::hosts::WorkerTable;
 use mocban_project::location::now;
@@ -43,8 +42,11 @@ pub(crate) struct StatusArgs {
     /// Add a table of all pairs: state, alignment, confidence and verdict
     #[arg(long, conflicts_with = "watch")]
     pub(crate) pairs: bool,
+    /// Add a list of the retired pairs: since when and why they are out of every count
+    #[arg(long, conflicts_with = "watch")]
+    pub(crate) retired: bool,
     /// Show the workers of each machine instead: what they have done, how long each stage takes, and what they wait for
-    #[arg(long, conflicts_with_all = ["failed", "pairs"])]
+    #[arg(long, conflicts_with_all = ["failed", "pairs", "retired"])]
     pub(crate) hosts: bool,
 }
 
@@ -87,29 +89,46 @@ async fn print_once(
         print_refreshed(args, context, &json, text)?;
     } else {
         let status = ProjectStatus::read(project, catalog, args.failed, &context.location).await?;
-        let pairs = if args.pairs {
-            Some(pair_table::read(catalog, PairChoice::All).await?)
-        } else {
-            None
-        };
-        print_status(&status, pairs.as_deref(), args, context)?;
+        let mut lists = AddedLists::default();
+        if args.pairs {
+            lists.pairs = Some(pair_table::read(catalog, PairChoice::All).await?);
+        }
+        if args.retired {
+            lists.retired = Some(catalog.retired_pairs().await?);
+        }
+        print_status(&status, &lists, args, context)?;
     }
     Ok(())
 }
 
+/// Lists that are printed below the screen on request.
+#[derive(Debug, Default)]
+struct AddedLists {
+    pairs: Option<Vec<PairRow>>,
+    retired: Option<Vec<RetiredPair>>,
+}
+
 fn print_status(
     status: &ProjectStatus,
-    pairs: Option<&[PairRow]>,
+    lists: &AddedLists,
     args: &StatusArgs,
     context: &Context,
 ) -> ProjectResult<()> {
     let dir = context.location.dir.display().to_string();
     let mut text = screen(status, &dir, args.failed, context.stdout);
     let mut json = status.json(args.failed)?;
-    if let Some(pairs) = pairs {
+    if let Some(pairs) = &lists.pairs {
         text.push('\n');
         text.push_str(&pair_table_text(pairs, context.stdout));
         json["pair_list"] = serde_json::to_value(pairs)?;
+    }
+    if let Some(retired) = &lists.retired {
+        text.push('\n');
+        text.push_str(&retired_table(retired, context.stdout));
+        let retired = retired.iter();
+        json["retired_list"] = retired
+            .map(|pair| json!({"id": pair.name, "cause": pair.cause, "at": pair.at}))
+            .collect();
     }
     print_refreshed(args, context, &json, text)?;
     if !context.global.json {
@@ -141,114 +160,6 @@ fn print_refreshed(
     Ok(streams::print(&text)?)
 }
 
-fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Palette) -> String {
-    let line = |word: &str, text: &str| format!("{}  {text}\n", label(word, palette));
-    let mut parts = vec![line("project", &headline(status, dir, palette))];
-    if !status.failures.blocks.is_empty() {
-        parts.push(line(
-            "blocks",
-            &blocks_line(&status.failures.blocks, status.running, palette),
-        ));
-        parts.push(failed_blocks_text(&status.failures.blocks, all));
-    }
-    parts.push(stage_table(&status.counts, palette));
-    if status.failed() > 0 {
-        parts.push(format!("{}\n", palette.paint(Tone::Strong, "failed")));
-        parts.push(failures_text(&status.failures, all));
-    }
-    if status.interrupted() > 0 {
-        let text = "their run ended before it finished them; the next run continues them";
-        parts.push(line("interrupted", text));
-    }
-    if status.counts.stale > 0 {
-        let pairs = count(status.counts.stale, "pair");
-        let text = format!("{pairs} computed with other settings or files than the current ones");
-        parts.push(line("stale", &text));
-    }
-    if status.counts.retired > 0 {
-        let pairs = count(status.counts.retired, "pair");
-        let text = format!("{pairs} out of every count; results and verdicts are kept");
-        parts.push(line("retired", &text));
-    }
-    if status.are_results_missing {
-        parts.push(line("files", missing_results::TEXT));
-    }
-    if let Some(missing) = &status.missing_inputs {
-        parts.push(line("inputs", &missing.to_string()));
-    }
-    parts.extend(low_confidence_line(&status.counts).map(|text| line("confidence", &text)));
-    parts.extend(verdict_line(&status.counts).map(|text| line("verdicts", &text)));
-    parts.concat()
-}
-
-fn label(word: &str, palette: Palette) -> String {
-    palette.paint(Tone::Strong, format!("{word:<11}"))
-}
-
-/// Returns `demo · 24 pairs · 22 done · 1 failed · 1 waiting · 91.7 %`
-fn headline(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
-    let done = status.jobs(JobStatus::Done);
-    let pairs = status.counts.pairs;
-    let mut parts = vec![
-        one_line(dir).into_owned(),
-        count(pairs, "pair"),
-        palette.paint(Tone::Good, format!("{done} done")),
-    ];
-    for (number, word, tone) in [
-        (status.failed(), "failed", Tone::Bad),
-        (status.in_process(), "running", Tone::Strong),
-        (status.interrupted(), "interrupted", Tone::Warn),
-        (status.waiting(), "waiting", Tone::Warn),
-    ] {
-        if number > 0 {
-            parts.push(palette.paint(tone, format!("{number} {word}")));
-        }
-    }
-    if pairs > 0 {
-        parts.push(format!("{:.1} %", done as f64 * 100.0 / pairs as f64));
-    }
-    parts.join(" · ")
-}
-
-fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
-    let of = |stage: Stage| counts.stages.get(&stage).copied().unwrap_or_default();
-    let head = Stage::ALL.map(|stage| palette.paint(Tone::Strong, stage));
-    let row = |name: &str, cell: &dyn Fn(StageCounts) -> String| {
-        let cells = Stage::ALL.map(|stage| cell(of(stage)));
-        [vec![label(name, palette)], cells.to_vec()].concat()
-    };
-    let failed = |stage: StageCounts| {
-        let tone = if stage.failed == 0 {
-            Tone::Faint
-        } else {
-            Tone::Bad
-        };
-        palette.paint(tone, stage.failed)
-    };
-    let rows = [
-        [vec![label("stages", palette)], head.to_vec()].concat(),
-        row("  done", &|stage| stage.done.to_string()),
-        row("  pending", &|stage| stage.pending.to_string()),
-        row("  failed", &failed),
-    ];
-    columns(rows, "<>>>>")
-}
-
-fn low_confidence_line(counts: &StatusCounts) -> Option<String> {
-    (counts.low_confidence > 0).then(|| {
-        let pairs = count(counts.low_confidence, "done pair");
-        let metric = ThresholdMetric::DEFAULT;
-        format!("{pairs} below {} ({metric})", MetricOutcome::LOW_CONFIDENCE)
-    })
-}
-
-fn verdict_line(counts: &StatusCounts) -> Option<String> {
-    let of = |verdict: Verdict| counts.verdicts.get(&verdict).copied().unwrap_or(0);
-    let total: u64 = Verdict::ALL.into_iter().map(of).sum();
-    let parts = Verdict::ALL.map(|verdict| format!("{} {verdict}", of(verdict)));
-    (total > 0).then(|| parts.join(" · "))
-}
-
 fn next_steps(status: &ProjectStatus) -> Vec<String> {
     let mut steps = Vec::new();
     if status.counts.pairs == 0 && status.failures.blocks.is_empty() {
@@ -261,7 +172,8 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     let running = status.in_process() > 0 || (status.running && leased > 0);
     let waiting = status.waiting() + status.failures.blocks.waiting();
     let interrupted = status.interrupted() + if status.running { 0 } else { leased };
-    let has_work = waiting + interrupted + status.counts.stale > 0;
+    let changed = status.counts.stale + status.counts.other_files;
+    let has_work = waiting + interrupted + changed > 0;
     if !running && (has_work || status.are_results_missing) {
         steps.push("run".to_owned());
     }
@@ -284,12 +196,10 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        JobStatus, Palette, ProjectStatus, Stage, StageCounts, StatusCounts, Verdict, next_steps,
-        screen,
-    };
-    use mocban_catalog::{FailedPair, StoredFailure};
-    use mocban_core::domain::{Failure, FailureClass};
+    use super::{ProjectStatus, next_steps, screen};
+    use crate::cli::output::screen::Palette;
+    use mocban_catalog::{FailedPair, StageCounts, StatusCounts, StoredFailure};
+    use mocban_core::domain::{Failure, FailureClass, JobStatus, Stage, Verdict};
     use mocban_project::failures::Failures;
     use mocban_project::missing_inputs::MissingInputs;
 
@@ -307,6 +217,7 @@ mod tests {
                 jobs: [(JobStatus::Done, done), (JobStatus::Ready, ready)].into(),
                 stages: Stage::ALL.map(|name| (name, stage)).into(),
                 stale: 0,
+                other_files: 0,
                 low_confidence: 0,
                 verdicts: std::collections::BTreeMap::new(),
             },
@@ -365,6 +276,18 @@ mod tests {
             steps[..2],
             ["show --low", "contact-sheet --order confidence"]
         );
+    }
+
+    #[test]
+    fn pairs_with_other_files_are_counted_and_run() {
+        let mut status = status(3, 0);
+        status.running = false;
+        assert!(!next_steps(&status).contains(&"run".to_owned()));
+        status.counts.other_files = 2;
+        let text = screen(&status, "demo", false, Palette::PLAIN);
+        let line = "changed      2 pairs with another mesh or print in the list than before; the next run reads them\n";
+        assert!(text.ends_with(line), "{text}");
+        assert_eq!(next_steps(&status)[0], "run");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
+use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
@@ -68,7 +69,7 @@ SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1) AS item WHERE EXISTS (SELE
 /// Selects the newest verdict on the result of each item by its reviewer, in one spelling of the name.
 const NEWEST: &str = concat!(
     "
-SELECT CAST(value ->> 0 AS bigint), last.id, last.verdict, last.reason, last.note, last.at FROM json_each(?1) AS item
+SELECT CAST(value ->> 0 AS bigint) AS number, last.id, last.verdict, last.reason, last.note, last.at FROM json_each(?1) AS item
     JOIN verdict AS last ON last.id = (SELECT v.id FROM verdict AS v WHERE ",
     is_of_item!(),
     " ORDER BY v.id DESC LIMIT 1)"
@@ -94,15 +95,17 @@ RETURNING id";
 /// What a verdict says.
 type Content = (Verdict, Option<Reason>, Option<String>);
 
-/// Number of an item, and the id, content and time of the newest verdict on its result.
-type NewestVerdictRow = (
-    i64,
-    i64,
-    Verdict,
-    Option<Reason>,
-    Option<String>,
-    UnixMillis,
-);
+/// The newest verdict on the result of an item with this number.
+struct NewestVerdictRow {
+    number: i64,
+    id: i64,
+    verdict: Verdict,
+    reason: Option<Reason>,
+    note: Option<String>,
+    at: UnixMillis,
+}
+
+from_row! { NewestVerdictRow { number, id, verdict, reason, note, at } }
 
 /// What each reviewer's newest verdict on a result says, and its time, unless it is one without a time of the same list.
 type NewestVerdicts = BTreeMap<(JudgedResult, String), (Content, Option<UnixMillis>)>;
@@ -364,13 +367,12 @@ async fn newest_contents(
     }));
     let mut found: Vec<NewestVerdictRow> = query_as(NEWEST).bind(items).fetch_all(conn).await?;
     // The newest of all spellings replaces the others.
-    found.sort_unstable_by_key(|(_, id, ..)| *id);
-    let found = found.into_iter();
-    let found = found.map(|(number, _, verdict, reason, note, at)| {
-        let new = compared[number as usize];
+    found.sort_unstable_by_key(|row| row.id);
+    let found = found.into_iter().map(|row| {
+        let new = compared[row.number as usize];
         let of_result = (new.result, new.reviewer.clone());
-        let at = (at != now).then_some(at);
-        (of_result, ((verdict, reason, note), at))
+        let content = (row.verdict, row.reason, row.note);
+        (of_result, (content, (row.at != now).then_some(row.at)))
     });
     Ok(found.collect())
 }

@@ -56,6 +56,8 @@ pub struct ImportSummary {
     pub added: u64,
     /// Existing pairs with other values, and the columns that differ.
     pub changed: Vec<PairChange>,
+    /// Number of changed pairs that get another mesh or print.
+    pub other_files: u64,
     /// Number of existing pairs with the same values.
     pub unchanged: u64,
     /// Number of pairs that the list does not have and that were retired.
@@ -135,6 +137,11 @@ ON CONFLICT (pair) DO NOTHING";
 const WITH_PREFIX: &str = "
 SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id
 WHERE p.name >= ?1 AND p.name < ?2 ORDER BY p.name LIMIT ?3";
+
+/// Marks completed pairs of these names, whose results may disagree with their new files, so that `status` counts them.
+const MARK: &str = "
+UPDATE job SET dirty = 1 WHERE dirty = 0 AND status = 3
+    AND pair IN (SELECT id FROM pair WHERE name IN (SELECT atom FROM json_each(?1)))";
 
 const OF_LISTED_BLOCK: &str = "SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id WHERE p.block = ?1 ORDER BY p.name";
 
@@ -302,6 +309,7 @@ pub(crate) async fn import_chunk(
             .iter()
             .any(|field| matches!(*field, "mesh" | "print"))
         {
+            summary.other_files += 1;
             moved.push(row.name.clone());
         }
         summary.changed.push(PairChange {
@@ -324,6 +332,10 @@ pub(crate) async fn import_chunk(
     let rows = upsert.fetch_all(&mut *conn).await?;
     checksums::store_of_rows(conn, ChecksummedTable::Pair, &rows).await?;
     let ids: Vec<i64> = rows.iter().map(|row| row.get(0)).collect::<Result<_>>()?;
+    if !moved.is_empty() {
+        let names = json_array(moved.iter().map(PairName::as_str));
+        query(MARK).bind(names).execute(&mut *conn).await?;
+    }
     requeue::retry::<PairJob>(conn, &RetrySelection::Names(moved), deltas).await?;
     query(NEW_JOBS)
         .bind(json_array(ids.iter().copied()))

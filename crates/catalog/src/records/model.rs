@@ -31,10 +31,12 @@ pub struct StatusCounts {
     pub stages: BTreeMap<Stage, StageCounts>,
     /// Number of pairs with stale results. A result is stale if its settings or inputs have changed since.
     pub stale: u64,
+    /// Number of completed pairs for which a list names another mesh or print than before. The next run reads these files.
+    pub other_files: u64,
     /// Number of completed pairs whose confidence by [`ThresholdMetric::DEFAULT`] is below
     /// [`MetricOutcome::LOW_CONFIDENCE`].
     pub low_confidence: u64,
-    /// Number of verdicts on current results. Only the newest verdict of each reviewer counts.
+    /// Number of verdicts on current results of completed pairs. Only the newest verdict of each reviewer counts.
     pub verdicts: BTreeMap<Verdict, u64>,
 }
 

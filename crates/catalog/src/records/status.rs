@@ -25,7 +25,7 @@ macro_rules! person {
     };
 }
 
-/// Selects verdicts `v` on current results. Only the newest verdict of each reviewer on a result counts. Leaves out the
+/// Selects verdicts `v` on current results of pairs that are done, as a report counts them. Only the newest verdict of each reviewer on a result counts. Leaves out the
 /// verdicts that the owner has set apart; damaged ones that nobody knows of yet are found by a check or a report.
 ///
 /// `?1` has the stored spellings of names that are not the spelling of the name.
@@ -34,6 +34,7 @@ macro_rules! from_current_verdicts {
         concat!(
             "FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
+    JOIN job AS done ON done.pair = v.pair AND done.status = 3
 WHERE v.id = (
     SELECT max(n.id) FROM verdict AS n
     WHERE n.pair = v.pair AND n.metric = v.metric AND ",
@@ -54,13 +55,17 @@ const VERDICTS: &str = concat!(
 SELECT v.verdict, count(*) ",
     from_current_verdicts!(),
     "
-    AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = v.pair)
 GROUP BY v.verdict"
 );
 
 /// Completed pairs whose result of the default metric has a low confidence.
 pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
+
+/// Completed pairs of which an import changed the path of a file, which no run has read since.
+pub(crate) const OTHER_FILES: &str = "
+SELECT count(*) FROM job AS j CROSS JOIN pair AS p ON p.id = j.pair
+WHERE j.dirty = 1 AND j.status = 3 AND (p.mesh_stat = '' OR p.print_stat = '')";
 
 /// Pairs that were retired, except for those whose boxes are gone, which their blocks count.
 const RETIRED: &str = "SELECT count(*) FROM retired_pair WHERE cause <> 'labels'";
@@ -79,6 +84,7 @@ impl Catalog {
             jobs: jobs_by_status(&counted),
             stages: by_stage(&counted),
             stale: count_stale(&mut conn, &current).await?,
+            other_files: query_scalar(OTHER_FILES).fetch_one(&mut conn).await?,
             low_confidence: query_scalar(LOW_CONFIDENCE).fetch_one(&mut conn).await?,
             verdicts: verdicts(&mut conn).await?,
         })

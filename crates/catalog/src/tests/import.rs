@@ -3,6 +3,7 @@
 use super::blocks::{attributes, block};
 use super::{World, name, row};
 use crate::{CatalogError, ImportChunk, ImportRow, ImportTerms};
+use mocban_core::domain::{PairId, Stage};
 
 #[tokio::test]
 async fn an_import_without_an_end_stores_nothing() {
@@ -42,6 +43,30 @@ async fn chunks_of_an_import_are_counted_together() {
     assert_eq!((summary.added, summary.unchanged, truths), (2, 0, 0));
     assert_eq!(summary.changed[0].name, name("p0"));
     assert_eq!(summary.changed[0].fields, ["mesh"]);
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_pair_with_another_path_is_counted_until_its_file_is_read() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    let other_files = async || {
+        let status = world.catalog.status(&super::fingerprints([1; 4])).await;
+        status.expect("a read").other_files
+    };
+    let mut moved = row("p0");
+    moved.mesh_path = "elsewhere.stl".to_owned();
+    let mut renamed = row("p1");
+    renamed.character = Some("二".to_owned());
+    for (expected, count) in [(1, 1), (0, 1)] {
+        let rows = vec![moved.clone(), renamed.clone()];
+        let summary = world.catalog.import(rows, 2).await.expect("imported");
+        assert_eq!(summary.other_files, expected);
+        assert_eq!(other_files().await, count);
+    }
+    let inputs = vec![(PairId(1), super::inputs(Stage::Normalize))];
+    world.catalog.store_inputs(inputs).await.expect("stored");
+    assert_eq!(other_files().await, 0);
     world.assert_counters().await;
 }
 

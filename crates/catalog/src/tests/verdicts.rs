@@ -2,7 +2,7 @@
 
 use super::{World, name};
 use crate::db::query::query;
-use crate::{Catalog, CatalogError, CheckpointOutcome, NewVerdict, ReviewContext};
+use crate::{Catalog, CatalogError, CheckpointOutcome, NewVerdict, RerunPolicy, ReviewContext};
 use mocban_core::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
 /// Number of metrics with a result, of a pair that is done.
@@ -56,6 +56,28 @@ async fn the_newest_verdict_of_each_reviewer_counts() {
         world.catalog.verdict_log(None).await.expect("a log").len(),
         3 * METRICS
     );
+}
+
+#[tokio::test]
+async fn verdicts_of_pairs_that_are_not_done_are_counted_nowhere() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let given = vec![verdict("ana", Verdict::Pass)];
+    world.catalog.verdict_set(given, 5).await.expect("stored");
+    let fingerprints = super::fingerprints([1; 4]);
+    let passed = async || {
+        let status = world.catalog.status(&fingerprints).await;
+        let pair = world.catalog.pair(&name("p0")).await.expect("a read");
+        let metrics = pair.expect("the pair").results.metrics;
+        let of_report: usize = metrics.iter().map(|record| record.verdicts.len()).sum();
+        let of_status = status.expect("a read").verdicts[&Verdict::Pass];
+        (of_status, of_report as u64)
+    };
+    assert_eq!(passed().await, (METRICS as u64, METRICS as u64));
+    let all = RerunPolicy::All(Stage::Fit);
+    let requeued = world.catalog.requeue_stale(&fingerprints, None, all).await;
+    assert_eq!(requeued.expect("requeued"), 1);
+    assert_eq!(passed().await, (0, 0));
 }
 
 #[tokio::test]

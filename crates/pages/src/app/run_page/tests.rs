@@ -58,6 +58,7 @@ fn running(blocks: Vec<BlockState>) -> RunState {
             jobs: BTreeMap::from([(JobStatus::Done, 10), (JobStatus::Ready, 10)]),
             stages: BTreeMap::new(),
             stale: 0,
+            other_files: 0,
             low_confidence: 0,
             verdicts: BTreeMap::new(),
         },
