@@ -17,7 +17,7 @@ use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{ContentHash, PairName, UnixMillis, sanitize};
 use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
 use mocban_lists::json_numbers::nan_as_null;
-use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, trimmed};
+use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, later_header, trimmed};
 use mocban_lists::quotes::check_quotes;
 use mocban_system::time_text::parse_utc;
 
@@ -153,7 +153,9 @@ fn csv_rows(
         .from_reader(Cursor::new(text.clone()));
     let headers = reader.headers().map_err(|error| csv_error(&error, &text))?;
     let mut lines = LineCounter::new(text.clone());
-    let positions = positions(headers, lines.at(headers.position()))?;
+    let line = lines.at(headers.position());
+    let below = later_header(text.as_ref(), (delimiter, line), &COLUMNS, REQUIRED);
+    let positions = positions(headers, line, below)?;
     Ok(reader.into_records().map(move |record| {
         let record = record.map_err(|error| csv_error(&error, &text))?;
         let line = lines.at(record.position());
@@ -204,8 +206,13 @@ pub fn unread_fields(first_lines: &BTreeMap<String, usize>) -> Option<String> {
     })
 }
 
-/// Returns the position of each of [`COLUMNS`] in the file. The header is on this line.
-fn positions(headers: &StringRecord, line: usize) -> Result<[Option<usize>; 7], RefusedLine> {
+/// Returns the position of each of [`COLUMNS`] in the file. The header is on this line, unless it is a title and the line
+/// `below` is the header.
+fn positions(
+    headers: &StringRecord,
+    line: usize,
+    below: Option<usize>,
+) -> Result<[Option<usize>; 7], RefusedLine> {
     let names: Vec<&str> = headers.iter().map(trimmed).collect();
     let refuse = |reason: &str| RefusedLine::new(line, reason);
     let same = |same: SameColumn| refuse(&same.reason(&names));
@@ -217,7 +224,12 @@ fn positions(headers: &StringRecord, line: usize) -> Result<[Option<usize>; 7], 
         .filter(|name| !columns.contains(&Some(*name)))
         .collect();
     if !unknown.is_empty() || !missing.is_empty() {
-        return Err(refuse(&columns_reason(&missing, &unknown)));
+        return Err(refuse(&match below {
+            Some(below) => format!(
+                "this is no header; line {below} has the columns pair, verdict and reviewer: remove the lines above it"
+            ),
+            None => columns_reason(&missing, &unknown),
+        }));
     }
     let mut positions = [None; 7];
     for (position, name) in positions.iter_mut().zip(COLUMNS.names) {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::block_columns::{COLUMNS, REQUIRED};
 use super::column_names::{missing_column, similar_column};
 use super::csv::column_names;
 use super::draft::MAX_PATH_BYTES;
@@ -13,29 +14,6 @@ use crate::columns::KnownColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
-
-/// The columns of a list of blocks, and their Vietnamese names. The first three are required.
-const COLUMNS: KnownColumns = KnownColumns {
-    names: &["block", "mesh", "page", "labels", "unit", "side"],
-    other_names: &[
-        ("so_hieu_van", "block"),
-        ("ma_van", "block"),
-        ("van", "block"),
-        ("van_khac", "block"),
-        ("khoi", "block"),
-        ("moc_ban", "block"),
-        ("ban_quet", "mesh"),
-        ("ban_quet_3d", "mesh"),
-        ("tep_quet", "mesh"),
-        ("luoi", "mesh"),
-        ("anh_trang", "page"),
-        ("trang", "page"),
-        ("nhan", "labels"),
-        ("don_vi", "unit"),
-        ("mat", "side"),
-    ],
-};
-const REQUIRED: usize = 3;
 
 /// A block of a list.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use super::block_columns;
 use super::chosen_columns::ChosenColumns;
 use super::column_names::missing_column;
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, Problem, at_line, of_list};
+use super::later_header::later_header;
 use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::{HeaderColumns, SameColumn};
@@ -160,30 +162,18 @@ fn not_utf8(columns: &[usize]) -> Option<String> {
 /// Largest number of columns that a message names.
 const MAX_COLUMNS_SHOWN: usize = 12;
 
-/// Number of lines in which a header below a title is searched.
-const MAX_TITLE_LINES: usize = 20;
-
-/// Says which of the lines below the first `above` ones has the required columns, if a title stands above it. Its
-/// separator may be another one.
-fn later_header(list: &[u8], delimiter: u8, above: usize) -> Option<Problem> {
-    let has_columns = |text: &str, delimiter: u8| {
-        let cells = text.split(char::from(delimiter));
-        let unquoted = |cell| trimmed(trimmed(cell).trim_matches('"'));
-        let names: Vec<&str> = cells.map(unquoted).collect();
-        COLUMNS.assign(&names).is_ok_and(|found| {
-            let mut required = REQUIRED.iter();
-            required.all(|name| found.columns.contains(&Some(*name)))
-        })
+/// Says which of the lines below the first `above` ones is the header of a list of pairs or of blocks, if a title stands
+/// above it.
+fn header_below(list: &[u8], delimiter: u8, above: usize) -> Option<Problem> {
+    let find = |known, required| later_header(list, (delimiter, above), known, required);
+    let (number, what) = match find(&COLUMNS, REQUIRED.len()) {
+        Some(number) => (number, "has these columns"),
+        None => {
+            let number = find(&block_columns::COLUMNS, block_columns::REQUIRED)?;
+            (number, "has the columns of a list of blocks")
+        }
     };
-    let lines = list.split(|byte| *byte == b'\n').take(MAX_TITLE_LINES);
-    let lines = (1..).zip(lines).skip(above);
-    let mut short = lines.filter(|(_, line)| line.len() <= MAX_ROW_BYTES);
-    let (number, _) = short.find(|(_, line)| {
-        let mut delimiters = [delimiter, b',', b';', b'\t'].into_iter();
-        std::str::from_utf8(line)
-            .is_ok_and(|text| delimiters.any(|delimiter| has_columns(text, delimiter)))
-    })?;
-    let text = format!("line {number} has these columns; remove the lines above it");
+    let text = format!("line {number} {what}; remove the lines above it");
     Some(of_list(&text))
 }
 
@@ -228,7 +218,7 @@ impl CsvHeader {
             .filter(|name| !columns.contains(&Some(**name)));
         problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
         if let Err(mut problems) = problems.check(false) {
-            problems.extend(later_header(list, delimiter, line));
+            problems.extend(header_below(list, delimiter, line));
             return Err(problems);
         }
         let names = names.into_iter().map(str::to_owned);

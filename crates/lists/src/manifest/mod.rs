@@ -1,6 +1,7 @@
 //! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem; and CSV lists of whole blocks. The functions
 //! parse text or lists of paths and read no files. All problems of a list are reported together.
 
+mod block_columns;
 mod block_list;
 mod chosen_columns;
 mod column_names;
@@ -10,6 +11,7 @@ mod error;
 mod folders;
 mod json_array;
 mod jsonl;
+mod later_header;
 mod list_head;
 mod misspelt_columns;
 mod row;
@@ -24,6 +26,7 @@ pub use folders::{
     is_named_like_input, is_named_like_mesh, is_named_like_print, pair_folders,
 };
 pub use jsonl::{parse_jsonl, read_jsonl};
+pub use later_header::later_header;
 pub use list_head::{ListHead, read_head};
 pub use misspelt_columns::MisspeltColumns;
 pub(crate) use row::is_text_column;

@@ -34,7 +34,7 @@ struct TableWriter<'w> {
     csv: Vec<u8>,
     /// Number of rows that were written.
     rows: usize,
-    /// Number of columns of the header, the first row with a value; 0 before it.
+    /// Number of columns of the header; 0 before it.
     width: usize,
     /// Columns whose values are names, with the header's.
     text_columns: BTreeMap<usize, String>,
@@ -47,8 +47,9 @@ struct TableWriter<'w> {
     cell: Option<OpenCell>,
 }
 
-/// Returns the text of a sheet as CSV. Columns without a name in the header, the first row with a value, are left out. Line
-/// breaks in cells become blanks.
+/// Returns the text of a sheet as CSV. Columns without a name in the header are left out. Line breaks in cells become blanks.
+///
+/// The header is the first row with a value that is no title: see [`is_header`]. A parser refuses titles above it.
 pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>, WorkbookError> {
     let mut writer = TableWriter {
         workbook,
@@ -223,7 +224,7 @@ impl TableWriter<'_> {
         if self.cells.is_empty() {
             return Ok(());
         }
-        if self.width == 0 {
+        if self.width == 0 && is_header(&self.cells) {
             self.width = self.cells.len();
             let cells = self.cells.iter().enumerate();
             let names = cells.filter(|(_, name)| is_text_column(name));
@@ -232,7 +233,7 @@ impl TableWriter<'_> {
         for _ in self.rows + 1..self.row {
             self.csv.push(b'\n');
         }
-        for column in 0..self.width {
+        for column in 0..self.width.max(self.cells.len()) {
             if column > 0 {
                 self.csv.push(b',');
             }
@@ -243,6 +244,15 @@ impl TableWriter<'_> {
         self.rows = self.row;
         check_table(self.csv.len())
     }
+}
+
+/// Number of columns that every list has.
+const FEWEST_COLUMNS: usize = 3;
+
+/// Returns whether a row can be the header of a list: it names enough columns, or one that is known.
+fn is_header(cells: &[String]) -> bool {
+    let named = cells.iter().filter(|name| !name.is_empty());
+    named.count() >= FEWEST_COLUMNS || cells.iter().any(|name| is_text_column(name))
 }
 
 /// Refuses a table of too many bytes.

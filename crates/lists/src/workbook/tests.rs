@@ -57,6 +57,20 @@ fn cells_without_places_follow_each_other_also_after_empty_ones() {
 }
 
 #[test]
+fn the_header_below_a_title_is_named() {
+    let title: &[&str] = &["Danh sách của ván 4", "2026"];
+    let row = text_rows(&[title, &["id", "mesh", "print"], &["1", "a.stl", "a.png"]]);
+    let bytes = workbook(&[("a", &row)], "", "");
+    assert_eq!(
+        csv(&bytes),
+        "\"Danh sách của ván 4\",\"2026\"\n\"id\",\"mesh\",\"print\"\n\"1\",\"a.stl\",\"a.png\"\n"
+    );
+    let refused = parse_csv(csv(&bytes).as_bytes()).expect_err("a title");
+    let sentence = "line 2 has these columns; remove the lines above it";
+    assert!(refused.to_string().ends_with(sentence), "{refused}");
+}
+
+#[test]
 fn ids_that_became_dates_or_powers_of_ten_are_refused_and_other_columns_are_not() {
     let styles = "<styleSheet><cellXfs><xf numFmtId=\"0\"/><xf numFmtId=\"16\"/><xf numFmtId=\"11\"/>\
         <xf numFmtId=\"2\"/></cellXfs></styleSheet>";

@@ -122,6 +122,11 @@ fn invalid_line_is_reported_by_number() {
          reviewer, and possible metric, reason, note, at"
     );
     assert!(error("pair,verdict,reveiwer\n").contains("did you mean \"reviewer\"?"));
+    let title = error("Ván 4\n\npair;verdict;reviewer\n1;pass;lan\n");
+    assert_eq!(
+        title,
+        "line 1: this is no header; line 3 has the columns pair, verdict and reviewer: remove the lines above it"
+    );
     assert!(error("pair,verdict,reviewer\n1,pass\n").starts_with("line 2: 2 cells"));
     assert!(error("pair,verdict,reviewer\na/b,pass,lan\n").starts_with("line 2: id"));
 }

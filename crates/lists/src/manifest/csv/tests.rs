@@ -268,6 +268,11 @@ fn a_header_below_a_title_and_other_separators_are_named() {
         title.ends_with("\nline 3 has these columns; remove the lines above it"),
         "{title}"
     );
+    let blocks = refusal("Ván 4,,\nblock,mesh,page\n4,a.stl,a.png\n");
+    assert!(
+        blocks.ends_with("\nline 2 has the columns of a list of blocks; remove the lines above it"),
+        "{blocks}"
+    );
     let title = refusal("Block 4\nid;mesh;print\n1;a.stl;a.png\n");
     assert!(title.contains("line 2 has these columns"), "{title}");
     // The refused line itself is no advice, even if another separator would give it the columns.

@@ -1,0 +1,28 @@
+//! The columns of a list of whole blocks.
+
+use crate::columns::KnownColumns;
+
+/// The columns of a list of blocks, and their Vietnamese names. The first three are required.
+pub(super) const COLUMNS: KnownColumns = KnownColumns {
+    names: &["block", "mesh", "page", "labels", "unit", "side"],
+    other_names: &[
+        ("so_hieu_van", "block"),
+        ("ma_van", "block"),
+        ("van", "block"),
+        ("van_khac", "block"),
+        ("khoi", "block"),
+        ("moc_ban", "block"),
+        ("ban_quet", "mesh"),
+        ("ban_quet_3d", "mesh"),
+        ("tep_quet", "mesh"),
+        ("luoi", "mesh"),
+        ("anh_trang", "page"),
+        ("trang", "page"),
+        ("nhan", "labels"),
+        ("don_vi", "unit"),
+        ("mat", "side"),
+    ],
+};
+
+/// Number of columns that every list of blocks needs.
+pub(super) const REQUIRED: usize = 3;
