@@ -107,7 +107,12 @@ fn a_moved_project_and_a_moved_folder_of_artifacts_go_on() {
     let ended = at(&moved, &["check", "--repair"]).expect(0);
     assert!(!ended.err.contains("warning"), "{}", ended.err);
     // A catalog copied by `copy`, to which the folder is moved.
-    mocban(dir.path(), &["copy", "moved", "other"]).expect(0);
+    let copied = mocban(dir.path(), &["copy", "moved", "other"]).expect(0);
+    let next = copied.next();
+    assert!(
+        next.len() == 1 && next[0].ends_with(" -C other status"),
+        "{next:?}"
+    );
     let other = open(&dir.path().join("other"));
     copy_folder(&moved.dir().join("data"), &other.dir().join("data"));
     std::fs::rename(moved.artifacts_dir(), other.artifacts_dir()).expect("moved");

@@ -8,6 +8,7 @@ use super::exit::Refusal;
 use super::files;
 use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form, is_windows_path};
 use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
+use super::same_files::SameFiles;
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
 use crate::pair_choices::{PairChoices, RowsHash};
@@ -90,9 +91,14 @@ impl Listing {
             read_csv_as
         };
         let (mut misspelt, mut unread) = (MisspeltColumns::default(), UnreadRows::default());
+        let left_out: BTreeSet<String> = choices.changes.left_out.iter().cloned().collect();
+        let mut same_files = SameFiles::default();
         let mut each = |row: ManifestRow| {
             misspelt.add(&row);
             unread.add(&row);
+            if !left_out.contains(row.name.as_str()) {
+                same_files.add(&row);
+            }
         };
         let columns = choices.columns.clone();
         let read =
@@ -100,8 +106,8 @@ impl Listing {
         let mut warnings = misspelt.warnings();
         let unread = unread.warnings();
         warnings.extend(unread.map_err(|sentences| refuse(file, &sentences))?);
+        warnings.extend(same_files.warning());
         let renamed = renamed(&read);
-        let left_out: BTreeSet<String> = choices.changes.left_out.iter().cloned().collect();
         let has = |id: &&String| PairName::new(id).is_ok_and(|name| read.ids.contains(&name));
         if let Some(id) = left_out.iter().find(|id| !has(id)) {
             let text = format!("there is no pair {id:?} to leave out");
@@ -354,6 +360,21 @@ mod tests {
         for line in missing {
             assert!(line.len() < 600 && line.contains("... of a "), "{line}");
         }
+    }
+
+    #[test]
+    fn the_same_files_under_two_ids_are_counted_with_the_first() {
+        let list = "id,mesh,print\na,a.stl,a.png\nb,./a.stl,a.png\nc,a.stl,c.png\nd,a.stl,a.png\n";
+        let read = |choices: &PairChoices| {
+            let listing = Listing::from_bytes(Path::new("pairs.csv"), list.into(), choices);
+            listing.expect("valid").warnings
+        };
+        let sentence =
+            "pairs with the same mesh and print as an earlier one: 2, first b, as on line 2";
+        assert_eq!(read(&PairChoices::default()), [sentence]);
+        let mut choices = PairChoices::default();
+        choices.changes.left_out = ["b", "d"].map(str::to_owned).into();
+        assert_eq!(read(&choices), [""; 0]);
     }
 
     #[test]

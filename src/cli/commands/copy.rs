@@ -1,5 +1,7 @@
 //! `copy`: copies a catalog between a project folder and PostgreSQL.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use serde_json::json;
 
@@ -7,6 +9,7 @@ use crate::cli::output::context::Context;
 use crate::cli::output::table::{columns, count};
 use crate::cli::output::terminal::Terminal;
 use mocban_catalog::{CatalogCopy, CopiedTable};
+use mocban_core::domain::is_address;
 use mocban_project::copy::copy as copy_catalog;
 use mocban_project::{ExitCode, ProjectResult};
 
@@ -33,7 +36,17 @@ pub(crate) async fn copy(args: CopyArgs, context: &Context) -> ProjectResult<Exi
     } else {
         "all rows were compared; artifacts and input files were not copied".to_owned()
     });
+    suggest_status(&from, &to, context);
     Ok(ExitCode::Done)
+}
+
+/// Suggests to look at the copy. A copy on a server belongs to the folder with the artifacts.
+fn suggest_status(from: &str, to: &str, context: &Context) {
+    let mut copied = context.clone();
+    let folder = [to, from].into_iter().find(|place| !is_address(place));
+    copied.global.directory = folder.map(PathBuf::from);
+    copied.global.catalog = is_address(to).then(|| to.to_owned());
+    copied.next("status");
 }
 
 fn text(tables: &[CopiedTable]) -> String {
