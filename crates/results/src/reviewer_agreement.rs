@@ -23,7 +23,8 @@ pub const MIN_RESULTS: u64 = 30;
 
 /// Agreement of all reviewers of a project.
 ///
-/// Results of one pair with the same threshold and alignment count once. Adjudications are not compared, because
+/// Results of one pair with the same threshold and alignment count once; one verdict on several metrics counts for each of
+/// their results that differ. Adjudications are not compared, because
 /// adjudicators have seen the verdicts of other reviewers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReviewerAgreement {
