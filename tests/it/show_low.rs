@@ -1,8 +1,9 @@
-//! `show --low`: which pairs it lists, and in what order.
+//! `show --low`, and commands with the block of a list: which pairs they list, and in what order.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::check::done;
 use crate::cli::{empty, mocban};
 
 /// Returns the files of a folder, sorted by name.
@@ -57,4 +58,27 @@ fn only_pairs_of_low_confidence_are_listed_the_least_confident_first() {
     assert_ne!(names, ids[1..], "the order of the names shows nothing");
     names.sort_unstable();
     assert_eq!(names, ids[1..]);
+}
+
+#[test]
+fn the_block_of_a_list_stands_for_its_pairs_or_is_explained() {
+    let dir = empty();
+    done(dir.path());
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
+    let list = fs::read_to_string(dir.path().join("p/data/manifest.csv")).expect("a list");
+    let block = list.lines().last().and_then(|line| line.split(',').nth(4));
+    let block = block.expect("a block");
+    let shown = at(&["show", block, "--json"]).expect(0).json();
+    let pairs = shown["pairs"].as_array().expect("rows");
+    let ids: Vec<&str> = pairs.iter().filter_map(|row| row["id"].as_str()).collect();
+    assert_eq!(ids, ["upright-0000", "upright-0001"]);
+    let text = at(&["show", block]).expect(0);
+    assert!(ids.iter().all(|id| text.out.contains(id)), "{}", text.out);
+    let sheet = at(&["contact-sheet", block, "-o", "sheet.png"]).expect(0);
+    assert!(sheet.err.contains("2 pairs of 2"), "{}", sheet.err);
+    let sheet = at(&["contact-sheet", "--block", block]).expect(4);
+    assert!(sheet.err.contains("has no page"), "{}", sheet.err);
+    let view = at(&["view", "--no-open", block]).expect(4);
+    let says = "is a block with 2 pairs, and no pair; give the id of a pair, such as upright-0000";
+    assert!(view.err.contains(says), "{}", view.err);
 }

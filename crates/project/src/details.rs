@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::error::{ProjectError, ProjectResult};
 use crate::location::Location;
+use crate::pair_table::{self, PairRow};
 use crate::selection;
 use mocban_catalog::{
     BlockDetail, Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment,
@@ -24,6 +25,8 @@ pub enum Details {
     Pair(Box<PairOverview>),
     /// A block, and its characters.
     Block(Box<BlockDetail>, Vec<StoredCharacter>),
+    /// The pairs of a block that only lists of pairs have.
+    ListedBlock(Vec<PairRow>),
 }
 
 /// A pair with what people and the next run do.
@@ -77,6 +80,10 @@ pub async fn read(id: &str, catalog: &Catalog, location: &Location) -> ProjectRe
     let Some(name) = pairs.first() else {
         return Err(ProjectError::unexpected(format!("{id} was not looked up")));
     };
+    if !id.parse().is_ok_and(|typed: PairName| typed == *name) {
+        let rows = pair_table::of_pairs(catalog, &pairs).await?;
+        return Ok(Details::ListedBlock(rows));
+    }
     let fingerprints = fingerprints(&location.settings()?.config.stages);
     let next_run = catalog.why(name, &fingerprints).await?;
     let Some(detail) = catalog.pair(name).await? else {

@@ -80,6 +80,16 @@ pub async fn read(catalog: &Catalog, choice: PairChoice) -> ProjectResult<Vec<Pa
     Ok(rows)
 }
 
+/// Reads the lines of these pairs, in this order.
+pub(crate) async fn of_pairs(catalog: &Catalog, names: &[PairName]) -> ProjectResult<Vec<PairRow>> {
+    let mut rows = Vec::new();
+    for name in names {
+        let detail = catalog.pair(name).await?;
+        rows.extend(detail.and_then(|detail| row(&detail.results, PairChoice::All)));
+    }
+    Ok(rows)
+}
+
 /// Returns the line of a pair, if it is chosen. Low confidence means the same as in `status`.
 fn row(pair: &PairResults, choice: PairChoice) -> Option<PairRow> {
     let default = pair.metric(ThresholdMetric::DEFAULT);

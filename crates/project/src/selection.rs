@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
+use crate::shell::shell_quoted;
 use mocban_catalog::{Catalog, RetiredPair};
 use mocban_core::domain::spelling::nearest;
 use mocban_core::domain::{BlockName, PairName, RetireCause};
@@ -63,21 +64,40 @@ pub async fn known_pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<V
     match typed.iter().find(|text| !is_known(text)) {
         None => Ok(names),
         Some(text) => {
+            refuse_block(catalog, text).await?;
             let all = catalog.pair_names().await?;
             Err(no_such("pair", text, all.iter().map(PairName::as_str)).into())
         }
     }
 }
 
-/// Looks up pairs by their ids. Returns `None`, which means all pairs, if no id is given.
-pub async fn some_or_all(
+/// Refuses the id of a block with pairs where one pair is meant.
+async fn refuse_block(catalog: &Catalog, typed: &str) -> ProjectResult<()> {
+    let pairs = catalog.pairs_of_listed_block(typed).await?;
+    let (number, first) = match pairs.as_slice() {
+        [] => return Ok(()),
+        [first] => ("1 pair".to_owned(), first),
+        [first, ..] => (format!("{} pairs", pairs.len()), first),
+    };
+    Err(Refusal::NothingSelected(format!(
+        "{typed} is a block with {number}, and no pair; give the id of a pair, such as {first}"
+    ))
+    .into())
+}
+
+/// Looks up pairs by their ids or those of their blocks. Returns `None`, which means all pairs, if no id is given.
+pub(crate) async fn some_or_all(
     catalog: &Catalog,
     typed: &[String],
 ) -> ProjectResult<Option<Vec<PairName>>> {
-    match typed {
-        [] => Ok(None),
-        typed => Ok(Some(pairs(catalog, typed).await?)),
+    if typed.is_empty() {
+        return Ok(None);
     }
+    let NamedWork { mut pairs, blocks } = pairs_and_blocks(catalog, typed).await?;
+    for block in blocks {
+        pairs.extend(catalog.pairs_of_listed_block(block.as_str()).await?);
+    }
+    Ok(Some(pairs))
 }
 
 /// Looks up one pair.
@@ -190,8 +210,17 @@ async fn no_such_pair_or_block(
 pub async fn existing_block(catalog: &Catalog, typed: &str) -> ProjectResult<BlockName> {
     let all = catalog.block_names().await?;
     let name = typed.parse::<BlockName>().ok();
-    name.filter(|name| all.contains(name))
-        .ok_or_else(|| no_such("block", typed, all.iter().map(BlockName::as_str)).into())
+    if let Some(name) = name.filter(|name| all.contains(name)) {
+        return Ok(name);
+    }
+    if !catalog.pairs_of_listed_block(typed).await?.is_empty() {
+        let quoted = shell_quoted(typed);
+        let text = format!(
+            "block {typed} has no page, because a list names it for its pairs; `contact-sheet {quoted}` draws them"
+        );
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    Err(no_such("block", typed, all.iter().map(BlockName::as_str)).into())
 }
 
 /// Returns the refusal of an id that does not exist, with similar ids.

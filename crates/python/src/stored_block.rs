@@ -37,6 +37,10 @@ pub(crate) async fn detail(id: &str, location: &Location) -> ProjectResult<Strin
             value["character_list"] = serde_json::to_value(characters)?;
             Ok(value.to_string())
         }
+        Details::ListedBlock(_) => {
+            let text = format!("{id} is a block of a list of pairs, which has no page");
+            Err(Refusal::NothingSelected(text).into())
+        }
         Details::Pair(_) => {
             let text = format!("{id} is a pair, not a block; `pair` returns it");
             Err(Refusal::NothingSelected(text).into())

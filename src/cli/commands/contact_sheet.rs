@@ -17,7 +17,7 @@ use mocban_project::{ExitCode, ProjectResult};
 /// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]
 pub(crate) struct ContactSheetArgs {
-    /// Only these pairs [default: all]
+    /// Only these pairs, or the pairs of these blocks [default: all]
     pub(crate) pairs: Vec<String>,
     /// Draw the page of this block with the boxes of its characters instead
     #[arg(long, value_name = "NAME", conflicts_with_all = ["pairs", "order", "limit", "columns"])]

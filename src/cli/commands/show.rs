@@ -46,6 +46,12 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<Exi
             show_block(&block, &characters, &project, context)?;
             return Ok(ExitCode::Done);
         }
+        Details::ListedBlock(rows) => {
+            let json = json!({"schema": 1, "block": id, "pairs": rows});
+            context.print(&json, || table_text(&rows, context.stdout))?;
+            context.next(&format!("contact-sheet {}", shell_quoted(&id)));
+            return Ok(ExitCode::Done);
+        }
     };
     let (detail, palette) = (&pair.detail, context.stdout);
     let next_run = pair.next_run.as_ref();

@@ -166,13 +166,11 @@ const MAX_COLUMNS_SHOWN: usize = 12;
 /// above it.
 fn header_below(list: &[u8], delimiter: u8, above: usize) -> Option<Problem> {
     let find = |known, required| later_header(list, (delimiter, above), known, required);
-    let (number, what) = match find(&COLUMNS, REQUIRED.len()) {
-        Some(number) => (number, "has these columns"),
-        None => {
-            let number = find(&block_columns::COLUMNS, block_columns::REQUIRED)?;
-            (number, "has the columns of a list of blocks")
-        }
-    };
+    let of_pairs = find(&COLUMNS, REQUIRED.len()).map(|number| (number, "has these columns"));
+    let (number, what) = of_pairs.or_else(|| {
+        let number = find(&block_columns::COLUMNS, block_columns::REQUIRED)?;
+        Some((number, "has the columns of a list of blocks"))
+    })?;
     let text = format!("line {number} {what}; remove the lines above it");
     Some(of_list(&text))
 }
