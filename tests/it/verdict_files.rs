@@ -10,8 +10,8 @@ fn of_two_verdicts_of_a_reviewer_the_later_one_counts() {
         std::fs::write(project.dir().join("v.csv"), text).expect("written");
         at(&project, &["verdict", "import", "v.csv", "--json"]).expect(0)
     };
-    let later = "pair,verdict,reviewer,at\nupright-0001,pass,hoa,2026-01-02\n\
-        upright-0001,fail,hoa,2026-01-01\n";
+    let later = "pair,verdict,reviewer,at\nupright-0001,pass,hoa,2024-01-02\n\
+        upright-0001,fail,hoa,2024-01-01\n";
     let taken = import(later);
     let counts =
         |taken: &serde_json::Value| ["recorded", "older", "known"].map(|key| taken[key].as_u64());
@@ -19,7 +19,7 @@ fn of_two_verdicts_of_a_reviewer_the_later_one_counts() {
     let says =
         "1 verdict left out where the reviewer judged the same result later, first on line 3";
     assert!(taken.err.contains(says), "{}", taken.err);
-    let again = import("pair,verdict,reviewer,at\nupright-0001,fail,hoa,2026-01-01\n");
+    let again = import("pair,verdict,reviewer,at\nupright-0001,fail,hoa,2024-01-01\n");
     assert_eq!(counts(&again.json()), [Some(0), Some(1), Some(0)]);
     let status = at(&project, &["status", "--json"]).expect(0).json();
     assert_eq!(status["verdicts"]["fail"], 0);

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use csv::StringRecord;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde_json::Value;
 
 use super::files::{MAX_SHOWN, RefusedLine};
 use super::verdict_words;
@@ -338,7 +338,7 @@ struct VerdictLine {
     result_hash: Option<ContentHash>,
     undone_at: Option<UnixMillis>,
     #[serde(flatten)]
-    fields: BTreeMap<String, IgnoredAny>,
+    fields: BTreeMap<String, Value>,
 }
 
 /// Parses a JSON Lines file. Undone verdicts are ignored.

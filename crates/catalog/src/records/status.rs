@@ -34,7 +34,6 @@ macro_rules! from_current_verdicts {
         concat!(
             "FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
-    JOIN job AS done ON done.pair = v.pair AND done.status = 3
 WHERE v.id = (
     SELECT max(n.id) FROM verdict AS n
     WHERE n.pair = v.pair AND n.metric = v.metric AND ",
@@ -43,7 +42,8 @@ WHERE v.id = (
             person!("v"),
             " AND n.result_hash = v.result_hash
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act)
-        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))"
+        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))
+    AND EXISTS (SELECT 1 FROM job AS done WHERE done.pair = v.pair AND done.status = 3)"
         )
     };
 }

@@ -103,7 +103,7 @@ async fn a_listed_verdict_that_is_older_than_the_newest_one_is_left_out() {
     let (pass, fail) = (Verdict::Pass, Verdict::Fail);
     for (rows, now, counts, newest) in [
         (
-            &[(pass, Some(7)), (fail, Some(6))] as &[_],
+            &[(pass, Some(7_i64)), (fail, Some(6))] as &[_],
             9,
             (1, 0, Some(1)),
             pass,
