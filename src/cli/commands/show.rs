@@ -123,7 +123,9 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
         (None, JobStatus::Quarantined) if !may_retry(detail) => {
             "  nothing; correct the file, its row in the list or a setting, and `run` computes the pair again".to_owned()
         }
-        (None, JobStatus::Quarantined) => "  nothing until `retry`".to_owned(),
+        (None, JobStatus::Quarantined) => {
+            "  nothing until `retry`, or until a missing file is there".to_owned()
+        }
         (None, JobStatus::Leased) => "  running now".to_owned(),
         (None, JobStatus::Done | JobStatus::Ready | JobStatus::Backoff) => {
             "  nothing left to do".to_owned()

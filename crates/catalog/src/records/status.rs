@@ -25,8 +25,9 @@ macro_rules! person {
     };
 }
 
-/// Selects verdicts `v` on current results of pairs that are done, as a report counts them. Only the newest verdict of each reviewer on a result counts. Leaves out the
-/// verdicts that the owner has set apart; damaged ones that nobody knows of yet are found by a check or a report.
+/// Selects verdicts `v` on current results of pairs that are done, as a report counts them. Only the newest verdict of each
+/// reviewer on a result counts. Leaves out the verdicts that the owner has set apart; damaged ones that nobody knows of yet are
+/// found by a check or a report.
 ///
 /// `?1` has the stored spellings of names that are not the spelling of the name.
 macro_rules! from_current_verdicts {
