@@ -8,7 +8,7 @@ use std::path::Path;
 use serde_json::Value;
 use unicode_normalization::UnicodeNormalization as _;
 
-use crate::cli::mocban;
+use crate::cli::{binary, call, mocban};
 
 /// The ids of the pairs, and the file names that their exports have. The third is decomposed (NFD) as it is written.
 const IDS: [[&str; 2]; 3] = [
@@ -200,4 +200,42 @@ fn folders_and_files_of_the_command_line_are_found_in_any_form() {
     assert_eq!(mocban(dir.path(), &list).expect(0).json()["added"], 1);
     let files = ["lưới/upright-0000.ply", "bản in/upright-0000.jpg"];
     mocban(dir.path(), &[&["align"], &files[..]].concat()).expect(0);
+}
+
+#[test]
+fn a_run_takes_its_names_from_a_file_or_the_standard_input() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    mocban(dir.path(), &["demo", "p", "--pairs", "4", "--no-run"]).expect(0);
+    let file = dir.path().join("names.txt");
+    let planned = |args: &[&str]| {
+        let mut run = binary();
+        run.current_dir(dir.path())
+            .args(["-C", "p", "run", "--dry-run", "--json", "--names-from"])
+            .args(args)
+            .stdin(fs::File::open(&file).expect("a file"));
+        call(&mut run)
+    };
+    // As programs of Windows write it.
+    fs::write(&file, "\u{feff}upright-0000\r\n\r\nupright-0002\r\n").expect("written");
+    for (args, pairs) in [
+        (&["-"][..], 2),
+        (&["names.txt"], 2),
+        (&["-", "upright-0003"], 3),
+    ] {
+        let plan = planned(args).expect(0).json();
+        assert_eq!(plan["pairs"], pairs, "{args:?}: {plan}");
+    }
+    for (bytes, code, part) in [
+        (&b"upright-0000\nnobody\n"[..], 4, "nobody"),
+        (b"\n", 4, "has no names"),
+        (b"ch\xff", 2, "is not UTF-8"),
+    ] {
+        fs::write(&file, bytes).expect("written");
+        for from in ["-", "names.txt"] {
+            let refused = planned(&[from]).expect(code);
+            assert!(refused.err.contains(part), "{}", refused.err);
+        }
+    }
+    let missing = planned(&["missing.txt"]).expect(2);
+    assert!(missing.err.contains("missing.txt"), "{}", missing.err);
 }

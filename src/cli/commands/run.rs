@@ -1,5 +1,8 @@
 //! `run`: aligns the pairs that are not aligned yet and reports the outcome.
 
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
 use clap::Args;
 use serde_json::json;
 
@@ -12,8 +15,9 @@ use crate::cli::output::terminal::Terminal;
 use mocban_catalog::RerunPolicy;
 use mocban_config::Config;
 use mocban_core::domain::Stage;
+use mocban_project::files;
 use mocban_project::run::{self, PreparedRun, RunOutcome, TWO_METHODS};
-use mocban_project::{ExitCode, ProjectResult};
+use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_runner::{RunOptions, RunPart, RunPlan, RunSummary, Stop};
 
 /// Arguments of `run`.
@@ -22,6 +26,9 @@ pub(crate) struct RunArgs {
     /// Only these pairs, and these blocks with their pairs [default: all]
     #[arg(value_name = "NAME")]
     pub(crate) names: Vec<String>,
+    /// Also the names in this file, one a line; - reads them from the standard input
+    #[arg(long, value_name = "FILE")]
+    pub(crate) names_from: Option<PathBuf>,
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) jobs: Option<u16>,
@@ -71,10 +78,10 @@ pub(crate) async fn execute(
 ) -> ProjectResult<ExitCode> {
     let server = MetricsServer::bind(&args.metrics).await?;
     let options = options(&args, &context.location.settings()?.config, part);
-    let (names, location) = (&args.names, &context.location);
+    let (names, location) = (all_names(&args)?, &context.location);
     let metrics = options.metrics.clone();
     let terminal = Terminal::new(context);
-    let prepared = PreparedRun::new(names, options, args.dry_run, location, &terminal).await?;
+    let prepared = PreparedRun::new(&names, options, args.dry_run, location, &terminal).await?;
     if args.dry_run {
         let (plan, running) = prepared.plan().await?;
         return print_plan(&plan, running, context);
@@ -103,6 +110,37 @@ pub(crate) async fn execute(
         context.next(command);
     }
     Ok(code(&outcome.summary))
+}
+
+/// Returns the names of the command line and those of its file.
+///
+/// # Errors
+/// Refuses a file without a name, which would otherwise run all pairs.
+fn all_names(args: &RunArgs) -> ProjectResult<Vec<String>> {
+    let mut names = args.names.clone();
+    let Some(file) = &args.names_from else {
+        return Ok(names);
+    };
+    let (shown, bytes) = if file == Path::new("-") {
+        let mut bytes = Vec::new();
+        std::io::stdin()
+            .read_to_end(&mut bytes)
+            .map_err(|error| ProjectError::unexpected(format!("cannot read the names: {error}")))?;
+        ("the standard input".to_owned(), bytes)
+    } else {
+        (file.display().to_string(), files::read(file)?)
+    };
+    let Ok(text) = String::from_utf8(bytes) else {
+        return Err(Refusal::Usage(format!("{shown} is not UTF-8; write it as UTF-8")).into());
+    };
+    let before = names.len();
+    let lines = text.trim_start_matches('\u{feff}').lines();
+    names.extend(lines.filter(|line| !line.is_empty()).map(str::to_owned));
+    if names.len() == before {
+        let text = format!("{shown} has no names; write one a line");
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    Ok(names)
 }
 
 /// Parses a number of bytes with an optional unit: 4G, 512M, 900K.

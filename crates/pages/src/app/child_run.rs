@@ -2,7 +2,7 @@
 
 use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{Read as _, Seek as _, SeekFrom};
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
@@ -22,13 +22,18 @@ const RECENT_MS: i64 = 3_600_000;
 /// Most bytes of the messages of a run that are shown.
 const MESSAGE_BYTES: u64 = 4096;
 
-/// Starts `run` for a project with more arguments. Returns once it works, or has ended at once without an error. The state
-/// keeps the reason of a later failure.
+/// Starts `run` for a project with more arguments, for the pairs with these ids or for all. Returns once it works, or has
+/// ended at once without an error. The state keeps the reason of a later failure.
 ///
 /// # Errors
 /// Returns the last message of a run that ended with an error at its beginning.
-pub(super) async fn start(state: &AppState, dir: &Path, args: &[String]) -> AppResult<()> {
-    let failed = |error: std::io::Error| {
+pub(super) async fn start(
+    state: &AppState,
+    dir: &Path,
+    args: &[String],
+    names: &[String],
+) -> AppResult<()> {
+    let failed = |error: io::Error| {
         AppFailure::refused(Sentence::new(
             format!("the run cannot start: {error}"),
             format!("không bắt đầu chạy được: {error}"),
@@ -37,13 +42,8 @@ pub(super) async fn start(state: &AppState, dir: &Path, args: &[String]) -> AppR
     state.failed_runs.set(dir, None);
     // The file has no name, so nothing stays if the app is killed.
     let messages = tempfile::tempfile().map_err(failed)?;
-    let mut command = Command::new(&state.options.program);
+    let mut command = run_command(&state.options.program, dir, args, names).map_err(failed)?;
     command
-        .arg("-C")
-        .arg(dir)
-        .args(["--color", "never", "--progress", "none", "run"])
-        .args(args)
-        .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(messages.try_clone().map_err(failed)?);
     platform::detach(&mut command);
@@ -70,6 +70,36 @@ pub(super) async fn start(state: &AppState, dir: &Path, args: &[String]) -> AppR
             Ok(())
         }
     }
+}
+
+/// Returns the command of a run. It reads ids from its standard input, because the arguments of a command are limited: to
+/// 32,767 characters on Windows.
+fn run_command(
+    program: &Path,
+    dir: &Path,
+    args: &[String],
+    names: &[String],
+) -> io::Result<Command> {
+    let mut command = Command::new(program);
+    command
+        .arg("-C")
+        .arg(dir)
+        .args(["--color", "never", "--progress", "none", "run"])
+        .args(args);
+    if names.is_empty() {
+        command.stdin(Stdio::null());
+    } else {
+        command.args(["--names-from", "-"]).stdin(name_file(names)?);
+    }
+    Ok(command)
+}
+
+/// Returns a file without a path that has one id a line and is read from its beginning.
+fn name_file(names: &[String]) -> io::Result<File> {
+    let mut file = tempfile::tempfile()?;
+    file.write_all(names.join("\n").as_bytes())?;
+    file.rewind()?;
+    Ok(file)
 }
 
 /// Returns why a run failed, or `None` if it did its work or was asked to stop.
@@ -196,8 +226,28 @@ pub(super) async fn stop(catalog: &Catalog) -> AppResult<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::{last_error, why};
+    use std::io::Read as _;
+    use std::path::Path;
+
+    use super::{last_error, name_file, run_command, why};
     use crate::review::Language;
+
+    #[test]
+    fn a_run_gets_ids_from_a_file_and_none_as_arguments() {
+        let names: Vec<String> = (0..1000).map(|id| format!("-ván {id:0190}")).collect();
+        let args = ["--rerun", "all"].map(str::to_owned);
+        let command = run_command(Path::new("mocban"), Path::new("p"), &args, &names);
+        let command = command.expect("a command");
+        let given: Vec<&str> = command.get_args().filter_map(|arg| arg.to_str()).collect();
+        assert!(given.ends_with(&["run", "--rerun", "all", "--names-from", "-"]));
+        let mut text = String::new();
+        let mut file = name_file(&names).expect("a file");
+        file.read_to_string(&mut text).expect("UTF-8");
+        assert!(text.lines().eq(names.iter().map(String::as_str)));
+        let all = run_command(Path::new("mocban"), Path::new("p"), &args, &[]);
+        let all = all.expect("a command");
+        assert!(all.get_args().all(|arg| arg != "--names-from"));
+    }
 
     #[test]
     fn the_error_of_a_run_is_shown_without_its_advice() {

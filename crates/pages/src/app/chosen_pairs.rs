@@ -27,11 +27,8 @@ use mocban_project::retire::{RetireChoice, RetireOutcome, retire, retired_at, un
 use mocban_project::retry::{RetryRequest, retry};
 use mocban_project::selection;
 
-/// Most pairs that are chosen at a time. A run gets their ids as arguments.
+/// Most pairs that are chosen at a time.
 pub(super) const MAX_CHOSEN: usize = 1000;
-
-/// Most bytes of the ids that a run gets on Windows, whose command lines have at most 32,767 characters.
-const MAX_ARGUMENT_BYTES: usize = 30_000;
 
 /// Parts of the address of a list that say what was done.
 const DONE: [&str; 4] = ["done", "count", "at", "still_out"];
@@ -135,19 +132,6 @@ pub(super) async fn require_pairs(
     names.map_err(|error| AppFailure::of(error, &open.dir))
 }
 
-/// Checks that Windows can start a run with these ids as arguments.
-fn require_short(names: &[String]) -> AppResult<()> {
-    // An id with spaces is quoted.
-    let bytes: usize = names.iter().map(|name| name.len() + 3).sum();
-    if cfg!(windows) && bytes > MAX_ARGUMENT_BYTES {
-        return Err(AppFailure::refused(Sentence::new(
-            "the ids of these pairs are too long to start one run: choose fewer pairs",
-            "mã của các cặp này quá dài để bắt đầu một lần chạy: hãy chọn ít cặp hơn",
-        )));
-    }
-    Ok(())
-}
-
 /// Does something with chosen pairs, and replies with the list that says what was done.
 pub(super) async fn change(
     State(state): State<Arc<AppState>>,
@@ -160,13 +144,11 @@ pub(super) async fn change(
     let list = without_done(&PageQuery::parse(&body.list));
     let (done, counted) = match body.change {
         ChosenChange::Compute => {
-            require_short(&names)?;
             let count = names.len();
             compute(&state, &open, names).await?;
             ("compute", ["count", &count.to_string()].map(str::to_owned))
         }
         ChosenChange::Resume => {
-            require_short(&names)?;
             let count = names.len();
             let done = resume(&state, &open, names).await?;
             (done, ["count", &count.to_string()].map(str::to_owned))
@@ -189,9 +171,8 @@ async fn compute(state: &AppState, open: &OpenProject, names: Vec<String>) -> Ap
             "đang có một lần chạy: hãy chờ, hoặc bấm Dừng ở trang Căn chỉnh",
         )));
     }
-    let options = ["--rerun", "all", "--"].map(str::to_owned);
-    let args: Vec<String> = options.into_iter().chain(names).collect();
-    child_run::start(state, &open.dir, &args).await
+    let args = ["--rerun", "all"].map(str::to_owned);
+    child_run::start(state, &open.dir, &args, &names).await
 }
 
 /// Runs the waiting and failed ones of some pairs. Starts no run beside one in progress, which takes them up unless it works
@@ -199,7 +180,7 @@ async fn compute(state: &AppState, open: &OpenProject, names: Vec<String>) -> Ap
 async fn resume(
     state: &AppState,
     open: &OpenProject,
-    mut names: Vec<String>,
+    names: Vec<String>,
 ) -> AppResult<&'static str> {
     let (request, location) = (RetryRequest::Names(names.clone()), open.location());
     let retried = on_thread(async move || retry(&request, &location).await).await;
@@ -213,8 +194,7 @@ async fn resume(
     if runs(open).await? {
         return Ok("resume-later");
     }
-    names.insert(0, "--".to_owned());
-    child_run::start(state, &open.dir, &names).await?;
+    child_run::start(state, &open.dir, &[], &names).await?;
     Ok("resume")
 }
 

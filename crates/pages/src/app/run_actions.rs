@@ -74,7 +74,7 @@ pub(super) async fn run(
     if body.which == "failed" {
         args.extend(["--rerun".to_owned(), "failed".to_owned()]);
     }
-    child_run::start(&state, &open.dir, &args).await?;
+    child_run::start(&state, &open.dir, &args, &[]).await?;
     Ok(reload())
 }
 
@@ -122,7 +122,7 @@ pub(super) async fn retry(
     let retried = on_thread(async move || retry_pairs(&request, &location).await).await;
     retried.map_err(|error| AppFailure::of(error, &open.dir))?;
     if !runs(&open).await? {
-        child_run::start(&state, &open.dir, &[]).await?;
+        child_run::start(&state, &open.dir, &[], &[]).await?;
     }
     Ok(reload())
 }
