@@ -27,7 +27,10 @@ function isWanted({ path }) {
 
 /** Returns a number of bytes as a person reads it. */
 function size(bytes) {
-  return bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+  const [unit, divisor, digits] = bytes < 1e6 ? ["kB", 1e3, 0] : bytes < 1e9 ? ["MB", 1e6, 1] : ["GB", 1e9, 1];
+  const rounded = digits === 0 ? Math.ceil(bytes / divisor) : bytes / divisor;
+  const format = { minimumFractionDigits: digits, maximumFractionDigits: digits };
+  return `${rounded.toLocaleString(document.documentElement.lang, format)} ${unit}`;
 }
 
 function show(files, count, sent, bytes) {

@@ -82,7 +82,7 @@ pub use queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
 pub use queue::provenance::{FingerprintId, InputVersions, PairProvenance};
 pub use queue::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use queue::requeue::RetrySelection;
-pub use queue::retired::{ImportedPair, RetiredPair};
+pub use queue::retired::{ImportedPair, ListedRetiredPair, RetiredPair};
 pub use queue::selection::PairSelection;
 pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;

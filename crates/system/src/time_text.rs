@@ -9,9 +9,19 @@ pub fn local(at: i64) -> String {
     in_zone(at, TimeZone::system())
 }
 
+/// Formats a time likewise with the day first, as in Vietnamese: `21/11/2026 11:10:03 +07:00`.
+pub fn local_day_first(at: i64) -> String {
+    day_first_in_zone(at, TimeZone::system())
+}
+
 fn in_zone(at: i64, zone: TimeZone) -> String {
     let time = timestamp(at).to_zoned(zone);
     time.strftime("%Y-%m-%d %H:%M:%S %:z").to_string()
+}
+
+fn day_first_in_zone(at: i64, zone: TimeZone) -> String {
+    let time = timestamp(at).to_zoned(zone);
+    time.strftime("%d/%m/%Y %H:%M:%S %:z").to_string()
 }
 
 /// Formats a day in UTC: `2026-11-21`.
@@ -56,7 +66,7 @@ pub fn rough_duration(ms: u64) -> String {
 mod tests {
     use jiff::tz::{Offset, TimeZone};
 
-    use super::{day, duration, in_zone, parse_utc};
+    use super::{day, day_first_in_zone, duration, in_zone, parse_utc};
 
     #[test]
     fn known_times_are_formatted_with_their_zone() {
@@ -66,8 +76,12 @@ mod tests {
         assert_eq!(utc(-1000), "1969-12-31 23:59:59 +00:00");
         let hanoi = TimeZone::fixed(Offset::constant(7));
         assert_eq!(
-            in_zone(1_795_234_203_999, hanoi),
+            in_zone(1_795_234_203_999, hanoi.clone()),
             "2026-11-21 11:10:03 +07:00"
+        );
+        assert_eq!(
+            day_first_in_zone(1_795_234_203_999, hanoi),
+            "21/11/2026 11:10:03 +07:00"
         );
         assert_eq!(day(1_795_234_203_999), "2026-11-21");
     }

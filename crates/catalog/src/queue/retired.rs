@@ -65,6 +65,16 @@ DELETE FROM retired_pair WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_ea
 const RETIRED: &str = "
 SELECT p.name, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair ORDER BY p.name";
 
+const RETIRED_PAIR: &str = "
+SELECT p.name, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair WHERE p.name = ?1";
+
+/// Retired pairs behind a row id, of a block and a character or of all.
+const RETIRED_PAGE: &str = "
+SELECT p.id, p.name, p.block, p.character, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair
+WHERE r.pair > ?1 AND (?2 IS NULL OR p.block = ?2) AND (?3 IS NULL OR p.character = ?3) ORDER BY r.pair LIMIT ?4";
+
+const RETIRED_COUNT: &str = "SELECT count(*) FROM retired_pair";
+
 /// Jobs of pairs that were not cut from a block.
 const LISTED_JOBS: &str = "
 SELECT j.pair FROM job AS j WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = j.pair) ORDER BY j.pair";
@@ -92,6 +102,21 @@ pub struct RetiredPair {
 }
 
 from_row! { RetiredPair { name, cause, at } }
+
+/// A retired pair in a list.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ListedRetiredPair {
+    /// Its row id, behind which the next page of the list begins.
+    pub id: i64,
+    /// The pair.
+    pub retired: RetiredPair,
+    /// Its block, if given.
+    pub block: Option<String>,
+    /// Its character, if given.
+    pub character: Option<String>,
+}
+
+from_row! { ListedRetiredPair { id, retired in row, block, character } }
 
 /// A pair that an import of a list or of folders added.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -131,6 +156,33 @@ impl Catalog {
     pub async fn retired_pairs(&self) -> Result<Vec<RetiredPair>> {
         let mut conn = self.read_conn().await?;
         query_as(RETIRED).fetch_all(&mut conn).await
+    }
+
+    /// Returns a retired pair, or `None` if no retired pair has this name.
+    pub async fn retired_pair(&self, name: &PairName) -> Result<Option<RetiredPair>> {
+        let mut conn = self.read_conn().await?;
+        let query = query_as(RETIRED_PAIR).bind(name.as_str());
+        query.fetch_optional(&mut conn).await
+    }
+
+    /// Returns up to `limit` retired pairs with row ids above `after`, of a block and a character if given, in the order of
+    /// import.
+    pub async fn retired_page(
+        &self,
+        (block, character): (Option<&str>, Option<&str>),
+        after: i64,
+        limit: usize,
+    ) -> Result<Vec<ListedRetiredPair>> {
+        let mut conn = self.read_conn().await?;
+        let query = query_as(RETIRED_PAGE).bind(after).bind(block);
+        let query = query.bind(character).bind(limit as i64);
+        query.fetch_all(&mut conn).await
+    }
+
+    /// Counts the retired pairs, for whatever cause.
+    pub async fn retired_count(&self) -> Result<u64> {
+        let mut conn = self.read_conn().await?;
+        query_scalar(RETIRED_COUNT).fetch_one(&mut conn).await
     }
 
     /// Returns the pairs that the newest import of a list or of folders added, sorted by name.

@@ -4,8 +4,8 @@ use super::block_pairs::{judge, names_of, status_of};
 use super::blocks::{block, character, world};
 use super::{World, fingerprints, name, row};
 use crate::{
-    CatalogError, CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, RetiredPair,
-    StatusCounts,
+    CatalogError, CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, ListedRetiredPair,
+    RetiredPair, StatusCounts,
 };
 use mocban_core::domain::{BlockStage, JobStatus, PairName, RetireCause, Stage, Verdict};
 
@@ -234,4 +234,33 @@ async fn an_import_counts_the_listed_pairs_that_a_person_retired() {
     assert_eq!(retired.expect("retired"), 1);
     let summary = replace(&world, &["p0", "p1"]).await;
     assert_eq!((summary.restored, summary.still_retired), (0, 1));
+}
+
+#[tokio::test]
+async fn retired_pairs_are_listed_in_pages_and_found_by_name() {
+    let world = World::new(5).await;
+    let catalog = &world.catalog;
+    let names = ["p3", "p0", "p4"].map(name);
+    assert_eq!(catalog.retire_pairs(&names, 9).await.expect("retired"), 3);
+    let page = async |block, after, limit| {
+        let page = catalog.retired_page((block, None), after, limit).await;
+        page.expect("a read")
+    };
+    let first = page(None, 0, 2).await;
+    let names = |page: &[ListedRetiredPair]| {
+        let names = page.iter().map(|pair| pair.retired.name.to_string());
+        names.collect::<Vec<_>>()
+    };
+    assert_eq!(names(&first), ["p0", "p3"]);
+    assert_eq!(names(&page(None, first[1].id, 2).await), ["p4"]);
+    assert!(page(Some("none"), 0, 2).await.is_empty());
+    assert_eq!(catalog.retired_count().await.expect("a read"), 3);
+    let found = catalog.retired_pair(&name("p3")).await.expect("a read");
+    assert_eq!(found.as_ref(), Some(&first[1].retired));
+    for other in ["p1", "none"] {
+        assert_eq!(
+            catalog.retired_pair(&name(other)).await.expect("a read"),
+            None
+        );
+    }
 }

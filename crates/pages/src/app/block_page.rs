@@ -25,7 +25,6 @@ use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockStage, FailureClass, JobStatus, one_line,
 };
-use mocban_system::time_text::{duration, local};
 use serde_json::Value;
 
 /// Most characters that are listed.
@@ -179,7 +178,7 @@ fn stages(visit: &Visit, detail: &BlockDetail) -> Markup {
                 tr {
                     th scope="row" { (visit.block_stage(stage)) }
                     td { @match done {
-                        Some(done) => { (local(done.at)) " · " (duration(done.ms)) },
+                        Some(done) => { (visit.time(done.at)) " · " (visit.duration(done.ms)) },
                         None => { "–" },
                     } }
                 }
@@ -232,7 +231,7 @@ fn character_row(visit: &Visit, one: &StoredCharacter) -> Markup {
                 (visit.character_state(one.state))
                 @if let Some(reason) = &one.reason { ": " (one_line(reason)) }
             }
-            td.number.warn[is_uncertain] { (score(one.confidence)) }
+            td.number.warn[is_uncertain] { (score(visit, one.confidence)) }
             td { @if let Some(pair) = one.pair.as_ref().filter(|_| one.state == BlockCharacterState::Cut) {
                 a href={ "../../pair/" (encoded(pair)) "/" } { (one_line(pair)) }
             } }
@@ -267,10 +266,10 @@ fn history(visit: &Visit, detail: &BlockDetail) -> Markup {
                 summary { h2 { (visit.t("History", "Lịch sử")) } }
                 ul.history { @for attempt in detail.attempts.iter().skip(hidden) {
                     li {
-                        (local(attempt.at)) " · " (visit.block_stage(attempt.stage)) " · "
+                        (visit.time(attempt.at)) " · " (visit.block_stage(attempt.stage)) " · "
                         @match &attempt.failure {
                             Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(&failure.message)) },
-                            None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (duration(ms)) ")" } },
+                            None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (visit.duration(ms)) ")" } },
                         }
                     }
                 } }

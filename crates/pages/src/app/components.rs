@@ -4,7 +4,8 @@ use axum::response::Html;
 use maud::{Markup, html};
 
 use super::address::encoded;
-pub(super) use super::byte_size::grouped;
+pub(super) use super::number_text::grouped;
+use super::number_text::with_decimal_sign;
 use super::sentence::without_commands;
 use super::visit::Visit;
 use crate::local_server::document;
@@ -165,12 +166,17 @@ pub(super) fn stored_message(message: &str) -> Markup {
 }
 
 /// Returns a score with three digits, or a dash.
-pub(super) fn score(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.3}"))
+pub(super) fn score(visit: &Visit, value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| visit.decimal(value, 3))
 }
 
 /// Returns a number minus another one with its sign, or a dash if one is missing.
-pub(super) fn difference(value: Option<f64>, other: Option<f64>, digits: usize) -> String {
+pub(super) fn difference(
+    visit: &Visit,
+    value: Option<f64>,
+    other: Option<f64>,
+    digits: usize,
+) -> String {
     let Some((value, other)) = value.zip(other) else {
         return "–".to_owned();
     };
@@ -178,10 +184,12 @@ pub(super) fn difference(value: Option<f64>, other: Option<f64>, digits: usize) 
     let is_zero = text
         .bytes()
         .all(|byte| matches!(byte, b'+' | b'-' | b'0' | b'.'));
-    if is_zero {
-        return text[1..].to_owned();
-    }
-    text.replace('-', "−")
+    let text = if is_zero {
+        text[1..].to_owned()
+    } else {
+        text.replace('-', "−")
+    };
+    with_decimal_sign(visit.language, text)
 }
 
 /// Returns an option of a choice.
@@ -193,17 +201,22 @@ pub(super) fn choice(value: &str, text: &str, selected: Option<&str>) -> Markup 
 
 #[cfg(test)]
 mod tests {
-    use super::{difference, grouped, score};
+    use super::{difference, score};
+    use crate::app::visit::Visit;
+    use crate::review::Language;
 
     #[test]
-    fn numbers_are_grouped() {
-        assert_eq!(grouped(7), "7");
-        assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
-        assert_eq!(score(Some(0.98765)), "0.988");
-        assert_eq!(score(None), "–");
-        assert_eq!(difference(Some(0.5), Some(0.75), 3), "−0.250");
-        assert_eq!(difference(Some(9.0), Some(2.5), 1), "+6.5");
-        assert_eq!(difference(Some(1.0), Some(1.0001), 2), "0.00");
-        assert_eq!(difference(None, Some(1.0), 2), "–");
+    fn scores_and_their_differences_have_the_decimal_sign_of_the_page() {
+        let english = Visit::in_language(Language::English);
+        let of = |value, other, digits| difference(&english, value, other, digits);
+        assert_eq!(score(&english, Some(0.98765)), "0.988");
+        assert_eq!(score(&english, None), "–");
+        assert_eq!(of(Some(0.5), Some(0.75), 3), "−0.250");
+        assert_eq!(of(Some(9.0), Some(2.5), 1), "+6.5");
+        assert_eq!(of(Some(1.0), Some(1.0001), 2), "0.00");
+        assert_eq!(of(None, Some(1.0), 2), "–");
+        let vietnamese = Visit::in_language(Language::Vietnamese);
+        assert_eq!(score(&vietnamese, Some(0.98765)), "0,988");
+        assert_eq!(difference(&vietnamese, Some(0.5), Some(0.75), 3), "−0,250");
     }
 }

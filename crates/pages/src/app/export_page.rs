@@ -14,7 +14,6 @@ use serde_json::{Value, json};
 use super::action_body::ActionBody;
 use super::address::encoded;
 use super::attachment::attachment;
-use super::byte_size::file_size;
 use super::chosen_pairs::require_pairs;
 use super::components::{NavSection, action_form, choice, frame};
 use super::export_zip::zip_link;
@@ -149,7 +148,7 @@ fn folder_part(
                     @if *bytes <= DOWNLOAD_BYTES {
                         a href={ "exports/" (name) "/" (encoded(file)) } download { (one_line(file)) }
                     } @else { (one_line(file)) }
-                    " " span.muted { (file_size(*bytes)) }
+                    " " span.muted { (visit.file_size(*bytes)) }
                 }
             } }
         }

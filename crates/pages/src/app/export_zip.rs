@@ -13,7 +13,6 @@ use maud::{Markup, html};
 use tokio::sync::mpsc;
 
 use super::attachment::{disposition, safe_name};
-use super::byte_size::file_size;
 use super::exports::{exports_dir, is_export};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
@@ -48,7 +47,7 @@ pub(super) fn zip_link(
         ZipSize::InWork => visit
             .t("The size is being worked out…", "Đang tính dung lượng…")
             .to_owned(),
-        ZipSize::Bytes(bytes) => file_size(bytes),
+        ZipSize::Bytes(bytes) => visit.file_size(bytes),
         ZipSize::NoArchive => {
             let text = visit.t(
                 "This folder cannot be downloaded as one ZIP. Export again.",

@@ -11,14 +11,15 @@ use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
 use super::attachment::attachment;
-use super::byte_size::file_size;
-use super::components::{NavSection, action_form, frame};
+use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::home::free_space;
+use super::number_text::file_size;
 use super::state::AppState;
 use super::task_part::task_part;
 use super::tasks::{TaskKind, TaskLines};
 use super::visit::Visit;
+use crate::review::Language;
 use mocban_core::domain::one_line;
 use mocban_project::ProjectResult;
 use mocban_project::backup::backup;
@@ -63,7 +64,7 @@ pub(super) async fn page(
                 (action_form("actions/backup", "inline", &html! { button #backup { (visit.t("Back up now", "Sao lưu ngay")) } }))
                 (task_part(&visit, stored.as_ref()))
                 @if let Some(meta) = meta {
-                    p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (file_size(meta.len())) } " "
+                    p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (visit.file_size(meta.len())) } " "
                         @if meta.len() <= DOWNLOAD_BYTES { a.button href="backup.sqlite" download { (visit.t("Save a copy", "Lưu một bản")) } }
                     }
                 }
@@ -224,10 +225,12 @@ pub(super) async fn start_backup(
 
 async fn backup_lines(location: Location) -> ProjectResult<TaskLines> {
     let stored = backup(&location.dir.join(BACKUP), &location, &()).await?;
-    let (pairs, verdicts, bytes) = (stored.pairs, stored.verdicts, file_size(stored.bytes));
+    let [pairs, verdicts] = [stored.pairs, stored.verdicts].map(grouped);
+    let [english, vietnamese] =
+        [Language::English, Language::Vietnamese].map(|language| file_size(language, stored.bytes));
     Ok(vec![[
-        format!("{pairs} pairs and {verdicts} verdicts are in the backup ({bytes})."),
-        format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({bytes})."),
+        format!("{pairs} pairs and {verdicts} verdicts are in the backup ({english})."),
+        format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({vietnamese})."),
     ]])
 }
 

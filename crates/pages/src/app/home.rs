@@ -11,12 +11,12 @@ use super::failure::{AppFailure, AppResult};
 use super::projects::{find, is_project};
 use super::state::AppState;
 use super::visit::Visit;
+use crate::review::Language;
 use mocban_catalog::StatusCounts;
 use mocban_core::domain::{JobStatus, one_line};
 use mocban_project::location::now;
 use mocban_runner::{fingerprints, is_running};
 use mocban_system::platform;
-use mocban_system::time_text::local;
 
 /// What the home page says of a project.
 struct Overview {
@@ -85,10 +85,10 @@ async fn read(state: &AppState, key: String) -> Overview {
 
 /// Says how much space is left on the disk.
 pub(super) fn free_space(visit: &Visit, bytes: u64) -> String {
-    let gigabytes = bytes as f64 / 1e9;
+    let size = visit.file_size(bytes);
     match visit.language {
-        crate::review::Language::English => format!("{gigabytes:.1} GB free on this disk"),
-        crate::review::Language::Vietnamese => format!("đĩa còn trống {gigabytes:.1} GB"),
+        Language::English => format!("{size} free on this disk"),
+        Language::Vietnamese => format!("đĩa còn trống {size}"),
     }
 }
 
@@ -112,7 +112,7 @@ fn card(visit: &Visit, project: &Overview) -> Markup {
                 Ok((counts, running)) => {
                     (summary(visit, counts, *running))
                     @if let Some(time) = project.last_change {
-                        p.muted { (visit.t("Last result", "Kết quả mới nhất")) ": " (local(time)) }
+                        p.muted { (visit.t("Last result", "Kết quả mới nhất")) ": " (visit.time(time)) }
                     }
                     p { a.button href=(href) { (next_step(visit, counts, *running)) } }
                 }

@@ -24,7 +24,6 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::{asks_for_page, document, respond};
 use mocban_core::domain::{ReviewOrder, one_line};
-use mocban_system::time_text::local;
 
 /// Invites a reviewer, unless the same invitation was sent before.
 pub(super) async fn invite(
@@ -220,7 +219,7 @@ fn progress(visit: &Visit, invitation: &SentInvitation) -> Markup {
             progress value=(counts.answered) max=(counts.items.max(1)) aria-label=(visit.t("Answered", "Đã trả lời")) {}
         }
         @if let Some(seen) = invitation.seen {
-            p.muted { (visit.t("Last seen", "Hoạt động gần nhất")) ": " time.seen { (local(seen)) } }
+            p.muted { (visit.t("Last seen", "Hoạt động gần nhất")) ": " time.seen { (visit.time(seen)) } }
         }
     }
 }

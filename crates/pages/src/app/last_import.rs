@@ -21,7 +21,6 @@ use crate::on_thread::on_thread;
 use mocban_catalog::ImportedPair;
 use mocban_core::domain::UnixMillis;
 use mocban_project::retire::{RetireChoice, retire, undo};
-use mocban_system::time_text::local;
 
 /// Responds with a part of the page of imports. It reads all pairs, so the page loads it afterwards.
 pub(super) async fn part(
@@ -59,7 +58,7 @@ fn undo_part(visit: &Visit, key: &str, added: &[ImportedPair]) -> Markup {
     html! {
         @if let Some(first) = added.first() {
             h2 { (visit.t("Newest import", "Lần nhập mới nhất")) }
-            p { (text) " (" (local(first.imported)) "): " b { (grouped(number as u64)) } ". "
+            p { (text) " (" (visit.time(first.imported)) "): " b { (grouped(number as u64)) } ". "
                 span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
             }
             // The part stands on the page of imports, so the address is relative to that page.

@@ -103,21 +103,21 @@ const NUMBERS: [PairNumber; 8] = [
 ];
 
 impl PairNumber {
-    fn text(&self, outcome: &MetricOutcome) -> String {
+    fn text(&self, visit: &Visit, outcome: &MetricOutcome) -> String {
         let value = (self.read)(outcome);
         value.map_or_else(
             || "–".to_owned(),
-            |value| format!("{value:.*}{}", self.digits, self.unit),
+            |value| visit.decimal(value, self.digits) + self.unit,
         )
     }
 
     /// Returns the number of one result minus that of another. Angles differ by half a turn at most.
-    fn difference(&self, outcome: &MetricOutcome, other: &MetricOutcome) -> String {
+    fn difference(&self, visit: &Visit, outcome: &MetricOutcome, other: &MetricOutcome) -> String {
         let [mut value, other] = [outcome, other].map(self.read);
         if let (Some(angle), Some(other), "°") = (&mut value, other, self.unit) {
             *angle -= 360.0 * ((*angle - other) / 360.0).round();
         }
-        difference(value, other, self.digits) + self.unit
+        difference(visit, value, other, self.digits) + self.unit
     }
 }
 
@@ -145,10 +145,10 @@ pub(super) fn numbers(
                     tbody { @for number in &NUMBERS {
                         tr {
                             th scope="row" { (number.name[visit.index()]) }
-                            td.number { (number.text(outcome)) }
+                            td.number { (number.text(visit, outcome)) }
                             @if let Some(other) = other {
-                                td.number { (number.text(&other.outcome)) }
-                                td.number { (number.difference(outcome, &other.outcome)) }
+                                td.number { (number.text(visit, &other.outcome)) }
+                                td.number { (number.difference(visit, outcome, &other.outcome)) }
                             }
                             td.muted { (number.meaning[visit.index()]) }
                         }
@@ -177,6 +177,8 @@ fn verdicts(visit: &Visit, record: &MetricRecord, has_other: bool) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::NUMBERS;
+    use crate::app::visit::Visit;
+    use crate::review::Language;
     use mocban_core::domain::ThresholdMetric;
     use mocban_results::test_fixtures;
 
@@ -186,14 +188,17 @@ mod tests {
         let mut second = first;
         (first.angle_deg, second.angle_deg) = (-179.0, 178.5);
         (first.confidence, second.confidence) = (Some(0.25), None);
+        let visit = Visit::in_language(Language::English);
         let of = |name: &str| NUMBERS.iter().find(|number| number.name[0] == name);
         let rotation = of("Rotation").expect("an angle");
-        assert_eq!(rotation.text(&first), "-179.0°");
-        assert_eq!(rotation.difference(&first, &second), "+2.5°");
+        assert_eq!(rotation.text(&visit, &first), "-179.0°");
+        assert_eq!(rotation.difference(&visit, &first, &second), "+2.5°");
         let confidence = of("Confidence").expect("a confidence");
-        assert_eq!(confidence.text(&first), "0.250");
-        assert_eq!(confidence.difference(&first, &second), "–");
+        assert_eq!(confidence.text(&visit, &first), "0.250");
+        assert_eq!(confidence.difference(&visit, &first, &second), "–");
         let iou = of("IoU").expect("a score");
-        assert_eq!(iou.difference(&first, &second), "0.000");
+        assert_eq!(iou.difference(&visit, &first, &second), "0.000");
+        let vietnamese = Visit::in_language(Language::Vietnamese);
+        assert_eq!(rotation.text(&vietnamese, &first), "-179,0°");
     }
 }

@@ -16,7 +16,6 @@ use crate::view::{page as scan_page, scan_asset};
 use mocban_catalog::PairDetail;
 use mocban_core::domain::{FailureClass, JobStatus, PairName, ThresholdMetric, one_line};
 use mocban_project::details::{self, Details, PairOverview};
-use mocban_system::time_text::local;
 
 /// Pictures that can be chosen, with their keys and names.
 const LAYERS: [(&str, [&str; 2]); 5] = [
@@ -267,16 +266,16 @@ fn history(visit: &Visit, detail: &PairDetail) -> Markup {
                 ul.history {
                     @for attempt in detail.attempts.iter().skip(hidden) {
                         li {
-                            (local(attempt.at)) " · " (visit.stage(attempt.stage)) " · "
+                            (visit.time(attempt.at)) " · " (visit.stage(attempt.stage)) " · "
                             @match &attempt.failure {
                                 Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(&failure.message)) },
-                                None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (ms) " ms)" } }
+                                None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (visit.duration(ms)) ")" } }
                             }
                         }
                     }
                     @for event in &detail.verdict_log {
                         li {
-                            (local(event.at)) " · " (one_line(&event.reviewer)) " · " (visit.verdict(event.verdict))
+                            (visit.time(event.at)) " · " (one_line(&event.reviewer)) " · " (visit.verdict(event.verdict))
                             " (" (visit.metric(event.metric)) ")"
                             @if event.undone_at.is_some() { " · " (visit.t("taken back", "đã rút lại")) }
                         }

@@ -229,7 +229,7 @@ pub(super) fn pair_card(
             span.name { (one_line(name)) @if let Some(character) = &pair.attributes.character { " " span.character { (one_line(character)) } } }
             @match outcome {
                 Some(outcome) => span.muted.warn[is_low] {
-                    (visit.t("confidence", "độ tin cậy")) " " (score(outcome.confidence))
+                    (visit.t("confidence", "độ tin cậy")) " " (score(visit, outcome.confidence))
                 },
                 None => span.state.(pair.status.name()) { (visit.status(pair.status)) },
             }
@@ -286,16 +286,16 @@ fn table_row(visit: &Visit, query: &PairQuery, pair: &PairResults) -> Markup {
             td { (pair.attributes.character.as_deref().map(one_line).unwrap_or_default()) }
             td { (pair.attributes.block.as_deref().map(one_line).unwrap_or_default()) }
             td { span.state.(pair.status.name()) { (visit.status(pair.status)) } }
-            td.number { (score(outcome.and_then(|outcome| outcome.confidence))) }
-            td.number { (score(scores.map(|scores| scores.iou))) }
-            td.number { (score(scores.map(|scores| scores.ssim))) }
-            td.number { (score(scores.map(|scores| scores.dice))) }
+            td.number { (score(visit, outcome.and_then(|outcome| outcome.confidence))) }
+            td.number { (score(visit, scores.map(|scores| scores.iou))) }
+            td.number { (score(visit, scores.map(|scores| scores.ssim))) }
+            td.number { (score(visit, scores.map(|scores| scores.dice))) }
             td { (verdict_marks(visit, pair, query.metric)) }
             td.reason { @if let Some(failure) = failure { (stored_message(&failure.message)) } }
             @if let Some(other) = query.compared {
                 @let iou = pair.metric(other).map(|record| record.outcome.scores.iou);
-                td.number { (score(iou)) }
-                td.number { (difference(scores.map(|scores| scores.iou), iou, 3)) }
+                td.number { (score(visit, iou)) }
+                td.number { (difference(visit, scores.map(|scores| scores.iou), iou, 3)) }
             }
         }
     }

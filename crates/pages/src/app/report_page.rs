@@ -117,23 +117,27 @@ fn table(visit: &Visit, report: &Report) -> Markup {
                 td.number { (grouped(row.judged)) }
                 td.number { (link(format!("verdict=pass&metric={metric}"), row.passed)) }
                 td.number { (link(format!("verdict=fail&metric={metric}"), row.failed)) }
-                td.number { (percent(row.acc)) }
-                td.number { (interval(row)) }
-                td.number { (score(row.ssim)) } td.number { (score(row.iou)) } td.number { (score(row.dice)) }
+                td.number { (percent(visit, row.acc)) }
+                td.number { (interval(visit, row)) }
+                td.number { (score(visit, row.ssim)) } td.number { (score(visit, row.iou)) } td.number { (score(visit, row.dice)) }
             }
         }
     };
     number_table(visit.t("Scores", "Điểm số"), &titles, &rows)
 }
 
-fn percent(share: Option<f64>) -> String {
-    share.map_or_else(|| "–".to_owned(), |share| format!("{:.1}", 100.0 * share))
+fn percent(visit: &Visit, share: Option<f64>) -> String {
+    share.map_or_else(|| "–".to_owned(), |share| visit.decimal(100.0 * share, 1))
 }
 
-fn interval(row: &MetricRow) -> String {
+fn interval(visit: &Visit, row: &MetricRow) -> String {
     row.acc_ci95.map_or_else(
         || "–".to_owned(),
-        |[low, high]| format!("{:.1} – {:.1}", 100.0 * low, 100.0 * high),
+        |bounds| {
+            bounds
+                .map(|bound| visit.decimal(100.0 * bound, 1))
+                .join(" – ")
+        },
     )
 }
 

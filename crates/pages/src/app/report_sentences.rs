@@ -1,6 +1,6 @@
 //! The answer of a report and its limits in sentences. The report itself is in English, so the Vietnamese ones are made here.
 
-use super::components::grouped;
+use super::number_text::{grouped, with_decimal_sign};
 use super::sentence::without_commands;
 use super::visit::Visit;
 use crate::review::Language;
@@ -40,6 +40,10 @@ fn plain(sentences: &[String]) -> Vec<String> {
         .collect()
 }
 
+fn vietnamese_number(text: String) -> String {
+    with_decimal_sign(Language::Vietnamese, text)
+}
+
 /// Says how many pairs are aligned, failed and not finished.
 fn aligned(report: &Report) -> String {
     let progress = report.progress;
@@ -47,7 +51,8 @@ fn aligned(report: &Report) -> String {
     let mut text = format!("{done} trên {pairs} cặp đã được căn chỉnh");
     let row = report.row(ThresholdMetric::DEFAULT);
     if let Some(low) = row.and_then(|row| row.low_confidence) {
-        let (low, least) = (grouped(low), MetricOutcome::LOW_CONFIDENCE);
+        let least = vietnamese_number(MetricOutcome::LOW_CONFIDENCE.to_string());
+        let low = grouped(low);
         text.extend([format!(", trong đó {low} có độ tin cậy dưới {least}")]);
     }
     for (number, what) in [(progress.failed, "bị lỗi"), (progress.pending, "chưa xong")] {
@@ -70,8 +75,8 @@ fn accuracy(visit: &Visit, report: &Report) -> String {
         Some(format!(
             "Acc của {} là {} % ({}): người đánh giá cho đạt {} trên {} kết quả.",
             visit.metric(row.metric),
-            format_share(acc),
-            interval.unwrap_or_default(),
+            vietnamese_number(format_share(acc)),
+            vietnamese_number(interval.unwrap_or_default()),
             grouped(row.passed),
             grouped(row.passed + row.failed),
         ))
@@ -110,7 +115,10 @@ fn differences(visit: &Visit, report: &Report) -> String {
             [found.b, found.a]
         };
         let [better, worse] = [better, worse].map(|metric| visit.metric(metric));
-        Some(format!("{better} đúng nhiều hơn {worse} ({})", format_p(p)))
+        Some(format!(
+            "{better} đúng nhiều hơn {worse} ({})",
+            vietnamese_number(format_p(p))
+        ))
     });
     let significant: Vec<String> = significant.collect();
     if significant.is_empty() {

@@ -84,7 +84,7 @@ fn pair_table(visit: &Visit, pairs: &[ReviewerPair]) -> Markup {
     let rows = html! {
         @for pair in pairs {
             @let agreement = &pair.agreement;
-            @let value = |value: Option<f64>| score(value.filter(|_| agreement.sufficient));
+            @let value = |value: Option<f64>| score(visit, value.filter(|_| agreement.sufficient));
             tr {
                 th scope="row" { (one_line(&pair.a)) ", " (one_line(&pair.b)) }
                 td.number { (grouped(agreement.n)) }
@@ -104,6 +104,6 @@ fn pair_table(visit: &Visit, pairs: &[ReviewerPair]) -> Markup {
 fn rate(rate: Rate) -> String {
     match rate.n {
         0 => "–".to_owned(),
-        n => format!("{} / {n}", rate.count),
+        n => format!("{} / {}", grouped(rate.count), grouped(n)),
     }
 }

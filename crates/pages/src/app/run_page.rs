@@ -234,16 +234,11 @@ fn blocks_text(visit: &Visit, blocks: &BlockStatus) -> String {
 /// Returns a number of pairs a second, or a minute if they are few.
 fn rate_text(visit: &Visit, per_second: f64) -> String {
     if per_second < 1.0 {
-        let per_minute = 60.0 * per_second;
-        format!(
-            "{per_minute:.1} {}",
-            visit.t("pairs a minute", "cặp mỗi phút")
-        )
+        let number = visit.decimal(60.0 * per_second, 1);
+        format!("{number} {}", visit.t("pairs a minute", "cặp mỗi phút"))
     } else {
-        format!(
-            "{per_second:.1} {}",
-            visit.t("pairs a second", "cặp mỗi giây")
-        )
+        let number = visit.decimal(per_second, 1);
+        format!("{number} {}", visit.t("pairs a second", "cặp mỗi giây"))
     }
 }
 

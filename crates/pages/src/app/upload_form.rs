@@ -2,7 +2,6 @@
 
 use maud::{Markup, html};
 
-use super::byte_size::file_size;
 use super::components::grouped;
 use super::home::free_space;
 use super::received_files::{ARCHIVE, importable_extensions};
@@ -45,7 +44,7 @@ pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Ma
                     code { (one_line(&uploads.folder().to_string_lossy())) }
                     (visit.t(", from which the project reads them, so keep it. ", ", nơi dự án sẽ đọc chúng, vì vậy hãy giữ thư mục đó. "))
                     (visit.t("At most", "Tối đa")) " " (grouped(MAX_FILES)) " " (visit.t("files", "tệp")) "; "
-                    (file_size(RESERVE_BYTES)) " " (visit.t("of the disk stays free", "của đĩa được để trống"))
+                    (visit.file_size(RESERVE_BYTES)) " " (visit.t("of the disk stays free", "của đĩa được để trống"))
                     @if let Some(free) = free { " (" (free_space(visit, free)) ")" }
                     "."
                 }

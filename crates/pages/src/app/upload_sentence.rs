@@ -2,8 +2,9 @@
 
 use std::io::{self, ErrorKind};
 
-use super::byte_size::{file_size, grouped};
+use super::number_text::{file_size, grouped};
 use super::sentence::Sentence;
+use crate::review::Language;
 use mocban_core::domain::sanitize;
 use mocban_lists::relative_path::PathFault;
 use mocban_lists::zip::ZipError;
@@ -51,11 +52,11 @@ pub(super) fn not_written(error: &io::Error) -> Sentence {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Sentence::new(
             format!(
                 "the disk is full, or less than {} of it would stay free, so nothing of the files was kept: make room and choose them again",
-                file_size(RESERVE_BYTES)
+                file_size(Language::English, RESERVE_BYTES)
             ),
             format!(
                 "đĩa đã đầy, hoặc sẽ còn trống ít hơn {}, nên không tệp nào được giữ lại: hãy giải phóng dung lượng rồi chọn lại các tệp",
-                file_size(RESERVE_BYTES)
+                file_size(Language::Vietnamese, RESERVE_BYTES)
             ),
         ),
         _ => Sentence::new(
@@ -71,15 +72,17 @@ pub(super) fn not_written(error: &io::Error) -> Sentence {
 
 /// Says that files need more room than the disk has.
 pub(super) fn no_room(bytes: u64, free: u64) -> Sentence {
-    let [bytes, free, reserve] = [bytes, free, RESERVE_BYTES].map(file_size);
-    Sentence::new(
-        format!(
-            "the files need {bytes}, the disk has {free}, and {reserve} must stay free: make room or choose fewer files"
-        ),
-        format!(
-            "các tệp cần {bytes}, đĩa còn {free}, và phải để trống {reserve}: hãy giải phóng dung lượng hoặc chọn ít tệp hơn"
-        ),
-    )
+    let sizes = |language| [bytes, free, RESERVE_BYTES].map(|size| file_size(language, size));
+    let [english, vietnamese] = [Language::English, Language::Vietnamese].map(sizes);
+    let [bytes, free, reserve] = english;
+    let english = format!(
+        "the files need {bytes}, the disk has {free}, and {reserve} must stay free: make room or choose fewer files"
+    );
+    let [bytes, free, reserve] = vietnamese;
+    let vietnamese = format!(
+        "các tệp cần {bytes}, đĩa còn {free}, và phải để trống {reserve}: hãy giải phóng dung lượng hoặc chọn ít tệp hơn"
+    );
+    Sentence::new(english, vietnamese)
 }
 
 /// Says that there are too many files.
@@ -209,7 +212,7 @@ pub(super) fn refused_archive(archive: &str, error: &ZipError) -> Sentence {
         ),
         ZipError::Large => because(
             "it has more than 4 GiB or more than 65,535 files (ZIP64); unpack it yourself and choose the folder",
-            "tệp lớn hơn 4 GiB hoặc có hơn 65.535 tệp (ZIP64); hãy tự giải nén rồi chọn thư mục",
+            "tệp lớn hơn 4 GiB hoặc có hơn 65\u{202f}535 tệp (ZIP64); hãy tự giải nén rồi chọn thư mục",
         ),
         ZipError::Encrypted(name) => because(
             &format!("{} has a password; pack the files without one", shown(name)),

@@ -8,9 +8,11 @@ use axum::http::header;
 use axum::http::request::Parts;
 
 use super::address::PageQuery;
+use super::number_text;
 use super::state::AppState;
 use crate::local_server::AccessControl;
 use crate::review::Language;
+use mocban_core::domain::UnixMillis;
 
 /// A request for a page.
 #[derive(Debug, Clone)]
@@ -26,6 +28,18 @@ pub(super) struct Visit {
 }
 
 impl Visit {
+    /// Returns the visit of a page at the root without a query.
+    #[cfg(test)]
+    pub(super) fn in_language(language: Language) -> Self {
+        Self {
+            language,
+            root: "./".to_owned(),
+            here: "./".to_owned(),
+            query: PageQuery::default(),
+            csrf_token: String::new(),
+        }
+    }
+
     /// Returns the text in the language of the page.
     pub(super) const fn t<'t>(&self, english: &'t str, vietnamese: &'t str) -> &'t str {
         match self.language {
@@ -40,6 +54,26 @@ impl Visit {
             Language::English => 0,
             Language::Vietnamese => 1,
         }
+    }
+
+    /// Returns a number with some digits behind the decimal sign of the language.
+    pub(super) fn decimal(&self, value: f64, digits: usize) -> String {
+        number_text::decimal(self.language, value, digits)
+    }
+
+    /// Returns a number of bytes in the unit that fits.
+    pub(super) fn file_size(&self, bytes: u64) -> String {
+        number_text::file_size(self.language, bytes)
+    }
+
+    /// Returns a time in the time zone of the computer, as it is written in the language.
+    pub(super) fn time(&self, at: UnixMillis) -> String {
+        number_text::date_and_time(self.language, at)
+    }
+
+    /// Returns a duration in milliseconds in the unit that fits.
+    pub(super) fn duration(&self, ms: u64) -> String {
+        number_text::duration(self.language, ms)
     }
 
     /// Returns the relative address of a page of a project.

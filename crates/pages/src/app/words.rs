@@ -147,7 +147,6 @@ impl Visit {
 #[cfg(test)]
 mod tests {
     use super::Visit;
-    use crate::app::address::PageQuery;
     use crate::review::Language;
     use mocban_core::domain::FailureClass;
 
@@ -155,13 +154,7 @@ mod tests {
     fn reasons_and_remedies_in_both_languages() {
         let mut lines = Vec::new();
         for language in Language::ALL {
-            let visit = Visit {
-                language,
-                root: "./".to_owned(),
-                here: "./".to_owned(),
-                query: PageQuery::default(),
-                csrf_token: String::new(),
-            };
+            let visit = Visit::in_language(language);
             for class in FailureClass::ALL {
                 lines.push(format!(
                     "{class}: {}\n  {}",

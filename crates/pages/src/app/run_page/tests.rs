@@ -3,22 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::{RunState, blocks_text, controls, progress};
-use crate::app::address::PageQuery;
 use crate::app::visit::Visit;
 use crate::review::Language;
 use mocban_catalog::{BlockAttributes, BlockState, StatusCounts, WorkerRecord};
 use mocban_core::domain::{BlockStage, JobStatus, WorkerId, WorkerMetrics};
 use mocban_project::block_status::BlockStatus;
-
-fn visit(language: Language) -> Visit {
-    Visit {
-        language,
-        root: "./".to_owned(),
-        here: "./".to_owned(),
-        query: PageQuery::default(),
-        csrf_token: String::new(),
-    }
-}
 
 fn block(name: &str, status: JobStatus) -> BlockState {
     BlockState {
@@ -89,7 +78,7 @@ fn blocks_in_progress_have_their_stage_in_both_languages() {
         block("b04", JobStatus::Leased),
         block("b05", JobStatus::Ready),
     ]);
-    let text = |language| blocks_text(&visit(language), &blocks);
+    let text = |language| blocks_text(&Visit::in_language(language), &blocks);
     assert_eq!(
         text(Language::English),
         "b04: registration with the page, 1 of 3 done"
@@ -102,7 +91,7 @@ fn blocks_in_progress_have_their_stage_in_both_languages() {
 
 #[test]
 fn time_is_estimated_once_every_pair_is_known() {
-    let visit = visit(Language::English);
+    let visit = Visit::in_language(Language::English);
     let is_estimated = |blocks| {
         let shown = progress(&visit, &running(blocks)).into_string();
         assert!(shown.contains("10.0 pairs a minute"), "{shown}");
@@ -123,12 +112,12 @@ fn a_project_of_blocks_alone_can_be_run() {
     let mut run = running(vec![block("b1", JobStatus::Ready)]);
     run.is_running = false;
     run.counts.jobs.clear();
-    let shown = controls(&visit(Language::English), &run).into_string();
+    let shown = controls(&Visit::in_language(Language::English), &run).into_string();
     assert!(shown.contains("Align 1 block<"), "{shown}");
     assert!(!shown.contains("disabled"), "{shown}");
     run.blocks = BlockStatus(Vec::new());
     run.counts.pairs = 0;
-    let shown = controls(&visit(Language::English), &run).into_string();
+    let shown = controls(&Visit::in_language(Language::English), &run).into_string();
     assert!(shown.contains("disabled"), "{shown}");
 }
 
@@ -137,7 +126,7 @@ fn a_finished_project_can_be_searched_for_changed_files() {
     let mut run = running(Vec::new());
     run.is_running = false;
     run.counts.jobs = BTreeMap::from([(JobStatus::Done, 20)]);
-    let shown = controls(&visit(Language::English), &run).into_string();
+    let shown = controls(&Visit::in_language(Language::English), &run).into_string();
     assert!(shown.contains("Look for changed files"), "{shown}");
     assert!(!shown.contains("disabled"), "{shown}");
 }
