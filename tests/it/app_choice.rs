@@ -94,6 +94,56 @@ fn chosen_pairs_leave_every_count_and_come_back() {
 }
 
 #[test]
+fn a_retired_pair_is_listed_has_a_page_and_comes_back() {
+    let (dir, page) = with_project();
+    let pair = "upright-0001";
+    let set = ["verdict", "set", pair, "pass", "--reviewer", "lan"];
+    mocban(&dir.path().join("p"), &set).expect(0);
+    let html = text(&page.get("/p/p/pairs"));
+    assert!(html.contains("retired (0)"), "{html}");
+    let retire = json!({ "pair": pair });
+    let restore = "/p/p/actions/restore";
+    for list in [None, Some("state=retired")] {
+        let reply = act(&page, "/p/p/actions/retire", &retire, |_| {});
+        assert_eq!(reply.status, 200, "{}", text(&reply));
+        let html = text(&page.get("/p/p/pairs?state=retired"));
+        for part in ["retired (1)", "a person took it out", "Bring it back", pair] {
+            assert!(html.contains(part), "{part}: {html}");
+        }
+        assert!(!html.contains("upright-0002") && !html.contains("data-pair="));
+        let other = text(&page.get("/p/p/pairs?state=retired&block=none"));
+        assert!(other.contains("No pair matches"), "{other}");
+        assert_eq!(page.get("/p/p/pairs/listed?state=retired").status, 422);
+        assert_eq!(page.get(&format!("/p/p/pairs?id={pair}")).status, 303);
+        let own = page.get(&format!("/p/p/pair/{pair}/"));
+        assert_eq!(own.status, 200);
+        let html = text(&own);
+        for part in ["This pair is retired.", "Bring it back", " · lan · passed"] {
+            assert!(html.contains(part), "{part}: {html}");
+        }
+        let mut body = retire.clone();
+        if let Some(list) = list {
+            body["list"] = list.into();
+        }
+        let reply = act(&page, restore, &body, |_| {});
+        assert_eq!(reply.status, 200, "{}", text(&reply));
+        if list.is_some() {
+            assert_eq!(
+                reply.json()["go"],
+                "pairs?state=retired&done=restore&count=1"
+            );
+        } else {
+            assert_eq!(reply.json()["reload"], true);
+        }
+        let html = text(&page.get(&format!("/p/p/pair/{pair}/")));
+        assert!(!html.contains("This pair is retired."), "{html}");
+        assert_eq!(status(dir.path())["retired"], 0);
+    }
+    assert_eq!(act(&page, restore, &retire, |_| {}).status, 422, "twice");
+    assert_eq!(act(&page, restore, &json!({}), |_| {}).status, 404);
+}
+
+#[test]
 fn only_the_page_itself_acts_on_known_pairs() {
     let (dir, page) = with_project();
     let body = chosen("retire", &["upright-0001"]);

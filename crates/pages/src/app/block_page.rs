@@ -119,7 +119,7 @@ fn state_part(visit: &Visit, detail: &BlockDetail) -> Markup {
         p { (state_badge(visit, state)) }
         @if let Some(stored) = &state.failure {
             div.notice.bad {
-                p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored_message(&stored.failure.message)) }
+                p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored_message(visit, &stored.failure.message)) }
                 p { (visit.block_remedy(stored.stage, stored.failure.class)) }
             }
         }
@@ -232,7 +232,7 @@ fn character_row(visit: &Visit, one: &StoredCharacter) -> Markup {
                 @if let Some(reason) = &one.reason { ": " (one_line(reason)) }
             }
             td.number.warn[is_uncertain] { (score(visit, one.confidence)) }
-            td { @if let Some(pair) = one.pair.as_ref().filter(|_| one.state == BlockCharacterState::Cut) {
+            td { @if let Some(pair) = one.pair.as_ref().filter(|_| one.state != BlockCharacterState::Left) {
                 a href={ "../../pair/" (encoded(pair)) "/" } { (one_line(pair)) }
             } }
         }
@@ -268,7 +268,7 @@ fn history(visit: &Visit, detail: &BlockDetail) -> Markup {
                     li {
                         (visit.time(attempt.at)) " · " (visit.block_stage(attempt.stage)) " · "
                         @match &attempt.failure {
-                            Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(&failure.message)) },
+                            Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(visit, &failure.message)) },
                             None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (visit.duration(ms)) ")" } },
                         }
                     }

@@ -112,7 +112,7 @@ fn row(visit: &Visit, block: &BlockState) -> Markup {
             th scope="row" { a href={ "block/" (encoded(name)) "/" } { (one_line(name)) } }
             td {
                 (state_badge(visit, block))
-                @if let Some(stored) = &block.failure { " " span.bad { (stored_message(&stored.failure.message)) } }
+                @if let Some(stored) = &block.failure { " " span.bad { (stored_message(visit, &stored.failure.message)) } }
             }
             td.number { @if block.characters > 0 {
                 a href={ "pairs?block=" (encoded(name)) } { (grouped(block.characters)) }

@@ -56,13 +56,17 @@ pub(super) struct ChosenBody {
     list: String,
 }
 
-/// The time at which pairs were retired.
+/// A retired pair, or the time at which pairs were retired.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RestoreBody {
+    #[serde(default)]
+    pair: Option<String>,
+    #[serde(default)]
     at: String,
-    /// The list that the page shows, as its address names it.
-    list: String,
+    /// The list that the page shows, as its address names it. `None` on the page of a pair.
+    #[serde(default)]
+    list: Option<String>,
 }
 
 /// Responds with the ids of all pairs of a list, which the page then chooses.
@@ -75,6 +79,12 @@ pub(super) async fn listed(
     let query = PairQuery::of(&visit.query);
     if query.lacks_compared {
         return Err(AppFailure::refused(metric_is_lacking()));
+    }
+    if query.is_retired {
+        return Err(AppFailure::refused(Sentence::new(
+            "retired pairs cannot be chosen: bring them back first",
+            "không thể chọn các cặp đã đưa ra khỏi thống kê: trước hết hãy đưa chúng trở lại",
+        )));
     }
     let (filter, order, metric) = (&query.filter, query.order, query.metric);
     let names = open.catalog.listed_names(filter, order, metric, MAX_CHOSEN);
@@ -207,20 +217,27 @@ async fn retire_pairs(open: &OpenProject, names: Vec<String>) -> AppResult<UnixM
     Ok(retired.at.unwrap_or_default())
 }
 
-/// Brings pairs back that were taken out of every count at the same time.
+/// Brings a pair back, or the pairs that were taken out of every count at the same time.
 pub(super) async fn restore(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
     ActionBody(body): ActionBody<RestoreBody>,
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
-    let at = body.at.parse::<UnixMillis>();
-    let at = at.map_err(|_invalid| AppFailure::not_found())?;
-    let choice = RetireChoice::RetiredAt(at);
+    let choice = match body.pair {
+        Some(pair) => RetireChoice::Ids(vec![pair]),
+        None => {
+            let at = body.at.parse::<UnixMillis>();
+            RetireChoice::RetiredAt(at.map_err(|_invalid| AppFailure::not_found())?)
+        }
+    };
     let location = open.location();
     let restored = on_thread(async move || undo(&choice, &location).await).await;
     let restored = restored.map_err(|error| AppFailure::of(error, &open.dir))?;
-    let done = with_restored(&PageQuery::parse(&body.list), &restored);
+    let Some(list) = body.list else {
+        return Ok(Json(json!({ "reload": true })));
+    };
+    let done = with_restored(&PageQuery::parse(&list), &restored);
     Ok(Json(json!({ "go": format!("pairs{}", done.text()) })))
 }
 

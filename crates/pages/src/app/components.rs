@@ -4,6 +4,7 @@ use axum::response::Html;
 use maud::{Markup, html};
 
 use super::address::encoded;
+use super::message_words;
 pub(super) use super::number_text::grouped;
 use super::number_text::with_decimal_sign;
 use super::sentence::without_commands;
@@ -160,9 +161,19 @@ fn unit_name(visit: &Visit, unit: LengthUnit) -> &'static str {
     }
 }
 
-/// Returns the message of a stored failure, which is in English, without its commands.
-pub(super) fn stored_message(message: &str) -> Markup {
-    html! { span lang="en" { (one_line(&without_commands(message))) } }
+/// Returns the message of a stored failure without its commands. It is in English, unless its Vietnamese text is known.
+pub(super) fn stored_message(visit: &Visit, message: &str) -> Markup {
+    let plain = without_commands(message);
+    let known = match visit.language {
+        Language::English => None,
+        Language::Vietnamese => message_words::vietnamese(&plain),
+    };
+    html! {
+        @match known {
+            Some(text) => (one_line(&text)),
+            None => span lang="en" { (one_line(&plain)) },
+        }
+    }
 }
 
 /// Returns a score with three digits, or a dash.
@@ -201,7 +212,7 @@ pub(super) fn choice(value: &str, text: &str, selected: Option<&str>) -> Markup 
 
 #[cfg(test)]
 mod tests {
-    use super::{difference, score};
+    use super::{difference, score, stored_message};
     use crate::app::visit::Visit;
     use crate::review::Language;
 
@@ -218,5 +229,25 @@ mod tests {
         let vietnamese = Visit::in_language(Language::Vietnamese);
         assert_eq!(score(&vietnamese, Some(0.98765)), "0,988");
         assert_eq!(difference(&vietnamese, Some(0.5), Some(0.75), 3), "−0,250");
+    }
+
+    #[test]
+    fn a_stored_message_is_translated_or_marked_as_english() {
+        let of = |language, message| {
+            stored_message(&Visit::in_language(language), message).into_string()
+        };
+        let known = "1.stl: the mesh has no faces";
+        assert_eq!(
+            of(Language::English, known),
+            "<span lang=\"en\">1.stl: the mesh has no faces</span>"
+        );
+        assert_eq!(
+            of(Language::Vietnamese, known),
+            "1.stl: bản quét không có mặt tam giác"
+        );
+        assert_eq!(
+            of(Language::Vietnamese, "odd"),
+            "<span lang=\"en\">odd</span>"
+        );
     }
 }

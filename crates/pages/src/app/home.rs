@@ -140,9 +140,12 @@ fn summary(visit: &Visit, counts: &StatusCounts, running: bool) -> Markup {
 /// Names what a project needs next.
 fn next_step(visit: &Visit, counts: &StatusCounts, running: bool) -> &'static str {
     let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
+    // Without a run, leases are those of an interrupted one.
+    let outstanding = [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased].map(jobs);
+    let outstanding: u64 = outstanding.iter().sum();
     if running {
         visit.t("Watch the run", "Xem tiến trình")
-    } else if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) + counts.stale > 0 {
+    } else if outstanding + counts.stale > 0 {
         visit.t("Align the pairs", "Căn chỉnh các cặp")
     } else if jobs(JobStatus::Quarantined) > 0 {
         visit.t("See what failed", "Xem các cặp lỗi")

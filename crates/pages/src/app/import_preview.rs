@@ -6,8 +6,10 @@ use maud::{Markup, html};
 
 use super::components::{action_form, choice, grouped};
 use super::import_choice::{ImportChoice, NAME_CHARS, Planned, SHOWN_PAIRS};
+use super::message_words;
 use super::sentence::Sentence;
 use super::visit::Visit;
+use crate::review::Language;
 use mocban_core::domain::{LengthUnit, one_line};
 use mocban_lists::manifest::PairingChanges;
 use mocban_project::import_plan::{ImportPlan, PlannedPair};
@@ -53,7 +55,7 @@ fn pairs_part(
             @if plan.missing.count > 0 { " · " span.bad { (grouped(plan.missing.count as u64)) " " (visit.t("missing files", "tệp không có")) } }
         }
         @if let Some(why) = no_pair { p.notice.bad { (why.text(visit.language)) } }
-        @for line in plan.missing.lines.iter().take(SHOWN_LINES) { p.notice.bad { (one_line(line)) } }
+        @for line in plan.missing.lines.iter().take(SHOWN_LINES) { p.notice.bad { (one_line(Sentence::of_program(line).text(visit.language))) } }
         @for line in plan.warnings.iter().take(SHOWN_LINES) { p.notice { (one_line(&warning(visit, line))) } }
         @if let Some(renamed) = &plan.renamed { p.muted { (one_line(&warning(visit, renamed))) } }
         @if shown.len() > 0 {
@@ -91,7 +93,11 @@ fn warning(visit: &Visit, line: &str) -> String {
         let rest = line.strip_prefix(english)?;
         Some(format!("{}{rest}", visit.t(english, vietnamese)))
     });
-    found.unwrap_or_else(|| line.to_owned())
+    let translated = || match visit.language {
+        Language::English => None,
+        Language::Vietnamese => message_words::vietnamese(line),
+    };
+    found.or_else(translated).unwrap_or_else(|| line.to_owned())
 }
 
 fn pair_row(

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
 use super::address::PageQuery;
-use super::components::action_form;
+use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::invitations::{GuestReview, SentInvitation};
 use super::open_pages::PagesId;
@@ -23,6 +23,7 @@ use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::{asks_for_page, document, respond};
+use crate::review::{Language, QueueCounts};
 use mocban_core::domain::{ReviewOrder, one_line};
 
 /// Invites a reviewer, unless the same invitation was sent before.
@@ -161,7 +162,10 @@ fn card(visit: &Visit, invitation: &SentInvitation) -> Markup {
         Some(metric) => visit.metric(metric),
         None => visit.t("all metrics", "mọi độ đo"),
     };
-    let results = visit.t("results", "kết quả");
+    let results = match (&invitation.progress, judged.parsed("sample")) {
+        (Some(counts), _) => Some(counts.results as u64),
+        (None, sample) => sample,
+    };
     let order = match judged.parsed("order") {
         Some(ReviewOrder::LeastConfident) => {
             visit.t("least confident first", "độ tin cậy thấp trước")
@@ -190,7 +194,7 @@ fn card(visit: &Visit, invitation: &SentInvitation) -> Markup {
     html! {
         div.card.invitation role="group" aria-label={ (reviewer) ", " (metric) ", " (order) } {
             h3 { (reviewer) }
-            p.muted { (metric) @if let Some(sample) = judged.get("sample") { ", " (sample) " " (results) } ", " (order) }
+            p.muted { (metric) @if let Some(results) = results { ", " (grouped(results)) " " (visit.t("results", "kết quả")) } ", " (order) }
             (progress(visit, invitation))
             @match &invitation.url {
                 Some(url) => {
@@ -208,12 +212,29 @@ fn card(visit: &Visit, invitation: &SentInvitation) -> Markup {
     }
 }
 
+/// Returns how many images a guest sees, which are more than the results if some are attention checks.
+fn images_text(visit: &Visit, counts: QueueCounts) -> String {
+    let images = grouped(counts.items as u64);
+    let checks = grouped(counts.items.saturating_sub(counts.results) as u64);
+    let results = grouped(counts.results as u64);
+    match (visit.language, counts.items > counts.results) {
+        (Language::English, true) => {
+            format!("{images} images ({results} results, {checks} attention checks and repeats)")
+        }
+        (Language::English, false) => format!("{images} images"),
+        (Language::Vietnamese, true) => {
+            format!("{images} hình ({results} kết quả, {checks} hình kiểm tra và lặp lại)")
+        }
+        (Language::Vietnamese, false) => format!("{images} hình"),
+    }
+}
+
 /// Says how much of the sample a guest has answered, and when the guest was last seen.
 fn progress(visit: &Visit, invitation: &SentInvitation) -> Markup {
     html! {
         @if let Some(counts) = invitation.progress {
             p.answered {
-                (visit.t("Answered", "Đã trả lời")) ": " b { (counts.answered) } " / " (counts.items)
+                (visit.t("Answered", "Đã trả lời")) ": " b { (counts.answered) } " / " (images_text(visit, counts))
                 @if counts.answered >= counts.items { " · " span.good { (visit.t("finished", "đã xong")) } }
             }
             progress value=(counts.answered) max=(counts.items.max(1)) aria-label=(visit.t("Answered", "Đã trả lời")) {}
@@ -221,5 +242,43 @@ fn progress(visit: &Visit, invitation: &SentInvitation) -> Markup {
         @if let Some(seen) = invitation.seen {
             p.muted { (visit.t("Last seen", "Hoạt động gần nhất")) ": " time.seen { (visit.time(seen)) } }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::card;
+    use crate::app::invitations::SentInvitation;
+    use crate::app::visit::Visit;
+    use crate::review::{Language, QueueCounts};
+
+    #[test]
+    fn a_card_counts_what_the_guest_sees_and_how_much_of_it_are_results() {
+        let shown = |language, items| {
+            let invitation = SentInvitation {
+                reviewer: "lan".to_owned(),
+                choice: "metric=relief&sample=50".to_owned(),
+                url: None,
+                progress: Some(QueueCounts {
+                    items,
+                    results: 2,
+                    answered: 1,
+                }),
+                seen: None,
+            };
+            card(&Visit::in_language(language), &invitation).into_string()
+        };
+        let english = shown(Language::English, 7);
+        for part in [
+            "Relief, 2 results, random order",
+            "<b>1</b> / 7 images (2 results, 5 attention checks and repeats)",
+        ] {
+            assert!(english.contains(part), "{part}: {english}");
+        }
+        let vietnamese = shown(Language::Vietnamese, 7);
+        let part = "<b>1</b> / 7 hình (2 kết quả, 5 hình kiểm tra và lặp lại)";
+        assert!(vietnamese.contains(part), "{vietnamese}");
+        let plain = shown(Language::English, 2);
+        assert!(plain.contains("<b>1</b> / 2 images<"), "{plain}");
     }
 }

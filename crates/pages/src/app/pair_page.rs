@@ -10,10 +10,11 @@ use super::address::encoded;
 use super::components::{NavSection, action_form, frame, scan_file, stored_message};
 use super::failure::AppResult;
 use super::pair_numbers::numbers;
+use super::retired_pairs::retired_band;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::view::{page as scan_page, scan_asset};
-use mocban_catalog::PairDetail;
+use mocban_catalog::{PairDetail, VerdictEvent};
 use mocban_core::domain::{FailureClass, JobStatus, PairName, ThresholdMetric, one_line};
 use mocban_project::details::{self, Details, PairOverview};
 
@@ -35,8 +36,24 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    if pair.parse::<PairName>().is_err() {
+    let Ok(name) = pair.parse::<PairName>() else {
         return Err(super::failure::AppFailure::not_found());
+    };
+    if let Some(retired) = open.catalog.retired_pair(&name).await? {
+        let neighbours = open.catalog.pair_neighbours(&name).await?;
+        let log = open.catalog.verdict_log(Some(&name)).await?;
+        let body = html! {
+            (neighbour_links(&visit, &neighbours))
+            (retired_band(&visit, &retired))
+            @if !log.is_empty() {
+                section {
+                    h2 { (visit.t("Verdicts", "Các đánh giá")) }
+                    ul.history { @for event in &log { (verdict_line(&visit, event)) } }
+                }
+            }
+        };
+        let title = one_line(name.as_str());
+        return Ok(frame(&visit, &title, Some(&key), NavSection::Pairs, &body));
     }
     let found = details::read(&pair, &open.catalog, &open.location()).await?;
     let Details::Pair(overview) = found else {
@@ -127,7 +144,7 @@ fn state_line(visit: &Visit, overview: &PairOverview) -> Markup {
         }
         @if let Some(stored) = &results.failure {
             div.notice.bad {
-                p { b { (visit.class(stored.failure.class)) } " (" (visit.stage(stored.stage)) "): " (stored_message(&stored.failure.message)) }
+                p { b { (visit.class(stored.failure.class)) } " (" (visit.stage(stored.stage)) "): " (stored_message(visit, &stored.failure.message)) }
                 p { (visit.remedy(stored.failure.class)) }
             }
         }
@@ -268,20 +285,25 @@ fn history(visit: &Visit, detail: &PairDetail) -> Markup {
                         li {
                             (visit.time(attempt.at)) " · " (visit.stage(attempt.stage)) " · "
                             @match &attempt.failure {
-                                Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(&failure.message)) },
+                                Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(visit, &failure.message)) },
                                 None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (visit.duration(ms)) ")" } }
                             }
                         }
                     }
-                    @for event in &detail.verdict_log {
-                        li {
-                            (visit.time(event.at)) " · " (one_line(&event.reviewer)) " · " (visit.verdict(event.verdict))
-                            " (" (visit.metric(event.metric)) ")"
-                            @if event.undone_at.is_some() { " · " (visit.t("taken back", "đã rút lại")) }
-                        }
-                    }
+                    @for event in &detail.verdict_log { (verdict_line(visit, event)) }
                 }
             }
+        }
+    }
+}
+
+/// Returns a line of the verdict log.
+fn verdict_line(visit: &Visit, event: &VerdictEvent) -> Markup {
+    html! {
+        li {
+            (visit.time(event.at)) " · " (one_line(&event.reviewer)) " · " (visit.verdict(event.verdict))
+            " (" (visit.metric(event.metric)) ")"
+            @if event.undone_at.is_some() { " · " (visit.t("taken back", "đã rút lại")) }
         }
     }
 }

@@ -12,6 +12,9 @@ const STATES: [(&str, &[JobStatus]); 4] = [
     ("running", &[JobStatus::Leased]),
 ];
 
+/// State by which a list asks for retired pairs, which have no job.
+pub(super) const RETIRED: &str = "retired";
+
 /// Differences of IoU that a list can ask for.
 pub(super) const DIFFERENCES: [&str; 4] = ["0.01", "0.03", "0.1", "0.3"];
 
@@ -29,6 +32,8 @@ pub(super) struct PairQuery {
     /// Whether the address asks for a difference of IoU without another metric. Then nothing is listed.
     pub(super) lacks_compared: bool,
     pub(super) is_table: bool,
+    /// Whether retired pairs are listed instead of the others.
+    pub(super) is_retired: bool,
     pub(super) after: Option<PairCursor>,
 }
 
@@ -69,6 +74,7 @@ impl PairQuery {
             compared,
             lacks_compared: min_iou.is_some() && compared.is_none(),
             is_table: query.get("view") == Some("table"),
+            is_retired: state == Some(RETIRED),
             after: query.get("after").and_then(cursor),
         }
     }
@@ -120,7 +126,8 @@ mod tests {
         assert_eq!(query.after, Some(after));
         assert_eq!(query.order, PairOrder::HighestIou);
         assert_eq!(query.metric, ThresholdMetric::Relief);
-        assert!(query.filter.is_unjudged && query.is_table);
+        assert!(query.filter.is_unjudged && query.is_table && !query.is_retired);
+        assert!(of("state=retired").is_retired);
         let failed = of("class=io&state=waiting&sort=iou");
         assert_eq!(failed.filter.class, Some(FailureClass::Io));
         assert_eq!(

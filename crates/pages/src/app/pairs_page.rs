@@ -13,19 +13,26 @@ use super::components::{
     NavSection, choice, difference, empty, frame, grouped, score, stored_message,
 };
 use super::failure::AppResult;
-use super::pair_query::{DIFFERENCES, PairQuery, cursor_text};
+use super::pair_query::{DIFFERENCES, PairQuery, RETIRED, cursor_text};
 use super::projects::OpenProject;
+use super::retired_pairs::{filter_name, retired_list};
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_catalog::{PairListPage, PairOrder, PairResults};
 use mocban_core::domain::{
-    FailureClass, JobStatus, MetricOutcome, PairName, ThresholdMetric, Verdict, one_line,
+    FailureClass, JobStatus, MetricOutcome, PairName, ThresholdMetric, Verdict, one_line, sanitize,
 };
 
 /// Columns of the table that hold scores.
 const NUMBER_COLUMNS: std::ops::Range<usize> = 4..8;
+/// Most blocks from which one is chosen without typing.
+const LISTED_BLOCKS: usize = 30;
 /// Most blocks that the filter suggests.
 const SUGGESTED_BLOCKS: usize = 200;
+/// Most reviewers of a verdict that a card names.
+const NAMED_REVIEWERS: usize = 3;
+/// Longest name of a reviewer on a card, in characters.
+const NAME_CHARS: usize = 24;
 /// Most ids that are suggested for one that does not exist.
 const SUGGESTED_IDS: usize = 20;
 
@@ -42,6 +49,19 @@ pub(super) async fn page(
         return jump(&visit, &open, typed.trim()).await;
     }
     let query = PairQuery::of(&visit.query);
+    let title = visit.t("Pairs", "Các cặp");
+    let blocks = open.catalog.first_listed_blocks(SUGGESTED_BLOCKS).await?;
+    let retired = open.catalog.retired_count().await?;
+    if query.is_retired {
+        let list = retired_list(&visit, &open, &query).await?;
+        let body = html! {
+            (done)
+            (jump_form(&visit))
+            (filter_form(&visit, &blocks, retired))
+            (list)
+        };
+        return Ok(frame(&visit, title, Some(&key), NavSection::Pairs, &body).into_response());
+    }
     let list = if query.lacks_compared {
         PairListPage {
             pairs: Vec::new(),
@@ -55,11 +75,10 @@ pub(super) async fn page(
             .pair_list(filter, order, metric, query.after, query.page_size());
         list.await?
     };
-    let blocks = open.catalog.first_listed_blocks(SUGGESTED_BLOCKS).await?;
     let body = html! {
         (done)
         (jump_form(&visit))
-        (filter_form(&visit, &blocks))
+        (filter_form(&visit, &blocks, retired))
         (views(&visit, &query))
         @if query.lacks_compared {
             p.notice role="alert" { (metric_is_lacking().text(visit.language)) }
@@ -82,14 +101,17 @@ pub(super) async fn page(
         (pager(&visit, &query, &list))
         (choice_bar(&visit, &key))
     };
-    let title = visit.t("Pairs", "Các cặp");
     Ok(frame(&visit, title, Some(&key), NavSection::Pairs, &body).into_response())
 }
 
-/// Opens the page of a pair, or lists similar ids.
+/// Opens the page of a pair, which may be retired, or lists similar ids.
 async fn jump(visit: &Visit, open: &OpenProject, typed: &str) -> AppResult<Response> {
     if let Ok(name) = typed.parse::<PairName>()
-        && open.catalog.pair(&name).await?.is_some()
+        && open
+            .catalog
+            .unknown_names(std::slice::from_ref(&name))
+            .await?
+            .is_empty()
     {
         let page = format!("pair/{}/", encoded(name.as_str()));
         return Ok(Redirect::to(&page).into_response());
@@ -133,8 +155,9 @@ fn field(visit: &Visit, name: &str, label: &str, options: &[(&str, &str)]) -> Ma
     }
 }
 
-fn filter_form(visit: &Visit, blocks: &[String]) -> Markup {
+fn filter_form(visit: &Visit, blocks: &[String], retired: u64) -> Markup {
     let any = visit.t("any", "bất kỳ");
+    let retired = filter_name(visit, retired);
     let classes = FailureClass::ALL.map(|class| (class.name(), visit.class(class)));
     let mut classes = classes.to_vec();
     classes.insert(0, ("", any));
@@ -154,14 +177,12 @@ fn filter_form(visit: &Visit, blocks: &[String]) -> Markup {
             (field(visit, "state", visit.t("State", "Trạng thái"), &[
                 ("", any), ("aligned", visit.status(JobStatus::Done)), ("failed", visit.status(JobStatus::Quarantined)),
                 ("waiting", visit.status(JobStatus::Ready)), ("running", visit.status(JobStatus::Leased)),
+                (RETIRED, &retired),
             ]))
             (field(visit, "class", visit.t("Why failed", "Lý do lỗi"), &classes))
             (field(visit, "confidence", visit.t("Confidence", "Độ tin cậy"), &[("", any), ("low", visit.t("low", "thấp"))]))
             (field(visit, "verdict", visit.t("Verdict", "Đánh giá"), &verdicts))
-            label { span { (visit.t("Block", "Ván")) }
-                input name="block" value=[visit.query.get("block")] list="blocks" autocomplete="off";
-                datalist #blocks { @for block in blocks { option value=(block) {} } }
-            }
+            (block_field(visit, blocks))
             label { span { (visit.t("Character", "Chữ")) }
                 input.short name="character" value=[visit.query.get("character")] autocomplete="off";
             }
@@ -178,6 +199,25 @@ fn filter_form(visit: &Visit, blocks: &[String]) -> Markup {
             (comparison_fields(visit, &metrics))
             button.primary { (visit.t("Show", "Hiện")) }
             a href=(visit.here) { (visit.t("Reset", "Đặt lại")) }
+        }
+    }
+}
+
+/// Returns the choice of a block: from a list if there are few, or else by its name, of which the first are suggested.
+fn block_field(visit: &Visit, blocks: &[String]) -> Markup {
+    let chosen = visit.query.get("block");
+    let is_listed = chosen.is_none_or(|chosen| blocks.iter().any(|block| block == chosen));
+    html! {
+        label { span { (visit.t("Block", "Ván")) }
+            @if is_listed && (1..=LISTED_BLOCKS).contains(&blocks.len()) {
+                select name="block" {
+                    (choice("", visit.t("any", "bất kỳ"), chosen))
+                    @for block in blocks { (choice(block, &one_line(block), chosen)) }
+                }
+            } @else {
+                input name="block" value=[chosen] list="blocks" autocomplete="off";
+                datalist #blocks { @for block in blocks { option value=(block) {} } }
+            }
         }
     }
 }
@@ -238,17 +278,36 @@ pub(super) fn pair_card(
     }
 }
 
-/// Returns the verdicts on the result of a metric.
+/// Returns the verdicts on the result of a metric: each once, with its reviewers if there are several.
 fn verdict_marks(visit: &Visit, pair: &PairResults, metric: ThresholdMetric) -> Markup {
     let verdicts = pair
         .metric(metric)
         .map_or(&[][..], |record| &record.verdicts);
+    let given = Verdict::ALL.map(|verdict| {
+        let of_it = verdicts.iter().filter(|given| given.verdict == verdict);
+        let names = of_it.map(|given| sanitize(&given.reviewer, NAME_CHARS));
+        (verdict, names.collect::<Vec<String>>())
+    });
+    let given: Vec<_> = given
+        .iter()
+        .filter(|(_, names)| !names.is_empty())
+        .collect();
     html! {
-        @if !verdicts.is_empty() {
-            span.verdicts { @for given in verdicts {
-                span.verdict.(given.verdict.name()) { (visit.verdict(given.verdict)) } " "
+        @if !given.is_empty() {
+            span.verdicts { @for (index, (verdict, reviewers)) in given.iter().enumerate() {
+                @if index > 0 { " · " }
+                span.verdict.(verdict.name()) { (visit.verdict(*verdict)) }
+                @if verdicts.len() > 1 { " (" (reviewers_text(reviewers)) ")" }
             } }
         }
+    }
+}
+
+/// Returns the names of a few reviewers, or the number of many.
+fn reviewers_text(reviewers: &[String]) -> String {
+    match reviewers.len() {
+        ..=NAMED_REVIEWERS => reviewers.join(", "),
+        many => grouped(many as u64),
     }
 }
 
@@ -291,7 +350,7 @@ fn table_row(visit: &Visit, query: &PairQuery, pair: &PairResults) -> Markup {
             td.number { (score(visit, scores.map(|scores| scores.ssim))) }
             td.number { (score(visit, scores.map(|scores| scores.dice))) }
             td { (verdict_marks(visit, pair, query.metric)) }
-            td.reason { @if let Some(failure) = failure { (stored_message(&failure.message)) } }
+            td.reason { @if let Some(failure) = failure { (stored_message(visit, &failure.message)) } }
             @if let Some(other) = query.compared {
                 @let iou = pair.metric(other).map(|record| record.outcome.scores.iou);
                 td.number { (score(visit, iou)) }
@@ -319,6 +378,58 @@ fn pager(visit: &Visit, query: &PairQuery, list: &PairListPage) -> Markup {
             @if let Some(next) = next {
                 a.button rel="next" href={ (visit.here) (next.text()) } { (visit.t("Next page", "Trang sau")) }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LISTED_BLOCKS, block_field, verdict_marks};
+    use crate::app::address::PageQuery;
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+    use mocban_core::domain::{ThresholdMetric, Verdict};
+    use mocban_results::test_fixtures;
+
+    #[test]
+    fn a_block_is_chosen_from_a_list_of_few_and_suggested_from_many() {
+        let mut visit = Visit::in_language(Language::English);
+        visit.query = PageQuery::parse("block=b+03");
+        let shown = |visit: &Visit, count: usize| {
+            let blocks: Vec<String> = (0..count).map(|block| format!("b {block:02}")).collect();
+            block_field(visit, &blocks).into_string()
+        };
+        let few = shown(&visit, LISTED_BLOCKS);
+        assert!(few.contains("<option value=\"b 03\" selected>"), "{few}");
+        assert!(!few.contains("<input"), "{few}");
+        for count in [0, 3, LISTED_BLOCKS + 1] {
+            let typed = shown(&visit, count);
+            assert!(typed.contains("value=\"b 03\" list=\"blocks\""), "{typed}");
+            assert_eq!(typed.matches("<option").count(), count);
+        }
+    }
+
+    #[test]
+    fn verdicts_of_several_reviewers_are_named_once_with_who_gave_them() {
+        let marks = |language, verdicts: &[Verdict]| {
+            let pair = test_fixtures::done("a", 0.5, verdicts);
+            let visit = Visit::in_language(language);
+            let marks = verdict_marks(&visit, &pair, ThresholdMetric::DEFAULT).into_string();
+            let mut text = String::new();
+            for part in marks.split('<').filter(|part| !part.is_empty()) {
+                text.push_str(part.split_once('>').expect("a tag").1);
+            }
+            text
+        };
+        let both = [Verdict::Pass, Verdict::Fail, Verdict::Pass];
+        for (language, verdicts, expected) in [
+            (Language::English, &[][..], ""),
+            (Language::English, &[Verdict::Fail], "failed"),
+            (Language::English, &both, "passed (r0, r2) · failed (r1)"),
+            (Language::Vietnamese, &both, "đạt (r0, r2) · không đạt (r1)"),
+            (Language::Vietnamese, &[Verdict::Pass; 4], "đạt (4)"),
+        ] {
+            assert_eq!(marks(language, verdicts), expected);
         }
     }
 }

@@ -150,7 +150,7 @@ fn reasons(visit: &Visit, report: &Report) -> Markup {
                 li {
                     a href={ "pairs?view=table&state=failed&class=" (group.class) } { (grouped(group.count)) }
                     " · " (visit.class(group.class))
-                    @if let Some(first) = group.pairs.first() { span.muted { " (" (stored_message(&first.error)) ")" } }
+                    @if let Some(first) = group.pairs.first() { span.muted { " (" (stored_message(visit, &first.error)) ")" } }
                 }
             } }
         }

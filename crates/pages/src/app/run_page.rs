@@ -18,7 +18,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::review::Language;
 use mocban_catalog::{
-    Catalog, PairFilter, PairOrder, PairResults, StatusCounts, WorkerRecord, WorkerState,
+    Catalog, PairFilter, PairOrder, PairResults, Plan, StatusCounts, WorkerRecord, WorkerState,
 };
 use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, UnixMillis, one_line};
 use mocban_project::block_status::BlockStatus;
@@ -32,7 +32,7 @@ use mocban_system::platform;
 const LATEST: usize = 12;
 /// Number of failed pairs that are shown as examples of each class.
 const EXAMPLES: usize = 3;
-/// Most failed pairs of which the page asks whether their settings or files have changed since.
+/// Most failed pairs with which the page asks what the next run would do.
 const MAX_INSPECTED: u64 = 1000;
 /// Most blocks in progress that are named.
 const MAX_BLOCKS: usize = 5;
@@ -49,6 +49,8 @@ struct RunState {
     failed_run: Option<Sentence>,
     /// Number of pairs at the same time, as the settings give it.
     jobs: usize,
+    /// What the next run would do. `None` during a run, and if it would take long to find out.
+    plan: Option<Plan>,
 }
 
 impl RunState {
@@ -67,12 +69,14 @@ impl RunState {
         let running = is_running(&open.project, catalog, now()).await?;
         let workers = child_run::workers(catalog).await;
         let current = fingerprints(&settings.config.stages);
-        let mut counts = catalog.status(&current).await?;
+        let counts = catalog.status(&current).await?;
         let failed = counts.jobs.get(&JobStatus::Quarantined).copied();
-        if !running && (1..=MAX_INSPECTED).contains(&failed.unwrap_or(0)) {
+        let plan = if running || failed.unwrap_or(0) > MAX_INSPECTED {
+            None
+        } else {
             let rerun = mocban_project::run::options(&settings.config).rerun;
-            counts.stale = catalog.plan(&current, None, rerun).await?.again();
-        }
+            Some(catalog.plan(&current, None, rerun).await?)
+        };
         let mut classes = catalog.failure_counts().await?;
         classes.sort_by_key(|(class, number)| (std::cmp::Reverse(*number), *class));
         let mut failures = Vec::new();
@@ -96,6 +100,7 @@ impl RunState {
             blocks,
             failed_run,
             jobs: mocban_project::run::options(&settings.config).workers,
+            plan,
         })
     }
 
@@ -109,6 +114,20 @@ impl RunState {
             .map(|status| self.jobs(status))
             .iter()
             .sum()
+    }
+
+    /// Returns the number of pairs that the next run would align, each counted once although it may be both interrupted and
+    /// outdated.
+    fn to_align(&self) -> u64 {
+        match &self.plan {
+            Some(plan) => plan.pairs() + plan.leased,
+            None => (self.outstanding() + self.counts.stale).min(self.counts.pairs),
+        }
+    }
+
+    /// Returns how many of these pairs an earlier run has computed or refused, with other settings or files.
+    fn outdated(&self) -> u64 {
+        (self.plan.as_ref()).map_or(self.counts.stale, Plan::again)
     }
 
     /// Returns the number of blocks that a run would work on or works on, whose pairs are not yet all known.
@@ -269,15 +288,13 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
             (action_form("actions/stop", "inline", &html! { button #stop { (text) } }))
         };
     }
-    let waiting = run.outstanding() + run.counts.stale;
+    let waiting = run.to_align();
     let blocks = run.open_blocks();
     let is_idle = waiting + blocks == 0;
     let is_empty = run.counts.pairs == 0 && run.blocks.is_empty();
     let failed = run.jobs(JobStatus::Quarantined);
     html! {
-        @if run.counts.stale > 0 {
-            p.notice { (grouped(run.counts.stale)) " " (visit.t("pairs were computed with other settings or files; a run updates them.", "cặp được tính với thiết lập hoặc tệp khác; lần chạy sẽ cập nhật.")) }
-        }
+        @if let Some(text) = outdated_text(visit, run) { p.notice #outdated { (text) } }
         (action_form("actions/run", "inline run-form", &html! {
             label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
@@ -297,6 +314,28 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
         @if is_idle && failed == 0 && run.counts.pairs > 0 {
             p.good { (visit.t("Everything is aligned. Next: judge a sample of the results.", "Mọi thứ đã được căn chỉnh. Tiếp theo: đánh giá một mẫu kết quả.")) " "
                 a href="review" { (visit.t("Review", "Đánh giá")) } }
+        }
+    }
+}
+
+/// Says that pairs to align have outdated results. The button says how many there are to align in all.
+fn outdated_text(visit: &Visit, run: &RunState) -> Option<String> {
+    let (outdated, all) = (run.outdated(), run.to_align());
+    match (visit.language, outdated) {
+        (_, 0) => None,
+        (Language::English, n) if n < all => Some(format!(
+            "{} of the pairs to align had other settings or files in an earlier run.",
+            grouped(n)
+        )),
+        (Language::English, _) => {
+            Some("The pairs to align had other settings or files in an earlier run.".to_owned())
+        }
+        (Language::Vietnamese, n) if n < all => Some(format!(
+            "{} trong số các cặp cần căn chỉnh đã chạy trước đây với thiết lập hoặc tệp khác.",
+            grouped(n)
+        )),
+        (Language::Vietnamese, _) => {
+            Some("Các cặp cần căn chỉnh đã chạy trước đây với thiết lập hoặc tệp khác.".to_owned())
         }
     }
 }
@@ -342,7 +381,7 @@ fn failures(visit: &Visit, run: &RunState) -> Markup {
                     article.card {
                         h3 { (grouped(*number)) " · " (visit.class(*class)) }
                         p { (visit.remedy(*class)) }
-                        ul { @for pair in examples { (example(pair)) } }
+                        ul { @for pair in examples { (example(visit, pair)) } }
                         div.row {
                             a.button href={ "pairs?view=table&state=failed&class=" (class) } { (visit.t("Show them", "Xem các cặp này")) }
                             (action_form("actions/retry", "inline", &html! {
@@ -357,13 +396,13 @@ fn failures(visit: &Visit, run: &RunState) -> Markup {
     }
 }
 
-fn example(pair: &PairResults) -> Markup {
+fn example(visit: &Visit, pair: &PairResults) -> Markup {
     let name = pair.attributes.name.as_str();
     let message = pair.failure.as_ref().map(|stored| &stored.failure.message);
     html! {
         li {
             a href={ "pair/" (super::address::encoded(name)) "/" } { (one_line(name)) }
-            @if let Some(message) = message { ": " (stored_message(message)) }
+            @if let Some(message) = message { ": " (stored_message(visit, message)) }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Sentences in both languages, without commands, because the app has buttons for them.
 
+use super::message_words;
 use crate::review::Language;
 use mocban_core::domain::ErrorCode;
 use mocban_project::ProjectError;
@@ -24,10 +25,12 @@ impl Sentence {
         }
     }
 
-    /// Quotes a message of the program, which is in English, without its commands.
+    /// Makes a sentence of a message of the program, which is in English, without its commands. In Vietnamese, a message that
+    /// is not known is quoted.
     pub(super) fn of_program(text: &str) -> Self {
         let plain = without_commands(text);
-        let vietnamese = format!("Chương trình báo: {plain}");
+        let known = message_words::vietnamese(&plain);
+        let vietnamese = known.unwrap_or_else(|| format!("Chương trình báo: {plain}"));
         Self::new(plain, vietnamese)
     }
 
@@ -104,9 +107,18 @@ impl Sentence {
     }
 }
 
-/// Returns a text without the remarks in brackets and the clauses that name commands or options.
+/// Returns a text without the remarks in brackets and the clauses that name commands or options, and without lines that have
+/// nothing else.
 pub(super) fn without_commands(text: &str) -> String {
-    let text = without_remarks(text);
+    let lines: Vec<String> = text.lines().filter_map(line_without_commands).collect();
+    if lines.is_empty() {
+        return text.replace('`', "");
+    }
+    lines.join("\n")
+}
+
+fn line_without_commands(line: &str) -> Option<String> {
+    let text = without_remarks(line);
     let sentences = text.trim_end_matches('.').split(". ");
     let sentences: Vec<String> = sentences
         .filter_map(|sentence| {
@@ -115,11 +127,8 @@ pub(super) fn without_commands(text: &str) -> String {
             (!clauses.is_empty()).then(|| clauses.join("; "))
         })
         .collect();
-    if sentences.is_empty() {
-        return text.replace('`', "");
-    }
     let end = if text.ends_with('.') { "." } else { "" };
-    sentences.join(". ") + end
+    (!sentences.is_empty()).then(|| sentences.join(". ") + end)
 }
 
 fn names_command(clause: &str) -> bool {
@@ -179,6 +188,10 @@ mod tests {
                 "/home/lan/mocban data/list.csv:3: the id a is there twice; rename it",
             ),
             ("use `x`", "use x"),
+            (
+                "2 files are missing, nothing was imported:\n  line 2: a.stl\nuse --allow-missing",
+                "2 files are missing, nothing was imported:\n  line 2: a.stl",
+            ),
             ("a (b", "a (b"),
         ] {
             assert_eq!(without_commands(text), plain);
@@ -214,5 +227,8 @@ mod tests {
             sentence.text(Language::Vietnamese),
             "Chương trình báo: a = 7 is too large"
         );
+        let known = Sentence::of_program("there is no pair b4; `show` lists all");
+        assert_eq!(known.text(Language::Vietnamese), "không có cặp b4");
+        assert_eq!(known.text(Language::English), "there is no pair b4");
     }
 }

@@ -13,23 +13,15 @@ use super::action_body::ActionBody;
 use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
+use super::setting_words::is_hidden;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
 use mocban_catalog::Catalog;
-use mocban_config::{Origin, Setting, explanation};
-use mocban_core::domain::one_line;
+use mocban_config::{Origin, Setting};
 use mocban_project::ProjectResult;
 use mocban_project::change_setting::{SettingChange, preview, save};
 use mocban_project::location::Location;
-
-/// Sections that this page leaves out: addresses of databases and stores, and keys.
-const HIDDEN: [&str; 2] = ["storage", "review"];
-
-fn is_hidden(key: &str) -> bool {
-    let first = key.split('.').next().unwrap_or_default();
-    HIDDEN.contains(&first)
-}
 
 /// A change, as the form sends it.
 #[derive(Debug, Clone, Deserialize)]
@@ -146,7 +138,7 @@ fn sections(visit: &Visit, settings: &[Setting]) -> Markup {
 }
 
 fn setting_part(visit: &Visit, setting: &Setting) -> Markup {
-    let text = explanation(&setting.key).join(" ");
+    let (text, language) = visit.setting(&setting.key);
     let value = setting.value.to_string();
     let value = value.trim_matches('"');
     let id = format!("setting-{}", setting.key);
@@ -156,9 +148,9 @@ fn setting_part(visit: &Visit, setting: &Setting) -> Markup {
             label for=(id) { (setting.key) }
             input id=(id) name="value" value=(value) autocomplete="off" spellcheck="false";
             button { (visit.t("Look at the change", "Xem thay đổi")) }
-            p.muted lang="en" {
+            p.muted lang=(language.name()) {
                 (text)
-                @if setting.origin != Origin::Default { " · " (one_line(&setting.origin.to_string())) }
+                @if let Some(origin) = visit.origin(&setting.origin) { " · " (origin) }
             }
         }
     }

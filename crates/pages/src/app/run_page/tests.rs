@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use super::{RunState, blocks_text, controls, progress};
 use crate::app::visit::Visit;
 use crate::review::Language;
-use mocban_catalog::{BlockAttributes, BlockState, StatusCounts, WorkerRecord};
-use mocban_core::domain::{BlockStage, JobStatus, WorkerId, WorkerMetrics};
+use mocban_catalog::{
+    BlockAttributes, BlockState, Plan, PlanEntry, StaleReason, StatusCounts, WorkerRecord,
+};
+use mocban_core::domain::{BlockStage, JobStatus, Stage, WorkerId, WorkerMetrics};
 use mocban_project::block_status::BlockStatus;
 
 fn block(name: &str, status: JobStatus) -> BlockState {
@@ -68,6 +70,7 @@ fn running(blocks: Vec<BlockState>) -> RunState {
         blocks: BlockStatus(blocks),
         failed_run: None,
         jobs: 2,
+        plan: None,
     }
 }
 
@@ -129,4 +132,48 @@ fn a_finished_project_can_be_searched_for_changed_files() {
     let shown = controls(&Visit::in_language(Language::English), &run).into_string();
     assert!(shown.contains("Look for changed files"), "{shown}");
     assert!(!shown.contains("disabled"), "{shown}");
+}
+
+#[test]
+fn an_interrupted_pair_with_outdated_results_is_counted_once() {
+    let mut run = running(Vec::new());
+    run.is_running = false;
+    let entry = |why, pairs| PlanEntry {
+        from: Stage::Fit,
+        why,
+        changes: None,
+        pairs,
+    };
+    // Four of the ten pairs that wait were interrupted, and their meshes have changed since.
+    run.counts.stale = 4;
+    run.plan = Some(Plan {
+        entries: vec![entry(StaleReason::New, 6), entry(StaleReason::Mesh, 4)],
+        done: 10,
+        ..Plan::default()
+    });
+    let shown = |run: &RunState, language| {
+        let visit = Visit::in_language(language);
+        controls(&visit, run).into_string()
+    };
+    let english = shown(&run, Language::English);
+    assert!(english.contains("Align 10 pairs<"), "{english}");
+    assert!(
+        english.contains(">4 of the pairs to align had other settings"),
+        "{english}"
+    );
+    let vietnamese = shown(&run, Language::Vietnamese);
+    assert!(
+        vietnamese.contains(">4 trong số các cặp cần căn chỉnh"),
+        "{vietnamese}"
+    );
+    if let Some(plan) = &mut run.plan {
+        plan.entries.remove(0);
+    }
+    let all = shown(&run, Language::English);
+    assert!(all.contains("Align 4 pairs<"), "{all}");
+    assert!(
+        all.contains(">The pairs to align had other settings"),
+        "{all}"
+    );
+    assert_eq!(all.matches("4 ").count(), 1, "one number: {all}");
 }
