@@ -11,6 +11,7 @@ const state = document.getElementById("upload-state");
 const bar = state.querySelector("progress");
 const done = document.getElementById("upload-done");
 const phase = document.getElementById("upload-phase");
+const arrived = document.getElementById("upload-arrived");
 const problem = document.getElementById("upload-problem");
 const cancel = document.getElementById("upload-cancel");
 
@@ -44,7 +45,7 @@ function sendFile(upload, { path, file }, sent) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     upload.request = request;
-    request.open("POST", `uploads/${upload.id}/${encodeURIComponent(path)}`);
+    request.open("POST", `uploads/${upload.id}/${encodeURIComponent(path)}?modified=${file.lastModified}`);
     request.setRequestHeader("content-type", "application/octet-stream");
     request.setRequestHeader("x-csrf-token", token);
     request.upload.onprogress = (event) => sent(event.loaded);
@@ -79,19 +80,42 @@ async function reason(upload) {
   return text ?? texts.cut;
 }
 
+/** Begins an upload. Goes on with one that broke off if all that has arrived is among these files. */
+async function begin(files, name, bytes) {
+  const begun = await act("actions/upload", { name, files: files.length, bytes });
+  const chosen = new Map(files.map(({ path, file }) => [path.normalize("NFC"), file]));
+  const isChosen = ({ path, size, modified }) => {
+    const file = chosen.get(path);
+    return file?.size === size && file.lastModified === modified;
+  };
+  if (begun.arrived.every(isChosen)) {
+    return { id: begun.upload, arrived: new Set(begun.arrived.map(({ path }) => path)), isCancelled: false };
+  }
+  await act("actions/upload-end", { upload: begun.upload, end: "cancel", project: "" });
+  return begin(files, name, bytes);
+}
+
+/** Says how many files are not sent again. */
+function showArrived(count) {
+  arrived.textContent = `${texts.arrived}: ${count}`;
+  arrived.hidden = count === 0;
+}
+
 /** Sends all files, and opens the page on which their pairs are shown. */
 async function sendAll(files, name) {
   const bytes = files.reduce((sum, { file }) => sum + file.size, 0);
-  const begun = await act("actions/upload", { name, files: files.length, bytes });
-  const upload = { id: begun.upload, isCancelled: false };
+  const upload = await begin(files, name, bytes);
   current = upload;
+  showArrived(upload.arrived.size);
   const timer = setInterval(() => follow(upload), 500);
   try {
     let sent = 0;
     for (const [index, file] of files.entries()) {
       phase.textContent = texts.sending;
       show(index, files.length, sent, bytes);
-      await sendFile(upload, file, (loaded) => show(index, files.length, sent + loaded, bytes));
+      if (!upload.arrived.has(file.path.normalize("NFC"))) {
+        await sendFile(upload, file, (loaded) => show(index, files.length, sent + loaded, bytes));
+      }
       if (upload.isCancelled) throw null;
       sent += file.file.size;
     }

@@ -24,7 +24,7 @@ pub(crate) fn empty_app() -> (tempfile::TempDir, Page) {
 }
 
 /// Returns the headers of a file.
-fn headers(page: &Page) -> Vec<(&'static str, String)> {
+pub(crate) fn headers(page: &Page) -> Vec<(&'static str, String)> {
     let mut headers = page.headers();
     headers.retain(|(name, _)| !["x-csrf-token", "content-type"].contains(name));
     headers.push(("x-csrf-token", token(page)));
@@ -38,7 +38,7 @@ pub(crate) fn encode(text: &str) -> String {
     bytes.collect()
 }
 
-fn file_path(page: &Page, upload: &Value, path: &str) -> String {
+pub(crate) fn file_path(page: &Page, upload: &Value, path: &str) -> String {
     format!("{}/uploads/{upload}/{}", page.session, encode(path))
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn put(page: &Page, upload: &Value, path: &str, bytes: &[u8]) -> Repl
     send(page.address(), "POST", &path, &headers(page), bytes).expect("a reply")
 }
 
-fn begin(page: &Page, name: &str, files: u64, bytes: u64) -> Reply {
+pub(crate) fn begin(page: &Page, name: &str, files: u64, bytes: u64) -> Reply {
     let body = json!({"name": name, "files": files, "bytes": bytes});
     act(page, "/actions/upload", &body, |_| {})
 }

@@ -16,6 +16,7 @@ mod app_invitations;
 mod app_sentences;
 mod app_upload_archives;
 mod app_upload_browser;
+mod app_upload_resume;
 mod app_uploads;
 #[cfg(target_os = "linux")]
 mod attacks;

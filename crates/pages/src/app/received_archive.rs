@@ -1,9 +1,11 @@
-//! The files of a ZIP archive of an upload: all are checked before the first is unpacked.
+//! A file of an upload, or those of a ZIP archive: all are checked before the first is unpacked.
 
 use std::fs::File;
 use std::sync::atomic::Ordering;
 
-use super::received_files::{ReceivedFiles, is_importable};
+use tokio::sync::mpsc;
+
+use super::received_files::{ARCHIVE, FilePiece, ReceivedFiles, is_importable, skip};
 use super::sentence::Sentence;
 use super::upload_sentence::{
     MAX_FILES, MAX_RATIO, bomb, link, not_utf8, not_written, refused_archive, refused_path,
@@ -15,15 +17,32 @@ use mocban_lists::zip::{ZipArchive, ZippedFile};
 /// Archives that unpack to fewer bytes are never refused for their size.
 const HARMLESS_BYTES: u64 = 64 << 20;
 
+/// Receives a file, unpacks an archive, or leaves a file of a system out. `modified` is as for [`ReceivedFiles::receive`].
+///
+/// # Errors
+/// Returns the reason if the file is refused, cannot be written or does not arrive whole.
+pub(super) fn take_file(
+    received: &mut ReceivedFiles,
+    path: &str,
+    modified: Option<i64>,
+    arriving: mpsc::Receiver<FilePiece>,
+) -> Result<(), Sentence> {
+    if is_of_system(path) {
+        return skip(arriving);
+    }
+    let safe = RelativePath::new(path).map_err(|fault| refused_path(path, &fault))?;
+    if safe.extension().as_deref() == Some(ARCHIVE) {
+        let archive = received.receive_archive(arriving)?;
+        return unpack(received, &archive, &safe);
+    }
+    received.receive(&safe, modified, arriving)
+}
+
 /// Unpacks the scans, images and lists of an archive beside its own path. Polls for a cancellation.
 ///
 /// # Errors
 /// Returns the reason if the archive is damaged or too large, or a file in it is refused or cannot be written.
-pub(super) fn unpack(
-    received: &mut ReceivedFiles,
-    archive: &File,
-    at: &RelativePath,
-) -> Result<(), Sentence> {
+fn unpack(received: &mut ReceivedFiles, archive: &File, at: &RelativePath) -> Result<(), Sentence> {
     let refuse = |error| refused_archive(at.as_str(), &error);
     let zip = ZipArchive::open(archive, MAX_FILES as usize).map_err(refuse)?;
     let (mut files, mut bytes) = (Vec::new(), 0_u64);

@@ -1,5 +1,6 @@
 //! The files of an upload: their names, their number, and room for them on the disk.
 
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
@@ -7,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use axum::body::Bytes;
+use serde::Serialize;
 use tokio::sync::mpsc;
 
 use super::folder_picker::LISTS;
@@ -57,11 +59,25 @@ pub(super) struct ReceivedCount {
     pub(super) left_out: AtomicU64,
 }
 
+/// A file that has arrived whole, as the browser knows it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub(super) struct ArrivedFile {
+    path: String,
+    /// Bytes.
+    pub(super) size: u64,
+    /// Time of its last change in the browser, in milliseconds since the Unix epoch.
+    modified: i64,
+}
+
 /// The files of an upload under a hidden name. They are removed if this is dropped before it has its name.
 #[derive(Debug)]
 pub(super) struct ReceivedFiles {
     folder: NewFolder,
     taken: TakenPaths,
+    /// Files that need not be sent again.
+    arrived: Vec<ArrivedFile>,
+    /// Names of files that were cut off, which may come again.
+    cut_off: BTreeSet<String>,
     unlooked_bytes: u64,
     pub(super) count: Arc<ReceivedCount>,
 }
@@ -72,26 +88,53 @@ impl ReceivedFiles {
         Self {
             folder,
             taken: TakenPaths::default(),
+            arrived: Vec::new(),
+            cut_off: BTreeSet::new(),
             unlooked_bytes: 0,
             count,
         }
     }
 
-    /// Writes a file as it arrives.
+    /// Returns the files that need not be sent again, or none if some are not known, such as those of an archive.
+    pub(super) fn arrived(&self) -> &[ArrivedFile] {
+        let all = self.count.files.load(Ordering::Relaxed);
+        if self.arrived.len() as u64 == all {
+            &self.arrived
+        } else {
+            &[]
+        }
+    }
+
+    /// Writes a file as it arrives. `modified` is when it was last changed in the browser, if that is known. A file that does
+    /// not arrive whole is removed, and may come again.
     ///
     /// # Errors
     /// Returns the reason if the path is refused, the disk is full, or the file does not arrive whole.
     pub(super) fn receive(
         &mut self,
         path: &RelativePath,
+        modified: Option<i64>,
         pieces: mpsc::Receiver<FilePiece>,
     ) -> Result<(), Sentence> {
         if !is_importable(path.as_str()) {
             return Err(other_file(path.as_str()));
         }
-        self.add(path)?;
+        if !self.cut_off.remove(path.as_str()) {
+            self.add(path)?;
+        }
+        let before = self.count.bytes.load(Ordering::Relaxed);
         let file = self.create(path).map_err(|error| not_written(&error))?;
-        self.write(file, pieces)?;
+        if let Err(why) = self.write(file, pieces) {
+            let _ = std::fs::remove_file(path.below(self.folder.path()));
+            self.count.bytes.store(before, Ordering::Relaxed);
+            self.cut_off.insert(path.as_str().to_owned());
+            return Err(why);
+        }
+        self.arrived.extend(modified.map(|modified| ArrivedFile {
+            path: path.as_str().to_owned(),
+            size: self.count.bytes.load(Ordering::Relaxed) - before,
+            modified,
+        }));
         self.finish_file(path);
         Ok(())
     }

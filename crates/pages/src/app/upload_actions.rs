@@ -39,7 +39,7 @@ pub(super) struct UploadBody {
     bytes: u64,
 }
 
-/// Begins an upload.
+/// Begins an upload, or goes on with one that broke off. Replies with the files that need not be sent again.
 pub(super) async fn begin(
     State(state): State<Arc<AppState>>,
     ActionBody(body): ActionBody<UploadBody>,
@@ -52,8 +52,8 @@ pub(super) async fn begin(
         state.uploads.begin(name, body.files, body.bytes)
     });
     let begun = begun.await;
-    let id = begun.map_err(|_panicked| WorkFailed)??;
-    Ok(Json(json!({ "upload": id })))
+    let (id, arrived) = begun.map_err(|_panicked| WorkFailed)??;
+    Ok(Json(json!({ "upload": id, "arrived": arrived })))
 }
 
 /// Returns the name of the folder for an upload.
@@ -76,7 +76,9 @@ pub(super) async fn receive(
     Path((id, path)): Path<(u64, String)>,
     request: Request,
 ) -> AppResult<Json<Value>> {
-    let file = state.uploads.find(id)?.start(&path)?;
+    let query = PageQuery::parse(request.uri().query().unwrap_or_default());
+    let upload = state.uploads.find(id)?;
+    let file = upload.start(&path, query.parsed("modified"))?;
     let mut body = request.into_body().into_data_stream();
     // Without an end, the file counts as cut off.
     while let Ok(next) = tokio::time::timeout(MAX_PAUSE, body.next()).await {

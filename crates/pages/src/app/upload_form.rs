@@ -30,7 +30,8 @@ pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Ma
             data-unpacking=(visit.t("Unpacking", "Đang giải nén"))
             data-storing=(visit.t("Storing", "Đang lưu"))
             data-cancelled=(visit.t("The upload was cancelled. Nothing of it was kept.", "Đã hủy. Không tệp nào được giữ lại."))
-            data-cut=(visit.t("The program did not take all files, and nothing of them was kept. Choose them again.", "Chương trình không nhận hết các tệp, và không tệp nào được giữ lại. Hãy chọn lại."))
+            data-cut=(visit.t("The program did not take all files. Choose them again.", "Chương trình không nhận hết các tệp. Hãy chọn lại."))
+            data-arrived=(visit.t("Files that had arrived before and are not sent again", "Số tệp đã đến nơi từ trước và không phải gửi lại"))
             data-nothing=(visit.t("None of the files is a scan, an image, a list or a ZIP.", "Không có tệp nào là bản quét, hình ảnh, danh sách hay ZIP."))
         {
             div #upload-choice {
@@ -51,6 +52,7 @@ pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Ma
             }
             div #upload-state hidden {
                 p #upload-phase role="status" {}
+                p #upload-arrived role="status" hidden {}
                 progress aria-label=(visit.t("Files that were received", "Các tệp đã nhận")) {}
                 p #upload-done {}
                 button #upload-cancel type="button" { (visit.t("Cancel", "Hủy")) }

@@ -128,6 +128,19 @@ pub(super) fn cut() -> Sentence {
     )
 }
 
+/// Says that the browser stopped sending, and how many files need not be sent again.
+pub(super) fn cut_with_rest(arrived: u64) -> Sentence {
+    let arrived = grouped(arrived);
+    Sentence::new(
+        format!(
+            "the connection was cut before all files had arrived: choose the same files again within an hour; {arrived} of them have arrived and are not sent again"
+        ),
+        format!(
+            "kết nối bị ngắt trước khi mọi tệp đến nơi: hãy chọn lại đúng các tệp đó trong vòng một giờ; {arrived} tệp đã đến nơi và không phải gửi lại"
+        ),
+    )
+}
+
 /// Says that not all files of an upload have arrived.
 pub(super) fn incomplete(arrived: u64, announced: u64) -> Sentence {
     let [arrived, announced] = [arrived, announced].map(grouped);

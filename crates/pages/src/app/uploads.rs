@@ -10,16 +10,15 @@ use tokio::sync::mpsc;
 use tokio::task::spawn_blocking;
 
 use super::failure::{AppFailure, AppResult};
-use super::received_archive::unpack;
-use super::received_files::{ARCHIVE, FilePiece, ReceivedCount, ReceivedFiles, check_room, skip};
+use super::received_archive::take_file;
+use super::received_files::{ArrivedFile, FilePiece, ReceivedCount, ReceivedFiles, check_room};
 use super::sentence::Sentence;
 use super::upload_sentence::{
-    MAX_FILES, busy, cut, ended, incomplete, left_over, not_written, nothing, refused_path,
+    MAX_FILES, busy, cut, cut_with_rest, ended, incomplete, left_over, not_written, nothing,
     storing, too_many, too_many_uploads,
 };
 use crate::local_server::WorkFailed;
 use mocban_core::domain::cancel::{CancelGuard, CancelToken};
-use mocban_lists::relative_path::{RelativePath, is_of_system};
 use mocban_store::NewFolder;
 
 /// Folder of uploads in the folder of the app.
@@ -28,6 +27,8 @@ pub(super) const FOLDER: &str = "uploads";
 const MAX_OPEN: usize = 4;
 /// A browser that has sent nothing for this long between two files is closed.
 const MAX_IDLE: Duration = Duration::from_secs(30);
+/// How long the files of an upload that broke off are kept for the same files.
+const MAX_BROKEN: Duration = Duration::from_hours(1);
 /// Pieces of a file that wait to be written. A piece has at most 64 KiB.
 const WAITING_PIECES: usize = 4;
 
@@ -46,7 +47,7 @@ pub(super) struct Uploads {
 pub(super) struct FileUpload {
     name: String,
     /// Number of files and archives that the browser will send, and that have arrived.
-    announced: u64,
+    announced: AtomicU64,
     arrived: AtomicU64,
     pub(super) count: Arc<ReceivedCount>,
     state: Mutex<UploadState>,
@@ -60,6 +61,8 @@ enum UploadState {
     Busy(CancelToken),
     /// A thread gives the files their folder, which cannot be cancelled.
     Storing,
+    /// The connection was cut since then. The same files may be sent again, without those that have arrived. Says so.
+    Broken(Box<ReceivedFiles>, Instant, Sentence),
     /// Nothing is kept, or all has its folder. Says why if it failed.
     Ended(Option<Sentence>),
 }
@@ -92,11 +95,17 @@ impl Uploads {
         &self.folder
     }
 
-    /// Begins an upload, and removes uploads that ended or were left. Waits for the disk.
+    /// Begins an upload, and removes uploads that ended or were left. Goes on with an upload of this name that broke off.
+    /// Returns its number, and the files that need not be sent again. Waits for the disk.
     ///
     /// # Errors
     /// Refuses too many files, and more bytes than the disk has room for.
-    pub(super) fn begin(&self, name: String, files: u64, bytes: u64) -> AppResult<u64> {
+    pub(super) fn begin(
+        &self,
+        name: String,
+        files: u64,
+        bytes: u64,
+    ) -> AppResult<(u64, Vec<ArrivedFile>)> {
         let refuse = |sentence| Err(AppFailure::refused(sentence));
         if files == 0 {
             return refuse(nothing());
@@ -104,8 +113,14 @@ impl Uploads {
         if files > MAX_FILES {
             return refuse(too_many());
         }
+        let resumed = self.resume(&name, files);
+        let arrived = resumed.iter().flat_map(|(_, arrived)| arrived);
+        let bytes = bytes.saturating_sub(arrived.map(|file| file.size).sum());
         if let Some(parent) = self.folder.parent() {
             check_room(parent, bytes).map_err(AppFailure::refused)?;
+        }
+        if let Some(resumed) = resumed {
+            return Ok(resumed);
         }
         if !self.make_place() {
             return refuse(too_many_uploads());
@@ -116,7 +131,7 @@ impl Uploads {
         let received = Box::new(ReceivedFiles::new(folder, Arc::clone(&count)));
         let upload = FileUpload {
             name,
-            announced: files,
+            announced: AtomicU64::new(files),
             arrived: AtomicU64::new(0),
             count,
             state: Mutex::new(UploadState::Ready(received, Instant::now())),
@@ -129,15 +144,28 @@ impl Uploads {
         }
         let id = self.next.fetch_add(1, Ordering::Relaxed);
         open.insert(id, Arc::clone(&upload));
-        Ok(id)
+        Ok((id, Vec::new()))
     }
 
-    /// Removes uploads that ended, and those whose browser is closed. Returns whether there is place for another.
+    /// Goes on with an upload that broke off, for as many files as are now chosen.
+    fn resume(&self, name: &str, files: u64) -> Option<(u64, Vec<ArrivedFile>)> {
+        let open = self.lock();
+        let mut named = open.iter().filter(|(_, upload)| upload.name == name);
+        named.find_map(|(id, upload)| Some((*id, upload.resume(files)?)))
+    }
+
+    /// Removes uploads that ended, and those whose browser is closed. Those that broke off stay for a while if there is place.
+    /// Returns whether there is place for another.
     fn make_place(&self) -> bool {
         let removed: Vec<_> = {
             let mut open = self.lock();
             let is_over = |_: &u64, upload: &mut Arc<FileUpload>| upload.is_over();
-            open.extract_if(.., is_over).collect()
+            let mut removed: Vec<_> = open.extract_if(.., is_over).collect();
+            if open.len() >= MAX_OPEN {
+                let is_broken = |_: &u64, upload: &mut Arc<FileUpload>| upload.is_broken();
+                removed.extend(open.extract_if(.., is_broken));
+            }
+            removed
         };
         // Their files are removed without the lock.
         drop(removed);
@@ -174,28 +202,28 @@ impl FileUpload {
     /// # Errors
     /// Refuses a file whose path is not safe, or while another file of the upload is arriving. After a refused path, nothing
     /// of the upload is kept.
-    pub(super) fn start(self: &Arc<Self>, path: &str) -> AppResult<FileInProgress> {
+    pub(super) fn start(
+        self: &Arc<Self>,
+        path: &str,
+        modified: Option<i64>,
+    ) -> AppResult<FileInProgress> {
         let token = CancelToken::default();
-        let mut received = self.take(UploadState::Busy(token.clone()))?;
+        let received = self.take(UploadState::Busy(token.clone()))?;
         let (pieces, arriving) = mpsc::channel(WAITING_PIECES);
         let cancels = CancelGuard(token.clone());
         let (upload, path) = (Arc::clone(self), path.to_owned());
         let written = spawn_blocking(move || {
             let mut ending = UploadEnding::of(upload);
             let work = token.run(|| {
-                if is_of_system(&path) {
-                    skip(arriving)?;
-                    return Ok(received);
+                let mut received = received;
+                match take_file(&mut received, &path, modified, arriving) {
+                    Ok(()) => Ok(received),
+                    Err(why) if why == cut() && !received.arrived().is_empty() => {
+                        let why = cut_with_rest(received.arrived().len() as u64);
+                        Err((why, Some(received)))
+                    }
+                    Err(why) => Err((why, None)),
                 }
-                let safe = RelativePath::new(&path);
-                let safe = safe.map_err(|fault| refused_path(&path, &fault))?;
-                if safe.extension().as_deref() == Some(ARCHIVE) {
-                    let archive = received.receive_archive(arriving)?;
-                    unpack(&mut received, &archive, &safe)?;
-                } else {
-                    received.receive(&safe, arriving)?;
-                }
-                Ok::<_, Sentence>(received)
             });
             // What is not kept was removed before this.
             let (next, outcome) = match work {
@@ -203,7 +231,11 @@ impl FileUpload {
                     ending.upload.arrived.fetch_add(1, Ordering::Relaxed);
                     (UploadState::Ready(received, Instant::now()), Ok(()))
                 }
-                Ok(Err(why)) => (UploadState::Ended(Some(why.clone())), Err(why)),
+                Ok(Err((why, Some(received)))) => {
+                    let next = UploadState::Broken(received, Instant::now(), why.clone());
+                    (next, Err(why))
+                }
+                Ok(Err((why, None))) => (UploadState::Ended(Some(why.clone())), Err(why)),
                 Err(_cancelled) => (UploadState::Ended(Some(cut())), Err(cut())),
             };
             ending.next = next;
@@ -226,11 +258,12 @@ impl FileUpload {
         let placed = spawn_blocking(move || {
             let mut ending = UploadEnding::of(Arc::clone(&upload));
             let arrived = upload.arrived.load(Ordering::Relaxed);
-            let placed = if arrived == upload.announced {
+            let announced = upload.announced.load(Ordering::Relaxed);
+            let placed = if arrived == announced {
                 received.place(&upload.name)
             } else {
                 drop(received);
-                Err(incomplete(arrived, upload.announced))
+                Err(incomplete(arrived, announced))
             };
             ending.next = UploadState::Ended(placed.as_ref().err().cloned());
             placed
@@ -261,8 +294,32 @@ impl FileUpload {
     pub(super) fn problem(&self) -> Option<Sentence> {
         match &*self.lock() {
             UploadState::Ended(why) => why.clone(),
+            UploadState::Broken(.., why) => Some(why.clone()),
             UploadState::Ready(..) | UploadState::Busy(_) | UploadState::Storing => None,
         }
+    }
+
+    /// Goes on for a number of files, if the upload broke off or its browser is closed. Returns the files that need not be
+    /// sent again.
+    fn resume(&self, files: u64) -> Option<Vec<ArrivedFile>> {
+        let mut state = self.lock();
+        let received = match std::mem::replace(&mut *state, UploadState::Storing) {
+            UploadState::Broken(received, ..) => received,
+            UploadState::Ready(received, since)
+                if since.elapsed() > MAX_IDLE && !received.arrived().is_empty() =>
+            {
+                received
+            }
+            other => {
+                *state = other;
+                return None;
+            }
+        };
+        let arrived = received.arrived().to_vec();
+        self.announced.store(files, Ordering::Relaxed);
+        self.arrived.store(arrived.len() as u64, Ordering::Relaxed);
+        *state = UploadState::Ready(received, Instant::now());
+        Some(arrived)
     }
 
     /// Takes the files for a thread that works on them, with the state of the upload meanwhile.
@@ -272,7 +329,7 @@ impl FileUpload {
             UploadState::Ready(received, _) => Ok(received),
             other => {
                 let why = match &other {
-                    UploadState::Ended(Some(why)) => why.clone(),
+                    UploadState::Ended(Some(why)) | UploadState::Broken(.., why) => why.clone(),
                     UploadState::Ended(None) => ended(),
                     UploadState::Storing => storing(),
                     UploadState::Ready(..) | UploadState::Busy(_) => busy(),
@@ -288,7 +345,7 @@ impl FileUpload {
         let mut state = self.lock();
         let unused = match &*state {
             UploadState::Busy(_) | UploadState::Storing => std::mem::replace(&mut *state, next),
-            UploadState::Ready(..) | UploadState::Ended(_) => next,
+            UploadState::Ready(..) | UploadState::Broken(..) | UploadState::Ended(_) => next,
         };
         drop(state);
         // Removes files of an upload that was cancelled.
@@ -298,9 +355,14 @@ impl FileUpload {
     fn is_over(&self) -> bool {
         match &*self.lock() {
             UploadState::Ready(_, since) => since.elapsed() > MAX_IDLE,
+            UploadState::Broken(_, since, _) => since.elapsed() > MAX_BROKEN,
             UploadState::Busy(_) | UploadState::Storing => false,
             UploadState::Ended(_) => true,
         }
+    }
+
+    fn is_broken(&self) -> bool {
+        matches!(*self.lock(), UploadState::Broken(..))
     }
 
     fn lock(&self) -> MutexGuard<'_, UploadState> {
@@ -360,7 +422,7 @@ mod tests {
     fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let uploads = Uploads::new(dir.path());
-        let id = uploads.begin("x".to_owned(), 1, 1).expect("begun");
+        let (id, _) = uploads.begin("x".to_owned(), 1, 1).expect("begun");
         let upload = uploads.find(id).expect("an upload");
         let received = upload.take(UploadState::Storing).expect("ready");
         upload.cancel().expect_err("it is stored");
