@@ -192,6 +192,34 @@ fn the_newest_import_is_undone_unless_another_followed() {
     assert!(text(&page.get("/import?project=p")).contains("data-load=\"p/p/last-import\""));
 }
 
+#[cfg(unix)]
+#[test]
+fn a_project_that_is_renamed_away_and_back_stays_usable() {
+    let (dir, page) = with_project();
+    let [here, away] = ["p", "q"].map(|name| dir.path().join(name));
+    let is_shown = |path: &str| page.get(path).status == 200;
+    assert!(is_shown("/p/p/pairs"));
+    // Between two requests, and with requests while it is away.
+    for asks_meanwhile in [false, true] {
+        std::fs::rename(&here, &away).expect("renamed");
+        if asks_meanwhile {
+            assert_eq!(page.get("/p/p/pairs").status, 404);
+            assert!(is_shown("/p/q/pairs"));
+        }
+        std::fs::rename(&away, &here).expect("renamed back");
+        assert!(is_shown("/p/p/pairs"));
+        assert_eq!(page.get("/p/q/pairs").status, 404);
+        let pair = json!({"pair": "upright-0001"});
+        for action in ["retire", "restore"] {
+            let reply = act(&page, &format!("/p/p/actions/{action}"), &pair, |_| {});
+            assert_eq!(reply.status, 200, "{action}: {}", text(&reply));
+        }
+        let status = mocban(&here, &["status", "--json"]).expect(0).json();
+        assert_eq!(status["pairs"], 15);
+    }
+    mocban(&here, &["check"]).expect(0);
+}
+
 #[test]
 fn only_the_page_itself_may_act() {
     let (dir, page) = with_project();

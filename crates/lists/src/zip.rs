@@ -401,4 +401,22 @@ mod tests {
         let zip = ZipArchive::open(Cursor::new(&*bytes), 10).expect("a directory");
         assert!(!zip.files()[0].is_link());
     }
+
+    #[test]
+    fn names_of_more_than_32_mib_in_all_are_refused() {
+        let name = |number: usize| format!("{number:0>4096}");
+        let with_names = |count: usize| {
+            let names: Vec<String> = (0..count).map(name).collect();
+            let files: Vec<(&str, &str)> = names.iter().map(|name| (&**name, "")).collect();
+            archive(&files, false)
+        };
+        let most = super::MAX_NAMES_BYTES / super::MAX_NAME_BYTES;
+        let opened = |count: usize| {
+            let bytes = with_names(count);
+            ZipArchive::open(Cursor::new(&*bytes), count).map(|zip| zip.files().len())
+        };
+        assert_eq!(opened(most).expect("names at the limit"), most);
+        let refused = opened(most + 1).expect_err("longer names");
+        assert!(matches!(refused, ZipError::LongNames), "{refused}");
+    }
 }

@@ -413,26 +413,4 @@ impl FileInProgress {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use super::{UploadEnding, UploadState, Uploads};
-
-    #[test]
-    fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let uploads = Uploads::new(dir.path());
-        let (id, _) = uploads.begin("x".to_owned(), 1, 1).expect("begun");
-        let upload = uploads.find(id).expect("an upload");
-        let received = upload.take(UploadState::Storing).expect("ready");
-        upload.cancel().expect_err("it is stored");
-        upload
-            .take(UploadState::Storing)
-            .expect_err("it is stored already");
-        assert!(!upload.is_over());
-        drop(received);
-        drop(UploadEnding::of(Arc::clone(&upload)));
-        assert!(upload.is_over(), "its place is free");
-        upload.cancel().expect("nothing to do");
-    }
-}
+mod tests;
