@@ -224,12 +224,11 @@ pub(super) async fn restore(
     ActionBody(body): ActionBody<RestoreBody>,
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
-    let choice = match body.pair {
-        Some(pair) => RetireChoice::Ids(vec![pair]),
-        None => {
-            let at = body.at.parse::<UnixMillis>();
-            RetireChoice::RetiredAt(at.map_err(|_invalid| AppFailure::not_found())?)
-        }
+    let choice = if let Some(pair) = body.pair {
+        RetireChoice::Ids(vec![pair])
+    } else {
+        let at = body.at.parse::<UnixMillis>();
+        RetireChoice::RetiredAt(at.map_err(|_invalid| AppFailure::not_found())?)
     };
     let location = open.location();
     let restored = on_thread(async move || undo(&choice, &location).await).await;
