@@ -354,3 +354,43 @@ fn an_export_of_chosen_pairs_has_only_their_verdicts() {
         "{log}"
     );
 }
+
+#[test]
+fn exactly_the_chosen_pairs_are_judged() {
+    let (_dir, page) = with_project();
+    let pairs = ["upright-0001", "upright-0004"];
+    let reply = act(&page, CHOSEN, &chosen("review", &pairs), |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    let go = reply.json()["go"].as_str().expect("a page").to_owned();
+    let key = go.strip_prefix("review?chosen=").expect("a key");
+    let html = text(&page.get(&format!("/p/p/{go}")));
+    for part in ["Only the chosen pairs are judged: <b>2</b>", key] {
+        assert!(html.contains(part), "{part}: {html}");
+    }
+    let mut form = json!({
+        "reviewer": "lan", "metric": "relief", "sample": "", "order": "random", "chosen": key,
+    });
+    let started = act(&page, "/p/p/actions/review", &form, |_| {});
+    assert_eq!(started.status, 200, "{}", text(&started));
+    let go = started.json()["go"].as_str().expect("a page").to_owned();
+    let queue = page.get(&format!("/p/p/{go}api/queue")).json();
+    let items = queue["items"].as_array().expect("items");
+    let mut judged: Vec<&str> = items
+        .iter()
+        .filter_map(|item| item["pair"].as_str())
+        .collect();
+    judged.sort_unstable();
+    assert_eq!(judged, pairs, "no other image: {queue}");
+    form["chosen"] = "0123456789ab".into();
+    let unknown = act(&page, "/p/p/actions/review", &form, |_| {});
+    assert_eq!(unknown.status, 422);
+    assert!(
+        text(&unknown).contains("choose them again"),
+        "{}",
+        text(&unknown)
+    );
+    let html = text(&page.get("/p/p/review?chosen=0123456789ab"));
+    assert!(html.contains("choose them again"), "{html}");
+    let none = act(&page, CHOSEN, &chosen("review", &[]), |_| {});
+    assert_eq!(none.status, 422);
+}

@@ -1,4 +1,4 @@
-//! An upload to `mocban app` that breaks off: the same files are chosen again, and those that arrived are not sent again.
+//! An upload to `mocban app` that breaks off: the same files are chosen again, and what has arrived is not sent again.
 
 use std::io::Write as _;
 use std::net::TcpStream;

@@ -213,6 +213,7 @@ fn queue_options(args: &ReviewArgs) -> QueueOptions {
         } else {
             args.order
         },
+        pairs: None,
         seed: args.seed,
         sample: args.sample.map(|sample| sample as usize),
         rates: CheckRates {

@@ -57,6 +57,7 @@ fn changes(visit: &Visit, kept: &str) -> Markup {
                 data-ask=(visit.t("Pairs whose results are computed again: {n}. Continue?", "Số cặp sẽ được tính lại: {n}. Tiếp tục?")) {}
             button #resume name="change" value="resume"
                 data-text=(visit.t("Run the waiting and failed of them ({n})", "Chạy các cặp chờ hoặc lỗi trong đó ({n})")) {}
+            button #judge name="change" value="review" data-text=(visit.t("Judge these ({n})", "Đánh giá các cặp này ({n})")) {}
             button #retire name="change" value="retire" data-text=(visit.t("Take out of every count ({n})", "Đưa ra khỏi thống kê ({n})"))
                 data-ask=(visit.t(
                     "Pairs to take out of every count: {n}. Their results and verdicts are kept, and they can be brought back. Continue?",

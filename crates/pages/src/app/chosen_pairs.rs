@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use super::action_body::ActionBody;
 use super::address::PageQuery;
 use super::child_run;
+use super::chosen_sets::CHOSEN;
 use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::pair_query::PairQuery;
@@ -43,6 +44,8 @@ enum ChosenChange {
     Resume,
     /// Takes them out of every count.
     Retire,
+    /// Lets a person judge their results.
+    Review,
 }
 
 /// The fields of the form.
@@ -149,8 +152,8 @@ pub(super) async fn change(
     ActionBody(body): ActionBody<ChosenBody>,
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
-    let names = require_pairs(&open, &body.pairs).await?;
-    let names: Vec<String> = names.iter().map(PairName::to_string).collect();
+    let chosen = require_pairs(&open, &body.pairs).await?;
+    let names: Vec<String> = chosen.iter().map(PairName::to_string).collect();
     let list = without_done(&PageQuery::parse(&body.list));
     let (done, counted) = match body.change {
         ChosenChange::Compute => {
@@ -166,6 +169,10 @@ pub(super) async fn change(
         ChosenChange::Retire => {
             let at = retire_pairs(&open, names).await?;
             ("retire", ["at", &at.to_string()].map(str::to_owned))
+        }
+        ChosenChange::Review => {
+            let key = state.chosen.keep(&chosen);
+            return Ok(Json(json!({ "go": format!("review?{CHOSEN}={key}") })));
         }
     };
     let [name, value] = counted;

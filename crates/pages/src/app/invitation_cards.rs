@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
 use super::address::PageQuery;
+use super::chosen_sets::CHOSEN;
 use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::invitations::{GuestReview, SentInvitation};
@@ -37,7 +38,7 @@ pub(super) async fn invite(
     match state.invitations.is_opened(&id).await {
         None => {
             state.invitations.require_room().await?;
-            let pages = guest_pages(open, reviewer, choice).await?;
+            let pages = guest_pages(state, open, reviewer, choice).await?;
             state.invitations.send(id, open, pages, false).await
         }
         Some(false) => Ok(()),
@@ -58,12 +59,14 @@ fn invitation_id(open: &OpenProject, reviewer: &str, choice: &str) -> PagesId {
 
 /// Returns what a guest sees, and the review, which says how far the guest is.
 async fn guest_pages(
+    state: &AppState,
     open: &Arc<OpenProject>,
     reviewer: &str,
     choice: &str,
 ) -> AppResult<(Router, Arc<GuestReview>)> {
     let query = PageQuery::parse(choice);
-    let pages = open_review(open, reviewer, &query, ReviewPlace::of_guest()).await?;
+    let pairs = state.chosen.of(&query)?;
+    let pages = open_review(open, reviewer, &query, ReviewPlace::of_guest(), pairs).await?;
     let routes = pages.routes();
     let review = Arc::new(GuestReview::new(pages));
     let router = Router::new()
@@ -133,7 +136,7 @@ pub(super) async fn change(
         InvitationChange::Withdraw => state.invitations.withdraw(&[key, reviewer, choice]).await,
         InvitationChange::Renew => {
             let open = state.open(&key).await?;
-            let pages = guest_pages(&open, &reviewer, &choice).await?;
+            let pages = guest_pages(&state, &open, &reviewer, &choice).await?;
             let id = invitation_id(&open, &reviewer, &choice);
             state.invitations.send(id, &open, pages, true).await?;
         }
@@ -194,7 +197,7 @@ fn card(visit: &Visit, invitation: &SentInvitation) -> Markup {
     html! {
         div.card.invitation role="group" aria-label={ (reviewer) ", " (metric) ", " (order) } {
             h3 { (reviewer) }
-            p.muted { (metric) @if let Some(results) = results { ", " (grouped(results)) " " (visit.t("results", "kết quả")) } ", " (order) }
+            p.muted { (metric) @if let Some(results) = results { ", " (grouped(results)) " " (visit.t("results", "kết quả")) } ", " (order) @if judged.get(CHOSEN).is_some() { ", " (visit.t("chosen pairs", "các cặp đã chọn")) } }
             (progress(visit, invitation))
             @match &invitation.url {
                 Some(url) => {

@@ -13,6 +13,7 @@ mod blocks_page;
 mod child_run;
 mod choice_bar;
 mod chosen_pairs;
+mod chosen_sets;
 mod components;
 mod export_page;
 mod export_zip;

@@ -1,5 +1,6 @@
 //! The pages of one reviewer, opened with a new reading of the queue.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::address::PageQuery;
@@ -9,7 +10,7 @@ use super::sentence::Sentence;
 use crate::on_thread::on_thread;
 use crate::review::{CheckRates, Language, QueueOptions, ReviewOptions, ReviewPages, key_map};
 use mocban_catalog::CatalogError;
-use mocban_core::domain::ReviewOrder;
+use mocban_core::domain::{PairName, ReviewOrder};
 use mocban_project::location::{Location, now};
 use mocban_project::{ProjectResult, Refusal};
 
@@ -42,17 +43,20 @@ impl ReviewPlace {
     }
 }
 
-/// Opens the pages of a reviewer.
+/// Opens the pages of a reviewer, with the results of some pairs or of all. Those of chosen pairs come without attention
+/// checks.
 pub(super) async fn open_review(
     open: &OpenProject,
     reviewer: &str,
     query: &PageQuery,
     place: ReviewPlace,
+    pairs: Option<BTreeSet<PairName>>,
 ) -> AppResult<ReviewPages> {
     let (location, reviewer) = (open.location(), reviewer.to_owned());
     let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
     let query = query.clone();
-    let opened = on_thread(async move || review_pages(&location, place, reviewer, &query).await);
+    let opened =
+        on_thread(async move || review_pages(&location, place, reviewer, &query, pairs).await);
     let pages = opened
         .await
         .map_err(|error| AppFailure::of(error, &open.dir))?;
@@ -77,6 +81,7 @@ async fn review_pages(
     place: ReviewPlace,
     reviewer: String,
     query: &PageQuery,
+    pairs: Option<BTreeSet<PairName>>,
 ) -> ProjectResult<ReviewPages> {
     let settings = location.settings()?;
     let keys = key_map(&settings.config.review.keys);
@@ -99,9 +104,16 @@ async fn review_pages(
             reviewer,
             metrics: query.parsed("metric").into_iter().collect(),
             order: query.parsed("order").unwrap_or(ReviewOrder::Random),
+            rates: match &pairs {
+                None => CheckRates::default(),
+                Some(_) => CheckRates {
+                    faults: 0.0,
+                    duplicates: 0.0,
+                },
+            },
+            pairs,
             seed: QueueOptions::DEFAULT_SEED,
             sample: query.parsed::<usize>("sample").filter(|sample| *sample > 0),
-            rates: CheckRates::default(),
         },
     };
     Ok(ReviewPages::open(catalog, project, options).await?)

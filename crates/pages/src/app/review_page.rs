@@ -12,7 +12,8 @@ use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
 use super::address::{PageQuery, encoded};
-use super::components::{NavSection, action_form, choice, frame};
+use super::chosen_sets::CHOSEN;
+use super::components::{NavSection, action_form, choice, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::invitation_cards::{invitation_list, invite};
 use super::opened_review::{ReviewPlace, open_review};
@@ -45,6 +46,9 @@ pub(super) struct StartBody {
     /// Whether the reviewer is invited instead of judging in this browser.
     #[serde(default)]
     invite: String,
+    /// Key of the chosen pairs, if not all are judged.
+    #[serde(default)]
+    chosen: String,
 }
 
 /// Shows the form that starts a review; a script then asks for the reviewers.
@@ -60,7 +64,13 @@ pub(super) async fn page(
             "The question is always the same: is the rotation within 5 degrees, and is the whole character there? Results come in random order, without scores, and each answer is stored at once.",
             "Câu hỏi luôn như nhau: góc xoay có lệch không quá 5 độ, và chữ có đủ không? Kết quả xuất hiện theo thứ tự ngẫu nhiên, không kèm điểm, và mỗi câu trả lời được lưu ngay.",
         )) }
-        (start_form(&visit))
+        @match state.chosen.of(&visit.query) {
+            Ok(chosen) => (start_form(&visit, chosen.map(|pairs| pairs.len()))),
+            Err(failure) => {
+                p.notice.bad role="alert" { (failure.text(visit.language)) }
+                (start_form(&visit, None))
+            },
+        }
         div #live data-live="3000" role="status" { (invitation_list(&visit, &invited)) }
         div #reviewers data-load="review/agreement" aria-live="polite" {}
     };
@@ -68,12 +78,30 @@ pub(super) async fn page(
     Ok(frame(&visit, title, Some(&key), NavSection::Review, &body))
 }
 
-fn start_form(visit: &Visit) -> Markup {
+/// Says how many pairs were chosen, and what their verdicts are good for.
+fn chosen_part(visit: &Visit, pairs: usize) -> Markup {
+    html! {
+        input type="hidden" name=(CHOSEN) value=[visit.query.get(CHOSEN)];
+        p #chosen-pairs.notice {
+            (visit.t("Only the chosen pairs are judged", "Chỉ đánh giá các cặp đã chọn")) ": " b { (grouped(pairs as u64)) } ". "
+            (visit.t(
+                "They are no random sample, so their verdicts may bias Acc. There are no attention checks among them.",
+                "Chúng không phải mẫu ngẫu nhiên nên đánh giá của chúng có thể làm lệch Acc. Không có hình kiểm tra sự chú ý.",
+            )) " "
+            a href=(visit.here) { (visit.t("Judge all pairs", "Đánh giá mọi cặp")) }
+        }
+    }
+}
+
+/// Returns the form that starts a review, of all pairs or of as many chosen ones.
+fn start_form(visit: &Visit, chosen: Option<usize>) -> Markup {
+    let sample = chosen.is_none().then_some(SAMPLE);
     let metrics = ThresholdMetric::ALL.map(|metric| (metric.name(), visit.metric(metric)));
     action_form(
         "actions/review",
         "card fields",
         &html! {
+            @if let Some(pairs) = chosen { (chosen_part(visit, pairs)) }
             label { span { (visit.t("Name of the reviewer", "Tên người đánh giá")) }
                 input #reviewer name="reviewer" required maxlength="100" autocomplete="off";
             }
@@ -84,7 +112,7 @@ fn start_form(visit: &Visit) -> Markup {
                 }
             }
             label { span { (visit.t("How many results (empty: all)", "Bao nhiêu kết quả (để trống: tất cả)")) }
-                input.short type="number" name="sample" min="1" value=(SAMPLE);
+                input.short type="number" name="sample" min="1" value=[sample];
             }
             label { span { (visit.t("Order", "Thứ tự")) }
                 select name="order" {
@@ -120,7 +148,8 @@ pub(super) async fn start(
     let query = PageQuery::default()
         .with("metric", &body.metric)
         .with("sample", &body.sample)
-        .with("order", &body.order);
+        .with("order", &body.order)
+        .with(CHOSEN, &body.chosen);
     let text = query.text();
     let choice = text.trim_start_matches('?');
     if !body.invite.is_empty() {
@@ -188,6 +217,8 @@ async fn review(
         explain: explanation,
         project_page: Some("../../../"),
     };
-    let opened = open_review(open, reviewer, &PageQuery::parse(choice), of_app).await?;
+    let query = PageQuery::parse(choice);
+    let pairs = state.chosen.of(&query)?;
+    let opened = open_review(open, reviewer, &query, of_app, pairs).await?;
     Ok(state.reviews.keep(id, open, opened.routes()))
 }

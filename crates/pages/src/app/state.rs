@@ -5,6 +5,7 @@ use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::chosen_sets::ChosenSets;
 use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
 use super::invitations::Invitations;
@@ -39,6 +40,8 @@ pub(super) struct AppState {
     language: Mutex<Option<Language>>,
     /// The projects that are open, by name.
     projects: Mutex<BTreeMap<String, Arc<OpenProject>>>,
+    /// Pairs that were chosen for reviews.
+    pub(super) chosen: ChosenSets,
     /// The reviews that are open.
     pub(super) reviews: OpenPages,
     /// The reviewers who were invited.
@@ -67,6 +70,7 @@ impl AppState {
             uploads: Uploads::new(&options.folder),
             options,
             projects: Mutex::default(),
+            chosen: ChosenSets::default(),
             reviews: OpenPages::new(32),
             blocks: OpenPages::new(2),
             tasks: AppTasks::default(),

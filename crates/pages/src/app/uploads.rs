@@ -61,7 +61,7 @@ enum UploadState {
     Busy(CancelToken),
     /// A thread gives the files their folder, which cannot be cancelled.
     Storing,
-    /// The connection was cut since then. The same files may be sent again, without those that have arrived. Says so.
+    /// The connection was cut at that time. The same files may be sent again, without what has arrived. Says so.
     Broken(Box<ReceivedFiles>, Instant, Sentence),
     /// Nothing is kept, or all has its folder. Says why if it failed.
     Ended(Option<Sentence>),
@@ -154,7 +154,7 @@ impl Uploads {
         named.find_map(|(id, upload)| Some((*id, upload.resume(files)?)))
     }
 
-    /// Removes uploads that ended, and those whose browser is closed. Those that broke off stay for a while if there is place.
+    /// Removes uploads that ended, and those whose browser is closed. Broken ones stay for a while if there is place.
     /// Returns whether there is place for another.
     fn make_place(&self) -> bool {
         let removed: Vec<_> = {

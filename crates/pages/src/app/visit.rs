@@ -66,7 +66,7 @@ impl Visit {
         number_text::file_size(self.language, bytes)
     }
 
-    /// Returns a time in the time zone of the computer, as it is written in the language.
+    /// Returns a time in the time zone of the computer, written as in the language.
     pub(super) fn time(&self, at: UnixMillis) -> String {
         number_text::date_and_time(self.language, at)
     }

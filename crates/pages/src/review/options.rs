@@ -1,13 +1,13 @@
 //! Options of the review page: the reviewer, the order of the queue, and the attention checks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::check_items::CheckRates;
 use super::i18n::Language;
 use mocban_catalog::CatalogError;
 use mocban_core::InputLimits;
-use mocban_core::domain::{ReviewOrder, ThresholdMetric, UnixMillis};
+use mocban_core::domain::{PairName, ReviewOrder, ThresholdMetric, UnixMillis};
 
 /// Options of a review queue.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +19,8 @@ pub struct QueueOptions {
     pub metrics: Vec<ThresholdMetric>,
     /// Order of the results.
     pub order: ReviewOrder,
+    /// Only the results of these pairs are reviewed. `None` for those of all pairs.
+    pub pairs: Option<BTreeSet<PairName>>,
     /// Seed of the shuffle and of the attention checks.
     pub seed: u64,
     /// Maximum number of results. The sample is the same for every reviewer.
@@ -81,6 +83,11 @@ impl QueueOptions {
         order.into_iter().chain(seed)
     }
 
+    /// Returns whether the results of a pair are reviewed.
+    pub(super) fn has_pair(&self, name: &PairName) -> bool {
+        (self.pairs.as_ref()).is_none_or(|pairs| pairs.contains(name))
+    }
+
     /// Returns whether the queue can have attention checks. If so, the page shows the pair of an item only after the
     /// answer, because the reviewer would recognise a pair that appears twice.
     pub(super) fn has_attention_checks(&self) -> bool {
@@ -127,6 +134,7 @@ mod tests {
             reviewer: "lan".to_owned(),
             metrics: Vec::new(),
             order: ReviewOrder::Random,
+            pairs: None,
             seed: QueueOptions::DEFAULT_SEED,
             sample: None,
             rates: CheckRates {

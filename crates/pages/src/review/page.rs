@@ -230,6 +230,7 @@ mod tests {
             reviewer: "lan".to_owned(),
             metrics: Vec::new(),
             order,
+            pairs: None,
             seed: 1,
             sample: None,
             rates: CheckRates {

@@ -68,7 +68,8 @@ async fn all_items(
     let mut items = Vec::new();
     let mut pages = catalog.result_pages(PAGE_PAIRS);
     while let Some(page) = pages.next().await? {
-        for pair in &page {
+        let wanted = |pair: &&PairResults| options.has_pair(&pair.attributes.name);
+        for pair in page.iter().filter(wanted) {
             items.extend(items_of_pair(pair, options));
         }
     }
@@ -165,6 +166,7 @@ mod tests {
             reviewer: "ana".to_owned(),
             metrics: Vec::new(),
             order,
+            pairs: None,
             seed: 1,
             sample: None,
             rates: CheckRates { faults, duplicates },
