@@ -15,6 +15,7 @@ use super::components::{
 use super::failure::{AppFailure, AppResult};
 use super::pass_on::{pass_on, path_below};
 use super::projects::OpenProject;
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
@@ -123,7 +124,9 @@ fn state_part(visit: &Visit, detail: &BlockDetail) -> Markup {
                 p { (visit.block_remedy(stored.stage, stored.failure.class)) }
             }
         }
-        @for warning in warnings(detail) { div.notice.warn { p { (one_line(warning)) } } }
+        @for warning in warnings(detail) {
+            div.notice.warn { p { (one_line(Sentence::of_program(warning).text(visit.language))) } }
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use super::action_body::ActionBody;
 use super::address::encoded;
 use super::attachment::attachment;
 use super::chosen_pairs::require_pairs;
-use super::components::{NavSection, action_form, choice, frame};
+use super::components::{NavSection, action_form, choice, frame, grouped};
 use super::export_zip::zip_link;
 use super::exports::{OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, purpose_of};
 use super::failure::{AppFailure, AppResult};
@@ -205,7 +205,7 @@ async fn run(
     };
     let output = exports_dir(&location.dir).join(format!("{name}{of_chosen}"));
     let summary = export(&output, &[format], options, &location, &()).await?;
-    let done = summary.pairs.done;
+    let done = grouped(summary.pairs.done);
     let mut lines = vec![[
         format!("{done} pairs were exported."),
         format!("Đã xuất {done} cặp."),

@@ -103,14 +103,14 @@ async fn check_lines(location: Location, repair: bool) -> ProjectResult<TaskLine
         ..CheckOptions::default()
     };
     let summary = check(options, &location, &()).await?;
-    let (pairs, files) = (summary.pairs, summary.files);
+    let [pairs, files] = [summary.pairs, summary.files].map(grouped);
     let [english, vietnamese] = conclusion(&summary, repair);
     let mut lines = vec![[
         format!("{pairs} pairs and {files} files were checked. {english}"),
         format!("Đã kiểm tra {pairs} cặp và {files} tệp. {vietnamese}"),
     ]];
     for (kind, found) in &summary.damage {
-        let number = found.found;
+        let number = grouped(found.found);
         lines.push(
             [kind.heading(), vietnamese_heading(*kind)].map(|what| format!("{what}: {number}")),
         );
@@ -137,7 +137,7 @@ async fn check_lines(location: Location, repair: bool) -> ProjectResult<TaskLine
                 .map(ToString::to_string)
                 .collect();
             let first = first.join(", ");
-            lines.push(what.map(|what| format!("{} {what}: {first}", notes.count)));
+            lines.push(what.map(|what| format!("{} {what}: {first}", grouped(notes.count))));
         }
     }
     Ok(lines)

@@ -76,7 +76,7 @@ fn pairs_part(
     }
 }
 
-/// Returns a warning of an import, whose beginning is translated if it is known.
+/// Returns a warning of an import, which is translated if its beginning is known, or else quoted.
 fn warning(visit: &Visit, line: &str) -> String {
     let [mesh_alone, print_alone, other] = IGNORED;
     let beginnings = [
@@ -93,11 +93,13 @@ fn warning(visit: &Visit, line: &str) -> String {
         let rest = line.strip_prefix(english)?;
         Some(format!("{}{rest}", visit.t(english, vietnamese)))
     });
-    let translated = || match visit.language {
-        Language::English => None,
-        Language::Vietnamese => message_words::vietnamese(line),
-    };
-    found.or_else(translated).unwrap_or_else(|| line.to_owned())
+    found.unwrap_or_else(|| match visit.language {
+        Language::English => line.to_owned(),
+        Language::Vietnamese => {
+            let known = message_words::vietnamese(line);
+            known.unwrap_or_else(|| format!("Chương trình báo: {line}"))
+        }
+    })
 }
 
 fn pair_row(

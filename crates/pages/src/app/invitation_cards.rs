@@ -237,7 +237,7 @@ fn progress(visit: &Visit, invitation: &SentInvitation) -> Markup {
     html! {
         @if let Some(counts) = invitation.progress {
             p.answered {
-                (visit.t("Answered", "Đã trả lời")) ": " b { (counts.answered) } " / " (images_text(visit, counts))
+                (visit.t("Answered", "Đã trả lời")) ": " b { (grouped(counts.answered as u64)) } " / " (images_text(visit, counts))
                 @if counts.answered >= counts.items { " · " span.good { (visit.t("finished", "đã xong")) } }
             }
             progress value=(counts.answered) max=(counts.items.max(1)) aria-label=(visit.t("Answered", "Đã trả lời")) {}
