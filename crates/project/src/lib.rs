@@ -63,7 +63,7 @@ pub mod retry;
 pub mod reviewers;
 mod row_spool;
 pub mod run;
-pub mod same_files;
+mod same_files;
 pub mod selection;
 pub mod sheets;
 pub mod shell;

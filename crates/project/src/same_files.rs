@@ -6,9 +6,6 @@ use std::path::{Component, Path, PathBuf};
 use mocban_core::domain::{ContentHash, PairName};
 use mocban_lists::manifest::ManifestRow;
 
-/// Beginning of the warning about pairs with the same files.
-pub const SAME_FILES: &str = "pairs with the same mesh and print as an earlier one";
-
 /// Counts the rows whose mesh and print an earlier row has, too.
 #[derive(Debug, Default)]
 pub(crate) struct SameFiles {
@@ -37,8 +34,11 @@ impl SameFiles {
     /// Returns a warning if there are such pairs.
     pub(crate) fn warning(self) -> Option<String> {
         let count = self.count;
-        self.first
-            .map(|(name, line)| format!("{SAME_FILES}: {count}, first {name}, as on line {line}"))
+        self.first.map(|(name, line)| {
+            format!(
+                "pairs with the same mesh and print as an earlier one: {count}, first {name}, as on line {line}"
+            )
+        })
     }
 }
 

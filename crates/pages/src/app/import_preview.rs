@@ -14,7 +14,6 @@ use mocban_core::domain::{LengthUnit, one_line};
 use mocban_lists::manifest::PairingChanges;
 use mocban_project::import_plan::{ImportPlan, PlannedPair};
 use mocban_project::manifest_file::{IGNORED, RENAMED};
-use mocban_project::same_files::SAME_FILES;
 
 /// Number of warnings and missing files that are shown.
 const SHOWN_LINES: usize = 12;
@@ -84,10 +83,6 @@ fn warning(visit: &Visit, line: &str) -> String {
         (print_alone, "Bỏ qua, bản in không có bản quét"),
         (other, "Bỏ qua, không phải bản quét hay bản in"),
         (RENAMED, "Đã hiểu các cột có tên khác"),
-        (
-            SAME_FILES,
-            "Các cặp có cùng bản quét và bản in với một cặp trước",
-        ),
     ];
     let found = beginnings.into_iter().find_map(|(english, vietnamese)| {
         let rest = line.strip_prefix(english)?;

@@ -48,6 +48,10 @@ const MESSAGES: &[(&str, &str)] = &[
     ),
     ("{} holds no meshes", "{0} không có bản quét"),
     ("{} holds no images", "{0} không có hình"),
+    (
+        "pairs with the same mesh and print as an earlier one: {}, first {}, as on line {}",
+        "số cặp có cùng bản quét và bản in với một cặp trước: {0}, cặp đầu tiên là {1}, giống dòng {2}",
+    ),
     // Formats that are not read.
     (
         "ignored, {} is not read: {} and {} more",
@@ -119,6 +123,14 @@ const MESSAGES: &[(&str, &str)] = &[
     (
         "the file is {} and does not hold the {}",
         "tệp là {0} và không chứa nội dung thật",
+    ),
+    (
+        "no labels for {}: the file is about {}",
+        "không có nhãn của {0}: tệp này nói về {1}",
+    ),
+    (
+        "take the labels of this page, or rename it",
+        "hãy dùng nhãn của trang này, hoặc đổi tên trang",
     ),
     ("the file is {}", "tệp là {0}"),
     (
@@ -265,18 +277,24 @@ fn line(text: &str) -> Option<String> {
     Some(format!("{indent}{}", all.join("; ")))
 }
 
-/// Returns a clause in Vietnamese, which may follow the path of a file or the name of a layer of settings.
+/// Returns a clause in Vietnamese, which may follow the path of a file, the name of a layer of settings or another clause.
 fn clause(text: &str) -> Option<String> {
     let starts = text.match_indices(": ").map(|(at, colon)| at + colon.len());
     let mut starts = std::iter::once(0).chain(starts);
     starts.find_map(|start| {
         let (before, message) = text.split_at(start);
-        MESSAGES.iter().find_map(|(english, vietnamese)| {
+        // A clause before this one or within a part would stay in English.
+        if before.contains("; ") {
+            return None;
+        }
+        let found = MESSAGES.iter().find_map(|(english, vietnamese)| {
             let parts = parts_of(message, english)?;
-            // A clause within a part would stay in English.
             let is_clean = parts.iter().all(|part| !part.contains("; "));
-            is_clean.then(|| format!("{before}{}", filled(vietnamese, &parts)))
-        })
+            is_clean.then(|| filled(vietnamese, &parts))
+        })?;
+        let known = before.strip_suffix(": ").and_then(clause);
+        let before = known.map_or_else(|| before.to_owned(), |known| format!("{known}: "));
+        Some(before + &found)
     })
 }
 
@@ -317,6 +335,7 @@ fn part_text(part: &str) -> String {
     }
     match part {
         "text" => return "văn bản".to_owned(),
+        "a pointer of Git LFS" => return "con trỏ của Git LFS".to_owned(),
         "MeshLab, Blender or CloudCompare" => {
             return "MeshLab, Blender hoặc CloudCompare".to_owned();
         }
@@ -357,6 +376,14 @@ mod tests {
             (
                 "data/prints/1.jpg: the file is a BMP image",
                 "data/prints/1.jpg: tệp là hình BMP",
+            ),
+            (
+                "a.jpg: the file is a GIF image; PNG, JPEG and TIFF images are read: convert them, such as with ImageMagick: x *.gif",
+                "a.jpg: tệp là hình GIF; chỉ đọc được hình PNG, JPEG và TIFF: hãy chuyển đổi chúng, chẳng hạn bằng ImageMagick: x *.gif",
+            ),
+            (
+                "no labels for b04.jpg: the file is about b05.jpg; take the labels of this page, or rename it",
+                "không có nhãn của b04.jpg: tệp này nói về b05.jpg; hãy dùng nhãn của trang này, hoặc đổi tên trang",
             ),
             (
                 "there is no pair b4; similar ids: b04",
