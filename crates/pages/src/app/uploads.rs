@@ -116,8 +116,13 @@ impl Uploads {
         let resumed = self.resume(&name, files);
         let arrived = resumed.iter().flat_map(|(_, arrived)| arrived);
         let bytes = bytes.saturating_sub(arrived.map(|file| file.size).sum());
-        if let Some(parent) = self.folder.parent() {
-            check_room(parent, bytes).map_err(AppFailure::refused)?;
+        if let Some(parent) = self.folder.parent()
+            && let Err(why) = check_room(parent, bytes)
+        {
+            if let Some((id, _)) = resumed {
+                self.find(id)?.break_off(why.clone());
+            }
+            return refuse(why);
         }
         if let Some(resumed) = resumed {
             return Ok(resumed);
@@ -320,6 +325,15 @@ impl FileUpload {
         self.arrived.store(arrived.len() as u64, Ordering::Relaxed);
         *state = UploadState::Ready(received, Instant::now());
         Some(arrived)
+    }
+
+    /// Keeps the files of an upload that cannot go on now.
+    fn break_off(&self, why: Sentence) {
+        let mut state = self.lock();
+        *state = match std::mem::replace(&mut *state, UploadState::Storing) {
+            UploadState::Ready(received, _) => UploadState::Broken(received, Instant::now(), why),
+            other => other,
+        };
     }
 
     /// Takes the files for a thread that works on them, with the state of the upload meanwhile.
