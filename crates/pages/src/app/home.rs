@@ -145,7 +145,7 @@ fn next_step(visit: &Visit, counts: &StatusCounts, running: bool) -> &'static st
     let outstanding: u64 = outstanding.iter().sum();
     if running {
         visit.t("Watch the run", "Xem tiến trình")
-    } else if outstanding + counts.stale > 0 {
+    } else if outstanding + counts.stale + counts.other_files > 0 {
         visit.t("Align the pairs", "Căn chỉnh các cặp")
     } else if jobs(JobStatus::Quarantined) > 0 {
         visit.t("See what failed", "Xem các cặp lỗi")

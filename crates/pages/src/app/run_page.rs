@@ -32,7 +32,7 @@ use mocban_system::platform;
 const LATEST: usize = 12;
 /// Number of failed pairs that are shown as examples of each class.
 const EXAMPLES: usize = 3;
-/// Most failed pairs with which the page asks what the next run would do.
+/// Most pairs that failed or have other files with which the page asks what the next run would do: each is inspected.
 const MAX_INSPECTED: u64 = 1000;
 /// Most blocks in progress that are named.
 const MAX_BLOCKS: usize = 5;
@@ -71,7 +71,8 @@ impl RunState {
         let current = fingerprints(&settings.config.stages);
         let counts = catalog.status(&current).await?;
         let failed = counts.jobs.get(&JobStatus::Quarantined).copied();
-        let plan = if running || failed.unwrap_or(0) > MAX_INSPECTED {
+        let inspected = failed.unwrap_or(0) + counts.other_files;
+        let plan = if running || inspected > MAX_INSPECTED {
             None
         } else {
             let rerun = mocban_project::run::options(&settings.config).rerun;
