@@ -45,8 +45,8 @@ impl ChosenSets {
         let found = kept.iter().find(|(known, _)| known == key);
         let gone = || {
             AppFailure::refused(Sentence::new(
-                "the program was started anew since these pairs were chosen: choose them again on the page Pairs",
-                "chương trình đã được mở lại sau khi các cặp này được chọn: hãy chọn lại ở trang Các cặp",
+                "the program does not keep any more which pairs were chosen: choose them again on the page Pairs",
+                "chương trình không còn giữ lựa chọn các cặp này: hãy chọn lại ở trang Các cặp",
             ))
         };
         found.map(|(_, names)| Some(names.clone())).ok_or_else(gone)

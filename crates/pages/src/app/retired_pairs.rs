@@ -57,7 +57,7 @@ pub(super) async fn retired_list(
 
 fn table(visit: &Visit, pairs: &[ListedRetiredPair]) -> Markup {
     html! {
-        div.scroll tabindex="0" role="region" aria-label=(visit.t("Retired pairs", "Các cặp đã đưa ra")) {
+        div.scroll tabindex="0" role="region" aria-label=(visit.t("Retired pairs", "Các cặp đã đưa ra khỏi thống kê")) {
             table #retired-pairs {
                 thead { tr {
                     @for title in [

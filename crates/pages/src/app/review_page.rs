@@ -86,7 +86,7 @@ fn chosen_part(visit: &Visit, pairs: usize) -> Markup {
             (visit.t("Only the chosen pairs are judged", "Chỉ đánh giá các cặp đã chọn")) ": " b { (grouped(pairs as u64)) } ". "
             (visit.t(
                 "They are no random sample, so their verdicts may bias Acc. There are no attention checks among them.",
-                "Chúng không phải mẫu ngẫu nhiên nên đánh giá của chúng có thể làm lệch Acc. Không có hình kiểm tra sự chú ý.",
+                "Chúng không phải mẫu ngẫu nhiên nên đánh giá về chúng có thể làm lệch Acc. Không có hình kiểm tra sự chú ý.",
             )) " "
             a href=(visit.here) { (visit.t("Judge all pairs", "Đánh giá mọi cặp")) }
         }
