@@ -61,7 +61,7 @@ enum UploadState {
     Busy(CancelToken),
     /// A thread gives the files their folder, which cannot be cancelled.
     Storing,
-    /// The connection was cut at that time. The same files may be sent again, without what has arrived. Says so.
+    /// It broke off at that time. The same files may be sent again, without what has arrived. Says why.
     Broken(Box<ReceivedFiles>, Instant, Sentence),
     /// Nothing is kept, or all has its folder. Says why if it failed.
     Ended(Option<Sentence>),
