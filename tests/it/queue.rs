@@ -112,6 +112,24 @@ fn a_pair_whose_missing_file_is_back_runs_again() {
 }
 
 #[test]
+fn done_stages_are_kept_while_a_file_is_missing() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "1");
+    call(&mut run(&project, &["--stage", "depth"])).expect(0);
+    let away = print(&project, 0).with_extension("away");
+    std::fs::rename(print(&project, 0), &away).expect("moved");
+    std::fs::rename(mesh(&project, 0), mesh(&project, 0).with_extension("away")).expect("moved");
+    for _ in 0..2 {
+        call(&mut run(&project, &[])).expect(3);
+    }
+    assert_eq!(finished(&project), [[1, 1, 0, 0]]);
+    std::fs::rename(away, print(&project, 0)).expect("moved back");
+    std::fs::rename(mesh(&project, 0).with_extension("away"), mesh(&project, 0)).expect("moved");
+    call(&mut run(&project, &[])).expect(0);
+    assert_eq!(finished(&project), [[1; 4]]);
+}
+
+#[test]
 fn a_project_in_use_is_refused_with_the_process_id() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "1");

@@ -20,7 +20,7 @@ use crate::queue::counters::{CounterKey, KeyedJob};
 use crate::queue::lease::position;
 use crate::queue::requeue::{requeue, send_back};
 use crate::queue::staleness::RerunPolicy;
-use crate::{Catalog, Result};
+use crate::{Catalog, InputVersion, Result};
 use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
 
 const JOBS: &str = "
@@ -127,7 +127,8 @@ impl PlannedBlock {
         BlockStage::from_index(index)
     }
 
-    /// Returns what changed since a result or a failure of a stage, if anything.
+    /// Returns what changed since a result or a failure of a stage, if anything. A file whose absence is the failure is
+    /// not compared: the results are those of the file that was there.
     fn change(
         &self,
         stage: BlockStage,
@@ -137,13 +138,19 @@ impl PlannedBlock {
         let points = self.control_points.as_ref();
         let (attributes, inputs) = (&self.attributes, &self.inputs);
         let now = BlockProvenance::new(stage, settings.of(stage), attributes, inputs, points);
+        let is_missing = |version: &Option<InputVersion>| {
+            let is_gone = version.as_ref().is_some_and(InputVersion::is_gone);
+            is_gone && self.status == JobStatus::Quarantined
+        };
+        let [mesh, page, labels] = [&inputs.mesh, &inputs.page, &inputs.labels].map(is_missing);
         [
-            (made.mesh != now.mesh, BlockReason::Mesh),
-            (made.page != now.page, BlockReason::Page),
-            (made.labels != now.labels, BlockReason::Labels),
+            (made.mesh != now.mesh && !mesh, BlockReason::Mesh),
+            (made.page != now.page && !page, BlockReason::Page),
+            (made.labels != now.labels && !labels, BlockReason::Labels),
             (made.attributes != now.attributes, BlockReason::Attributes),
             (
-                made.control_points != now.control_points,
+                // Points are of one scan and page.
+                made.control_points != now.control_points && !mesh && !page,
                 BlockReason::ControlPoints,
             ),
             (

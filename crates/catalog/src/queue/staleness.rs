@@ -33,13 +33,46 @@ pub enum RerunPolicy {
     All(Stage),
 }
 
+/// Returns the hash of an input file of a pair `p` with the job `j`. While the pair is in quarantine because the file is
+/// missing, its results are those of the file that was there, so that the hash is `NULL`, which differs from none.
+macro_rules! input_hash {
+    ($file:literal) => {
+        concat!(
+            "CASE WHEN j.status = 4 AND p.",
+            $file,
+            "_stat = 'gone' THEN NULL ELSE p.",
+            $file,
+            "_hash END"
+        )
+    };
+}
+
+/// Compares a result `r` with the current settings in `?1` and the pair's inputs.
+macro_rules! is_outdated {
+    () => {
+        concat!(
+            "(
+            r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.attributes <> p.attributes OR r.mesh_hash <> ",
+            input_hash!("mesh"),
+            " OR r.print_hash <> ",
+            input_hash!("print"),
+            ")"
+        )
+    };
+}
+
 /// Selects jobs, each with its first outdated result. A result is outdated if its settings or inputs have changed.
-pub(crate) const INSPECT: &str = "
+pub(crate) const INSPECT: &str = concat!(
+    "
 WITH found AS (
-    SELECT j.pair, j.stage, j.status, j.fingerprint, p.mesh_hash, p.print_hash, p.attributes, (
-        SELECT min(r.stage) FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-            r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
-            OR r.attributes <> p.attributes)) AS first
+    SELECT j.pair, j.stage, j.status, j.fingerprint, p.attributes, ",
+    input_hash!("mesh"),
+    " AS mesh_hash, ",
+    input_hash!("print"),
+    " AS print_hash, (
+        SELECT min(r.stage) FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND ",
+    is_outdated!(),
+    ") AS first
     FROM (SELECT atom FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)
         JOIN pair AS p ON p.id = j.pair WHERE j.pair > ?2 ORDER BY j.pair LIMIT ?3)
 SELECT found.pair, found.stage, found.status, coalesce(found.fingerprint, 0) AS fingerprint, found.first, r.fingerprint AS old,
@@ -49,7 +82,8 @@ SELECT found.pair, found.stage, found.status, coalesce(found.fingerprint, 0) AS 
         OR coalesce(f.print_hash <> found.print_hash, false) OR coalesce(f.attributes <> found.attributes, false)
         AS failure_is_outdated
 FROM found LEFT JOIN stage_result AS r ON r.pair = found.pair AND r.stage = found.first
-    LEFT JOIN failure AS f ON f.pair = found.pair ORDER BY found.pair";
+    LEFT JOIN failure AS f ON f.pair = found.pair ORDER BY found.pair"
+);
 
 /// Selects one page of the dirty and quarantined jobs, sorted by pair.
 pub(crate) const MARKED: &str = "
@@ -57,14 +91,16 @@ SELECT pair FROM job WHERE dirty = 1 AND pair > ?1 UNION SELECT pair FROM job WH
 ORDER BY 1 LIMIT ?2";
 
 /// Counts the pairs that have a result with outdated settings or inputs.
-pub(crate) const COUNT_STALE: &str = "
+pub(crate) const COUNT_STALE: &str = concat!(
+    "
 SELECT (SELECT coalesce(CAST(sum(n) AS bigint), 0) FROM counter
         WHERE fingerprint <> 0 AND fingerprint NOT IN (SELECT CAST(atom AS bigint) FROM json_each(?1))) + (
     SELECT count(*) FROM job AS j CROSS JOIN pair AS p ON p.id = j.pair
     WHERE j.dirty = 1 AND (j.fingerprint IS NULL OR j.fingerprint IN (SELECT CAST(atom AS bigint) FROM json_each(?1))) AND EXISTS (
-        SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-            r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
-            OR r.attributes <> p.attributes)))";
+        SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND ",
+    is_outdated!(),
+    "))"
+);
 
 /// Unmarks dirty jobs whose results are consistent again. Skips leased jobs, which may still get inconsistent results.
 pub(crate) const CLEAR_DIRTY: &str = concat!(

@@ -316,6 +316,32 @@ async fn a_failed_block_runs_again_after_an_import_with_another_page() {
 }
 
 #[tokio::test]
+async fn a_missing_file_restarts_no_stage_of_the_block_that_failed_on_it() {
+    let world = world().await;
+    let (mut lease, work) = world.leased_block().await;
+    for stage in [BlockStage::Face, BlockStage::Align] {
+        let stored = world.catalog.checkpoint_block(lease, done(&work, stage));
+        lease = continued(stored.await.expect("stored"));
+    }
+    let mut refused = failed(&work, BlockStage::Boxes, FailureAction::Quarantine);
+    let gone = InputVersion::gone();
+    refused.provenance.page = Some(gone.hash);
+    refused.inputs.page = Some(gone);
+    let stored = world.catalog.fail_block(lease, refused).await;
+    assert!(stored.expect("stored"));
+    assert_eq!(world.requeue_blocks([1; 4]).await, []);
+    let block = world.catalog.known_blocks().await.expect("a read")[0].block;
+    let back = BlockInputVersions {
+        page: Some(version("page")),
+        ..BlockInputVersions::default()
+    };
+    let stored = world.catalog.store_block_inputs(vec![(block, back)]).await;
+    stored.expect("stored");
+    let requeued = world.requeue_blocks([1; 4]).await;
+    assert_eq!(requeued, [(BlockStage::Boxes, BlockReason::FailedBefore)]);
+}
+
+#[tokio::test]
 async fn a_refused_block_stays_until_a_retry_or_another_page() {
     let world = world().await;
     let (lease, work) = world.leased_block().await;

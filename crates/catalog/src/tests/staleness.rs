@@ -2,8 +2,8 @@
 
 use super::{World, fingerprints, name, row};
 use crate::{
-    FailureAction, Fingerprints, InputVersion, InputVersions, Plan, RerunPolicy, StageFailure,
-    StaleReason,
+    CheckpointOutcome, FailureAction, Fingerprints, InputVersion, InputVersions, PairProvenance,
+    Plan, RerunPolicy, StageFailure, StaleReason,
 };
 use mocban_core::domain::{ContentHash, Failure, FailureClass, JobStatus, LengthUnit, Stage};
 
@@ -161,6 +161,43 @@ async fn a_failed_pair_runs_again_after_an_import_with_another_path() {
         let detail = world.catalog.pair(&name(pair)).await.expect("a read");
         assert_eq!(detail.expect("the pair").results.status, expected, "{pair}");
     }
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_missing_file_restarts_no_stage_of_the_pair_that_failed_on_it() {
+    let world = World::new(1).await;
+    let fit = world.claim(1).await.remove(0);
+    let fit = world.catalog.checkpoint_now(fit, world.done(Stage::Fit));
+    let Ok(CheckpointOutcome::Lease(lease)) = fit.await else {
+        unreachable!("the pair has more stages");
+    };
+    let mut inputs = super::inputs(Stage::Depth);
+    inputs.mesh = Some(InputVersion::gone());
+    let attributes = world.done(Stage::Depth).provenance.attributes;
+    let failed = StageFailure {
+        stage: Stage::Depth,
+        failure: Failure::new(FailureClass::Io, "p0.stl is not there"),
+        action: FailureAction::Quarantine,
+        provenance: PairProvenance::new(world.fingerprints.of(Stage::Depth), &inputs, attributes),
+        inputs,
+        ms: None,
+        at: 5,
+        alive_since: 0,
+    };
+    assert!(world.catalog.fail(lease, failed).await.expect("stored"));
+    let current = fingerprints([1; 4]);
+    assert_eq!(requeue_stale(&world, &current).await, 0);
+    let status = world.catalog.status(&current).await.expect("a read");
+    assert_eq!(status.stale, 0);
+    world.assert_counters().await;
+    // The same file is back.
+    see(&world, "mesh", "print").await;
+    let plan = plan(&world).await;
+    let why: Vec<_> = plan.entries.iter().map(|one| (one.from, one.why)).collect();
+    assert_eq!(why, [(Stage::Depth, StaleReason::FailedBefore)]);
+    assert_eq!(requeue_stale(&world, &current).await, 1);
+    assert_eq!(cursor(&world, "p0").await, Some(Stage::Depth));
     world.assert_counters().await;
 }
 
