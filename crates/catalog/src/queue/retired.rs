@@ -73,7 +73,7 @@ const RETIRED_PAGE: &str = "
 SELECT p.id, p.name, p.block, p.character, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair
 WHERE r.pair > ?1 AND (?2 IS NULL OR p.block = ?2) AND (?3 IS NULL OR p.character = ?3) ORDER BY r.pair LIMIT ?4";
 
-const RETIRED_COUNT: &str = "SELECT count(*) FROM retired_pair";
+pub(crate) const RETIRED_COUNT: &str = "SELECT count(*) FROM retired_pair";
 
 /// Jobs of pairs that were not cut from a block.
 const LISTED_JOBS: &str = "

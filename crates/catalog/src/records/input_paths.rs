@@ -15,17 +15,44 @@ const PAGE: i64 = 2_000;
 const SELECT: &str =
     "SELECT id, mesh_path, print_path FROM pair WHERE id > ?1 ORDER BY id LIMIT ?2";
 
-/// Clears the `stat` of the files, so that the next run reads them again.
-const UPDATE: &str = "
-UPDATE pair SET mesh_path = item.value ->> 1, mesh_stat = '', print_path = item.value ->> 2, print_stat = ''
-FROM json_each(?1) AS item WHERE pair.id = CAST(item.value ->> 0 AS bigint)";
+/// Returns a `stat` that no file has, so that the next run reads the file again. What is known of a file that an import
+/// changed (`''`) or that is missing stays.
+macro_rules! unread {
+    ($stat:literal) => {
+        concat!(
+            "CASE WHEN ",
+            $stat,
+            " IN ('', 'gone') THEN ",
+            $stat,
+            " WHEN ",
+            $stat,
+            " IS NOT NULL THEN 'restored' END"
+        )
+    };
+}
+
+const UPDATE: &str = concat!(
+    "
+UPDATE pair SET mesh_path = item.value ->> 1, mesh_stat = ",
+    unread!("mesh_stat"),
+    ", print_path = item.value ->> 2, print_stat = ",
+    unread!("print_stat"),
+    "
+FROM json_each(?1) AS item WHERE pair.id = CAST(item.value ->> 0 AS bigint)"
+);
 
 const SELECT_BLOCKS: &str = "SELECT id, mesh_path, page_path, labels_path FROM block ORDER BY id";
 
-/// Clears the `stat` of the files, like [`UPDATE`].
-const UPDATE_BLOCK: &str = "
-UPDATE block SET mesh_path = ?2, mesh_stat = '', page_path = ?3, page_stat = '', labels_path = ?4, labels_stat = ''
-WHERE id = ?1";
+const UPDATE_BLOCK: &str = concat!(
+    "
+UPDATE block SET mesh_path = ?2, mesh_stat = ",
+    unread!("mesh_stat"),
+    ", page_path = ?3, page_stat = ",
+    unread!("page_stat"),
+    ", labels_path = ?4, labels_stat = ",
+    unread!("labels_stat"),
+    " WHERE id = ?1"
+);
 
 /// Selects the input files whose paths end with one of two texts.
 const NAMED: Sql = Sql::pair(

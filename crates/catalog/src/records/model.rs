@@ -23,7 +23,7 @@ pub struct StatusCounts {
     pub schema: u32,
     /// Number of pairs.
     pub pairs: u64,
-    /// Number of pairs that a person or a shorter list retired. They are in no other count.
+    /// Number of retired pairs, for whatever cause. They are in no other count of pairs.
     pub retired: u64,
     /// Number of pairs by job status, all statuses included.
     pub jobs: BTreeMap<JobStatus, u64>,

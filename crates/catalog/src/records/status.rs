@@ -6,6 +6,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::queue::counters::{JobCounts, by_status, counters};
 use crate::queue::fingerprint::{Fingerprints, current_json};
+use crate::queue::retired::RETIRED_COUNT;
 use crate::queue::staleness::count_stale;
 use crate::records::model::{StageCounts, StatusCounts};
 use crate::records::reviewer_names::Spellings;
@@ -68,9 +69,6 @@ pub(crate) const OTHER_FILES: &str = "
 SELECT count(*) FROM job AS j CROSS JOIN pair AS p ON p.id = j.pair
 WHERE j.dirty = 1 AND j.status = 3 AND (p.mesh_stat = '' OR p.print_stat = '')";
 
-/// Pairs that were retired, except for those whose boxes are gone, which their blocks count.
-const RETIRED: &str = "SELECT count(*) FROM retired_pair WHERE cause <> 'labels'";
-
 impl Catalog {
     /// Returns the counts of the `status` command. Results count as stale if their fingerprint is not among
     /// `fingerprints`, or if their inputs have changed.
@@ -81,7 +79,7 @@ impl Catalog {
         Ok(StatusCounts {
             schema: 1,
             pairs: counted.values().sum(),
-            retired: query_scalar(RETIRED).fetch_one(&mut conn).await?,
+            retired: query_scalar(RETIRED_COUNT).fetch_one(&mut conn).await?,
             jobs: jobs_by_status(&counted),
             stages: by_stage(&counted),
             stale: count_stale(&mut conn, &current).await?,

@@ -140,6 +140,8 @@ async fn only_changed_characters_run_again_and_verdicts_stay() {
     let retired = world.catalog.retired_pairs().await.expect("a read");
     assert_eq!(names_of(&retired), [name("b_c")]);
     assert_eq!(retired[0].cause, RetireCause::Labels);
+    let counts = world.catalog.status(&super::fingerprints([1; 4])).await;
+    assert_eq!(counts.expect("a read").retired, 1);
     let log = world.catalog.verdict_log(None).await.expect("a read");
     assert_eq!(log.len(), 1);
     let states = world.character_states().await;

@@ -70,6 +70,39 @@ async fn a_pair_with_another_path_is_counted_until_its_file_is_read() {
     world.assert_counters().await;
 }
 
+#[tokio::test]
+async fn a_restored_pair_has_other_files_only_if_a_list_named_them() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    let mut changed = super::inputs(Stage::Normalize);
+    changed.mesh = Some(super::blocks::version("other bytes"));
+    let inputs = vec![(PairId(1), changed)];
+    world.catalog.store_inputs(inputs).await.expect("stored");
+    let other_files = async || {
+        let status = world.catalog.status(&super::fingerprints([1; 4])).await;
+        status.expect("a read").other_files
+    };
+    let restore = async || {
+        let keep = |path: &str| Some(path.to_owned());
+        let kept = world.catalog.replace_input_paths(keep).await;
+        assert_eq!(kept.expect("replaced"), [""; 0]);
+        let known = world.catalog.known_inputs(None, 1, None).await;
+        known.expect("a page")[0].mesh.clone().expect("a mesh").stat
+    };
+    assert_eq!(
+        (restore().await.as_str(), other_files().await),
+        ("restored", 0)
+    );
+    let mut moved = row("p0");
+    moved.mesh_path = "elsewhere.stl".to_owned();
+    world
+        .catalog
+        .import(vec![moved], 2)
+        .await
+        .expect("imported");
+    assert_eq!((restore().await.as_str(), other_files().await), ("", 1));
+}
+
 /// Returns a row with files of its own.
 fn row_with(id: &str, files: &str) -> ImportRow {
     ImportRow {
