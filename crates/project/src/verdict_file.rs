@@ -11,6 +11,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::files::{MAX_SHOWN, RefusedLine};
+use super::location::now;
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
@@ -48,6 +49,7 @@ const COLUMNS: KnownColumns = KnownColumns {
     ],
 };
 const REQUIRED: usize = 3;
+const DAY_MS: UnixMillis = 24 * 60 * 60 * 1000;
 
 /// The fields of the log of verdicts, which JSON Lines may have.
 const LOG_FIELDS: [&str; 17] = [
@@ -285,7 +287,10 @@ fn row(
         reason: cell(4).map(reason).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
         context: ReviewContext::default(),
-        at: cell(6).map(|text| time(text, line)).transpose()?,
+        at: cell(6)
+            .map(|text| time(text, now(), line))
+            .transpose()?
+            .flatten(),
     };
     let judged = None;
     let listed = ListedVerdict { verdict, judged };
@@ -302,12 +307,20 @@ fn at_line<T>(line: usize, parsed: Result<T, String>) -> Result<T, RefusedLine> 
     parsed.map_err(|reason| RefusedLine::new(line, &reason))
 }
 
-fn time(text: &str, line: usize) -> Result<UnixMillis, RefusedLine> {
-    parse_utc(text).ok_or_else(|| {
+/// Parses a time. A day alone counts as its end, because the reviewer may have given an earlier verdict in the app on the
+/// same day. Returns `None`, which means the time of the import, for a day that is not over.
+fn time(text: &str, now: UnixMillis, line: usize) -> Result<Option<UnixMillis>, RefusedLine> {
+    let at = parse_utc(text).ok_or_else(|| {
         let reason =
             format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
         RefusedLine::new(line, &reason)
-    })
+    })?;
+    let is_far_ahead = at > now + DAY_MS;
+    if is_far_ahead || text.contains(['T', 't', ' ', ':']) {
+        return Ok(Some(at));
+    }
+    let end = at + DAY_MS - 1;
+    Ok((end <= now).then_some(end))
 }
 
 fn value<T>(text: &str, line: usize) -> Result<T, RefusedLine>

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{RefusedLine, VerdictList, VerdictRow, check_values, unknown_pairs, unread_fields};
+use super::{
+    RefusedLine, VerdictList, VerdictRow, check_values, time, unknown_pairs, unread_fields,
+};
 use mocban_core::domain::{PairName, Reason, ThresholdMetric, Verdict};
 
 fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
@@ -85,6 +87,22 @@ fn times_are_parsed_and_other_texts_refused() {
         refused.starts_with("line 2: at is \"yesterday\""),
         "{refused}"
     );
+}
+
+#[test]
+fn a_day_without_a_time_counts_as_its_end_and_today_as_the_time_of_the_import() {
+    let begin = 1_795_219_200_000;
+    let day = 24 * 60 * 60 * 1000;
+    let at = |text, now| time(text, now, 2).expect("a time");
+    assert_eq!(at("2026-11-21", begin + day), Some(begin + day - 1));
+    assert_eq!(at("2026-11-21", begin + 1000), None);
+    // It has begun in another time zone.
+    assert_eq!(at("2026-11-21", begin - 1000), None);
+    // The import refuses it.
+    assert_eq!(at("2026-11-21", begin - 2 * day), Some(begin));
+    for text in ["2026-11-21 00:00:00", "2026-11-21T00:00:00Z"] {
+        assert_eq!(at(text, begin + 1000), Some(begin));
+    }
 }
 
 #[test]
