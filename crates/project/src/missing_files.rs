@@ -58,7 +58,28 @@ impl MissingFiles {
 
 #[cfg(test)]
 mod tests {
-    use super::{MissingFiles, WINDOWS_HINT};
+    use super::{IS_FOLDER, MissingFiles, WINDOWS_HINT};
+
+    #[test]
+    fn one_file_and_several_are_named_with_what_is_in_their_place() {
+        let mut files = MissingFiles::default();
+        for (end, one) in [
+            ("does not exist", "1 file is missing, nothing was imported:"),
+            (
+                IS_FOLDER,
+                "1 file is missing or a folder, nothing was imported:",
+            ),
+        ] {
+            let mut missing = MissingFiles::default();
+            missing.add(format!("line 2: 1.stl {end}"));
+            files.add(format!("line 2: 1.stl {end}"));
+            let text = missing.refusal().to_string();
+            assert!(text.starts_with(one), "{text}");
+        }
+        let several = "2 files are missing or a folder, nothing was imported:";
+        let text = files.refusal().to_string();
+        assert!(text.starts_with(several), "{text}");
+    }
 
     #[test]
     fn the_hint_on_windows_paths_is_given_once() {

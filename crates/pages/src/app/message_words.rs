@@ -1,259 +1,9 @@
 //! Frequent messages of the program in Vietnamese. They are stored or refuse something in English, so they are recognised
 //! by their wording.
 
+use super::message_table::{KINDS, MESSAGES};
 use super::number_text::with_decimal_sign;
 use crate::review::Language;
-
-/// Messages, or clauses of them, with `{}` for each part that varies, and their Vietnamese texts, in which `{0}` is the
-/// first part. An earlier row is preferred.
-const MESSAGES: &[(&str, &str)] = &[
-    // Files of a list or of folders.
-    (
-        "{} files are {}, nothing was imported:",
-        "thiếu {0} tệp nên chưa nhập gì:",
-    ),
-    (
-        "1 file is {}, nothing was imported:",
-        "thiếu 1 tệp nên chưa nhập gì:",
-    ),
-    (
-        "{} is refused, nothing was imported:",
-        "không dùng được {0} nên chưa nhập gì:",
-    ),
-    (
-        "{}: line {}: mesh {} of {} does not exist",
-        "{0}: dòng {1}: không có bản quét {2} của {3}",
-    ),
-    (
-        "{}: line {}: print {} of {} does not exist",
-        "{0}: dòng {1}: không có bản in {2} của {3}",
-    ),
-    (
-        "it is a path of a Windows computer: write paths relative to the list",
-        "đây là đường dẫn của máy Windows: hãy viết đường dẫn tính từ danh sách",
-    ),
-    ("and {} more", "và {0} mục khác"),
-    ("line {}: column {} is missing", "dòng {0}: thiếu cột {1}"),
-    ("column {} is missing", "thiếu cột {0}"),
-    ("the header has: {}", "dòng tiêu đề có: {0}"),
-    ("the list contains no pairs", "danh sách không có cặp nào"),
-    ("the list is empty", "danh sách trống"),
-    (
-        "no mesh has the same file name as a print",
-        "không có bản quét nào trùng tên tệp với một bản in",
-    ),
-    (
-        "{} holds no meshes and no images",
-        "{0} không có bản quét và không có hình",
-    ),
-    ("{} holds no meshes", "{0} không có bản quét"),
-    ("{} holds no images", "{0} không có hình"),
-    (
-        "pairs with the same mesh and print as an earlier one: {}, first {}, as on line {}",
-        "số cặp có cùng bản quét và bản in với một cặp trước: {0}, cặp đầu tiên là {1}, giống dòng {2}",
-    ),
-    // Formats that are not read.
-    (
-        "ignored, {} is not read: {} and {} more",
-        "bỏ qua, không đọc được {0}: {1} và {2} tệp khác",
-    ),
-    (
-        "ignored, {} is not read: {}",
-        "bỏ qua, không đọc được {0}: {1}",
-    ),
-    (
-        "{} is not read: {} and {} more",
-        "không đọc được {0}: {1} và {2} tệp khác",
-    ),
-    ("{} is not read: {}", "không đọc được {0}: {1}"),
-    (
-        "open them in {} and export them as PLY",
-        "hãy mở chúng bằng {0} rồi xuất thành PLY",
-    ),
-    (
-        "convert them, such as with ImageMagick: {}",
-        "hãy chuyển đổi chúng, chẳng hạn bằng ImageMagick: {0}",
-    ),
-    (
-        "save their pages as images, such as with {}",
-        "hãy lưu các trang thành hình, chẳng hạn bằng {0}",
-    ),
-    // Ids.
-    ("there is no pair or block {}", "không có cặp hay ván {0}"),
-    ("there is no pair {}", "không có cặp {0}"),
-    ("there is no block {}", "không có ván {0}"),
-    ("there is {}/{}", "có tệp {0}/{1}"),
-    ("similar ids: {}", "mã gần giống: {0}"),
-    (
-        "pair {} has no box any more in the labels of its block",
-        "cặp {0} không còn khung trong nhãn của ván",
-    ),
-    (
-        "it comes back with its box, when the block runs again",
-        "cặp sẽ trở lại khi có lại khung và ván được chạy lại",
-    ),
-    (
-        "none of these pairs is retired",
-        "không có cặp nào trong số này đã được đưa ra khỏi thống kê",
-    ),
-    // Settings.
-    (
-        "{} = {} is outside the range {} to {}",
-        "{0} = {1} nằm ngoài khoảng {2} đến {3}",
-    ),
-    (
-        "{} = {}: must be above {} = {}",
-        "{0} = {1}: phải lớn hơn {2} = {3}",
-    ),
-    (
-        "{} = {}: must be below {} = {}",
-        "{0} = {1}: phải nhỏ hơn {2} = {3}",
-    ),
-    // Files of a pair.
-    ("{} is not there", "không có tệp {0}"),
-    (
-        "{} may not be read: permission denied",
-        "không có quyền đọc {0}",
-    ),
-    (
-        "{} changed while it was read",
-        "{0} thay đổi khi đang được đọc",
-    ),
-    ("the file is empty (0 bytes)", "tệp rỗng (0 byte)"),
-    (
-        "the file is {} and does not hold the {}",
-        "tệp là {0} và không chứa nội dung thật",
-    ),
-    (
-        "no labels for {}: the file is about {}",
-        "không có nhãn của {0}: tệp này nói về {1}",
-    ),
-    (
-        "take the labels of this page, or rename it",
-        "hãy dùng nhãn của trang này, hoặc đổi tên trang",
-    ),
-    ("the file is {}", "tệp là {0}"),
-    (
-        "PNG, JPEG and TIFF images are read",
-        "chỉ đọc được hình PNG, JPEG và TIFF",
-    ),
-    (
-        "OBJ, PLY and STL meshes and XYZ points are read: open them in {} and export them as PLY",
-        "chỉ đọc được lưới OBJ, PLY, STL và điểm XYZ: hãy mở bằng {0} rồi xuất thành PLY",
-    ),
-    (
-        "OBJ, PLY and STL meshes and XYZ points are read",
-        "chỉ đọc được lưới OBJ, PLY, STL và điểm XYZ",
-    ),
-    ("the mesh has no faces", "bản quét không có mặt tam giác"),
-    ("the mesh has no vertices", "bản quét không có đỉnh"),
-    (
-        "the file has {} {}; limits.mesh.max_{} is {}",
-        "tệp vượt giới hạn: có {0}, limits.mesh.max_{2} là {3}",
-    ),
-    // Pairs that do not match.
-    (
-        "relief and print do not match: confidence {} in the pose is below register.min_confidence {}",
-        "mặt khắc và bản in không khớp: độ tin cậy {0} của tư thế thấp hơn register.min_confidence {1}",
-    ),
-    (
-        "relief and print have strokes that the other one lacks (confidence in the pose {}, in the same character {})",
-        "mặt khắc và bản in có những nét mà bên kia không có (độ tin cậy của tư thế {0}, của việc cùng một chữ {1})",
-    ),
-    (
-        "no pose of the relief matches the print: the best correlation is {}, needs {}",
-        "không có tư thế nào của mặt khắc khớp với bản in: tương quan cao nhất là {0}, cần {1}",
-    ),
-    (
-        "the relief matches the mirrored print better ({} as well as the print itself)",
-        "mặt khắc khớp với bản in lật gương hơn (bằng {0} so với chính bản in)",
-    ),
-    (
-        "the print or the mesh may be mirrored, the print may be of another character, or the scan may show another side of the block",
-        "bản in hoặc bản quét có thể bị lật gương, bản in có thể của chữ khác, hoặc bản quét là mặt khác của ván",
-    ),
-    (
-        "the strokes of the print match the valleys of the relief, not its tops",
-        "nét của bản in khớp với chỗ lõm của mặt khắc, không phải với đỉnh",
-    ),
-    (
-        "was the mesh mirrored, or does it show the back of the scanned surface?",
-        "bản quét có bị lật gương, hay là mặt sau của bề mặt được quét?",
-    ),
-    (
-        "is it the print of another character?",
-        "đây có phải bản in của chữ khác không?",
-    ),
-    (
-        "the scan shows {} separate pieces: does one file hold several characters or pieces?",
-        "bản quét có {0} mảnh rời: một tệp có chứa nhiều chữ hoặc nhiều mảnh không?",
-    ),
-    (
-        "the face of the scan is nearly flat (its relief is {} % of its length): does it show the back of the block?",
-        "bề mặt bản quét gần như phẳng (độ nổi là {0} % chiều dài): có phải là mặt sau của ván không?",
-    ),
-    (
-        "print or relief has no strokes to register",
-        "bản in hoặc mặt khắc không có nét để căn chỉnh",
-    ),
-    (
-        "no threshold gives the depth map any strokes",
-        "không ngưỡng nào cho bản đồ độ sâu có nét",
-    ),
-    (
-        "print has no ink to tell from paper: their greys differ by {} of full white",
-        "không phân biệt được mực với giấy trên bản in: mức xám chỉ chênh {0} so với trắng hoàn toàn",
-    ),
-    (
-        "if you see ink, raise the contrast of the image",
-        "nếu bạn thấy mực, hãy tăng độ tương phản của hình",
-    ),
-    (
-        "print shows the character with {} px, too few to tell its strokes, needs {} px",
-        "chữ trên bản in chỉ có {0} điểm ảnh, quá ít để phân biệt các nét, cần {1} điểm ảnh",
-    ),
-    (
-        "scan or photograph it at a higher resolution",
-        "hãy quét hoặc chụp với độ phân giải cao hơn",
-    ),
-    // Blocks.
-    (
-        "the page does not belong to this block: at the best position found, {} % of the places agree",
-        "trang in không thuộc ván này: ở vị trí tốt nhất tìm được, {0} % số chỗ khớp nhau",
-    ),
-    (
-        "on the right page nearly all do",
-        "với trang in đúng, hầu hết các chỗ đều khớp",
-    ),
-    (
-        "the scan was taken to be {} x {} mm",
-        "bản quét được coi là có cỡ {0} x {1} mm",
-    ),
-    (
-        "check the file names and the unit",
-        "hãy kiểm tra tên tệp và đơn vị",
-    ),
-    (
-        "the scan shows no carved face: {}",
-        "bản quét không có mặt khắc: {0}",
-    ),
-    (
-        "is this the scan of a whole block?",
-        "đây có phải bản quét của cả ván không?",
-    ),
-];
-
-/// Kinds of files as messages name them, by the last words of the English name.
-const KINDS: [(&str, &str); 8] = [
-    (" image", "hình "),
-    (" mesh", "lưới "),
-    (" scene", "cảnh 3D "),
-    (" model", "mô hình "),
-    (" point cloud", "đám mây điểm "),
-    (" document", "tài liệu "),
-    (" archive", "tệp nén "),
-    (" database", "cơ sở dữ liệu "),
-];
 
 /// Returns a message of the program in Vietnamese if its beginning is known. Parts that are not known stay as they are.
 pub(super) fn vietnamese(text: &str) -> Option<String> {
@@ -290,7 +40,9 @@ fn clause(text: &str) -> Option<String> {
         let found = MESSAGES.iter().find_map(|(english, vietnamese)| {
             let parts = parts_of(message, english)?;
             let is_clean = parts.iter().all(|part| !part.contains("; "));
-            is_clean.then(|| filled(vietnamese, &parts))
+            // The first part of these may begin behind a colon, but not before it.
+            let begins_here = !english.starts_with("{} ") || !parts[0].contains(": ");
+            (is_clean && begins_here).then(|| filled(vietnamese, &parts))
         })?;
         let known = before.strip_suffix(": ").and_then(clause);
         let before = known.map_or_else(|| before.to_owned(), |known| format!("{known}: "));
@@ -366,6 +118,14 @@ mod tests {
                 "thiếu 60 tệp nên chưa nhập gì:\n  pairs.csv: dòng 2: không có bản quét m/0.stl của 0\n  và 59 mục khác",
             ),
             (
+                "60 files are missing or a folder, nothing was imported:\n  new words",
+                "không dùng được 60 tệp nên chưa nhập gì:\n  new words",
+            ),
+            (
+                "1 file is missing or a folder, nothing was imported:",
+                "không dùng được 1 tệp nên chưa nhập gì:",
+            ),
+            (
                 "ignored, a glTF scene is not read: m/b.glb and 1 more; open them in MeshLab, Blender or CloudCompare and export them as PLY",
                 "bỏ qua, không đọc được cảnh 3D glTF: m/b.glb và 1 tệp khác; hãy mở chúng bằng MeshLab, Blender hoặc CloudCompare rồi xuất thành PLY",
             ),
@@ -397,6 +157,14 @@ mod tests {
                 "p/data/meshes/0.ply is not there",
                 "không có tệp p/data/meshes/0.ply",
             ),
+            (
+                "no labels for x: y is not there",
+                "no labels for x: không có tệp y",
+            ),
+            (
+                "b1: p/1.ply may not be read: permission denied",
+                "b1: không có quyền đọc p/1.ply",
+            ),
         ] {
             assert_eq!(vietnamese(english).as_deref(), Some(expected));
         }
@@ -417,6 +185,7 @@ mod tests {
                     open.push(path);
                 } else if path.extension().is_some_and(|extension| extension == "rs")
                     && !path.ends_with("message_words.rs")
+                    && !path.ends_with("message_table.rs")
                 {
                     all += &std::fs::read_to_string(path).expect("a source");
                 }

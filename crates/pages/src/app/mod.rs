@@ -31,6 +31,7 @@ mod import_preview;
 mod invitation_cards;
 mod invitations;
 mod last_import;
+mod message_table;
 mod message_words;
 mod number_text;
 mod open_pages;
