@@ -21,6 +21,7 @@ mod exports;
 mod failed_runs;
 mod failure;
 mod failure_page;
+mod file_in_progress;
 mod folder_picker;
 mod health_page;
 mod home;

@@ -1,9 +1,9 @@
 //! What a browser asks for to send files: an upload, each of its files, and its end.
 
 use std::path::Path as FilePath;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::sync::{Arc, Weak};
+use std::time::{Duration, Instant};
 
 use axum::Json;
 use axum::extract::{Path, Request, State};
@@ -26,6 +26,8 @@ use mocban_system::time_text::day;
 
 /// Longest time in which a browser sends nothing of a file.
 const MAX_PAUSE: Duration = Duration::from_mins(1);
+/// Time between two looks at whether an upload was left.
+const CLEANING_INTERVAL: Duration = Duration::from_mins(10);
 /// Longest name of the folder of an upload, characters.
 const MAX_NAME: usize = 60;
 
@@ -45,15 +47,31 @@ pub(super) async fn begin(
     ActionBody(body): ActionBody<UploadBody>,
 ) -> AppResult<Json<Value>> {
     let name = folder_name(&body.name);
+    let shared = Arc::clone(&state);
     let begun = spawn_blocking(move || {
-        let folder = &state.options.folder;
+        let folder = &shared.options.folder;
         // Otherwise the files could not be imported.
         utf8(&PickerRoots::new(folder).allowed(folder)?)?;
-        state.uploads.begin(name, body.files, body.bytes)
+        shared.uploads.begin(name, body.files, body.bytes)
     });
     let begun = begun.await;
     let (id, arrived) = begun.map_err(|_panicked| WorkFailed)??;
+    tokio::spawn(remove_if_left(Arc::downgrade(&state), id));
     Ok(Json(json!({ "upload": id, "arrived": arrived })))
+}
+
+/// Removes the files of an upload if nobody goes on with it after it broke off. Returns when it has ended.
+async fn remove_if_left(state: Weak<AppState>, id: u64) {
+    loop {
+        tokio::time::sleep(CLEANING_INTERVAL).await;
+        let Some(Ok(upload)) = state.upgrade().map(|state| state.uploads.find(id)) else {
+            return;
+        };
+        let ended = spawn_blocking(move || upload.end_if_left(Instant::now()));
+        if ended.await.unwrap_or(true) {
+            return;
+        }
+    }
 }
 
 /// Returns the name of the folder for an upload.
@@ -87,9 +105,7 @@ pub(super) async fn receive(
             Some(Err(_cut)) => break,
             None => FilePiece::End,
         };
-        let is_end = matches!(piece, FilePiece::End);
-        // Nobody receives if the file was refused; `finish` has the reason.
-        if file.pieces.send(piece).await.is_err() || is_end {
+        if !file.pass(piece).await {
             break;
         }
     }

@@ -178,6 +178,14 @@ pub(super) fn busy() -> Sentence {
     )
 }
 
+/// Says that the connection of an earlier upload seems to be cut.
+pub(super) fn silent() -> Sentence {
+    Sentence::new(
+        "nothing more arrives of another upload with this name: if its connection was cut, choose the same files again in a minute; what has arrived is then not sent again",
+        "một lần gửi cùng tên không còn nhận thêm được gì: nếu kết nối của lần đó bị ngắt, hãy chọn lại đúng các tệp đó sau một phút; phần đã đến nơi khi đó không phải gửi lại",
+    )
+}
+
 /// Says that an upload is already being stored.
 pub(super) fn storing() -> Sentence {
     Sentence::new(

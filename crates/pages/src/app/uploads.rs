@@ -10,12 +10,13 @@ use tokio::sync::mpsc;
 use tokio::task::spawn_blocking;
 
 use super::failure::{AppFailure, AppResult};
+use super::file_in_progress::{FileInProgress, LastPiece};
 use super::received_archive::take_file;
-use super::received_files::{ArrivedFile, FilePiece, ReceivedCount, ReceivedFiles, check_room};
+use super::received_files::{ArrivedFile, ReceivedCount, ReceivedFiles, check_room};
 use super::sentence::Sentence;
 use super::upload_sentence::{
     MAX_FILES, busy, cut, cut_with_rest, ended, incomplete, left_over, not_written, nothing,
-    storing, too_many, too_many_uploads,
+    silent, storing, too_many, too_many_uploads,
 };
 use crate::local_server::WorkFailed;
 use mocban_core::domain::cancel::{CancelGuard, CancelToken};
@@ -27,6 +28,8 @@ pub(super) const FOLDER: &str = "uploads";
 const MAX_OPEN: usize = 4;
 /// A browser that has sent nothing for this long between two files is closed.
 const MAX_IDLE: Duration = Duration::from_secs(30);
+/// A browser of which nothing arrives for this long in a file may have lost its connection.
+const MAX_SILENT: Duration = Duration::from_secs(5);
 /// How long the files of an upload that broke off are kept for the same files.
 const MAX_BROKEN: Duration = Duration::from_hours(1);
 /// Pieces of a file that wait to be written. A piece has at most 64 KiB.
@@ -50,6 +53,7 @@ pub(super) struct FileUpload {
     announced: AtomicU64,
     arrived: AtomicU64,
     pub(super) count: Arc<ReceivedCount>,
+    last_piece: LastPiece,
     state: Mutex<UploadState>,
 }
 
@@ -65,15 +69,6 @@ enum UploadState {
     Broken(Box<ReceivedFiles>, Instant, Sentence),
     /// Nothing is kept, or all has its folder. Says why if it failed.
     Ended(Option<Sentence>),
-}
-
-/// A file that is being received.
-#[derive(Debug)]
-pub(super) struct FileInProgress {
-    pub(super) pieces: mpsc::Sender<FilePiece>,
-    written: tokio::task::JoinHandle<Result<(), Sentence>>,
-    /// Ends the work if nobody waits for it any more.
-    cancels: CancelGuard,
 }
 
 impl Uploads {
@@ -99,7 +94,7 @@ impl Uploads {
     /// Returns its number, and the files that need not be sent again. Waits for the disk.
     ///
     /// # Errors
-    /// Refuses too many files, and more bytes than the disk has room for.
+    /// Refuses too many files, more bytes than the disk has room for, and files of which another upload may soon break off.
     pub(super) fn begin(
         &self,
         name: String,
@@ -127,6 +122,9 @@ impl Uploads {
         if let Some(resumed) = resumed {
             return Ok(resumed);
         }
+        if self.has_silent(&name) {
+            return refuse(silent());
+        }
         if !self.make_place() {
             return refuse(too_many_uploads());
         }
@@ -139,6 +137,7 @@ impl Uploads {
             announced: AtomicU64::new(files),
             arrived: AtomicU64::new(0),
             count,
+            last_piece: LastPiece::default(),
             state: Mutex::new(UploadState::Ready(received, Instant::now())),
         };
         let upload = Arc::new(upload);
@@ -159,16 +158,26 @@ impl Uploads {
         named.find_map(|(id, upload)| Some((*id, upload.resume(files)?)))
     }
 
-    /// Removes uploads that ended, and those whose browser is closed. Broken ones stay for a while if there is place.
-    /// Returns whether there is place for another.
+    /// Returns whether an upload of this name seems to have lost its connection after files had arrived.
+    fn has_silent(&self, name: &str) -> bool {
+        let now = Instant::now();
+        let open = self.lock();
+        let mut named = open.values().filter(|upload| upload.name == name);
+        named.any(|upload| upload.is_silent(now))
+    }
+
+    /// Removes uploads that ended, and those whose browser is closed. Broken ones stay for a while, except for the oldest if
+    /// there is no place. Returns whether there is place for another.
     fn make_place(&self) -> bool {
         let removed: Vec<_> = {
             let mut open = self.lock();
             let is_over = |_: &u64, upload: &mut Arc<FileUpload>| upload.is_over();
             let mut removed: Vec<_> = open.extract_if(.., is_over).collect();
             if open.len() >= MAX_OPEN {
-                let is_broken = |_: &u64, upload: &mut Arc<FileUpload>| upload.is_broken();
-                removed.extend(open.extract_if(.., is_broken));
+                let broken = open.iter();
+                let broken = broken.filter_map(|(id, upload)| Some((upload.broken_since()?, *id)));
+                let oldest = broken.min();
+                removed.extend(oldest.and_then(|(_, id)| open.remove_entry(&id)));
             }
             removed
         };
@@ -214,6 +223,7 @@ impl FileUpload {
     ) -> AppResult<FileInProgress> {
         let token = CancelToken::default();
         let received = self.take(UploadState::Busy(token.clone()))?;
+        self.last_piece.set(Some(Instant::now()));
         let (pieces, arriving) = mpsc::channel(WAITING_PIECES);
         let cancels = CancelGuard(token.clone());
         let (upload, path) = (Arc::clone(self), path.to_owned());
@@ -249,6 +259,7 @@ impl FileUpload {
         Ok(FileInProgress {
             pieces,
             written,
+            last_piece: self.last_piece.clone(),
             cancels,
         })
     }
@@ -375,8 +386,35 @@ impl FileUpload {
         }
     }
 
-    fn is_broken(&self) -> bool {
-        matches!(*self.lock(), UploadState::Broken(..))
+    fn broken_since(&self) -> Option<Instant> {
+        match *self.lock() {
+            UploadState::Broken(_, since, _) => Some(since),
+            _ => None,
+        }
+    }
+
+    /// Returns whether a file stopped arriving after others had arrived.
+    fn is_silent(&self, now: Instant) -> bool {
+        let is_arriving = matches!(*self.lock(), UploadState::Busy(_));
+        let last = self.last_piece.get().filter(|_| is_arriving);
+        let is_silent = last.is_some_and(|last| now.duration_since(last) > MAX_SILENT);
+        is_silent && self.arrived.load(Ordering::Relaxed) > 0
+    }
+
+    /// Ends an upload with which nobody has gone on for [`MAX_BROKEN`], and removes its files. Returns whether it has ended.
+    pub(super) fn end_if_left(&self, now: Instant) -> bool {
+        let mut state = self.lock();
+        let is_left = match &*state {
+            UploadState::Ready(_, since) | UploadState::Broken(_, since, _) => {
+                now.duration_since(*since) > MAX_BROKEN
+            }
+            UploadState::Busy(_) | UploadState::Storing => false,
+            UploadState::Ended(_) => return true,
+        };
+        let left = is_left.then(|| std::mem::replace(&mut *state, UploadState::Ended(None)));
+        drop(state);
+        // Removes the files without the lock.
+        left.is_some()
     }
 
     fn lock(&self) -> MutexGuard<'_, UploadState> {
@@ -404,25 +442,6 @@ impl Drop for UploadEnding {
     fn drop(&mut self) {
         let next = std::mem::replace(&mut self.next, UploadState::Ended(None));
         self.upload.settle(next);
-    }
-}
-
-impl FileInProgress {
-    /// Waits until the file is written.
-    ///
-    /// # Errors
-    /// Returns why the file is refused. Nothing of the upload is kept then.
-    pub(super) async fn finish(self) -> AppResult<()> {
-        let Self {
-            pieces,
-            written,
-            cancels,
-        } = self;
-        drop(pieces);
-        let written = written.await;
-        drop(cancels);
-        let written = written.map_err(|_panicked| WorkFailed)?;
-        written.map_err(AppFailure::refused)
     }
 }
 

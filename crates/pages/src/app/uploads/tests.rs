@@ -1,11 +1,13 @@
 //! Uploads that begin at once, that are stored, and that end after a panic.
 
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier};
 use std::time::Instant;
 
-use super::{ArrivedFile, MAX_OPEN, UploadEnding, UploadState, Uploads};
+use super::{ArrivedFile, MAX_BROKEN, MAX_OPEN, MAX_SILENT, UploadEnding, UploadState, Uploads};
 use crate::app::failure::AppResult;
 use crate::app::upload_sentence::cut;
+use mocban_core::domain::cancel::CancelToken;
 
 #[test]
 fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
@@ -73,4 +75,65 @@ fn an_upload_that_broke_off_goes_on_once() {
     let begun = begin_two(&uploads).map(|begun| begun.expect("begun").0);
     assert_ne!(begun[0], begun[1]);
     assert!(begun.contains(&broken), "{begun:?}");
+}
+
+/// Begins an upload that broke off at a time.
+fn broken(uploads: &Uploads, name: &str, since: Instant) -> u64 {
+    let (id, _) = uploads.begin(name.to_owned(), 1, 1).expect("a place");
+    let upload = uploads.find(id).expect("an upload");
+    let received = upload.take(UploadState::Storing).expect("ready");
+    *upload.lock() = UploadState::Broken(received, since, cut());
+    id
+}
+
+#[test]
+fn a_new_upload_takes_the_place_of_the_oldest_broken_one_alone() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let uploads = Uploads::new(dir.path());
+    let now = Instant::now();
+    let ages = [2, 3, 1, 0];
+    let ids = ages.map(|age| broken(&uploads, &format!("broken {age}"), now + MAX_SILENT * age));
+    uploads.begin("new".to_owned(), 1, 1).expect("a place");
+    assert_eq!(
+        ids.map(|id| uploads.find(id).is_ok()),
+        [true, true, true, false]
+    );
+}
+
+#[test]
+fn files_are_not_sent_twice_while_their_first_upload_may_break_off() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let uploads = Uploads::new(dir.path());
+    let (id, _) = uploads.begin("x".to_owned(), 2, 1).expect("begun");
+    let upload = uploads.find(id).expect("an upload");
+    let _received = upload.take(UploadState::Busy(CancelToken::default()));
+    let now = Instant::now();
+    let later = now + MAX_SILENT * 2;
+    upload.last_piece.set(Some(now));
+    assert!(!upload.is_silent(later), "no file has arrived");
+    upload.arrived.store(1, Ordering::Relaxed);
+    assert!(upload.is_silent(later));
+    assert!(!upload.is_silent(now), "it goes on");
+    let before = now.checked_sub(MAX_SILENT * 2);
+    let before = before.expect("a computer that started earlier");
+    upload.last_piece.set(Some(before));
+    uploads.begin("x".to_owned(), 2, 1).expect_err("silent");
+    uploads.begin("y".to_owned(), 2, 1).expect("other files");
+    upload.last_piece.set(Some(now));
+    uploads.begin("x".to_owned(), 2, 1).expect("another one");
+    upload.last_piece.set(None);
+    assert!(!upload.is_silent(later), "an archive is unpacked");
+}
+
+#[test]
+fn files_of_a_broken_upload_are_removed_after_their_time() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let uploads = Uploads::new(dir.path());
+    let now = Instant::now();
+    let upload = uploads.find(broken(&uploads, "x", now)).expect("an upload");
+    assert!(!upload.end_if_left(now + MAX_BROKEN));
+    assert!(upload.broken_since().is_some());
+    assert!(upload.end_if_left(now + MAX_BROKEN * 2));
+    assert!(matches!(*upload.lock(), UploadState::Ended(None)));
+    assert!(upload.end_if_left(now), "nothing is left to remove");
 }

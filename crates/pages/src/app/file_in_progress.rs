@@ -1,0 +1,66 @@
+//! A file of an upload while it arrives.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use tokio::sync::mpsc;
+use tokio::task::JoinHandle;
+
+use super::failure::{AppFailure, AppResult};
+use super::received_files::FilePiece;
+use super::sentence::Sentence;
+use crate::local_server::WorkFailed;
+use mocban_core::domain::cancel::CancelGuard;
+
+/// When the last piece of a file arrived. `None` if no file is arriving, as while an archive is unpacked.
+#[derive(Debug, Clone, Default)]
+pub(super) struct LastPiece(Arc<Mutex<Option<Instant>>>);
+
+impl LastPiece {
+    pub(super) fn get(&self) -> Option<Instant> {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn set(&self, at: Option<Instant>) {
+        // A single assignment.
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = at;
+    }
+}
+
+/// A file that is being received.
+#[derive(Debug)]
+pub(super) struct FileInProgress {
+    pub(super) pieces: mpsc::Sender<FilePiece>,
+    pub(super) written: JoinHandle<Result<(), Sentence>>,
+    pub(super) last_piece: LastPiece,
+    /// Ends the work if nobody waits for it any more.
+    pub(super) cancels: CancelGuard,
+}
+
+impl FileInProgress {
+    /// Passes a piece on. Returns whether more pieces are wanted.
+    pub(super) async fn pass(&self, piece: FilePiece) -> bool {
+        let is_end = matches!(piece, FilePiece::End);
+        self.last_piece.set((!is_end).then(Instant::now));
+        // Nobody receives if the file was refused; `finish` has the reason.
+        self.pieces.send(piece).await.is_ok() && !is_end
+    }
+
+    /// Waits until the file is written.
+    ///
+    /// # Errors
+    /// Returns why the file is refused. Nothing of the upload is kept then.
+    pub(super) async fn finish(self) -> AppResult<()> {
+        let Self {
+            pieces,
+            written,
+            last_piece: _,
+            cancels,
+        } = self;
+        drop(pieces);
+        let written = written.await;
+        drop(cancels);
+        let written = written.map_err(|_panicked| WorkFailed)?;
+        written.map_err(AppFailure::refused)
+    }
+}
