@@ -108,6 +108,9 @@ fn a_refused_block_is_named_by_run_status_show_and_retry() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     write_blocks(dir.path(), &["b1"]);
     project(dir.path(), &["import", "blocks.csv"]).expect(0);
+    let sheet = project(dir.path(), &["contact-sheet", "b1"]).expect(4);
+    let reason = "block b1 has no pairs yet";
+    assert!(sheet.err.contains(reason), "{}", sheet.err);
     let plan = project(dir.path(), &["run", "--dry-run", "--json"])
         .expect(0)
         .json();

@@ -85,7 +85,10 @@ async fn refuse_block(catalog: &Catalog, typed: &str) -> ProjectResult<()> {
     .into())
 }
 
-/// Looks up pairs by their ids or those of their blocks. Returns `None`, which means all pairs, if no id is given.
+/// Looks up pairs by their ids or those of their blocks, each once. Returns `None`, which means all pairs, if no id is given.
+///
+/// # Errors
+/// Returns an error like [`pairs_and_blocks`], and if a block has no pairs.
 pub(crate) async fn some_or_all(
     catalog: &Catalog,
     typed: &[String],
@@ -95,9 +98,30 @@ pub(crate) async fn some_or_all(
     }
     let NamedWork { mut pairs, blocks } = pairs_and_blocks(catalog, typed).await?;
     for block in blocks {
-        pairs.extend(catalog.pairs_of_listed_block(block.as_str()).await?);
+        let of_block = catalog.pairs_of_listed_block(block.as_str()).await?;
+        if of_block.is_empty() {
+            let known = catalog.pairs_of_block_with_retired(block.as_str()).await?;
+            return Err(no_pairs(&block, !known.is_empty()).into());
+        }
+        pairs.extend(of_block);
     }
+    keep_each_once(&mut pairs);
     Ok(Some(pairs))
+}
+
+/// Removes the pairs that occur earlier in a list.
+fn keep_each_once(pairs: &mut Vec<PairName>) {
+    let mut seen = BTreeSet::new();
+    pairs.retain(|pair| seen.insert(pair.clone()));
+}
+
+/// Refuses a block without pairs.
+fn no_pairs(block: &BlockName, are_retired: bool) -> Refusal {
+    Refusal::NothingSelected(if are_retired {
+        format!("all pairs of block {block} are retired; `status --retired` lists them")
+    } else {
+        format!("block {block} has no pairs yet; `run` cuts them")
+    })
 }
 
 /// Looks up one pair.
@@ -123,7 +147,7 @@ pub async fn block(catalog: &Catalog, typed: &str) -> ProjectResult<Option<Block
 }
 
 /// Looks up pairs and blocks by their ids. An id of both is that of the pair. The id of a block that only lists of pairs
-/// have stands for its pairs.
+/// have stands for its pairs. Returns each pair once.
 ///
 /// # Errors
 /// Returns an error if there is neither a pair nor a block with an id, or a pair is retired.
@@ -157,6 +181,7 @@ pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectRes
             .await?
             .into());
     }
+    keep_each_once(&mut found.pairs);
     refuse_retired(catalog, &found.pairs).await?;
     Ok(found)
 }
@@ -182,10 +207,7 @@ pub async fn known_pairs_of(catalog: &Catalog, typed: &[String]) -> ProjectResul
         if of_block.is_empty() {
             let all = catalog.block_names().await?;
             let refusal = match block.filter(|name| all.contains(name)) {
-                Some(block) => {
-                    let text = format!("block {block} has no pairs yet; `run` cuts them");
-                    Refusal::NothingSelected(text)
-                }
+                Some(block) => no_pairs(&block, false),
                 None => no_such_pair_or_block(catalog, text, &all).await?,
             };
             return Err(refusal.into());
@@ -242,7 +264,7 @@ fn no_such<'a>(what: &str, typed: &str, all: impl Iterator<Item = &'a str> + Clo
 
 #[cfg(test)]
 mod tests {
-    use super::{no_such, pairs_and_blocks};
+    use super::{no_such, pairs_and_blocks, some_or_all};
     use crate::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
     use crate::location::Location;
     use crate::pair_choices::PairChoices;
@@ -280,6 +302,14 @@ mod tests {
             pairs_and_blocks(&catalog, &["Ván 03".to_owned()])
                 .await
                 .is_err()
+        );
+        // Pairs that are named beside their block.
+        let typed = ["c", "Ván 01", "c"].map(str::to_owned);
+        let chosen = some_or_all(&catalog, &typed).await.expect("pairs");
+        let chosen = chosen.expect("not all");
+        assert_eq!(
+            chosen.iter().map(PairName::as_str).collect::<Vec<_>>(),
+            ["c", "a"]
         );
         catalog.close().await;
     }
