@@ -215,8 +215,12 @@ fn a_run_takes_its_names_from_a_file_or_the_standard_input() {
             .stdin(fs::File::open(&file).expect("a file"));
         call(&mut run)
     };
-    // As programs of Windows write it.
-    fs::write(&file, "\u{feff}upright-0000\r\n\r\nupright-0002\r\n").expect("written");
+    // As programs of Windows write it, with blanks of a spreadsheet.
+    fs::write(
+        &file,
+        "\u{feff}upright-0000 \r\n\r\n\tupright-0002\r\n \r\n",
+    )
+    .expect("written");
     for (args, pairs) in [
         (&["-"][..], 2),
         (&["names.txt"], 2),

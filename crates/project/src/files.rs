@@ -12,7 +12,8 @@ use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::relative_path::SYSTEM_FOLDERS;
 use mocban_lists::workbook::{is_workbook, read_sheet};
 use mocban_store::{
-    CATALOG_FILE, Project, create_folders, open_regular, read_file_or_pipe, write_atomic,
+    CATALOG_FILE, Project, create_folders, open_regular, read_file_or_pipe, read_up_to,
+    write_atomic,
 };
 
 /// Longest list that is read, in bytes.
@@ -27,6 +28,12 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
         return Err(Refusal::Usage(text));
     }
     Ok(bytes)
+}
+
+/// Reads a list from the standard input, like [`read`].
+pub fn read_stdin() -> Result<Vec<u8>, Refusal> {
+    read_up_to(std::io::stdin().lock(), MAX_LIST_BYTES)
+        .map_err(|error| Refusal::Usage(format!("cannot read the standard input: {error}")))
 }
 
 /// A list that was read.

@@ -49,7 +49,7 @@ pub use inputs::{InputFile, InputReader, hash_input, open_input, read_input, sta
 pub use lock::{LockError, RunLock};
 pub use mocban_core::domain::CATALOG_FILE;
 pub use new_folder::NewFolder;
-pub use open_file::{open_regular, read_file_or_pipe};
+pub use open_file::{open_regular, read_file_or_pipe, read_up_to};
 pub use place_owner::PlaceError;
 pub use project::{Project, SETTINGS_FILE, StoreError};
 pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};

@@ -1,7 +1,7 @@
 //! Opening files of users. Opening a pipe waits for a writer, and some devices never end, so the type is checked first.
 
 use std::fs::{File, Metadata};
-use std::io::{self, Read as _};
+use std::io::{self, Read};
 use std::path::Path;
 
 use super::input_error::{InputError, with_advice};
@@ -44,16 +44,25 @@ pub fn read_file_or_pipe(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
         // A pipe is opened as usual: this waits until its writer has opened it too.
         let file = File::open(path)?;
         check_readable(&file.metadata()?)?;
-        let mut bytes = Vec::new();
-        file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > limit {
-            let text =
-                format!("it has more than {limit} bytes, the most that is read of such a file");
-            return Err(io::Error::other(text));
-        }
-        Ok(bytes)
+        read_up_to(file, limit)
     };
     read().map_err(with_advice)
+}
+
+/// Reads to the end, such as of the standard input.
+///
+/// # Errors
+/// Returns an error if reading fails, or there are more than `limit` bytes.
+pub fn read_up_to(input: impl Read, limit: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    input
+        .take(limit.saturating_add(1))
+        .read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        let text = format!("it has more than {limit} bytes, the most that is read of such a file");
+        return Err(io::Error::other(text));
+    }
+    Ok(bytes)
 }
 
 fn check_regular(path: &Path, meta: &Metadata) -> Result<(), InputError> {
@@ -97,7 +106,7 @@ mod tests {
 
     #[cfg(unix)]
     use super::open_regular;
-    use super::read_file_or_pipe;
+    use super::{read_file_or_pipe, read_up_to};
 
     #[cfg(unix)]
     fn pipe(path: &Path) {
@@ -144,6 +153,8 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("pairs.csv");
         std::fs::write(&path, "id,mesh,print\n").expect("written");
+        assert!(read_up_to(&b"abc"[..], 3).is_ok());
+        read_up_to(&b"abc"[..], 2).expect_err("too long");
         assert!(read_file_or_pipe(&path, 14).is_ok());
         let refused = read_file_or_pipe(&path, 13).expect_err("too long");
         assert!(

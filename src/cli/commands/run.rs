@@ -1,6 +1,5 @@
 //! `run`: aligns the pairs that are not aligned yet and reports the outcome.
 
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -17,7 +16,7 @@ use mocban_config::Config;
 use mocban_core::domain::Stage;
 use mocban_project::files;
 use mocban_project::run::{self, PreparedRun, RunOutcome, TWO_METHODS};
-use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{RunOptions, RunPart, RunPlan, RunSummary, Stop};
 
 /// Arguments of `run`.
@@ -122,11 +121,7 @@ fn all_names(args: &RunArgs) -> ProjectResult<Vec<String>> {
         return Ok(names);
     };
     let (shown, bytes) = if file == Path::new("-") {
-        let mut bytes = Vec::new();
-        std::io::stdin()
-            .read_to_end(&mut bytes)
-            .map_err(|error| ProjectError::unexpected(format!("cannot read the names: {error}")))?;
-        ("the standard input".to_owned(), bytes)
+        ("the standard input".to_owned(), files::read_stdin()?)
     } else {
         (file.display().to_string(), files::read(file)?)
     };
@@ -134,7 +129,7 @@ fn all_names(args: &RunArgs) -> ProjectResult<Vec<String>> {
         return Err(Refusal::Usage(format!("{shown} is not UTF-8; write it as UTF-8")).into());
     };
     let before = names.len();
-    let lines = text.trim_start_matches('\u{feff}').lines();
+    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
     names.extend(lines.filter(|line| !line.is_empty()).map(str::to_owned));
     if names.len() == before {
         let text = format!("{shown} has no names; write one a line");
