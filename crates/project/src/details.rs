@@ -81,7 +81,7 @@ pub async fn read(id: &str, catalog: &Catalog, location: &Location) -> ProjectRe
         return Err(ProjectError::unexpected(format!("{id} was not looked up")));
     };
     if !id.parse().is_ok_and(|typed: PairName| typed == *name) {
-        let rows = pair_table::of_pairs(catalog, &pairs).await?;
+        let rows = pair_table::of_listed_block(catalog, id).await?;
         return Ok(Details::ListedBlock(rows));
     }
     let fingerprints = fingerprints(&location.settings()?.config.stages);

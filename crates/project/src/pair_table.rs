@@ -80,14 +80,11 @@ pub async fn read(catalog: &Catalog, choice: PairChoice) -> ProjectResult<Vec<Pa
     Ok(rows)
 }
 
-/// Reads the lines of these pairs, in this order.
-pub(crate) async fn of_pairs(catalog: &Catalog, names: &[PairName]) -> ProjectResult<Vec<PairRow>> {
-    let mut rows = Vec::new();
-    for name in names {
-        let detail = catalog.pair(name).await?;
-        rows.extend(detail.and_then(|detail| row(&detail.results, PairChoice::All)));
-    }
-    Ok(rows)
+/// Reads the lines of the pairs that a list assigns to a block, by id.
+pub(crate) async fn of_listed_block(catalog: &Catalog, block: &str) -> ProjectResult<Vec<PairRow>> {
+    let pairs = catalog.results_of_listed_block(block).await?;
+    let rows = pairs.iter().filter_map(|pair| row(pair, PairChoice::All));
+    Ok(rows.collect())
 }
 
 /// Returns the line of a pair, if it is chosen. Low confidence means the same as in `status`.

@@ -46,6 +46,8 @@ const ONE: &str = select_pairs!("p.name = ?1");
 pub(crate) const BY_IDS: &str =
     select_pairs!("p.id IN (SELECT CAST(wanted.atom AS bigint) FROM json_each(?1) AS wanted)");
 
+const OF_BLOCK: &str = select_pairs!("p.block = ?1 ORDER BY p.name");
+
 pub(crate) const FAILED: &str = "
 SELECT p.name, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at
 FROM job AS j JOIN pair AS p ON p.id = j.pair JOIN failure AS f ON f.pair = j.pair
@@ -69,6 +71,14 @@ impl Catalog {
         let mut conn = self.snapshot().await?;
         let found = self.bind_left_out(query(PAGE).bind(after.map_or("", PairName::as_str)));
         let found = found.bind(limit as i64).fetch_all(&mut conn).await?;
+        assemble(&mut conn, &found, &self.left_out).await
+    }
+
+    /// Returns the pairs that a list assigns to a block with this id, sorted by name, without retired pairs.
+    pub async fn results_of_listed_block(&self, block: &str) -> Result<Vec<PairResults>> {
+        let mut conn = self.snapshot().await?;
+        let found = self.bind_left_out(query(OF_BLOCK).bind(block));
+        let found = found.fetch_all(&mut conn).await?;
         assemble(&mut conn, &found, &self.left_out).await
     }
 
@@ -111,7 +121,7 @@ impl Catalog {
         Ok(ids.iter().filter_map(|id| by_id.remove(id)).collect())
     }
 
-    /// Binds the parameters `?2` and `?3` of [`PAGE`], [`ONE`] and [`BY_IDS`].
+    /// Binds the parameters `?2` and `?3` of [`PAGE`], [`ONE`], [`BY_IDS`] and [`OF_BLOCK`].
     fn bind_left_out<R>(&self, query: Query<R>) -> Query<R> {
         let query = query.bind(self.left_out.of(ChecksummedTable::Pair));
         query.bind(self.left_out.of(ChecksummedTable::Truth))
