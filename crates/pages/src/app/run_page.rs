@@ -296,6 +296,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
     let failed = run.jobs(JobStatus::Quarantined);
     html! {
         @if let Some(text) = outdated_text(visit, run) { p.notice #outdated { (text) } }
+        @if let Some(text) = other_files_text(visit, run) { p.notice #other-files { (text) } }
         (action_form("actions/run", "inline run-form", &html! {
             label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
@@ -312,7 +313,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
                 button name="which" value="failed" { (visit.t("Try failed pairs again", "Thử lại các cặp lỗi")) }
             }
         }))
-        @if is_idle && failed == 0 && run.counts.pairs > 0 {
+        @if is_idle && failed == 0 && run.counts.other_files == 0 && run.counts.pairs > 0 {
             p.good { (visit.t("Everything is aligned. Next: judge a sample of the results.", "Mọi thứ đã được căn chỉnh. Tiếp theo: đánh giá một mẫu kết quả.")) " "
                 a href="review" { (visit.t("Review", "Đánh giá")) } }
         }
@@ -338,6 +339,25 @@ fn outdated_text(visit: &Visit, run: &RunState) -> Option<String> {
         (Language::Vietnamese, _) => {
             Some("Các cặp cần căn chỉnh đã chạy trước đây với thiết lập hoặc tệp khác.".to_owned())
         }
+    }
+}
+
+/// Says that a list names other files of aligned pairs, which no run has read.
+fn other_files_text(visit: &Visit, run: &RunState) -> Option<String> {
+    let number = run.counts.other_files;
+    let pairs = grouped(number);
+    match (visit.language, number) {
+        (_, 0) => None,
+        (Language::English, 1) => Some(
+            "1 aligned pair has another mesh or print in the list than before: the next run reads it."
+                .to_owned(),
+        ),
+        (Language::English, _) => Some(format!(
+            "{pairs} aligned pairs have another mesh or print in the list than before: the next run reads them."
+        )),
+        (Language::Vietnamese, _) => Some(format!(
+            "{pairs} cặp đã căn chỉnh có bản quét hoặc bản in khác trong danh sách so với trước: lần chạy tới sẽ đọc các tệp đó."
+        )),
     }
 }
 

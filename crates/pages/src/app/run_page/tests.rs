@@ -135,6 +135,34 @@ fn a_finished_project_can_be_searched_for_changed_files() {
 }
 
 #[test]
+fn pairs_with_other_files_in_the_list_are_named_in_both_languages() {
+    let mut run = running(Vec::new());
+    run.is_running = false;
+    run.counts.jobs = BTreeMap::from([(JobStatus::Done, 20)]);
+    let shown =
+        |run: &RunState, language| controls(&Visit::in_language(language), run).into_string();
+    let before = shown(&run, Language::English);
+    assert!(before.contains("Everything is aligned"), "{before}");
+    assert!(!before.contains("other-files"), "{before}");
+    run.counts.other_files = 2;
+    for (language, text) in [
+        (
+            Language::English,
+            "2 aligned pairs have another mesh or print",
+        ),
+        (
+            Language::Vietnamese,
+            "2 cặp đã căn chỉnh có bản quét hoặc bản in khác",
+        ),
+    ] {
+        let shown = shown(&run, language);
+        assert!(shown.contains(text), "{shown}");
+    }
+    let after = shown(&run, Language::English);
+    assert!(!after.contains("Everything is aligned"), "{after}");
+}
+
+#[test]
 fn an_interrupted_pair_with_outdated_results_is_counted_once() {
     let mut run = running(Vec::new());
     run.is_running = false;
