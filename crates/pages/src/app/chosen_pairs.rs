@@ -171,7 +171,7 @@ pub(super) async fn change(
             ("retire", ["at", &at.to_string()].map(str::to_owned))
         }
         ChosenChange::Review => {
-            let key = state.chosen.keep(&chosen);
+            let key = state.chosen.keep(&open.key, &chosen);
             return Ok(Json(json!({ "go": format!("review?{CHOSEN}={key}") })));
         }
     };

@@ -65,7 +65,7 @@ async fn guest_pages(
     choice: &str,
 ) -> AppResult<(Router, Arc<GuestReview>)> {
     let query = PageQuery::parse(choice);
-    let pairs = state.chosen.of(&query)?;
+    let pairs = state.chosen.of(&open.key, &query)?;
     let pages = open_review(open, reviewer, &query, ReviewPlace::of_guest(), pairs).await?;
     let routes = pages.routes();
     let review = Arc::new(GuestReview::new(pages));

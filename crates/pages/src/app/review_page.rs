@@ -64,7 +64,7 @@ pub(super) async fn page(
             "The question is always the same: is the rotation within 5 degrees, and is the whole character there? Results come in random order, without scores, and each answer is stored at once.",
             "Câu hỏi luôn như nhau: góc xoay có lệch không quá 5 độ, và chữ có đủ không? Kết quả xuất hiện theo thứ tự ngẫu nhiên, không kèm điểm, và mỗi câu trả lời được lưu ngay.",
         )) }
-        @match state.chosen.of(&visit.query) {
+        @match state.chosen.of(&key, &visit.query) {
             Ok(chosen) => (start_form(&visit, chosen.map(|pairs| pairs.len()))),
             Err(failure) => {
                 p.notice.bad role="alert" { (failure.text(visit.language)) }
@@ -218,7 +218,7 @@ async fn review(
         project_page: Some("../../../"),
     };
     let query = PageQuery::parse(choice);
-    let pairs = state.chosen.of(&query)?;
+    let pairs = state.chosen.of(&open.key, &query)?;
     let opened = open_review(open, reviewer, &query, of_app, pairs).await?;
     Ok(state.reviews.keep(id, open, opened.routes()))
 }
