@@ -1,6 +1,6 @@
 //! Table of how many decoys, pairs without a right answer, are rejected.
 
-use mocban::domain::ThresholdMetric;
+use mocban::domain::{MetricOutcome, ThresholdMetric};
 use mocban::mesh::write::MeshFormat;
 use mocban::results::stats::quantile;
 
@@ -72,6 +72,10 @@ fn outcome(run: &Run, metric: ThresholdMetric) -> anyhow::Result<Result<Numbers,
         Ok((_, aligned)) => {
             let mut numbers = Numbers::of_stages(aligned)?;
             numbers.add("metric", &aligned.metric(metric))?;
+            let of_metric = |found: &MetricOutcome| found.metric == metric;
+            if let Some(k) = aligned.metrics().iter().position(of_metric) {
+                numbers.add_inputs(aligned, k)?;
+            }
             Ok(Ok(numbers))
         }
         Err(failed) => Ok(Err(failed.to_string())),

@@ -27,6 +27,23 @@ impl Numbers {
         Ok(())
     }
 
+    /// Adds the inputs of the confidence of the metric with an index, if the method has any.
+    pub(super) fn add_inputs(
+        &mut self,
+        aligned: &AlignedPair,
+        metric: usize,
+    ) -> anyhow::Result<()> {
+        let Some(inputs) = aligned.registered.confidence_inputs.get(metric) else {
+            return Ok(());
+        };
+        self.add("inputs.pose", &inputs.pose)?;
+        self.add("inputs.mask", &inputs.mask)?;
+        self.add("inputs.character", &inputs.character)?;
+        self.add("inputs.share", &inputs.doubts.share)?;
+        self.add("inputs.smooth_misfit", &inputs.doubts.smooth_misfit)?;
+        self.add("inputs.seen_ink", &inputs.doubts.seen_ink)
+    }
+
     /// Returns a value as text.
     pub(super) fn text(&self, path: &str) -> Option<&str> {
         self.0.get(path).map(String::as_str)

@@ -132,9 +132,10 @@ fn found(
     aligned: &AlignedPair,
 ) -> anyhow::Result<Vec<Found>> {
     let shared = Numbers::of_stages(aligned)?;
-    let held = |outcome: &MetricOutcome| {
+    let held = |(k, outcome): (usize, &MetricOutcome)| {
         let mut numbers = shared.clone();
         numbers.add("metric", outcome)?;
+        numbers.add_inputs(aligned, k)?;
         let map = aligned.print_from_mesh(outcome);
         let tops = tops_iou(&aligned.depth, outcome, &pair.tops);
         Ok(Found {
@@ -145,5 +146,5 @@ fn found(
             numbers,
         })
     };
-    aligned.metrics().iter().map(held).collect()
+    aligned.metrics().iter().enumerate().map(held).collect()
 }

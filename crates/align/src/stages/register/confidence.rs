@@ -313,7 +313,7 @@ mod tests {
             share: 0.6,
             ..NO_DOUBTS
         });
-        assert!((of_part - 0.6).abs() < 1e-9, "{of_part}");
+        assert!((of_part - 0.8).abs() < 1e-9, "{of_part}");
         let smooth_misfit = 0.14;
         assert!(
             with(Doubts {

@@ -22,6 +22,8 @@ const MISSING_PX: f64 = 3.0;
 const FULL_PX: f64 = 1.0;
 /// Weight of the prior in the score of `ensemble`: a candidate's depth is probably close to the depth of `relief`.
 const PRIOR: f64 = 0.05;
+/// On a levelled depth map, `relief` agrees with the ink by at most this much less than the best candidate.
+const LEVELLED_LOSS: f64 = 0.03;
 
 /// A candidate threshold, and how its mask fits the corrected ink.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +46,8 @@ pub(super) struct ChosenThreshold {
 }
 
 /// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`]. Also returns the distance by which the ink
-/// spreads over the strokes of `relief`, in pixels of the half canvas.
+/// spreads over the strokes of `relief`, in pixels of the half canvas. `is_levelled` is whether the heights were chosen
+/// from the ink: then the relief alone does not show where the tops end.
 ///
 /// # Errors
 /// Returns an error if no threshold leaves strokes, or if no ink lies where the depth map has data.
@@ -52,6 +55,7 @@ pub(super) fn choose(
     depth: &DepthMap,
     relief: &ReliefHeights,
     canvas: &HalfCanvas,
+    is_levelled: bool,
     params: &RegisterParams,
 ) -> Result<(Vec<ChosenThreshold>, f64), RegisterError> {
     let mut levels = candidate_levels(depth, relief, params);
@@ -61,9 +65,14 @@ pub(super) fn choose(
         return Err(RegisterError::NoStrokes);
     }
     let edge = TopsEdge::of(canvas, &levels, relief);
-    let by_relief = edge.best();
+    let measured = |by_relief| candidates(canvas, &levels, edge.spread(by_relief));
+    let mut by_relief = edge.best();
+    let mut candidates = measured(by_relief);
+    if is_levelled {
+        by_relief = nearest_agreeing(&candidates, by_relief);
+        candidates = measured(by_relief);
+    }
     let spread = edge.spread(by_relief);
-    let candidates = candidates(canvas, &levels, spread);
     let corrected = canvas.edge.corrected(spread);
     // Ink thinner than its spread would vanish.
     let corrected = if corrected.count() == 0 {
@@ -107,6 +116,16 @@ pub(super) fn choose(
         choice(ThresholdMetric::Relief, by_relief, 0.0),
     ];
     Ok((chosen, spread))
+}
+
+/// Returns the index of the candidate nearest to `from` that agrees with the ink about as well as the best one.
+fn nearest_agreeing(candidates: &[Candidate], from: usize) -> usize {
+    let agreements = candidates.iter().map(|candidate| candidate.agreement);
+    let least = agreements.fold(f64::NEG_INFINITY, f64::max) - LEVELLED_LOSS;
+    (0..candidates.len())
+        .filter(|k| candidates[*k].agreement >= least)
+        .min_by_key(|k| k.abs_diff(from))
+        .unwrap_or(from)
 }
 
 /// Returns the index of the first candidate with the lowest value.
@@ -269,7 +288,7 @@ mod tests {
 
     /// Returns the depth that a metric chooses, as a fraction of the relief.
     fn chosen(depth: &DepthMap, canvas: &HalfCanvas, metric: ThresholdMetric) -> f64 {
-        let (all, _) = choose(depth, &RELIEF, canvas, &params()).expect("strokes and ink");
+        let (all, _) = choose(depth, &RELIEF, canvas, false, &params()).expect("strokes and ink");
         let choice = all
             .iter()
             .map(|chosen| chosen.choice)
@@ -343,6 +362,29 @@ mod tests {
                 [0..0, 20..70].map(|rows| chosen(&depth, &canvas(&depth, 5.0, rows), metric));
             assert!((whole - torn).abs() < 0.06, "{metric}: {whole}, {torn}");
         }
+    }
+
+    #[test]
+    fn relief_follows_the_ink_on_a_levelled_map() {
+        // A rule that is higher than the bars looks like the only tops.
+        let bars = bars(0.0);
+        let lower = |x: usize, y: usize| bars.levels.at(x, y) / 5 * 4;
+        let level = |x: usize, y: usize| if x < 4 { 65_000 } else { lower(x, y) };
+        let levels = Grid::from_fn(SIDE, SIDE, level);
+        let depth = DepthMap::of_levels(levels);
+        let canvas = canvas(&depth, 5.0, 0..0);
+        let relief = ReliefHeights {
+            top: depth.scale.height(65_000),
+            ..RELIEF
+        };
+        let iou = |is_levelled| {
+            let (all, _) = choose(&depth, &relief, &canvas, is_levelled, &params()).expect("ink");
+            let mask = canvas.mask(all[3].choice.level);
+            let both = mask.zip_map(&canvas.ink, |a, b| a && b).count() as f64;
+            both / mask.zip_map(&canvas.ink, |a, b| a || b).count() as f64
+        };
+        assert!(iou(false) < 0.3, "{}", iou(false));
+        assert!(iou(true) > 0.7, "{}", iou(true));
     }
 
     #[test]

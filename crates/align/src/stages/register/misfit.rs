@@ -2,8 +2,9 @@
 //! displaced from each other.
 //!
 //! Dry ink and lost wood make edges rough, and a sheet that shrank or was photographed at an angle displaces them by an
-//! affine map. Another block of the same text has its strokes in slightly other places: whole edges are displaced, by
-//! other distances in each part of the character.
+//! affine map. Ink that spreads unevenly, worn tops and heights that drift widen or narrow strokes: both edges of a stroke
+//! move by the same distance, but in opposite directions. Another block of the same text has its strokes in slightly other
+//! places: both edges of a stroke move in the same direction, by other distances in each part of the character.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -30,8 +31,9 @@ struct Edge {
     distance: f64,
 }
 
-/// Returns the root mean square of the displacements of the edges that neither an affine map nor the roughness of the edges
-/// explains, as a fraction of the stroke width. `strokes` are the distances to the edge of the strokes.
+/// Returns the root mean square of the displacements of the edges that neither an affine map, nor the width of the strokes
+/// in each part of the character, nor the roughness of the edges explains, as a fraction of the stroke width. `strokes` are
+/// the distances to the edge of the strokes.
 pub(super) fn smooth_misfit(canvas: &HalfCanvas, strokes: &InkEdge) -> f64 {
     let mut edges = edges(canvas, strokes);
     if edges.len() < LEAST_EDGES {
@@ -46,7 +48,6 @@ pub(super) fn smooth_misfit(canvas: &HalfCanvas, strokes: &InkEdge) -> f64 {
         },
     );
     let squares = |edges: &[Edge]| edges.iter().map(|edge| edge.distance.powi(2)).sum::<f64>();
-    let before = squares(&edges);
     let cell = |edge: &Edge| {
         let [x, y] = edge.at.map(|at| {
             let cell = at.midpoint(1.0) * CELLS as f64;
@@ -55,6 +56,8 @@ pub(super) fn smooth_misfit(canvas: &HalfCanvas, strokes: &InkEdge) -> f64 {
         y * CELLS + x
     };
     let count = edges.len() as f64;
+    fit(&mut edges, cell, |_| [1.0]);
+    let before = squares(&edges);
     fit(&mut edges, cell, |edge| {
         [edge.normal[0], edge.normal[1], 1.0]
     });
@@ -130,19 +133,32 @@ mod tests {
 
     const SIDE: usize = 192;
 
-    /// Measures bars in two directions. `shift` returns how far the ink of a place is displaced, in pixels.
-    fn misfit(shift: impl Fn(usize, usize) -> [f64; 2]) -> f64 {
-        let is_bar = |x: f64, y: f64| {
-            let inside = |at: f64| (16.0..176.0).contains(&at);
-            inside(x) && inside(y) && (x.rem_euclid(48.0) < 14.0 || y.rem_euclid(48.0) < 14.0)
-        };
-        let ink = Mask::from_fn(SIDE, SIDE, |x, y| {
-            let [dx, dy] = shift(x, y);
-            is_bar(x as f64 - dx, y as f64 - dy)
-        });
-        let wood = Mask::from_fn(SIDE, SIDE, |x, y| is_bar(x as f64, y as f64));
+    /// Returns whether a point lies on one of the bars in two directions, each of which is `wider` px wider on each side.
+    fn is_bar(x: f64, y: f64, wider: f64) -> bool {
+        let inside = |at: f64| (16.0 - wider..176.0 + wider).contains(&at);
+        let on = |at: f64| (at + wider).rem_euclid(48.0) < 14.0 + 2.0 * wider;
+        inside(x) && inside(y) && (on(x) || on(y))
+    }
+
+    /// Measures the ink against the bars. `is_ink` returns whether a pixel is ink.
+    fn measured(is_ink: impl Fn(usize, usize) -> bool) -> f64 {
+        let ink = Mask::from_fn(SIDE, SIDE, is_ink);
+        let wood = Mask::from_fn(SIDE, SIDE, |x, y| is_bar(x as f64, y as f64, 0.0));
         let canvas = HalfCanvas::of(Grid::new(SIDE, SIDE, 1), ink);
         smooth_misfit(&canvas, &InkEdge::of(&wood))
+    }
+
+    /// Measures bars of displaced ink. `shift` returns how far the ink of a place is displaced, in pixels.
+    fn misfit(shift: impl Fn(usize, usize) -> [f64; 2]) -> f64 {
+        measured(|x, y| {
+            let [dx, dy] = shift(x, y);
+            is_bar(x as f64 - dx, y as f64 - dy, 0.0)
+        })
+    }
+
+    /// Measures bars of ink that spreads. `wider` returns how far the ink of a place spreads, in pixels.
+    fn widened(wider: impl Fn(usize, usize) -> f64) -> f64 {
+        measured(|x, y| is_bar(x as f64, y as f64, wider(x, y)))
     }
 
     #[test]
@@ -151,6 +167,9 @@ mod tests {
         assert!(misfit(|_, _| [2.0, -1.0]) < 0.05);
         // A sheet that shrank along one axis.
         assert!(misfit(|x, _| [0.02 * (x as f64 - 96.0), 0.0]) < 0.06);
+        // Ink that spreads farther at the left and at the right than in the middle.
+        let uneven = widened(|x, _| 1.5 * ((x as f64 - 96.0) / 40.0).abs());
+        assert!(uneven < 0.04, "{uneven}");
         // Ragged edges.
         let ragged = misfit(|x, y| [((x * 7 + y * 13) % 5) as f64 - 2.0, 0.0]);
         assert!(ragged < 0.09, "{ragged}");

@@ -44,7 +44,7 @@ use pose_search::PoseSearch;
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 27;
+pub const REVISION: u32 = 28;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -115,7 +115,7 @@ pub fn register(
         ..*expected
     });
     let mut search = pose_search::search(&depths, &normalized.prints, expected.as_ref(), params)?;
-    let mut single = Posed::new(depth, &depths, &relief, normalized, &search, params);
+    let mut single = Posed::new(depth, &depths, &relief, normalized, &search, false, params);
     // A block shows where a character is, whether or not its print is torn.
     let mut of_part = None;
     if expected.is_none()
@@ -176,7 +176,7 @@ pub fn register(
     let print = part_print.as_ref().unwrap_or(&registered.canvas_print);
     let doubts = Doubts {
         share,
-        // A levelling chooses the heights from the ink, which hides displaced edges: the larger misfit counts.
+        // A levelling chooses the heights from the ink, which hides displaced strokes: the larger misfit counts.
         smooth_misfit: posed.smooth_misfit.max(single.smooth_misfit),
         seen_ink: seen_ink(print, &posed.canvas.ink),
     };
@@ -226,7 +226,7 @@ fn on_larger_part(
     let part = larger_part::find(depths, print, &search.poses)?;
     let found = pose_search::search_part(depths, print, search, &part, params).ok()?;
     let masks = normalized.with_masks(search.ink, part.masks.clone());
-    let posed = Posed::new(depth, depths, &relief, &masks, &found, params).ok()?;
+    let posed = Posed::new(depth, depths, &relief, &masks, &found, false, params).ok()?;
     (part.share * probability(&posed) > of_whole).then_some(PartFit {
         search: found,
         posed,

@@ -33,7 +33,7 @@ pub(super) struct Posed {
     pub(super) thresholds: Vec<ChosenThreshold>,
     /// Evidence for and against the pose.
     pub(super) features: PoseFeatures,
-    /// Displacement of whole edges of the ink, see `misfit`, as a fraction of the stroke width.
+    /// Displacement of whole strokes of the ink, see `misfit`, as a fraction of the stroke width.
     pub(super) smooth_misfit: f64,
     /// Heights of the relief.
     relief: ReliefHeights,
@@ -43,6 +43,7 @@ pub(super) struct Posed {
 
 impl Posed {
     /// Refines the poses of a search, and chooses the thresholds. `depths` are the depths of `depth` below the tops.
+    /// `is_levelled` is whether `depth` was levelled.
     ///
     /// # Errors
     /// Returns an error if print, relief or strokes are empty, or if the pose is too unlikely.
@@ -52,6 +53,7 @@ impl Posed {
         relief: &ReliefHeights,
         normalized: &Normalized,
         search: &PoseSearch,
+        is_levelled: bool,
         params: &RegisterParams,
     ) -> Result<Self, RegisterError> {
         let print = &normalized.prints[search.ink];
@@ -64,7 +66,8 @@ impl Posed {
         require_match(&refined.features, search.prior, params)
             .map_err(|error| error.with(|| observe(depth, relief, &canvas())))?;
         let canvas = canvas();
-        let (thresholds, spread) = metric_thresholds::choose(depth, relief, &canvas, params)?;
+        let (thresholds, spread) =
+            metric_thresholds::choose(depth, relief, &canvas, is_levelled, params)?;
         let levels = || thresholds.iter().map(|chosen| chosen.choice.level);
         let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
         let unmatched = Unmatched::of(&canvas, range);
@@ -122,7 +125,7 @@ impl Levelled {
         }
         let relief = relief_heights(&map)?;
         let depths = relative_depths(&map, &relief);
-        let posed = Posed::new(&map, &depths, &relief, normalized, search, params).ok()?;
+        let posed = Posed::new(&map, &depths, &relief, normalized, search, true, params).ok()?;
         let [after, before] = [&posed, single].map(|posed| posed.features);
         let is_better = after.edge_scatter <= LESS_SCATTER * before.edge_scatter
             && after.correlation > before.correlation;

@@ -39,7 +39,7 @@ pub(super) struct Unmatched {
     pub(super) edge_scatter: f64,
     /// Area of the ink, in squares of the stroke width.
     pub(super) ink_area: f64,
-    /// Displacement of whole edges, see [`smooth_misfit`].
+    /// Displacement of whole strokes, see [`smooth_misfit`].
     pub(super) smooth_misfit: f64,
 }
 
