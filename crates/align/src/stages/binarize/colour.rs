@@ -19,6 +19,8 @@ const SAMPLES: usize = 2_500;
 const DARK: f64 = 0.04;
 /// Colours that deviate less from their mean, in natural logarithms, are those of one sheet.
 const LEAST_COLOUR: f64 = 0.04;
+/// Colours that deviate at least this much are those of a sheet and of another ink than black.
+const TWO_COLOURS: f64 = 0.1;
 /// If the brightness of the two classes differs by at least this, in natural logarithms, coloured ink is sought in the
 /// lighter class only: the darker one is black ink, or a dark stain.
 const HIGH_CONTRAST: f64 = 0.45;
@@ -47,7 +49,7 @@ pub(super) struct ColourContrast {
 /// badly.
 pub(super) fn contrast(picture: &PrintImage, known: &Mask) -> Option<ColourContrast> {
     let mut samples = samples(picture, known);
-    let brightness = Vector3::repeat(1.0 / f64::sqrt(3.0));
+    let brightness = brightness();
     let plain = classes(&samples, &brightness)?;
     let has_contrast = plain.gap / f64::sqrt(3.0) >= HIGH_CONTRAST;
     if has_contrast {
@@ -81,6 +83,16 @@ pub(super) fn contrast(picture: &PrintImage, known: &Mask) -> Option<ColourContr
         even,
         is_clearer: !has_contrast && apart > CLEARER * plain.apart,
     })
+}
+
+/// Returns whether the known pixels have two colours, apart from their brightness.
+pub(super) fn is_coloured(picture: &PrintImage, known: &Mask) -> bool {
+    colour_deviation(&samples(picture, known), &brightness()) >= TWO_COLOURS
+}
+
+/// Returns the direction of the brightness.
+fn brightness() -> Vector3<f64> {
+    Vector3::repeat(1.0 / f64::sqrt(3.0))
 }
 
 /// Returns the colours along an axis, which points to or from the ink, minus those of the background.

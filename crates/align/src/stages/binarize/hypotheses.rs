@@ -123,4 +123,25 @@ mod tests {
         let wrong = inks[0].mask.data().iter().enumerate().filter(wrong).count();
         assert!(wrong < 100, "{wrong}");
     }
+
+    #[test]
+    fn white_around_a_sheet_is_left_out_although_its_ink_is_as_bright() {
+        let from_middle = |x: usize, y: usize| (x as f64 - 75.0).hypot(y as f64 - 75.0);
+        // Soft edges are the only pixels that the brightness separates from the others.
+        let round = print(|x, y| match from_middle(x, y) {
+            73.0.. => [255; 3],
+            71.0.. => [242, 245, 238],
+            _ if is_stroke(x, y) => [190, 108, 79],
+            _ => [125, 137, 98],
+        });
+        let inks = hypotheses(&round).expect("ink");
+        let ink = &inks[0];
+        assert!(!ink.soft.known.at(4, 4) && ink.soft.known.at(75, 110));
+        let wrong = |(at, ink): &(usize, &bool)| {
+            let (x, y) = (at % SIDE, at / SIDE);
+            from_middle(x, y) < 68.0 && **ink != is_stroke(x, y)
+        };
+        let wrong = ink.mask.data().iter().enumerate().filter(wrong).count();
+        assert!(wrong < 100, "{wrong}");
+    }
 }

@@ -1,6 +1,7 @@
 //! Finds the ink of a print: which pixels the print covers, whether ink is dark or light, and which pixels are ink.
 
 use super::background::{self, NARROW, STROKE};
+use super::colour;
 use super::polarity::polarity;
 use crate::stages::pose::SoftMask;
 use mocban_core::domain::cancel::poll;
@@ -15,6 +16,8 @@ const DISTINCT_BACKGROUND: f64 = 0.945;
 /// Light pixels inside the white border are a coloured background if they cover at least this fraction of the image. A
 /// smaller area is only the soft edges of ink on white.
 const LEAST_BACKGROUND: f64 = 0.2;
+/// Least fraction of the image covered by ink and background of other colours than white. Ink on white covers less.
+const LEAST_COLOURED: f64 = 0.6;
 /// Least fraction of the image covered by the white around the print.
 const LEAST_WHITE: f64 = 0.004;
 /// A dark pixel is pale if its grey lies beyond this fraction of the way from the 10th percentile of the dark pixels to
@@ -246,7 +249,17 @@ pub(super) fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     let background = values.iter().filter(is_light).count() as f64;
     let is_enough = background >= LEAST_BACKGROUND * all.data().len() as f64;
     if is_enough && split.high < DISTINCT_BACKGROUND {
-        inside
+        return inside;
+    }
+    // If ink and background are equally bright, the brightness separates only rests of white and its soft edges from both.
+    let is_coloured = inside.density() >= LEAST_COLOURED
+        && f64::from(values[values.len() / 2]) < DISTINCT_BACKGROUND
+        && colour::is_coloured(picture, &inside);
+    if is_coloured {
+        let is_rest =
+            |grey: f32| split.high >= DISTINCT_BACKGROUND && f64::from(grey) > split.threshold;
+        let white = grey.zip_map(&beyond, |grey, beyond| beyond || is_rest(grey));
+        white.dilate().dilate().map(|white| !white)
     } else {
         all
     }

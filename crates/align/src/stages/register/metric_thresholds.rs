@@ -327,7 +327,7 @@ mod tests {
             let order = |a: &&(f64, u16), b: &&(f64, u16)| score(**a).total_cmp(&score(**b));
             levels.iter().rev().max_by(order).expect("levels").1
         };
-        let (all, _) = choose(&depth, &RELIEF, &canvas, &params).expect("strokes and ink");
+        let (all, _) = choose(&depth, &RELIEF, &canvas, false, &params).expect("strokes and ink");
         let wanted = [
             best(&|(_, level)| structure(level)),
             best(&|(_, level)| -gap(level)),
