@@ -375,16 +375,18 @@ mod tests {
 
     #[test]
     fn one_side_of_a_crack_is_found_if_both_do_not_fit_the_print() {
-        let pair = PairGenerator::new(Tier::Slid, 1).with_vertices(Some(20_000));
-        let pair = pair.pair(6).expect("a pair");
-        let (scan, print) = read(&pair);
-        let found = fit(&scan, Some(&print), None, &settings().fit).expect("a plane");
-        let [x, y, z, _] = found.plane_from_mesh.0[2];
-        let turn = Vector3::new(x, y, z).angle(&Vector3::from(pair.truth.plane.n));
-        assert!(turn.to_degrees() < 4.0, "{turn} rad");
-        let region = found.region.expect("a box");
-        for landmark in &pair.truth.landmarks {
-            assert!(region.contains(*landmark));
+        for index in [0, 5] {
+            let pair = PairGenerator::new(Tier::Slid, 1).with_vertices(Some(20_000));
+            let pair = pair.pair(index).expect("a pair");
+            let (scan, print) = read(&pair);
+            let found = fit(&scan, Some(&print), None, &settings().fit).expect("a plane");
+            let [x, y, z, _] = found.plane_from_mesh.0[2];
+            let turn = Vector3::new(x, y, z).angle(&Vector3::from(pair.truth.plane.n));
+            assert!(turn.to_degrees() < 4.0, "{turn} rad in pair {index}");
+            let region = found.region.expect("a box");
+            for landmark in &pair.truth.landmarks {
+                assert!(region.contains(*landmark), "pair {index}");
+            }
         }
     }
 }

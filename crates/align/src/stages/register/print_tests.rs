@@ -67,7 +67,7 @@ fn another_block_with_the_same_character_is_refused_or_doubted() {
     match try_align(pair.mesh.clone(), &print.expect("images encode")) {
         Ok(other) => assert!(other.first_metric().confidence.expect("a confidence") < 0.5),
         Err(StageError::Register(RegisterError::OtherCharacter { pose, .. })) => {
-            assert!(pose > 0.9)
+            assert!(pose > 0.9);
         }
         Err(error) => panic!("{error}"),
     }
