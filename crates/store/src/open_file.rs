@@ -49,7 +49,7 @@ pub fn read_file_or_pipe(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     read().map_err(with_advice)
 }
 
-/// Reads to the end, such as of the standard input.
+/// Reads an input, such as the standard input, to its end.
 ///
 /// # Errors
 /// Returns an error if reading fails, or there are more than `limit` bytes.

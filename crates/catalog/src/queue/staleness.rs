@@ -34,7 +34,7 @@ pub enum RerunPolicy {
 }
 
 /// Returns the hash of an input file of a pair `p` with the job `j`. While the pair is in quarantine because the file is
-/// missing, its results are those of the file that was there, so that the hash is `NULL`, which differs from none.
+/// missing, its results are those of the file that was there, so the hash is `NULL`, and no comparison with it finds a difference.
 macro_rules! input_hash {
     ($file:literal) => {
         concat!(
@@ -47,7 +47,7 @@ macro_rules! input_hash {
     };
 }
 
-/// Compares a result `r` with the current settings in `?1` and the pair's inputs.
+/// Returns whether a result `r` differs from the current settings in `?1` or from the pair's inputs.
 macro_rules! is_outdated {
     () => {
         concat!(

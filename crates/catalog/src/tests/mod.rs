@@ -192,8 +192,10 @@ impl World {
         let n: i64 = query_scalar(
             "SELECT count(*) FROM job AS j JOIN pair AS p ON p.id = j.pair WHERE EXISTS (
                 SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-                    r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.mesh_hash <> p.mesh_hash
-                    OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes))",
+                    r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.attributes <> p.attributes
+                    OR r.mesh_hash <> p.mesh_hash AND NOT (j.status = 4 AND coalesce(p.mesh_stat, '') = 'gone')
+                    OR r.print_hash <> p.print_hash
+                        AND NOT (j.status = 4 AND coalesce(p.print_stat, '') = 'gone')))",
         )
         .bind(current.expect("fingerprints"))
         .fetch_one(&mut conn)

@@ -33,6 +33,14 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "{0}: dòng {1}: không có bản in {2} của {3}",
     ),
     (
+        "{}: line {}: mesh {} of {} is a folder, not a file",
+        "{0}: dòng {1}: bản quét {2} của {3} là thư mục, không phải tệp",
+    ),
+    (
+        "{}: line {}: print {} of {} is a folder, not a file",
+        "{0}: dòng {1}: bản in {2} của {3} là thư mục, không phải tệp",
+    ),
+    (
         "it is a path of a Windows computer: write paths relative to the list",
         "đây là đường dẫn của máy Windows: hãy viết đường dẫn tính từ danh sách",
     ),

@@ -118,8 +118,8 @@ mod tests {
                 "thiếu 60 tệp nên chưa nhập gì:\n  pairs.csv: dòng 2: không có bản quét m/0.stl của 0\n  và 59 mục khác",
             ),
             (
-                "60 files are missing or a folder, nothing was imported:\n  new words",
-                "không dùng được 60 tệp nên chưa nhập gì:\n  new words",
+                "60 files are missing or a folder, nothing was imported:\n  pairs.csv: line 3: print p/1 of 1 is a folder, not a file",
+                "không dùng được 60 tệp nên chưa nhập gì:\n  pairs.csv: dòng 3: bản in p/1 của 1 là thư mục, không phải tệp",
             ),
             (
                 "1 file is missing or a folder, nothing was imported:",

@@ -349,7 +349,7 @@ fn other_files_text(visit: &Visit, run: &RunState) -> Option<String> {
     match (visit.language, number) {
         (_, 0) => None,
         (Language::English, 1) => Some(
-            "1 aligned pair has another mesh or print in the list than before: the next run reads it."
+            "1 aligned pair has another mesh or print in the list than before: the next run reads its files."
                 .to_owned(),
         ),
         (Language::English, _) => Some(format!(

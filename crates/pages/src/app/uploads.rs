@@ -94,7 +94,7 @@ impl Uploads {
     /// Returns its number, and the files that need not be sent again. Waits for the disk.
     ///
     /// # Errors
-    /// Refuses too many files, more bytes than the disk has room for, and files of which another upload may soon break off.
+    /// Refuses too many files, more bytes than the disk has room for, and files whose earlier upload seems to have lost its connection.
     pub(super) fn begin(
         &self,
         name: String,

@@ -252,7 +252,8 @@ pub(super) fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
         return inside;
     }
     // If ink and background are equally bright, the brightness separates only rests of white and its soft edges from both.
-    let is_coloured = inside.density() >= LEAST_COLOURED
+    let is_coloured = !is_enough
+        && inside.density() >= LEAST_COLOURED
         && f64::from(values[values.len() / 2]) < DISTINCT_BACKGROUND
         && colour::is_coloured(picture, &inside);
     if is_coloured {

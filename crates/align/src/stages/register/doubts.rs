@@ -1,5 +1,5 @@
 //! What lowers the confidence of an alignment beside the models of `confidence`: a part of the print that was left out,
-//! edges of another block, and ink beside the scan.
+//! strokes of another block, and ink beside the scan.
 
 /// Displacement of whole strokes at which it is as probable that print and relief come from two blocks as from one, and its
 /// deviation, both as fractions of the stroke width.

@@ -22,7 +22,8 @@ const MISSING_PX: f64 = 3.0;
 const FULL_PX: f64 = 1.0;
 /// Weight of the prior in the score of `ensemble`: a candidate's depth is probably close to the depth of `relief`.
 const PRIOR: f64 = 0.05;
-/// On a levelled depth map, `relief` agrees with the ink by at most this much less than the best candidate.
+/// Largest loss of agreement with the ink, compared with the best candidate, for which `relief` keeps its threshold on a
+/// levelled depth map. It is measured with the spread of the first choice.
 const LEVELLED_LOSS: f64 = 0.03;
 
 /// A candidate threshold, and how its mask fits the corrected ink.

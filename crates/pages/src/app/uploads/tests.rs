@@ -119,7 +119,7 @@ fn files_are_not_sent_twice_while_their_first_upload_may_break_off() {
     upload.last_piece.set(Some(before));
     uploads.begin("x".to_owned(), 2, 1).expect_err("silent");
     uploads.begin("y".to_owned(), 2, 1).expect("other files");
-    upload.last_piece.set(Some(now));
+    upload.last_piece.set(Some(later));
     uploads.begin("x".to_owned(), 2, 1).expect("another one");
     upload.last_piece.set(None);
     assert!(!upload.is_silent(later), "an archive is unpacked");
