@@ -49,7 +49,7 @@ fn agreement(found: &ReviewerAgreement) -> Table {
             }
         })
         .caption("agreement", format!(
-            "Over the n results that both passed or failed: one verdict on several metrics of a pair counts for each of \
+            "Over the n results that both passed or failed. One verdict on several metrics of a pair counts for each of \
              their results that differ. Kappa (Cohen) and AC1 (Gwet) need at least {MIN_RESULTS}. \
              Kappa falls to 0 when failures are rare, however well reviewers agree. AC1 does not."
         ))
