@@ -80,7 +80,7 @@ async function reason(upload) {
   return text ?? texts.cut;
 }
 
-/** Begins an upload. Goes on with one that broke off if all that has arrived is among these files. */
+/** Begins an upload, or resumes an interrupted one if all files that have arrived are among these. */
 async function begin(files, name, bytes) {
   const begun = await act("actions/upload", { name, files: files.length, bytes });
   const chosen = new Map(files.map(({ path, file }) => [path.normalize("NFC"), file]));

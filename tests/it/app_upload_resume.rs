@@ -1,4 +1,4 @@
-//! An upload to `mocban app` that breaks off: the same files are chosen again, and what has arrived is not sent again.
+//! An interrupted upload to `mocban app`: the same files are chosen again, and what has arrived is not sent again.
 
 use std::io::Write as _;
 use std::net::TcpStream;
@@ -38,7 +38,7 @@ fn cut_off(page: &Page, upload: &Value, path: &str) {
         arrived().json()["bytes"] == before + 5
     });
     drop(stream);
-    wait_until("the upload is broken", || arrived().status == 422);
+    wait_until("the upload is interrupted", || arrived().status == 422);
 }
 
 /// Begins an upload of files with this name. Returns its id and what has arrived.
@@ -83,17 +83,17 @@ fn files_that_have_arrived_are_not_sent_again() {
 }
 
 #[test]
-fn an_upload_that_broke_off_is_not_mixed_with_other_files() {
+fn an_interrupted_upload_is_not_mixed_with_other_files() {
     let (dir, page) = empty_app();
-    let (broken, _) = begun_with(&page, "x", 2);
-    put_modified(&page, &broken, "1.stl", b"solid", 5);
-    cut_off(&page, &broken, "2.stl");
+    let (interrupted, _) = begun_with(&page, "x", 2);
+    put_modified(&page, &interrupted, "1.stl", b"solid", 5);
+    cut_off(&page, &interrupted, "2.stl");
     let (other, arrived) = begun_with(&page, "y", 1);
-    assert!(other != broken && arrived == json!([]), "{arrived}");
+    assert!(other != interrupted && arrived == json!([]), "{arrived}");
     assert_eq!(end(&page, &other, "cancel").status, 200);
     // The page cancels it if other files were chosen.
     let (again, arrived) = begun_with(&page, "x", 1);
-    assert_eq!(again, broken);
+    assert_eq!(again, interrupted);
     assert_eq!(arrived.as_array().map(Vec::len), Some(1));
     assert_eq!(end(&page, &again, "cancel").status, 200);
     assert_eq!(names(dir.path()), [""; 0]);
@@ -104,7 +104,7 @@ fn an_upload_that_broke_off_is_not_mixed_with_other_files() {
     assert_eq!(names(dir.path()), [""; 0]);
     let (fresh, arrived) = begun_with(&page, "x", 2);
     assert!(fresh != plain && arrived == json!([]), "{arrived}");
-    // Broken uploads take no place that others need.
+    // Interrupted uploads take no place that others need.
     put_modified(&page, &fresh, "1.stl", b"solid", 5);
     cut_off(&page, &fresh, "2.stl");
     for name in ["a", "b", "c", "d"] {

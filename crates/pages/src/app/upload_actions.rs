@@ -41,7 +41,7 @@ pub(super) struct UploadBody {
     bytes: u64,
 }
 
-/// Begins an upload, or goes on with one that broke off. Replies with the files that need not be sent again.
+/// Begins an upload, or resumes an interrupted one. Replies with the files that need not be sent again.
 pub(super) async fn begin(
     State(state): State<Arc<AppState>>,
     ActionBody(body): ActionBody<UploadBody>,
@@ -60,7 +60,7 @@ pub(super) async fn begin(
     Ok(Json(json!({ "upload": id, "arrived": arrived })))
 }
 
-/// Removes the files of an upload if nobody goes on with it after it broke off. Returns when it has ended.
+/// Removes the files of an upload that is interrupted and not resumed. Returns when the upload has ended.
 async fn remove_if_left(state: Weak<AppState>, id: u64) {
     loop {
         tokio::time::sleep(CLEANING_INTERVAL).await;

@@ -30,8 +30,8 @@ const MAX_OPEN: usize = 4;
 const MAX_IDLE: Duration = Duration::from_secs(30);
 /// A browser of which nothing arrives for this long in a file may have lost its connection.
 const MAX_SILENT: Duration = Duration::from_secs(5);
-/// How long the files of an upload that broke off are kept for the same files.
-const MAX_BROKEN: Duration = Duration::from_hours(1);
+/// How long the files of an interrupted upload are kept, so that it can be resumed.
+const MAX_KEPT: Duration = Duration::from_hours(1);
 /// Pieces of a file that wait to be written. A piece has at most 64 KiB.
 const WAITING_PIECES: usize = 4;
 
@@ -65,8 +65,8 @@ enum UploadState {
     Busy(CancelToken),
     /// A thread gives the files their folder, which cannot be cancelled.
     Storing,
-    /// It broke off at that time. The same files may be sent again, without what has arrived. Says why.
-    Broken(Box<ReceivedFiles>, Instant, Sentence),
+    /// It was interrupted at that time, for this reason. It can be resumed with the files that have not arrived.
+    Paused(Box<ReceivedFiles>, Instant, Sentence),
     /// Nothing is kept, or all has its folder. Says why if it failed.
     Ended(Option<Sentence>),
 }
@@ -90,11 +90,11 @@ impl Uploads {
         &self.folder
     }
 
-    /// Begins an upload, and removes uploads that ended or were left. Goes on with an upload of this name that broke off.
-    /// Returns its number, and the files that need not be sent again. Waits for the disk.
+    /// Begins an upload, or resumes an interrupted one of this name. Removes uploads that ended or were abandoned. Returns the
+    /// number of the upload, and the files that need not be sent again. Waits for the disk.
     ///
     /// # Errors
-    /// Refuses too many files, more bytes than the disk has room for, and files whose earlier upload seems to have lost its connection.
+    /// Refuses too many files, more bytes than the disk has room for, and files whose connection seems to be cut.
     pub(super) fn begin(
         &self,
         name: String,
@@ -115,7 +115,7 @@ impl Uploads {
             && let Err(why) = check_room(parent, bytes)
         {
             if let Some((id, _)) = resumed {
-                self.find(id)?.break_off(why.clone());
+                self.find(id)?.interrupt(why.clone());
             }
             return refuse(why);
         }
@@ -151,7 +151,7 @@ impl Uploads {
         Ok((id, Vec::new()))
     }
 
-    /// Goes on with an upload that broke off, for as many files as are now chosen.
+    /// Resumes an interrupted upload of this name, which then has this number of files.
     fn resume(&self, name: &str, files: u64) -> Option<(u64, Vec<ArrivedFile>)> {
         let open = self.lock();
         let mut named = open.iter().filter(|(_, upload)| upload.name == name);
@@ -166,17 +166,17 @@ impl Uploads {
         named.any(|upload| upload.is_silent(now))
     }
 
-    /// Removes uploads that ended, and those whose browser is closed. Broken ones stay for a while, except for the oldest if
-    /// there is no place. Returns whether there is place for another.
+    /// Removes uploads that ended, and those whose browser is closed. Interrupted ones stay for a while, except for the
+    /// oldest if there is no place. Returns whether there is place for another.
     fn make_place(&self) -> bool {
         let removed: Vec<_> = {
             let mut open = self.lock();
             let is_over = |_: &u64, upload: &mut Arc<FileUpload>| upload.is_over();
             let mut removed: Vec<_> = open.extract_if(.., is_over).collect();
             if open.len() >= MAX_OPEN {
-                let broken = open.iter();
-                let broken = broken.filter_map(|(id, upload)| Some((upload.broken_since()?, *id)));
-                let oldest = broken.min();
+                let paused = open.iter();
+                let paused = paused.filter_map(|(id, upload)| Some((upload.paused_since()?, *id)));
+                let oldest = paused.min();
                 removed.extend(oldest.and_then(|(_, id)| open.remove_entry(&id)));
             }
             removed
@@ -247,7 +247,7 @@ impl FileUpload {
                     (UploadState::Ready(received, Instant::now()), Ok(()))
                 }
                 Ok(Err((why, Some(received)))) => {
-                    let next = UploadState::Broken(received, Instant::now(), why.clone());
+                    let next = UploadState::Paused(received, Instant::now(), why.clone());
                     (next, Err(why))
                 }
                 Ok(Err((why, None))) => (UploadState::Ended(Some(why.clone())), Err(why)),
@@ -310,17 +310,17 @@ impl FileUpload {
     pub(super) fn problem(&self) -> Option<Sentence> {
         match &*self.lock() {
             UploadState::Ended(why) => why.clone(),
-            UploadState::Broken(.., why) => Some(why.clone()),
+            UploadState::Paused(.., why) => Some(why.clone()),
             UploadState::Ready(..) | UploadState::Busy(_) | UploadState::Storing => None,
         }
     }
 
-    /// Goes on for a number of files, if the upload broke off or its browser is closed. Returns the files that need not be
-    /// sent again.
+    /// Resumes the upload with this number of files, if it was interrupted or its browser is closed. Returns the files that
+    /// need not be sent again.
     fn resume(&self, files: u64) -> Option<Vec<ArrivedFile>> {
         let mut state = self.lock();
         let received = match std::mem::replace(&mut *state, UploadState::Storing) {
-            UploadState::Broken(received, ..) => received,
+            UploadState::Paused(received, ..) => received,
             UploadState::Ready(received, since)
                 if since.elapsed() > MAX_IDLE && !received.arrived().is_empty() =>
             {
@@ -338,11 +338,11 @@ impl FileUpload {
         Some(arrived)
     }
 
-    /// Keeps the files of an upload that cannot go on now.
-    fn break_off(&self, why: Sentence) {
+    /// Keeps the files of an upload that cannot be continued now.
+    fn interrupt(&self, why: Sentence) {
         let mut state = self.lock();
         *state = match std::mem::replace(&mut *state, UploadState::Storing) {
-            UploadState::Ready(received, _) => UploadState::Broken(received, Instant::now(), why),
+            UploadState::Ready(received, _) => UploadState::Paused(received, Instant::now(), why),
             other => other,
         };
     }
@@ -354,7 +354,7 @@ impl FileUpload {
             UploadState::Ready(received, _) => Ok(received),
             other => {
                 let why = match &other {
-                    UploadState::Ended(Some(why)) | UploadState::Broken(.., why) => why.clone(),
+                    UploadState::Ended(Some(why)) | UploadState::Paused(.., why) => why.clone(),
                     UploadState::Ended(None) => ended(),
                     UploadState::Storing => storing(),
                     UploadState::Ready(..) | UploadState::Busy(_) => busy(),
@@ -370,7 +370,7 @@ impl FileUpload {
         let mut state = self.lock();
         let unused = match &*state {
             UploadState::Busy(_) | UploadState::Storing => std::mem::replace(&mut *state, next),
-            UploadState::Ready(..) | UploadState::Broken(..) | UploadState::Ended(_) => next,
+            UploadState::Ready(..) | UploadState::Paused(..) | UploadState::Ended(_) => next,
         };
         drop(state);
         // Removes files of an upload that was cancelled.
@@ -380,33 +380,33 @@ impl FileUpload {
     fn is_over(&self) -> bool {
         match &*self.lock() {
             UploadState::Ready(_, since) => since.elapsed() > MAX_IDLE,
-            UploadState::Broken(_, since, _) => since.elapsed() > MAX_BROKEN,
+            UploadState::Paused(_, since, _) => since.elapsed() > MAX_KEPT,
             UploadState::Busy(_) | UploadState::Storing => false,
             UploadState::Ended(_) => true,
         }
     }
 
-    fn broken_since(&self) -> Option<Instant> {
+    fn paused_since(&self) -> Option<Instant> {
         match *self.lock() {
-            UploadState::Broken(_, since, _) => Some(since),
+            UploadState::Paused(_, since, _) => Some(since),
             _ => None,
         }
     }
 
     /// Returns whether a file stopped arriving after others had arrived.
     fn is_silent(&self, now: Instant) -> bool {
-        let is_arriving = matches!(*self.lock(), UploadState::Busy(_));
-        let last = self.last_piece.get().filter(|_| is_arriving);
-        let is_silent = last.is_some_and(|last| now.duration_since(last) > MAX_SILENT);
-        is_silent && self.arrived.load(Ordering::Relaxed) > 0
+        let last = self.last_piece.get();
+        last.is_some_and(|last| now.duration_since(last) > MAX_SILENT)
+            && matches!(*self.lock(), UploadState::Busy(_))
+            && self.arrived.load(Ordering::Relaxed) > 0
     }
 
-    /// Ends an upload with which nobody has gone on for [`MAX_BROKEN`], and removes its files. Returns whether it has ended.
+    /// Ends an upload that nobody has resumed for [`MAX_KEPT`], and removes its files. Returns whether it has ended.
     pub(super) fn end_if_left(&self, now: Instant) -> bool {
         let mut state = self.lock();
         let is_left = match &*state {
-            UploadState::Ready(_, since) | UploadState::Broken(_, since, _) => {
-                now.duration_since(*since) > MAX_BROKEN
+            UploadState::Ready(_, since) | UploadState::Paused(_, since, _) => {
+                now.duration_since(*since) > MAX_KEPT
             }
             UploadState::Busy(_) | UploadState::Storing => false,
             UploadState::Ended(_) => return true,

@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier};
 use std::time::Instant;
 
-use super::{ArrivedFile, MAX_BROKEN, MAX_OPEN, MAX_SILENT, UploadEnding, UploadState, Uploads};
+use super::{ArrivedFile, MAX_KEPT, MAX_OPEN, MAX_SILENT, UploadEnding, UploadState, Uploads};
 use crate::app::failure::AppResult;
 use crate::app::upload_sentence::cut;
 use mocban_core::domain::cancel::CancelToken;
@@ -65,34 +65,40 @@ fn the_last_place_goes_to_one_of_two_that_begin_at_once() {
 }
 
 #[test]
-fn an_upload_that_broke_off_goes_on_once() {
+fn an_interrupted_upload_is_resumed_once() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
-    let (broken, _) = uploads.begin("x".to_owned(), 1, 1).expect("begun");
-    let upload = uploads.find(broken).expect("an upload");
+    let (interrupted, _) = uploads.begin("x".to_owned(), 1, 1).expect("begun");
+    let upload = uploads.find(interrupted).expect("an upload");
     let received = upload.take(UploadState::Storing).expect("ready");
-    *upload.lock() = UploadState::Broken(received, Instant::now(), cut());
+    *upload.lock() = UploadState::Paused(received, Instant::now(), cut());
     let begun = begin_two(&uploads).map(|begun| begun.expect("begun").0);
     assert_ne!(begun[0], begun[1]);
-    assert!(begun.contains(&broken), "{begun:?}");
+    assert!(begun.contains(&interrupted), "{begun:?}");
 }
 
-/// Begins an upload that broke off at a time.
-fn broken(uploads: &Uploads, name: &str, since: Instant) -> u64 {
+/// Begins an upload that was interrupted at this time.
+fn interrupted(uploads: &Uploads, name: &str, since: Instant) -> u64 {
     let (id, _) = uploads.begin(name.to_owned(), 1, 1).expect("a place");
     let upload = uploads.find(id).expect("an upload");
     let received = upload.take(UploadState::Storing).expect("ready");
-    *upload.lock() = UploadState::Broken(received, since, cut());
+    *upload.lock() = UploadState::Paused(received, since, cut());
     id
 }
 
 #[test]
-fn a_new_upload_takes_the_place_of_the_oldest_broken_one_alone() {
+fn a_new_upload_takes_the_place_of_the_oldest_interrupted_one_alone() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
     let now = Instant::now();
     let ages = [2, 3, 1, 0];
-    let ids = ages.map(|age| broken(&uploads, &format!("broken {age}"), now + MAX_SILENT * age));
+    let ids = ages.map(|age| {
+        interrupted(
+            &uploads,
+            &format!("interrupted {age}"),
+            now + MAX_SILENT * age,
+        )
+    });
     uploads.begin("new".to_owned(), 1, 1).expect("a place");
     assert_eq!(
         ids.map(|id| uploads.find(id).is_ok()),
@@ -101,7 +107,7 @@ fn a_new_upload_takes_the_place_of_the_oldest_broken_one_alone() {
 }
 
 #[test]
-fn files_are_not_sent_twice_while_their_first_upload_may_break_off() {
+fn files_are_not_sent_twice_while_their_first_upload_may_interrupt() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
     let (id, _) = uploads.begin("x".to_owned(), 2, 1).expect("begun");
@@ -113,7 +119,7 @@ fn files_are_not_sent_twice_while_their_first_upload_may_break_off() {
     assert!(!upload.is_silent(later), "no file has arrived");
     upload.arrived.store(1, Ordering::Relaxed);
     assert!(upload.is_silent(later));
-    assert!(!upload.is_silent(now), "it goes on");
+    assert!(!upload.is_silent(now), "files are arriving");
     let before = now.checked_sub(MAX_SILENT * 2);
     let before = before.expect("a computer that started earlier");
     upload.last_piece.set(Some(before));
@@ -126,14 +132,16 @@ fn files_are_not_sent_twice_while_their_first_upload_may_break_off() {
 }
 
 #[test]
-fn files_of_a_broken_upload_are_removed_after_their_time() {
+fn files_of_an_interrupted_upload_are_removed_after_their_time() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
     let now = Instant::now();
-    let upload = uploads.find(broken(&uploads, "x", now)).expect("an upload");
-    assert!(!upload.end_if_left(now + MAX_BROKEN));
-    assert!(upload.broken_since().is_some());
-    assert!(upload.end_if_left(now + MAX_BROKEN * 2));
+    let upload = uploads
+        .find(interrupted(&uploads, "x", now))
+        .expect("an upload");
+    assert!(!upload.end_if_left(now + MAX_KEPT));
+    assert!(upload.paused_since().is_some());
+    assert!(upload.end_if_left(now + MAX_KEPT * 2));
     assert!(matches!(*upload.lock(), UploadState::Ended(None)));
     assert!(upload.end_if_left(now), "nothing is left to remove");
 }
