@@ -1,7 +1,7 @@
 //! Fourier transforms of lengths that are powers of two.
 //!
 //! `rustfft` is generic, so its code is compiled into each crate that makes a plan, and again into the tests of that
-//! crate: a quarter of the compile time of the alignment. Here it is compiled once.
+//! crate: a quarter of the LLVM code of the alignment. Here it is compiled once.
 //!
 //! **Invariant:** nothing here is generic.
 

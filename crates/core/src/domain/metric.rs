@@ -44,7 +44,8 @@ pub enum ThresholdMetric {
     /// are flat and the walls are even, and large if wear has rounded the strokes. Each tried depth has a
     /// probability: the normalized product of the densities of this estimate and of the ink's spread, which is
     /// usually 3 % of the stroke width. The metric maximizes the expected IoU under these probabilities. The score is
-    /// always 0. Not part of the paper's method.
+    /// always 0. On a levelled depth map, whose heights come from the ink, it then takes the nearest depth that agrees with
+    /// the ink about as well as the best one. Not part of the paper's method.
     Relief,
 }
 

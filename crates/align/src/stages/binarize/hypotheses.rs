@@ -144,4 +144,16 @@ mod tests {
         let wrong = ink.mask.data().iter().enumerate().filter(wrong).count();
         assert!(wrong < 100, "{wrong}");
     }
+
+    #[test]
+    fn a_sheet_on_a_coloured_board_is_no_rest_of_the_white_around_it() {
+        let board = print(|x, y| match (x.min(SIDE - 1 - x), y.min(SIDE - 1 - y)) {
+            (..10, _) | (_, ..10) => [255; 3],
+            (10..35, _) | (_, 10..25) => [120, 75, 40],
+            _ if is_stroke(x, y) => [30; 3],
+            _ => [250, 249, 245],
+        });
+        let inks = hypotheses(&board).expect("ink");
+        assert!(inks[0].soft.known.at(100, 100) && inks[0].soft.known.at(66, 80));
+    }
 }

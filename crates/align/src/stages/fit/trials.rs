@@ -353,20 +353,26 @@ mod tests {
         assert!(pair.truth.landmarks.iter().all(is_inside));
     }
 
+    /// Fits a scan with several parts. The surface and the box must be those of the part that the print shows.
+    fn box_of_part(tier: Tier, index: u64) -> (Scan, ScanRegion) {
+        let pair = PairGenerator::new(tier, 1).with_vertices(Some(20_000));
+        let pair = pair.pair(index).expect("a pair");
+        let (scan, print) = read(&pair);
+        let found = fit(&scan, Some(&print), None, &settings().fit).expect("a plane");
+        let [x, y, z, _] = found.plane_from_mesh.0[2];
+        let turn = Vector3::new(x, y, z).angle(&Vector3::from(pair.truth.plane.n));
+        assert!(turn.to_degrees() < 4.0, "{turn} rad in pair {index}");
+        let region = found.region.expect("a box");
+        for landmark in &pair.truth.landmarks {
+            assert!(region.contains(*landmark), "pair {index}");
+        }
+        (scan, region)
+    }
+
     #[test]
     fn the_piece_that_the_print_shows_is_found_among_others() {
         for index in [3, 8] {
-            let pair = PairGenerator::new(Tier::Pieces, 1).with_vertices(Some(20_000));
-            let pair = pair.pair(index).expect("a pair");
-            let (scan, print) = read(&pair);
-            let found = fit(&scan, Some(&print), None, &settings().fit).expect("a plane");
-            let [x, y, z, _] = found.plane_from_mesh.0[2];
-            let turn = Vector3::new(x, y, z).angle(&Vector3::from(pair.truth.plane.n));
-            assert!(turn.to_degrees() < 4.0, "{turn} rad in pair {index}");
-            let region = found.region.expect("a box");
-            for landmark in &pair.truth.landmarks {
-                assert!(region.contains(*landmark), "pair {index}");
-            }
+            let (scan, region) = box_of_part(Tier::Pieces, index);
             // The other pieces are as large.
             let inside = scan.mesh_in(&region).triangles.len() as f64;
             assert!(inside < 0.6 * scan.mesh().triangles.len() as f64);
@@ -376,17 +382,7 @@ mod tests {
     #[test]
     fn one_side_of_a_crack_is_found_if_both_do_not_fit_the_print() {
         for index in [0, 5] {
-            let pair = PairGenerator::new(Tier::Slid, 1).with_vertices(Some(20_000));
-            let pair = pair.pair(index).expect("a pair");
-            let (scan, print) = read(&pair);
-            let found = fit(&scan, Some(&print), None, &settings().fit).expect("a plane");
-            let [x, y, z, _] = found.plane_from_mesh.0[2];
-            let turn = Vector3::new(x, y, z).angle(&Vector3::from(pair.truth.plane.n));
-            assert!(turn.to_degrees() < 4.0, "{turn} rad in pair {index}");
-            let region = found.region.expect("a box");
-            for landmark in &pair.truth.landmarks {
-                assert!(region.contains(*landmark), "pair {index}");
-            }
+            box_of_part(Tier::Slid, index);
         }
     }
 }
