@@ -8,7 +8,7 @@ use super::exit::Refusal;
 use super::files;
 use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form, is_windows_path};
 use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
-use super::same_files::SameFiles;
+use super::repeated_files::RepeatedFiles;
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
 use crate::pair_choices::{PairChoices, RowsHash};
@@ -92,12 +92,12 @@ impl Listing {
         };
         let (mut misspelt, mut unread) = (MisspeltColumns::default(), UnreadRows::default());
         let left_out: BTreeSet<String> = choices.changes.left_out.iter().cloned().collect();
-        let mut same_files = SameFiles::default();
+        let mut repeated = RepeatedFiles::default();
         let mut each = |row: ManifestRow| {
             misspelt.add(&row);
             unread.add(&row);
             if !left_out.contains(row.name.as_str()) {
-                same_files.add(&row);
+                repeated.add(&row);
             }
         };
         let columns = choices.columns.clone();
@@ -106,7 +106,7 @@ impl Listing {
         let mut warnings = misspelt.warnings();
         let unread = unread.warnings();
         warnings.extend(unread.map_err(|sentences| refuse(file, &sentences))?);
-        warnings.extend(same_files.warning());
+        warnings.extend(repeated.warning());
         let renamed = renamed(&read);
         let has = |id: &&String| PairName::new(id).is_ok_and(|name| read.ids.contains(&name));
         if let Some(id) = left_out.iter().find(|id| !has(id)) {

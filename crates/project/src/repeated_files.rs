@@ -8,7 +8,7 @@ use mocban_lists::manifest::ManifestRow;
 
 /// Counts the rows whose mesh and print an earlier row has, too.
 #[derive(Debug, Default)]
-pub(crate) struct SameFiles {
+pub(crate) struct RepeatedFiles {
     /// The first line of each mesh with a print, by a hash of their paths: a list may have millions of rows.
     lines: BTreeMap<u64, usize>,
     count: u64,
@@ -16,7 +16,7 @@ pub(crate) struct SameFiles {
     first: Option<(PairName, usize)>,
 }
 
-impl SameFiles {
+impl RepeatedFiles {
     /// Adds a row.
     pub(crate) fn add(&mut self, row: &ManifestRow) {
         let files = format!("{:?}", (plain(&row.mesh), plain(&row.print)));

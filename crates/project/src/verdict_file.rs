@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::files::{MAX_SHOWN, RefusedLine};
 use super::location::now;
 use super::verdict_words;
-use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
+use mocban_catalog::{ListedVerdict, MAX_AHEAD_MS, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{ContentHash, PairName, UnixMillis, sanitize};
 use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
@@ -196,8 +196,9 @@ pub fn unknown_pairs(
 
 /// Returns a warning about fields that are not read. They are given with the first line of each.
 pub fn unread_fields(first_lines: &BTreeMap<String, usize>) -> Option<String> {
-    let fields = first_lines.iter().take(MAX_SHOWN);
-    let fields = fields.map(|(field, line)| format!("{} (line {line})", sanitize(field, 100)));
+    let fields = first_lines
+        .iter()
+        .map(|(field, line)| format!("{} (line {line})", sanitize(field, 100)));
     let fields: Vec<String> = fields.collect();
     let read = COLUMNS.names[REQUIRED..].join(", ");
     (!fields.is_empty()).then(|| {
@@ -315,7 +316,7 @@ fn time(text: &str, now: UnixMillis, line: usize) -> Result<Option<UnixMillis>, 
             format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
         RefusedLine::new(line, &reason)
     })?;
-    let is_far_ahead = at > now + DAY_MS;
+    let is_far_ahead = at > now + MAX_AHEAD_MS;
     if is_far_ahead || text.contains(['T', 't', ' ', ':']) {
         return Ok(Some(at));
     }

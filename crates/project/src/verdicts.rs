@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use crate::files::{self, ListFile, RefusedLine};
+use crate::files::{self, ListFile, MAX_SHOWN, RefusedLine};
 use crate::location::{Location, now};
 use crate::reviewers;
 use crate::selection;
@@ -178,7 +178,10 @@ impl NamesInList {
                     unread,
                 }) => {
                     for field in unread {
-                        names.unread.entry(field).or_insert(line);
+                        // More than these are not shown, however many a file has.
+                        if names.unread.len() < MAX_SHOWN {
+                            names.unread.entry(field).or_insert(line);
+                        }
                     }
                     let NewVerdict { pair, reviewer, .. } = listed.verdict;
                     if listed.judged.is_none() {

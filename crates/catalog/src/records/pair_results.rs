@@ -46,7 +46,7 @@ const ONE: &str = select_pairs!("p.name = ?1");
 pub(crate) const BY_IDS: &str =
     select_pairs!("p.id IN (SELECT CAST(wanted.atom AS bigint) FROM json_each(?1) AS wanted)");
 
-const OF_BLOCK: &str = select_pairs!("p.block = ?1 ORDER BY p.name");
+const OF_LISTED_BLOCK: &str = select_pairs!("p.block = ?1 ORDER BY p.name");
 
 pub(crate) const FAILED: &str = "
 SELECT p.name, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at
@@ -77,7 +77,7 @@ impl Catalog {
     /// Returns the pairs that a list assigns to a block with this id, sorted by name, without retired pairs.
     pub async fn results_of_listed_block(&self, block: &str) -> Result<Vec<PairResults>> {
         let mut conn = self.snapshot().await?;
-        let found = self.bind_left_out(query(OF_BLOCK).bind(block));
+        let found = self.bind_left_out(query(OF_LISTED_BLOCK).bind(block));
         let found = found.fetch_all(&mut conn).await?;
         assemble(&mut conn, &found, &self.left_out).await
     }
@@ -121,7 +121,7 @@ impl Catalog {
         Ok(ids.iter().filter_map(|id| by_id.remove(id)).collect())
     }
 
-    /// Binds the parameters `?2` and `?3` of [`PAGE`], [`ONE`], [`BY_IDS`] and [`OF_BLOCK`].
+    /// Binds the parameters `?2` and `?3` of [`PAGE`], [`ONE`], [`BY_IDS`] and [`OF_LISTED_BLOCK`].
     fn bind_left_out<R>(&self, query: Query<R>) -> Query<R> {
         let query = query.bind(self.left_out.of(ChecksummedTable::Pair));
         query.bind(self.left_out.of(ChecksummedTable::Truth))

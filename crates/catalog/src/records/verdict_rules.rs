@@ -11,7 +11,7 @@ pub const NOTE_CHARS: usize = 2000;
 /// Maximum length of an event id in characters.
 const EVENT_CHARS: usize = 64;
 /// How far a time may lie ahead of the clock, which may be wrong on the computer where the verdict was given.
-const DAY_MS: UnixMillis = 24 * 60 * 60 * 1000;
+pub const MAX_AHEAD_MS: UnixMillis = 24 * 60 * 60 * 1000;
 
 /// Why a verdict is not stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -71,7 +71,10 @@ impl NewVerdict {
         {
             return Err(InvalidVerdict::ShownMs);
         }
-        if !self.at.is_none_or(|at| (0..=now + DAY_MS).contains(&at)) {
+        if !self
+            .at
+            .is_none_or(|at| (0..=now + MAX_AHEAD_MS).contains(&at))
+        {
             return Err(InvalidVerdict::At);
         }
         Ok(())
@@ -123,7 +126,9 @@ pub fn check_event(event: &str) -> Result<(), InvalidVerdict> {
 
 #[cfg(test)]
 mod tests {
-    use super::{DAY_MS, InvalidVerdict, NOTE_CHARS, check_event, check_reviewer, reviewer_name};
+    use super::{
+        InvalidVerdict, MAX_AHEAD_MS, NOTE_CHARS, check_event, check_reviewer, reviewer_name,
+    };
     use crate::{NewVerdict, ReviewContext};
     use mocban_core::domain::{Reason, Verdict};
 
@@ -143,7 +148,7 @@ mod tests {
                 shown_ms: Some(i64::MAX as u64),
                 ..ReviewContext::default()
             },
-            at: Some(NOW + DAY_MS),
+            at: Some(NOW + MAX_AHEAD_MS),
         }
     }
 
@@ -182,7 +187,10 @@ mod tests {
                 InvalidVerdict::ShownMs,
             ),
             (|one| one.at = Some(-1), InvalidVerdict::At),
-            (|one| one.at = Some(NOW + DAY_MS + 1), InvalidVerdict::At),
+            (
+                |one| one.at = Some(NOW + MAX_AHEAD_MS + 1),
+                InvalidVerdict::At,
+            ),
             (
                 |one| one.reviewer = " lan".to_owned(),
                 InvalidVerdict::Reviewer,
