@@ -3,7 +3,7 @@
 /** The token that they carry. */
 export const token = document.querySelector('meta[name="csrf-token"]').content;
 
-/** Returns what a reply says; throws the sentence of a refusal. */
+/** Returns what a reply says; throws the sentence of a refusal, with its status and the retired pairs that it names. */
 export function read(status, text) {
   let reply = {};
   try {
@@ -11,7 +11,9 @@ export function read(status, text) {
   } catch {
     reply = { error: text };
   }
-  if (status !== 200) throw new Error(reply.error || text || String(status));
+  if (status !== 200) {
+    throw Object.assign(new Error(reply.error || text || String(status)), { status, retired: reply.retired ?? [] });
+  }
   return reply;
 }
 

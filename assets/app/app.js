@@ -43,7 +43,7 @@ document.addEventListener("submit", async (event) => {
     else if (reply.reload) await refresh(true);
   } catch (error) {
     showProblem(form, error.message);
-    if (keptName(form)) document.dispatchEvent(new CustomEvent("refused", { detail: error.message }));
+    if (keptName(form)) document.dispatchEvent(new CustomEvent("refused", { detail: error.retired ?? [] }));
   } finally {
     form.removeAttribute("aria-busy");
   }

@@ -110,9 +110,7 @@ all.addEventListener("click", async () => {
 });
 
 // Pairs that were retired meanwhile are not in the list any more, so the user cannot remove them from the choice.
-document.addEventListener("refused", ({ detail }) => {
-  change([], [...chosen].filter((name) => ["was", "is"].some((verb) => detail.includes(`pair ${name} ${verb} retired`))));
-});
+document.addEventListener("refused", ({ detail }) => change([], detail));
 
 // A page that the browser kept shows the choice as it was.
 addEventListener("pageshow", (event) => {

@@ -70,6 +70,13 @@ fn chosen_pairs_leave_every_count_and_come_back() {
         "{}",
         text(&again)
     );
+    // The page then no longer chooses them.
+    assert_eq!(again.json()["retired"], body["pairs"]);
+    page.get("/?language=vi");
+    let vietnamese = text(&act(&page, CHOSEN, &body, |_| {}));
+    let part = "cặp upright-0001 đã được đưa ra khỏi thống kê lúc ";
+    assert!(vietnamese.contains(part), "{vietnamese}");
+    page.get("/?language=en");
     // Another pair that was taken out before stays out.
     let other = act(
         &page,

@@ -152,6 +152,10 @@ fn another_method_is_said_to_replace_the_results() {
         "{vietnamese}"
     );
     assert!(!asked("default", "en").contains(sentence));
+    assert!(
+        vietnamese.contains("<h2>Khớp mặt khắc</h2> <code>fit</code>"),
+        "{vietnamese}"
+    );
     let other = text(&page.get("/p/p/settings?key=register.min_confidence&value=0.4"));
     assert!(!other.contains(sentence), "{other}");
 }

@@ -124,7 +124,7 @@ pub(super) fn metric_is_lacking() -> Sentence {
 /// Checks that pairs exist and are not retired, and that they are few enough.
 ///
 /// # Errors
-/// Names the pair that does not.
+/// Names a pair that does not, and all that are retired.
 pub(super) async fn require_pairs(
     open: &OpenProject,
     typed: &[String],
@@ -141,8 +141,16 @@ pub(super) async fn require_pairs(
             format!("chỉ có thể chọn tối đa {MAX_CHOSEN} cặp"),
         )));
     }
-    let names = selection::pairs(&open.catalog, typed).await;
-    names.map_err(|error| AppFailure::of(error, &open.dir))
+    match selection::pairs(&open.catalog, typed).await {
+        Ok(names) => Ok(names),
+        Err(error) => {
+            let retired = open.catalog.retired_pairs().await?.into_iter();
+            let retired = retired.map(|pair| pair.name);
+            let is_chosen = |name: &PairName| typed.iter().any(|typed| typed == name.as_str());
+            let retired = retired.filter(is_chosen).collect();
+            Err(AppFailure::of(error, &open.dir).with_retired(retired))
+        }
+    }
 }
 
 /// Does something with chosen pairs, and replies with the list that says what was done.

@@ -4,12 +4,13 @@ use std::path::Path;
 
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
+use serde_json::{Value, json};
 
 use super::sentence::Sentence;
 use crate::local_server::WorkFailed;
 use crate::review::Language;
 use mocban_catalog::CatalogError;
-use mocban_core::domain::ErrorCode;
+use mocban_core::domain::{ErrorCode, PairName};
 use mocban_project::ProjectError;
 
 /// Result of a handler.
@@ -21,6 +22,8 @@ pub(super) struct AppFailure {
     status: StatusCode,
     /// What failed. `None` if there is no such page.
     sentence: Option<Sentence>,
+    /// Chosen pairs that are retired, which the page then no longer chooses.
+    retired: Vec<PairName>,
 }
 
 impl AppFailure {
@@ -29,6 +32,7 @@ impl AppFailure {
         Self {
             status: StatusCode::NOT_FOUND,
             sentence: None,
+            retired: Vec::new(),
         }
     }
 
@@ -37,6 +41,7 @@ impl AppFailure {
         Self {
             status: StatusCode::UNPROCESSABLE_ENTITY,
             sentence: Some(sentence),
+            retired: Vec::new(),
         }
     }
 
@@ -52,7 +57,23 @@ impl AppFailure {
         Self {
             status,
             sentence: Some(Sentence::of_error(&error, dir)),
+            retired: Vec::new(),
         }
+    }
+
+    /// Names the chosen pairs that are retired.
+    #[must_use]
+    pub(super) fn with_retired(self, retired: Vec<PairName>) -> Self {
+        Self { retired, ..self }
+    }
+
+    /// Returns the body of the response to a script.
+    pub(super) fn json(&self, language: Language) -> Value {
+        let mut body = json!({ "error": self.text(language) });
+        if !self.retired.is_empty() {
+            body["retired"] = json!(self.retired);
+        }
+        body
     }
 
     /// Returns the status of the response.
@@ -87,6 +108,7 @@ impl From<WorkFailed> for AppFailure {
         Self {
             status: StatusCode::INTERNAL_SERVER_ERROR,
             sentence: Some(Sentence::of_program(&error.to_string())),
+            retired: Vec::new(),
         }
     }
 }

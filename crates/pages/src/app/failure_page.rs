@@ -8,7 +8,6 @@ use axum::http::{Method, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 use maud::html;
-use serde_json::json;
 
 use super::components::{NavSection, frame};
 use super::failure::AppFailure;
@@ -33,7 +32,7 @@ pub(super) async fn explain(
     };
     let (status, text) = (failure.status(), failure.text(visit.language));
     if !is_page {
-        return (status, Json(json!({ "error": text }))).into_response();
+        return (status, Json(failure.json(visit.language))).into_response();
     }
     let title = visit.t("This did not work", "Không thực hiện được");
     let body = html! {

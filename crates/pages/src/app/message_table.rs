@@ -105,10 +105,49 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "cặp sẽ trở lại khi có lại khung và ván được chạy lại",
     ),
     (
+        "pair {} was retired on {}, because a list that replaced the others does not have it",
+        "cặp {0} đã được đưa ra khỏi thống kê lúc {1}, vì danh sách thay thế các danh sách khác không có cặp này",
+    ),
+    (
+        "pair {} was retired on {}",
+        "cặp {0} đã được đưa ra khỏi thống kê lúc {1}",
+    ),
+    (
+        "pair {} is retired, because its box is gone from the labels of its block",
+        "cặp {0} không có trong thống kê, vì khung của nó không còn trong nhãn của ván",
+    ),
+    ("its verdicts are kept", "các đánh giá của nó vẫn được giữ"),
+    (
+        "all pairs of block {} are retired",
+        "mọi cặp của ván {0} đã được đưa ra khỏi thống kê",
+    ),
+    ("block {} has no pairs yet", "ván {0} chưa có cặp nào"),
+    (
+        "{} is a block with {}, and no pair",
+        "{0} là ván, không phải là cặp",
+    ),
+    (
+        "give the id of a pair, such as {}",
+        "hãy nêu mã của một cặp, ví dụ {0}",
+    ),
+    (
         "none of these pairs is retired",
         "không có cặp nào trong số này đã được đưa ra khỏi thống kê",
     ),
+    (
+        "none of these has failed",
+        "không có mục nào trong số này bị lỗi",
+    ),
+    (
+        "no pair or block has failed with class {}",
+        "không có cặp hay ván nào bị lỗi thuộc loại {0}",
+    ),
     // Settings.
+    ("there is no setting {}", "không có thiết lập {0}"),
+    (
+        "{} is saved, but an environment variable gives it another value",
+        "đã lưu {0}, nhưng một biến môi trường cho nó giá trị khác",
+    ),
     (
         "{} = {} is outside the range {} to {}",
         "{0} = {1} nằm ngoài khoảng {2} đến {3}",
@@ -121,6 +160,17 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "{} = {}: must be below {} = {}",
         "{0} = {1}: phải nhỏ hơn {2} = {3}",
     ),
+    // Exports.
+    (
+        "the settings compute no {}",
+        "với các thiết lập này, độ đo {0} không được tính",
+    ),
+    ("choose from {}", "hãy chọn trong: {0}"),
+    (
+        "none of the chosen pairs has a result to export",
+        "không có cặp nào đã chọn có kết quả để xuất",
+    ),
+    ("nothing was written to {}", "chưa ghi gì vào {0}"),
     // Files of a pair.
     ("{} is not there", "không có tệp {0}"),
     (

@@ -72,10 +72,16 @@ fn parts_of<'t>(text: &'t str, pattern: &str) -> Option<Vec<&'t str>> {
     rest.is_empty().then_some(parts)
 }
 
+/// Returns a pattern with `{0}` replaced by the first part, and so on. Braces in a part stay as they are.
 fn filled(pattern: &str, parts: &[&str]) -> String {
-    let mut text = pattern.to_owned();
-    for (index, part) in parts.iter().enumerate() {
-        text = text.replace(&format!("{{{index}}}"), &part_text(part));
+    let mut pieces = pattern.split('{');
+    let mut text = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let filled = piece.split_once('}').and_then(|(index, rest)| {
+            let part = parts.get(index.parse::<usize>().ok()?)?;
+            Some([part_text(part), rest.to_owned()].concat())
+        });
+        text += &filled.unwrap_or_else(|| format!("{{{piece}"));
     }
     text
 }
@@ -150,6 +156,22 @@ mod tests {
                 "không có cặp b4; mã gần giống: b04",
             ),
             (
+                "pair b 4 was retired on 2026-11-21 11:10:03 +07:00",
+                "cặp b 4 đã được đưa ra khỏi thống kê lúc 2026-11-21 11:10:03 +07:00",
+            ),
+            (
+                "pair b4 was retired on 2026-11-21, because a list that replaced the others does not have it",
+                "cặp b4 đã được đưa ra khỏi thống kê lúc 2026-11-21, vì danh sách thay thế các danh sách khác không có cặp này",
+            ),
+            (
+                "pair b4 is retired, because its box is gone from the labels of its block; its verdicts are kept",
+                "cặp b4 không có trong thống kê, vì khung của nó không còn trong nhãn của ván; các đánh giá của nó vẫn được giữ",
+            ),
+            (
+                "b04 is a block with 2 pairs, and no pair; give the id of a pair, such as b04-1",
+                "b04 là ván, không phải là cặp; hãy nêu mã của một cặp, ví dụ b04-1",
+            ),
+            (
                 "p/mocban.toml: fit.seed = 7 is outside the range 0 to 1; new words",
                 "p/mocban.toml: fit.seed = 7 nằm ngoài khoảng 0 đến 1; new words",
             ),
@@ -164,6 +186,10 @@ mod tests {
             (
                 "b1: p/1.ply may not be read: permission denied",
                 "b1: không có quyền đọc p/1.ply",
+            ),
+            (
+                "a{1}.csv: line 2: mesh m/{3}.stl of {x{0} does not exist",
+                "a{1}.csv: dòng 2: không có bản quét m/{3}.stl của {x{0}",
             ),
         ] {
             assert_eq!(vietnamese(english).as_deref(), Some(expected));

@@ -168,6 +168,21 @@ impl Visit {
         }
     }
 
+    /// Returns what a section of settings is about, or its name if that is not known.
+    pub(super) fn setting_section<'n>(&self, name: &'n str) -> &'n str {
+        match name {
+            "limits.mesh" => self.t("Limits of scans", "Giới hạn của bản quét"),
+            "limits.image" => self.t("Limits of images", "Giới hạn của hình"),
+            "run" => self.t("Runs", "Lần chạy"),
+            "pipeline" => self.t("Method", "Phương pháp"),
+            "fit" => self.t("Fit of the carved face", "Khớp mặt khắc"),
+            "depth" => self.t("Depth map", "Bản đồ độ sâu"),
+            "normalize" => self.t("Separation of the strokes", "Tách nét"),
+            "register" => self.t("Registration with the print", "Căn chỉnh với bản in"),
+            other => other,
+        }
+    }
+
     /// Says where the value of a setting comes from. `None` if it is the default.
     pub(super) fn origin(&self, origin: &Origin) -> Option<String> {
         let name = one_line(&origin.to_string()).into_owned();
@@ -217,6 +232,20 @@ mod tests {
                 .map(|number| (*number).to_owned())
                 .collect();
             assert!(missing.is_empty(), "{key}: {missing:?} of {english:?}");
+        }
+    }
+
+    #[test]
+    fn every_section_of_the_page_says_what_it_is_about() {
+        let settings = load(&Sources::default()).expect("the defaults").tree;
+        let keys = settings.settings().into_iter().map(|setting| setting.key);
+        let [english, vietnamese] =
+            [Language::English, Language::Vietnamese].map(Visit::in_language);
+        for key in keys.filter(|key| !is_hidden(key)) {
+            let (section, _) = key.rsplit_once('.').expect("a section");
+            let texts = [&english, &vietnamese].map(|visit| visit.setting_section(section));
+            assert!(texts[0] != texts[1], "{section}");
+            assert!(!texts.contains(&section), "{section}");
         }
     }
 

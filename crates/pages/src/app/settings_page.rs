@@ -130,7 +130,7 @@ fn sections(visit: &Visit, settings: &[Setting]) -> Markup {
             @let of_section: Vec<&Setting> = settings.iter().filter(|setting| section(setting) == *name).collect();
             @let is_open = of_section.iter().any(|setting| setting.origin != Origin::Default || asked == Some(&setting.key));
             details.card open[is_open] {
-                summary { h2 { (name) } }
+                summary { h2 { (visit.setting_section(name)) } " " code { (name) } }
                 @for setting in of_section { (setting_part(visit, setting)) }
             }
         }
