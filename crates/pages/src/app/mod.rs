@@ -22,6 +22,7 @@ mod failed_runs;
 mod failure;
 mod failure_page;
 mod file_in_progress;
+mod file_upload;
 mod folder_picker;
 mod health_page;
 mod home;

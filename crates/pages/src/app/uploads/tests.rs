@@ -4,8 +4,9 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier};
 use std::time::Instant;
 
-use super::{ArrivedFile, MAX_KEPT, MAX_OPEN, MAX_SILENT, UploadEnding, UploadState, Uploads};
+use super::{ArrivedFile, MAX_OPEN, Uploads};
 use crate::app::failure::AppResult;
+use crate::app::file_upload::{MAX_KEPT, MAX_SILENT, UploadEnding, UploadState};
 use crate::app::upload_sentence::cut;
 use mocban_core::domain::cancel::CancelToken;
 
