@@ -14,9 +14,16 @@ const phase = document.getElementById("upload-phase");
 const arrived = document.getElementById("upload-arrived");
 const problem = document.getElementById("upload-problem");
 const cancel = document.getElementById("upload-cancel");
+const takeOver = document.getElementById("upload-take-over");
+/** Most characters of a file name in the name of a folder. */
+const MAX_STEM = 50;
+/** The status of an upload that another page has begun, and this one can take over. */
+const CONFLICT = 409;
 
 /** The upload in progress: its id, and the request of its current file. */
 let current = null;
+/** Files that another page has begun to send, and the name of their folder. */
+let refused = null;
 
 /** Returns whether an import can use a file. Hidden files and those of systems are left out. */
 function isWanted({ path }) {
@@ -80,19 +87,19 @@ async function reason(upload) {
   return text ?? texts.cut;
 }
 
-/** Begins an upload, or resumes an interrupted one if all files that have arrived are among these. */
-async function begin(files, name, bytes) {
-  const begun = await act("actions/upload", { name, files: files.length, bytes });
-  const chosen = new Map(files.map(({ path, file }) => [path.normalize("NFC"), file]));
-  const isChosen = ({ path, size, modified }) => {
-    const file = chosen.get(path);
-    return file?.size === size && file.lastModified === modified;
-  };
-  if (begun.arrived.every(isChosen)) {
-    return { id: begun.upload, arrived: new Set(begun.arrived.map(({ path }) => path)), isCancelled: false };
-  }
-  await act("actions/upload-end", { upload: begun.upload, end: "cancel", project: "" });
-  return begin(files, name, bytes);
+/** Returns a hash of the paths, sizes and times of files. The same files have the same hash, in any order. */
+async function contentOf(files) {
+  const lines = files.map(({ path, file }) => `${path}\n${file.size} ${file.lastModified}\n`);
+  const bytes = new TextEncoder().encode(lines.sort().join(""));
+  const hash = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
+  return [...hash].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+/** Begins an upload, or resumes an interrupted one of the same files. */
+async function begin(files, name, bytes, takesOver) {
+  const content = await contentOf(files);
+  const begun = await act("actions/upload", { name, content, files: files.length, bytes, take_over: takesOver });
+  return { id: begun.upload, arrived: new Set(begun.arrived.map(({ path }) => path)), isCancelled: false };
 }
 
 /** Says how many files are not sent again. */
@@ -102,9 +109,9 @@ function showArrived(count) {
 }
 
 /** Sends all files, and opens the page on which their pairs are shown. */
-async function sendAll(files, name) {
+async function sendAll(files, name, takesOver) {
   const bytes = files.reduce((sum, { file }) => sum + file.size, 0);
-  const upload = await begin(files, name, bytes);
+  const upload = await begin(files, name, bytes, takesOver);
   current = upload;
   showArrived(upload.arrived.size);
   const timer = setInterval(() => follow(upload), 500);
@@ -135,8 +142,10 @@ async function sendAll(files, name) {
 }
 
 /** Begins an upload of what was chosen, unless one is in progress. */
-async function start(chosen, name) {
+async function start(chosen, name, takesOver = false) {
   if (current || form.getAttribute("aria-busy") === "true") return;
+  refused = null;
+  takeOver.hidden = true;
   const files = chosen.filter(isWanted);
   problem.textContent = files.length > 0 ? "" : texts.nothing;
   problem.hidden = files.length > 0;
@@ -148,10 +157,12 @@ async function start(chosen, name) {
   choice.hidden = true;
   state.hidden = false;
   try {
-    await sendAll(files, name);
+    await sendAll(files, name, takesOver);
   } catch (error) {
     problem.textContent = error.message;
     problem.hidden = false;
+    if (error.status === CONFLICT) refused = { files, name };
+    takeOver.hidden = !refused;
     state.hidden = true;
     choice.hidden = false;
   } finally {
@@ -159,14 +170,15 @@ async function start(chosen, name) {
   }
 }
 
-/** Returns the name that the folder of the files gets: that of the only folder or archive. */
+/** Returns the name that the folder of the files gets: that of the only folder or archive, or else that of the first file. */
 function nameOf(files) {
   const tops = new Set(files.map(({ path }) => path.split("/")[0]));
   const [top] = tops;
-  if (tops.size !== 1) return "";
-  const isArchive = top.toLowerCase().endsWith(".zip") && files.length === 1;
-  if (isArchive) return top.slice(0, -".zip".length);
-  return files[0].path.includes("/") ? top : "";
+  if (!top) return "";
+  const stem = top.replace(/(.)\.[^.]*$/, "$1");
+  if (tops.size === 1 && files[0].path.includes("/")) return top;
+  if (files.length === 1 && top.toLowerCase().endsWith(".zip")) return stem;
+  return `files ${[...stem].slice(0, MAX_STEM).join("")}`;
 }
 
 function chosenIn(input) {
@@ -210,6 +222,10 @@ form.addEventListener("drop", async (event) => {
     problem.textContent = error.message;
     problem.hidden = false;
   }
+});
+
+takeOver.addEventListener("click", () => {
+  if (refused) start(refused.files, refused.name, true);
 });
 
 cancel.addEventListener("click", async () => {

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::app::{act, app, text, with_project};
+use crate::app::{act, app, open_app, text, with_project};
 use crate::cli::mocban;
-use crate::page::{Page, Site, read_project};
+use crate::page::{Page, Site, answer, read_project};
 use crate::waiting::wait_until;
 
 const CHOSEN: &str = "/p/p/actions/chosen";
@@ -392,12 +392,48 @@ fn exactly_the_chosen_pairs_are_judged() {
     let unknown = act(&page, "/p/p/actions/review", &form, |_| {});
     assert_eq!(unknown.status, 422);
     assert!(
-        text(&unknown).contains("choose them again"),
+        text(&unknown).contains("choose the same pairs again"),
         "{}",
         text(&unknown)
     );
     let html = text(&page.get("/p/p/review?chosen=0123456789ab"));
-    assert!(html.contains("choose them again"), "{html}");
+    assert!(html.contains("choose the same pairs again"), "{html}");
     let none = act(&page, CHOSEN, &chosen("review", &[]), |_| {});
     assert_eq!(none.status, 422);
+}
+
+#[test]
+fn a_review_of_chosen_pairs_goes_on_after_a_restart_when_they_are_chosen_again() {
+    let (dir, mut page) = with_project();
+    let pairs = ["upright-0001", "upright-0004"];
+    let choose = |page: &Page, pairs: &[&str]| {
+        let reply = act(page, CHOSEN, &chosen("review", pairs), |_| {}).json();
+        let go = reply["go"].as_str().expect("a page");
+        go.strip_prefix("review?chosen=").expect("a key").to_owned()
+    };
+    let key = choose(&page, &pairs);
+    let form = json!({
+        "reviewer": "lan", "metric": "relief", "sample": "", "order": "random", "chosen": key,
+    });
+    let started = act(&page, "/p/p/actions/review", &form, |_| {}).json();
+    let review = format!("/p/p/{}", started["go"].as_str().expect("a page"));
+    let items = |page: &Page| page.get(&format!("{review}api/queue")).json()["items"].clone();
+    let [first, second] = [0, 1].map(|index| items(&page)[index].clone());
+    let send = |page: &Page, event: &str, item: &Value| {
+        let body = answer(event, item, "pass");
+        act(page, &format!("{review}api/answer"), &body, |_| {}).status
+    };
+    assert_eq!(send(&page, "e-1", &first), 200);
+    page.kill();
+    let page = open_app(dir.path());
+    let asked = page.get(&review);
+    assert_eq!(asked.status, 422);
+    let html = text(&asked);
+    assert!(html.contains("choose the same pairs again"), "{html}");
+    assert_eq!(send(&page, "e-2", &second), 503, "the page sends it again");
+    assert_eq!(choose(&page, &[pairs[1], pairs[0]]), key);
+    assert_eq!(send(&page, "e-2", &second), 200);
+    for item in items(&page).as_array().expect("items") {
+        assert_eq!(item["answer"]["verdict"], "pass", "{item}");
+    }
 }

@@ -7,6 +7,7 @@ use crate::app::app;
 use crate::app_browser::{enter, looks_right};
 use crate::app_choice::import_many;
 use crate::browser::{Browser, Tab};
+use crate::cli::mocban;
 use crate::page::{Page, read_project};
 
 /// Opens a list of pairs.
@@ -193,6 +194,76 @@ fn pairs_are_chosen_by_touch_and_on_several_pages() {
     assert!(dir.path().join("p/exports/table-chosen").is_dir());
     let kept = tab.eval("sessionStorage.length");
     assert_eq!(kept, 0, "the choice is cleared");
+}
+
+#[test]
+fn exactly_the_chosen_pairs_are_judged_in_a_browser() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1366, 660]);
+    open_list(&tab, &home, "");
+    tab.click(&choice_of(1), false);
+    tab.click(&choice_of(3), false);
+    tab.eval("document.querySelector('#judge').focus(), null");
+    tab.press("Space", false);
+    tab.wait("document.body?.dataset.ready && document.querySelector('#chosen-pairs b')?.textContent === '2'");
+    tab.screenshot("app_judge_these");
+    tab.eval("document.querySelector('#reviewer').value = 'lan', document.querySelector('form.action .primary').click(), null");
+    tab.wait("document.body?.dataset.shown && document.getElementById('canvas')");
+    let pairs = tab.eval(
+        "fetch('api/queue').then((reply) => reply.json()).then(({ items }) => items.map(({ pair }) => pair).sort())",
+    );
+    assert_eq!(pairs, json!(["upright-0001", "upright-0003"]));
+}
+
+#[test]
+fn retired_pairs_leave_the_choice_and_come_back_from_their_list() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let page = Page::of(app(dir.path()).args(["--lang", "vi"]));
+    let (tab, home) = enter(&browser, &page, [1366, 660]);
+    open_list(&tab, &home, "");
+    for number in [1, 2, 3] {
+        tab.click(&choice_of(number), false);
+    }
+    // Somebody else takes two of them out meanwhile.
+    let retire = ["retire", "upright-0001", "upright-0003"];
+    mocban(&dir.path().join("p"), &retire).expect(0);
+    tab.eval("window.confirm = () => true, document.querySelector('#retire').click(), null");
+    tab.wait("document.querySelector('#choice-actions .problem:not([hidden])')");
+    let problem = tab.eval("document.querySelector('#choice-actions .problem').textContent");
+    let expected = "cặp upright-0001 đã được đưa ra khỏi thống kê lúc ";
+    assert!(
+        problem
+            .as_str()
+            .is_some_and(|text| text.starts_with(expected)),
+        "{problem}"
+    );
+    assert_eq!(chosen(&tab), [2]);
+    tab.eval("document.querySelector('.filter [name=state]').value = 'retired', document.querySelector('.filter').requestSubmit(), null");
+    let rows = "document.querySelectorAll('#retired-pairs tbody tr').length";
+    tab.wait(&format!(
+        "document.body?.dataset.ready && location.search.includes('state=retired') && {rows} === 2"
+    ));
+    tab.eval("document.querySelector('#retired-pairs button').focus(), null");
+    tab.press("Space", false);
+    tab.wait(&format!(
+        "document.body?.dataset.ready && document.querySelector('#done') && {rows} === 1"
+    ));
+    tab.screenshot("app_retired_list");
+    open_list(&tab, &home, "");
+    assert_eq!(
+        tab.eval("document.querySelectorAll('[data-pair]').length"),
+        14
+    );
+    assert_eq!(chosen(&tab), [2], "the choice stays");
 }
 
 #[test]

@@ -4,11 +4,12 @@ use std::io::Write as _;
 use std::net::TcpStream;
 use std::path::Path;
 
+use mocban::workbook::test_helpers::archive;
 use serde_json::{Value, json};
 
-use crate::app::text;
+use crate::app::{act, text};
 use crate::app_uploads::{begin, empty_app, end, file_path, headers, put, refusal, stored};
-use crate::page::{Page, send};
+use crate::page::{Page, Reply, send};
 use crate::waiting::wait_until;
 
 /// Sends a file that was last changed at a time.
@@ -18,8 +19,8 @@ fn put_modified(page: &Page, upload: &Value, path: &str, bytes: &[u8], modified:
     assert_eq!(reply.status, 200, "{}", text(&reply));
 }
 
-/// Sends the beginning of a file and cuts the connection. Waits until the program has noticed.
-fn cut_off(page: &Page, upload: &Value, path: &str) {
+/// Sends the beginning of a file, and waits until it has arrived.
+fn begin_file(page: &Page, upload: &Value, path: &str) -> TcpStream {
     let arrived = || page.get(&format!("/uploads/{upload}"));
     let before = arrived().json()["bytes"].as_u64().expect("a number");
     let path = file_path(page, upload, path);
@@ -37,14 +38,33 @@ fn cut_off(page: &Page, upload: &Value, path: &str) {
     wait_until("the file arrives", || {
         arrived().json()["bytes"] == before + 5
     });
-    drop(stream);
-    wait_until("the upload is interrupted", || arrived().status == 422);
+    stream
 }
 
-/// Begins an upload of files with this name. Returns its id and what has arrived.
-fn begun_with(page: &Page, name: &str, files: u64) -> (Value, Value) {
-    let reply = begin(page, name, files, 10);
-    assert_eq!(reply.status, 200, "{}", text(&reply));
+/// Sends the beginning of a file and cuts the connection. Waits until the program has noticed.
+fn cut_off(page: &Page, upload: &Value, path: &str) {
+    drop(begin_file(page, upload, path));
+    wait_until("the upload is interrupted", || {
+        page.get(&format!("/uploads/{upload}")).status == 422
+    });
+}
+
+/// Begins an upload of files with this content, or takes it over from another page.
+fn begin_same(page: &Page, content: &str, files: u64, takes_over: bool) -> Reply {
+    let body = json!({
+        "name": content, "content": content, "files": files, "bytes": 10, "take_over": takes_over,
+    });
+    act(page, "/actions/upload", &body, |_| {})
+}
+
+/// Begins an upload of files with this content. Returns its id and what has arrived.
+fn begun_with(page: &Page, content: &str, files: u64) -> (Value, Value) {
+    begun(&begin_same(page, content, files, false))
+}
+
+#[track_caller]
+fn begun(reply: &Reply) -> (Value, Value) {
+    assert_eq!(reply.status, 200, "{}", text(reply));
     let reply = reply.json();
     (reply["upload"].clone(), reply["arrived"].clone())
 }
@@ -59,7 +79,7 @@ fn names(dir: &Path) -> Vec<String> {
 #[test]
 fn files_that_have_arrived_are_not_sent_again() {
     let (dir, page) = empty_app();
-    let (upload, arrived) = begun_with(&page, "quét", 3);
+    let (mut upload, arrived) = begun_with(&page, "quét", 3);
     assert_eq!(arrived, json!([]));
     put_modified(&page, &upload, "a/1.stl", b"solid 1", 5);
     for _ in 0..2 {
@@ -69,8 +89,13 @@ fn files_that_have_arrived_are_not_sent_again() {
         assert!(why.contains("1 of them have arrived"), "{why}");
         assert!(text(&page.get("/import")).contains(&why), "{why}");
         assert_eq!(refusal(&end(&page, &upload, "finish")), why);
+        let (next, arrived) = begun_with(&page, "quét", 3);
         let expected = json!([{"path": "a/1.stl", "size": 7, "modified": 5}]);
-        assert_eq!(begun_with(&page, "quét", 3), (upload.clone(), expected));
+        assert_eq!(arrived, expected);
+        // The page of the first part can send nothing more.
+        let late = refusal(&put(&page, &upload, "b/1.png", b"x"));
+        assert!(late.contains("another page has taken over"), "{late}");
+        upload = next;
     }
     assert!(!text(&page.get("/import")).contains("the connection was cut"));
     put_modified(&page, &upload, "a/2.stl", b"solid 2", 6);
@@ -83,6 +108,63 @@ fn files_that_have_arrived_are_not_sent_again() {
 }
 
 #[test]
+fn an_archive_that_was_unpacked_is_not_sent_again() {
+    let (dir, page) = empty_app();
+    let zip = archive(&[("1.stl", "solid 1"), ("notes.doc", "x")], true);
+    let size = zip.len();
+    let (upload, _) = begun_with(&page, "quét", 3);
+    put_modified(&page, &upload, "ván.zip", &zip, 5);
+    // One that is cut off comes again, also as the first file.
+    cut_off(&page, &upload, "other.zip");
+    assert_eq!(names(dir.path()), ["archive", "1.stl"]);
+    let (upload, arrived) = begun_with(&page, "quét", 3);
+    let expected = json!([{"path": "ván.zip", "size": size, "modified": 5}]);
+    assert_eq!(arrived, expected);
+    let other = archive(&[("2.stl", "solid 2")], true);
+    put_modified(&page, &upload, "other.zip", &other, 6);
+    put_modified(&page, &upload, "1.png", b"png", 6);
+    assert_eq!(end(&page, &upload, "finish").status, 200);
+    let files = ["quét/1.png", "quét/1.stl", "quét/2.stl"];
+    assert_eq!(stored(dir.path()), files);
+}
+
+#[test]
+fn another_page_takes_over_an_upload_of_which_nothing_arrives() {
+    let (dir, page) = empty_app();
+    let (first, _) = begun_with(&page, "quét", 2);
+    put_modified(&page, &first, "1.stl", b"solid 1", 5);
+    let stream = begin_file(&page, &first, "2.stl");
+    let early = refusal(&begin_same(&page, "quét", 2, true));
+    assert!(early.contains("another page is sending"), "{early}");
+    let (other, arrived) = begun_with(&page, "other files", 2);
+    assert_eq!(arrived, json!([]));
+    assert_eq!(end(&page, &other, "cancel").status, 200);
+    wait_until("nothing arrives", || {
+        begin_same(&page, "quét", 2, false).status == 409
+    });
+    let asked = begin_same(&page, "quét", 2, false);
+    assert!(text(&asked).contains("Take over"), "{}", text(&asked));
+    let (second, arrived) = begun(&begin_same(&page, "quét", 2, true));
+    let expected = json!([{"path": "1.stl", "size": 7, "modified": 5}]);
+    assert_eq!(arrived, expected, "nothing is lost");
+    assert_eq!(names(dir.path()), ["1.stl"], "the part is removed");
+    for refused in [
+        put(&page, &first, "2.stl", b"x"),
+        end(&page, &first, "finish"),
+        page.get(&format!("/uploads/{first}")),
+    ] {
+        let why = refusal(&refused);
+        assert!(why.contains("another page has taken over"), "{why}");
+    }
+    // The first page is closed at last.
+    drop(stream);
+    assert_eq!(end(&page, &first, "cancel").status, 200);
+    put_modified(&page, &second, "2.stl", b"solid 2", 6);
+    assert_eq!(end(&page, &second, "finish").status, 200);
+    assert_eq!(stored(dir.path()), ["quét/1.stl", "quét/2.stl"]);
+}
+
+#[test]
 fn an_interrupted_upload_is_not_mixed_with_other_files() {
     let (dir, page) = empty_app();
     let (interrupted, _) = begun_with(&page, "x", 2);
@@ -91,9 +173,7 @@ fn an_interrupted_upload_is_not_mixed_with_other_files() {
     let (other, arrived) = begun_with(&page, "y", 1);
     assert!(other != interrupted && arrived == json!([]), "{arrived}");
     assert_eq!(end(&page, &other, "cancel").status, 200);
-    // The page cancels it if other files were chosen.
-    let (again, arrived) = begun_with(&page, "x", 1);
-    assert_eq!(again, interrupted);
+    let (again, arrived) = begun_with(&page, "x", 2);
     assert_eq!(arrived.as_array().map(Vec::len), Some(1));
     assert_eq!(end(&page, &again, "cancel").status, 200);
     assert_eq!(names(dir.path()), [""; 0]);

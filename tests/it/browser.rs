@@ -236,6 +236,14 @@ impl Tab<'_> {
         self.call("Page.navigate", &json!({ "url": url }));
     }
 
+    /// Limits how many bytes the tab sends in a second; -1 for no limit.
+    pub(crate) fn limit_sending(&self, bytes: i64) {
+        let conditions = json!({
+            "offline": false, "latency": 0, "downloadThroughput": -1, "uploadThroughput": bytes,
+        });
+        self.call("Network.emulateNetworkConditions", &conditions);
+    }
+
     /// Runs a script before those of every page that is opened from now on.
     pub(crate) fn before_scripts(&self, source: &str) {
         self.call(

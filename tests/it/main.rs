@@ -13,6 +13,7 @@ mod app_choice_browser;
 mod app_export_zip;
 mod app_import;
 mod app_invitations;
+mod app_resume_browser;
 mod app_sentences;
 mod app_upload_archives;
 mod app_upload_browser;

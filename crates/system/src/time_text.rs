@@ -29,6 +29,12 @@ pub fn day(at: i64) -> String {
     TimeZone::UTC.to_datetime(timestamp(at)).date().to_string()
 }
 
+/// Formats a time in UTC as a part of a file name: `2026-11-21 041003`.
+pub fn file_time(at: i64) -> String {
+    let time = TimeZone::UTC.to_datetime(timestamp(at));
+    time.strftime("%Y-%m-%d %H%M%S").to_string()
+}
+
 /// Returns a time; the Unix epoch for times outside the years -9999 to 9999.
 fn timestamp(at: i64) -> Timestamp {
     Timestamp::from_millisecond(at).unwrap_or(Timestamp::UNIX_EPOCH)
@@ -66,7 +72,7 @@ pub fn rough_duration(ms: u64) -> String {
 mod tests {
     use jiff::tz::{Offset, TimeZone};
 
-    use super::{day, day_first_in_zone, duration, in_zone, parse_utc};
+    use super::{day, day_first_in_zone, duration, file_time, in_zone, parse_utc};
 
     #[test]
     fn known_times_are_formatted_with_their_zone() {
@@ -84,6 +90,7 @@ mod tests {
             "21/11/2026 11:10:03 +07:00"
         );
         assert_eq!(day(1_795_234_203_999), "2026-11-21");
+        assert_eq!(file_time(1_795_234_203_999), "2026-11-21 041003");
     }
 
     #[test]

@@ -61,8 +61,8 @@ impl ChosenSets {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(found) = kept.iter().find(|known| known.key == key) else {
             return Err(AppFailure::refused(Sentence::new(
-                "the program does not keep any more which pairs were chosen: choose them again on the page Pairs",
-                "chương trình không còn giữ lựa chọn các cặp này: hãy chọn lại ở trang Các cặp",
+                "the program no longer knows which pairs were chosen: choose the same pairs again on the page Pairs and press \"Judge these\"; the review then goes on where it stopped, and no answer is lost",
+                "chương trình không còn giữ lựa chọn các cặp này: hãy chọn lại đúng các cặp đó ở trang Các cặp rồi bấm \"Đánh giá các cặp này\"; lần đánh giá sẽ tiếp tục ở chỗ đã dừng và không mất câu trả lời nào",
             )));
         };
         if found.project != project {

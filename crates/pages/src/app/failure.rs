@@ -45,6 +45,15 @@ impl AppFailure {
         }
     }
 
+    /// A request against another one, which the user may end for it.
+    pub(super) const fn conflict(sentence: Sentence) -> Self {
+        Self {
+            status: StatusCode::CONFLICT,
+            sentence: Some(sentence),
+            retired: Vec::new(),
+        }
+    }
+
     /// Explains an error of the project in a folder.
     pub(super) fn of(error: impl Into<ProjectError>, dir: &Path) -> Self {
         let error = error.into();
@@ -58,6 +67,15 @@ impl AppFailure {
             status,
             sentence: Some(Sentence::of_error(&error, dir)),
             retired: Vec::new(),
+        }
+    }
+
+    /// Returns the failure for a page that keeps what it sent, and sends it again later.
+    #[must_use]
+    pub(super) fn for_later(self) -> Self {
+        Self {
+            status: StatusCode::SERVICE_UNAVAILABLE,
+            ..self
         }
     }
 

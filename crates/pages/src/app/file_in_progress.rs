@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 
 use super::failure::{AppFailure, AppResult};
@@ -33,6 +33,8 @@ pub(super) struct FileInProgress {
     pub(super) pieces: mpsc::Sender<FilePiece>,
     pub(super) written: JoinHandle<Result<(), Sentence>>,
     pub(super) last_piece: LastPiece,
+    /// Becomes ready if no more of the file is wanted, such as when another page goes on with the upload.
+    pub(super) interrupted: oneshot::Receiver<()>,
     /// Ends the work if nobody waits for it any more.
     pub(super) cancels: CancelGuard,
 }
@@ -54,8 +56,8 @@ impl FileInProgress {
         let Self {
             pieces,
             written,
-            last_piece: _,
             cancels,
+            ..
         } = self;
         drop(pieces);
         let written = written.await;

@@ -1,19 +1,20 @@
 //! An upload of files from a browser: they are written one after another, and get their folder when all are there.
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use tokio::sync::mpsc;
+use serde::Deserialize;
+use tokio::sync::{Notify, mpsc, oneshot};
 use tokio::task::spawn_blocking;
 
 use super::failure::{AppFailure, AppResult};
 use super::file_in_progress::{FileInProgress, LastPiece};
 use super::received_archive::take_file;
-use super::received_files::{ArrivedFile, ReceivedCount, ReceivedFiles};
+use super::received_files::{ReceivedCount, ReceivedFiles};
 use super::sentence::Sentence;
-use super::upload_sentence::{busy, cut, cut_with_rest, ended, incomplete, storing};
+use super::upload_sentence::{busy, cut, cut_with_rest, ended, incomplete, storing, taken_over};
 use crate::local_server::WorkFailed;
 use mocban_core::domain::cancel::{CancelGuard, CancelToken};
 
@@ -23,18 +24,50 @@ const MAX_IDLE: Duration = Duration::from_secs(30);
 pub(super) const MAX_SILENT: Duration = Duration::from_secs(5);
 /// How long the files of an interrupted upload are kept, so that it can be resumed.
 pub(super) const MAX_KEPT: Duration = Duration::from_hours(1);
+/// How long a file that is interrupted may take to be removed.
+const MAX_SETTLING: Duration = Duration::from_secs(10);
 /// Pieces of a file that wait to be written. A piece has at most 64 KiB.
 const WAITING_PIECES: usize = 4;
+
+/// What a browser will send.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AnnouncedFiles {
+    /// Name of the folder that the files get.
+    pub(super) name: String,
+    /// Hash of the paths, sizes and times of all files. Empty if it is not known: then the upload cannot be resumed.
+    #[serde(default)]
+    pub(super) content: String,
+    /// Number of files and archives.
+    pub(super) files: u64,
+    /// Bytes of all.
+    pub(super) bytes: u64,
+    /// Whether the upload of the same files by another page is interrupted first, if nothing more of it arrives.
+    #[serde(default)]
+    pub(super) take_over: bool,
+}
+
+/// How an upload stands in the way of another one of the same files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SameFiles {
+    /// Files are arriving.
+    Arriving,
+    /// Files have arrived, and then nothing for a while.
+    Silent,
+}
 
 /// Files that a browser sends.
 #[derive(Debug)]
 pub(super) struct FileUpload {
-    pub(super) name: String,
-    /// Number of files and archives that the browser will send, and that have arrived.
-    announced: AtomicU64,
+    announced: AnnouncedFiles,
+    /// Number of files and archives that have arrived.
     pub(super) arrived: AtomicU64,
     pub(super) count: Arc<ReceivedCount>,
     pub(super) last_piece: LastPiece,
+    /// Whether another page takes over.
+    is_taken: AtomicBool,
+    /// Notifies when a thread has put back the files.
+    settled: Notify,
     state: Mutex<UploadState>,
 }
 
@@ -43,8 +76,8 @@ pub(super) struct FileUpload {
 pub(super) enum UploadState {
     /// Waits for the next file since then.
     Ready(Box<ReceivedFiles>, Instant),
-    /// A thread has the files.
-    Busy(CancelToken),
+    /// A thread has the files. The file that arrives is interrupted when the sender is dropped.
+    Busy(CancelToken, Option<oneshot::Sender<()>>),
     /// A thread gives the files their folder, which cannot be cancelled.
     Storing,
     /// It was interrupted at that time, for this reason. It can be resumed with the files that have not arrived.
@@ -54,16 +87,59 @@ pub(super) enum UploadState {
 }
 
 impl FileUpload {
-    /// Waits for the first of this number of files.
-    pub(super) fn new(name: String, files: u64, received: ReceivedFiles) -> Self {
+    /// Waits for the first of these files that has not arrived.
+    pub(super) fn new(announced: AnnouncedFiles, received: Box<ReceivedFiles>) -> Self {
         Self {
-            name,
-            announced: AtomicU64::new(files),
-            arrived: AtomicU64::new(0),
+            announced,
+            arrived: AtomicU64::new(received.arrived().len() as u64),
             count: Arc::clone(&received.count),
             last_piece: LastPiece::default(),
-            state: Mutex::new(UploadState::Ready(Box::new(received), Instant::now())),
+            is_taken: AtomicBool::new(false),
+            settled: Notify::new(),
+            state: Mutex::new(UploadState::Ready(received, Instant::now())),
         }
+    }
+
+    /// Returns whether the upload has these files.
+    pub(super) fn is_of(&self, files: &AnnouncedFiles) -> bool {
+        let content = &self.announced.content;
+        !content.is_empty() && *content == files.content
+    }
+
+    /// Returns how the upload stands in the way of another one of the same files. `None` if it was interrupted or has ended,
+    /// or seems to be lost before a file had arrived.
+    pub(super) fn in_the_way(&self, now: Instant) -> Option<SameFiles> {
+        let last = match *self.lock() {
+            UploadState::Ready(_, since) => since,
+            // While an archive is unpacked, no piece is the last one.
+            UploadState::Busy(..) => self.last_piece.get().unwrap_or(now),
+            UploadState::Storing => now,
+            UploadState::Paused(..) | UploadState::Ended(_) => return None,
+        };
+        if now.duration_since(last) <= MAX_SILENT {
+            return Some(SameFiles::Arriving);
+        }
+        (self.arrived.load(Ordering::Relaxed) > 0).then_some(SameFiles::Silent)
+    }
+
+    /// Interrupts the upload, so that another page can resume it. Returns when its files are there, or if that takes long.
+    pub(super) async fn cut_off(&self) {
+        let settled = self.settled.notified();
+        tokio::pin!(settled);
+        // A thread may put the files back before they are waited for.
+        settled.as_mut().enable();
+        let interrupt = match &mut *self.lock() {
+            UploadState::Busy(_, interrupt) => interrupt.take(),
+            _ => None,
+        };
+        if interrupt.is_none() {
+            self.interrupt(taken_over());
+            return;
+        }
+        self.is_taken.store(true, Ordering::Relaxed);
+        drop(interrupt);
+        // Otherwise the files are still in use, and the other page is asked again.
+        let _ = tokio::time::timeout(MAX_SETTLING, settled).await;
     }
 
     /// Starts to write a file on a thread of its own.
@@ -77,7 +153,9 @@ impl FileUpload {
         modified: Option<i64>,
     ) -> AppResult<FileInProgress> {
         let token = CancelToken::default();
-        let received = self.take(UploadState::Busy(token.clone()))?;
+        let (interrupt, interrupted) = oneshot::channel();
+        let received = self.take(UploadState::Busy(token.clone(), Some(interrupt)))?;
+        self.is_taken.store(false, Ordering::Relaxed);
         self.last_piece.set(Some(Instant::now()));
         let (pieces, arriving) = mpsc::channel(WAITING_PIECES);
         let cancels = CancelGuard(token.clone());
@@ -89,7 +167,11 @@ impl FileUpload {
                 match take_file(&mut received, &path, modified, arriving) {
                     Ok(()) => Ok(received),
                     Err(why) if why == cut() && !received.arrived().is_empty() => {
-                        let why = cut_with_rest(received.arrived().len() as u64);
+                        let why = if ending.upload.is_taken.load(Ordering::Relaxed) {
+                            taken_over()
+                        } else {
+                            cut_with_rest(received.arrived().len() as u64)
+                        };
                         Err((why, Some(received)))
                     }
                     Err(why) => Err((why, None)),
@@ -115,6 +197,7 @@ impl FileUpload {
             pieces,
             written,
             last_piece: self.last_piece.clone(),
+            interrupted,
             cancels,
         })
     }
@@ -129,12 +212,12 @@ impl FileUpload {
         let placed = spawn_blocking(move || {
             let mut ending = UploadEnding::of(Arc::clone(&upload));
             let arrived = upload.arrived.load(Ordering::Relaxed);
-            let announced = upload.announced.load(Ordering::Relaxed);
-            let placed = if arrived == announced {
-                received.place(&upload.name)
+            let announced = &upload.announced;
+            let placed = if arrived == announced.files {
+                received.place(&announced.name)
             } else {
                 drop(received);
-                Err(incomplete(arrived, announced))
+                Err(incomplete(arrived, announced.files))
             };
             ending.next = UploadState::Ended(placed.as_ref().err().cloned());
             placed
@@ -155,7 +238,7 @@ impl FileUpload {
             }
             std::mem::replace(&mut *state, UploadState::Ended(None))
         };
-        if let UploadState::Busy(token) = &before {
+        if let UploadState::Busy(token, _) = &before {
             token.cancel();
         }
         Ok(())
@@ -166,31 +249,26 @@ impl FileUpload {
         match &*self.lock() {
             UploadState::Ended(why) => why.clone(),
             UploadState::Paused(.., why) => Some(why.clone()),
-            UploadState::Ready(..) | UploadState::Busy(_) | UploadState::Storing => None,
+            UploadState::Ready(..) | UploadState::Busy(..) | UploadState::Storing => None,
         }
     }
 
-    /// Resumes the upload with this number of files, if it was interrupted or its browser is closed. Returns the files that
-    /// need not be sent again.
-    pub(super) fn resume(&self, files: u64) -> Option<Vec<ArrivedFile>> {
+    /// Gives away the files of an upload that was interrupted or whose browser is closed, so that another page resumes it. The
+    /// page of this one, if it is open after all, can send nothing more.
+    pub(super) fn give_up(&self) -> Option<Box<ReceivedFiles>> {
         let mut state = self.lock();
-        let received = match std::mem::replace(&mut *state, UploadState::Storing) {
-            UploadState::Paused(received, ..) => received,
+        match std::mem::replace(&mut *state, UploadState::Ended(Some(taken_over()))) {
+            UploadState::Paused(received, ..) => Some(received),
             UploadState::Ready(received, since)
                 if since.elapsed() > MAX_IDLE && !received.arrived().is_empty() =>
             {
-                received
+                Some(received)
             }
             other => {
                 *state = other;
-                return None;
+                None
             }
-        };
-        let arrived = received.arrived().to_vec();
-        self.announced.store(files, Ordering::Relaxed);
-        self.arrived.store(arrived.len() as u64, Ordering::Relaxed);
-        *state = UploadState::Ready(received, Instant::now());
-        Some(arrived)
+        }
     }
 
     /// Keeps the files of an upload that cannot be continued now.
@@ -212,7 +290,7 @@ impl FileUpload {
                     UploadState::Ended(Some(why)) | UploadState::Paused(.., why) => why.clone(),
                     UploadState::Ended(None) => ended(),
                     UploadState::Storing => storing(),
-                    UploadState::Ready(..) | UploadState::Busy(_) => busy(),
+                    UploadState::Ready(..) | UploadState::Busy(..) => busy(),
                 };
                 *state = other;
                 Err(AppFailure::refused(why))
@@ -224,36 +302,35 @@ impl FileUpload {
     fn settle(&self, next: UploadState) {
         let mut state = self.lock();
         let unused = match &*state {
-            UploadState::Busy(_) | UploadState::Storing => std::mem::replace(&mut *state, next),
+            UploadState::Busy(..) | UploadState::Storing => std::mem::replace(&mut *state, next),
             UploadState::Ready(..) | UploadState::Paused(..) | UploadState::Ended(_) => next,
         };
         drop(state);
         // Removes files of an upload that was cancelled.
         drop(unused);
+        self.settled.notify_waiters();
     }
 
     pub(super) fn is_over(&self) -> bool {
         match &*self.lock() {
-            UploadState::Ready(_, since) => since.elapsed() > MAX_IDLE,
-            UploadState::Paused(_, since, _) => since.elapsed() > MAX_KEPT,
-            UploadState::Busy(_) | UploadState::Storing => false,
+            UploadState::Ready(received, since) if received.arrived().is_empty() => {
+                since.elapsed() > MAX_IDLE
+            }
+            UploadState::Ready(_, since) | UploadState::Paused(_, since, _) => {
+                since.elapsed() > MAX_KEPT
+            }
+            UploadState::Busy(..) | UploadState::Storing => false,
             UploadState::Ended(_) => true,
         }
     }
 
+    /// Returns since when the upload is interrupted, or its browser closed.
     pub(super) fn paused_since(&self) -> Option<Instant> {
         match *self.lock() {
             UploadState::Paused(_, since, _) => Some(since),
+            UploadState::Ready(_, since) if since.elapsed() > MAX_IDLE => Some(since),
             _ => None,
         }
-    }
-
-    /// Returns whether a file stopped arriving after others had arrived.
-    pub(super) fn is_silent(&self, now: Instant) -> bool {
-        let last = self.last_piece.get();
-        last.is_some_and(|last| now.duration_since(last) > MAX_SILENT)
-            && matches!(*self.lock(), UploadState::Busy(_))
-            && self.arrived.load(Ordering::Relaxed) > 0
     }
 
     /// Ends an upload that nobody has resumed for [`MAX_KEPT`], and removes its files. Returns whether it has ended.
@@ -263,7 +340,7 @@ impl FileUpload {
             UploadState::Ready(_, since) | UploadState::Paused(_, since, _) => {
                 now.duration_since(*since) > MAX_KEPT
             }
-            UploadState::Busy(_) | UploadState::Storing => false,
+            UploadState::Busy(..) | UploadState::Storing => false,
             UploadState::Ended(_) => return true,
         };
         let left = is_left.then(|| std::mem::replace(&mut *state, UploadState::Ended(None)));

@@ -32,8 +32,10 @@ pub(super) fn take_file(
     }
     let safe = RelativePath::new(path).map_err(|fault| refused_path(path, &fault))?;
     if safe.extension().as_deref() == Some(ARCHIVE) {
-        let archive = received.receive_archive(arriving)?;
-        return unpack(received, &archive, &safe);
+        let (archive, size) = received.receive_archive(arriving)?;
+        unpack(received, &archive, &safe)?;
+        received.note_arrived(&safe, size, modified);
+        return Ok(());
     }
     received.receive(&safe, modified, arriving)
 }

@@ -74,8 +74,10 @@ pub(super) struct ArrivedFile {
 pub(super) struct ReceivedFiles {
     folder: NewFolder,
     taken: TakenPaths,
-    /// Files that need not be sent again.
+    /// Files and archives that need not be sent again.
     arrived: Vec<ArrivedFile>,
+    /// Whether a file has arrived whose time in the browser is not known, so that it would have to be sent again.
+    has_unknown: bool,
     /// Names of files that were cut off, which may come again.
     cut_off: BTreeSet<String>,
     unlooked_bytes: u64,
@@ -89,20 +91,29 @@ impl ReceivedFiles {
             folder,
             taken: TakenPaths::default(),
             arrived: Vec::new(),
+            has_unknown: false,
             cut_off: BTreeSet::new(),
             unlooked_bytes: 0,
             count,
         }
     }
 
-    /// Returns the files that need not be sent again, or none if some are not known, such as those of an archive.
+    /// Returns the files and archives that need not be sent again, or none if some are not known.
     pub(super) fn arrived(&self) -> &[ArrivedFile] {
-        let all = self.count.files.load(Ordering::Relaxed);
-        if self.arrived.len() as u64 == all {
-            &self.arrived
-        } else {
-            &[]
-        }
+        if self.has_unknown { &[] } else { &self.arrived }
+    }
+
+    /// Notes a file or an archive that has arrived whole, with its size in bytes.
+    pub(super) fn note_arrived(&mut self, path: &RelativePath, size: u64, modified: Option<i64>) {
+        let Some(modified) = modified else {
+            self.has_unknown = true;
+            return;
+        };
+        self.arrived.push(ArrivedFile {
+            path: path.as_str().to_owned(),
+            size,
+            modified,
+        });
     }
 
     /// Writes a file as it arrives. `modified` is when it was last changed in the browser, if that is known. A file that does
@@ -130,28 +141,32 @@ impl ReceivedFiles {
             self.cut_off.insert(path.as_str().to_owned());
             return Err(why);
         }
-        self.arrived.extend(modified.map(|modified| ArrivedFile {
-            path: path.as_str().to_owned(),
-            size: self.count.bytes.load(Ordering::Relaxed) - before,
-            modified,
-        }));
+        let size = self.count.bytes.load(Ordering::Relaxed) - before;
+        self.note_arrived(path, size, modified);
         self.finish_file(path);
         Ok(())
     }
 
-    /// Writes an archive as it arrives, to a file that does not stay. Returns it.
+    /// Writes an archive as it arrives, to a file that does not stay. Returns it with its size in bytes. One that does not
+    /// arrive whole may come again.
     ///
     /// # Errors
     /// Returns the reason if the disk is full, or the file does not arrive whole.
     pub(super) fn receive_archive(
         &mut self,
         pieces: mpsc::Receiver<FilePiece>,
-    ) -> Result<File, Sentence> {
+    ) -> Result<(File, u64), Sentence> {
+        let before = self.count.bytes.load(Ordering::Relaxed);
         let path = self.folder.scratch().join(ARCHIVE_FILE);
         let mut options = OpenOptions::new();
         options.create(true).truncate(true).read(true).write(true);
         let file = options.open(path).map_err(|error| not_written(&error))?;
-        self.write(file, pieces)
+        let written = self.write(file, pieces);
+        if written.is_err() {
+            self.count.bytes.store(before, Ordering::Relaxed);
+        }
+        let size = self.count.bytes.load(Ordering::Relaxed) - before;
+        Ok((written?, size))
     }
 
     fn write(

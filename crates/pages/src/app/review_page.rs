@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use axum::extract::{Path, Request, State};
+use axum::http::Method;
 use axum::response::{Html, Response};
 use axum::{Extension, Json};
 use maud::{Markup, html};
@@ -192,7 +193,12 @@ pub(super) async fn pages(
         return Err(AppFailure::not_found());
     };
     let open = state.open(key).await?;
-    let router = review(&state, &open, reviewer, choice).await?;
+    let router = match review(&state, &open, reviewer, choice).await {
+        Ok(router) => router,
+        // An open page keeps its answers until the review is open again.
+        Err(failure) if request.method() == Method::POST => return Err(failure.for_later()),
+        Err(failure) => return Err(failure),
+    };
     pass_on(router, access, request).await
 }
 

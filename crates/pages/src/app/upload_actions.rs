@@ -15,6 +15,7 @@ use tokio::task::spawn_blocking;
 use super::action_body::ActionBody;
 use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
+use super::file_upload::AnnouncedFiles;
 use super::folder_picker::PickerRoots;
 use super::received_files::FilePiece;
 use super::sentence::Sentence;
@@ -22,7 +23,7 @@ use super::state::AppState;
 use crate::local_server::WorkFailed;
 use mocban_lists::relative_path::RelativePath;
 use mocban_project::location::now;
-use mocban_system::time_text::day;
+use mocban_system::time_text::file_time;
 
 /// Longest time in which a browser sends nothing of a file.
 const MAX_PAUSE: Duration = Duration::from_mins(1);
@@ -31,28 +32,25 @@ const CLEANING_INTERVAL: Duration = Duration::from_mins(10);
 /// Longest name of the folder of an upload, characters.
 const MAX_NAME: usize = 60;
 
-/// What a browser will send.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct UploadBody {
-    /// Name of the folder or archive that was chosen; empty for several files.
-    name: String,
-    files: u64,
-    bytes: u64,
-}
-
-/// Begins an upload, or resumes an interrupted one. Replies with the files that need not be sent again.
+/// Begins an upload, or resumes an interrupted one. Replies with the files that need not be sent again. The status 409 means
+/// that the page can take over from another one.
 pub(super) async fn begin(
     State(state): State<Arc<AppState>>,
-    ActionBody(body): ActionBody<UploadBody>,
+    ActionBody(body): ActionBody<AnnouncedFiles>,
 ) -> AppResult<Json<Value>> {
-    let name = folder_name(&body.name);
+    let files = AnnouncedFiles {
+        name: folder_name(&body.name),
+        ..body
+    };
+    if files.take_over {
+        state.uploads.interrupt_silent(&files).await;
+    }
     let shared = Arc::clone(&state);
     let begun = spawn_blocking(move || {
         let folder = &shared.options.folder;
         // Otherwise the files could not be imported.
         utf8(&PickerRoots::new(folder).allowed(folder)?)?;
-        shared.uploads.begin(name, body.files, body.bytes)
+        shared.uploads.begin(files)
     });
     let begun = begun.await;
     let (id, arrived) = begun.map_err(|_panicked| WorkFailed)??;
@@ -74,7 +72,7 @@ async fn remove_if_left(state: Weak<AppState>, id: u64) {
     }
 }
 
-/// Returns the name of the folder for an upload.
+/// Returns the name of the folder for an upload: the chosen one, or the time if it cannot be the name of a folder.
 fn folder_name(chosen: &str) -> String {
     let name = RelativePath::new(chosen.trim()).ok();
     let is_name = |name: &RelativePath| {
@@ -83,7 +81,7 @@ fn folder_name(chosen: &str) -> String {
     };
     let name = name.filter(is_name);
     name.map_or_else(
-        || format!("files {}", day(now())),
+        || format!("files {}", file_time(now())),
         |name| name.as_str().to_owned(),
     )
 }
@@ -96,14 +94,18 @@ pub(super) async fn receive(
 ) -> AppResult<Json<Value>> {
     let query = PageQuery::parse(request.uri().query().unwrap_or_default());
     let upload = state.uploads.find(id)?;
-    let file = upload.start(&path, query.parsed("modified"))?;
+    let mut file = upload.start(&path, query.parsed("modified"))?;
     let mut body = request.into_body().into_data_stream();
-    // Without an end, the file counts as cut off.
-    while let Ok(next) = tokio::time::timeout(MAX_PAUSE, body.next()).await {
+    loop {
+        let next = tokio::select! {
+            next = tokio::time::timeout(MAX_PAUSE, body.next()) => next,
+            _ = &mut file.interrupted => break,
+        };
+        // Without an end, the file counts as cut off.
         let piece = match next {
-            Some(Ok(bytes)) => FilePiece::Bytes(bytes),
-            Some(Err(_cut)) => break,
-            None => FilePiece::End,
+            Ok(Some(Ok(bytes))) => FilePiece::Bytes(bytes),
+            Ok(None) => FilePiece::End,
+            Ok(Some(Err(_cut))) | Err(_silent) => break,
         };
         if !file.pass(piece).await {
             break;
@@ -206,11 +208,12 @@ mod tests {
     use super::folder_name;
 
     #[test]
-    fn an_upload_is_named_like_its_folder_or_by_its_day() {
+    fn an_upload_is_named_like_its_folder_or_by_its_time() {
         assert_eq!(folder_name(" ván 4 "), "ván 4");
         for other in ["", "a/b", "../x", ".git", "con", "a?", &"a".repeat(61)] {
             let name = folder_name(other);
             assert!(name.starts_with("files 2"), "{name}");
+            assert_eq!(name.len(), "files 2026-11-21 041003".len(), "{name}");
         }
     }
 }

@@ -58,6 +58,7 @@ pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Ma
                 button #upload-cancel type="button" { (visit.t("Cancel", "Hủy")) }
             }
             p #upload-problem.problem role="alert" hidden {}
+            button #upload-take-over.primary type="button" hidden { (visit.t("Take over", "Gửi tiếp ở đây")) }
         }
         script type="module" src={ (visit.root) "assets/upload.js" } {}
     }

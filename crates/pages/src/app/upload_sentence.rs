@@ -178,11 +178,27 @@ pub(super) fn busy() -> Sentence {
     )
 }
 
-/// Says that the connection of an earlier upload seems to be cut.
+/// Says that another page has begun to send the same files, and seems to have lost its connection.
 pub(super) fn silent() -> Sentence {
     Sentence::new(
-        "nothing more arrives of another upload with this name: if its connection was cut, choose the same files again in a minute; what has arrived is then not sent again",
-        "một lần gửi cùng tên không còn nhận thêm được gì: nếu kết nối của lần đó bị ngắt, hãy chọn lại đúng các tệp đó sau một phút; phần đã đến nơi khi đó không phải gửi lại",
+        "another page has begun to send the same files, and nothing more of them arrives: press \"Take over\" to go on here; what has arrived is not sent again",
+        "một trang khác đã bắt đầu gửi chính các tệp này, nhưng không còn nhận thêm được gì: hãy bấm \"Gửi tiếp ở đây\"; phần đã đến nơi không phải gửi lại",
+    )
+}
+
+/// Says that another page is sending the same files.
+pub(super) fn same_files() -> Sentence {
+    Sentence::new(
+        "another page is sending the same files: wait for their end, or cancel them there",
+        "một trang khác đang gửi chính các tệp này: hãy chờ đến khi xong, hoặc hủy ở trang đó",
+    )
+}
+
+/// Says that another page goes on with an upload.
+pub(super) fn taken_over() -> Sentence {
+    Sentence::new(
+        "another page has taken over this upload: follow it there",
+        "một trang khác đã tiếp nhận lần gửi này: hãy theo dõi ở trang đó",
     )
 }
 

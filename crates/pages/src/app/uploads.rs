@@ -7,11 +7,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use super::failure::{AppFailure, AppResult};
-use super::file_upload::FileUpload;
-use super::received_files::{ArrivedFile, ReceivedCount, ReceivedFiles, check_room};
+use super::file_upload::{AnnouncedFiles, FileUpload, SameFiles};
+use super::received_files::{ArrivedFile, ReceivedFiles, check_room};
 use super::sentence::Sentence;
 use super::upload_sentence::{
-    MAX_FILES, ended, left_over, not_written, nothing, silent, too_many, too_many_uploads,
+    MAX_FILES, ended, left_over, not_written, nothing, same_files, silent, too_many,
+    too_many_uploads,
 };
 use mocban_store::NewFolder;
 
@@ -20,11 +21,14 @@ pub(super) const FOLDER: &str = "uploads";
 /// Most uploads that are open at the same time.
 const MAX_OPEN: usize = 4;
 
+/// Uploads by their number.
+type OpenUploads = BTreeMap<u64, Arc<FileUpload>>;
+
 /// The uploads of this process.
 #[derive(Debug)]
 pub(super) struct Uploads {
     folder: PathBuf,
-    open: Mutex<BTreeMap<u64, Arc<FileUpload>>>,
+    open: Mutex<OpenUploads>,
     next: AtomicU64,
     /// Whether an earlier process left an upload.
     has_left_over: bool,
@@ -49,26 +53,22 @@ impl Uploads {
         &self.folder
     }
 
-    /// Begins an upload, or resumes an interrupted one of this name. Removes uploads that ended or were abandoned. Returns the
-    /// number of the upload, and the files that need not be sent again. Waits for the disk.
+    /// Begins an upload, or resumes an interrupted one of the same files. Removes uploads that ended or were abandoned. Returns
+    /// the number of the upload, and the files that need not be sent again. Waits for the disk.
     ///
     /// # Errors
-    /// Refuses too many files, more bytes than the disk has room for, and files whose connection seems to be cut.
-    pub(super) fn begin(
-        &self,
-        name: String,
-        files: u64,
-        bytes: u64,
-    ) -> AppResult<(u64, Vec<ArrivedFile>)> {
+    /// Refuses too many files, more bytes than the disk has room for, and files that another page is sending.
+    pub(super) fn begin(&self, files: AnnouncedFiles) -> AppResult<(u64, Vec<ArrivedFile>)> {
         let refuse = |sentence| Err(AppFailure::refused(sentence));
-        if files == 0 {
+        if files.files == 0 {
             return refuse(nothing());
         }
-        if files > MAX_FILES {
+        if files.files > MAX_FILES {
             return refuse(too_many());
         }
-        let resumed = self.resume(&name, files);
+        let resumed = self.resume(&files);
         let arrived = resumed.iter().flat_map(|(_, arrived)| arrived);
+        let bytes = files.bytes;
         let bytes = bytes.saturating_sub(arrived.map(|file| file.size).sum());
         if let Some(parent) = self.folder.parent()
             && let Err(why) = check_room(parent, bytes)
@@ -81,19 +81,17 @@ impl Uploads {
         if let Some(resumed) = resumed {
             return Ok(resumed);
         }
-        if self.has_silent(&name) {
-            return refuse(silent());
-        }
+        refuse_same(&self.lock(), &files)?;
         if !self.make_place() {
             return refuse(too_many_uploads());
         }
         let folder = NewFolder::begin(&self.folder);
         let folder = folder.map_err(|error| AppFailure::refused(not_written(&error)))?;
-        let count = Arc::<ReceivedCount>::default();
-        let received = ReceivedFiles::new(folder, count);
-        let upload = Arc::new(FileUpload::new(name, files, received));
+        let received = Box::new(ReceivedFiles::new(folder, Arc::default()));
+        let upload = Arc::new(FileUpload::new(files.clone(), received));
         let mut open = self.lock();
         // Others may have begun meanwhile. The files are removed after the lock.
+        refuse_same(&open, &files)?;
         if open.len() >= MAX_OPEN {
             return refuse(too_many_uploads());
         }
@@ -102,23 +100,34 @@ impl Uploads {
         Ok((id, Vec::new()))
     }
 
-    /// Resumes an interrupted upload of this name, which then has this number of files.
-    fn resume(&self, name: &str, files: u64) -> Option<(u64, Vec<ArrivedFile>)> {
-        let open = self.lock();
-        let mut named = open.iter().filter(|(_, upload)| upload.name == name);
-        named.find_map(|(id, upload)| Some((*id, upload.resume(files)?)))
+    /// Resumes an interrupted upload of the same files under a new number, so that the page that sent them before cannot go on
+    /// too.
+    fn resume(&self, files: &AnnouncedFiles) -> Option<(u64, Vec<ArrivedFile>)> {
+        let mut open = self.lock();
+        let mut same = open.values().filter(|upload| upload.is_of(files));
+        let received = same.find_map(|upload| upload.give_up())?;
+        let arrived = received.arrived().to_vec();
+        let id = self.next.fetch_add(1, Ordering::Relaxed);
+        let upload = FileUpload::new(files.clone(), received);
+        open.insert(id, Arc::new(upload));
+        Some((id, arrived))
     }
 
-    /// Returns whether an upload of this name seems to have lost its connection after files had arrived.
-    fn has_silent(&self, name: &str) -> bool {
-        let now = Instant::now();
-        let open = self.lock();
-        let mut named = open.values().filter(|upload| upload.name == name);
-        named.any(|upload| upload.is_silent(now))
+    /// Interrupts the upload of the same files by another page, if nothing more of it arrives. Then it can be resumed.
+    pub(super) async fn interrupt_silent(&self, files: &AnnouncedFiles) {
+        let silent = {
+            let (open, now) = (self.lock(), Instant::now());
+            let mut same = open.values().filter(|upload| upload.is_of(files));
+            let silent = same.find(|upload| upload.in_the_way(now) == Some(SameFiles::Silent));
+            silent.cloned()
+        };
+        if let Some(silent) = silent {
+            silent.cut_off().await;
+        }
     }
 
-    /// Removes uploads that ended, and those whose browser is closed. Interrupted ones stay for a while, except for the
-    /// oldest if there is no place. Returns whether there is place for another.
+    /// Removes uploads that ended, and those whose browser is closed and of which nothing has arrived. Interrupted ones stay for a
+    /// while, except for the oldest if there is no place. Returns whether there is place for another.
     fn make_place(&self) -> bool {
         let removed: Vec<_> = {
             let mut open = self.lock();
@@ -155,9 +164,23 @@ impl Uploads {
         last.or_else(|| (self.has_left_over && is_first).then(left_over))
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Arc<FileUpload>>> {
+    fn lock(&self) -> MutexGuard<'_, OpenUploads> {
         // Each change is a single insertion or removal.
         self.open.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Refuses files that another page is sending.
+///
+/// # Errors
+/// The failure says whether this page can take over.
+fn refuse_same(open: &OpenUploads, files: &AnnouncedFiles) -> AppResult<()> {
+    let now = Instant::now();
+    let mut same = open.values().filter(|upload| upload.is_of(files));
+    match same.find_map(|upload| upload.in_the_way(now)) {
+        None => Ok(()),
+        Some(SameFiles::Arriving) => Err(AppFailure::refused(same_files())),
+        Some(SameFiles::Silent) => Err(AppFailure::conflict(silent())),
     }
 }
 

@@ -6,15 +6,29 @@ use std::time::Instant;
 
 use super::{ArrivedFile, MAX_OPEN, Uploads};
 use crate::app::failure::AppResult;
-use crate::app::file_upload::{MAX_KEPT, MAX_SILENT, UploadEnding, UploadState};
-use crate::app::upload_sentence::cut;
+use crate::app::file_upload::{
+    AnnouncedFiles, FileUpload, MAX_KEPT, MAX_SILENT, SameFiles, UploadEnding, UploadState,
+};
+use crate::app::upload_sentence::{cut, taken_over};
+use crate::review::Language;
 use mocban_core::domain::cancel::CancelToken;
+
+/// Announces a file with this content.
+fn files(content: &str) -> AnnouncedFiles {
+    AnnouncedFiles {
+        name: "x".to_owned(),
+        content: content.to_owned(),
+        files: 1,
+        bytes: 1,
+        take_over: false,
+    }
+}
 
 #[test]
 fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
-    let (id, _) = uploads.begin("x".to_owned(), 1, 1).expect("begun");
+    let (id, _) = uploads.begin(files("x")).expect("begun");
     let upload = uploads.find(id).expect("an upload");
     let received = upload.take(UploadState::Storing).expect("ready");
     upload.cancel().expect_err("it is stored");
@@ -28,30 +42,27 @@ fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
     upload.cancel().expect("nothing to do");
 }
 
-/// Begins two uploads of one name at once.
-fn begin_two(uploads: &Uploads) -> [AppResult<(u64, Vec<ArrivedFile>)>; 2] {
+/// Begins two uploads of the same files at once.
+fn begin_two(uploads: &Uploads, content: &str) -> [AppResult<(u64, Vec<ArrivedFile>)>; 2] {
     let both = Barrier::new(2);
     std::thread::scope(|scope| {
         let begin = || {
             both.wait();
-            uploads.begin("x".to_owned(), 1, 1)
+            uploads.begin(files(content))
         };
         [scope.spawn(begin), scope.spawn(begin)].map(|one| one.join().expect("no panic"))
     })
 }
 
 #[test]
-fn two_uploads_of_one_name_that_begin_at_once_are_two() {
+fn of_two_uploads_of_the_same_files_that_begin_at_once_one_is_refused() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
-    let begun = begin_two(&uploads).map(|begun| begun.expect("begun"));
-    let [(first, _), (second, _)] = &begun;
-    assert_ne!(first, second);
-    for (id, arrived) in &begun {
-        assert!(arrived.is_empty());
-        let received = uploads.find(*id).expect("an upload");
-        received.take(UploadState::Storing).expect("its own files");
-    }
+    let begun = begin_two(&uploads, "x").map(|begun| begun.is_ok());
+    assert!(begun[0] != begun[1], "{begun:?}");
+    uploads.begin(files("y")).expect("other files");
+    let unknown = begin_two(&uploads, "").map(|begun| begun.expect("begun").0);
+    assert_ne!(unknown[0], unknown[1], "they may be different files");
 }
 
 #[test]
@@ -59,28 +70,35 @@ fn the_last_place_goes_to_one_of_two_that_begin_at_once() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
     for _ in 1..MAX_OPEN {
-        uploads.begin("y".to_owned(), 1, 1).expect("a place");
+        uploads.begin(files("")).expect("a place");
     }
-    let begun = begin_two(&uploads).map(|begun| begun.is_ok());
+    let begun = begin_two(&uploads, "").map(|begun| begun.is_ok());
     assert!(begun[0] != begun[1], "{begun:?}");
 }
 
 #[test]
-fn an_interrupted_upload_is_resumed_once() {
+fn an_interrupted_upload_is_resumed_once_and_its_page_can_send_nothing_more() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
-    let (interrupted, _) = uploads.begin("x".to_owned(), 1, 1).expect("begun");
-    let upload = uploads.find(interrupted).expect("an upload");
-    let received = upload.take(UploadState::Storing).expect("ready");
-    *upload.lock() = UploadState::Paused(received, Instant::now(), cut());
-    let begun = begin_two(&uploads).map(|begun| begun.expect("begun").0);
-    assert_ne!(begun[0], begun[1]);
-    assert!(begun.contains(&interrupted), "{begun:?}");
+    let id = interrupted(&uploads, "x", Instant::now());
+    let begun = begin_two(&uploads, "x").map(|begun| begun.ok().map(|(id, _)| id));
+    let resumed = match begun {
+        [Some(resumed), None] | [None, Some(resumed)] => resumed,
+        _ => unreachable!("one is refused: {begun:?}"),
+    };
+    assert_ne!(resumed, id);
+    let before = uploads.find(id).expect("a reason");
+    before.take(UploadState::Storing).expect_err("taken over");
+    assert_eq!(before.problem(), Some(taken_over()));
+    // The page that is closed at last cancels only what it began.
+    before.cancel().expect("nothing to do");
+    let after = uploads.find(resumed).expect("an upload");
+    after.take(UploadState::Storing).expect("its files");
 }
 
 /// Begins an upload that was interrupted at this time.
-fn interrupted(uploads: &Uploads, name: &str, since: Instant) -> u64 {
-    let (id, _) = uploads.begin(name.to_owned(), 1, 1).expect("a place");
+fn interrupted(uploads: &Uploads, content: &str, since: Instant) -> u64 {
+    let (id, _) = uploads.begin(files(content)).expect("a place");
     let upload = uploads.find(id).expect("an upload");
     let received = upload.take(UploadState::Storing).expect("ready");
     *upload.lock() = UploadState::Paused(received, since, cut());
@@ -100,36 +118,72 @@ fn a_new_upload_takes_the_place_of_the_oldest_interrupted_one_alone() {
             now + MAX_SILENT * age,
         )
     });
-    uploads.begin("new".to_owned(), 1, 1).expect("a place");
+    uploads.begin(files("new")).expect("a place");
     assert_eq!(
         ids.map(|id| uploads.find(id).is_ok()),
         [true, true, true, false]
     );
 }
 
+/// Returns an upload of which a file has arrived and another one arrives, on no thread.
+fn busy(uploads: &Uploads, content: &str) -> Arc<FileUpload> {
+    let (id, _) = uploads.begin(files(content)).expect("begun");
+    let upload = uploads.find(id).expect("an upload");
+    let arriving = UploadState::Busy(CancelToken::default(), None);
+    let _received = upload.take(arriving).expect("ready");
+    upload.arrived.store(1, Ordering::Relaxed);
+    upload
+}
+
 #[test]
-fn files_are_not_sent_twice_while_their_first_upload_may_interrupt() {
+fn files_are_not_sent_twice_while_another_page_may_send_them() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
-    let (id, _) = uploads.begin("x".to_owned(), 2, 1).expect("begun");
-    let upload = uploads.find(id).expect("an upload");
-    let _received = upload.take(UploadState::Busy(CancelToken::default()));
+    let upload = busy(&uploads, "x");
     let now = Instant::now();
     let later = now + MAX_SILENT * 2;
     upload.last_piece.set(Some(now));
-    assert!(!upload.is_silent(later), "no file has arrived");
-    upload.arrived.store(1, Ordering::Relaxed);
-    assert!(upload.is_silent(later));
-    assert!(!upload.is_silent(now), "files are arriving");
+    assert_eq!(upload.in_the_way(later), Some(SameFiles::Silent));
+    assert_eq!(upload.in_the_way(now), Some(SameFiles::Arriving));
+    let refused = |content| {
+        let begun = uploads.begin(files(content)).expect_err("another page");
+        begun.text(Language::English).to_owned()
+    };
+    assert!(refused("x").contains("wait for their end"));
     let before = now.checked_sub(MAX_SILENT * 2);
     let before = before.expect("a computer that started earlier");
     upload.last_piece.set(Some(before));
-    uploads.begin("x".to_owned(), 2, 1).expect_err("silent");
-    uploads.begin("y".to_owned(), 2, 1).expect("other files");
-    upload.last_piece.set(Some(later));
-    uploads.begin("x".to_owned(), 2, 1).expect("another one");
+    assert!(refused("x").contains("Take over"));
+    uploads.begin(files("y")).expect("other files");
     upload.last_piece.set(None);
-    assert!(!upload.is_silent(later), "an archive is unpacked");
+    let unpacking = Some(SameFiles::Arriving);
+    assert_eq!(upload.in_the_way(later), unpacking, "an archive");
+    upload.last_piece.set(Some(before));
+    upload.arrived.store(0, Ordering::Relaxed);
+    assert_eq!(upload.in_the_way(later), None, "no file has arrived");
+    uploads.begin(files("x")).expect("nothing can be resumed");
+}
+
+#[tokio::test]
+async fn an_upload_is_taken_over_only_while_nothing_of_it_arrives() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let uploads = Uploads::new(dir.path());
+    let (id, _) = uploads.begin(files("x")).expect("begun");
+    let upload = uploads.find(id).expect("an upload");
+    upload.arrived.store(1, Ordering::Relaxed);
+    uploads.interrupt_silent(&files("x")).await;
+    uploads.begin(files("x")).expect_err("files are arriving");
+    let received = upload.take(UploadState::Storing).expect("ready");
+    let before = Instant::now().checked_sub(MAX_SILENT * 2);
+    let before = before.expect("a computer that started earlier");
+    *upload.lock() = UploadState::Ready(received, before);
+    uploads.begin(files("x")).expect_err("it may come back");
+    uploads.interrupt_silent(&files("y")).await;
+    uploads.begin(files("x")).expect_err("other files");
+    uploads.interrupt_silent(&files("x")).await;
+    let (taken, _) = uploads.begin(files("x")).expect("taken over");
+    assert_ne!(taken, id);
+    assert_eq!(upload.problem(), Some(taken_over()));
 }
 
 #[test]

@@ -1,0 +1,141 @@
+//! Uploads of a browser that are interrupted: the same files are chosen again, on the same page or on another one.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::app::app;
+use crate::app_browser::enter;
+use crate::browser::{Browser, Tab};
+use crate::page::Page;
+use crate::waiting::wait_until;
+
+/// The page of imports can take files.
+const READY: &str = "document.getElementById('upload')?.dataset.ready";
+/// The files got their folder, and the page shows them.
+const STORED: &str = "location.search.includes('path=') && document.body?.dataset.ready";
+/// Keeps the names of the files that are sent, also when another page follows, and how many are said to have arrived before.
+const RECORD: &str = "(() => {
+    const open = XMLHttpRequest.prototype.open;
+    const keep = (name, value) => sessionStorage.setItem(name, JSON.stringify(value));
+    XMLHttpRequest.prototype.open = function (method, address, ...rest) {
+        const [file] = address.split('/')[2].split('?');
+        keep('sent', [...JSON.parse(sessionStorage.getItem('sent') ?? '[]'), decodeURIComponent(file)]);
+        keep('arrived', document.querySelector('#upload-arrived').textContent);
+        window.sending = this;
+        open.call(this, method, address, ...rest);
+    };
+})(), null";
+
+/// Writes two small files and a large one.
+fn files(dir: &Path) -> [PathBuf; 3] {
+    [("1.stl", 10), ("1.png", 10), ("2.stl", 2_000_000)].map(|(name, bytes)| {
+        let file = dir.join(name);
+        std::fs::write(&file, "x".repeat(bytes)).expect("written");
+        file
+    })
+}
+
+/// Opens the page of imports.
+fn open_import(tab: &Tab<'_>, home: &str) {
+    tab.open(&format!("{home}import"));
+    tab.wait(READY);
+    tab.eval(RECORD);
+}
+
+/// Returns how many bytes of an upload have arrived, or nothing if it was interrupted.
+fn arrived(tab: &Tab<'_>, upload: u64) -> Option<u64> {
+    let asked = format!(
+        "fetch('uploads/{upload}', {{ headers: {{ accept: 'application/json' }} }}).then((reply) => reply.json())"
+    );
+    tab.eval(&asked)["bytes"].as_u64()
+}
+
+/// Sends files slowly until the third one is on its way.
+fn send_slowly(tab: &Tab<'_>, files: &[PathBuf]) {
+    tab.limit_sending(100_000);
+    tab.choose_files("#upload-files", files);
+    tab.wait("document.querySelector('#upload-done').textContent.startsWith('2 / 3 files')");
+    wait_until("the third file arrives", || arrived(tab, 1) > Some(20));
+}
+
+fn kept(tab: &Tab<'_>, name: &str) -> Value {
+    tab.eval(&format!("JSON.parse(sessionStorage.getItem('{name}'))"))
+}
+
+/// Checks that the files are in their folder.
+fn are_stored(dir: &Path, files: &[PathBuf]) {
+    for file in files {
+        let name = file.file_name().expect("a name");
+        let copy = std::fs::read(dir.join("uploads/files 1").join(name)).expect("a file");
+        assert!(copy == std::fs::read(file).expect("a file"), "{name:?}");
+    }
+    let folders = std::fs::read_dir(dir.join("uploads")).expect("a folder");
+    assert_eq!(folders.count(), 1, "nothing unfinished is left");
+}
+
+#[test]
+fn only_the_missing_files_are_sent_when_the_same_are_chosen_again() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let source = tempfile::tempdir().expect("a temporary directory");
+    let files = files(source.path());
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1366, 660]);
+    open_import(&tab, &home);
+    send_slowly(&tab, &files);
+    tab.eval("window.sending.abort(), null");
+    tab.wait("!document.querySelector('#upload-problem').hidden");
+    wait_until("the program notices", || arrived(&tab, 1).is_none());
+    assert_eq!(kept(&tab, "sent"), json!(["1.stl", "1.png", "2.stl"]));
+    tab.limit_sending(-1);
+    tab.choose_files("#upload-files", &files);
+    tab.wait(STORED);
+    let sent = json!(["1.stl", "1.png", "2.stl", "2.stl"]);
+    assert_eq!(kept(&tab, "sent"), sent);
+    let said = "Files that had arrived before and are not sent again: 2";
+    assert_eq!(kept(&tab, "arrived"), said);
+    are_stored(dir.path(), &files);
+}
+
+#[test]
+fn another_tab_takes_over_an_upload_of_which_nothing_arrives() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let source = tempfile::tempdir().expect("a temporary directory");
+    let files = files(source.path());
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (first, home) = enter(&browser, &page, [1366, 660]);
+    open_import(&first, &home);
+    send_slowly(&first, &files);
+    let second = browser.tab(1366, 660);
+    open_import(&second, &home);
+    let problem = "document.querySelector('#upload-problem').textContent";
+    let choose = || {
+        second.choose_files("#upload-files", &files);
+        second.wait("!document.querySelector('#upload-problem').hidden && !document.querySelector('#upload').ariaBusy");
+        second.eval("document.querySelector('#upload-take-over').hidden") == false
+    };
+    assert!(!choose(), "files are arriving");
+    let said = second.eval(problem);
+    assert!(
+        said.to_string().contains("another page is sending"),
+        "{said}"
+    );
+    first.limit_sending(1);
+    wait_until("the other page can take over", choose);
+    second.screenshot("app_take_over");
+    second.eval("document.querySelector('#upload-take-over').focus(), null");
+    second.press("Space", false);
+    second.wait(STORED);
+    assert_eq!(kept(&second, "sent"), json!(["2.stl"]));
+    are_stored(dir.path(), &files);
+    first.limit_sending(-1);
+    first.wait(&format!(
+        "{problem}.includes('another page has taken over')"
+    ));
+}
