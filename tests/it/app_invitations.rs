@@ -6,9 +6,17 @@ use crate::accessible::{axe, no_violation};
 use crate::app::{act, app, text};
 use crate::app_browser::enter;
 use crate::browser::Browser;
+#[cfg(target_os = "linux")]
+use crate::cli::call;
 use crate::cli::mocban;
+#[cfg(target_os = "linux")]
+use crate::memory::enlarge;
 use crate::page::{Page, Site, answer, read_project, send};
+#[cfg(target_os = "linux")]
+use crate::resume::{pairs, project, run};
 use crate::review_browser::{judge, saved};
+#[cfg(target_os = "linux")]
+use crate::review_load::peak_mib;
 
 /// Starts the app on a folder with the shared project `p`. Guests reach it at 127.0.0.1, as the tests have no network.
 fn start() -> (tempfile::TempDir, Page) {
@@ -233,6 +241,35 @@ fn answers_of_a_guest_wait_while_another_project_is_in_its_place() {
     std::fs::rename(dir.path().join("old"), dir.path().join("p")).expect("moved back");
     let sent = guest.post("/api/answer", &answer("e-1", &item, "pass"));
     assert_eq!(sent.expect("a reply").status, 200);
+}
+
+/// Each decoded print has 69 MiB, so those of sixteen guests would need more than a gigabyte.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_of_the_app_does_not_grow_with_its_guests() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "3");
+    for pair in pairs(&project) {
+        let print = project.input_path(&pair.results.attributes.print_path);
+        enlarge(&print, 12_000_000);
+    }
+    call(&mut run(&project, &["-j", "1"])).expect(0);
+    let page = Page::of(app(dir.path()).args(["--lang", "en", "--listen", "127.0.0.1"])).entered();
+    let guests = (0..16).map(|number| open(&invite(&page, &format!("guest {number}"))[0]));
+    let guests: Vec<Site> = guests.collect();
+    std::thread::scope(|scope| {
+        for guest in &guests {
+            scope.spawn(move || {
+                for item in guest.queue() {
+                    let id = item["id"].as_str().expect("an id");
+                    let print = guest.get(&format!("/image/{id}/print"));
+                    assert_eq!(print.status, 200, "{}", text(&print));
+                }
+            });
+        }
+    });
+    let peak = peak_mib(page.pid());
+    assert!(peak < 800, "{peak} MiB");
 }
 
 #[test]

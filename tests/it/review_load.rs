@@ -119,7 +119,7 @@ fn a_signal_ends_the_server_although_a_request_never_ends() {
 }
 
 /// Returns the peak memory of a process in MiB.
-fn peak_mib(pid: Pid) -> u64 {
+pub(crate) fn peak_mib(pid: Pid) -> u64 {
     let path = format!("/proc/{}/status", pid.as_raw_nonzero());
     let status = std::fs::read_to_string(path).expect("a running process");
     let mut lines = status.lines();

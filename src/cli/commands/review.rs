@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
@@ -19,8 +20,8 @@ use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_pages::local_server::LocalServer;
 use mocban_pages::review::{
-    self, CheckRates, FaultShortage, Language, QueueCounts, QueueOptions, ReviewOptions,
-    ReviewPages,
+    self, CheckRates, FaultShortage, Language, PictureWork, QueueCounts, QueueOptions,
+    ReviewOptions, ReviewPages,
 };
 use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::error::explanation;
@@ -141,7 +142,13 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     let ip = args.listen.unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST));
     let name = review::origin_name(&project, &args.reviewer);
     let server = LocalServer::bind(SocketAddr::new(ip, args.port), &name, "review").await?;
-    let pages = ReviewPages::open(catalog.clone(), project, options).await?;
+    let pages = ReviewPages::open(
+        catalog.clone(),
+        project,
+        options,
+        Arc::new(PictureWork::for_one()),
+    )
+    .await?;
     if pages.counts().items == 0 {
         drop(pages);
         catalog.close().await;

@@ -198,7 +198,7 @@ fn character_list(visit: &Visit, block: &BlockName, characters: &[StoredCharacte
             @if characters.is_empty() {
                 p.muted { (visit.t("A run finds them on the page.", "Lần chạy sẽ tìm chúng trên trang in.")) }
             } @else {
-                p {
+                p.row {
                     (grouped(characters.len() as u64)) " · "
                     a href={ "../../pairs?block=" (encoded(block.as_str())) } { (visit.t("All pairs of this block", "Tất cả các cặp của ván này")) }
                 }

@@ -45,7 +45,7 @@ pub(super) async fn page(
         let shown: Vec<&BlockState> = blocks.iter().filter(is_shown).collect();
         html! {
             (figures(&visit, &blocks))
-            @if chosen.is_some() { p { a href=(visit.here) { (visit.t("All blocks", "Tất cả các ván")) } } }
+            @if chosen.is_some() { nav.pager { a href=(visit.here) { (visit.t("All blocks", "Tất cả các ván")) } } }
             (table(&visit, &shown))
         }
     };

@@ -201,7 +201,7 @@ fn counts_text(visit: &Visit, counts: &FileCounts) -> String {
 
 fn root_links(visit: &Visit, roots: &PickerRoots) -> Markup {
     html! {
-        p.muted { (visit.t("Start at", "Bắt đầu từ")) ":"
+        p.muted.row { (visit.t("Start at", "Bắt đầu từ")) ":"
             @for root in roots.all() {
                 " " a href={ (visit.here) "?path=" (encoded(&root.to_string_lossy())) } { (one_line(&root.to_string_lossy())) }
             }

@@ -66,7 +66,14 @@ async fn guest_pages(
 ) -> AppResult<(Router, Arc<GuestReview>)> {
     let query = PageQuery::parse(choice);
     let pairs = state.chosen.of(&open.key, &query)?;
-    let pages = open_review(open, reviewer, &query, ReviewPlace::of_guest(), pairs).await?;
+    let pages = open_review(
+        open,
+        reviewer,
+        &query,
+        ReviewPlace::of_guest(Arc::clone(&state.review_work)),
+        pairs,
+    )
+    .await?;
     let routes = pages.routes();
     let review = Arc::new(GuestReview::new(pages));
     let router = Router::new()

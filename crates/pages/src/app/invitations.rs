@@ -18,7 +18,7 @@ use crate::review::{QueueCounts, ReviewPages};
 use mocban_core::domain::UnixMillis;
 use mocban_project::location::now;
 
-/// Most invitations at a time. Each has connections to the catalog and pictures in memory.
+/// Most invitations at a time. Each has connections to the catalog, and keeps its queue in memory.
 const LIMIT: usize = 16;
 
 /// The invitations of the app. The server for guests starts with the first.

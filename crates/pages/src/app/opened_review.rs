@@ -2,13 +2,16 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use crate::on_thread::on_thread;
-use crate::review::{CheckRates, Language, QueueOptions, ReviewOptions, ReviewPages, key_map};
+use crate::review::{
+    CheckRates, Language, PictureWork, QueueOptions, ReviewOptions, ReviewPages, key_map,
+};
 use mocban_catalog::CatalogError;
 use mocban_core::domain::{PairName, ReviewOrder};
 use mocban_project::location::{Location, now};
@@ -27,11 +30,13 @@ pub(super) struct ReviewPlace {
     pub(super) explain: fn(&CatalogError, &Path) -> String,
     /// Relative address of the pages of the project.
     pub(super) project_page: Option<&'static str>,
+    /// The threads and the rendered images of all reviews of the app.
+    pub(super) work: Arc<PictureWork>,
 }
 
 impl ReviewPlace {
     /// Returns the place of a guest, whose page has the language of the browser and names no file and no command.
-    pub(super) fn of_guest() -> Self {
+    pub(super) fn of_guest(work: Arc<PictureWork>) -> Self {
         Self {
             language: None,
             command: None,
@@ -39,6 +44,7 @@ impl ReviewPlace {
                 "the project cannot be read now: tell the person who invited you, and keep this page open".to_owned()
             },
             project_page: None,
+            work,
         }
     }
 }
@@ -116,5 +122,5 @@ async fn review_pages(
             sample: query.parsed::<usize>("sample").filter(|sample| *sample > 0),
         },
     };
-    Ok(ReviewPages::open(catalog, project, options).await?)
+    Ok(ReviewPages::open(catalog, project, options, place.work).await?)
 }

@@ -222,6 +222,7 @@ async fn review(
         )),
         explain: explanation,
         project_page: Some("../../../"),
+        work: Arc::clone(&state.review_work),
     };
     let query = PageQuery::parse(choice);
     let pairs = state.chosen.of(&open.key, &query)?;

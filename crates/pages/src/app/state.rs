@@ -17,7 +17,7 @@ use super::thumb_cache::ThumbCache;
 use super::uploads::Uploads;
 use super::zip_sizes::ZipSizes;
 use crate::local_server::WorkThread;
-use crate::review::Language;
+use crate::review::{Language, PictureWork};
 
 /// Options of the app.
 #[derive(Debug, Clone)]
@@ -42,6 +42,8 @@ pub(super) struct AppState {
     projects: Mutex<BTreeMap<String, Arc<OpenProject>>>,
     /// Pairs that were chosen for reviews.
     pub(super) chosen: ChosenSets,
+    /// The threads and the rendered images of all reviews, also of guests.
+    pub(super) review_work: Arc<PictureWork>,
     /// The reviews that are open.
     pub(super) reviews: OpenPages,
     /// The reviewers who were invited.
@@ -71,6 +73,7 @@ impl AppState {
             options,
             projects: Mutex::default(),
             chosen: ChosenSets::default(),
+            review_work: Arc::new(PictureWork::for_many()),
             reviews: OpenPages::new(32),
             blocks: OpenPages::new(2),
             tasks: AppTasks::default(),

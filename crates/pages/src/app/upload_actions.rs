@@ -50,7 +50,7 @@ pub(super) async fn begin(
         let folder = &shared.options.folder;
         // Otherwise the files could not be imported.
         utf8(&PickerRoots::new(folder).allowed(folder)?)?;
-        shared.uploads.begin(files)
+        shared.uploads.begin(&files)
     });
     let begun = begun.await;
     let (id, arrived) = begun.map_err(|_panicked| WorkFailed)??;
@@ -105,7 +105,8 @@ pub(super) async fn receive(
         let piece = match next {
             Ok(Some(Ok(bytes))) => FilePiece::Bytes(bytes),
             Ok(None) => FilePiece::End,
-            Ok(Some(Err(_cut))) | Err(_silent) => break,
+            // The connection was cut, or nothing came for long.
+            Ok(Some(Err(_))) | Err(_) => break,
         };
         if !file.pass(piece).await {
             break;

@@ -58,7 +58,7 @@ impl Uploads {
     ///
     /// # Errors
     /// Refuses too many files, more bytes than the disk has room for, and files that another page is sending.
-    pub(super) fn begin(&self, files: AnnouncedFiles) -> AppResult<(u64, Vec<ArrivedFile>)> {
+    pub(super) fn begin(&self, files: &AnnouncedFiles) -> AppResult<(u64, Vec<ArrivedFile>)> {
         let refuse = |sentence| Err(AppFailure::refused(sentence));
         if files.files == 0 {
             return refuse(nothing());
@@ -66,7 +66,7 @@ impl Uploads {
         if files.files > MAX_FILES {
             return refuse(too_many());
         }
-        let resumed = self.resume(&files);
+        let resumed = self.resume(files);
         let arrived = resumed.iter().flat_map(|(_, arrived)| arrived);
         let bytes = files.bytes;
         let bytes = bytes.saturating_sub(arrived.map(|file| file.size).sum());
@@ -81,7 +81,7 @@ impl Uploads {
         if let Some(resumed) = resumed {
             return Ok(resumed);
         }
-        refuse_same(&self.lock(), &files)?;
+        refuse_same(&self.lock(), files)?;
         if !self.make_place() {
             return refuse(too_many_uploads());
         }
@@ -91,7 +91,7 @@ impl Uploads {
         let upload = Arc::new(FileUpload::new(files.clone(), received));
         let mut open = self.lock();
         // Others may have begun meanwhile. The files are removed after the lock.
-        refuse_same(&open, &files)?;
+        refuse_same(&open, files)?;
         if open.len() >= MAX_OPEN {
             return refuse(too_many_uploads());
         }

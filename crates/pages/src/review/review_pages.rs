@@ -5,14 +5,15 @@ use std::sync::Arc;
 use axum::Router;
 
 use super::history::ReviewerHistory;
+use super::image_cache::ImageCache;
 use super::item::ReviewItem;
-use super::item_images::ImageCache;
 use super::options::ReviewOptions;
+use super::picture_work::PictureWork;
 use super::planted_faults::{FaultPlanter, FaultShortage, QueueError};
 use super::routes;
 use super::state::ServerState;
 use super::unstored::UnstoredEvents;
-use crate::local_server::{WorkFailed, WorkThread};
+use crate::local_server::WorkFailed;
 use mocban_catalog::{Catalog, CatalogError};
 use mocban_core::domain::explained_by_cause;
 use mocban_store::Project;
@@ -61,7 +62,7 @@ impl QueueCounts {
 }
 
 impl ReviewPages {
-    /// Reads the queue of a reviewer.
+    /// Reads the queue of a reviewer. `work` is for all reviews of the server.
     ///
     /// # Errors
     /// Returns an error if the queue cannot be read.
@@ -69,12 +70,13 @@ impl ReviewPages {
         catalog: Catalog,
         project: Project,
         options: ReviewOptions,
+        work: Arc<PictureWork>,
     ) -> Result<Self, ReviewError> {
-        let quick = Arc::new(WorkThread::default());
+        let quick = Arc::clone(&work.quick.work);
         let (read, files) = (catalog.clone(), project.clone());
         let state = ServerState {
-            planter: FaultPlanter::new(read.clone(), files.clone(), Arc::clone(&quick)),
-            images: ImageCache::new(read, files, options.limits, quick),
+            planter: FaultPlanter::new(read.clone(), files.clone(), quick),
+            images: ImageCache::new(read, files, options.limits, work),
             catalog,
             project,
             options,

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::image_cache::ImageCache;
 use super::item::ReviewItem;
-use super::item_images::ImageCache;
 use super::options::ReviewOptions;
 use super::planted_faults::{FaultPlanter, QueueError};
 use super::review_queue::ReviewQueue;

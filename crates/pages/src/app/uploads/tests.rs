@@ -28,7 +28,7 @@ fn files(content: &str) -> AnnouncedFiles {
 fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
-    let (id, _) = uploads.begin(files("x")).expect("begun");
+    let (id, _) = uploads.begin(&files("x")).expect("begun");
     let upload = uploads.find(id).expect("an upload");
     let received = upload.take(UploadState::Storing).expect("ready");
     upload.cancel().expect_err("it is stored");
@@ -48,7 +48,7 @@ fn begin_two(uploads: &Uploads, content: &str) -> [AppResult<(u64, Vec<ArrivedFi
     std::thread::scope(|scope| {
         let begin = || {
             both.wait();
-            uploads.begin(files(content))
+            uploads.begin(&files(content))
         };
         [scope.spawn(begin), scope.spawn(begin)].map(|one| one.join().expect("no panic"))
     })
@@ -60,7 +60,7 @@ fn of_two_uploads_of_the_same_files_that_begin_at_once_one_is_refused() {
     let uploads = Uploads::new(dir.path());
     let begun = begin_two(&uploads, "x").map(|begun| begun.is_ok());
     assert!(begun[0] != begun[1], "{begun:?}");
-    uploads.begin(files("y")).expect("other files");
+    uploads.begin(&files("y")).expect("other files");
     let unknown = begin_two(&uploads, "").map(|begun| begun.expect("begun").0);
     assert_ne!(unknown[0], unknown[1], "they may be different files");
 }
@@ -70,7 +70,7 @@ fn the_last_place_goes_to_one_of_two_that_begin_at_once() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
     for _ in 1..MAX_OPEN {
-        uploads.begin(files("")).expect("a place");
+        uploads.begin(&files("")).expect("a place");
     }
     let begun = begin_two(&uploads, "").map(|begun| begun.is_ok());
     assert!(begun[0] != begun[1], "{begun:?}");
@@ -98,7 +98,7 @@ fn an_interrupted_upload_is_resumed_once_and_its_page_can_send_nothing_more() {
 
 /// Begins an upload that was interrupted at this time.
 fn interrupted(uploads: &Uploads, content: &str, since: Instant) -> u64 {
-    let (id, _) = uploads.begin(files(content)).expect("a place");
+    let (id, _) = uploads.begin(&files(content)).expect("a place");
     let upload = uploads.find(id).expect("an upload");
     let received = upload.take(UploadState::Storing).expect("ready");
     *upload.lock() = UploadState::Paused(received, since, cut());
@@ -118,7 +118,7 @@ fn a_new_upload_takes_the_place_of_the_oldest_interrupted_one_alone() {
             now + MAX_SILENT * age,
         )
     });
-    uploads.begin(files("new")).expect("a place");
+    uploads.begin(&files("new")).expect("a place");
     assert_eq!(
         ids.map(|id| uploads.find(id).is_ok()),
         [true, true, true, false]
@@ -127,7 +127,7 @@ fn a_new_upload_takes_the_place_of_the_oldest_interrupted_one_alone() {
 
 /// Returns an upload of which a file has arrived and another one arrives, on no thread.
 fn busy(uploads: &Uploads, content: &str) -> Arc<FileUpload> {
-    let (id, _) = uploads.begin(files(content)).expect("begun");
+    let (id, _) = uploads.begin(&files(content)).expect("begun");
     let upload = uploads.find(id).expect("an upload");
     let arriving = UploadState::Busy(CancelToken::default(), None);
     let _received = upload.take(arriving).expect("ready");
@@ -146,7 +146,7 @@ fn files_are_not_sent_twice_while_another_page_may_send_them() {
     assert_eq!(upload.in_the_way(later), Some(SameFiles::Silent));
     assert_eq!(upload.in_the_way(now), Some(SameFiles::Arriving));
     let refused = |content| {
-        let begun = uploads.begin(files(content)).expect_err("another page");
+        let begun = uploads.begin(&files(content)).expect_err("another page");
         begun.text(Language::English).to_owned()
     };
     assert!(refused("x").contains("wait for their end"));
@@ -154,34 +154,34 @@ fn files_are_not_sent_twice_while_another_page_may_send_them() {
     let before = before.expect("a computer that started earlier");
     upload.last_piece.set(Some(before));
     assert!(refused("x").contains("Take over"));
-    uploads.begin(files("y")).expect("other files");
+    uploads.begin(&files("y")).expect("other files");
     upload.last_piece.set(None);
     let unpacking = Some(SameFiles::Arriving);
     assert_eq!(upload.in_the_way(later), unpacking, "an archive");
     upload.last_piece.set(Some(before));
     upload.arrived.store(0, Ordering::Relaxed);
     assert_eq!(upload.in_the_way(later), None, "no file has arrived");
-    uploads.begin(files("x")).expect("nothing can be resumed");
+    uploads.begin(&files("x")).expect("nothing can be resumed");
 }
 
 #[tokio::test]
 async fn an_upload_is_taken_over_only_while_nothing_of_it_arrives() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
-    let (id, _) = uploads.begin(files("x")).expect("begun");
+    let (id, _) = uploads.begin(&files("x")).expect("begun");
     let upload = uploads.find(id).expect("an upload");
     upload.arrived.store(1, Ordering::Relaxed);
     uploads.interrupt_silent(&files("x")).await;
-    uploads.begin(files("x")).expect_err("files are arriving");
+    uploads.begin(&files("x")).expect_err("files are arriving");
     let received = upload.take(UploadState::Storing).expect("ready");
     let before = Instant::now().checked_sub(MAX_SILENT * 2);
     let before = before.expect("a computer that started earlier");
     *upload.lock() = UploadState::Ready(received, before);
-    uploads.begin(files("x")).expect_err("it may come back");
+    uploads.begin(&files("x")).expect_err("it may come back");
     uploads.interrupt_silent(&files("y")).await;
-    uploads.begin(files("x")).expect_err("other files");
+    uploads.begin(&files("x")).expect_err("other files");
     uploads.interrupt_silent(&files("x")).await;
-    let (taken, _) = uploads.begin(files("x")).expect("taken over");
+    let (taken, _) = uploads.begin(&files("x")).expect("taken over");
     assert_ne!(taken, id);
     assert_eq!(upload.problem(), Some(taken_over()));
 }
