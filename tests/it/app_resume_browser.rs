@@ -68,7 +68,11 @@ fn are_stored(dir: &Path, files: &[PathBuf]) {
     for file in files {
         let name = file.file_name().expect("a name");
         let copy = std::fs::read(dir.join("uploads/files 1").join(name)).expect("a file");
-        assert!(copy == std::fs::read(file).expect("a file"), "{name:?}");
+        assert!(
+            copy == std::fs::read(file).expect("a file"),
+            "{}",
+            name.display()
+        );
     }
     let folders = std::fs::read_dir(dir.join("uploads")).expect("a folder");
     assert_eq!(folders.count(), 1, "nothing unfinished is left");

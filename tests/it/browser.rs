@@ -22,7 +22,7 @@ const NAMES: [&str; 5] = [
 const TIMEOUT_MS: u32 = 60_000;
 
 /// The key Shift in events.
-const SHIFT: u8 = 8;
+pub(crate) const SHIFT: u8 = 8;
 
 /// A running browser.
 pub(crate) struct Browser {
@@ -220,7 +220,8 @@ pub(crate) struct Tab<'a> {
 }
 
 impl Tab<'_> {
-    fn call(&self, method: &str, params: &Value) -> Value {
+    /// Calls a method; panics on an error.
+    pub(crate) fn call(&self, method: &str, params: &Value) -> Value {
         self.browser.call(Some(&self.session), method, params)
     }
 
@@ -234,14 +235,6 @@ impl Tab<'_> {
     /// Navigates to a URL.
     pub(crate) fn open(&self, url: &str) {
         self.call("Page.navigate", &json!({ "url": url }));
-    }
-
-    /// Limits how many bytes the tab sends in a second; -1 for no limit.
-    pub(crate) fn limit_sending(&self, bytes: i64) {
-        let conditions = json!({
-            "offline": false, "latency": 0, "downloadThroughput": -1, "uploadThroughput": bytes,
-        });
-        self.call("Network.emulateNetworkConditions", &conditions);
     }
 
     /// Runs a script before those of every page that is opened from now on.
@@ -352,25 +345,6 @@ impl Tab<'_> {
             event["windowsVirtualKeyCode"] = json!(27);
         }
         self.call("Input.dispatchKeyEvent", &event);
-    }
-
-    /// Presses and releases a key of the keyboard as a person does, with Shift or without, so that controls react to it.
-    pub(crate) fn press(&self, code: &str, with_shift: bool) {
-        let (key, number) = match code {
-            "Space" => (" ", 32),
-            "ArrowLeft" => (code, 37),
-            "ArrowUp" => (code, 38),
-            "ArrowRight" => (code, 39),
-            "ArrowDown" => (code, 40),
-            other => unreachable!("no test presses {other}"),
-        };
-        for kind in ["rawKeyDown", "keyUp"] {
-            let event = json!({
-                "type": kind, "code": code, "key": key, "windowsVirtualKeyCode": number,
-                "modifiers": SHIFT * u8::from(with_shift),
-            });
-            self.call("Input.dispatchKeyEvent", &event);
-        }
     }
 
     /// Clicks into the middle of an element, with Shift or without.

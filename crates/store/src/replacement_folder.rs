@@ -80,13 +80,7 @@ impl ReplacementFolder {
         create_folders(&parent).map_err(at(&parent))?;
         let target = parent.join(name);
         let lock = TargetLock::acquire(&target)?;
-        for stale in StagingFolder::stale(&target) {
-            let earlier = stale.path().join(EARLIER);
-            let is_displaced = exists(&earlier).and_then(|is| Ok(is && !exists(&target)?));
-            if is_displaced.map_err(at(&target))? {
-                rename(&earlier, &target).map_err(at(&earlier))?;
-            }
-        }
+        recover_locked(&target)?;
         let staging = StagingFolder::beside(&target).map_err(at(&target))?;
         let new = staging.path().join(NEW);
         fs::create_dir(&new).map_err(at(&target))?;
@@ -96,6 +90,18 @@ impl ReplacementFolder {
             staging,
             lock,
         })
+    }
+
+    /// Restores the target if an earlier process died while it replaced it, and removes what that process left. Returns
+    /// whether there was such a process.
+    ///
+    /// # Errors
+    /// Returns an error if another process writes the target, or the target cannot be restored.
+    pub fn recover(target: &Path) -> Result<bool, ReplaceError> {
+        let (parent, name) = place(target)?;
+        let target = parent.join(name);
+        let _lock = TargetLock::acquire(&target)?;
+        recover_locked(&target)
     }
 
     /// Returns the folder to write to.
@@ -185,6 +191,30 @@ fn at(path: &Path) -> impl Fn(io::Error) -> ReplaceError {
     }
 }
 
+/// Does the work of [`ReplacementFolder::recover`] while the lock of the target is held.
+fn recover_locked(target: &Path) -> Result<bool, ReplaceError> {
+    let stale = StagingFolder::stale(target);
+    let is_found = !stale.is_empty();
+    for folder in stale {
+        if let Err(error) = restore(&folder, target) {
+            // It may hold the only copy.
+            folder.keep();
+            return Err(error);
+        }
+    }
+    Ok(is_found)
+}
+
+/// Moves the earlier content back if it is in this folder and nothing has taken its place.
+fn restore(folder: &StagingFolder, target: &Path) -> Result<(), ReplaceError> {
+    let earlier = folder.path().join(EARLIER);
+    let is_displaced = exists(&earlier).and_then(|is| Ok(is && !exists(target)?));
+    if is_displaced.map_err(at(target))? {
+        rename(&earlier, target).map_err(at(&earlier))?;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::{EARLIER, ReplaceError, ReplacementFolder, StagingFolder, TargetLockError};
@@ -252,5 +282,24 @@ mod tests {
         drop(ReplacementFolder::begin(&target).expect("the target is free"));
         assert_eq!(text(&target), "one");
         assert_eq!(count(dir.path()), 1);
+    }
+
+    #[test]
+    fn what_a_dead_process_left_is_removed_without_a_new_folder() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let target = dir.path().join("out");
+        write(&target, "one").finish().expect("renamed");
+        let recover = || ReplacementFolder::recover(&target);
+        assert!(!recover().expect("the target is free"));
+        let dead = StagingFolder::beside(&target).expect("a folder");
+        fs::write(dead.path().join("half"), "two").expect("written");
+        dead.keep();
+        assert!(recover().expect("the target is free"));
+        assert_eq!(text(&target), "one");
+        assert_eq!(count(dir.path()), 1);
+        let writer = write(&target, "three");
+        recover().expect_err("in use");
+        writer.finish().expect("renamed");
+        assert_eq!(text(&target), "three");
     }
 }

@@ -10,6 +10,7 @@ use axum::response::{Html, Response};
 use maud::{Markup, html};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use tokio::task::spawn_blocking;
 
 use super::action_body::ActionBody;
 use super::address::encoded;
@@ -17,7 +18,9 @@ use super::attachment::attachment;
 use super::chosen_pairs::require_pairs;
 use super::components::{NavSection, action_form, choice, frame, grouped};
 use super::export_zip::zip_link;
-use super::exports::{OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, purpose_of};
+use super::exports::{
+    OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, purpose_of, recover_exports,
+};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -55,7 +58,18 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let task = state.tasks.state(TaskKind::Export, &open);
+    let mut task = state.tasks.state(TaskKind::Export, &open);
+    if task.is_none() {
+        let dir = open.dir.clone();
+        let recovered = spawn_blocking(move || recover_exports(&dir)).await;
+        if recovered.unwrap_or(false) {
+            let why = Sentence::new(
+                "the program ended before the last export was done, so an earlier one is kept: press Export again",
+                "chương trình dừng trước khi xuất xong nên bản xuất trước được giữ lại: hãy bấm Xuất lại",
+            );
+            task = Some(state.tasks.note_failure(TaskKind::Export, &open, why));
+        }
+    }
     let folders = exported(&open.dir);
     let body = html! {
         (form(&visit))

@@ -1,8 +1,10 @@
 //! The exports of a project: a folder for each purpose.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use mocban_export::ExportFormat;
+use mocban_store::ReplacementFolder;
 
 /// Folder of exports in a project.
 const FOLDER: &str = "exports";
@@ -83,6 +85,23 @@ pub(super) fn purpose_of(name: &str) -> Option<(&'static Purpose, bool)> {
     };
     let purpose = PURPOSES.iter().find(|(known, ..)| *known == purpose)?;
     Some((purpose, is_of_chosen))
+}
+
+/// Restores exports of a project that a process was replacing when it died, and removes what it left. Returns whether there
+/// was one. Waits for the disk.
+pub(super) fn recover_exports(dir: &Path) -> bool {
+    let folder = exports_dir(dir);
+    let entries = std::fs::read_dir(&folder).into_iter().flatten().flatten();
+    let unfinished = entries.filter_map(|entry| {
+        let name = entry.file_name().into_string().ok()?;
+        let (name, _) = name.strip_prefix('.')?.split_once('.')?;
+        is_export(name).then(|| name.to_owned())
+    });
+    let unfinished: BTreeSet<String> = unfinished.collect();
+    // One that another process is writing is left alone.
+    let recover =
+        |name: &&String| matches!(ReplacementFolder::recover(&folder.join(name)), Ok(true));
+    unfinished.iter().filter(recover).count() > 0
 }
 
 /// Returns whether an export of the app has this name.

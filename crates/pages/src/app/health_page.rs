@@ -8,6 +8,7 @@ use axum::response::{Html, Response};
 use maud::html;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use tokio::task::spawn_blocking;
 
 use super::action_body::ActionBody;
 use super::attachment::attachment;
@@ -15,6 +16,7 @@ use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::home::free_space;
 use super::number_text::file_size;
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
 use super::tasks::{TaskKind, TaskLines};
@@ -26,6 +28,7 @@ use mocban_project::backup::backup;
 use mocban_project::check::check;
 use mocban_project::location::Location;
 use mocban_runner::check::{CheckOptions, CheckSummary, Kind};
+use mocban_store::StagingFolder;
 use mocban_system::platform;
 
 /// Path of the backup in a project.
@@ -42,8 +45,19 @@ pub(super) async fn page(
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
     let checked = state.tasks.state(TaskKind::Check, &open);
-    let stored = state.tasks.state(TaskKind::Backup, &open);
+    let mut stored = state.tasks.state(TaskKind::Backup, &open);
     let file = open.dir.join(BACKUP);
+    if stored.is_none() {
+        let file = file.clone();
+        let removed = spawn_blocking(move || StagingFolder::remove_stale(&file)).await;
+        if removed.unwrap_or(0) > 0 {
+            let why = Sentence::new(
+                "the program ended before the last backup was done, so an earlier one is kept: press Back up now again",
+                "chương trình dừng trước khi sao lưu xong nên bản trước được giữ lại: hãy bấm Sao lưu ngay lần nữa",
+            );
+            stored = Some(state.tasks.note_failure(TaskKind::Backup, &open, why));
+        }
+    }
     let meta = std::fs::metadata(&file).ok();
     let shown = std::path::absolute(&file).unwrap_or(file);
     let body = html! {

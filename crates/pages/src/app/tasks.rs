@@ -71,6 +71,18 @@ impl AppTasks {
         Ok(())
     }
 
+    /// Notes why a task of an earlier process failed, unless another one was started since. Returns the state of the task.
+    pub(super) fn note_failure(
+        &self,
+        kind: TaskKind,
+        open: &OpenProject,
+        why: Sentence,
+    ) -> TaskState {
+        let mut tasks = self.lock();
+        let state = tasks.entry((open.key.clone(), kind));
+        state.or_insert(TaskState::Failed(why)).clone()
+    }
+
     /// Returns the state of the last task of a kind.
     pub(super) fn state(&self, kind: TaskKind, open: &OpenProject) -> Option<TaskState> {
         self.lock().get(&(open.key.clone(), kind)).cloned()
