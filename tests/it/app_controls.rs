@@ -95,12 +95,12 @@ fn every_control_of_the_app_fits_a_finger() {
 }
 
 #[test]
-fn every_control_of_a_review_and_of_the_views_fits_a_finger() {
+fn every_control_of_a_review_fits_a_finger() {
     let Some(browser) = Browser::start() else {
         return;
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
-    finished_block(dir.path());
+    read_project(&dir);
     let page = Page::of(app(dir.path()).args(["--lang", "en"]));
     let (tab, home) = enter(&browser, &page, [1024, 768]);
     tab.open(&format!("{home}p/p/review"));
@@ -112,18 +112,30 @@ fn every_control_of_a_review_and_of_the_views_fits_a_finger() {
         fits_fingers(&tab, &format!("review {size:?}"));
         tab.screenshot(&format!("review_fingers_{}", size[0]));
     }
-    let views = browser.tab(1024, 768);
-    views.use_fingers([1024, 768]);
+}
+
+#[test]
+fn every_control_of_the_views_of_a_block_fits_a_finger() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    finished_block(dir.path());
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1024, 768]);
+    tab.use_fingers([1024, 768]);
     for (path, shown) in [
+        ("p/p/blocks", SHOWN),
+        ("p/p/block/b1/", SHOWN),
         (
             "p/p/block/b1/view/",
             "window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100",
         ),
         ("p/p/block/b1/view/correct", "window.mocbanCorrection"),
     ] {
-        views.open(&format!("{home}{path}"));
-        views.wait(shown);
-        fits_fingers(&views, path);
+        tab.open(&format!("{home}{path}"));
+        tab.wait(shown);
+        fits_fingers(&tab, path);
     }
 }
 

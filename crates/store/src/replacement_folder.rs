@@ -194,15 +194,13 @@ fn at(path: &Path) -> impl Fn(io::Error) -> ReplaceError {
 /// Does the work of [`ReplacementFolder::recover`] while the lock of the target is held.
 fn recover_locked(target: &Path) -> Result<bool, ReplaceError> {
     let stale = StagingFolder::stale(target);
-    let is_found = !stale.is_empty();
-    for folder in stale {
-        if let Err(error) = restore(&folder, target) {
-            // It may hold the only copy.
-            folder.keep();
-            return Err(error);
-        }
+    let restored = stale.iter().try_for_each(|folder| restore(folder, target));
+    if let Err(error) = restored {
+        // One of them may hold the only copy.
+        stale.into_iter().for_each(StagingFolder::keep);
+        return Err(error);
     }
-    Ok(is_found)
+    Ok(!stale.is_empty())
 }
 
 /// Moves the earlier content back if it is in this folder and nothing has taken its place.

@@ -82,9 +82,8 @@ fn an_interrupted_upload_is_resumed_once_and_its_page_can_send_nothing_more() {
     let uploads = Uploads::new(dir.path());
     let id = interrupted(&uploads, "x", Instant::now());
     let begun = begin_two(&uploads, "x").map(|begun| begun.ok().map(|(id, _)| id));
-    let resumed = match begun {
-        [Some(resumed), None] | [None, Some(resumed)] => resumed,
-        _ => unreachable!("one is refused: {begun:?}"),
+    let ([Some(resumed), None] | [None, Some(resumed)]) = begun else {
+        unreachable!("one is refused: {begun:?}");
     };
     assert_ne!(resumed, id);
     let before = uploads.find(id).expect("a reason");
