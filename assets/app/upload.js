@@ -22,7 +22,7 @@ const CONFLICT = 409;
 
 /** The upload in progress: its id, and the request of its current file. */
 let current = null;
-/** Files that another page has begun to send, and the name of their folder. */
+/** Files that another page has begun to send. */
 let refused = null;
 
 /** Returns whether an import can use a file. Hidden files and those of systems are left out. */
@@ -96,8 +96,8 @@ async function contentOf(files) {
 }
 
 /** Begins an upload, or resumes an interrupted one of the same files. */
-async function begin(files, name, bytes, takesOver) {
-  const content = await contentOf(files);
+async function begin(files, bytes, takesOver) {
+  const [name, content] = [nameOf(files), await contentOf(files)];
   const begun = await act("actions/upload", { name, content, files: files.length, bytes, take_over: takesOver });
   return { id: begun.upload, arrived: new Set(begun.arrived.map(({ path }) => path)), isCancelled: false };
 }
@@ -109,9 +109,9 @@ function showArrived(count) {
 }
 
 /** Sends all files, and opens the page on which their pairs are shown. */
-async function sendAll(files, name, takesOver) {
+async function sendAll(files, takesOver) {
   const bytes = files.reduce((sum, { file }) => sum + file.size, 0);
-  const upload = await begin(files, name, bytes, takesOver);
+  const upload = await begin(files, bytes, takesOver);
   current = upload;
   showArrived(upload.arrived.size);
   const timer = setInterval(() => follow(upload), 500);
@@ -142,7 +142,7 @@ async function sendAll(files, name, takesOver) {
 }
 
 /** Begins an upload of what was chosen, unless one is in progress. */
-async function start(chosen, name, takesOver = false) {
+async function start(chosen, takesOver = false) {
   if (current || form.getAttribute("aria-busy") === "true") return;
   refused = null;
   takeOver.hidden = true;
@@ -157,11 +157,11 @@ async function start(chosen, name, takesOver = false) {
   choice.hidden = true;
   state.hidden = false;
   try {
-    await sendAll(files, name, takesOver);
+    await sendAll(files, takesOver);
   } catch (error) {
     problem.textContent = error.message;
     problem.hidden = false;
-    if (error.status === CONFLICT) refused = { files, name };
+    if (error.status === CONFLICT) refused = files;
     takeOver.hidden = !refused;
     state.hidden = true;
     choice.hidden = false;
@@ -174,7 +174,6 @@ async function start(chosen, name, takesOver = false) {
 function nameOf(files) {
   const tops = new Set(files.map(({ path }) => path.split("/")[0]));
   const [top] = tops;
-  if (!top) return "";
   const stem = top.replace(/(.)\.[^.]*$/, "$1");
   if (tops.size === 1 && files[0].path.includes("/")) return top;
   if (files.length === 1 && top.toLowerCase().endsWith(".zip")) return stem;
@@ -186,8 +185,7 @@ function chosenIn(input) {
 }
 
 form.addEventListener("change", async (event) => {
-  const files = chosenIn(event.target);
-  await start(files, nameOf(files));
+  await start(chosenIn(event.target));
   event.target.value = "";
 });
 
@@ -217,7 +215,7 @@ form.addEventListener("drop", async (event) => {
   const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry()).filter(Boolean);
   try {
     const found = await Promise.all(entries.map((entry) => below(entry, "")));
-    await start(found.flat(), nameOf(found.flat()));
+    await start(found.flat());
   } catch (error) {
     problem.textContent = error.message;
     problem.hidden = false;
@@ -225,7 +223,7 @@ form.addEventListener("drop", async (event) => {
 });
 
 takeOver.addEventListener("click", () => {
-  if (refused) start(refused.files, refused.name, true);
+  if (refused) start(refused, true);
 });
 
 cancel.addEventListener("click", async () => {

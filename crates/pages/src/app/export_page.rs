@@ -22,6 +22,7 @@ use super::exports::{
     OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, purpose_of, recover_exports,
 };
 use super::failure::{AppFailure, AppResult};
+use super::message_words::vietnamese;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
@@ -232,7 +233,8 @@ async fn run(
     }
     for (pair, why) in summary.unreadable.iter().take(3) {
         let line = format!("{pair}: {why}");
-        lines.push([line.clone(), line]);
+        let vietnamese = vietnamese(&line).unwrap_or_else(|| line.clone());
+        lines.push([line, vietnamese]);
     }
     Ok(lines)
 }
