@@ -106,8 +106,6 @@ pub use records::review_context::ReviewContext;
 pub use records::review_rights::ReviewRights;
 pub use records::reviewer_names::person_name;
 pub use records::set_apart::SetApart;
-pub use records::verdict_rules::{
-    InvalidVerdict, MAX_AHEAD_MS, NOTE_CHARS, check_event, reviewer_name,
-};
+pub use records::verdict_rules::{InvalidVerdict, NOTE_CHARS, check_event, reviewer_name};
 pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};
 pub use transfer::{CatalogCopy, CopiedTable, CopyProgress};

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use serde_json::Value;
 use super::files::{MAX_SHOWN, RefusedLine};
 use super::location::now;
 use super::verdict_words;
-use mocban_catalog::{ListedVerdict, MAX_AHEAD_MS, NewVerdict, ReviewContext, person_name};
+use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{ContentHash, PairName, UnixMillis, sanitize};
 use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
@@ -100,6 +101,9 @@ impl AsRef<[u8]> for ListText {
         &self.0
     }
 }
+
+/// The time of a verdict, and its day if no more is known.
+type GivenTime = (Option<UnixMillis>, Option<RangeInclusive<UnixMillis>>);
 
 /// Rows of a file, up to the first invalid line.
 type VerdictRows = Box<dyn Iterator<Item = Result<VerdictRow, RefusedLine>> + Send>;
@@ -280,6 +284,8 @@ fn row(
     };
     let metric = |text| at_line(line, verdict_words::metric(text));
     let reason = |text| at_line(line, verdict_words::reason(text));
+    let given = cell(6).map(|text| time(text, now(), line)).transpose()?;
+    let (at, day) = given.unwrap_or_default();
     let verdict = NewVerdict {
         pair: value(required(0)?, line)?,
         verdict: at_line(line, verdict_words::verdict(required(1)?))?,
@@ -288,13 +294,13 @@ fn row(
         reason: cell(4).map(reason).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
         context: ReviewContext::default(),
-        at: cell(6)
-            .map(|text| time(text, now(), line))
-            .transpose()?
-            .flatten(),
+        at,
     };
-    let judged = None;
-    let listed = ListedVerdict { verdict, judged };
+    let listed = ListedVerdict {
+        verdict,
+        judged: None,
+        day,
+    };
     let unread = Vec::new();
     Ok(VerdictRow {
         line,
@@ -308,20 +314,21 @@ fn at_line<T>(line: usize, parsed: Result<T, String>) -> Result<T, RefusedLine> 
     parsed.map_err(|reason| RefusedLine::new(line, &reason))
 }
 
-/// Parses a time. A day alone counts as its end, because the reviewer may have given an earlier verdict in the app on the
-/// same day. Returns `None`, which means the time of the import, for a day that is not over.
-fn time(text: &str, now: UnixMillis, line: usize) -> Result<Option<UnixMillis>, RefusedLine> {
+/// Parses a time. A day alone is returned as such, too, and counts as its end, because the reviewer may have given an earlier
+/// verdict in the app on the same day. Until this end, it counts as the time of the import, which is `None`; a day that has
+/// only begun in other time zones counts as its begin.
+fn time(text: &str, now: UnixMillis, line: usize) -> Result<GivenTime, RefusedLine> {
     let at = parse_utc(text).ok_or_else(|| {
         let reason =
             format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
         RefusedLine::new(line, &reason)
     })?;
-    let is_far_ahead = at > now + MAX_AHEAD_MS;
-    if is_far_ahead || text.contains(['T', 't', ' ', ':']) {
-        return Ok(Some(at));
+    if text.contains(['T', 't', ' ', ':']) {
+        return Ok((Some(at), None));
     }
-    let end = at + DAY_MS - 1;
-    Ok((end <= now).then_some(end))
+    let day = at..=at + DAY_MS - 1;
+    let at = (!day.contains(&now)).then_some(if now < at { at } else { *day.end() });
+    Ok((at, Some(day)))
 }
 
 fn value<T>(text: &str, line: usize) -> Result<T, RefusedLine>

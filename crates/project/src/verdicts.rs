@@ -65,6 +65,7 @@ pub async fn record_on(
     let listed = ListedVerdict {
         verdict: verdict.clone(),
         judged,
+        day: None,
     };
     let counts = catalog
         .import_verdicts([Ok(listed)].into_iter(), now())

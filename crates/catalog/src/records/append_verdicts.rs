@@ -1,6 +1,7 @@
 //! Appends verdicts on current results, with a few statements for many verdicts.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 
 use serde_json::{Value, json};
 
@@ -27,6 +28,8 @@ pub struct ListedVerdict {
     pub verdict: NewVerdict,
     /// The judged result, if the list names it.
     pub judged: Option<ContentHash>,
+    /// The day on which it was given, from its first to its last millisecond, if the list names a day without a time.
+    pub day: Option<RangeInclusive<UnixMillis>>,
 }
 
 /// Counts of an import of verdicts.
@@ -55,7 +58,8 @@ macro_rules! is_of_item {
     };
 }
 
-/// Selects the numbers of items of which a verdict with the same values and an id up to `?2` is stored.
+/// Selects the numbers of items of which a verdict with the same values and an id up to `?2` is stored. For an item with a
+/// day, this is one of a list or command on this day.
 const STORED: &str = concat!(
     "
 SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1) AS item WHERE EXISTS (SELECT 1 FROM verdict AS v
@@ -63,7 +67,8 @@ SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1) AS item WHERE EXISTS (SELE
     is_of_item!(),
     "
         AND v.verdict = value ->> 5 AND v.reason IS NOT DISTINCT FROM value ->> 6
-        AND v.note IS NOT DISTINCT FROM value ->> 7 AND v.at = CAST(value ->> 8 AS bigint) AND v.id <= ?2)"
+        AND v.note IS NOT DISTINCT FROM value ->> 7 AND v.id <= ?2 AND (v.at = CAST(value ->> 8 AS bigint)
+            OR v.event IS NULL AND v.at BETWEEN CAST(value ->> 14 AS bigint) AND CAST(value ->> 15 AS bigint)))"
 );
 
 /// Selects the newest verdict on the result of each item by its reviewer, in one spelling of the name.
@@ -115,6 +120,7 @@ struct VerdictRowDraft<'v> {
     /// Position of the verdict in its part of the list.
     row: usize,
     new: &'v NewVerdict,
+    day: Option<&'v RangeInclusive<UnixMillis>>,
     result: JudgedResult,
     /// The one spelling of the reviewer's name.
     reviewer: String,
@@ -140,7 +146,9 @@ impl VerdictRowDraft<'_> {
     /// Returns the item for a statement. `first` is its number, or the number of its action, and `reviewer` a spelling of the
     /// name.
     fn item(&self, first: i64, reviewer: &str, now: UnixMillis) -> Value {
-        let Self { new, result, .. } = self;
+        let Self {
+            new, result, day, ..
+        } = self;
         let context = &new.context;
         json!([
             first,
@@ -157,6 +165,8 @@ impl VerdictRowDraft<'_> {
             context.shown_ms,
             context.angle_read_deg,
             context.review_order.map(ReviewOrder::name),
+            day.map(RangeInclusive::start),
+            day.map(RangeInclusive::end),
         ])
     }
 }
@@ -174,13 +184,15 @@ impl Catalog {
             Ok(ListedVerdict {
                 verdict,
                 judged: None,
+                day: None,
             })
         });
         Ok(self.import_verdicts(listed, now).await?.recorded)
     }
 
     /// Appends the verdicts of a list as [`Self::verdict_set`] does. Leaves out a verdict that names another result than the
-    /// current one. Reads the list in parts, so that it need not be in memory.
+    /// current one. Skips a verdict with a day if an equal one of a list or command on this day, which was not undone, was
+    /// stored before this call. Reads the list in parts, so that it need not be in memory.
     ///
     /// # Errors
     /// Returns an error if a pair or the judged result does not exist, or if a database operation fails; also the first
@@ -236,6 +248,7 @@ async fn append(
         candidates.extend(results.into_iter().flatten().map(|result| VerdictRowDraft {
             row,
             new: &listed.verdict,
+            day: listed.day.as_ref(),
             result,
             reviewer: person_name(&listed.verdict.reviewer),
         }));
@@ -287,8 +300,8 @@ fn judged(
     }
 }
 
-/// Removes the verdicts that are stored already: those whose event is stored for the metric; those with a time if the same
-/// values are stored; those without a time and a context that equal the reviewer's newest verdict on the result. Also removes
+/// Removes the verdicts that are stored already: those whose event is stored for the metric; those with a time or a day if the
+/// same values are stored; those without a time and a context that equal the reviewer's newest verdict on the result. Also removes
 /// those with an earlier time than this newest verdict, and returns their rows.
 async fn without_stored<'v>(
     conn: &mut Conn,
@@ -299,7 +312,7 @@ async fn without_stored<'v>(
 ) -> Result<(Vec<VerdictRowDraft<'v>>, BTreeSet<usize>)> {
     let mut events = stored_events(conn, &candidates).await?;
     let with_time = (0..).zip(&candidates);
-    let with_time = with_time.filter(|(_, new)| new.new.at.is_some());
+    let with_time = with_time.filter(|(_, new)| new.new.at.is_some() || new.day.is_some());
     let items = json_array(with_time.flat_map(|(number, new)| {
         let spellings = stored_names.of(&new.reviewer);
         spellings.map(move |reviewer| new.item(number, reviewer, now))

@@ -11,7 +11,7 @@ pub const NOTE_CHARS: usize = 2000;
 /// Maximum length of an event id in characters.
 const EVENT_CHARS: usize = 64;
 /// How far a time may lie ahead of the clock, which may be wrong on the computer where the verdict was given.
-pub const MAX_AHEAD_MS: UnixMillis = 24 * 60 * 60 * 1000;
+const MAX_AHEAD_MS: UnixMillis = 24 * 60 * 60 * 1000;
 
 /// Why a verdict is not stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

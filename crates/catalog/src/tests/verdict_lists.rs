@@ -19,6 +19,7 @@ fn mixed_list() -> Vec<ListedVerdict> {
         ListedVerdict {
             verdict: new,
             judged: None,
+            day: None,
         }
     };
     (0..300).map(listed).collect()
@@ -94,6 +95,7 @@ async fn a_listed_verdict_that_is_older_than_the_newest_one_is_left_out() {
                 ..verdict("ana", *given)
             },
             judged: None,
+            day: None,
         });
         let rows: Vec<_> = rows.map(Ok).collect();
         let counts = world.catalog.import_verdicts(rows.into_iter(), now).await;
@@ -135,12 +137,55 @@ async fn a_listed_verdict_that_is_older_than_the_newest_one_is_left_out() {
 }
 
 #[tokio::test]
+async fn a_listed_verdict_with_a_day_replaces_no_correction_when_it_is_imported_again() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    // On a day from 100 to 199.
+    let import = async |given, at, now| {
+        let listed = ListedVerdict {
+            verdict: NewVerdict {
+                at,
+                ..verdict("ana", given)
+            },
+            judged: None,
+            day: Some(100..=199),
+        };
+        let counts = world.catalog.import_verdicts([Ok(listed)].into_iter(), now);
+        let counts = counts.await.expect("stored");
+        (counts.recorded, counts.known, counts.older)
+    };
+    let (pass, fail) = (Verdict::Pass, Verdict::Fail);
+    let in_app = async |event: &str, given, now| {
+        let mut new = verdict("ana", given);
+        new.context.event = Some(event.to_owned());
+        let set = world.catalog.verdict_set(vec![new], now).await;
+        assert_eq!(set.expect("stored"), 1);
+    };
+    // The list is newer than both verdicts of the app, one of which is equal.
+    in_app("1", pass, 110).await;
+    in_app("2", fail, 120).await;
+    assert_eq!(import(pass, None, 130).await, (1, 0, 0));
+    assert_eq!(counted(&world.catalog).await, [("ana".to_owned(), pass)]);
+    in_app("3", fail, 140).await;
+    for (at, now) in [(None, 150), (Some(199), 250), (Some(100), 99)] {
+        assert_eq!(import(pass, at, now).await, (0, 1, 0), "{now}");
+        assert_eq!(counted(&world.catalog).await, [("ana".to_owned(), fail)]);
+    }
+    // Another verdict of the list counts, and one after a correction on a later day does not.
+    assert_eq!(import(Verdict::Unsure, Some(199), 260).await, (1, 0, 0));
+    in_app("4", pass, 270).await;
+    assert_eq!(import(fail, Some(199), 280).await, (0, 0, 1));
+    assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
+}
+
+#[tokio::test]
 async fn a_long_list_takes_few_statements_and_is_stored_whole_or_not_at_all() {
     let world = World::new(1).await;
     world.finish_one().await;
     let row = |number: usize| ListedVerdict {
         verdict: verdict(&format!("reviewer {number}"), Verdict::Pass),
         judged: None,
+        day: None,
     };
     let rows = 2500;
     let broken = (0..rows).map(move |number| match number {
@@ -180,6 +225,7 @@ async fn a_listed_verdict_on_another_result_is_left_out() {
             ..verdict("ana", Verdict::Pass)
         },
         judged: Some(judged),
+        day: None,
     };
     let (current, other) = (density.result_hash, ContentHash::of(b"another"));
     let list = [

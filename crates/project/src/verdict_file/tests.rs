@@ -92,16 +92,22 @@ fn times_are_parsed_and_other_texts_refused() {
 #[test]
 fn a_day_without_a_time_counts_as_its_end_and_today_as_the_time_of_the_import() {
     let begin = 1_795_219_200_000;
-    let day = 24 * 60 * 60 * 1000;
-    let at = |text, now| time(text, now, 2).expect("a time");
-    assert_eq!(at("2026-11-21", begin + day), Some(begin + day - 1));
-    assert_eq!(at("2026-11-21", begin + 1000), None);
-    // It has begun in another time zone.
-    assert_eq!(at("2026-11-21", begin - 1000), None);
-    // The import refuses it.
-    assert_eq!(at("2026-11-21", begin - 2 * day), Some(begin));
+    let length = 24 * 60 * 60 * 1000;
+    let day = Some(begin..=begin + length - 1);
+    let given = |text, now| time(text, now, 2).expect("a time");
+    for (now, at) in [
+        (begin + length, Some(begin + length - 1)),
+        (begin + length - 1, None),
+        (begin, None),
+        // It has begun in another time zone.
+        (begin - 1000, Some(begin)),
+        // The import refuses it.
+        (begin - 2 * length, Some(begin)),
+    ] {
+        assert_eq!(given("2026-11-21", now), (at, day.clone()), "{now}");
+    }
     for text in ["2026-11-21 00:00:00", "2026-11-21T00:00:00Z"] {
-        assert_eq!(at(text, begin + 1000), Some(begin));
+        assert_eq!(given(text, begin + 1000), (Some(begin), None));
     }
 }
 
