@@ -40,6 +40,11 @@ impl BlockStatus {
         leased.filter_map(|state| Some((&state.attributes.name, state.next_stage?)))
     }
 
+    /// Returns the number of finished blocks of which an import changed the path of a file, which no run has read since.
+    pub fn other_files(&self) -> u64 {
+        self.0.iter().filter(|state| state.other_files).count() as u64
+    }
+
     /// Returns the failed blocks.
     pub fn failed(&self) -> impl Iterator<Item = &BlockState> {
         let states = self.0.iter();
@@ -69,6 +74,7 @@ impl BlockStatus {
             "characters": sum(|state| state.characters),
             "left_out": sum(|state| state.left_out),
             "retired": sum(|state| state.retired),
+            "other_files": self.other_files(),
             "low_confidence": sum(|state| state.low_confidence),
             "failures": failures.collect::<Value>(),
         })

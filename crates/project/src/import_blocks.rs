@@ -13,6 +13,7 @@ use crate::location::{Location, now};
 use crate::manifest_file::{locate_file, refuse};
 use crate::missing_files::MissingFiles;
 use crate::new_project::import_with;
+use crate::repeated_files::RepeatedFiles;
 use mocban_catalog::{BlockAttributes, BlockImportSummary};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
 use mocban_lists::manifest::{BlockRow, is_block_list, is_named_like_mesh, parse_blocks};
@@ -25,6 +26,8 @@ pub struct BlockImportOutcome {
     pub summary: BlockImportSummary,
     /// Files that do not exist.
     pub missing: MissingFiles,
+    /// Warnings about the list, one line each.
+    pub warnings: Vec<String>,
 }
 
 /// Blocks to import.
@@ -32,6 +35,7 @@ struct BlockListing {
     rows: Vec<BlockRow>,
     /// Label of row numbers in messages: `blocks.csv: line`, or `block` for a single one.
     label: String,
+    warnings: Vec<String>,
 }
 
 /// Where the blocks of an import are named.
@@ -151,7 +155,16 @@ pub async fn import_blocks(
     Ok(BlockImportOutcome {
         summary: summary.await?,
         missing,
+        warnings: listing.warnings,
     })
+}
+
+/// Returns warnings about a list of blocks, as [`import_blocks`] does, without storing anything.
+///
+/// # Errors
+/// Returns an error if an import would refuse the list.
+pub fn list_warnings(source: &BlockSource) -> ProjectResult<Vec<String>> {
+    Ok(listing(source)?.warnings)
 }
 
 fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
@@ -169,12 +182,15 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
                     side: files.side,
                 }],
                 label: "block".to_owned(),
+                warnings: Vec::new(),
             });
         }
     };
     let mut rows = parse_blocks(bytes).map_err(|problems| refuse(file, &problems))?;
     let folder = file.parent().unwrap_or(Path::new(""));
+    let mut repeated = RepeatedFiles::default();
     for row in &mut rows {
+        repeated.add(row.line, row.name.as_str(), &row.mesh, &row.page);
         let paths = [&mut row.mesh, &mut row.page].into_iter();
         for path in paths.chain(row.labels.as_mut()) {
             *path = folder.join(&*path);
@@ -183,6 +199,10 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
     Ok(BlockListing {
         rows,
         label: format!("{}: line", file.display()),
+        warnings: repeated
+            .warning("blocks with the same scan and page")
+            .into_iter()
+            .collect(),
     })
 }
 
@@ -226,7 +246,22 @@ fn stored_row(row: &BlockRow, project: &Project) -> ProjectResult<BlockAttribute
 
 #[cfg(test)]
 mod tests {
-    use super::ListedItems;
+    use super::{BlockSource, ListedItems, list_warnings};
+
+    #[test]
+    fn the_same_files_under_the_ids_of_two_blocks_are_counted_with_the_first() {
+        let warnings = |rows: &str| {
+            let source = BlockSource::List {
+                file: "blocks.csv".into(),
+                bytes: format!("block,mesh,page\n{rows}").into_bytes(),
+            };
+            list_warnings(&source).expect("valid")
+        };
+        let sentence =
+            "blocks with the same scan and page as an earlier one: 1, first b, as on line 2";
+        assert_eq!(warnings("a,a.stl,a.png\nb,./a.stl,a.png\n"), [sentence]);
+        assert_eq!(warnings("a,a.stl,a.png\nb,a.stl,b.png\n"), [""; 0]);
+    }
 
     #[test]
     fn other_files_in_place_of_a_list_are_named() {

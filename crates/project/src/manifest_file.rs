@@ -97,7 +97,7 @@ impl Listing {
             misspelt.add(&row);
             unread.add(&row);
             if !left_out.contains(row.name.as_str()) {
-                repeated.add(&row);
+                repeated.add(row.line, row.name.as_str(), &row.mesh, &row.print);
             }
         };
         let columns = choices.columns.clone();
@@ -106,7 +106,7 @@ impl Listing {
         let mut warnings = misspelt.warnings();
         let unread = unread.warnings();
         warnings.extend(unread.map_err(|sentences| refuse(file, &sentences))?);
-        warnings.extend(repeated.warning());
+        warnings.extend(repeated.warning("pairs with the same mesh and print"));
         let renamed = renamed(&read);
         let has = |id: &&String| PairName::new(id).is_ok_and(|name| read.ids.contains(&name));
         if let Some(id) = left_out.iter().find(|id| !has(id)) {

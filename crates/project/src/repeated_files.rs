@@ -1,43 +1,40 @@
-//! Finds pairs of a list with the same files under several ids.
+//! Finds pairs or blocks of a list with the same files under several ids.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use mocban_core::domain::{ContentHash, PairName};
-use mocban_lists::manifest::ManifestRow;
+use mocban_core::domain::ContentHash;
 
-/// Counts the rows whose mesh and print an earlier row has, too.
+/// Counts the rows whose mesh and image an earlier row has, too.
 #[derive(Debug, Default)]
 pub(crate) struct RepeatedFiles {
-    /// The first line of each mesh with a print, by a hash of their paths: a list may have millions of rows.
+    /// The first line of each mesh with an image, by a hash of their paths: a list may have millions of rows.
     lines: BTreeMap<u64, usize>,
     count: u64,
-    /// The first such pair, and the line with the same files.
-    first: Option<(PairName, usize)>,
+    /// The first such id, and the line with the same files.
+    first: Option<(String, usize)>,
 }
 
 impl RepeatedFiles {
     /// Adds a row.
-    pub(crate) fn add(&mut self, row: &ManifestRow) {
-        let files = format!("{:?}", (plain(&row.mesh), plain(&row.print)));
+    pub(crate) fn add(&mut self, line: usize, id: &str, mesh: &Path, image: &Path) {
+        let files = format!("{:?}", (plain(mesh), plain(image)));
         let hash = ContentHash::of(files.as_bytes());
         let key = hash.as_bytes().first_chunk().copied();
         let key = key.map_or(0, u64::from_le_bytes);
         if let Some(earlier) = self.lines.get(&key) {
             self.count += 1;
-            self.first.get_or_insert((row.name.clone(), *earlier));
+            self.first.get_or_insert((id.to_owned(), *earlier));
         } else {
-            self.lines.insert(key, row.line);
+            self.lines.insert(key, line);
         }
     }
 
-    /// Returns a warning if there are such pairs.
-    pub(crate) fn warning(self) -> Option<String> {
+    /// Returns a warning if there are such rows. `what` names rows and their files: `pairs with the same mesh and print`.
+    pub(crate) fn warning(self, what: &str) -> Option<String> {
         let count = self.count;
-        self.first.map(|(name, line)| {
-            format!(
-                "pairs with the same mesh and print as an earlier one: {count}, first {name}, as on line {line}"
-            )
+        self.first.map(|(id, line)| {
+            format!("{what} as an earlier one: {count}, first {id}, as on line {line}")
         })
     }
 }

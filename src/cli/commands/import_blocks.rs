@@ -58,6 +58,9 @@ pub(crate) fn print_outcome(outcome: &BlockImportOutcome, context: &Context) {
     for line in &outcome.missing.lines {
         context.warn(line);
     }
+    for line in &outcome.warnings {
+        context.warn(line);
+    }
     let summary = &outcome.summary;
     context.info(&format!(
         "{} added, {} changed, {} unchanged",
@@ -65,6 +68,12 @@ pub(crate) fn print_outcome(outcome: &BlockImportOutcome, context: &Context) {
         summary.changed.len(),
         summary.unchanged
     ));
+    if summary.other_files > 0 {
+        let blocks = count(summary.other_files, "block");
+        context.info(&format!(
+            "{blocks} with another scan, page or labels; the next run reads them"
+        ));
+    }
     for (name, fields) in &summary.changed {
         context.info(&format!("  {name}: {} changed", fields.join(", ")));
     }
@@ -79,8 +88,10 @@ pub(crate) fn as_json(outcome: &BlockImportOutcome) -> Value {
         "blocks": {
             "added": summary.added,
             "changed": changed.collect::<Value>(),
+            "other_files": summary.other_files,
             "unchanged": summary.unchanged,
         },
         "missing_files": outcome.missing.lines,
+        "warnings": outcome.warnings,
     })
 }

@@ -172,7 +172,8 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     let running = status.in_process() > 0 || (status.running && leased > 0);
     let waiting = status.waiting() + status.failures.blocks.waiting();
     let interrupted = status.interrupted() + if status.running { 0 } else { leased };
-    let changed = status.counts.stale + status.counts.other_files;
+    let other_files = status.counts.other_files + status.failures.blocks.other_files();
+    let changed = status.counts.stale + other_files;
     let has_work = waiting + interrupted + changed > 0;
     if !running && (has_work || status.are_results_missing) {
         steps.push("run".to_owned());
@@ -288,6 +289,21 @@ mod tests {
         let line = "changed      2 pairs with another mesh or print in the list than before; the next run reads them\n";
         assert!(text.ends_with(line), "{text}");
         assert_eq!(next_steps(&status)[0], "run");
+    }
+
+    #[test]
+    fn blocks_with_other_files_are_counted_and_run() {
+        let mut status = status(3, 0);
+        status.running = false;
+        let mut block = crate::cli::output::block_status::tests::state("a", JobStatus::Done);
+        status.failures.blocks.0 = vec![block.clone()];
+        assert_eq!(next_steps(&status)[0], "run");
+        let text = screen(&status, "demo", false, Palette::PLAIN);
+        let line = "changed      1 block with another scan, page or labels than before; the next run reads them\n";
+        assert!(text.contains(line), "{text}");
+        block.other_files = false;
+        status.failures.blocks.0 = vec![block];
+        assert!(!next_steps(&status).contains(&"run".to_owned()));
     }
 
     #[test]

@@ -73,14 +73,14 @@ pub(crate) fn failed_blocks_text(blocks: &BlockStatus, all: bool) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::{blocks_line, failed_blocks_text};
     use crate::cli::output::screen::Palette;
     use mocban_catalog::{BlockAttributes, BlockState, StoredFailure};
     use mocban_core::domain::{BlockStage, Failure, FailureClass, JobStatus};
     use mocban_project::block_status::BlockStatus;
 
-    fn state(name: &str, status: JobStatus) -> BlockState {
+    pub(crate) fn state(name: &str, status: JobStatus) -> BlockState {
         let failure = StoredFailure {
             stage: BlockStage::Align,
             failure: Failure::new(
@@ -108,6 +108,7 @@ mod tests {
             left_out: 1,
             retired: 0,
             low_confidence: 2,
+            other_files: name == "a",
         }
     }
 
@@ -128,6 +129,7 @@ mod tests {
         assert_eq!(text, "  b  at align  p.png: the page is of another block\n");
         let json = blocks.json();
         assert_eq!(json["jobs"]["done"], 1);
+        assert_eq!(json["other_files"], 1);
         assert_eq!(json["failures"][0]["stage"], "align");
     }
 }

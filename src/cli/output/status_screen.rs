@@ -41,6 +41,14 @@ pub(crate) fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Pale
         );
         parts.push(line("changed", &text));
     }
+    let blocks = status.failures.blocks.other_files();
+    if blocks > 0 {
+        let blocks = count(blocks, "block");
+        let text = format!(
+            "{blocks} with another scan, page or labels than before; the next run reads them"
+        );
+        parts.push(line("changed", &text));
+    }
     if status.counts.retired > 0 {
         let pairs = count(status.counts.retired, "pair");
         let text = format!(

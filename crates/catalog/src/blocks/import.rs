@@ -21,6 +21,8 @@ pub struct BlockImportSummary {
     pub added: u64,
     /// Existing blocks with other values, and the columns that differ.
     pub changed: Vec<(BlockName, Vec<&'static str>)>,
+    /// Number of changed blocks that get another scan, page or labels.
+    pub other_files: u64,
     /// Number of existing blocks with the same values.
     pub unchanged: u64,
 }
@@ -73,6 +75,7 @@ impl Catalog {
             let changed = summary.changed.iter();
             let moved = changed.filter(|(_, fields)| fields.iter().any(is_file));
             let moved: Vec<BlockName> = moved.map(|(name, _)| name.clone()).collect();
+            summary.other_files = moved.len() as u64;
             let moved = RetrySelection::<BlockJob>::Names(moved);
             requeue::retry(conn, &moved, &mut uncounted()).await?;
             if summary.added > 0 {

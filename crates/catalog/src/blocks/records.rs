@@ -41,7 +41,9 @@ SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND (c.state = 'retired' OR c.state = 'cut' AND EXISTS (
         SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair))) AS retired,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND c.confidence < ?2 AND NOT EXISTS (
-        SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair)) AS low_confidence
+        SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair)) AS low_confidence,
+    j.status = 3 AND coalesce(b.mesh_stat = '' OR b.page_stat = '' OR b.labels_path IS NOT NULL AND b.labels_stat = '', false)
+        AS other_files
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id WHERE (?1 IS NULL OR b.name = ?1) AND ",
     is_counted!("b.id", "?3"),
     " ORDER BY b.name"
@@ -84,6 +86,8 @@ pub struct BlockState {
     pub retired: u64,
     /// Characters that were cut although their position is uncertain.
     pub low_confidence: u64,
+    /// Whether the block is done, and an import changed the path of a file, which no run has read since.
+    pub other_files: bool,
 }
 
 /// The result of one stage of a block.
@@ -166,6 +170,7 @@ impl FromRow for BlockState {
             left_out: row.get("left_out")?,
             retired: row.get("retired")?,
             low_confidence: row.get("low_confidence")?,
+            other_files: row.get("other_files")?,
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Imports that are streamed in chunks.
 
-use super::blocks::{attributes, block};
+use super::blocks::{attributes, block, inputs, world};
 use super::{World, name, row};
 use crate::{CatalogError, ImportChunk, ImportRow, ImportTerms};
 use mocban_core::domain::{PairId, Stage};
@@ -68,6 +68,34 @@ async fn a_pair_with_another_path_is_counted_until_its_file_is_read() {
     world.catalog.store_inputs(inputs).await.expect("stored");
     assert_eq!(other_files().await, 0);
     world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_block_with_another_path_is_counted_until_its_file_is_read() {
+    let world = world().await;
+    let other_files = async || {
+        let states = world.catalog.block_states().await.expect("a read");
+        states.iter().filter(|state| state.other_files).count()
+    };
+    let mut moved = attributes("b");
+    moved.page_path = "elsewhere.png".to_owned();
+    let unread = world.catalog.import_blocks(vec![moved], false, 1).await;
+    assert_eq!(unread.expect("imported").other_files, 1);
+    assert_eq!(other_files().await, 0, "the block is not done");
+    world.finish_block(Vec::new()).await;
+    for (expected, count) in [(1, 1), (0, 1)] {
+        let moved = world
+            .catalog
+            .import_blocks(vec![attributes("b")], false, 2)
+            .await;
+        assert_eq!(moved.expect("imported").other_files, expected);
+        assert_eq!(other_files().await, count);
+    }
+    let known = world.catalog.known_blocks().await.expect("a read");
+    let read = vec![(known[0].block, inputs(["mesh", "page", "labels"]))];
+    let stored = world.catalog.store_block_inputs(read).await;
+    stored.expect("stored");
+    assert_eq!(other_files().await, 0);
 }
 
 #[tokio::test]

@@ -15,7 +15,7 @@ use super::uploads::FOLDER as UPLOADS;
 use mocban_core::domain::LengthUnit;
 use mocban_lists::manifest::{ChosenColumns, ListHead, PairingChanges, read_head};
 use mocban_project::files::is_jsonl;
-use mocban_project::import_blocks::ListedItems;
+use mocban_project::import_blocks::{ListedItems, list_warnings};
 use mocban_project::import_pairs::PairSource;
 use mocban_project::import_plan::{ImportPlan, plan_import};
 use mocban_project::location::Location;
@@ -64,8 +64,8 @@ pub(super) struct ImportChoice {
 pub(super) enum Planned {
     /// Pairs. The page shows some from a position in the plan.
     Pairs(Arc<ImportPlan>, usize),
-    /// A list of whole blocks, whose pairs a run finds.
-    Blocks,
+    /// A list of whole blocks, whose pairs a run finds, with warnings about it.
+    Blocks(Vec<String>),
 }
 
 /// What the page shows of a choice.
@@ -216,7 +216,9 @@ impl ImportChoice {
     ) -> Option<ImportPreview> {
         let (mut head, items) = (None, self.items(roots).transpose()?);
         let planned = items.and_then(|items| match items {
-            ListedItems::Blocks(_) => Ok(Planned::Blocks),
+            ListedItems::Blocks(source) => Ok(Planned::Blocks(
+                list_warnings(&source).map_err(AppFailure::from)?,
+            )),
             ListedItems::Pairs(source) => {
                 let choices = self.choices()?;
                 if let PairSource::List { file, bytes } = &source {
@@ -238,7 +240,7 @@ impl ImportChoice {
         });
         let last = match &planned {
             Ok(Planned::Pairs(plan, _)) => plan.pairs.saturating_sub(1) / SHOWN_PAIRS * SHOWN_PAIRS,
-            Ok(Planned::Blocks) | Err(_) => from,
+            Ok(Planned::Blocks(_)) | Err(_) => from,
         };
         if from > last {
             return self.preview(folder, roots, last, plans);

@@ -31,7 +31,10 @@ pub(super) fn plan_part(
         section.card {
             h2 { (visit.t("What would be imported", "Sẽ nhập những gì")) }
             @match planned {
-                Planned::Blocks => p { (visit.t("A list of whole blocks with their pages. A run finds the characters and makes the pairs.", "Một danh sách ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) },
+                Planned::Blocks(warnings) => {
+                    p { (visit.t("A list of whole blocks with their pages. A run finds the characters and makes the pairs.", "Một danh sách ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) }
+                    @for line in warnings { p.notice { (one_line(&warning(visit, line))) } }
+                },
                 Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
             }
             (import_form(visit, chosen, planned))
@@ -208,7 +211,7 @@ fn join_form(visit: &Visit, plan: &ImportPlan) -> Markup {
 fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Markup {
     let plan = match planned {
         Planned::Pairs(plan, _) => Some(plan),
-        Planned::Blocks => None,
+        Planned::Blocks(_) => None,
     };
     let missing = plan.is_some_and(|plan| plan.missing.count > 0);
     let is_nothing = plan.is_some_and(|plan| plan.pairs == 0);

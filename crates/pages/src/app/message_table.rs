@@ -64,6 +64,10 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "pairs with the same mesh and print as an earlier one: {}, first {}, as on line {}",
         "số cặp có cùng bản quét và bản in với một cặp trước: {0}, cặp đầu tiên là {1}, giống dòng {2}",
     ),
+    (
+        "blocks with the same scan and page as an earlier one: {}, first {}, as on line {}",
+        "số ván có cùng bản quét và trang in với một ván trước: {0}, ván đầu tiên là {1}, giống dòng {2}",
+    ),
     // Formats that are not read.
     (
         "ignored, {} is not read: {} and {} more",

@@ -294,9 +294,11 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
     let is_idle = waiting + blocks == 0;
     let is_empty = run.counts.pairs == 0 && run.blocks.is_empty();
     let failed = run.jobs(JobStatus::Quarantined);
+    let other_files = run.counts.other_files + run.blocks.other_files();
     html! {
         @if let Some(text) = outdated_text(visit, run) { p.notice #outdated { (text) } }
         @if let Some(text) = other_files_text(visit, run) { p.notice #other-files { (text) } }
+        @if let Some(text) = other_blocks_text(visit, &run.blocks) { p.notice #other-block-files { (text) } }
         (action_form("actions/run", "inline run-form", &html! {
             label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
@@ -313,7 +315,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
                 button name="which" value="failed" { (visit.t("Try failed pairs again", "Thử lại các cặp lỗi")) }
             }
         }))
-        @if is_idle && failed == 0 && run.counts.other_files == 0 && run.counts.pairs > 0 {
+        @if is_idle && failed == 0 && other_files == 0 && run.counts.pairs > 0 {
             p.good { (visit.t("Everything is aligned. Next: judge a sample of the results.", "Mọi thứ đã được căn chỉnh. Tiếp theo: đánh giá một mẫu kết quả.")) " "
                 a href="review" { (visit.t("Review", "Đánh giá")) } }
         }
@@ -359,6 +361,19 @@ fn other_files_text(visit: &Visit, run: &RunState) -> Option<String> {
             "{pairs} cặp đã căn chỉnh có bản quét hoặc bản in khác trong danh sách so với trước: lần chạy tới sẽ đọc các tệp đó."
         )),
     }
+}
+
+/// Says that an import named other files of finished blocks, which no run has read.
+fn other_blocks_text(visit: &Visit, blocks: &BlockStatus) -> Option<String> {
+    let number = grouped(blocks.other_files());
+    (blocks.other_files() > 0).then(|| match visit.language {
+        Language::English => format!(
+            "Blocks with another scan, page or labels than before: {number}. The next run reads them."
+        ),
+        Language::Vietnamese => format!(
+            "Số ván có bản quét, trang in hoặc nhãn khác so với trước: {number}. Lần chạy tới sẽ đọc các tệp đó."
+        ),
+    })
 }
 
 /// Returns the number of blocks and pairs that a run would align, such as `1 block and 3 pairs`.

@@ -31,6 +31,7 @@ fn block(name: &str, status: JobStatus) -> BlockState {
         left_out: 0,
         retired: 0,
         low_confidence: 0,
+        other_files: false,
     }
 }
 
@@ -160,6 +161,33 @@ fn pairs_with_other_files_in_the_list_are_named_in_both_languages() {
     }
     let after = shown(&run, Language::English);
     assert!(!after.contains("Everything is aligned"), "{after}");
+}
+
+#[test]
+fn blocks_with_other_files_are_named_in_both_languages() {
+    let mut run = running(vec![block("b1", JobStatus::Done)]);
+    run.is_running = false;
+    run.counts.jobs = BTreeMap::from([(JobStatus::Done, 20)]);
+    let shown =
+        |run: &RunState, language| controls(&Visit::in_language(language), run).into_string();
+    let before = shown(&run, Language::English);
+    assert!(before.contains("Everything is aligned"), "{before}");
+    assert!(!before.contains("other-block-files"), "{before}");
+    run.blocks.0[0].other_files = true;
+    for (language, text) in [
+        (
+            Language::English,
+            "Blocks with another scan, page or labels than before: 1.",
+        ),
+        (
+            Language::Vietnamese,
+            "Số ván có bản quét, trang in hoặc nhãn khác so với trước: 1.",
+        ),
+    ] {
+        let shown = shown(&run, language);
+        assert!(shown.contains(text), "{shown}");
+        assert!(!shown.contains("Everything is aligned"), "{shown}");
+    }
 }
 
 #[test]
