@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -137,7 +138,7 @@ class Results(Mapping[str, MetricResult]):
         return cls({name: MetricResult(name, numbers[name], native) for name in metrics}, native)
 
     def __getitem__(self, metric: str) -> MetricResult:
-        return self._by_metric[metric]
+        return self._by_metric[plain_metric(metric)]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._by_metric)
@@ -518,9 +519,15 @@ def aligned(
     return Alignment(None, refusal)
 
 
+def plain_metric(name: str) -> str:
+    """Return the name of a metric that is written with capitals, blanks or hyphens; anything else as it is."""
+    plain = "_".join(re.split(r"[\s_-]+", name.strip().lower())) if isinstance(name, str) else name
+    return plain if plain in METRICS else name
+
+
 def metric_names(metrics: Iterable[str], chosen: Settings) -> tuple[str, ...]:
     """Return the names of metrics, all of which the method gives."""
-    names = (metrics,) if isinstance(metrics, str) else tuple(metrics)
+    names = tuple(map(plain_metric, (metrics,) if isinstance(metrics, str) else metrics))
     if not names:
         raise InputError("metrics is empty; leave it out for all metrics", "usage")
     known = METRICS if chosen["pipeline.method"] == "default" else METRICS[:-1]

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from . import _native as _rust
-from ._alignment import METRICS, Alignment
+from ._alignment import METRICS, Alignment, plain_metric
 from ._blocks import BlockAlignment
 from ._errors import Cancelled, InputError, ReadOnlyProject
 from ._frozen import Frozen
@@ -230,6 +230,7 @@ class Project:
             import pyarrow.parquet
         except ImportError:
             raise ImportError("Project.pairs needs pyarrow: pip install 'mocban[arrow]'") from None
+        metric = None if metric is None else plain_metric(metric)
         if metric is not None and metric not in METRICS:
             raise InputError(f"there is no metric {metric!r}, only {', '.join(METRICS)}", "usage")
         if where is not None and not isinstance(where, pyarrow.compute.Expression):

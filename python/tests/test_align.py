@@ -130,8 +130,10 @@ def test_results_are_frozen_values(pair: DemoPair) -> None:
 
 
 def test_chosen_metrics_alone_are_kept(pair: DemoPair) -> None:
-    found = mocban.align(pair.mesh, pair.print, metrics=["density"])
+    found = mocban.align(pair.mesh, pair.print, metrics=["Density"])
     assert list(found.results) == ["density"]
+    assert found.results["DENSITY"] is found.results["density"] and "relief" not in found.results
+    assert np.array_equal(found.overlay("Density"), found.overlay("density"))
     assert pickle.loads(pickle.dumps(found)) == found
     with pytest.raises(mocban.Error, match="no metric 'relif'"):
         mocban.align(pair.mesh, pair.print, metrics=["relif"])

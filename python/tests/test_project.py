@@ -45,7 +45,7 @@ def test_pairs_are_an_arrow_table(demo: Path, tmp_path: Path) -> None:
     assert isinstance(table, pyarrow.Table) and table.num_rows == 24
     assert set(table["metric"].to_pylist()) == {"relief"}
     assert project.pairs(metric=None).num_rows == 96
-    chosen = project.pairs(["id", "iou"], metric="density", where=compute.field("iou") > 0.5)
+    chosen = project.pairs(["id", "iou"], metric="Density", where=compute.field("iou") > 0.5)
     assert chosen.column_names == ["id", "iou"] and 0 < chosen.num_rows <= 24
     mocban_command("-C", demo, "export", "--to", "parquet", "-o", tmp_path / "out")
     exported = pyarrow.parquet.read_table(tmp_path / "out" / "pairs.parquet")
@@ -80,7 +80,7 @@ def test_a_stored_alignment_is_that_of_align(demo: Path, pairs: list[DemoPair]) 
 def test_verdicts_have_the_rules_of_the_command_line(copied: Path, pair: DemoPair) -> None:
     project = mocban.open(copied, readonly=False)
     judged = project.pair(pair.id).metrics["relief"]["result_hash"]
-    assert project.add_verdict(pair.id, "relief", "fail", reason="angle", reviewer="Lan", expect=judged)
+    assert project.add_verdict(pair.id, "Relief", "fail", reason="angle", reviewer="Lan", expect=judged)
     mocban_command("-C", copied, "verdict", "set", pair.id, "pass", "--reviewer", "Minh", "--metric", "density")
     log = project.verdicts()
     assert [(v["reviewer"], v["metric"], v["verdict"]) for v in log] == [
@@ -146,7 +146,7 @@ def test_rows_are_imported_and_run_with_progress(pairs: list[DemoPair], tmp_path
     assert summary["left"] == 0 and summary["failed_in_all"] == 1
     assert "no.stl" in project.pair("7").error and project.status()["jobs"]["quarantined"] == 1
     assert project.run()["stages"] == 0
-    exported = project.export(tmp_path / "out", ["jsonl", "csv"], metrics=["relief"])
+    exported = project.export(tmp_path / "out", ["jsonl", "csv"], metrics=["RELIEF"])
     assert exported["done"] + exported["without_result"] == 4
     assert (tmp_path / "out" / "jsonl" / "pairs.jsonl").exists()
 

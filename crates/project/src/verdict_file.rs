@@ -16,7 +16,9 @@ use super::location::now;
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
-use mocban_core::domain::{ContentHash, PairName, UnixMillis, sanitize};
+use mocban_core::domain::{
+    ContentHash, PairName, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, sanitize,
+};
 use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
 use mocban_lists::json_numbers::nan_as_null;
 use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, later_header, trimmed};
@@ -71,6 +73,22 @@ const LOG_FIELDS: [&str; 17] = [
     "at",
     "undone_at",
     "current",
+];
+
+/// Returns the name of a word, or a sentence with the names that there are.
+type NameOfWord = fn(&str) -> Result<&'static str, String>;
+
+/// The fields of JSON that have one of a few names.
+const NAMED: [(&str, NameOfWord); 3] = [
+    ("verdict", |text| {
+        verdict_words::verdict(text).map(Verdict::name)
+    }),
+    ("reason", |text| {
+        verdict_words::reason(text).map(Reason::name)
+    }),
+    ("metric", |text| {
+        verdict_words::metric(text).map(ThresholdMetric::name)
+    }),
 ];
 
 /// One verdict and its line number.
@@ -377,25 +395,36 @@ fn json_rows(text: ListText) -> impl Iterator<Item = Result<VerdictRow, RefusedL
     parsed.filter_map(|(line, parsed)| json_row(line, parsed).transpose())
 }
 
-/// Parses a line. If it is not JSON, tries again with `NaN` as no value.
-fn parsed(line: &[u8]) -> serde_json::Result<VerdictLine> {
-    serde_json::from_slice(line).or_else(|error| {
+/// Parses a line. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons and metrics may be those of the
+/// review page and in any case.
+///
+/// # Errors
+/// Returns a sentence about what was not understood.
+fn parsed(line: &[u8]) -> Result<VerdictLine, String> {
+    let read = serde_json::from_slice(line).or_else(|error| {
         let text = std::str::from_utf8(line).ok().and_then(nan_as_null);
         text.map_or(Err(error), |text| serde_json::from_str(&text))
-    })
+    });
+    let UniqueKeys(mut value) = read.map_err(|error| json_error(&error))?;
+    for (field, name) in NAMED {
+        if let Some(Value::String(text)) = value.get_mut(field) {
+            *text = name(text)?.to_owned();
+        }
+    }
+    serde_json::from_value(value).map_err(|error| json_error(&error))
 }
 
 /// Returns the row of a parsed line, or `None` if the verdict was undone.
 fn json_row(
     line: usize,
-    parsed: serde_json::Result<VerdictLine>,
+    parsed: Result<VerdictLine, String>,
 ) -> Result<Option<VerdictRow>, RefusedLine> {
     let VerdictLine {
         mut verdict,
         result_hash: judged,
         undone_at,
         fields,
-    } = parsed.map_err(|error| RefusedLine::new(line, &json_error(&error)))?;
+    } = at_line(line, parsed)?;
     verdict.reviewer = person_name(&verdict.reviewer);
     if verdict.reviewer.is_empty() {
         return Err(RefusedLine::new(line, "reviewer is empty"));

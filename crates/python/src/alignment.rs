@@ -19,6 +19,7 @@ use mocban_core::domain::MetricOutcome;
 use mocban_core::raster::{Mask, compact_rgb8, warp_mask};
 use mocban_export::pictures::{PrintView, Rgb};
 use mocban_project::align::{self, AlignFailure};
+use mocban_project::verdict_words;
 use mocban_system::failpoint::{self, Point};
 
 /// An aligned pair.
@@ -33,9 +34,10 @@ type PyMask<'py> = Bound<'py, PyArray1<bool>>;
 
 impl NativeAlignment {
     fn outcome(&self, py: Python<'_>, metric: &str) -> PyResult<(usize, &MetricOutcome)> {
+        let wanted = verdict_words::metric(metric).ok();
         let mut metrics = self.pair.metrics().iter().enumerate();
         metrics
-            .find(|(_, found)| found.metric.name() == metric)
+            .find(|(_, found)| Some(found.metric) == wanted)
             .ok_or_else(|| {
                 let text = format!("there is no result of the metric {metric}");
                 wrong_argument(py, &text)

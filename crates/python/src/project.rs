@@ -14,7 +14,7 @@ use crate::mesh::unit as mesh_unit;
 use crate::{log, stored_block, stored_pair};
 use mocban_catalog::{NewVerdict, ReviewContext};
 use mocban_core::domain::cancel::CancelToken;
-use mocban_core::domain::{ContentHash, ErrorCode};
+use mocban_core::domain::{ContentHash, ErrorCode, ThresholdMetric};
 use mocban_export::{ExportFormat, ExportOptions};
 use mocban_project::events::{Listener, ProjectEvent};
 use mocban_project::import_blocks::ImportedBlock;
@@ -56,7 +56,7 @@ impl Listener for Hearing {
     }
 }
 
-/// Parses an argument, such as the name of a metric.
+/// Parses an argument, such as the name of a format.
 fn parsed<T: std::str::FromStr>(py: Python<'_>, name: &str) -> PyResult<T>
 where
     T::Err: std::fmt::Display,
@@ -65,12 +65,9 @@ where
         .map_err(|error: T::Err| wrong_argument(py, &error.to_string()))
 }
 
-/// Parses arguments of a list.
-fn all_parsed<T: std::str::FromStr>(py: Python<'_>, names: &[String]) -> PyResult<Vec<T>>
-where
-    T::Err: std::fmt::Display,
-{
-    names.iter().map(|name| parsed(py, name)).collect()
+/// Parses the name of a metric, in any case.
+fn parsed_metric(py: Python<'_>, name: &str) -> PyResult<ThresholdMetric> {
+    verdict_words::metric(name).map_err(|text| wrong_argument(py, &text))
 }
 
 impl NativeProject {
@@ -223,7 +220,7 @@ impl NativeProject {
         expect: Option<&str>,
         new_reviewer: bool,
     ) -> PyResult<bool> {
-        let metric = metric.map(|name| parsed(py, name)).transpose()?;
+        let metric = metric.map(|name| parsed_metric(py, name)).transpose()?;
         let verdict = verdict_words::verdict(verdict).map_err(|text| wrong_argument(py, &text))?;
         let reason = reason.map(verdict_words::reason).transpose();
         let reason = reason.map_err(|text| wrong_argument(py, &text))?;
@@ -413,8 +410,11 @@ impl NativeProject {
         only: String,
         images: bool,
     ) -> PyResult<String> {
-        let formats: Vec<ExportFormat> = all_parsed(py, &formats)?;
-        let (metrics, only) = (all_parsed(py, &metrics)?, parsed(py, &only)?);
+        let formats = formats.iter().map(|name| parsed(py, name));
+        let formats: Vec<ExportFormat> = formats.collect::<PyResult<_>>()?;
+        let metrics = metrics.iter().map(|name| parsed_metric(py, name));
+        let metrics: Vec<ThresholdMetric> = metrics.collect::<PyResult<_>>()?;
+        let only = parsed(py, &only)?;
         self.simple(py, move |location, hearing| async move {
             let limits = location.settings()?.config.limits;
             let options = ExportOptions {

@@ -286,6 +286,27 @@ fn json_lines_are_read_back_without_undone_verdicts() {
 }
 
 #[test]
+fn words_of_json_lines_may_be_capitals_or_vietnamese() {
+    let plain =
+        r#"{"pair":"1","verdict":"fail","reviewer":"lan","metric":"nl_ssim","reason":"angle"}"#;
+    let words = r#"{"pair":"1","verdict":"Không đạt","reviewer":"lan","metric":"NL-SSIM","reason":"Sai góc"}"#;
+    let read = |line: &str| parse_jsonl(line.as_bytes()).expect("valid");
+    assert_eq!(read(words), read(plain));
+    for (old, new, why) in [
+        (
+            "nl_ssim",
+            "IoU",
+            "\"IoU\" is not a metric (nl_ssim, density, ensemble, relief)",
+        ),
+        ("\"metric\"", "\"pair\"", "the key \"pair\" is given twice"),
+    ] {
+        let refused = parse_jsonl(plain.replace(old, new).as_bytes());
+        let text = refused.expect_err(new).to_string();
+        assert_eq!(text, format!("line 1: {why}"));
+    }
+}
+
+#[test]
 fn fields_that_no_verdict_has_are_named() {
     let plain =
         r#"{"pair":"1","verdict":"pass","reviewer":"lan","angle_read_deg":2.5,"at":5,"act":1}"#;
