@@ -119,7 +119,10 @@ fn done_stages_are_kept_while_a_file_is_missing() {
     let away = print(&project, 0).with_extension("away");
     std::fs::rename(print(&project, 0), &away).expect("moved");
     std::fs::rename(mesh(&project, 0), mesh(&project, 0).with_extension("away")).expect("moved");
-    for _ in 0..2 {
+    for is_retried in [false, false, true] {
+        if is_retried {
+            mocban(project.dir(), &["retry"]).expect(0);
+        }
         call(&mut run(&project, &[])).expect(3);
     }
     assert_eq!(finished(&project), [[1, 1, 0, 0]]);

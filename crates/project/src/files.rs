@@ -1,5 +1,6 @@
 //! Files and directories named on the command line.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
@@ -73,6 +74,14 @@ pub fn read_list(path: &Path, sheet: Option<&str>) -> Result<ListFile, Refusal> 
             Err(Refusal::Usage(text))
         }
     }
+}
+
+/// Lists fields that are not read, with the first line of each: `angle (line 2), who (line 3)`.
+pub(crate) fn fields_with_lines(first_lines: &BTreeMap<String, usize>) -> String {
+    let fields = first_lines
+        .iter()
+        .map(|(field, line)| format!("{} (line {line})", sanitize(field, 100)));
+    fields.collect::<Vec<_>>().join(", ")
 }
 
 /// Returns the first `max` of `count` lines, indented, and how many more there are.

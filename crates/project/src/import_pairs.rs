@@ -108,10 +108,14 @@ pub async fn import_pairs(
     if let Some(why) = listing.no_pair.take() {
         return Err(why.into());
     }
-    let warnings = std::mem::take(&mut listing.warnings);
+    let mut warnings = std::mem::take(&mut listing.warnings);
     let renamed = listing.renamed.take();
     let truths = match &import.truth {
-        Some(file) => read_truths(file, &listing.ids, location).await?,
+        Some(file) => {
+            let truths = read_truths(file, &listing.ids, location).await?;
+            warnings.extend(truth_file::unread_fields(file, &truths));
+            truths
+        }
         None => Vec::new(),
     };
     let (storage, url) = location.data_locations()?;

@@ -5,13 +5,24 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::files::RefusedLine;
+use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{PairName, UniqueKeys};
 use mocban_results::ground_truth::TruthRecord;
 
 /// Longest line in bytes. The values of a line take about ten times as much memory.
 const MAX_LINE_BYTES: usize = 16 << 20;
+
+/// The fields of a line, of which only the last may be missing.
+const FIELDS: [&str; 6] = [
+    "id",
+    "print_from_mesh",
+    "plane",
+    "landmarks",
+    "char_height_px",
+    "tops_mask",
+];
+const REQUIRED: usize = 5;
 
 /// One true alignment and its line number.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +56,12 @@ pub fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
                 "the line has {bytes} bytes; at most {limit} are read"
             )));
         }
+        if !text.trim_start().starts_with('{') {
+            let fields = FIELDS[..REQUIRED].join(", ");
+            return Err(refuse(format!(
+                "each line is a JSON object with {fields}; tables are not read"
+            )));
+        }
         let UniqueKeys(value) =
             serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
@@ -62,6 +79,26 @@ pub fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
     Ok(rows)
 }
 
+/// Returns a warning about fields that are not read.
+pub fn unread_fields(file: &Path, rows: &[TruthRow]) -> Option<String> {
+    let mut first_lines = BTreeMap::new();
+    for row in rows {
+        let fields = row.value.as_object().into_iter().flat_map(|row| row.keys());
+        for field in fields.filter(|field| !FIELDS.contains(&field.as_str())) {
+            if first_lines.len() < MAX_SHOWN {
+                first_lines.entry(field.clone()).or_insert(row.line);
+            }
+        }
+    }
+    let fields = fields_with_lines(&first_lines);
+    (!first_lines.is_empty()).then(|| {
+        let file = file.display();
+        format!(
+            "{file}: fields that no true alignment has are not read: {fields}; print_from_mesh gives angle and scale"
+        )
+    })
+}
+
 /// Refuses a row whose pair does not exist, and suggests one of the known pairs.
 pub fn unknown_pair(row: &TruthRow, known: &[PairName]) -> RefusedLine {
     let hint = hint(row.name.as_str(), known.iter().map(PairName::as_str));
@@ -72,7 +109,7 @@ pub fn unknown_pair(row: &TruthRow, known: &[PairName]) -> RefusedLine {
 mod tests {
     use std::path::Path;
 
-    use super::{RefusedLine, TruthRow, parse};
+    use super::{FIELDS, REQUIRED, RefusedLine, TruthRow, parse, unread_fields};
 
     const LINE: &str = r#"{"id":"a","print_from_mesh":[[1,0,0,0],[0,-1,0,0],[0,0,1,0]],"plane":{"n":[0,0,1],"d":0},"landmarks":[[0,0,0]],"char_height_px":10,"tops_mask":"tops/a.png"}"#;
 
@@ -97,6 +134,43 @@ mod tests {
             rows[0].tops_mask.as_deref(),
             Some(Path::new("data/tops/a.png"))
         );
+    }
+
+    #[test]
+    fn fields_that_are_not_read_are_named_with_their_first_lines() {
+        let file = Path::new("truth.jsonl");
+        let rows = read(LINE).expect("valid");
+        assert_eq!(unread_fields(file, &rows), None);
+        let fields = rows[0].value.as_object().expect("an object");
+        assert!(fields.keys().all(|field| FIELDS.contains(&field.as_str())));
+        let more = LINE.replace("\"id\":\"a\"", "\"id\":\"b\",\"scale\":2,\"angle\":3");
+        let again = more.replace("\"b\"", "\"c\"");
+        let rows = read(&format!("{LINE}\n{more}\n{again}\n")).expect("valid");
+        assert_eq!(
+            unread_fields(file, &rows).as_deref(),
+            Some(
+                "truth.jsonl: fields that no true alignment has are not read: angle (line 2), scale (line 2); \
+                 print_from_mesh gives angle and scale"
+            )
+        );
+    }
+
+    #[test]
+    fn a_table_and_a_line_without_a_required_field_are_refused() {
+        let table = read("id,angle,scale\na,5,1\n").expect_err("a table");
+        assert_eq!(
+            table,
+            "data/truth.jsonl: line 1: each line is a JSON object with id, print_from_mesh, plane, landmarks, \
+             char_height_px; tables are not read; nothing was imported"
+        );
+        for field in &FIELDS[..REQUIRED] {
+            let other = LINE.replace(&format!("\"{field}\""), "\"other\"");
+            let refused = read(&other).expect_err(field);
+            assert!(
+                refused.contains(&format!("missing field `{field}`")),
+                "{refused}"
+            );
+        }
     }
 
     #[test]

@@ -11,13 +11,13 @@ use csv::StringRecord;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::files::{MAX_SHOWN, RefusedLine};
+use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use super::location::now;
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{
-    ContentHash, PairName, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, sanitize,
+    ContentHash, PairName, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict,
 };
 use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
 use mocban_lists::json_numbers::nan_as_null;
@@ -218,15 +218,11 @@ pub fn unknown_pairs(
 
 /// Returns a warning about fields that are not read. They are given with the first line of each.
 pub fn unread_fields(first_lines: &BTreeMap<String, usize>) -> Option<String> {
-    let fields = first_lines
-        .iter()
-        .map(|(field, line)| format!("{} (line {line})", sanitize(field, 100)));
-    let fields: Vec<String> = fields.collect();
     let read = COLUMNS.names[REQUIRED..].join(", ");
-    (!fields.is_empty()).then(|| {
+    (!first_lines.is_empty()).then(|| {
+        let fields = fields_with_lines(first_lines);
         format!(
-            "fields that no verdict has are not read: {}; besides pair, verdict and reviewer, {read} and angle_read_deg are",
-            fields.join(", ")
+            "fields that no verdict has are not read: {fields}; besides pair, verdict and reviewer, {read} and angle_read_deg are"
         )
     })
 }
@@ -429,7 +425,11 @@ fn json_row(
     if verdict.reviewer.is_empty() {
         return Err(RefusedLine::new(line, "reviewer is empty"));
     }
-    let listed = ListedVerdict { verdict, judged };
+    let listed = ListedVerdict {
+        verdict,
+        judged,
+        day: None,
+    };
     let fields = fields.into_keys();
     let unread = fields.filter(|field| !LOG_FIELDS.contains(&field.as_str()));
     Ok(undone_at.is_none().then(|| VerdictRow {

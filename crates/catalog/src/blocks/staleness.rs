@@ -127,7 +127,7 @@ impl PlannedBlock {
         BlockStage::from_index(index)
     }
 
-    /// Returns what changed since a result or a failure of a stage, if anything. A file whose absence is the failure is
+    /// Returns what changed since a result or a failure of a stage, if anything. A missing file that the next stage reads is
     /// not compared: the results are those of the file that was there.
     fn change(
         &self,
@@ -138,11 +138,13 @@ impl PlannedBlock {
         let points = self.control_points.as_ref();
         let (attributes, inputs) = (&self.attributes, &self.inputs);
         let now = BlockProvenance::new(stage, settings.of(stage), attributes, inputs, points);
-        let is_missing = |version: &Option<InputVersion>| {
+        let is_awaited = |version: &Option<InputVersion>, reads: fn(BlockStage) -> bool| {
             let is_gone = version.as_ref().is_some_and(InputVersion::is_gone);
-            is_gone && self.status == JobStatus::Quarantined
+            is_gone && self.next().is_some_and(reads)
         };
-        let [mesh, page, labels] = [&inputs.mesh, &inputs.page, &inputs.labels].map(is_missing);
+        let mesh = is_awaited(&inputs.mesh, |_| true);
+        let page = is_awaited(&inputs.page, BlockStage::reads_page);
+        let labels = is_awaited(&inputs.labels, BlockStage::depends_on_labels);
         [
             (made.mesh != now.mesh && !mesh, BlockReason::Mesh),
             (made.page != now.page && !page, BlockReason::Page),

@@ -33,17 +33,34 @@ pub enum RerunPolicy {
     All(Stage),
 }
 
-/// Returns the hash of an input file of a pair `p` with the job `j`. While the pair is in quarantine because the file is
-/// missing, its results are those of the file that was there, so the hash is `NULL`, and no comparison with it finds a difference.
+/// Returns the hash of an input file of a pair `p` with the job `j`, which the stages `$readers` read. While the file is missing
+/// and the next stage is one of them, it cannot succeed and the results are those of the file that was there, so the hash is
+/// `NULL`, and no comparison with it finds a difference.
 macro_rules! input_hash {
-    ($file:literal) => {
+    ($file:literal, $readers:literal) => {
         concat!(
-            "CASE WHEN j.status = 4 AND p.",
+            "CASE WHEN j.stage IN (",
+            $readers,
+            ") AND p.",
             $file,
             "_stat = 'gone' THEN NULL ELSE p.",
             $file,
             "_hash END"
         )
+    };
+}
+
+/// Returns the hash of the mesh, which `fit` and `depth` read.
+macro_rules! mesh_hash {
+    () => {
+        input_hash!("mesh", "0, 1")
+    };
+}
+
+/// Returns the hash of the print, which `fit` and `normalize` read.
+macro_rules! print_hash {
+    () => {
+        input_hash!("print", "0, 2")
     };
 }
 
@@ -53,9 +70,9 @@ macro_rules! is_outdated {
         concat!(
             "(
             r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.attributes <> p.attributes OR r.mesh_hash <> ",
-            input_hash!("mesh"),
+            mesh_hash!(),
             " OR r.print_hash <> ",
-            input_hash!("print"),
+            print_hash!(),
             ")"
         )
     };
@@ -66,9 +83,9 @@ pub(crate) const INSPECT: &str = concat!(
     "
 WITH found AS (
     SELECT j.pair, j.stage, j.status, j.fingerprint, p.attributes, ",
-    input_hash!("mesh"),
+    mesh_hash!(),
     " AS mesh_hash, ",
-    input_hash!("print"),
+    print_hash!(),
     " AS print_hash, (
         SELECT min(r.stage) FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND ",
     is_outdated!(),

@@ -260,7 +260,11 @@ async fn changes_make_the_right_stages_stale() {
     assert_eq!(requeued, [(BlockStage::Face, BlockReason::Attributes)]);
 }
 
-fn failed(work: &BlockWork, stage: BlockStage, action: FailureAction) -> StageFailure<BlockJob> {
+pub(super) fn failed(
+    work: &BlockWork,
+    stage: BlockStage,
+    action: FailureAction,
+) -> StageFailure<BlockJob> {
     let done = done(work, stage);
     StageFailure {
         stage,

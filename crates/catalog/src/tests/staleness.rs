@@ -1,11 +1,14 @@
 //! Changed settings and inputs requeue a pair from the first affected stage.
 
+use super::blocks::{self, continued, done, failed};
 use super::{World, fingerprints, name, row};
 use crate::{
-    CheckpointOutcome, FailureAction, Fingerprints, InputVersion, InputVersions, PairProvenance,
-    Plan, RerunPolicy, StageFailure, StaleReason,
+    BlockReason, CheckpointOutcome, FailureAction, Fingerprints, InputVersion, InputVersions,
+    PairProvenance, Plan, RerunPolicy, RetrySelection, StageFailure, StaleReason,
 };
-use mocban_core::domain::{ContentHash, Failure, FailureClass, JobStatus, LengthUnit, Stage};
+use mocban_core::domain::{
+    BlockStage, ContentHash, Failure, FailureClass, JobStatus, LengthUnit, PairId, Stage,
+};
 
 async fn cursor(world: &World, pair: &str) -> Option<Stage> {
     let detail = world.catalog.pair(&name(pair)).await.expect("a read");
@@ -164,8 +167,8 @@ async fn a_failed_pair_runs_again_after_an_import_with_another_path() {
     world.assert_counters().await;
 }
 
-#[tokio::test]
-async fn a_missing_file_restarts_no_stage_of_the_pair_that_failed_on_it() {
+/// A pair whose mesh was missing when `depth` read it.
+async fn failed_on_its_mesh() -> World {
     let world = World::new(1).await;
     let fit = world.claim(1).await.remove(0);
     let fit = world.catalog.checkpoint_now(fit, world.done(Stage::Fit));
@@ -186,6 +189,17 @@ async fn a_missing_file_restarts_no_stage_of_the_pair_that_failed_on_it() {
         alive_since: 0,
     };
     assert!(world.catalog.fail(lease, failed).await.expect("stored"));
+    world
+}
+
+async fn reasons(world: &World) -> Vec<(Stage, StaleReason)> {
+    let entries = plan(world).await.entries.into_iter();
+    entries.map(|entry| (entry.from, entry.why)).collect()
+}
+
+#[tokio::test]
+async fn a_missing_file_restarts_no_stage_of_the_pair_that_failed_on_it() {
+    let world = failed_on_its_mesh().await;
     let current = fingerprints([1; 4]);
     assert_eq!(requeue_stale(&world, &current).await, 0);
     let status = world.catalog.status(&current).await.expect("a read");
@@ -193,12 +207,65 @@ async fn a_missing_file_restarts_no_stage_of_the_pair_that_failed_on_it() {
     world.assert_counters().await;
     // The same file is back.
     see(&world, "mesh", "print").await;
-    let plan = plan(&world).await;
-    let why: Vec<_> = plan.entries.iter().map(|one| (one.from, one.why)).collect();
-    assert_eq!(why, [(Stage::Depth, StaleReason::FailedBefore)]);
+    let failed_before = (Stage::Depth, StaleReason::FailedBefore);
+    assert_eq!(reasons(&world).await, [failed_before]);
     assert_eq!(requeue_stale(&world, &current).await, 1);
     assert_eq!(cursor(&world, "p0").await, Some(Stage::Depth));
     world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_retry_keeps_the_finished_stages_of_a_pair_whose_file_is_missing() {
+    let world = failed_on_its_mesh().await;
+    let current = fingerprints([1; 4]);
+    let retried = world.retry(&RetrySelection::All).await;
+    assert_eq!(retried.expect("retried"), 1);
+    let unfinished = (Stage::Depth, StaleReason::Unfinished);
+    assert_eq!(reasons(&world).await, [unfinished]);
+    assert_eq!(requeue_stale(&world, &current).await, 0);
+    let status = world.catalog.status(&current).await.expect("a read");
+    assert_eq!(status.stale, 0);
+    // The same file is back, and then another one.
+    see(&world, "mesh", "print").await;
+    assert_eq!(reasons(&world).await, [unfinished]);
+    see(&world, "another mesh", "print").await;
+    assert_eq!(reasons(&world).await, [(Stage::Fit, StaleReason::Mesh)]);
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_missing_file_that_the_next_stage_does_not_read_makes_the_pair_stale() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let mut gone = super::inputs(Stage::Normalize);
+    gone.mesh = Some(InputVersion::gone());
+    let stored = world.catalog.store_inputs(vec![(PairId(1), gone)]).await;
+    stored.expect("stored");
+    assert_eq!(reasons(&world).await, [(Stage::Fit, StaleReason::Mesh)]);
+}
+
+#[tokio::test]
+async fn a_retry_keeps_the_finished_stages_of_a_block_whose_file_is_missing() {
+    let world = blocks::world().await;
+    let (lease, work) = world.leased_block().await;
+    let stored = world
+        .catalog
+        .checkpoint_block(lease, done(&work, BlockStage::Face));
+    let lease = continued(stored.await.expect("stored"));
+    let mut refused = failed(&work, BlockStage::Align, FailureAction::Quarantine);
+    let gone = InputVersion::gone();
+    refused.provenance.mesh = Some(gone.hash);
+    refused.inputs.mesh = Some(gone);
+    let stored = world.catalog.fail_block(lease, refused).await;
+    assert!(stored.expect("stored"));
+    let nothing = RetrySelection::Names(Vec::new());
+    let retried = world
+        .catalog
+        .retry_pairs_and_blocks(&nothing, &RetrySelection::All)
+        .await;
+    assert_eq!(retried.expect("retried"), [0, 1]);
+    let requeued = world.requeue_blocks([1; 4]).await;
+    assert_eq!(requeued, [(BlockStage::Align, BlockReason::Unfinished)]);
 }
 
 #[tokio::test]
