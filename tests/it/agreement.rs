@@ -92,12 +92,35 @@ fn two_reviewers_are_compared_and_a_third_settles_a_conflict() {
     let after = json_output(&project, &["agreement", "--json"]);
     assert_eq!(count(&after["conflicts"]), n - agreed - 1);
     assert_eq!(after["reviewer_pairs"], found["reviewer_pairs"]);
+    let pair = settled_by_a_command(&project, &after);
+    let after = json_output(&project, &["agreement", "--json"]);
+    let waiting = count(&after["conflicts"]);
+    assert!(waiting < n - agreed - 1, "{after}");
+    let pairs = after["conflicting_pairs"].as_array().expect("ids");
+    assert!(!pairs.is_empty() && !pairs.contains(&pair), "{after}");
     let text = mocban(project.dir(), &["agreement"]).expect(0).out;
-    let waiting = format!("Conflicts waiting: {}\n", n - agreed - 1);
+    let waiting = format!("Conflicts waiting: {waiting}\n");
     assert!(
         text.contains(&waiting) && text.contains("lan, minh"),
         "{text}"
     );
+}
+
+/// Settles the conflicts of the first pair by `verdict set`, which a party to them cannot do. Returns the pair.
+fn settled_by_a_command(project: &Project, agreement: &Value) -> Value {
+    let conflicting = &agreement["conflicting_pairs"][0];
+    let pair = conflicting.as_str().expect("an id");
+    let args = ["verdict", "set", pair, "fail", "--adjudicate", "--reviewer"];
+    let party = mocban(project.dir(), &[&args[..], &["lan"]].concat()).expect(4);
+    let why = format!("{pair}: no two others disagree on a result that lan has not judged");
+    assert!(party.err.contains(&why), "{}", party.err);
+    let settled = mocban(project.dir(), &[&args[..], &["chi"]].concat()).expect(0);
+    assert!(
+        settled.err.contains(": fail settles the conflict;"),
+        "{}",
+        settled.err
+    );
+    conflicting.clone()
 }
 
 fn report_has_the_same_rates(project: &Project, checks: &Value) {

@@ -11,9 +11,11 @@ use crate::reviewers;
 use crate::selection;
 use crate::verdict_file::{self, VerdictList, VerdictRow};
 use mocban_catalog::{
-    CatalogError, FaultyRow, ImportedVerdicts, ListedVerdict, NewVerdict, VerdictEvent, person_name,
+    Catalog, CatalogError, FaultyRow, ImportedVerdicts, ListedVerdict, NewVerdict, Shown,
+    VerdictEvent, person_name,
 };
-use mocban_core::domain::{ContentHash, PairName};
+use mocban_core::domain::{ContentHash, PairName, ReviewOrder, ThresholdMetric};
+use mocban_results::consensus::is_open_conflict;
 
 /// What became of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,16 +54,8 @@ pub async fn record_on(
     location: &Location,
 ) -> ProjectResult<(NewVerdict, RecordedVerdict)> {
     let (_project, catalog) = location.open().await?;
-    let rights = catalog.review_rights().await?;
-    let mut verdict = verdict(selection::pair(&catalog, pair).await?);
-    verdict.reviewer = person_name(&verdict.reviewer);
-    rights.require_verdicts(&verdict.reviewer)?;
-    let checked = verdict.check(now());
-    checked.map_err(|error| Refusal::Usage(error.to_string()))?;
-    if !is_new_allowed {
-        let reviewers = BTreeSet::from([verdict.reviewer.clone()]);
-        reviewers::refuse_similar(&catalog, &rights, &reviewers).await?;
-    }
+    let verdict = verdict(selection::pair(&catalog, pair).await?);
+    let verdict = checked(&catalog, verdict, is_new_allowed).await?;
     let listed = ListedVerdict {
         verdict: verdict.clone(),
         judged,
@@ -77,6 +71,64 @@ pub async fn record_on(
         _ => RecordedVerdict::Known,
     };
     Ok((verdict, recorded))
+}
+
+/// Records a verdict that settles a conflict: on those current results of a pair on which two reviewers disagree, as a review of
+/// conflicts does. Returns the verdict, and the metrics of these results.
+///
+/// # Errors
+/// As for [`record`]; also if there is no such result, or the reviewer has judged it.
+pub async fn settle(
+    pair: &str,
+    verdict: impl FnOnce(PairName) -> NewVerdict,
+    is_new_allowed: bool,
+    location: &Location,
+) -> ProjectResult<(NewVerdict, Vec<ThresholdMetric>)> {
+    let (_project, catalog) = location.open().await?;
+    let mut verdict = verdict(selection::pair(&catalog, pair).await?);
+    verdict.context.review_order = Some(ReviewOrder::Adjudicate);
+    let verdict = checked(&catalog, verdict, is_new_allowed).await?;
+    let found = catalog.pair(&verdict.pair).await?;
+    let records = found.into_iter().flat_map(|pair| pair.results.metrics);
+    let open = records.filter(|record| {
+        let metric = record.outcome.metric;
+        verdict.metric.is_none_or(|wanted| wanted == metric)
+            && is_open_conflict(record, &verdict.reviewer)
+    });
+    let open: Vec<_> = open
+        .map(|record| (record.outcome.metric, record.result_hash))
+        .collect();
+    if open.is_empty() {
+        let NewVerdict { pair, reviewer, .. } = &verdict;
+        let text = format!(
+            "{pair}: no two others disagree on a result that {reviewer} has not judged; `agreement` names the pairs in conflict"
+        );
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    let metrics = open.iter().map(|(metric, _)| *metric).collect();
+    let shown = Shown::Results(open);
+    catalog.answer(verdict.clone(), shown, now()).await?;
+    catalog.close().await;
+    Ok((verdict, metrics))
+}
+
+/// Returns a verdict with the one spelling of the reviewer's name. Refuses values that no verdict has, a reviewer for whom the
+/// user may not record it, and a new one whose name is similar to another unless `is_new_allowed`.
+async fn checked(
+    catalog: &Catalog,
+    mut verdict: NewVerdict,
+    is_new_allowed: bool,
+) -> ProjectResult<NewVerdict> {
+    let rights = catalog.review_rights().await?;
+    verdict.reviewer = person_name(&verdict.reviewer);
+    rights.require_verdicts(&verdict.reviewer)?;
+    let checked = verdict.check(now());
+    checked.map_err(|error| Refusal::Usage(error.to_string()))?;
+    if !is_new_allowed {
+        let reviewers = BTreeSet::from([verdict.reviewer.clone()]);
+        reviewers::refuse_similar(catalog, &rights, &reviewers).await?;
+    }
+    Ok(verdict)
 }
 
 /// What became of the verdicts of a file.

@@ -70,15 +70,27 @@ pub fn partition_verdicts(record: &MetricRecord) -> (Vec<&ReviewerVerdict>, Vec<
 }
 
 /// Returns whether one reviewer passes what another fails.
-pub fn is_disputed(verdicts: &[&ReviewerVerdict]) -> bool {
+fn is_disputed(verdicts: &[&ReviewerVerdict]) -> bool {
     let any = |wanted| verdicts.iter().any(|verdict| verdict.verdict == wanted);
     any(Verdict::Pass) && any(Verdict::Fail)
 }
 
+/// Returns whether a result is disputed and this reviewer may adjudicate it. The reviewer must not be a party to the
+/// dispute, and the dispute must not have been settled by another reviewer.
+pub fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
+    let (rulings, verdicts) = partition_verdicts(record);
+    let is_party = verdicts.iter().any(|read| read.reviewer == reviewer);
+    let is_settled = rulings
+        .iter()
+        .any(|ruling| ruling.reviewer != reviewer && ruling.verdict != Verdict::Unsure);
+    is_disputed(&verdicts) && !is_party && !is_settled
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Consensus;
+    use super::{Consensus, is_open_conflict};
     use crate::test_fixtures;
+    use mocban_catalog::ReviewerVerdict;
     use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict};
 
     fn consensus(verdicts: &[Verdict], older: u64) -> Consensus {
@@ -135,5 +147,34 @@ mod tests {
         assert_eq!(consensus(&[], 0), Consensus::Unjudged);
         assert_eq!(consensus(&[Verdict::Pass], 2), Consensus::Passed);
         assert_eq!(Consensus::Stale.verdict(), None);
+    }
+
+    fn read(reviewer: &str, verdict: Verdict, order: ReviewOrder) -> ReviewerVerdict {
+        ReviewerVerdict {
+            reviewer: reviewer.to_owned(),
+            verdict,
+            reason: None,
+            review_order: Some(order),
+        }
+    }
+
+    #[test]
+    fn a_conflict_is_open_to_third_reviewers_until_one_settles_it() {
+        let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]);
+        record.verdicts = vec![read("ana", Verdict::Pass, ReviewOrder::Random)];
+        assert!(!is_open_conflict(&record, "chi"));
+        record
+            .verdicts
+            .push(read("bo", Verdict::Fail, ReviewOrder::Random));
+        assert!(is_open_conflict(&record, "chi"));
+        assert!(!is_open_conflict(&record, "ana"));
+        record
+            .verdicts
+            .push(read("chi", Verdict::Fail, ReviewOrder::Adjudicate));
+        assert!(
+            is_open_conflict(&record, "chi"),
+            "it stays with its adjudicator"
+        );
+        assert!(!is_open_conflict(&record, "dung"));
     }
 }

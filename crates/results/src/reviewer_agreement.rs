@@ -32,6 +32,8 @@ pub struct ReviewerAgreement {
     pub schema: u32,
     /// Results on which reviewers disagree and that nobody adjudicated.
     pub conflicts: u64,
+    /// The pairs of these results, in the order of the catalog.
+    pub conflicting_pairs: Vec<PairName>,
     /// Every two reviewers who judged the same results, by name.
     pub reviewer_pairs: Vec<ReviewerPair>,
     /// Every reviewer, by name.
@@ -173,6 +175,7 @@ impl VerdictTable {
 #[derive(Debug, Default)]
 struct AgreementCounts {
     conflicts: u64,
+    conflicting_pairs: Vec<PairName>,
     reviewer_pairs: BTreeMap<(String, String), VerdictTable>,
     reviewers: BTreeMap<String, ReviewerRecord>,
 }
@@ -180,6 +183,7 @@ struct AgreementCounts {
 impl AgreementCounts {
     /// Counts the distinct results of one pair.
     fn add(&mut self, pair: &PairResults) {
+        let conflicts_before = self.conflicts;
         for group in group_identical(&pair.metrics) {
             let is_conflict = |record: &&MetricRecord| Consensus::of(record) == Consensus::Conflict;
             self.conflicts += u64::from(group.iter().any(is_conflict));
@@ -192,6 +196,9 @@ impl AgreementCounts {
                     table.add(*first, *second);
                 }
             }
+        }
+        if self.conflicts > conflicts_before {
+            self.conflicting_pairs.push(pair.attributes.name.clone());
         }
     }
 
@@ -224,6 +231,7 @@ impl AgreementCounts {
         ReviewerAgreement {
             schema: SCHEMA,
             conflicts: self.conflicts,
+            conflicting_pairs: self.conflicting_pairs,
             reviewer_pairs: reviewer_pairs
                 .map(|((a, b), table)| ReviewerPair {
                     a,
@@ -294,6 +302,7 @@ mod tests {
         counts.add(&apart);
         let found = counts.finish();
         assert_eq!((found.conflicts, found.reviewers[0].judged), (1, 3));
+        assert_eq!(found.conflicting_pairs, ["a".parse().expect("an id")]);
         let two = &found.reviewer_pairs[0];
         assert_eq!((two.a.as_str(), two.b.as_str()), ("r0", "r1"));
         assert_eq!((two.agreement.n, two.agreement.agreed), (3, 2));

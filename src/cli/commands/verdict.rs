@@ -59,6 +59,9 @@ pub(crate) struct VerdictSetArgs {
     /// Remaining rotation of the relief to match the print, degrees clockwise
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle)]
     pub(crate) angle: Option<f64>,
+    /// Settle a conflict: judge only results on which two others disagree
+    #[arg(long)]
+    pub(crate) adjudicate: bool,
 }
 
 /// Arguments of `verdict import`.
@@ -120,6 +123,12 @@ async fn set(args: VerdictSetArgs, context: &Context) -> ProjectResult<ExitCode>
         },
         at: None,
     };
+    if args.adjudicate {
+        let settled =
+            verdicts::settle(&args.pair, verdict, args.new_reviewer, &context.location).await?;
+        context.info(&settled_text(&settled));
+        return Ok(ExitCode::Done);
+    }
     let (new, is_new) =
         verdicts::record(&args.pair, verdict, args.new_reviewer, &context.location).await?;
     context.info(&if is_new {
@@ -138,6 +147,21 @@ fn set_text(new: &NewVerdict) -> String {
         None => ", and --metric judges the result of one metric only",
     };
     format!("{}; {undo} takes it back{one_only}", verdict_text(new))
+}
+
+/// Returns which conflicts `verdict set --adjudicate` settled, and how to take it back.
+fn settled_text((new, metrics): &(NewVerdict, Vec<ThresholdMetric>)) -> String {
+    let NewVerdict {
+        pair,
+        reviewer,
+        verdict,
+        ..
+    } = new;
+    let metrics: Vec<&str> = metrics.iter().map(|metric| metric.name()).collect();
+    let (metrics, reviewer) = (metrics.join(", "), shell_quoted(reviewer));
+    format!(
+        "{pair}, {metrics}: {verdict} settles the conflict; `verdict undo --reviewer {reviewer}` takes it back"
+    )
 }
 
 /// Returns `b01-0117, density: pass`.

@@ -10,7 +10,7 @@ use super::order;
 use super::planted_faults::{FaultPlanter, FaultShortage, QueueError};
 use mocban_catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use mocban_core::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
-use mocban_results::consensus::{is_disputed, partition_verdicts};
+use mocban_results::consensus::is_open_conflict;
 use mocban_results::pair_artifacts::group_identical;
 
 /// Number of pairs read from the catalog at a time.
@@ -142,22 +142,10 @@ fn is_reliable(record: &MetricRecord, reviewer: &str) -> bool {
         && verdicts.all(|read| read.reviewer == reviewer || read.verdict == Verdict::Pass)
 }
 
-/// Returns whether a result is disputed and this reviewer may adjudicate it. The reviewer must not be a party to the
-/// dispute, and the dispute must not have been settled by another reviewer.
-fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
-    let (rulings, verdicts) = partition_verdicts(record);
-    let is_party = verdicts.iter().any(|read| read.reviewer == reviewer);
-    let is_settled = rulings
-        .iter()
-        .any(|ruling| ruling.reviewer != reviewer && ruling.verdict != Verdict::Unsure);
-    is_disputed(&verdicts) && !is_party && !is_settled
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{is_open_conflict, is_reliable, items_of_pair};
+    use super::{is_reliable, items_of_pair};
     use crate::review::{CheckRates, QueueOptions};
-    use mocban_catalog::ReviewerVerdict;
     use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict};
     use mocban_results::test_fixtures;
 
@@ -171,35 +159,6 @@ mod tests {
             sample: None,
             rates: CheckRates { faults, duplicates },
         }
-    }
-
-    fn read(reviewer: &str, verdict: Verdict, order: ReviewOrder) -> ReviewerVerdict {
-        ReviewerVerdict {
-            reviewer: reviewer.to_owned(),
-            verdict,
-            reason: None,
-            review_order: Some(order),
-        }
-    }
-
-    #[test]
-    fn a_conflict_is_open_to_third_reviewers_until_one_settles_it() {
-        let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]);
-        record.verdicts = vec![read("ana", Verdict::Pass, ReviewOrder::Random)];
-        assert!(!is_open_conflict(&record, "chi"));
-        record
-            .verdicts
-            .push(read("bo", Verdict::Fail, ReviewOrder::Random));
-        assert!(is_open_conflict(&record, "chi"));
-        assert!(!is_open_conflict(&record, "ana"));
-        record
-            .verdicts
-            .push(read("chi", Verdict::Fail, ReviewOrder::Adjudicate));
-        assert!(
-            is_open_conflict(&record, "chi"),
-            "it stays with its adjudicator"
-        );
-        assert!(!is_open_conflict(&record, "dung"));
     }
 
     #[test]
