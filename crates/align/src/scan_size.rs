@@ -64,6 +64,55 @@ pub fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
     ))
 }
 
+/// Typical long side of a block, mm.
+pub const TYPICAL_BLOCK_MM: f64 = 320.0;
+
+/// Typical longer side of a character, mm.
+const TYPICAL_CHARACTER_MM: f64 = 12.0;
+
+/// Longer sides of characters that do not contradict the unit, mm.
+const POSSIBLE_CHARACTER_MM: std::ops::RangeInclusive<f64> = 2.5..=40.0;
+
+/// Returns the unit in which a length in units of the mesh is nearest to a typical one, mm.
+pub fn nearest_unit(length: f64, typical_mm: f64) -> LengthUnit {
+    let distance = |unit: &LengthUnit| (length * unit.mm() / typical_mm).ln().abs();
+    LengthUnit::ALL
+        .into_iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(LengthUnit::Mm)
+}
+
+/// Returns why the face of a block cannot be one, if its longer side in mm is that of a character.
+pub fn short_face(longest_mm: f64, unit: LengthUnit) -> String {
+    let length = longest_mm / unit.mm();
+    let likely = nearest_unit(length, TYPICAL_BLOCK_MM);
+    let other = if likely == unit {
+        String::new()
+    } else {
+        format!(" (with the unit {likely}: {:.0} mm)", length * likely.mm())
+    };
+    format!(
+        "its face is only {longest_mm:.0} mm long, which is the size of a single character{other}"
+    )
+}
+
+/// Returns a doubt about the unit of a block if its characters have a size that characters do not have. `side_mm` is the longer
+/// side of most of them.
+pub fn doubtful_characters(side_mm: f64, unit: LengthUnit) -> Option<String> {
+    if side_mm.is_nan() || POSSIBLE_CHARACTER_MM.contains(&side_mm) {
+        return None;
+    }
+    let likely = nearest_unit(side_mm / unit.mm(), TYPICAL_CHARACTER_MM);
+    let question = if likely == unit {
+        "check the unit".to_owned()
+    } else {
+        format!("is the unit {likely}?")
+    };
+    Some(format!(
+        "characters of about {side_mm:.1} mm, but most have 6 to 30 mm; {question}"
+    ))
+}
+
 /// Depths of carving that do not contradict the unit, mm.
 const POSSIBLE_RELIEF_MM: std::ops::RangeInclusive<f64> = 0.01..=10.0;
 
@@ -115,7 +164,7 @@ pub fn length_of_map(depth: &DepthMap) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{advice, length_of, wrong_unit};
+    use super::{advice, doubtful_characters, length_of, short_face, wrong_unit};
     use mocban_core::domain::LengthUnit;
     use mocban_core::mesh::Vertices;
 
@@ -154,6 +203,37 @@ mod tests {
     fn the_likeliest_unit_gives_a_character() {
         let text = wrong_unit(0.484, Some(LengthUnit::Mm)).expect("half a millimetre");
         assert!(text.ends_with("(perhaps in)"), "{text}");
+    }
+
+    #[test]
+    fn the_size_of_characters_says_whether_the_unit_is_wrong() {
+        assert_eq!(doubtful_characters(f64::NAN, LengthUnit::Mm), None);
+        for (side_mm, unit, likely) in [
+            (0.9, LengthUnit::Mm, "is the unit cm?"),
+            (150.0, LengthUnit::Cm, "is the unit mm?"),
+            (0.4, LengthUnit::Mm, "is the unit in?"),
+            (60.0, LengthUnit::In, "is the unit cm?"),
+            (41.0, LengthUnit::Cm, "is the unit mm?"),
+        ] {
+            let expected =
+                format!("characters of about {side_mm:.1} mm, but most have 6 to 30 mm; {likely}");
+            assert_eq!(doubtful_characters(side_mm, unit), Some(expected));
+        }
+        for side_mm in [2.5, 12.0, 40.0] {
+            assert_eq!(doubtful_characters(side_mm, LengthUnit::Mm), None);
+        }
+        let large = doubtful_characters(41.0, LengthUnit::Mm).expect("a doubt");
+        assert!(large.ends_with("6 to 30 mm; check the unit"), "{large}");
+    }
+
+    #[test]
+    fn a_face_as_long_as_a_character_has_its_length_in_the_likeliest_unit() {
+        let single = "its face is only 32 mm long, which is the size of a single character";
+        assert_eq!(
+            short_face(32.0, LengthUnit::Mm),
+            format!("{single} (with the unit cm: 320 mm)")
+        );
+        assert_eq!(short_face(32.0, LengthUnit::M), single);
     }
 
     #[test]

@@ -9,13 +9,12 @@ use serde::{Deserialize, Serialize};
 
 use super::error::BlockError;
 use super::scan_sums::{SampledTriangle, ScanPart, ScanSums};
+use crate::scan_size::{TYPICAL_BLOCK_MM, nearest_unit};
 use mocban_core::domain::LengthUnit;
 use mocban_core::domain::cancel::poll;
 use mocban_core::mesh::TriangleStream;
 use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
 
-/// Typical long side of a block, mm. The unit is the one that brings the long side nearest to it.
-const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
 /// Ratio of the side of a uniform rectangle to its standard deviation along that side: sqrt(12).
 const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 /// Half extent of the frame, in standard deviations of the area. A uniform rectangle ends at 1.73.
@@ -108,7 +107,8 @@ impl Orientation {
         let axes = [u, v, n];
         let deviation = |axis: &Vector3<f64>| axis.dot(&(covariance * axis)).max(0.0).sqrt();
         let long_side = SIDE_BY_DEVIATION * deviation(&u);
-        let mm = unit.unwrap_or_else(|| nearest_unit(long_side)).mm();
+        let unit = unit.unwrap_or_else(|| nearest_unit(long_side, TYPICAL_BLOCK_MM));
+        let mm = unit.mm();
         let half_extent_mm = axes.map(|axis| {
             let distance =
                 |[corner, _]: &SampledTriangle| axis.dot(&(corner.cast::<f64>() - mean)).abs();
@@ -188,15 +188,6 @@ fn layer_area(n: &Vector3<f64>, sample: &[SampledTriangle], thickness: f64) -> f
         largest = largest.max(area);
     }
     largest
-}
-
-/// Returns the unit in which the long side of a block is nearest to a typical one.
-fn nearest_unit(long_side: f64) -> LengthUnit {
-    let distance = |unit: &LengthUnit| (long_side * unit.mm() / TYPICAL_LONG_SIDE_MM).ln().abs();
-    LengthUnit::ALL
-        .into_iter()
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .unwrap_or(LengthUnit::Mm)
 }
 
 /// Returns the axis or its opposite, so that its largest component is positive.

@@ -62,7 +62,7 @@ pub struct AlignOutcome {
 pub struct BoxesOutcome {
     /// Format of the labels; `None` if the boxes were found.
     pub labels: Option<String>,
-    /// What was assumed about the labels or left out.
+    /// What was assumed about the labels or left out, and what contradicts the unit of the scan.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
     /// Number of characters.

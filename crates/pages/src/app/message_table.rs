@@ -300,6 +300,10 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "hãy kiểm tra tên tệp và đơn vị",
     ),
     (
+        "characters of about {} mm, but most have 6 to 30 mm; is the unit {}?",
+        "các chữ khoảng {0} mm, trong khi đa số có 6 đến 30 mm; đơn vị có phải là {1} không?",
+    ),
+    (
         "the scan shows no carved face: {}",
         "bản quét không có mặt khắc: {0}",
     ),

@@ -7,9 +7,10 @@ use super::failure::output;
 use super::stage_cache::{HeldInputs, HeldPage};
 use crate::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
 use mocban_align::block::{
-    AlignOutcome, BoxesOutcome, CarvedFace, CharacterBox, PageMap, StoredPageMap, check_label_fit,
-    find_boxes, place_characters,
+    AlignOutcome, BoxesOutcome, CarvedFace, CharacterBox, FaceOutcome, PageMap, StoredPageMap,
+    check_label_fit, find_boxes, place_characters,
 };
+use mocban_align::scan_size::doubtful_characters;
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockStage, FailureClass};
 use mocban_lists::labels::{self, PageFile, reading_order};
@@ -36,10 +37,14 @@ pub(crate) fn boxes(
     let map = PageMap::try_from(aligned.page_from_face)
         .ok()
         .ok_or_else(rerun)?;
-    let read = match &context.inputs.labels {
+    let mut read = match &context.inputs.labels {
         Some(file) => read_labels(context, file, &page)?,
         None => found_on_page(context, face, &page, &map)?,
     };
+    let scan: FaceOutcome = context.outcome(BlockStage::Face)?;
+    let side_mm = median_side(&read.boxes) / aligned.px_per_mm;
+    read.warnings
+        .extend(doubtful_characters(side_mm, scan.unit));
     let placed = place_characters(face, &page.ink, (&map, &aligned.support), &read.boxes);
     let sure = placed
         .characters
@@ -54,6 +59,14 @@ pub(crate) fn boxes(
         page_from_face: StoredPageMap::from(&placed.map),
         characters: placed.characters,
     })
+}
+
+/// Returns the median of the longer sides of the boxes, in pixels of the page; NaN without boxes.
+fn median_side(boxes: &[CharacterBox]) -> f64 {
+    let longer = |[left, top, right, bottom]: [f64; 4]| (right - left).max(bottom - top);
+    let mut sides: Vec<f64> = boxes.iter().map(|one| longer(one.page_box)).collect();
+    sides.sort_unstable_by(f64::total_cmp);
+    sides.get(sides.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// Finds the boxes of the characters on face and page.

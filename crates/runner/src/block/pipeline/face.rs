@@ -9,6 +9,7 @@ use crate::block_stages::{BlockStageError, BlockStageOutput};
 use mocban_align::block::{
     BlockError, FaceOutcome, FoundFace, HEIGHT_STEP_MM, Orientation, draw_height_maps, heights_role,
 };
+use mocban_align::scan_size::short_face;
 use mocban_core::domain::{BlockSide, LengthUnit};
 use mocban_core::raster::png_grey16;
 
@@ -50,10 +51,10 @@ pub(crate) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, Block
     if faces.is_empty() {
         return Err(fail(BlockError::no_face()));
     }
-    if context.inputs.unit.is_some() && longest < MIN_SIDE_MM {
-        let found = format!(
-            "its face is only {longest:.0} mm long, which is the size of a single character"
-        );
+    if let Some(unit) = context.inputs.unit
+        && longest < MIN_SIDE_MM
+    {
+        let found = short_face(longest, unit);
         return Err(fail(BlockError::NoFace { found }));
     }
     let unit = |unit: &LengthUnit| unit.mm() == frame.mm;
