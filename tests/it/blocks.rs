@@ -287,6 +287,32 @@ fn replaced_labels_give_the_results_of_a_new_import() {
     assert!(first != replaced);
 }
 
+#[test]
+fn characters_of_an_unusual_size_raise_a_doubt_about_the_unit() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    demo_block(dir);
+    few_labels(dir, &dir.join("few.json"));
+    let bytes = fs::read(dir.join("d/data/block.ply")).expect("the scan");
+    let mesh = mesh::read(&bytes, "block.ply", &MeshLimits::SUGGESTED);
+    let mut mesh = mesh.expect("a mesh");
+    let scaled = mesh.vertices.iter().map(|vertex| vertex.map(|x| 0.2 * x));
+    mesh.vertices = scaled.collect();
+    fs::write(
+        dir.join("block.ply"),
+        MeshFormat::PlyLittleEndian.encode(&mesh),
+    )
+    .expect("written");
+    let files = ["--block", "block.ply", "--page", "d/data/page.jpg"];
+    let labels = ["--labels", "few.json", "--name", "b1", "--unit", "mm"];
+    project(dir, &[&["import"], &files[..], &labels].concat()).expect(0);
+    let run = project(dir, &["--progress", "none", "run", "--stage", "fit"]).expect(0);
+    let doubt = " mm, but most have 6 to 30 mm; is the unit cm?";
+    assert_eq!(run.err.matches(doubt).count(), 1, "{}", run.err);
+    let shown = project(dir, &["show", "b1", "--json"]).expect(0).json();
+    assert!(shown["warnings"].to_string().contains(doubt), "{shown}");
+}
+
 /// A scan of a block is read without its vertices that have no position and its faces that have two corners, and says so.
 #[test]
 fn what_is_left_out_of_the_scan_of_a_block_is_told_by_run_and_kept() {
