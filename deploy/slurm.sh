@@ -6,7 +6,7 @@
 #SBATCH --cpus-per-task=8
 #SBATCH --mem=8G
 #SBATCH --requeue
-# Slurm sends SIGTERM 20 s before the time limit, and the worker gives its pairs back. Without `B:`, only steps of `srun`
-# would receive it. To end one worker by hand: scancel --batch --signal=TERM JOBID
+# Slurm sends SIGTERM 20 s before the time limit, and the worker gives its pairs back. Without `B:`, only steps of
+# `srun` would receive it. To end one worker by hand: scancel --batch --signal=TERM JOBID
 #SBATCH --signal=B:TERM@20
 exec mocban -C "${1:?give the project folder}" worker --jobs "${SLURM_CPUS_PER_TASK:-1}" --memory 6G
