@@ -35,7 +35,7 @@ pub fn check_new_folder(dir: &Path) -> Result<(), Refusal> {
     match names.find(is_odd) {
         None => Ok(()),
         Some(dir) => Err(Refusal::Usage(format!(
-            "the name of the new folder \"{}\" begins or ends with white space, so it would look like that of another folder; name it without",
+            "the name of the new folder \"{}\" begins or ends with white space and would look like another name; name it without",
             dir.display()
         ))),
     }

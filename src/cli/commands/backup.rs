@@ -39,7 +39,7 @@ pub(crate) async fn backup(args: BackupArgs, context: &Context) -> ProjectResult
         "verdicts_file": Value::Null,
     }))?;
     context.info(&format!(
-        "{} and {} saved to {shown}, {:.1} MB; your scans and prints are not in it, and neither are depth maps and masks, which `run` computes again from them",
+        "{} and {} saved to {shown}, {:.1} MB; your scans and prints are not in it, nor depth maps and masks, which `run` computes again",
         count(pairs, "pair"),
         count(verdicts, "verdict"),
         bytes as f64 / 1e6

@@ -122,7 +122,7 @@ fn items(args: &ImportArgs) -> ProjectResult<(ListedItems, Option<String>)> {
             Ok((ListedItems::Pairs(folders), None))
         }
         (None, ..) => {
-            let text = "give a manifest, or --meshes and --prints";
+            let text = "give a list, or --meshes and --prints, or --block and --page";
             Err(Refusal::Usage(text.to_owned()).into())
         }
     }

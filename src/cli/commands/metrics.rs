@@ -30,7 +30,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
     if let Ok(port) = text.parse() {
         return Ok((Ipv4Addr::LOCALHOST, port).into());
     }
-    let example = "metrics are served at a port of this machine, such as 9464, or at an address with a port, such as 10.0.0.7:9464";
+    let example = "give a port of this machine, such as 9464, or an address with a port, such as 10.0.0.7:9464";
     text.parse().ok().ok_or_else(|| example.to_owned())
 }
 

@@ -33,7 +33,7 @@ pub enum WorkbookError {
         sheets: Vec<String>,
     },
     /// An id or a file name that the spreadsheet program took for a date or a number.
-    #[error("cell {cell} of column \"{}\" is {kind}, {}, which the spreadsheet program may have made of a text such as {example}; give the column the format Text and write the cell again", sanitize(.column, MAX_SHOWN), sanitize(.text, MAX_SHOWN))]
+    #[error("cell {cell} of column \"{}\" is {kind}, {}; the spreadsheet program may have made it of a text such as {example}; give the column the format Text and write the cell again", sanitize(.column, MAX_SHOWN), sanitize(.text, MAX_SHOWN))]
     Converted {
         /// The cell, such as `B5`.
         cell: String,
