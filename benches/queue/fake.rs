@@ -143,6 +143,7 @@ fn checkpoints(
                 metrics: metrics.iter().map(|metric| metric.outcome).collect(),
                 features: None,
                 levelling: None,
+                displaced: None,
             })
         } else {
             json!({ "stage": stage })

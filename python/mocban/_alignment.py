@@ -7,6 +7,7 @@ import logging
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from . import _native as _rust
@@ -185,6 +186,9 @@ class Alignment(Frozen):
     print_from_mesh : array of shape (3, 4) or None
         Rows 1 and 2 give the print pixel of a mesh point ``[x, y, z, 1]``, row 3 its height over the plane.
     results : mapping of str to MetricResult
+    displaced : mapping or None
+        The part of a torn print or a cracked block that lies elsewhere than the pose puts it: ``ink_share``, ``shift_px``,
+        ``angle_deg``, its own ``print_from_depth``, and the line beside it as ``normal`` and ``offset_px`` in the print.
     warnings : tuple of str
         What may be wrong with the mesh or the print, such as vertices without a position.
 
@@ -199,7 +203,7 @@ class Alignment(Frozen):
 
     __slots__ = (
         "status", "refusal", "confidence", "rotation_deg", "scale", "shift_px", "mirrored", "side", "print_from_mesh",
-        "results", "warnings", "_native", "_first",
+        "results", "displaced", "warnings", "_native", "_first",
     )  # fmt: skip
     status: Literal["aligned", "refused"]
     refusal: Refusal | None
@@ -211,6 +215,7 @@ class Alignment(Frozen):
     side: str | None
     print_from_mesh: NDArray[np.float64] | None
     results: Mapping[str, MetricResult]
+    displaced: Mapping[str, Any] | None
     warnings: tuple[str, ...]
     _native: _rust.NativeAlignment | None
     _first: str | None
@@ -224,7 +229,7 @@ class Alignment(Frozen):
         if native is None:
             names = ("confidence", "rotation_deg", "scale", "shift_px", "mirrored", "side", "print_from_mesh")
             self._set(status="refused", refusal=refusal, results=Results({}, None), _native=None, _first=None)
-            self._set(warnings=(), **dict.fromkeys(names))
+            self._set(displaced=None, warnings=(), **dict.fromkeys(names))
             return
         import numpy as np
 
@@ -246,6 +251,7 @@ class Alignment(Frozen):
             side=numbers["side"],
             print_from_mesh=matrix,
             results=Results(results, native),
+            displaced=None if numbers["displaced"] is None else MappingProxyType(numbers["displaced"]),
             warnings=tuple(numbers["warnings"]),
             _native=native,
             _first="relief" if "relief" in all_results else "ensemble",

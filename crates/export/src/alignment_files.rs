@@ -24,13 +24,15 @@ pub fn alignment_files(pair: &AlignedPair, print: &Print) -> [(&'static str, Vec
     let strokes = depth.stroke_mask(metric.threshold_level);
     let aligned = warp_mask(&strokes, pose, size[0], size[1]);
     let view = PrintView::enlarged(image);
+    let displaced = pair.registered.outcome.displaced.as_ref();
+    let displaced = displaced.map(|part| (part, &strokes));
     let files = [
         png_mask(&pair.normalized.prints[pair.registered.outcome.ink].ink_of_print()),
         png_grey16(&depth.levels),
         sidecar(&depth.scale, pair.registered.outcome.levelling).into_bytes(),
         png_grey16(&warp_depth(depth, pose, size[0], size[1])),
         png_mask(&aligned),
-        compact_rgb8(&view.overlay_on(view.print(image), &aligned)),
+        compact_rgb8(&view.overlay_on(view.print(image), &aligned, displaced)),
     ];
     let mut names = ALIGNMENT_FILES.into_iter();
     files.map(|file| (names.next().unwrap_or_default(), file))

@@ -37,7 +37,8 @@ pub(super) struct Files {
     pub(super) canvas_print_mask: String,
     /// Where the canvas masks disagree: 128 = stroke without ink, 255 = ink without wood, 0 = elsewhere.
     pub(super) stroke_map: String,
-    /// The print with the edges of the strokes, enlarged if it is small.
+    /// The print with the edges of the strokes, enlarged if it is small. On a displaced part, they are blue and at its own
+    /// pose.
     pub(super) overlay: String,
 }
 

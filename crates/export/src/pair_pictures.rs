@@ -252,7 +252,10 @@ impl<'a> PairPictures<'a> {
         let print = &self.source_print()?.picture;
         let view = PrintView::enlarged(print);
         let enlarged = get_or_read(&self.enlarged, || Ok(view.print(print)))?;
-        Ok(view.overlay_on(enlarged.clone(), self.mask_on_print(outcome)?))
+        let strokes = self.depth_mask(outcome)?;
+        let displaced = self.outcomes.register.displaced.as_ref();
+        let displaced = displaced.map(|part| (part, &strokes));
+        Ok(view.overlay_on(enlarged.clone(), self.mask_on_print(outcome)?, displaced))
     }
 
     /// Places the scan under an alignment on a print of `print` pixels. Heights are those of the depth map with this scale,

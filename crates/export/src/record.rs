@@ -7,8 +7,9 @@ use serde_json::{Map, Value};
 use super::stage_outcomes::StageOutcomes;
 use mocban_catalog::{CutOrigin, MetricRecord, PairResults, ReviewerVerdict, StoredAlignment};
 use mocban_core::domain::{
-    Affine2, ContentHash, Failure, FailureClass, HeightFromMesh, JobStatus, LengthUnit, PairName,
-    PrintFromMesh, Reason, ReviewOrder, Rigid3, Stage, ThresholdMetric, UnixMillis, Verdict,
+    Affine2, ContentHash, DisplacedPart, Failure, FailureClass, HeightFromMesh, JobStatus,
+    LengthUnit, PairName, PrintFromMesh, Reason, ReviewOrder, Rigid3, Stage, ThresholdMetric,
+    UnixMillis, Verdict,
 };
 use mocban_results::Consensus;
 
@@ -135,6 +136,8 @@ pub struct PairFields {
     pub page_from_mesh: Option<PrintFromMesh>,
     /// The newest valid manual alignment.
     pub manual_alignment: Option<ManualAlignmentFields>,
+    /// The part of a torn print or a cracked block that lies elsewhere than the pose of the rest puts it.
+    pub displaced: Option<DisplacedFields>,
     /// BLAKE3 hash of the mesh file.
     pub mesh_hash: Option<ContentHash>,
     /// BLAKE3 hash of the print file.
@@ -228,6 +231,36 @@ pub struct ManualAlignmentFields {
     pub dice: f64,
     /// The reviewer's note.
     pub note: Option<String>,
+}
+
+/// A part of a print with a pose of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct DisplacedFields {
+    /// Share of the ink on this part, with the strip beside the line that belongs to neither part.
+    pub ink_share: f64,
+    /// Offset of the middle of its ink from where the pose of the rest puts it, in print pixels.
+    pub shift_px: [f64; 2],
+    /// Rotation against the rest in degrees, positive clockwise on the screen.
+    pub angle_deg: f64,
+    /// Unit vector in the print across the line between the parts, towards this part.
+    pub normal: [f64; 2],
+    /// Pixels x, y of the print are on this part if their product with `normal` is larger than this.
+    pub offset_px: f64,
+    /// Map (3 x 3) from depth-map pixels to print pixels on this part, found at a low resolution.
+    pub print_from_depth: [[f64; 3]; 3],
+}
+
+impl From<DisplacedPart> for DisplacedFields {
+    fn from(part: DisplacedPart) -> Self {
+        Self {
+            ink_share: part.ink_share,
+            shift_px: part.shift_px,
+            angle_deg: part.angle_deg,
+            normal: part.normal,
+            offset_px: part.offset_px,
+            print_from_depth: homogeneous(&part.print_from_depth),
+        }
+    }
 }
 
 impl From<StoredAlignment> for ManualAlignmentFields {
@@ -332,6 +365,7 @@ impl PairFields {
             page_from_crop: None,
             page_from_mesh: None,
             manual_alignment: None,
+            displaced: outcomes.and_then(|found| Some(found.register.displaced?.into())),
             mesh_hash: fit.map(|record| record.mesh_hash),
             print_hash: normalize.and_then(|record| record.print_hash),
             config_hash: register.map(|record| record.fingerprint_hash),

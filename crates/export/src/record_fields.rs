@@ -22,7 +22,7 @@ const fn field(name: &'static str, unit: &'static str, frame: &'static str) -> R
 }
 
 /// The fields of a pair, in their order.
-pub(super) const PAIR_FIELDS: [RecordField; 36] = [
+pub(super) const PAIR_FIELDS: [RecordField; 37] = [
     field("id", "", ""),
     field("character", "", ""),
     field("block", "", ""),
@@ -54,6 +54,7 @@ pub(super) const PAIR_FIELDS: [RecordField; 36] = [
     field("page_from_crop", "px", "print to page"),
     field("page_from_mesh", "px; mesh unit", "mesh to page and tops"),
     field("manual_alignment", "", ""),
+    field("displaced", "px", "print"),
     field("mesh_hash", "", ""),
     field("print_hash", "", ""),
     field("config_hash", "", ""),

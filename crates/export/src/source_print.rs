@@ -124,10 +124,15 @@ pub(super) fn result_images(
     let Some(record) = pair.metric(metric) else {
         return ([plain, None, None], None);
     };
-    match PairArtifacts::new(project, pair).depth() {
-        Ok(depth) => {
+    let artifacts = PairArtifacts::new(project, pair);
+    match artifacts
+        .depth()
+        .and_then(|depth| Ok((depth, artifacts.displaced()?)))
+    {
+        Ok((depth, displaced)) => {
             let relief = view.relief(&depth, &record.outcome.print_from_depth);
-            let overlay = view.overlay(&print.picture, &depth, &record.outcome);
+            let outcome = &record.outcome;
+            let overlay = view.overlay(&print.picture, &depth, outcome, displaced.as_ref());
             ([plain, Some(relief), Some(overlay)], None)
         }
         Err(error) => ([plain, None, None], Some(error.to_string())),

@@ -198,7 +198,9 @@ pub fn warnings(pair: &AlignedPair, print: &Print) -> Vec<String> {
     let profile = profile.map(|warning| format!("print: {warning}"));
     let said = scan_size::contradictions(&pair.fit, pair.hints).into_iter();
     let said = said.map(|text| format!("mesh: {text}"));
-    lost.chain(said).chain(profile).collect()
+    let displaced = pair.registered.outcome.displaced;
+    let displaced = displaced.map(|part| format!("print: {part}"));
+    lost.chain(said).chain(profile).chain(displaced).collect()
 }
 
 /// Returns the result of an aligned pair as `align --json` prints it.
@@ -233,6 +235,7 @@ pub fn aligned_json(pair: &AlignedPair, print: &Print) -> Value {
         "side": side(pair),
         "print_from_mesh": pair.print_from_mesh(first),
         "results": results,
+        "displaced": pair.registered.outcome.displaced,
         "warnings": warnings(pair, print),
     })
 }

@@ -58,7 +58,10 @@ impl NativeAlignment {
     fn picture(&self, outcome: &MetricOutcome) -> Rgb {
         let image = self.print.image();
         let view = PrintView::enlarged(image);
-        view.overlay_on(view.print(image), &self.strokes(outcome))
+        let strokes = self.pair.depth.stroke_mask(outcome.threshold_level);
+        let displaced = self.pair.registered.outcome.displaced.as_ref();
+        let displaced = displaced.map(|part| (part, &strokes));
+        view.overlay_on(view.print(image), &self.strokes(outcome), displaced)
     }
 }
 

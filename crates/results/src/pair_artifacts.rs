@@ -5,8 +5,8 @@ use serde::de::DeserializeOwned;
 use mocban_catalog::{MetricRecord, PairResults, StageRecord};
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, print_mask};
 use mocban_core::domain::{
-    Affine2, ArtifactRef, DepthOutcome, FitOutcome, Levelling, MaskScale, MetricOutcome,
-    NormalizeOutcome, PrintFromMesh, RegisterOutcome, Stage,
+    Affine2, ArtifactRef, DepthOutcome, DisplacedPart, FitOutcome, Levelling, MaskScale,
+    MetricOutcome, NormalizeOutcome, PrintFromMesh, RegisterOutcome, Stage,
 };
 use mocban_core::raster::{
     DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16, mask_of_print,
@@ -135,11 +135,23 @@ impl<'a> PairArtifacts<'a> {
 
     /// Returns the levelling that the registration found, if any.
     fn levelling(&self) -> Result<Option<Levelling>, PairArtifactsError> {
-        if self.pair.stage(Stage::Register).is_none() {
-            return Ok(None);
-        }
-        let register: RegisterOutcome = self.outcome(Stage::Register)?;
-        Ok(register.levelling)
+        Ok(self.registered()?.and_then(|register| register.levelling))
+    }
+
+    /// Returns the displaced part of the print, if the registration found one.
+    ///
+    /// # Errors
+    /// Returns an error if the result of the register stage cannot be read.
+    pub fn displaced(&self) -> Result<Option<DisplacedPart>, PairArtifactsError> {
+        Ok(self.registered()?.and_then(|register| register.displaced))
+    }
+
+    /// Returns the result of the register stage. `None` if there is none.
+    fn registered(&self) -> Result<Option<RegisterOutcome>, PairArtifactsError> {
+        let has_result = self.pair.stage(Stage::Register).is_some();
+        has_result
+            .then(|| self.outcome(Stage::Register))
+            .transpose()
     }
 
     /// Reads the ink mask of the print. The mask has the frame and the size of the print image.

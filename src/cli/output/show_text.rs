@@ -7,8 +7,8 @@ use mocban_align::scan_size;
 use mocban_align::stages::ScanHints;
 use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
 use mocban_core::domain::{
-    DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
-    Verdict, one_line,
+    DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome,
+    RegisterOutcome, Stage, Verdict, one_line,
 };
 use mocban_project::details::{Adjustment, ManualResult};
 use mocban_results::ManualCorrection;
@@ -198,7 +198,7 @@ fn numbers(record: &StageRecord, hints: ScanHints) -> String {
             .parse()
             .map(|depth| depth_numbers(&depth, hints.unit)),
         Stage::Normalize => record.parse().map(|found| ink_numbers(&found)),
-        Stage::Register => Ok(String::new()),
+        Stage::Register => record.parse().map(|found| displaced_text(&found)),
     };
     text.unwrap_or_else(|_| "written by another version of this program".to_owned())
 }
@@ -242,6 +242,11 @@ fn ink_numbers(found: &NormalizeOutcome) -> String {
             format!("; turned upright by its EXIF orientation {orientation}")
         });
     format!("{}{turned}", texts.join("; or "))
+}
+
+fn displaced_text(found: &RegisterOutcome) -> String {
+    let part = found.displaced.as_ref();
+    part.map_or_else(String::new, ToString::to_string)
 }
 
 /// Formats a share, such as `1.5 %`.

@@ -231,6 +231,7 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
         metrics: ThresholdMetric::ALL.map(metric).to_vec(),
         features: None,
         levelling: None,
+        displaced: None,
     };
     let last = stage == Stage::Register;
     let metrics = register.metrics.iter().map(|outcome| MetricResult {

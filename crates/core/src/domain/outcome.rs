@@ -7,8 +7,8 @@ use std::num::{NonZeroU32, NonZeroU64};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Affine2, LengthUnit, Levelling, MaskReduction, MaskScale, MeshLosses, PrintOutline, Rigid3,
-    ThresholdMetric,
+    Affine2, DisplacedPart, LengthUnit, Levelling, MaskReduction, MaskScale, MeshLosses,
+    PrintOutline, Rigid3, ThresholdMetric,
 };
 
 /// The curved surface of the stroke tops. All lengths are in mesh units.
@@ -384,4 +384,7 @@ pub struct RegisterOutcome {
     /// Correction of the depth map to which the thresholds refer. `None` if one threshold fits the whole character.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub levelling: Option<Levelling>,
+    /// The part of the print with a pose of its own. `None` if one pose fits the whole print.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displaced: Option<DisplacedPart>,
 }

@@ -248,6 +248,15 @@ fn columns(fields: &[&str], meta: &[String]) -> Vec<ResultColumn> {
                     });
                 }
             }
+            "displaced" => {
+                for name in ["ink_share", "angle_deg", "shift_px"] {
+                    let before = columns.len();
+                    add_list(&mut columns, name, &format!("/displaced/{name}"));
+                    for column in &mut columns[before..] {
+                        column.name.insert_str(0, "displaced_");
+                    }
+                }
+            }
             "verdicts" => columns.push(ResultColumn {
                 name: "verdicts".to_owned(),
                 pointer: "/verdicts_text".to_owned(),

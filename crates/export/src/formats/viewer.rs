@@ -98,7 +98,8 @@ impl SingleResultFormat for ViewerFormat {
         let (pictures, outcome) = (shown.pictures, &shown.record.outcome);
         let print = &pictures.source_print()?.picture;
         let small = PrintView::of_side(print, PICTURE_SIDE);
-        let picture = small.overlay(print, pictures.depth()?, outcome);
+        let displaced = pictures.outcomes.register.displaced.as_ref();
+        let picture = small.overlay(print, pictures.depth()?, outcome, displaced);
         let scan = ScanView::new(pictures, outcome, shown.scale)?;
         let data = scan.named(pair.to_string()).to_bytes();
         Ok(vec![

@@ -2,13 +2,15 @@
 
 use super::paint::{BLUE, Rgb, VERMILLION, resized};
 use super::relief::shaded;
-use mocban_core::domain::{Affine2, MetricOutcome};
+use mocban_core::domain::{Affine2, DisplacedPart, MetricOutcome};
 use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage, warp_depth, warp_mask};
 
 /// Colour of the edges of stroke masks.
 const EDGE: [u8; 3] = VERMILLION;
 /// Colour of the edges of the true stroke tops.
 const TRUE_EDGE: [u8; 3] = BLUE;
+/// Colour of the line beside a displaced part of the print, and of the edges of the strokes on it.
+const DISPLACED_EDGE: [u8; 3] = BLUE;
 /// Pixels of the longest side per pixel of edge width.
 const SIDE_PER_EDGE_PX: usize = 240;
 /// Minimal longest side of a saved overlay, pixels. An edge of one pixel then hides little of a stroke.
@@ -60,25 +62,56 @@ impl PrintView {
         shaded(&levels, depth.scale.height_per_level / side)
     }
 
-    /// Draws the print with the edges of the aligned depth mask.
-    pub fn overlay(&self, print: &PrintImage, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
-        let mut picture = self.print(print);
-        self.draw_edges(&mut picture, &self.warped_mask(depth, outcome), EDGE);
-        picture
+    /// Draws the print with the edges of the aligned depth mask. On a displaced part of the print, its own pose counts.
+    pub fn overlay(
+        &self,
+        print: &PrintImage,
+        depth: &DepthMap,
+        outcome: &MetricOutcome,
+        displaced: Option<&DisplacedPart>,
+    ) -> Rgb {
+        let strokes = depth.stroke_mask(outcome.threshold_level);
+        let aligned = self.mask(&strokes, &outcome.print_from_depth);
+        let displaced = displaced.map(|part| (part, &strokes));
+        self.draw_strokes(self.print(print), &aligned, displaced)
     }
 
     /// Draws the edges of a mask on a picture of the view, which is the print or the print enlarged. `strokes` is in the
-    /// print's frame.
-    pub fn overlay_on(&self, mut picture: Rgb, strokes: &Mask) -> Rgb {
+    /// print's frame. `displaced` is a displaced part of the print, with the mask in the frame of the depth map.
+    pub fn overlay_on(
+        &self,
+        picture: Rgb,
+        strokes: &Mask,
+        displaced: Option<(&DisplacedPart, &Mask)>,
+    ) -> Rgb {
+        // The pixels of the print are repeated too.
         let factor = (self.width / strokes.width()).max(1);
-        if factor == 1 {
+        let repeated = |x, y| strokes.at(x / factor, y / factor);
+        let repeated = Mask::from_fn(self.width, self.height, repeated);
+        self.draw_strokes(picture, &repeated, displaced)
+    }
+
+    /// Draws the edges of the strokes, which are in the frame of the view.
+    fn draw_strokes(
+        &self,
+        mut picture: Rgb,
+        strokes: &Mask,
+        displaced: Option<(&DisplacedPart, &Mask)>,
+    ) -> Rgb {
+        let place = displaced.zip(self.from_print.inverse());
+        let Some(((part, of_depth), print_from_view)) = place else {
             self.draw_edges(&mut picture, strokes, EDGE);
-        } else {
-            // The pixels of the print are repeated too.
-            let repeated = |x, y| strokes.at(x / factor, y / factor);
-            let repeated = Mask::from_fn(self.width, self.height, repeated);
-            self.draw_edges(&mut picture, &repeated, EDGE);
-        }
+            return picture;
+        };
+        let on_part = Mask::from_fn(self.width, self.height, |x, y| {
+            part.contains(print_from_view.apply([x as f64, y as f64]))
+        });
+        let of_rest = strokes.zip_map(&on_part, |stroke, on_part| stroke && !on_part);
+        let displaced = self.mask(of_depth, &part.print_from_depth);
+        let displaced = displaced.zip_map(&on_part, |stroke, on_part| stroke && on_part);
+        self.draw_edges(&mut picture, &of_rest, EDGE);
+        self.draw_edges(&mut picture, &displaced, DISPLACED_EDGE);
+        self.draw_edges(&mut picture, &on_part, DISPLACED_EDGE);
         picture
     }
 
@@ -92,9 +125,11 @@ impl PrintView {
         outcome: &MetricOutcome,
     ) -> Rgb {
         let tops = self.mask(tops, &Affine2::IDENTITY);
+        let strokes = depth.stroke_mask(outcome.threshold_level);
+        let strokes = self.mask(&strokes, &outcome.print_from_depth);
         let mut picture = self.print(print);
         self.draw_edges(&mut picture, &tops, TRUE_EDGE);
-        self.draw_edges(&mut picture, &self.warped_mask(depth, outcome), EDGE);
+        self.draw_edges(&mut picture, &strokes, EDGE);
         picture
     }
 
@@ -119,12 +154,6 @@ impl PrintView {
     /// Returns the map from print pixels to pixels of the view.
     pub const fn from_print(&self) -> &Affine2 {
         &self.from_print
-    }
-
-    /// Warps a metric's depth mask to the view.
-    fn warped_mask(&self, depth: &DepthMap, outcome: &MetricOutcome) -> Mask {
-        let strokes = depth.stroke_mask(outcome.threshold_level);
-        self.mask(&strokes, &outcome.print_from_depth)
     }
 
     fn draw_edges(&self, onto: &mut Rgb, mask: &Mask, colour: [u8; 3]) {
@@ -152,8 +181,8 @@ fn edges(mask: &Mask, width: usize) -> Grid<bool> {
 
 #[cfg(test)]
 mod tests {
-    use super::{EDGE, PrintView, TRUE_EDGE, edges};
-    use mocban_core::domain::{Affine2, ThresholdMetric};
+    use super::{DISPLACED_EDGE, EDGE, PrintView, TRUE_EDGE, edges};
+    use mocban_core::domain::{Affine2, DisplacedPart, ThresholdMetric};
     use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage};
     use mocban_results::test_fixtures;
 
@@ -177,11 +206,32 @@ mod tests {
     }
 
     #[test]
+    fn strokes_of_a_displaced_part_are_drawn_at_its_own_pose() {
+        let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+        outcome.print_from_depth = Affine2::IDENTITY;
+        let part = DisplacedPart {
+            normal: [0.0, 1.0],
+            offset_px: 14.5,
+            ink_share: 0.5,
+            shift_px: [9.0, 0.0],
+            angle_deg: 0.0,
+            print_from_depth: Affine2::scale_shift(1.0, [9.0, 0.0]),
+        };
+        let view = PrintView::of_side(&blank_print(), 30);
+        let picture = view.overlay(&blank_print(), &depth(), &outcome, Some(&part));
+        let shown = |x, y| picture.at(x, y);
+        // The bar begins at column 8 above the line, and at column 17 below it.
+        assert_eq!([shown(8, 10), shown(17, 10)], [EDGE, [255; 3]]);
+        assert_eq!([shown(8, 20), shown(17, 20)], [[255; 3], DISPLACED_EDGE]);
+        assert_eq!([shown(2, 14), shown(2, 15)], [[255; 3], DISPLACED_EDGE]);
+    }
+
+    #[test]
     fn overlay_draws_the_bar_at_its_aligned_place() {
         let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::scale_shift(1.0, [10.0, 0.0]);
         let view = PrintView::of_side(&blank_print(), 30);
-        let picture = view.overlay(&blank_print(), &depth(), &outcome);
+        let picture = view.overlay(&blank_print(), &depth(), &outcome, None);
         let edge: Vec<_> = (0..30).filter(|x| picture.at(*x, 15) == EDGE).collect();
         assert_eq!(edge, [18, 21]);
     }
@@ -193,8 +243,8 @@ mod tests {
         let view = PrintView::enlarged(&blank_print());
         assert_eq!((view.width, view.height), (240, 240));
         let strokes = depth().stroke_mask(outcome.threshold_level);
-        let of_depth = view.overlay(&blank_print(), &depth(), &outcome);
-        let of_mask = view.overlay_on(view.print(&blank_print()), &strokes);
+        let of_depth = view.overlay(&blank_print(), &depth(), &outcome, None);
+        let of_mask = view.overlay_on(view.print(&blank_print()), &strokes, None);
         for picture in [of_depth, of_mask] {
             let row: Vec<_> = (0..240).filter(|x| picture.at(*x, 120) == EDGE).collect();
             // The bar covers print pixels 8 to 11. Enlarged 8 times, it covers view pixels 64 to 95.

@@ -156,8 +156,9 @@ fn draw(
             Some(mask(&view.mask(&strokes, &outcome.print_from_depth)))
         }
         (PairPicture::Thumb | PairPicture::Overlay, Some(outcome)) => {
-            let depth = artifacts.depth().ok()?;
-            Some(jpeg(&view.overlay(&source.picture, &depth, outcome)))
+            let (depth, displaced) = (artifacts.depth().ok()?, artifacts.displaced().ok()?);
+            let overlay = view.overlay(&source.picture, &depth, outcome, displaced.as_ref());
+            Some(jpeg(&overlay))
         }
     }
 }

@@ -151,6 +151,7 @@ impl PairStages for FakePairs {
             metrics: ThresholdMetric::ALL.map(values::metric_outcome).to_vec(),
             features: None,
             levelling: None,
+            displaced: None,
         };
         let last = stage == Stage::Register;
         Ok(PairStageOutput {

@@ -5,8 +5,8 @@
 
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{ImagePyramid, Loss, PoseCandidate, PyramidLevel, Refiner, SoftMask};
-use mocban_core::domain::Affine2;
 use mocban_core::domain::cancel::poll;
+use mocban_core::domain::{Affine2, DisplacedPart};
 
 /// Working size of print and relief, pixels, and the smoothing there.
 const PX: usize = 60;
@@ -72,6 +72,42 @@ pub(super) struct LargerPart {
     pub(super) pose: PoseCandidate,
     /// Fraction of the ink that lies on it.
     pub(super) share: f64,
+    /// The other part.
+    pub(super) other: OtherPart,
+}
+
+/// The part of a torn print that is left out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OtherPart {
+    /// The side of the line that it is not on.
+    larger: Side,
+    pose: PoseCandidate,
+    /// Depth-map pixel that its pose maps to the middle of its ink.
+    middle: [f64; 2],
+}
+
+impl OtherPart {
+    /// Returns the part in pixels of the print. `rest` maps depth-map pixels to print pixels on the larger part, which has
+    /// the given share of the ink.
+    pub(super) fn in_print(&self, print: &PrintMasks, rest: &Affine2, share: f64) -> DisplacedPart {
+        let print_from_masks = print.print_from_masks();
+        let print_from_depth = print_from_masks.after(&self.pose.fixed_from_moving);
+        let [x, y] = print_from_depth.apply(self.middle);
+        let [expected_x, expected_y] = rest.apply(self.middle);
+        let Side { normal, offset } = self.larger;
+        let on_line = print_from_masks.apply(normal.map(|cosine| cosine * offset));
+        let turn = rest
+            .inverse()
+            .map(|inverse| print_from_depth.after(&inverse));
+        DisplacedPart {
+            normal,
+            offset_px: normal[0] * on_line[0] + normal[1] * on_line[1],
+            ink_share: 1.0 - share,
+            shift_px: [x - expected_x, y - expected_y],
+            angle_deg: turn.map_or(0.0, |turn| turn.angle_deg()),
+            print_from_depth,
+        }
+    }
 }
 
 /// A side of a line with the pose that is refined on it, and its score there.
@@ -115,17 +151,28 @@ pub(super) fn find(
     if sum - of_whole < LEAST_GAIN * (1.0 - of_whole) {
         return None;
     }
-    let side = best_line(&whole, &fixed, &larger.pose, &smaller.pose)?;
+    let line = best_line(&whole, &fixed, &larger.pose, &smaller.pose)?;
+    let beyond = fixed.restricted(|point| !line.contains(point))?;
+    let other = OtherPart {
+        larger: line,
+        pose: smaller.pose,
+        middle: moving_middle(&smaller.pose, &beyond)?,
+    };
     let side = Side {
-        offset: side.offset - STRIP * longest,
-        ..side
+        offset: line.offset - STRIP * longest,
+        ..line
     };
     let kept = fixed.restricted(|point| side.contains(point))?;
     let pose = Refiner::new(&kept, &moving).refine(&larger.pose, STEPS, Loss::Tukey);
     let masks = within(print, &side);
     let share = masks.ink.count() as f64 / print.ink.count().max(1) as f64;
     let is_cut = masks.known.count() < print.known.count();
-    (is_cut && share >= LARGER[0]).then_some(LargerPart { masks, pose, share })
+    (is_cut && share >= LARGER[0]).then_some(LargerPart {
+        masks,
+        pose,
+        share,
+        other,
+    })
 }
 
 /// Returns the masks of a print, unknown beyond a line.
@@ -355,6 +402,10 @@ mod tests {
         assert!(known.at(40, 60) && !known.at(95, 60) && !part.masks.ink.at(100, 60));
         let moved = part.pose.fixed_from_moving.apply([60.0, 60.0]);
         assert!((moved[0] - 60.0).hypot(moved[1] - 60.0) < 1.5, "{moved:?}");
+        let other = &part.other;
+        assert!((other.larger.offset - 78.0).abs() < 5.0, "{other:?}");
+        let moved = other.pose.fixed_from_moving.apply([90.0, 60.0]);
+        assert!((moved[0] - 93.0).hypot(moved[1] - 82.0) < 3.0, "{moved:?}");
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub use stroke_map::StrokeMap;
 use super::normalize::{Normalized, relative_depths};
 use crate::stages::binarize::rim_share;
 use crate::stages::pose::SoftMask;
+use larger_part::OtherPart;
 use metric_thresholds::ChosenThreshold;
 use mocban_core::domain::{InkHypothesis, PoseFeatures};
 use mocban_core::raster::{DepthMap, Mask};
@@ -44,7 +45,7 @@ use pose_search::PoseSearch;
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 28;
+pub const REVISION: u32 = 29;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -122,11 +123,11 @@ pub fn register(
         && let Some(found) = on_larger_part(depth, &depths, normalized, &search, &single, params)
     {
         (search, single) = (found.search, Ok(found.posed));
-        of_part = Some((found.masks, found.share));
+        of_part = Some(found.part);
     }
     let single = single?;
     let (masks, share) = match &of_part {
-        Some((masks, share)) => (masks, *share),
+        Some(part) => (&part.masks, part.share),
         None => (normalized, 1.0),
     };
     let levelled = Levelled::try_new(depth, &relief, &single, masks, &search, params);
@@ -172,7 +173,7 @@ pub fn register(
     // The other part of a torn print is no evidence.
     let part_print = of_part
         .as_ref()
-        .map(|(masks, _)| canvas_print(masks, search.ink));
+        .map(|part| canvas_print(&part.masks, search.ink));
     let print = part_print.as_ref().unwrap_or(&registered.canvas_print);
     let doubts = Doubts {
         share,
@@ -192,6 +193,11 @@ pub fn register(
     );
     registered.outcome.features = Some(*features);
     registered.outcome.levelling = levelling;
+    registered.outcome.displaced = of_part.as_ref().map(|part| {
+        let print = &normalized.prints[search.ink];
+        part.other
+            .in_print(print, &refined.print_from_depth, part.share)
+    });
     Ok(registered)
 }
 
@@ -199,10 +205,16 @@ pub fn register(
 struct PartFit {
     search: PoseSearch,
     posed: Posed,
-    /// The print without its other part.
+    part: TornPrint,
+}
+
+/// A torn print without its smaller part.
+struct TornPrint {
     masks: Normalized,
-    /// Fraction of the ink that is on the part.
+    /// Fraction of the ink that is on the larger part.
     share: f64,
+    /// The smaller part.
+    other: OtherPart,
 }
 
 /// Returns the pose on the larger part of a torn print, if that is more probable than `single`, the pose on the whole
@@ -230,8 +242,11 @@ fn on_larger_part(
     (part.share * probability(&posed) > of_whole).then_some(PartFit {
         search: found,
         posed,
-        masks,
-        share: part.share,
+        part: TornPrint {
+            masks,
+            share: part.share,
+            other: part.other,
+        },
     })
 }
 

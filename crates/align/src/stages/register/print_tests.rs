@@ -50,6 +50,15 @@ fn a_picture_that_was_scaled_unequally_is_aligned() {
 fn the_larger_part_of_a_torn_print_is_aligned_and_trusted_less() {
     let confidence = confidence(Tier::Torn, 9);
     assert!((0.5..0.9).contains(&confidence), "{confidence}");
+    let pair = PairGenerator::new(Tier::Torn, 1).pair(9);
+    let pair = pair.expect("images encode");
+    let aligned = align(pair.mesh, &pair.print);
+    let part = aligned.registered.outcome.displaced;
+    let part = part.expect("a displaced part");
+    // Parts are 1 to 3 mm apart, on characters of about 20 mm.
+    let apart = part.shift_px[0].hypot(part.shift_px[1]) / pair.truth.char_height_px;
+    assert!((0.03..0.2).contains(&apart), "{part:?}");
+    assert!((0.05..0.48).contains(&part.ink_share), "{part:?}");
 }
 
 #[test]

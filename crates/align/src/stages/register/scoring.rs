@@ -114,6 +114,7 @@ pub(crate) fn score_alignments(
             metrics,
             features: None,
             levelling: None,
+            displaced: None,
         },
         confidence_inputs: Vec::new(),
         canvas_print,
