@@ -181,6 +181,29 @@ fn an_import_is_refused_if_the_files_changed_after_they_were_shown() {
 }
 
 #[test]
+fn blocks_with_the_same_files_are_named_before_the_import() {
+    let (dir, page) = with_project();
+    let file = dir.path().join("blocks.csv");
+    let rows = "block,mesh,page\na,a.stl,a.png\nb,a.stl,a.png\n";
+    std::fs::write(&file, rows).expect("written");
+    let list = encode(file.to_str().expect("UTF-8"));
+    for (language, sentence) in [
+        (
+            "en",
+            "blocks with the same scan and page as an earlier one: 1, first b, as on line 2",
+        ),
+        (
+            "vi",
+            "số ván có cùng bản quét và trang in với một ván trước: 1, ván đầu tiên là b, giống dòng 2",
+        ),
+    ] {
+        page.get(&format!("/?language={language}"));
+        let shown = text(&page.get(&format!("/import?project=new&list={list}")));
+        assert!(shown.contains(sentence), "{shown}");
+    }
+}
+
+#[test]
 fn a_person_names_the_columns_of_a_list() {
     let (dir, page) = with_project();
     let dir = dir.path();
