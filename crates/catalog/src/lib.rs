@@ -96,7 +96,7 @@ pub use records::listed_names::ListedNames;
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageCounts,
-    StageRecord, StatusCounts, StoredFailure,
+    StageRecord, StatusCounts, StoredFailure, all_retired,
 };
 pub use records::pair_list::{MetricDifference, PairCursor, PairFilter, PairListPage, PairOrder};
 pub use records::pair_results::ResultPages;

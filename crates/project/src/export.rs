@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use crate::error::ProjectResult;
-use crate::events::{Listener, LongWork, warn_about_set_apart};
+use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::exit::Refusal;
 use crate::location::Location;
 use crate::own_files::refuse_project_file;
-use crate::status::warn_about_stale;
+use crate::status::{all_retired, warn_about_stale};
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{ExportFormat, ExportOptions, ExportSummary, export as export_pairs};
 
@@ -50,16 +50,20 @@ pub async fn export(
     let summary = export_pairs(&catalog, &project, output, formats, options).await;
     drop(work);
     let summary = summary?;
+    let retired = all_retired(&catalog).await?;
     catalog.close().await;
     if summary.is_nothing_selected {
-        let nothing = if are_pairs_chosen {
-            "none of the chosen pairs has a result to export"
-        } else {
-            "no result is selected by --only or --min-confidence"
+        let nothing = match &retired {
+            Some(retired) => retired,
+            None if are_pairs_chosen => "none of the chosen pairs has a result to export",
+            None => "no result is selected by --only or --min-confidence",
         };
         let text = format!("{nothing}; nothing was written to {}", output.display());
         return Err(Refusal::NothingSelected(text).into());
     }
     warn_about_set_apart(listener, &summary.set_apart);
+    if let Some(retired) = retired {
+        warn(listener, format!("the export has no pairs: {retired}"));
+    }
     Ok(summary)
 }

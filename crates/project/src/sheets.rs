@@ -9,6 +9,7 @@ use crate::files;
 use crate::location::Location;
 use crate::own_files::refuse_used_file;
 use crate::selection;
+use crate::status::all_retired;
 use mocban_catalog::Catalog;
 use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
@@ -44,9 +45,13 @@ pub async fn contact_sheet(
     drop(work);
     let sheet = sheet?;
     warn_about_set_apart(listener, &sheet.set_apart);
+    let retired = all_retired(&catalog).await?;
     catalog.close().await;
     if sheet.shown == 0 {
-        let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");
+        let text = match retired {
+            Some(retired) => format!("there is nothing to draw: {retired}"),
+            None => format!("no pair has a result of {metric} yet, so there is nothing to draw"),
+        };
         return Err(Refusal::NothingSelected(text).into());
     }
     for (pair, why) in &sheet.problems {

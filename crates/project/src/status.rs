@@ -104,6 +104,13 @@ pub(crate) fn are_results_missing(project: &Project, jobs: &BTreeMap<JobStatus, 
     jobs.get(&JobStatus::Done).is_some_and(|done| *done > 0) && project.has_no_artifacts()
 }
 
+/// Returns a clause if all pairs of a project are retired, such as `all 2 pairs of the project are retired; ..`.
+pub async fn all_retired(catalog: &Catalog) -> ProjectResult<Option<String>> {
+    let pairs: u64 = catalog.counters().await?.values().sum();
+    let clause = mocban_catalog::all_retired(pairs, catalog.retired_count().await?);
+    Ok(clause.map(|clause| format!("{clause}; `status --retired` says why")))
+}
+
 /// Warns about results that were computed with other settings or files than the current ones. Does nothing if the settings
 /// are invalid.
 pub(crate) async fn warn_about_stale(

@@ -33,6 +33,7 @@ use mocban_results::stats::{IntervalMethod, Rate, ratio};
 #[derive(Debug, Clone, Default)]
 pub struct ReportAccumulator {
     pairs: u64,
+    retired: u64,
     progress: PairProgress,
     metrics: [MetricSums; ThresholdMetric::ALL.len()],
     scores: ScoreSample,
@@ -110,6 +111,11 @@ impl ReportAccumulator {
         self.attention_checks = (rates.all.n > 0).then_some(rates);
     }
 
+    /// Sets how many pairs are retired. They are not added.
+    pub const fn set_retired(&mut self, retired: u64) {
+        self.retired = retired;
+    }
+
     /// Sets how many whole blocks are finished.
     pub fn set_block_progress(&mut self, blocks: Option<BlockCounts>) {
         self.block_progress = blocks;
@@ -171,6 +177,7 @@ impl ReportAccumulator {
             schema: SCHEMA,
             headline: Vec::new(),
             pairs: self.pairs,
+            retired: self.retired,
             interval: IntervalMethod::default(),
             progress: self.progress,
             warnings: warnings(

@@ -39,6 +39,7 @@ pub async fn build_with(
     report.set_attention_checks(attention_checks::project_rates(&catalog).await?);
     let states = catalog.block_states().await?;
     report.set_block_progress(BlockCounts::of(states.iter().map(|block| block.status)));
+    report.set_retired(catalog.retired_count().await?);
     let mut blocks = BlockSums::of_true_boxes(&catalog).await?;
     let manual_alignments = catalog.newest_manual_alignments().await?;
     let mut pages = catalog.result_pages(PAIRS_PER_PAGE);

@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use super::accuracy_sentence::accuracy;
 use super::comparison::{Basis, Comparison, MIN_PAIRS, TOO_FEW_TO_ESTIMATE, sample_size};
 use super::model::{BlockCounts, MetricRow, Report};
+use mocban_catalog::all_retired;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric};
 use mocban_results::number_format::{format_count, format_p, joined};
 use mocban_results::stats::SIGNIFICANCE_LEVEL;
@@ -15,9 +16,13 @@ use mocban_results::stats::SIGNIFICANCE_LEVEL;
 pub(super) fn headline(report: &Report) -> Vec<String> {
     let blocks = report.block_progress.and_then(BlockCounts::unfinished);
     if report.pairs == 0 {
-        let sentence = match blocks {
-            Some(blocks) => format!("The project has no pairs yet: {blocks}."),
-            None => "The project has no pairs yet; `mocban import` adds them.".to_owned(),
+        let retired = all_retired(report.pairs, report.retired);
+        let sentence = match (retired, blocks) {
+            (Some(retired), _) => {
+                format!("There is nothing to report: {retired}; `mocban status --retired` says why.")
+            }
+            (None, Some(blocks)) => format!("The project has no pairs yet: {blocks}."),
+            (None, None) => "The project has no pairs yet; `mocban import` adds them.".to_owned(),
         };
         return vec![sentence];
     }
@@ -262,6 +267,25 @@ mod tests {
                 "There is no result to judge yet; `mocban status` lists the reasons."
             ]
         );
+    }
+
+    #[test]
+    fn a_project_whose_pairs_are_all_retired_has_no_missing_pairs() {
+        for (retired, clause) in [
+            (1, "the only pair of the project is retired"),
+            (2, "all 2 pairs of the project are retired"),
+        ] {
+            let mut report = ReportAccumulator::default();
+            report.set_retired(retired);
+            let sentence =
+                format!("There is nothing to report: {clause}; `mocban status --retired` says why.");
+            assert_eq!(headline(&report.finish()), [sentence]);
+        }
+        let mut report = ReportAccumulator::default();
+        report.set_retired(2);
+        report.add(&test_fixtures::pending("a"), &TruthEvaluation::default());
+        let found = headline(&report.finish());
+        assert!(found[0].starts_with("The only pair is not aligned"), "{found:?}");
     }
 
     #[test]

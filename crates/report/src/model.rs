@@ -33,6 +33,9 @@ pub struct Report {
     pub headline: Vec<String>,
     /// Pairs in the project, in every state.
     pub pairs: u64,
+    /// Retired pairs, which are in no other number.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub retired: u64,
     /// How the intervals of shares are computed.
     pub interval: IntervalMethod,
     /// How many pairs are finished.
@@ -73,6 +76,14 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// What the numbers were computed from.
     pub provenance: Provenance,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+const fn is_zero(number: &u64) -> bool {
+    *number == 0
 }
 
 /// Numbers of pairs by state.

@@ -1,6 +1,7 @@
 //! Checks that a report is good enough (`--fail-under`) and complete (`--require-complete`).
 
 use super::model::Report;
+use mocban_catalog::all_retired;
 use mocban_results::number_format::format_count;
 
 /// Returns the reasons why a report misses the required Acc. The list is empty if there are none.
@@ -45,7 +46,8 @@ pub fn missing(report: &Report) -> Vec<String> {
         add(format!("unsure results of {}", row.metric), row.unsure);
     }
     if report.pairs == 0 {
-        missing.push("the project has no pairs".to_owned());
+        let retired = all_retired(report.pairs, report.retired);
+        missing.push(retired.unwrap_or_else(|| "the project has no pairs".to_owned()));
     }
     missing
 }
@@ -86,6 +88,10 @@ mod tests {
         assert_eq!(missing(&report(&[Some(Verdict::Pass), None])).len(), 4);
         assert_eq!(missing(&report(&[Some(Verdict::Unsure)])).len(), 4);
         assert_eq!(missing(&report(&[])), ["the project has no pairs"]);
+        let mut retired = ReportAccumulator::default();
+        retired.set_retired(2);
+        let expected = ["all 2 pairs of the project are retired"];
+        assert_eq!(missing(&retired.finish()), expected);
     }
 
     #[test]

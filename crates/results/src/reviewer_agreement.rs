@@ -40,6 +40,8 @@ pub struct ReviewerAgreement {
     pub reviewers: Vec<ReviewerRecord>,
     /// Planted faults that reviewers failed, as a share of all answers to planted faults.
     pub attention_checks: Rate,
+    /// Retired pairs, whose verdicts are in no number.
+    pub retired: u64,
     /// Damaged rows that the numbers do not include.
     #[serde(skip_serializing_if = "SetApart::is_empty")]
     pub set_apart: SetApart,
@@ -116,6 +118,7 @@ pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogEr
         counts.add_checks(reviewer, answers, &own);
     }
     Ok(ReviewerAgreement {
+        retired: catalog.retired_count().await?,
         set_apart: SetApart::of(damaged),
         ..counts.finish()
     })
@@ -242,6 +245,7 @@ impl AgreementCounts {
             attention_checks: Rate::total(
                 reviewers.iter().map(|record| record.attention_checks.all),
             ),
+            retired: 0,
             set_apart: SetApart::default(),
             reviewers,
         }

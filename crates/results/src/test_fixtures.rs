@@ -153,6 +153,7 @@ pub fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
         },
     };
     ReviewerAgreement {
+        retired: 0,
         set_apart: mocban_catalog::SetApart::default(),
         schema: 1,
         conflicts: disputed,

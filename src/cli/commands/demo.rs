@@ -11,6 +11,7 @@ use super::demo_data::replace_data;
 use super::import;
 use super::import_blocks;
 use super::report;
+use super::review::review_step;
 use super::run::{code, drive};
 use super::run_text;
 use crate::cli::output::busy::Busy;
@@ -175,7 +176,9 @@ async fn align(
     let (data, picture) = (dir.join("data"), picture.display());
     context.info(&format!("meshes, prints and truth: {}", data.display()));
     context.info(&format!("results in one image, worst first: {picture}"));
-    context.next("review --reviewer me");
+    if let Some(review) = review_step(&outcome.summary.status) {
+        context.next(&review);
+    }
     context.next("report");
     context.next("export -o export");
     Ok(code)

@@ -28,6 +28,7 @@ use mocban_project::error::explanation;
 use mocban_project::location::now;
 use mocban_project::reviewers;
 use mocban_project::shell::shell_quoted;
+use mocban_project::status::all_retired;
 use mocban_project::verdict_words;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
@@ -151,12 +152,18 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
     .await?;
     if pages.counts().items == 0 {
         drop(pages);
+        let retired = all_retired(&catalog).await?;
         catalog.close().await;
         if args.adjudicate {
             return no_conflict(&args, context);
         }
-        let command = context.command("run");
-        let text = format!("there is no result to judge yet; first: {command}");
+        let text = match retired {
+            Some(retired) => format!("there is no result to judge: {retired}"),
+            None => {
+                let command = context.command("run");
+                format!("there is no result to judge yet; first: {command}")
+            }
+        };
         return Err(Refusal::NothingSelected(text).into());
     }
     let stop = Stop::default();
@@ -297,11 +304,11 @@ pub(crate) fn review_step(counts: &StatusCounts) -> Option<String> {
     is_unjudged.then(|| review_command(user_name().as_deref()))
 }
 
-/// Returns the `review` command with the user's name as the reviewer.
+/// Returns the `review` command with the user's name as the reviewer, or with a word in its place that `review` refuses.
 fn review_command(user: Option<&str>) -> String {
     let name = user.and_then(|user| reviewer_name(user).ok());
-    let name = name.unwrap_or_else(|| "me".to_owned());
-    format!("review --reviewer {}", shell_quoted(&name))
+    let name = name.map_or_else(|| "NAME".to_owned(), |name| shell_quoted(&name));
+    format!("review --reviewer {name}")
 }
 
 /// Returns the name of the user, as Unix or Windows gives it.
@@ -361,6 +368,6 @@ mod tests {
     #[test]
     fn the_suggested_reviewer_is_the_user() {
         assert_eq!(review_command(Some("lê văn")), "review --reviewer 'lê văn'");
-        assert_eq!(review_command(None), "review --reviewer me");
+        assert_eq!(review_command(None), "review --reviewer NAME");
     }
 }

@@ -15,7 +15,9 @@ use mocban_catalog::RerunPolicy;
 use mocban_config::Config;
 use mocban_core::domain::Stage;
 use mocban_project::files;
-use mocban_project::run::{self, PreparedRun, RunOutcome, TWO_METHODS};
+use mocban_project::missing_inputs::MissingInputs;
+use mocban_project::run::{self, PreparedRun, RunOutcome, RunPreview, TWO_METHODS};
+use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{RunOptions, RunPart, RunPlan, RunSummary, Stop};
 
@@ -82,8 +84,8 @@ pub(crate) async fn execute(
     let terminal = Terminal::new(context);
     let prepared = PreparedRun::new(&names, options, args.dry_run, location, &terminal).await?;
     if args.dry_run {
-        let (plan, running) = prepared.plan().await?;
-        return print_plan(&plan, running, context);
+        let preview = prepared.preview().await?;
+        return print_plan(&preview, &command_without_dry_run(&args, &names), context);
     }
     let serving = server.map(|server| server.serve(metrics, context));
     let outcome = drive(prepared, context).await;
@@ -93,14 +95,11 @@ pub(crate) async fn execute(
     json["schema"] = json!(1);
     context.print_json(&json)?;
     print_outcome(&outcome, context);
-    if outcome.are_results_missing {
-        context.warn(missing_results::TEXT);
-        context.next(missing_results::NEXT);
-    }
-    if let Some(missing) = &outcome.missing_inputs {
-        context.warn(&missing.to_string());
-        context.next("check");
-    }
+    warn_about_missing(
+        outcome.are_results_missing,
+        outcome.missing_inputs.as_ref(),
+        context,
+    );
     for command in next_steps(&outcome) {
         let command = match (part, command.as_str()) {
             (RunPart::Work, "run") => "worker",
@@ -154,6 +153,23 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
         .ok_or_else(|| "a size is a whole number with K, M, G or T, such as 4G".to_owned())
 }
 
+/// Returns the word that [`rerun`] parses.
+const fn rerun_text(rerun: RerunPolicy) -> &'static str {
+    match rerun {
+        RerunPolicy::Failed => "failed",
+        RerunPolicy::Changed => "stale",
+        RerunPolicy::All(_) => "all",
+    }
+}
+
+/// Returns a number of bytes as [`bytes`] parses it.
+fn size_text(bytes: u64) -> String {
+    let units = [(40, "T"), (30, "G"), (20, "M"), (10, "K")];
+    let whole = units.into_iter().find(|(shift, _)| bytes % (1 << shift) == 0);
+    let (shift, unit) = whole.unwrap_or((0, ""));
+    format!("{}{unit}", bytes >> shift)
+}
+
 /// Returns the options of a run from the arguments and the settings.
 pub(crate) fn options(args: &RunArgs, config: &Config, part: RunPart) -> RunOptions {
     let plain = run::options(config);
@@ -195,8 +211,35 @@ pub(crate) const fn code(summary: &RunSummary) -> ExitCode {
     }
 }
 
-fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> ProjectResult<ExitCode> {
-    let (blocks, plan) = (&plan.blocks, &plan.pairs);
+/// Warns about results and input files that are not at their places, with the command that helps.
+fn warn_about_missing(
+    are_results_missing: bool,
+    missing_inputs: Option<&MissingInputs>,
+    context: &Context,
+) {
+    if are_results_missing {
+        context.warn(missing_results::TEXT);
+        context.next(missing_results::NEXT);
+    }
+    if let Some(missing) = missing_inputs {
+        context.warn(&missing.to_string());
+        context.next("check");
+    }
+}
+
+/// Prints what `command` would run.
+fn print_plan(
+    preview: &RunPreview,
+    command: &str,
+    context: &Context,
+) -> ProjectResult<ExitCode> {
+    let RunPreview {
+        plan: RunPlan { blocks, pairs: plan },
+        is_running,
+        counts,
+        ..
+    } = preview;
+    let running = *is_running;
     let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan, "blocks": blocks});
     context.print(&json, || {
         plan_text(plan, running) + &block_plan_text(blocks)
@@ -204,15 +247,99 @@ fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> ProjectResult
     if plan.changes_method() {
         context.info(TWO_METHODS);
     }
+    if let Some(retired) = counts.all_retired() {
+        context.info(&retired);
+        context.next("status --retired");
+    }
+    warn_about_missing(
+        preview.are_results_missing,
+        preview.missing_inputs.as_ref(),
+        context,
+    );
     if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
-        context.next("run");
+        context.next(command);
     }
     Ok(ExitCode::Done)
 }
 
+/// Returns the command that runs what was planned: with all arguments but `--dry-run`. Names from the standard input cannot
+/// be read again, so they are arguments.
+fn command_without_dry_run(args: &RunArgs, names: &[String]) -> String {
+    let RunArgs {
+        names: typed,
+        names_from,
+        jobs,
+        memory,
+        dry_run: _,
+        join,
+        max_failures,
+        rerun,
+        stage,
+        // Conflicts with `--dry-run`.
+        metrics: _,
+    } = args;
+    let file = names_from.as_deref().filter(|file| *file != Path::new("-"));
+    let option = |name: &str, value: String| format!("{name} {}", shell_quoted(&value));
+    let options = [
+        file.map(|file| option("--names-from", file.to_string_lossy().into_owned())),
+        jobs.map(|jobs| format!("-j {jobs}")),
+        memory.map(|memory| format!("--memory {}", size_text(memory))),
+        join.then(|| "--join".to_owned()),
+        max_failures.map(|number| format!("--max-failures {number}")),
+        rerun.map(|rerun| format!("--rerun {}", rerun_text(rerun))),
+        stage.map(|stage| format!("--stage {stage}")),
+    ];
+    let names = if file.is_some() { typed } else { names };
+    let mut words = vec!["run".to_owned()];
+    words.extend(options.into_iter().flatten());
+    if names.iter().any(|name| name.starts_with('-')) {
+        words.push("--".to_owned());
+    }
+    words.extend(names.iter().map(|name| shell_quoted(name)));
+    words.join(" ")
+}
+
 #[cfg(test)]
 mod tests {
-    use super::bytes;
+    use clap::Parser as _;
+
+    use super::{RunArgs, bytes, command_without_dry_run, size_text};
+
+    #[derive(Debug, clap::Parser)]
+    struct RunLine {
+        #[command(flatten)]
+        args: RunArgs,
+    }
+
+    #[test]
+    fn the_command_of_a_plan_asks_for_the_same() {
+        for line in [
+            "run",
+            "run b01",
+            "run --names-from names.txt -j 4 --memory 512M --join --max-failures 3 --rerun all --stage fit b01",
+            "run --rerun stale",
+        ] {
+            let words = line.split(' ').chain(["-n"]);
+            let RunLine { args } = RunLine::try_parse_from(words).expect("valid");
+            // Those of the file are not repeated.
+            let mut names = args.names.clone();
+            names.extend(args.names_from.is_some().then(|| "b02".to_owned()));
+            assert_eq!(command_without_dry_run(&args, &names), line);
+        }
+        let words = ["run", "-n", "--names-from", "-", "--", "-a"];
+        let RunLine { args } = RunLine::try_parse_from(words).expect("valid");
+        let names = ["-a", "lê văn"].map(str::to_owned);
+        let command = command_without_dry_run(&args, &names);
+        assert_eq!(command, "run -- -a 'lê văn'");
+    }
+
+    #[test]
+    fn sizes_are_written_as_they_are_read() {
+        for size in [1, 1000, 1 << 10, 3 << 20, 4 << 30, (4 << 30) + 1, 5 << 40] {
+            assert_eq!(bytes(&size_text(size)), Ok(size));
+        }
+        assert_eq!(size_text(4 << 30), "4G");
+    }
 
     #[test]
     fn sizes_may_have_a_unit() {

@@ -5,7 +5,7 @@ use crate::cli::output::block_status::failed_blocks_text;
 use crate::cli::output::context::Context;
 use crate::cli::output::failures::failures_text;
 use crate::cli::output::table::{columns, count, pairs_and_blocks};
-use mocban_catalog::{BlockPlanEntry, Plan};
+use mocban_catalog::{BlockPlanEntry, Plan, StatusCounts};
 use mocban_core::domain::JobStatus;
 use mocban_project::failures::Failures;
 use mocban_project::run::RunOutcome;
@@ -54,9 +54,11 @@ fn pair_headline(summary: &RunSummary) -> String {
         );
     }
     if summary.stages == 0 && summary.failed == 0 {
-        return match summary.status.pairs {
-            0 => "nothing to do: the project has no pairs".to_owned(),
-            pairs => format!(
+        let retired = summary.status.all_retired();
+        return match (summary.status.pairs, retired) {
+            (0, Some(retired)) => format!("nothing to do: {retired}"),
+            (0, None) => "nothing to do: the project has no pairs".to_owned(),
+            (pairs, _) => format!(
                 "nothing left to do: {} in the project",
                 count(pairs, "pair")
             ),
@@ -77,9 +79,7 @@ pub(crate) fn next_steps(outcome: &RunOutcome) -> Vec<String> {
         ..
     } = outcome;
     let mut steps = Vec::new();
-    if summary.status.pairs == 0 && failures.blocks.is_empty() {
-        steps.push("import pairs.csv".to_owned());
-    }
+    steps.extend(empty_project_step(&summary.status, failures));
     let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
     if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) + summary.blocks.left > 0
         || *are_results_missing
@@ -99,6 +99,18 @@ pub(crate) fn next_steps(outcome: &RunOutcome) -> Vec<String> {
         steps.push("report".to_owned());
     }
     steps
+}
+
+/// Returns what helps if no pair counts: a look at those that are retired, or an import.
+pub(crate) fn empty_project_step(counts: &StatusCounts, failures: &Failures) -> Option<String> {
+    let is_retired = counts.all_retired().is_some();
+    let step = if is_retired {
+        "status --retired"
+    } else {
+        "import pairs.csv"
+    };
+    let is_empty = counts.pairs == 0 && failures.blocks.is_empty();
+    (is_empty || is_retired).then(|| step.to_owned())
 }
 
 /// Returns the commands that show a failed pair and let failed pairs run again.

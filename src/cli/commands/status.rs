@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::review::review_step;
-use super::run_text::failed_pair_steps;
+use super::run_text::{empty_project_step, failed_pair_steps};
 use super::status_hosts::table_text;
 use crate::cli::output::context::Context;
 use crate::cli::output::missing_results;
@@ -162,9 +162,7 @@ fn print_refreshed(
 
 fn next_steps(status: &ProjectStatus) -> Vec<String> {
     let mut steps = Vec::new();
-    if status.counts.pairs == 0 && status.failures.blocks.is_empty() {
-        steps.push("import pairs.csv".to_owned());
-    }
+    steps.extend(empty_project_step(&status.counts, &status.failures));
     if status.are_results_missing {
         steps.push(missing_results::NEXT.to_owned());
     }
@@ -327,6 +325,9 @@ mod tests {
     #[test]
     fn next_step_follows_from_the_counts() {
         assert_eq!(next_steps(&status(0, 0)), ["import pairs.csv"]);
+        let mut retired = status(0, 0);
+        retired.counts.retired = 2;
+        assert_eq!(next_steps(&retired), ["status --retired"]);
         assert_eq!(next_steps(&status(0, 2)), ["run"]);
         let mut done = status(2, 0);
         let steps = next_steps(&done);

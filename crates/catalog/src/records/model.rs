@@ -40,6 +40,22 @@ pub struct StatusCounts {
     pub verdicts: BTreeMap<Verdict, u64>,
 }
 
+impl StatusCounts {
+    /// Returns a clause if all pairs are retired, as [`all_retired`] does.
+    pub fn all_retired(&self) -> Option<String> {
+        all_retired(self.pairs, self.retired)
+    }
+}
+
+/// Returns `all 2 pairs of the project are retired` if there are `retired` pairs and no others.
+pub fn all_retired(pairs: u64, retired: u64) -> Option<String> {
+    match (pairs, retired) {
+        (1.., _) | (0, 0) => None,
+        (0, 1) => Some("the only pair of the project is retired".to_owned()),
+        (0, retired) => Some(format!("all {retired} pairs of the project are retired")),
+    }
+}
+
 /// Counts of one stage.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct StageCounts {

@@ -13,6 +13,10 @@ use mocban_results::stats::SIGNIFICANCE_LEVEL;
 pub(super) fn headline(visit: &Visit, report: &Report) -> Vec<String> {
     match visit.language {
         Language::English => plain(&report.headline),
+        Language::Vietnamese if report.pairs == 0 && report.retired > 0 => {
+            let retired = grouped(report.retired);
+            vec![format!("Không có gì để báo cáo: mọi cặp của dự án ({retired}) đã được đưa ra khỏi thống kê.")]
+        }
         Language::Vietnamese if report.pairs == 0 => {
             vec!["Dự án chưa có cặp nào: hãy thêm ở trang Nhập dữ liệu.".to_owned()]
         }

@@ -28,7 +28,14 @@ fn agreement_part(visit: &Visit, found: &ReviewerAgreement) -> Markup {
     html! {
         h2 { (visit.t("Reviewers", "Người đánh giá")) }
         @if found.reviewers.is_empty() {
-            p.muted { (visit.t("Nobody has judged a result yet.", "Chưa ai đánh giá kết quả nào.")) }
+            p.muted { @if found.retired == 0 {
+                (visit.t("Nobody has judged a result yet.", "Chưa ai đánh giá kết quả nào."))
+            } @else {
+                (visit.t(
+                    "Nobody has judged a result of a pair that counts; verdicts on retired pairs are kept.",
+                    "Chưa ai đánh giá kết quả nào của các cặp được tính; đánh giá về các cặp đã đưa ra khỏi thống kê vẫn được giữ.",
+                ))
+            } }
         } @else {
             (reviewer_table(visit, &found.reviewers))
             h2 { (visit.t("Agreement", "Mức độ thống nhất")) }

@@ -12,7 +12,13 @@ pub fn agreement_text(found: &ReviewerAgreement) -> String {
     let sentence = found.set_apart.sentence();
     let sentence = sentence.map(|text| wrapped("", &(text + ".")));
     if found.reviewers.is_empty() {
-        return "Nobody has judged a result yet.\n".to_owned() + &sentence.unwrap_or_default();
+        let nobody = match found.retired {
+            0 => "Nobody has judged a result yet.",
+            _ => {
+                "Nobody has judged a result of a pair that counts; verdicts on retired pairs are kept (`status --retired`)."
+            }
+        };
+        return wrapped("", nobody) + &sentence.unwrap_or_default();
     }
     let mut blocks = Vec::new();
     if found.reviewer_pairs.is_empty() {
@@ -127,5 +133,11 @@ mod tests {
         found.reviewers.clear();
         let nobody = "Nobody has judged a result yet.\n";
         assert_eq!(agreement_text(&found), nobody);
+        found.retired = 2;
+        let text = agreement_text(&found);
+        assert!(
+            text.starts_with("Nobody has judged a result of a pair that counts; verdicts on retired"),
+            "{text}"
+        );
     }
 }
