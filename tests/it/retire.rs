@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::block_view::finished_block;
+use crate::check::done;
 use crate::cli::{call, mocban};
 use crate::processes::Running;
 use crate::resume::{project, results, run};
@@ -51,6 +52,44 @@ fn counts(dir: &Path) -> ProjectCounts {
         names: names["pairs"].as_array().expect("names").len(),
         exported: lines.lines().count(),
     }
+}
+
+#[test]
+fn commands_on_a_project_whose_pairs_are_all_retired_say_so() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    done(dir.path());
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
+    at(&["retire", "upright-0000", "upright-0001"]).expect(0);
+    let clause = "all 2 pairs of the project are retired";
+    for (args, code) in [
+        (&["report"][..], 0),
+        (&["report", "--require-complete"], 21),
+        (&["run"], 0),
+        (&["run", "--dry-run"], 0),
+        (&["export", "-o", "out"], 0),
+        (&["export", "-o", "out", "--only", "confident"], 4),
+        (&["contact-sheet"], 4),
+        (&["review", "--reviewer", "lan", "--no-open"], 4),
+    ] {
+        let call = at(args).expect(code);
+        let text = [call.out, call.err].concat().replace('\n', " ");
+        assert!(text.contains(clause), "{args:?}: {text}");
+        assert!(!text.contains("import"), "{args:?}: {text}");
+    }
+    for command in ["run", "status"] {
+        let text = at(&[command]).expect(0).err;
+        assert!(
+            text.contains("next: mocban -C p status --retired"),
+            "{text}"
+        );
+    }
+    let agreement = at(&["agreement"]).expect(0).out;
+    assert!(
+        agreement.starts_with("Nobody has judged a result of a pair that counts;"),
+        "{agreement}"
+    );
+    let report = at(&["report", "--format", "json"]).expect(0).json();
+    assert_eq!(report["retired"], 2);
 }
 
 #[test]

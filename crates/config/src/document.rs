@@ -10,6 +10,7 @@ use super::sources::Preset;
 use super::tree::{Setting, Tree};
 use mocban_align::stages::Settings;
 use mocban_core::InputLimits;
+use mocban_core::domain::value_error_text;
 
 /// Every setting as a typed value. [`Tree`] has already refused unknown sections and keys.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -102,7 +103,11 @@ fn blame(changes: &[Setting], error: &toml::de::Error) -> ConfigError {
     for change in changes {
         tree.apply(change);
         if let Err(error) = read(&tree) {
-            return change.invalid(error.message().trim_end());
+            let why = value_error_text(error.message().trim_end());
+            return match why.strip_prefix(&change.value.to_string()) {
+                Some(rest) => change.refused(rest),
+                None => change.invalid(&why),
+            };
         }
     }
     ConfigError::BuiltIn(error.message().to_owned())

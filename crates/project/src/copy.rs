@@ -48,7 +48,8 @@ async fn warn_about_inputs(to: &str, listener: &dyn Listener) {
         return;
     };
     if let Some(missing) = missing_inputs::of_new_project(&project, &catalog).await {
-        let text = format!("{missing}; put copies of the input files at the same places below {to}");
+        let text =
+            format!("{missing}; put copies of the input files at the same places below {to}");
         warn(listener, text);
     }
     catalog.close().await;

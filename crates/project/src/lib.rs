@@ -71,6 +71,8 @@ pub mod status;
 pub mod truth_file;
 mod unread_files;
 pub mod verdict_file;
+mod verdict_json;
+pub mod verdict_row;
 pub mod verdict_words;
 pub mod verdicts;
 pub mod worker_totals;

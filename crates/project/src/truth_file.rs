@@ -167,7 +167,7 @@ mod tests {
             let other = LINE.replace(&format!("\"{field}\""), "\"other\"");
             let refused = read(&other).expect_err(field);
             assert!(
-                refused.contains(&format!("missing field `{field}`")),
+                refused.contains(&format!("{field} is missing")),
                 "{refused}"
             );
         }

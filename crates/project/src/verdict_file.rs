@@ -3,27 +3,22 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
-use std::ops::RangeInclusive;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use csv::StringRecord;
-use serde::Deserialize;
-use serde_json::Value;
 
 use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use super::location::now;
+use super::verdict_json::json_rows;
+use super::verdict_row::{GivenTime, VerdictRow, at_line};
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
-use mocban_core::domain::{
-    ContentHash, PairName, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict,
-};
+use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
-use mocban_lists::json_numbers::nan_as_null;
 use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, later_header, trimmed};
 use mocban_lists::quotes::check_quotes;
-use mocban_system::time_text::parse_utc;
 
 /// The columns, and their other names in English and Vietnamese. Every file must have the first three.
 const COLUMNS: KnownColumns = KnownColumns {
@@ -52,56 +47,6 @@ const COLUMNS: KnownColumns = KnownColumns {
     ],
 };
 const REQUIRED: usize = 3;
-const DAY_MS: UnixMillis = 24 * 60 * 60 * 1000;
-
-/// The fields of the log of verdicts, which JSON Lines may have.
-const LOG_FIELDS: [&str; 17] = [
-    "id",
-    "act",
-    "pair",
-    "metric",
-    "result_hash",
-    "verdict",
-    "reviewer",
-    "reason",
-    "note",
-    "event",
-    "seen",
-    "shown_ms",
-    "angle_read_deg",
-    "review_order",
-    "at",
-    "undone_at",
-    "current",
-];
-
-/// Returns the name of a word, or a sentence with the names that there are.
-type NameOfWord = fn(&str) -> Result<&'static str, String>;
-
-/// The fields of JSON that have one of a few names.
-const NAMED: [(&str, NameOfWord); 3] = [
-    ("verdict", |text| {
-        verdict_words::verdict(text).map(Verdict::name)
-    }),
-    ("reason", |text| {
-        verdict_words::reason(text).map(Reason::name)
-    }),
-    ("metric", |text| {
-        verdict_words::metric(text).map(ThresholdMetric::name)
-    }),
-];
-
-/// One verdict and its line number.
-#[derive(Debug, Clone, PartialEq)]
-pub struct VerdictRow {
-    /// Number of the line, from 1.
-    pub line: usize,
-    /// The verdict, and the result that it judges if the file names it.
-    pub listed: ListedVerdict,
-    /// Fields of an object of JSON that no verdict has.
-    pub unread: Vec<String>,
-}
-
 /// The text of a verdict file. Its rows are parsed whenever they are needed, so that a long file takes little memory.
 #[derive(Debug, Clone)]
 pub struct VerdictList {
@@ -119,9 +64,6 @@ impl AsRef<[u8]> for ListText {
         &self.0
     }
 }
-
-/// The time of a verdict, and its day if no more is known.
-type GivenTime = (Option<UnixMillis>, Option<RangeInclusive<UnixMillis>>);
 
 /// Rows of a file, up to the first invalid line.
 type VerdictRows = Box<dyn Iterator<Item = Result<VerdictRow, RefusedLine>> + Send>;
@@ -174,17 +116,30 @@ fn csv_rows(
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter)
         .trim(csv::Trim::All)
+        .flexible(true)
         .from_reader(Cursor::new(text.clone()));
     let headers = reader.headers().map_err(|error| csv_error(&error, &text))?;
     let mut lines = LineCounter::new(text.clone());
     let line = lines.at(headers.position());
     let below = later_header(text.as_ref(), (delimiter, line), &COLUMNS, REQUIRED);
     let positions = positions(headers, line, below)?;
-    Ok(reader.into_records().map(move |record| {
+    let columns = headers.len();
+    let mut parse = move |record: Result<StringRecord, csv::Error>| {
         let record = record.map_err(|error| csv_error(&error, &text))?;
+        // Spreadsheet programs append rows of empty cells.
+        if record.iter().all(|cell| trimmed(cell).is_empty()) {
+            return Ok(None);
+        }
         let line = lines.at(record.position());
-        row(&record, line, &positions)
-    }))
+        if record.len() != columns {
+            let cells = record.len();
+            let reason = format!("{cells} cells where the header has {columns}");
+            return Err(RefusedLine::new(line, &reason));
+        }
+        row(&record, line, &positions).map(Some)
+    };
+    let records = reader.into_records();
+    Ok(records.filter_map(move |record| parse(record).transpose()))
 }
 
 /// Refuses a row with values that no verdict has.
@@ -298,8 +253,12 @@ fn row(
     };
     let metric = |text| at_line(line, verdict_words::metric(text));
     let reason = |text| at_line(line, verdict_words::reason(text));
-    let given = cell(6).map(|text| time(text, now(), line)).transpose()?;
-    let (at, day) = given.unwrap_or_default();
+    let time = |text| at_line(line, GivenTime::parse(text, now()));
+    let GivenTime {
+        at,
+        day,
+        is_day_first,
+    } = cell(6).map(time).transpose()?.unwrap_or_default();
     let verdict = NewVerdict {
         pair: value(required(0)?, line)?,
         verdict: at_line(line, verdict_words::verdict(required(1)?))?,
@@ -315,34 +274,12 @@ fn row(
         judged: None,
         day,
     };
-    let unread = Vec::new();
     Ok(VerdictRow {
         line,
         listed,
-        unread,
+        unread: Vec::new(),
+        is_day_first,
     })
-}
-
-/// Names the line of what was not understood.
-fn at_line<T>(line: usize, parsed: Result<T, String>) -> Result<T, RefusedLine> {
-    parsed.map_err(|reason| RefusedLine::new(line, &reason))
-}
-
-/// Parses a time. A day alone is returned as such, too, and counts as its end, because the reviewer may have given an earlier
-/// verdict in the app on the same day. Until this end, it counts as the time of the import, which is `None`; a day that has
-/// only begun in other time zones counts as its begin.
-fn time(text: &str, now: UnixMillis, line: usize) -> Result<GivenTime, RefusedLine> {
-    let at = parse_utc(text).ok_or_else(|| {
-        let reason =
-            format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
-        RefusedLine::new(line, &reason)
-    })?;
-    if text.contains(['T', 't', ' ', ':']) {
-        return Ok((Some(at), None));
-    }
-    let day = at..=at + DAY_MS - 1;
-    let at = (!day.contains(&now)).then_some(if now < at { at } else { *day.end() });
-    Ok((at, Some(day)))
 }
 
 fn value<T>(text: &str, line: usize) -> Result<T, RefusedLine>
@@ -356,94 +293,10 @@ where
 fn csv_error(error: &csv::Error, text: &ListText) -> RefusedLine {
     let line = LineCounter::new(text.clone()).at(error.position());
     let reason = match error.kind() {
-        csv::ErrorKind::UnequalLengths {
-            expected_len, len, ..
-        } => format!("{len} cells where the header has {expected_len}"),
         csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8; save it as \"CSV UTF-8\"".to_owned(),
         _ => error.to_string(),
     };
     RefusedLine::new(line, &reason)
-}
-
-/// A line written by `verdict log --json` or an export.
-#[derive(Debug, Deserialize)]
-struct VerdictLine {
-    #[serde(flatten)]
-    verdict: NewVerdict,
-    result_hash: Option<ContentHash>,
-    undone_at: Option<UnixMillis>,
-    #[serde(flatten)]
-    fields: BTreeMap<String, Value>,
-}
-
-/// Parses a JSON Lines file. Undone verdicts are ignored.
-fn json_rows(text: ListText) -> impl Iterator<Item = Result<VerdictRow, RefusedLine>> + Send {
-    let mut at = 0;
-    let next_line = move || {
-        let rest = text.as_ref().get(at..).filter(|rest| !rest.is_empty())?;
-        let line = rest.split(|byte| *byte == b'\n').next()?;
-        at += line.len() + 1;
-        let is_blank = line.trim_ascii().is_empty();
-        Some((!is_blank).then(|| parsed(line)))
-    };
-    let lines = (1..).zip(std::iter::from_fn(next_line));
-    let parsed = lines.filter_map(|(line, parsed)| Some((line, parsed?)));
-    parsed.filter_map(|(line, parsed)| json_row(line, parsed).transpose())
-}
-
-/// Parses a line. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons and metrics may be those of the
-/// review page and in any case.
-///
-/// # Errors
-/// Returns a sentence about what was not understood.
-fn parsed(line: &[u8]) -> Result<VerdictLine, String> {
-    let read = serde_json::from_slice(line).or_else(|error| {
-        let text = std::str::from_utf8(line).ok().and_then(nan_as_null);
-        text.map_or(Err(error), |text| serde_json::from_str(&text))
-    });
-    let UniqueKeys(mut value) = read.map_err(|error| json_error(&error))?;
-    for (field, name) in NAMED {
-        if let Some(Value::String(text)) = value.get_mut(field) {
-            *text = name(text)?.to_owned();
-        }
-    }
-    serde_json::from_value(value).map_err(|error| json_error(&error))
-}
-
-/// Returns the row of a parsed line, or `None` if the verdict was undone.
-fn json_row(
-    line: usize,
-    parsed: Result<VerdictLine, String>,
-) -> Result<Option<VerdictRow>, RefusedLine> {
-    let VerdictLine {
-        mut verdict,
-        result_hash: judged,
-        undone_at,
-        fields,
-    } = at_line(line, parsed)?;
-    verdict.reviewer = person_name(&verdict.reviewer);
-    if verdict.reviewer.is_empty() {
-        return Err(RefusedLine::new(line, "reviewer is empty"));
-    }
-    let listed = ListedVerdict {
-        verdict,
-        judged,
-        day: None,
-    };
-    let fields = fields.into_keys();
-    let unread = fields.filter(|field| !LOG_FIELDS.contains(&field.as_str()));
-    Ok(undone_at.is_none().then(|| VerdictRow {
-        line,
-        listed,
-        unread: unread.collect(),
-    }))
-}
-
-/// Returns the parser's message without its line number, which is always 1 because lines are parsed one by one.
-fn json_error(error: &serde_json::Error) -> String {
-    let message = error.to_string();
-    let reason = message.split(" at line ").next().unwrap_or(&message);
-    reason.to_owned()
 }
 
 #[cfg(test)]

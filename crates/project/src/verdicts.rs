@@ -9,7 +9,8 @@ use crate::files::{self, ListFile, MAX_SHOWN, RefusedLine};
 use crate::location::{Location, now};
 use crate::reviewers;
 use crate::selection;
-use crate::verdict_file::{self, VerdictList, VerdictRow};
+use crate::verdict_file::{self, VerdictList};
+use crate::verdict_row::VerdictRow;
 use mocban_catalog::{
     Catalog, CatalogError, FaultyRow, ImportedVerdicts, ListedVerdict, NewVerdict, Shown,
     VerdictEvent, person_name,
@@ -161,6 +162,7 @@ pub async fn import(
         reviewers,
         mut refused,
         unread,
+        day_first,
     } = NamesInList::read(&list);
     let names: Vec<_> = first_lines.keys().cloned().collect();
     let unknown = catalog.unknown_names(&names).await?;
@@ -194,12 +196,18 @@ pub async fn import(
         let row = list.rows().nth(usize::try_from(position).ok()?)?;
         row.ok().map(|row| row.line)
     });
+    let day_first = day_first.map(|line| {
+        format!(
+            "dates such as the one on line {line} are read with the day first, as in 21/11/2026"
+        )
+    });
     let unread = verdict_file::unread_fields(&unread);
-    let unread = unread.map(|text| format!("{}: {text}", file.display()));
+    let read = [day_first, unread].into_iter().flatten();
+    let read = read.map(|text| format!("{}: {text}", file.display()));
     Ok(VerdictFileImport {
         counts,
         first_older,
-        warnings: warning.into_iter().chain(unread).collect(),
+        warnings: warning.into_iter().chain(read).collect(),
     })
 }
 
@@ -214,6 +222,8 @@ struct NamesInList {
     refused: Vec<RefusedLine>,
     /// The first line of each field that is not read.
     unread: BTreeMap<String, usize>,
+    /// The first line with a date that is read with the day first.
+    day_first: Option<usize>,
 }
 
 impl NamesInList {
@@ -229,7 +239,11 @@ impl NamesInList {
                     line,
                     listed,
                     unread,
+                    is_day_first,
                 }) => {
+                    if is_day_first {
+                        names.day_first.get_or_insert(line);
+                    }
                     for field in unread {
                         // More than these are not shown, however many a file has.
                         if names.unread.len() < MAX_SHOWN {

@@ -19,7 +19,9 @@ pub(super) fn headline(report: &Report) -> Vec<String> {
         let retired = all_retired(report.pairs, report.retired);
         let sentence = match (retired, blocks) {
             (Some(retired), _) => {
-                format!("There is nothing to report: {retired}; `mocban status --retired` says why.")
+                format!(
+                    "There is nothing to report: {retired}; `mocban status --retired` says why."
+                )
             }
             (None, Some(blocks)) => format!("The project has no pairs yet: {blocks}."),
             (None, None) => "The project has no pairs yet; `mocban import` adds them.".to_owned(),
@@ -277,15 +279,19 @@ mod tests {
         ] {
             let mut report = ReportAccumulator::default();
             report.set_retired(retired);
-            let sentence =
-                format!("There is nothing to report: {clause}; `mocban status --retired` says why.");
+            let sentence = format!(
+                "There is nothing to report: {clause}; `mocban status --retired` says why."
+            );
             assert_eq!(headline(&report.finish()), [sentence]);
         }
         let mut report = ReportAccumulator::default();
         report.set_retired(2);
         report.add(&test_fixtures::pending("a"), &TruthEvaluation::default());
         let found = headline(&report.finish());
-        assert!(found[0].starts_with("The only pair is not aligned"), "{found:?}");
+        assert!(
+            found[0].starts_with("The only pair is not aligned"),
+            "{found:?}"
+        );
     }
 
     #[test]

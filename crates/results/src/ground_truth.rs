@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use mocban_core::domain::{Affine2, PairName, PrintFromMesh, Rigid3};
+use mocban_core::domain::{Affine2, PairName, PrintFromMesh, Rigid3, value_error_text};
 
 /// A result passes only if its angle error is at most this number of degrees (the paper's rule).
 pub const MAX_ANGLE_DEG: f64 = 5.0;
@@ -110,8 +110,8 @@ impl TruthRecord {
     /// # Errors
     /// Returns an error if the value is not a record, or if its plane, map, landmarks or height are degenerate.
     pub fn read(value: &serde_json::Value) -> Result<Self, TruthError> {
-        let record =
-            Self::deserialize(value).map_err(|error| TruthError::Form(error.to_string()))?;
+        let record = Self::deserialize(value)
+            .map_err(|error| TruthError::Form(value_error_text(&error.to_string())))?;
         let tangents = record.tangents()?;
         if record.landmarks.is_empty() {
             return Err(TruthError::NoLandmarks);

@@ -49,6 +49,29 @@ pub fn parse_utc(text: &str) -> Option<i64> {
     time.map(Timestamp::as_millisecond).ok()
 }
 
+/// Parses a time that is written with the day first, as spreadsheets write it: `21/11/2026` or `21.11.2026 04:10:03`. `None`
+/// for other forms. The time is in UTC.
+pub fn parse_day_first(text: &str) -> Option<i64> {
+    let (date, time) = text.split_once(' ').unwrap_or((text, "00:00"));
+    let parts: Vec<&str> = date.split(['/', '.', '-']).collect();
+    let [day, month, year] = parts[..] else {
+        return None;
+    };
+    let is_number = |text: &str, digits: std::ops::RangeInclusive<usize>| {
+        digits.contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit())
+    };
+    let is_date = is_number(day, 1..=2) && is_number(month, 1..=2) && is_number(year, 4..=4);
+    let hour = time.trim().split(':').next().unwrap_or_default();
+    let time = if hour.len() == 1 {
+        format!("0{}", time.trim())
+    } else {
+        time.trim().to_owned()
+    };
+    is_date
+        .then(|| parse_utc(&format!("{year}-{month:0>2}-{day:0>2} {time}")))
+        .flatten()
+}
+
 /// Formats a duration in the unit that fits: `480 ms`, `12.3 s`, `4 min 05 s`, `2 h 03 min`.
 pub fn duration(ms: u64) -> String {
     let seconds = ms / 1000;
@@ -72,7 +95,7 @@ pub fn rough_duration(ms: u64) -> String {
 mod tests {
     use jiff::tz::{Offset, TimeZone};
 
-    use super::{day, day_first_in_zone, duration, file_time, in_zone, parse_utc};
+    use super::{day, day_first_in_zone, duration, file_time, in_zone, parse_day_first, parse_utc};
 
     #[test]
     fn known_times_are_formatted_with_their_zone() {
@@ -91,6 +114,31 @@ mod tests {
         );
         assert_eq!(day(1_795_234_203_999), "2026-11-21");
         assert_eq!(file_time(1_795_234_203_999), "2026-11-21 041003");
+    }
+
+    #[test]
+    fn dates_of_spreadsheets_have_the_day_first() {
+        for text in [
+            "21/11/2026 04:10:03",
+            "21.11.2026 4:10:03",
+            "21-11-2026  04:10:03",
+        ] {
+            assert_eq!(parse_day_first(text), Some(1_795_234_203_000), "{text}");
+        }
+        assert_eq!(parse_day_first("29/2/2000"), Some(951_782_400_000));
+        for text in [
+            "11/21/2026",
+            "29/2/2001",
+            "2026-11-21",
+            "21/11/26",
+            "21/11",
+            "+1/11/2026",
+            "21/11/2026 soon",
+            "21/11/2026 4",
+            "",
+        ] {
+            assert_eq!(parse_day_first(text), None, "{text}");
+        }
     }
 
     #[test]

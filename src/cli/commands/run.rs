@@ -165,7 +165,9 @@ const fn rerun_text(rerun: RerunPolicy) -> &'static str {
 /// Returns a number of bytes as [`bytes`] parses it.
 fn size_text(bytes: u64) -> String {
     let units = [(40, "T"), (30, "G"), (20, "M"), (10, "K")];
-    let whole = units.into_iter().find(|(shift, _)| bytes % (1 << shift) == 0);
+    let whole = units
+        .into_iter()
+        .find(|(shift, _)| bytes % (1 << shift) == 0);
     let (shift, unit) = whole.unwrap_or((0, ""));
     format!("{}{unit}", bytes >> shift)
 }
@@ -228,13 +230,12 @@ fn warn_about_missing(
 }
 
 /// Prints what `command` would run.
-fn print_plan(
-    preview: &RunPreview,
-    command: &str,
-    context: &Context,
-) -> ProjectResult<ExitCode> {
+fn print_plan(preview: &RunPreview, command: &str, context: &Context) -> ProjectResult<ExitCode> {
     let RunPreview {
-        plan: RunPlan { blocks, pairs: plan },
+        plan: RunPlan {
+            blocks,
+            pairs: plan,
+        },
         is_running,
         counts,
         ..

@@ -40,6 +40,7 @@ pub mod test_values;
 mod transform;
 mod unique_keys;
 mod unit;
+mod value_error;
 mod verdict;
 mod worker_metrics;
 
@@ -86,6 +87,7 @@ pub use transform::{Affine2, PrintFromMesh, Rigid3};
 pub use unique_keys::KEY_TWICE;
 pub use unique_keys::UniqueKeys;
 pub use unit::LengthUnit;
+pub use value_error::value_error_text;
 pub use verdict::{Reason, Verdict};
 pub use worker_metrics::{ComputeTimes, WaitReason, WorkerMetrics};
 

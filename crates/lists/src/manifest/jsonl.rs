@@ -13,7 +13,7 @@ use super::row::{COLUMNS, ManifestRow, ReadRows};
 use super::text::{as_utf8, trimmed};
 use crate::columns::HeaderColumns;
 use crate::json_numbers::{nan_as_null, unknown_number};
-use mocban_core::domain::{KEY_TWICE, UniqueKeys, sanitize};
+use mocban_core::domain::{KEY_TWICE, UniqueKeys, sanitize, value_error_text};
 
 /// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` counts as no value. Blank lines are ignored.
 ///
@@ -184,6 +184,7 @@ fn wrong_json(error: &serde_json::Error, first: usize, text: &str) -> String {
     if reason.ends_with(KEY_TWICE) {
         return reason.to_owned();
     }
+    let reason = value_error_text(reason);
     if text.contains('\n') {
         let line = first + error.line().max(1) - 1;
         return format!("not a JSON object, line {line}: {reason}");
@@ -246,8 +247,7 @@ mod tests {
         );
         assert_eq!(
             refused.expect_err("refused").to_string(),
-            "line 3: not a JSON object, line 4: expected value\nline 5: not a JSON object, column 1: invalid type: \
-             integer `3`, expected a map"
+            "line 3: not a JSON object, line 4: expected value\nline 5: not a JSON object, column 1: 3 is not an object"
         );
         let short = parse("[{\"id\":\"a\",\"mesh\":\"m\",\"print\":\"p\"}").expect_err("refused");
         assert_eq!(

@@ -15,7 +15,9 @@ pub(super) fn headline(visit: &Visit, report: &Report) -> Vec<String> {
         Language::English => plain(&report.headline),
         Language::Vietnamese if report.pairs == 0 && report.retired > 0 => {
             let retired = grouped(report.retired);
-            vec![format!("Không có gì để báo cáo: mọi cặp của dự án ({retired}) đã được đưa ra khỏi thống kê.")]
+            vec![format!(
+                "Không có gì để báo cáo: mọi cặp của dự án ({retired}) đã được đưa ra khỏi thống kê."
+            )]
         }
         Language::Vietnamese if report.pairs == 0 => {
             vec!["Dự án chưa có cặp nào: hãy thêm ở trang Nhập dữ liệu.".to_owned()]

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{
-    RefusedLine, VerdictList, VerdictRow, check_values, time, unknown_pairs, unread_fields,
-};
+use super::{RefusedLine, VerdictList, VerdictRow, check_values, unknown_pairs, unread_fields};
 use mocban_core::domain::{PairName, Reason, ThresholdMetric, Verdict};
 
 fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
@@ -82,33 +80,23 @@ fn times_are_parsed_and_other_texts_refused() {
     let rows = rows.expect("valid");
     assert_eq!(rows[0].listed.verdict.at, Some(1_795_234_203_000));
     assert_eq!(rows[1].listed.verdict.at, None);
+    for (text, at) in [
+        ("21/11/2026 04:10:03", 1_795_234_203_000),
+        ("1.2.2026", 1_769_990_399_999),
+    ] {
+        let csv = format!("pair,verdict,reviewer,at\n1,pass,lan,{text}\n");
+        let json = format!(r#"{{"pair":"1","verdict":"pass","reviewer":"lan","at":"{text}"}}"#);
+        let csv = parse_csv(csv.as_bytes()).expect("valid").remove(0);
+        let json = parse_jsonl(json.as_bytes()).expect("valid").remove(0);
+        assert_eq!(csv.listed.verdict.at, Some(at), "{text}");
+        assert!(csv.is_day_first && json.is_day_first);
+        assert_eq!(json.listed, csv.listed, "{text}");
+    }
     let refused = error("pair,verdict,reviewer,at\n1,pass,lan,yesterday\n");
     assert!(
         refused.starts_with("line 2: at is \"yesterday\""),
         "{refused}"
     );
-}
-
-#[test]
-fn a_day_without_a_time_counts_as_its_end_and_today_as_the_time_of_the_import() {
-    let begin = 1_795_219_200_000;
-    let length = 24 * 60 * 60 * 1000;
-    let day = Some(begin..=begin + length - 1);
-    let given = |text, now| time(text, now, 2).expect("a time");
-    for (now, at) in [
-        (begin + length, Some(begin + length - 1)),
-        (begin + length - 1, None),
-        (begin, None),
-        // It has begun in another time zone.
-        (begin - 1000, Some(begin)),
-        // The import refuses it.
-        (begin - 2 * length, Some(begin)),
-    ] {
-        assert_eq!(given("2026-11-21", now), (at, day.clone()), "{now}");
-    }
-    for text in ["2026-11-21 00:00:00", "2026-11-21T00:00:00Z"] {
-        assert_eq!(given(text, begin + 1000), (Some(begin), None));
-    }
 }
 
 #[test]
@@ -126,6 +114,9 @@ fn files_of_spreadsheets_are_read() {
     }
     let cut = parse_csv(&utf16[..utf16.len() - 1]).expect_err("truncated");
     assert!(cut.to_string().contains("UTF-16"), "{cut}");
+    let empty = "pair;verdict;reviewer;note\r\n;;;\r\n1;pass;lan;a, b\r\n; ;\u{a0};\r\n;;;;;;\r\n";
+    let rows = parse_csv(empty.as_bytes()).expect("rows without cells are skipped");
+    assert_eq!((rows.len(), rows[0].line), (1, 3));
     let latin = parse_csv(b"pair;verdict;reviewer\n1;pass;Nguy\xean\n").expect_err("not UTF-8");
     assert!(latin.to_string().contains("CSV UTF-8"), "{latin}");
 }
@@ -289,7 +280,7 @@ fn json_lines_are_read_back_without_undone_verdicts() {
 fn words_of_json_lines_may_be_capitals_or_vietnamese() {
     let plain =
         r#"{"pair":"1","verdict":"fail","reviewer":"lan","metric":"nl_ssim","reason":"angle"}"#;
-    let words = r#"{"pair":"1","verdict":"Không đạt","reviewer":"lan","metric":"NL-SSIM","reason":"Sai góc"}"#;
+    let words = r#"{"pair":1,"note":" ","verdict":"Không đạt","reviewer":"lan","metric":"NL-SSIM","reason":"Sai góc"}"#;
     let read = |line: &str| parse_jsonl(line.as_bytes()).expect("valid");
     assert_eq!(read(words), read(plain));
     for (old, new, why) in [
@@ -337,8 +328,28 @@ fn invalid_json_line_is_reported_by_number() {
             r#"{"pair":"1","verdict":"pass","reviewer":" "}"#,
             "reviewer is empty",
         ),
-        (r#"{"pair":"1","verdict":"pass"}"#, "reviewer"),
-        ("pass", "expected"),
+        (
+            r#"{"pair":"1","verdict":"pass","reviewer":null}"#,
+            "reviewer is empty",
+        ),
+        (r#"{"pair":"1","verdict":"pass"}"#, "reviewer is missing"),
+        (
+            r#"{"pair":["1"],"verdict":"pass","reviewer":"lan"}"#,
+            "pair is [\"1\"], not text",
+        ),
+        (
+            r#"{"pair":"1","verdict":"pass","reviewer":"lan","angle_read_deg":"2,5"}"#,
+            "\"2,5\" is not a number; write 2.5",
+        ),
+        (
+            r#"{"pair":"1","verdict":"pass","reviewer":"lan","at":"yesterday"}"#,
+            "at is \"yesterday\", not a time such as",
+        ),
+        (
+            "[1]",
+            "each line is a JSON object with pair, verdict and reviewer",
+        ),
+        ("pass", "not a JSON object, column 1: expected value"),
     ] {
         let text = format!("{good}\n{line}\n");
         let error = parse_jsonl(text.as_bytes())

@@ -136,7 +136,9 @@ mod tests {
         found.retired = 2;
         let text = agreement_text(&found);
         assert!(
-            text.starts_with("Nobody has judged a result of a pair that counts; verdicts on retired"),
+            text.starts_with(
+                "Nobody has judged a result of a pair that counts; verdicts on retired"
+            ),
             "{text}"
         );
     }

@@ -1,0 +1,173 @@
+//! Parses verdicts in JSON Lines, such as those of an export, one object on each line.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+use super::files::RefusedLine;
+use super::location::now;
+use super::verdict_row::{GivenTime, VerdictRow, at_line};
+use super::verdict_words;
+use mocban_catalog::{ListedVerdict, NewVerdict, person_name};
+use mocban_core::domain::{
+    ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
+};
+use mocban_lists::json_numbers::nan_as_null;
+
+/// The fields of the log of verdicts, which JSON Lines may have.
+const LOG_FIELDS: [&str; 17] = [
+    "id",
+    "act",
+    "pair",
+    "metric",
+    "result_hash",
+    "verdict",
+    "reviewer",
+    "reason",
+    "note",
+    "event",
+    "seen",
+    "shown_ms",
+    "angle_read_deg",
+    "review_order",
+    "at",
+    "undone_at",
+    "current",
+];
+
+/// Returns the text of a field as the catalog has it, or a sentence about what it may be.
+type StoredText = fn(&str) -> Result<String, String>;
+
+/// The fields with texts, and how each is read.
+const TEXTS: [(&str, StoredText); 6] = [
+    ("pair", |text| Ok(text.to_owned())),
+    ("verdict", |text| {
+        verdict_words::verdict(text).map(|verdict| Verdict::name(verdict).to_owned())
+    }),
+    ("reviewer", |text| Ok(person_name(text))),
+    ("reason", |text| {
+        verdict_words::reason(text).map(|reason| Reason::name(reason).to_owned())
+    }),
+    ("metric", |text| {
+        verdict_words::metric(text).map(|metric| ThresholdMetric::name(metric).to_owned())
+    }),
+    ("note", |text| Ok(text.to_owned())),
+];
+/// The fields of [`TEXTS`] that every line has.
+const REQUIRED: [&str; 3] = ["pair", "verdict", "reviewer"];
+
+/// A line written by `verdict log --json` or an export.
+#[derive(Debug, Deserialize)]
+struct VerdictLine {
+    #[serde(flatten)]
+    verdict: NewVerdict,
+    result_hash: Option<ContentHash>,
+    undone_at: Option<UnixMillis>,
+    #[serde(flatten)]
+    fields: BTreeMap<String, Value>,
+}
+
+/// Parses a JSON Lines file. Undone verdicts are ignored.
+pub(crate) fn json_rows(
+    text: impl AsRef<[u8]> + Send,
+) -> impl Iterator<Item = Result<VerdictRow, RefusedLine>> + Send {
+    let mut at = 0;
+    let next_line = move || {
+        let rest = text.as_ref().get(at..).filter(|rest| !rest.is_empty())?;
+        let line = rest.split(|byte| *byte == b'\n').next()?;
+        at += line.len() + 1;
+        let is_blank = line.trim_ascii().is_empty();
+        Some((!is_blank).then(|| parsed(line)))
+    };
+    let lines = (1..).zip(std::iter::from_fn(next_line));
+    let parsed = lines.filter_map(|(line, parsed)| Some((line, parsed?)));
+    parsed.filter_map(|(line, parsed)| json_row(line, parsed).transpose())
+}
+
+/// Parses a line. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons, metrics and times may be as in
+/// CSV.
+///
+/// # Errors
+/// Returns a sentence about what was not understood.
+fn parsed(line: &[u8]) -> Result<(VerdictLine, GivenTime), String> {
+    let read = serde_json::from_slice(line).or_else(|error| {
+        let text = std::str::from_utf8(line).ok().and_then(nan_as_null);
+        text.map_or(Err(error), |text| serde_json::from_str(&text))
+    });
+    let UniqueKeys(value) = read.map_err(|error| json_error(&error))?;
+    let Value::Object(mut fields) = value else {
+        return Err("each line is a JSON object with pair, verdict and reviewer".to_owned());
+    };
+    for (field, stored) in TEXTS {
+        match text_of(&fields, field)? {
+            Some(text) => fields.insert(field.to_owned(), stored(&text)?.into()),
+            None if REQUIRED.contains(&field) => {
+                let is_there = fields.contains_key(field);
+                let what = if is_there { "empty" } else { "missing" };
+                return Err(format!("{field} is {what}"));
+            }
+            None => fields.remove(field),
+        };
+    }
+    let mut given = GivenTime::default();
+    if let Some(Value::String(text)) = fields.get("at") {
+        if !text.trim().is_empty() {
+            given = GivenTime::parse(text.trim(), now())?;
+        }
+        let at = given.at.map_or(Value::Null, Value::from);
+        fields.insert("at".to_owned(), at);
+    }
+    let read = serde_json::from_value(Value::Object(fields));
+    Ok((read.map_err(|error| json_error(&error))?, given))
+}
+
+/// Returns the text of a field without blanks at its ends, or `None` if there is none. Numbers are accepted, because ids are
+/// often numbers.
+fn text_of(fields: &Map<String, Value>, field: &str) -> Result<Option<String>, String> {
+    let text = match fields.get(field) {
+        None | Some(Value::Null) => return Ok(None),
+        Some(Value::String(text)) => text.trim().to_owned(),
+        Some(Value::Number(number)) => number.to_string(),
+        Some(other) => return Err(format!("{field} is {other}, not text")),
+    };
+    Ok((!text.is_empty()).then_some(text))
+}
+
+/// Returns the row of a parsed line, or `None` if the verdict was undone.
+fn json_row(
+    line: usize,
+    parsed: Result<(VerdictLine, GivenTime), String>,
+) -> Result<Option<VerdictRow>, RefusedLine> {
+    let (read, given) = at_line(line, parsed)?;
+    let VerdictLine {
+        verdict,
+        result_hash: judged,
+        undone_at,
+        fields,
+    } = read;
+    let listed = ListedVerdict {
+        verdict,
+        judged,
+        day: given.day,
+    };
+    let fields = fields.into_keys();
+    let unread = fields.filter(|field| !LOG_FIELDS.contains(&field.as_str()));
+    Ok(undone_at.is_none().then(|| VerdictRow {
+        line,
+        listed,
+        unread: unread.collect(),
+        is_day_first: given.is_day_first,
+    }))
+}
+
+/// Returns the parser's message without its line number, which is always 1 because lines are parsed one by one.
+fn json_error(error: &serde_json::Error) -> String {
+    let message = error.to_string();
+    let reason = message.split(" at line ").next().unwrap_or(&message);
+    if error.is_data() {
+        value_error_text(reason)
+    } else {
+        format!("not a JSON object, column {}: {reason}", error.column())
+    }
+}
