@@ -79,17 +79,8 @@ fn a_finished_copy_is_compared_and_never_written_to() {
         copies.push((first, second));
     }
     for (from, to) in &copies {
-        let call = copy(root, from, to).expect(0);
-        let made = call.json();
+        let made = copy(root, from, to).expect(0).json();
         assert_eq!(made["existed"], false);
-        // The folder of the original has the files.
-        let warning = "input files that were looked at are missing or have moved, first";
-        assert_eq!(
-            call.err.contains(warning),
-            !to.contains("://"),
-            "{}",
-            call.err
-        );
         let status = on(root, to, &["status", "--json"]).expect(0).json();
         assert_eq!(status["retired"], 1);
         let again = copy(root, from, to).expect(0);
@@ -116,13 +107,6 @@ fn a_finished_copy_is_compared_and_never_written_to() {
     for (_, to) in &copies {
         let refused = copy(root, "other", to).expect(2);
         assert!(refused.err.contains("holds another catalog"));
-    }
-    let plan = on(root, "file", &["run", "--dry-run"]).expect(0);
-    for part in [
-        "the depth maps and masks of the results are not here",
-        "4 of 4 input files that were looked at are missing or have moved",
-    ] {
-        assert!(plan.err.contains(part), "{}", plan.err);
     }
 }
 

@@ -85,3 +85,27 @@ fn metrics_are_named_in_any_case() {
         at(&project, &[command, "--metric", "RELIEF", "-o", &output]).expect(0);
     }
 }
+
+#[test]
+fn the_rows_of_a_list_are_undone_together() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let list =
+        "pair,verdict,reviewer,at\nupright-0000,fail,hoa,21/11/2024\nupright-0001,fail,hoa,\n,,,\n";
+    std::fs::write(project.dir().join("v.csv"), list).expect("written");
+    let taken = at(&project, &["verdict", "import", "v.csv"]).expect(0);
+    for says in [
+        "v.csv: dates such as the one on line 2 are read with the day first",
+        "2 verdicts recorded; `verdict undo --reviewer NAME --last N` takes back",
+    ] {
+        assert!(taken.err.contains(says), "{}", taken.err);
+    }
+    let undo = ["verdict", "undo", "--json", "--reviewer", "hoa", "--last"];
+    let undo = |last: &str| at(&project, &[&undo[..], &[last]].concat());
+    let undone = undo("3").expect(0).json()["undone"].clone();
+    // On four metrics each.
+    assert_eq!(undone.as_array().map(Vec::len), Some(8));
+    let status = at(&project, &["status", "--json"]).expect(0).json();
+    assert_eq!(status["verdicts"]["fail"], 0);
+    assert!(undo("1").code != 0);
+}

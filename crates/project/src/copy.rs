@@ -6,7 +6,6 @@ use crate::error::{ProjectError, ProjectResult};
 use crate::events::{Listener, LongWork, warn};
 use crate::exit::Refusal;
 use crate::location::{now, refuse_password, settings_of};
-use crate::missing_inputs;
 use crate::new_project::check_new_folder;
 use mocban_catalog::{Catalog, CatalogCopy, CatalogError};
 use mocban_core::domain::is_address;
@@ -33,26 +32,7 @@ pub async fn copy(from: &str, to: &str, listener: &dyn Listener) -> ProjectResul
     let copied = write(&source, from, to).await;
     drop(work);
     source.close().await;
-    let copied = copied?;
-    if !is_address(to) {
-        warn_about_inputs(to, listener).await;
-    }
-    Ok(copied)
-}
-
-/// Warns about input files that the project in a folder names and does not find, such as those below the folder of the
-/// original. What cannot be looked up is no error, because the copy is complete.
-async fn warn_about_inputs(to: &str, listener: &dyn Listener) {
-    let project = Project::at(Path::new(to));
-    let Ok(catalog) = Catalog::open_read_only(&project.catalog_path()).await else {
-        return;
-    };
-    if let Some(missing) = missing_inputs::of_new_project(&project, &catalog).await {
-        let text =
-            format!("{missing}; put copies of the input files at the same places below {to}");
-        warn(listener, text);
-    }
-    catalog.close().await;
+    copied
 }
 
 fn of_source(error: impl Into<ProjectError>, from: &str) -> ProjectError {

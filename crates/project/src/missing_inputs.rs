@@ -86,13 +86,6 @@ fn was_read(version: &InputVersion) -> bool {
     !version.is_gone()
 }
 
-/// Looks at the files of a project that was just made, as [`find`] does. What cannot be looked up is no error.
-pub async fn of_new_project(project: &Project, catalog: &Catalog) -> Option<MissingInputs> {
-    let jobs: u64 = catalog.counters().await.ok()?.values().sum();
-    let pairs = jobs + catalog.retired_count().await.ok()?;
-    find(project, catalog, pairs).await.ok().flatten()
-}
-
 fn among(project: &Project, paths: Vec<String>) -> Option<MissingInputs> {
     let looked_at = paths.len();
     let is_missing = |path: &String| {

@@ -9,8 +9,8 @@ use crate::failures::Failures;
 use crate::location::{Location, now};
 use crate::missing_inputs::{self, MissingInputs};
 use crate::selection;
-use crate::status::are_results_missing;
-use mocban_catalog::{Catalog, StatusCounts};
+use crate::status::{all_retired, are_results_missing};
+use mocban_catalog::Catalog;
 use mocban_config::Config;
 use mocban_core::domain::ErrorCode;
 use mocban_runner::{self as runner, RunOptions, RunPlan, RunSummary, Stop};
@@ -50,21 +50,6 @@ pub struct PreparedRun {
     catalog: Catalog,
     config: Box<Config>,
     options: RunOptions,
-}
-
-/// What a run would do.
-#[derive(Debug)]
-pub struct RunPreview {
-    /// What would run and why.
-    pub plan: RunPlan,
-    /// Whether another process works on the project.
-    pub is_running: bool,
-    /// Counts of pairs.
-    pub counts: StatusCounts,
-    /// Whether there are results, but none of their files.
-    pub are_results_missing: bool,
-    /// Input files that are no longer at their places.
-    pub missing_inputs: Option<MissingInputs>,
 }
 
 /// How a run ended.
@@ -117,23 +102,18 @@ impl PreparedRun {
         })
     }
 
-    /// Returns what would run and why, and what is missing.
-    pub async fn preview(self) -> ProjectResult<RunPreview> {
+    /// Returns a clause if all pairs are retired, so that nothing would run.
+    pub async fn all_retired(&self) -> ProjectResult<Option<String>> {
+        all_retired(&self.catalog).await
+    }
+
+    /// Returns what would run and why, and whether another process works on the project.
+    pub async fn plan(self) -> ProjectResult<(RunPlan, bool)> {
         let (project, catalog) = (&self.project, &self.catalog);
         let plan = runner::plan(project, catalog, &self.config.stages, &self.options).await?;
         let is_running = runner::is_running(project, catalog, now()).await?;
-        let fingerprints = runner::fingerprints(&self.config.stages);
-        let counts = catalog.status(&fingerprints).await?;
-        let pairs = counts.pairs + counts.retired;
-        let missing_inputs = missing_inputs::find(project, catalog, pairs).await?;
         self.catalog.close().await;
-        Ok(RunPreview {
-            plan,
-            is_running,
-            are_results_missing: are_results_missing(&self.project, &counts.jobs),
-            missing_inputs,
-            counts,
-        })
+        Ok((plan, is_running))
     }
 
     /// Runs until nothing is left or `stop` is set. Before that, warns if the method differs from that of the results.

@@ -293,9 +293,17 @@ pub async fn log(pair: Option<&str>, location: &Location) -> ProjectResult<Verdi
     Ok(VerdictLog { events, damaged })
 }
 
-/// Undoes the newest verdict of a reviewer, who need not be named if there is only one. The log keeps it, marked as undone.
-/// Returns the undone verdicts on all metrics.
-pub async fn undo(reviewer: Option<&str>, location: &Location) -> ProjectResult<Vec<VerdictEvent>> {
+/// Undoes up to `last` of the newest verdicts of a reviewer, who need not be named if there is only one. The log keeps them,
+/// marked as undone. Returns the undone verdicts on all metrics.
+///
+/// # Errors
+/// Returns an error if there is none to undo, several people have verdicts and none is named, the user of the database may
+/// not undo it, or the catalog fails.
+pub async fn undo(
+    reviewer: Option<&str>,
+    last: u32,
+    location: &Location,
+) -> ProjectResult<Vec<VerdictEvent>> {
     let (_project, catalog) = location.open().await?;
     let rights = catalog.review_rights().await?;
     let reviewer = reviewer.or(rights.only_reviewer());
@@ -303,7 +311,14 @@ pub async fn undo(reviewer: Option<&str>, location: &Location) -> ProjectResult<
     if reviewer.is_none() {
         reviewers::refuse_several(&catalog).await?;
     }
-    let undone = catalog.verdict_undo(reviewer, now()).await?;
+    let mut undone = catalog.verdict_undo(reviewer, now()).await?;
+    for _ in 1..last {
+        match catalog.verdict_undo(reviewer, now()).await {
+            Ok(earlier) => undone.extend(earlier),
+            Err(CatalogError::NothingToUndo(_)) => break,
+            Err(error) => return Err(error.into()),
+        }
+    }
     catalog.close().await;
     Ok(undone)
 }

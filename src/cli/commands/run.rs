@@ -15,8 +15,7 @@ use mocban_catalog::RerunPolicy;
 use mocban_config::Config;
 use mocban_core::domain::Stage;
 use mocban_project::files;
-use mocban_project::missing_inputs::MissingInputs;
-use mocban_project::run::{self, PreparedRun, RunOutcome, RunPreview, TWO_METHODS};
+use mocban_project::run::{self, PreparedRun, RunOutcome, TWO_METHODS};
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{RunOptions, RunPart, RunPlan, RunSummary, Stop};
@@ -84,8 +83,10 @@ pub(crate) async fn execute(
     let terminal = Terminal::new(context);
     let prepared = PreparedRun::new(&names, options, args.dry_run, location, &terminal).await?;
     if args.dry_run {
-        let preview = prepared.preview().await?;
-        return print_plan(&preview, &command_without_dry_run(&args, &names), context);
+        let retired = prepared.all_retired().await?;
+        let (plan, running) = prepared.plan().await?;
+        let command = command_without_dry_run(&args, &names);
+        return print_plan(&plan, running, (&command, retired), context);
     }
     let serving = server.map(|server| server.serve(metrics, context));
     let outcome = drive(prepared, context).await;
@@ -95,11 +96,14 @@ pub(crate) async fn execute(
     json["schema"] = json!(1);
     context.print_json(&json)?;
     print_outcome(&outcome, context);
-    warn_about_missing(
-        outcome.are_results_missing,
-        outcome.missing_inputs.as_ref(),
-        context,
-    );
+    if outcome.are_results_missing {
+        context.warn(missing_results::TEXT);
+        context.next(missing_results::NEXT);
+    }
+    if let Some(missing) = &outcome.missing_inputs {
+        context.warn(&missing.to_string());
+        context.next("check");
+    }
     for command in next_steps(&outcome) {
         let command = match (part, command.as_str()) {
             (RunPart::Work, "run") => "worker",
@@ -213,50 +217,24 @@ pub(crate) const fn code(summary: &RunSummary) -> ExitCode {
     }
 }
 
-/// Warns about results and input files that are not at their places, with the command that helps.
-fn warn_about_missing(
-    are_results_missing: bool,
-    missing_inputs: Option<&MissingInputs>,
+/// Prints what `command` would run. `retired` says that all pairs are retired.
+fn print_plan(
+    plan: &RunPlan,
+    running: bool,
+    (command, retired): (&str, Option<String>),
     context: &Context,
-) {
-    if are_results_missing {
-        context.warn(missing_results::TEXT);
-        context.next(missing_results::NEXT);
-    }
-    if let Some(missing) = missing_inputs {
-        context.warn(&missing.to_string());
-        context.next("check");
-    }
-}
-
-/// Prints what `command` would run.
-fn print_plan(preview: &RunPreview, command: &str, context: &Context) -> ProjectResult<ExitCode> {
-    let RunPreview {
-        plan: RunPlan {
-            blocks,
-            pairs: plan,
-        },
-        is_running,
-        counts,
-        ..
-    } = preview;
-    let running = *is_running;
+) -> ProjectResult<ExitCode> {
+    let (blocks, plan) = (&plan.blocks, &plan.pairs);
     let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan, "blocks": blocks});
     context.print(&json, || {
         plan_text(plan, running) + &block_plan_text(blocks)
     })?;
+    if let Some(retired) = retired {
+        context.info(&retired);
+    }
     if plan.changes_method() {
         context.info(TWO_METHODS);
     }
-    if let Some(retired) = counts.all_retired() {
-        context.info(&retired);
-        context.next("status --retired");
-    }
-    warn_about_missing(
-        preview.are_results_missing,
-        preview.missing_inputs.as_ref(),
-        context,
-    );
     if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
         context.next(command);
     }

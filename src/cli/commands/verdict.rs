@@ -29,7 +29,7 @@ pub(crate) enum VerdictCommand {
     Import(VerdictImportArgs),
     /// Print the log, oldest first
     Log(VerdictLogArgs),
-    /// Undo a reviewer's newest verdict; the log keeps it, marked as undone
+    /// Undo a reviewer's newest verdict, or the last few; the log keeps them, marked as undone
     Undo(VerdictUndoArgs),
 }
 
@@ -90,6 +90,9 @@ pub(crate) struct VerdictUndoArgs {
     /// Only verdicts of this reviewer; may be left out if nobody else has verdicts
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(crate) reviewer: Option<String>,
+    /// Undo this many of the newest verdicts. One on several metrics counts once, and each row of an imported list is one
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) last: u32,
 }
 
 /// Parses an angle from -180 to 180 degrees.
@@ -205,7 +208,11 @@ async fn import(args: VerdictImportArgs, context: &Context) -> ProjectResult<Exi
     if known > 0 {
         context.info(&format!("{} already recorded", count(known, "verdict")));
     }
-    context.info(&format!("{} recorded", count(number, "verdict")));
+    let undo = match number {
+        0 | 1 => "",
+        _ => "; `verdict undo --reviewer NAME --last N` takes back the newest N of one reviewer",
+    };
+    context.info(&format!("{} recorded{undo}", count(number, "verdict")));
     context.next("report");
     Ok(ExitCode::Done)
 }
@@ -248,7 +255,7 @@ fn damaged_text(rows: &[FaultyRow], palette: Palette) -> String {
 }
 
 async fn undo(args: VerdictUndoArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let undone = verdicts::undo(args.reviewer.as_deref(), &context.location).await?;
+    let undone = verdicts::undo(args.reviewer.as_deref(), args.last, &context.location).await?;
     context.print_json(&json!({"schema": 1, "undone": undone}))?;
     for event in &undone {
         context.info(&format!(
