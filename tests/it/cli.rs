@@ -299,7 +299,11 @@ fn missing_files_cause_a_warning_by_line_and_fail_only_their_pairs() {
     assert_eq!(second["unchanged"], 1);
 
     let ran = mocban(dir.path(), &["-C", "p", "run"]).expect(3);
-    assert!(ran.err.contains("2 pairs failed"), "{}", ran.err);
+    assert!(ran.err.contains("2 pairs failed:"), "{}", ran.err);
+    let one = mocban(dir.path(), &["-C", "p", "run", "b"]).expect(3).err;
+    let heading = "1 pair failed in earlier runs:\n  io 1  b  at fit";
+    assert!(one.contains(heading) && !one.contains("a.stl"), "{one}");
+    assert!(one.contains(" show b\n"), "{one}");
     let status = mocban(dir.path(), &["-C", "p", "status", "--json"])
         .expect(0)
         .json();

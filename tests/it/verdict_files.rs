@@ -109,3 +109,29 @@ fn the_rows_of_a_list_are_undone_together() {
     assert_eq!(status["verdicts"]["fail"], 0);
     assert!(undo("1").code != 0);
 }
+
+#[test]
+fn lines_of_an_export_on_retired_pairs_are_known_or_refused() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let lines = at(&project, &["verdict", "log", "--json"]).expect(0).out;
+    std::fs::write(project.dir().join("v.jsonl"), &lines).expect("written");
+    at(&project, &["retire", "upright-0000"]).expect(0);
+    let import = || at(&project, &["verdict", "import", "v.jsonl", "--json"]);
+    let taken = import().expect(0);
+    let counts = ["recorded", "left_out", "known"].map(|key| taken.json()[key].as_u64());
+    assert_eq!(counts, [Some(0), Some(0), Some(4)]);
+    // By another reviewer, on the same results.
+    let other = lines.replace("\"lan\"", "\"hoa\"");
+    std::fs::write(project.dir().join("v.jsonl"), lines + &other).expect("written");
+    let refused = import().expect(2);
+    assert!(
+        refused
+            .err
+            .contains("line 5: pair upright-0000 was retired on"),
+        "{}",
+        refused.err
+    );
+    at(&project, &["retire", "--undo", "upright-0000"]).expect(0);
+    assert_eq!(import().expect(0).json()["recorded"], 4);
+}

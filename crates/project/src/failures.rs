@@ -1,11 +1,14 @@
 //! The failed pairs of a project by class, and its blocks.
 
+use std::collections::BTreeSet;
+
 use serde_json::{Value, json};
 
 use crate::block_status::BlockStatus;
 use crate::error::ProjectResult;
 use mocban_catalog::{Catalog, FailedPair, StoredFailure};
-use mocban_core::domain::FailureClass;
+use mocban_core::domain::{FailureClass, PairName};
+use mocban_runner::NamedWork;
 
 /// Maximum number of failed pairs that are read, unless all are requested.
 const READ_LIMIT: usize = 200;
@@ -45,6 +48,29 @@ impl Failures {
             pairs,
             blocks: BlockStatus(catalog.block_states().await?),
         })
+    }
+
+    /// Reads the failures of some pairs and blocks, and of the pairs of these blocks. `None` stands for all, as in
+    /// [`Failures::read`].
+    pub(crate) async fn of(catalog: &Catalog, only: Option<&NamedWork>) -> ProjectResult<Self> {
+        let mut failures = Self::read(catalog, only.is_some()).await?;
+        let Some(NamedWork { pairs, blocks }) = only else {
+            return Ok(failures);
+        };
+        let mut named: BTreeSet<PairName> = pairs.iter().cloned().collect();
+        for block in blocks {
+            named.extend(catalog.pairs_of_block_with_retired(block.as_str()).await?);
+        }
+        failures.pairs.retain(|pair| named.contains(&pair.name));
+        let states = &mut failures.blocks.0;
+        states.retain(|state| blocks.contains(&state.attributes.name));
+        for (class, number) in &mut failures.counts {
+            let pairs = failures.pairs.iter();
+            let of_class = pairs.filter(|pair| pair.failure.failure.class == *class);
+            *number = of_class.count() as u64;
+        }
+        failures.counts.retain(|(_, number)| *number > 0);
+        Ok(failures)
     }
 
     /// Returns whether a failed pair may succeed with the same files and settings. A run finds changed ones itself.

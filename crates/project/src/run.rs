@@ -57,7 +57,7 @@ pub struct PreparedRun {
 pub struct RunOutcome {
     /// What it did.
     pub summary: RunSummary,
-    /// What failed, in this run and earlier ones.
+    /// What failed, in this run and earlier ones, among what the run was of.
     pub failures: Failures,
     /// Whether there are results, but none of their files.
     pub are_results_missing: bool,
@@ -141,7 +141,7 @@ impl PreparedRun {
         listener.event(ProjectEvent::Ended);
         // After an error, the catalog may not reply any more.
         let failures = match &ended {
-            Ok(_) => Failures::read(catalog, false).await,
+            Ok(_) => Failures::of(catalog, self.options.only.as_ref()).await,
             Err(_) => Ok(Failures::default()),
         };
         let missing_inputs = match &ended {

@@ -1,7 +1,7 @@
 //! Parses verdict files in CSV or JSON Lines format. If a line is invalid, the whole file is refused.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -104,6 +104,16 @@ impl VerdictList {
                 Ok(rows) => Box::new(rows),
                 Err(refused) => Box::new(std::iter::once(Err(refused))),
             },
+        }
+    }
+
+    /// Returns a function that parses the rows whenever it is called, without those of some pairs.
+    pub fn rows_without(&self, pairs: BTreeSet<PairName>) -> impl Fn() -> VerdictRows + use<> {
+        let (list, pairs) = (self.clone(), Arc::new(pairs));
+        move || {
+            let pairs = Arc::clone(&pairs);
+            let is_kept = move |row: &Result<VerdictRow, RefusedLine>| !matches!(row, Ok(row) if pairs.contains(&row.listed.verdict.pair));
+            Box::new(list.rows().filter(is_kept))
         }
     }
 }

@@ -158,7 +158,6 @@ pub async fn import(
     let list = VerdictList::new(bytes, is_jsonl).map_err(|error| error.in_file(file, outcome))?;
     let NamesInList {
         first_lines,
-        current_lines,
         reviewers,
         mut refused,
         unread,
@@ -170,11 +169,8 @@ pub async fn import(
         let known = catalog.pair_names().await?;
         refused.extend(verdict_file::unknown_pairs(&first_lines, &unknown, &known));
     }
-    for pair in catalog.retired_pairs().await? {
-        let line = current_lines.get(&pair.name);
-        let reason = selection::retired_text(&pair);
-        refused.extend(line.map(|line| RefusedLine::new(*line, &reason)));
-    }
+    let retired = RetiredInList::read(&catalog, &list, &first_lines).await?;
+    refused.extend(retired.refused);
     if let Some(refusal) = RefusedLine::all_in_file(refused, file, outcome) {
         return Err(refusal.into());
     }
@@ -185,15 +181,17 @@ pub async fn import(
     if !is_new_allowed {
         reviewers::refuse_similar(&catalog, &rights, &reviewers).await?;
     }
+    let rows = list.rows_without(retired.pairs);
     // All rows were valid in the first pass.
-    let rows = list.rows().map(|row| match row {
+    let listed = rows().map(|row| match row {
         Ok(row) => Ok(row.listed),
         Err(_) => Err(CatalogError::CutShort),
     });
-    let counts = catalog.import_verdicts(rows, now()).await?;
+    let mut counts = catalog.import_verdicts(listed, now()).await?;
     catalog.close().await;
+    counts.known += retired.stored;
     let first_older = counts.first_older.and_then(|position| {
-        let row = list.rows().nth(usize::try_from(position).ok()?)?;
+        let row = rows().nth(usize::try_from(position).ok()?)?;
         row.ok().map(|row| row.line)
     });
     let day_first = day_first.map(|line| {
@@ -216,8 +214,6 @@ pub async fn import(
 struct NamesInList {
     /// The first line of each pair.
     first_lines: BTreeMap<PairName, usize>,
-    /// The first lines with verdicts on the current results, whatever these are.
-    current_lines: BTreeMap<PairName, usize>,
     reviewers: BTreeSet<String>,
     refused: Vec<RefusedLine>,
     /// The first line of each field that is not read.
@@ -251,9 +247,6 @@ impl NamesInList {
                         }
                     }
                     let NewVerdict { pair, reviewer, .. } = listed.verdict;
-                    if listed.judged.is_none() {
-                        names.current_lines.entry(pair.clone()).or_insert(line);
-                    }
                     names.first_lines.entry(pair).or_insert(line);
                     names.reviewers.insert(reviewer);
                 }
@@ -262,6 +255,62 @@ impl NamesInList {
         }
         names
     }
+}
+
+/// Retired pairs in a list of verdicts.
+#[derive(Debug, Default)]
+struct RetiredInList {
+    pairs: BTreeSet<PairName>,
+    /// Number of their verdicts that are stored already.
+    stored: u64,
+    /// The first line of each pair with a verdict that is not stored.
+    refused: Vec<RefusedLine>,
+}
+
+impl RetiredInList {
+    async fn read(
+        catalog: &Catalog,
+        list: &VerdictList,
+        first_lines: &BTreeMap<PairName, usize>,
+    ) -> ProjectResult<Self> {
+        let mut logs = BTreeMap::new();
+        for pair in catalog.retired_pairs().await? {
+            if first_lines.contains_key(&pair.name) {
+                let log = catalog.verdict_log(Some(&pair.name)).await?;
+                logs.insert(pair.name.clone(), (log, selection::retired_text(&pair)));
+            }
+        }
+        let mut found = Self::default();
+        if logs.is_empty() {
+            return Ok(found);
+        }
+        let mut refused = BTreeSet::new();
+        for VerdictRow { line, listed, .. } in list.rows().flatten() {
+            let pair = &listed.verdict.pair;
+            let Some((log, reason)) = logs.get(pair) else {
+                continue;
+            };
+            if log.iter().any(|event| is_event(&listed, event)) {
+                found.stored += 1;
+            } else if refused.insert(pair.clone()) {
+                found.refused.push(RefusedLine::new(line, reason));
+            }
+        }
+        found.pairs = logs.into_keys().collect();
+        Ok(found)
+    }
+}
+
+/// Returns whether a line of a log that was exported is this event, which was not undone.
+fn is_event(listed: &ListedVerdict, event: &VerdictEvent) -> bool {
+    let new = &listed.verdict;
+    listed.judged == Some(event.result_hash)
+        && event.undone_at.is_none()
+        && new.metric.is_none_or(|metric| metric == event.metric)
+        && new.at.is_none_or(|at| at == event.at)
+        && new.reviewer == person_name(&event.reviewer)
+        && (new.verdict, new.reason) == (event.verdict, event.reason)
+        && new.note == event.note
 }
 
 /// The verdicts of a project or a pair.

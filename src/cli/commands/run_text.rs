@@ -18,14 +18,29 @@ pub(crate) fn print_outcome(outcome: &RunOutcome, context: &Context) {
     let (summary, failures) = (&outcome.summary, &outcome.failures);
     context.info(&headline(summary));
     if summary.failed_in_all > 0 {
-        let number = count(summary.failed_in_all, "pair");
+        let heading = failed_heading("pair", summary.failed_in_all, summary.failed);
         let text = failures_text(failures, false);
-        context.info(&format!("{number} failed:\n{}", text.trim_end()));
+        context.info(&format!("{heading}\n{}", text.trim_end()));
     }
     if summary.blocks.failed_in_all > 0 {
-        let number = count(summary.blocks.failed_in_all, "block");
+        let BlockSummary {
+            failed_in_all,
+            failed,
+            ..
+        } = summary.blocks;
+        let heading = failed_heading("block", failed_in_all, failed);
         let text = failed_blocks_text(&failures.blocks, false);
-        context.info(&format!("{number} failed:\n{}", text.trim_end()));
+        context.info(&format!("{heading}\n{}", text.trim_end()));
+    }
+}
+
+/// Returns the line above a list of failures, of which `now` are of this run: `3 blocks failed, 2 of them in earlier runs:`.
+fn failed_heading(what: &str, in_all: u64, now: u64) -> String {
+    let number = count(in_all, what);
+    match in_all.saturating_sub(now) {
+        0 => format!("{number} failed:"),
+        earlier if earlier == in_all => format!("{number} failed in earlier runs:"),
+        earlier => format!("{number} failed, {earlier} of them in earlier runs:"),
     }
 }
 
@@ -164,9 +179,17 @@ pub(crate) fn block_plan_text(blocks: &[BlockPlanEntry]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Plan, plan_text};
+    use super::{Plan, failed_heading, plan_text};
     use mocban_catalog::{FieldChange, FingerprintId, PlanEntry, StaleReason};
     use mocban_core::domain::Stage;
+
+    #[test]
+    fn failures_of_earlier_runs_are_told_from_those_of_this_run() {
+        let heading = |in_all, now| failed_heading("block", in_all, now);
+        assert_eq!(heading(3, 3), "3 blocks failed:");
+        assert_eq!(heading(3, 1), "3 blocks failed, 2 of them in earlier runs:");
+        assert_eq!(heading(1, 0), "1 block failed in earlier runs:");
+    }
 
     #[test]
     fn plan_names_the_setting_that_changed() {
