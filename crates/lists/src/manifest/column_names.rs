@@ -75,8 +75,13 @@ pub(super) fn missing_column(
         && columns == [None]
     {
         let shown: String = alone.chars().take(MAX_SHOWN_CHARS).collect();
+        let hint = if alone.contains(['|', ',', ';', '\t', ':']) {
+            "; put a comma, semicolon or tab between columns"
+        } else {
+            ""
+        };
         return format!(
-            "column {name:?} is missing; the header has no comma, semicolon or tab between columns: {shown}"
+            "column {name:?} is missing; the header has one column only, {shown}{hint}"
         );
     }
     let mut similar = unknown.filter(|(field, _)| similar_column(&field.to_lowercase(), name));

@@ -216,7 +216,12 @@ impl CsvHeader {
             .filter(|name| !columns.contains(&Some(**name)));
         problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
         if let Err(mut problems) = problems.check(false) {
-            problems.extend(header_below(list, delimiter, line));
+            if let Some(below) = header_below(list, delimiter, line) {
+                if names.len() == 1 {
+                    problems = at_line(line, "this is no header").into();
+                }
+                problems.add(below);
+            }
             return Err(problems);
         }
         let names = names.into_iter().map(str::to_owned);

@@ -49,21 +49,23 @@ pub struct CsvText<'t> {
 }
 
 impl<'t> CsvText<'t> {
-    /// Decodes a list and finds its separator: the one that a first line such as `sep=;` names for Excel, or
-    /// `delimiter`. The content of that line, and blanks before quoted cells, are left out; no line moves.
+    /// Decodes a list and finds its separator: the one that a first line such as `sep=;` names for Excel, if the header has
+    /// it, or `delimiter`. The content of that line, and blanks before quoted cells, are left out; no line moves.
     ///
     /// # Errors
     /// Returns an error if the bytes are not text.
     pub fn new(bytes: &'t [u8]) -> Result<Self, NotText> {
         let mut bytes = as_utf8(bytes)?;
         let named = separator_line(&bytes);
-        let delimiter = named.unwrap_or_else(|| delimiter(&bytes));
         if named.is_some() {
             bytes = match bytes {
                 Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[SEPARATOR.len() + 1..]),
                 Cow::Owned(bytes) => Cow::Owned(bytes[SEPARATOR.len() + 1..].to_vec()),
             };
         }
+        // A spreadsheet program may have saved the list with another separator since the line was written.
+        let is_used = |named: &u8| header(&bytes).contains(named);
+        let delimiter = named.filter(is_used).unwrap_or_else(|| delimiter(&bytes));
         if let Some(changed) = without_blanks_before_quotes(&bytes, delimiter) {
             bytes = Cow::Owned(changed);
         }
@@ -195,11 +197,16 @@ fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, N
         .ok_or(NotText::DamagedUtf16)
 }
 
+/// Returns the first line that is not blank.
+fn header(bytes: &[u8]) -> &[u8] {
+    let start = bytes.trim_ascii_start();
+    start.split(|byte| *byte == b'\n').next().unwrap_or(start)
+}
+
 /// Returns the column separator: the most frequent of tab, semicolon and comma in the first line that is not blank.
 /// Returns a comma if the line has none of them.
 fn delimiter(bytes: &[u8]) -> u8 {
-    let start = bytes.trim_ascii_start();
-    let header = start.split(|byte| *byte == b'\n').next().unwrap_or(start);
+    let header = header(bytes);
     let count = |delimiter: u8| header.split(|byte| *byte == delimiter).count();
     [b'\t', b';', b',']
         .into_iter()
@@ -259,6 +266,8 @@ mod tests {
             assert_eq!(text.lines().count(), 2, "lines are counted as in the file");
         }
         assert_eq!(text("sep=;x\na,b\n").1, ';');
+        assert_eq!(text("sep=,\r\n\na;b;c\n1;2,5;3\n").1, ';');
+        assert_eq!(text("sep=|\na|b\n").1, '|');
         assert_eq!(text("sep,a\n").1, ',');
     }
 

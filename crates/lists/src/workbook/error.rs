@@ -70,6 +70,36 @@ pub enum WorkbookError {
         /// The error, such as `#REF!`.
         value: String,
     },
+    /// Several cells.
+    #[error("{count} cells cannot be read:{}", lines(.first, *.count))]
+    Cells {
+        /// The first ones.
+        first: Vec<WorkbookError>,
+        /// Number of all.
+        count: usize,
+    },
+}
+
+impl WorkbookError {
+    /// Returns whether the error is of one cell, so that others may be found.
+    pub(super) const fn is_of_cell(&self) -> bool {
+        matches!(
+            self,
+            Self::Converted { .. }
+                | Self::LongCell { .. }
+                | Self::NoResult { .. }
+                | Self::CellError { .. }
+        )
+    }
+}
+
+/// Returns errors of cells, each on a line, and how many there are besides.
+fn lines(first: &[WorkbookError], count: usize) -> String {
+    let mut lines: Vec<String> = first.iter().map(ToString::to_string).collect();
+    if let Some(more @ 1..) = count.checked_sub(first.len()) {
+        lines.push(format!("and {more} more"));
+    }
+    format!("\n{}", lines.join("\n"))
 }
 
 /// Returns the first names of sheets in quotation marks.

@@ -45,7 +45,14 @@ struct TableWriter<'w> {
     /// Column of the next cell if it does not say where it is.
     next_column: usize,
     cell: Option<OpenCell>,
+    /// The first cells that cannot be read.
+    refused: Vec<WorkbookError>,
+    /// Number of these cells.
+    refused_count: usize,
 }
+
+/// Largest number of cells that are named because they cannot be read.
+const MAX_REFUSED: usize = 10;
 
 /// Returns the text of a sheet as CSV. Columns without a name in the header are left out. Line breaks in cells become blanks.
 ///
@@ -62,6 +69,8 @@ pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>
         row_bytes: 0,
         next_column: 0,
         cell: None,
+        refused: Vec::new(),
+        refused_count: 0,
     };
     let mut collector = TextCollector::default();
     read_part(file, text, |part| {
@@ -93,7 +102,15 @@ pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>
             XmlPart::End | XmlPart::Text(_) => Ok(()),
         }
     })?;
-    Ok(writer.csv)
+    match (writer.refused_count, writer.refused.pop()) {
+        (0, _) | (_, None) => Ok(writer.csv),
+        (1, Some(alone)) => Err(alone),
+        (count, Some(last)) => {
+            let mut first = writer.refused;
+            first.push(last);
+            Err(WorkbookError::Cells { first, count })
+        }
+    }
 }
 
 impl TableWriter<'_> {
@@ -140,7 +157,17 @@ impl TableWriter<'_> {
         if self.width > 0 && column >= self.width {
             return Ok(());
         }
-        let text = self.text(cell)?;
+        let text = match self.text(cell) {
+            Err(error) if error.is_of_cell() => {
+                self.refused_count += 1;
+                if self.refused.len() < MAX_REFUSED {
+                    self.refused.push(error);
+                }
+                // The row is not empty.
+                "?".to_owned()
+            }
+            read => read?,
+        };
         if text.trim().is_empty() {
             return Ok(());
         }

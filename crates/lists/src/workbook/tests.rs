@@ -90,6 +90,28 @@ fn ids_that_became_dates_or_powers_of_ten_are_refused_and_other_columns_are_not(
             format!("\"{header}\"\n\"46115.00\"\n")
         );
     }
+    let cell = "<row><c s=\"1\"><v>46115</v></c></row>";
+    let header = "<row><c t=\"inlineStr\"><is><t>id</t></is></c></row>";
+    let rows = |number: usize| {
+        workbook(
+            &[("a", &(header.to_owned() + &cell.repeat(number)))],
+            "",
+            styles,
+        )
+    };
+    let two = refusal(&rows(2));
+    let lines: Vec<&str> = two.lines().collect();
+    assert_eq!((lines.len(), lines[0]), (3, "2 cells cannot be read:"));
+    assert!(
+        lines[1].starts_with("cell A2 ") && lines[2].starts_with("cell A3 "),
+        "{two}"
+    );
+    let many = refusal(&rows(12));
+    assert!(
+        many.starts_with("12 cells cannot be read:\ncell A2 "),
+        "{many}"
+    );
+    assert!(many.ends_with("\nand 2 more"), "{many}");
     assert_eq!(csv(&sheet("at", 1)), "\"at\"\n\"2026-04-03\"\n");
     assert_eq!(csv(&sheet("weight", 2)), "\"weight\"\n\"46115\"\n");
 }

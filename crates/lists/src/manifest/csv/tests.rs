@@ -255,6 +255,8 @@ fn lists_of_spreadsheets_and_scripts_are_read() {
             (&plain[0].name, &plain[0].print)
         );
     }
+    let other = parse("sep=,\nid;mesh;print\na;b,c;d\n").expect("parses");
+    assert_eq!(other[0].mesh.to_str(), Some("b,c"));
     let shifted = refusal("sep=;\nid;mesh;print\na;;d\n");
     assert_eq!(shifted, "line 3: mesh is empty");
     let spaced = parse("id,mesh,print\nchữ\u{a0}số,b,c\n").expect("parses");
@@ -274,7 +276,10 @@ fn a_header_below_a_title_and_other_separators_are_named() {
         "{blocks}"
     );
     let title = refusal("Block 4\nid;mesh;print\n1;a.stl;a.png\n");
-    assert!(title.contains("line 2 has these columns"), "{title}");
+    assert_eq!(
+        title,
+        "line 1: this is no header\nline 2 has these columns; remove the lines above it"
+    );
     // The refused line itself is no advice, even if another separator would give it the columns.
     let tied = refusal("id;mesh;print;a,b,c,d\n1;a.stl;a.png;x\n");
     assert!(!tied.contains("has these columns"), "{tied}");
@@ -282,7 +287,8 @@ fn a_header_below_a_title_and_other_separators_are_named() {
     assert_eq!(
         pipes.lines().next(),
         Some(
-            "line 1: column \"id\" is missing; the header has no comma, semicolon or tab between columns: id|mesh|print"
+            "line 1: column \"id\" is missing; the header has one column only, id|mesh|print; put a comma, semicolon or tab \
+             between columns"
         )
     );
     assert!(!pipes.contains("remove the lines"), "{pipes}");
