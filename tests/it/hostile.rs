@@ -134,8 +134,8 @@ fn bad_prints() -> Vec<Case> {
             "bmp_as_png",
             print(b"BM\x36\0\0\0\0\0\0\0\x36\0\0\0".to_vec()),
             "bad_input",
-            "the file is a BMP image; PNG, JPEG and TIFF images are read: convert them, such as with \
-                ImageMagick: `magick mogrify -format png *.bmp`",
+            "the file is a BMP image; PNG, JPEG and TIFF images are read: convert it, such as with \
+                ImageMagick: `magick mogrify -format png FILE`, and use the new file",
         ),
         case(
             "lfs_pointer",

@@ -49,6 +49,7 @@ impl UnreadFiles {
                 0 => String::new(),
                 more => format!(" and {more} more"),
             };
+            let advice = with_patterns(&advice, &paths);
             let sentence = format!("{start}{kind} is not read: {first}{more}; {advice}");
             found.sentences.push(sentence);
             found.paths.extend(paths.into_iter().cloned());
@@ -61,6 +62,20 @@ impl UnreadFiles {
         self.paths.append(&mut other.paths);
         self.sentences.append(&mut other.sentences);
     }
+}
+
+/// Returns advice whose command is for all files with an extension such as `*.bmp`, with the extensions of these files as they
+/// are written.
+fn with_patterns(advice: &str, paths: &[&PathBuf]) -> String {
+    let Some((before, _)) = advice.split_once("*.") else {
+        return advice.to_owned();
+    };
+    let extensions = paths.iter().filter_map(|path| path.extension());
+    let patterns: BTreeSet<String> = extensions
+        .map(|extension| format!("*.{}", extension.display()))
+        .collect();
+    let patterns = Vec::from_iter(patterns);
+    format!("{before}{}`", patterns.join(" "))
 }
 
 fn unread_kind(path: &Path) -> Option<FileKind> {
@@ -138,7 +153,7 @@ mod tests {
             ),
             format!(
                 "ignored, a BMP image is not read: {} and 2 more; convert them, such as with ImageMagick: \
-                 `magick mogrify -format png *.bmp`",
+                 `magick mogrify -format png *.BMP *.bmp`",
                 prints.join("a.bmp").display()
             ),
             format!(

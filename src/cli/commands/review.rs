@@ -157,12 +157,10 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
         if args.adjudicate {
             return no_conflict(&args, context);
         }
+        let command = context.command("run");
         let text = match retired {
             Some(retired) => format!("there is no result to judge: {retired}"),
-            None => {
-                let command = context.command("run");
-                format!("there is no result to judge yet; first: {command}")
-            }
+            None => format!("there is no result to judge yet; first: {command}"),
         };
         return Err(Refusal::NothingSelected(text).into());
     }

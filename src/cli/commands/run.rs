@@ -171,7 +171,7 @@ fn size_text(bytes: u64) -> String {
     let units = [(40, "T"), (30, "G"), (20, "M"), (10, "K")];
     let whole = units
         .into_iter()
-        .find(|(shift, _)| bytes % (1 << shift) == 0);
+        .find(|(shift, _)| bytes.is_multiple_of(1 << shift));
     let (shift, unit) = whole.unwrap_or((0, ""));
     format!("{}{unit}", bytes >> shift)
 }

@@ -221,6 +221,16 @@ impl FileKind {
         })
     }
 
+    /// Returns what to do with a file whose content is of this type where an image is needed. Its name may say otherwise.
+    pub(crate) fn image_content_advice(self) -> Option<String> {
+        let advice = self.image_advice()?;
+        Some(match self {
+            Self::OtherImage(_) => "convert it, such as with ImageMagick: `magick mogrify -format png FILE`, and use the new file"
+                .to_owned(),
+            _ => advice,
+        })
+    }
+
     /// Returns what to do with files of this type where meshes are needed, if that does not depend on the file.
     pub fn mesh_advice(self) -> Option<String> {
         let programs = match self {
@@ -325,6 +335,11 @@ mod tests {
         }
         assert_eq!(FileKind::of_unread_extension("png"), None);
         assert_eq!(FileKind::Text.image_advice(), None);
+        let webp = FileKind::of(b"RIFF\x10\0\0\0WEBPVP8 ");
+        let advice = webp.image_content_advice().expect("advice");
+        assert!(advice.contains("-format png FILE`"), "{advice}");
+        let pdf = FileKind::Other("a PDF document");
+        assert_eq!(pdf.image_content_advice(), pdf.image_advice());
     }
 
     #[test]

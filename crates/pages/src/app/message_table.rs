@@ -87,6 +87,10 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "hãy mở chúng bằng {0} rồi xuất thành PLY",
     ),
     (
+        "convert it, such as with ImageMagick: {}, and use the new file",
+        "hãy chuyển đổi tệp, chẳng hạn bằng ImageMagick: {0}, rồi dùng tệp mới",
+    ),
+    (
         "convert them, such as with ImageMagick: {}",
         "hãy chuyển đổi chúng, chẳng hạn bằng ImageMagick: {0}",
     ),
@@ -146,12 +150,35 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "no pair or block has failed with class {}",
         "không có cặp hay ván nào bị lỗi thuộc loại {0}",
     ),
+    ("the export has no pairs", "bản xuất không có cặp nào"),
+    (
+        "all {} pairs of the project are retired",
+        "cả {0} cặp của dự án đã được đưa ra khỏi thống kê",
+    ),
+    (
+        "the only pair of the project is retired",
+        "cặp duy nhất của dự án đã được đưa ra khỏi thống kê",
+    ),
     // Settings.
     ("there is no setting {}", "không có thiết lập {0}"),
     (
         "{} is saved, but an environment variable gives it another value",
         "đã lưu {0}, nhưng một biến môi trường cho nó giá trị khác",
     ),
+    (
+        "{} = {} is not a whole number from 0",
+        "{0} = {1} không phải là số nguyên từ 0 trở lên",
+    ),
+    ("{} = {} is not a number", "{0} = {1} không phải là số"),
+    (
+        "{} = {} is not true or false",
+        "{0} = {1} không phải là true hay false",
+    ),
+    (
+        "{} = {} is not one of {}",
+        "{0} = {1} không phải là một trong: {2}",
+    ),
+    ("write {}", "hãy viết {0}"),
     (
         "{} = {} is outside the range {} to {}",
         "{0} = {1} nằm ngoài khoảng {2} đến {3}",

@@ -144,8 +144,8 @@ mod tests {
                 "data/prints/1.jpg: tệp là hình BMP",
             ),
             (
-                "a.jpg: the file is a GIF image; PNG, JPEG and TIFF images are read: convert them, such as with ImageMagick: x *.gif",
-                "a.jpg: tệp là hình GIF; chỉ đọc được hình PNG, JPEG và TIFF: hãy chuyển đổi chúng, chẳng hạn bằng ImageMagick: x *.gif",
+                "a.jpg: the file is a GIF image; PNG, JPEG and TIFF images are read: convert it, such as with ImageMagick: x FILE, and use the new file",
+                "a.jpg: tệp là hình GIF; chỉ đọc được hình PNG, JPEG và TIFF: hãy chuyển đổi tệp, chẳng hạn bằng ImageMagick: x FILE, rồi dùng tệp mới",
             ),
             (
                 "no labels for b04.jpg: the file is about b05.jpg; take the labels of this page, or rename it",

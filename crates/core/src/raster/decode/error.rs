@@ -76,5 +76,9 @@ pub(super) fn broken(kind: FileKind, reason: &str) -> DecodeError {
 }
 
 fn not_an_image(kind: FileKind) -> String {
-    kind.refusal("image", "PNG, JPEG and TIFF images", kind.image_advice())
+    kind.refusal(
+        "image",
+        "PNG, JPEG and TIFF images",
+        kind.image_content_advice(),
+    )
 }

@@ -293,8 +293,8 @@ mod tests {
         for (bytes, says) in [
             (
                 &b"GIF89a\x01\0\x01\0\x80.."[..],
-                "the file is a GIF image; PNG, JPEG and TIFF images are read: convert them, such as \
-                with ImageMagick: `magick mogrify -format png *.gif`",
+                "the file is a GIF image; PNG, JPEG and TIFF images are read: convert it, such as \
+                with ImageMagick: `magick mogrify -format png FILE`, and use the new file",
             ),
             (
                 b"%PDF-1.7\n",
