@@ -66,6 +66,7 @@ fn commands_on_a_project_whose_pairs_are_all_retired_say_so() {
         (&["report", "--require-complete"], 21),
         (&["run"], 0),
         (&["run", "--dry-run"], 0),
+        (&["plan"], 0),
         (&["export", "-o", "out"], 0),
         (&["export", "-o", "out", "--only", "confident"], 4),
         (&["contact-sheet"], 4),

@@ -56,6 +56,7 @@ pub(crate) async fn plan(args: PlanArgs, context: &Context) -> ProjectResult<Exi
     let terminal = Terminal::new(context);
     let (names, location) = (&args.names, &context.location);
     let prepared = PreparedRun::new(names, options, false, location, &terminal).await?;
+    let retired = prepared.all_retired().await?;
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
     let planned = prepared.run(&stop, &()).await;
@@ -67,6 +68,9 @@ pub(crate) async fn plan(args: PlanArgs, context: &Context) -> ProjectResult<Exi
     }))?;
     let numbers = pairs_and_blocks(planned.left, blocks);
     context.info(&format!("{numbers} to run"));
+    if let Some(retired) = retired {
+        context.info(&retired);
+    }
     if planned.left + blocks > 0 {
         context.next("worker");
     }

@@ -178,7 +178,6 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "{} = {} is not one of {}",
         "{0} = {1} không phải là một trong: {2}",
     ),
-    ("write {}", "hãy viết {0}"),
     (
         "{} = {} is outside the range {} to {}",
         "{0} = {1} nằm ngoài khoảng {2} đến {3}",
