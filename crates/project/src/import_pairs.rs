@@ -111,12 +111,12 @@ pub async fn import_pairs(
     let mut warnings = std::mem::take(&mut listing.warnings);
     let renamed = listing.renamed.take();
     let truths = match &import.truth {
-        Some(file) => {
+        Some(file) if listing.refused.is_none() => {
             let truths = read_truths(file, &listing.ids, location).await?;
             warnings.extend(truth_file::unread_fields(file, &truths));
             truths
         }
-        None => Vec::new(),
+        _ => Vec::new(),
     };
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
@@ -194,6 +194,9 @@ fn spool(
                 stored_row(&row, project).and_then(|row| spool.push(&row).with_context(failed));
         }
     });
+    if let Some(refused) = &listing.refused {
+        return Err(missing.added_to(refused, allowed.missing).into());
+    }
     outcome?;
     let is_other = |shown| shown != hash;
     if choices.shown.is_some_and(is_other) {

@@ -81,6 +81,9 @@ pub fn plan_import(
         }
         pairs += 1;
     });
+    if let Some(refused) = &listing.refused {
+        return Err(missing.added_to(refused, false).into());
+    }
     Ok(ImportPlan {
         pairs,
         hash,

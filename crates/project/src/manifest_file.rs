@@ -43,6 +43,8 @@ pub struct Listing {
     pub alone: [Vec<String>; 2],
     /// Says why directories have no pair.
     pub no_pair: Option<Refusal>,
+    /// Says which rows of a list are refused. The others are passed on, so that their missing files can be named too.
+    pub refused: Option<Refusal>,
     /// Label of row numbers in messages: `pairs.csv: line`, or `pair` for directories.
     row_label: String,
 }
@@ -78,11 +80,11 @@ pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
 
 impl Listing {
     /// Parses the content of a CSV or JSON Lines file as a person has chosen. If its extension is unknown, the first
-    /// character decides the format.
+    /// character decides the format. Rows may be refused.
     ///
     /// # Errors
-    /// Returns an error if the content is no list, the names of its files say that none of its pairs can be read, or there is
-    /// nothing of what was chosen.
+    /// Returns an error if the names of its files say that none of its pairs can be read, or there is nothing of what was
+    /// chosen.
     pub fn from_bytes(file: &Path, bytes: Vec<u8>, choices: &PairChoices) -> ProjectResult<Self> {
         let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {
@@ -101,15 +103,22 @@ impl Listing {
             }
         };
         let columns = choices.columns.clone();
-        let read =
-            parse(&bytes, &columns, &mut each).map_err(|problems| refuse(file, &problems))?;
+        let parsed = parse(&bytes, &columns, &mut each);
+        let refused = parsed.as_ref().err();
+        let refused = refused.map(|problems| refuse(file, problems));
+        let read = parsed.unwrap_or_default();
         let mut warnings = misspelt.warnings();
-        let unread = unread.warnings();
-        warnings.extend(unread.map_err(|sentences| refuse(file, &sentences))?);
+        match unread.warnings() {
+            Ok(unread) => warnings.extend(unread),
+            Err(sentences) if refused.is_none() => return Err(refuse(file, &sentences).into()),
+            Err(_) => {}
+        }
         warnings.extend(repeated.warning("pairs with the same mesh and print"));
         let renamed = renamed(&read);
         let has = |id: &&String| PairName::new(id).is_ok_and(|name| read.ids.contains(&name));
-        if let Some(id) = left_out.iter().find(|id| !has(id)) {
+        if refused.is_none()
+            && let Some(id) = left_out.iter().find(|id| !has(id))
+        {
             let text = format!("there is no pair {id:?} to leave out");
             return Err(refuse(file, &text).into());
         }
@@ -127,6 +136,7 @@ impl Listing {
             renamed,
             alone: [Vec::new(), Vec::new()],
             no_pair: None,
+            refused,
             row_label: format!("{shown}: line"),
         })
     }
@@ -182,6 +192,7 @@ impl Listing {
             renamed: None,
             alone,
             no_pair,
+            refused: None,
             row_label: "pair".to_owned(),
         })
     }
@@ -238,7 +249,7 @@ impl Listing {
                     }
                     each(row);
                 });
-                parsed.expect("the same bytes were parsed before");
+                debug_assert_eq!(parsed.is_err(), self.refused.is_some());
                 hash.value()
             }
         }

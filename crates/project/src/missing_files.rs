@@ -36,10 +36,25 @@ impl MissingFiles {
         }
     }
 
+    /// Returns a line for each of the first missing files.
+    fn listed(&self) -> String {
+        const MAX_SHOWN: usize = 10;
+        listed(&self.lines, self.count, MAX_SHOWN)
+    }
+
+    /// Adds the missing files of the other rows to the reason why a list is refused, unless these may be missing.
+    pub(crate) fn added_to(&self, refused: &Refusal, may_be_missing: bool) -> Refusal {
+        let missing = if may_be_missing {
+            String::new()
+        } else {
+            self.listed()
+        };
+        Refusal::Usage(format!("{refused}{missing}"))
+    }
+
     /// Returns why a list with missing files is refused.
     pub fn refusal(&self) -> Refusal {
-        const MAX_SHOWN: usize = 10;
-        let shown = listed(&self.lines, self.count, MAX_SHOWN);
+        let shown = self.listed();
         let missing = if self.lines.iter().any(|line| line.ends_with(IS_FOLDER)) {
             "missing or a folder"
         } else {

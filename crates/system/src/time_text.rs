@@ -134,7 +134,6 @@ mod tests {
             "21/11",
             "+1/11/2026",
             "21/11/2026 soon",
-            "21/11/2026 4",
             "",
         ] {
             assert_eq!(parse_day_first(text), None, "{text}");
