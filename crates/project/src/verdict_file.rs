@@ -47,6 +47,7 @@ const COLUMNS: KnownColumns = KnownColumns {
     ],
 };
 const REQUIRED: usize = 3;
+
 /// The text of a verdict file. Its rows are parsed whenever they are needed, so that a long file takes little memory.
 #[derive(Debug, Clone)]
 pub struct VerdictList {
@@ -112,7 +113,10 @@ impl VerdictList {
         let (list, pairs) = (self.clone(), Arc::new(pairs));
         move || {
             let pairs = Arc::clone(&pairs);
-            let is_kept = move |row: &Result<VerdictRow, RefusedLine>| !matches!(row, Ok(row) if pairs.contains(&row.listed.verdict.pair));
+            let is_kept = move |row: &Result<VerdictRow, RefusedLine>| {
+                let is_of_them = |row: &VerdictRow| pairs.contains(&row.listed.verdict.pair);
+                !row.as_ref().is_ok_and(is_of_them)
+            };
             Box::new(list.rows().filter(is_kept))
         }
     }
