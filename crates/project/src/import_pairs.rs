@@ -116,7 +116,7 @@ pub async fn import_pairs(
             warnings.extend(truth_file::unread_fields(file, &truths));
             truths
         }
-        _ => Vec::new(),
+        Some(_) | None => Vec::new(),
     };
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);

@@ -116,7 +116,7 @@ pub(crate) fn next_steps(outcome: &RunOutcome) -> Vec<String> {
     steps
 }
 
-/// Returns what helps if no pair counts: a look at those that are retired, or an import.
+/// Returns what helps if no pair counts: a look at the retired ones, or an import.
 pub(crate) fn empty_project_step(counts: &StatusCounts, failures: &Failures) -> Option<String> {
     let is_retired = counts.all_retired().is_some();
     let step = if is_retired {

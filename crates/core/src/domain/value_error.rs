@@ -23,10 +23,10 @@ fn wrong_type(message: &str) -> Option<String> {
         "sequence" => "a list",
         "map" => "an object",
         "null" | "unit value" | "Option value" => "null",
-        value => {
-            let value = value.strip_prefix("string ").unwrap_or(value);
-            value.split('`').nth(1).unwrap_or(value)
-        }
+        value => value
+            .strip_prefix("string ")
+            .or_else(|| value.split('`').nth(1))
+            .unwrap_or(value),
     };
     let needed = match expected {
         "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0",
