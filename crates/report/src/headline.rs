@@ -272,29 +272,6 @@ mod tests {
     }
 
     #[test]
-    fn a_project_whose_pairs_are_all_retired_has_no_missing_pairs() {
-        for (retired, clause) in [
-            (1, "the only pair of the project is retired"),
-            (2, "all 2 pairs of the project are retired"),
-        ] {
-            let mut report = ReportAccumulator::default();
-            report.set_retired(retired);
-            let sentence = format!(
-                "There is nothing to report: {clause}; `mocban status --retired` says why."
-            );
-            assert_eq!(headline(&report.finish()), [sentence]);
-        }
-        let mut report = ReportAccumulator::default();
-        report.set_retired(2);
-        report.add(&test_fixtures::pending("a"), &TruthEvaluation::default());
-        let found = headline(&report.finish());
-        assert!(
-            found[0].starts_with("The only pair is not aligned"),
-            "{found:?}"
-        );
-    }
-
-    #[test]
     fn failed_pairs_and_low_confidence_are_counted() {
         let found = of(&[
             test_fixtures::with_confidence("a", 0.4),

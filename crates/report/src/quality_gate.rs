@@ -88,10 +88,6 @@ mod tests {
         assert_eq!(missing(&report(&[Some(Verdict::Pass), None])).len(), 4);
         assert_eq!(missing(&report(&[Some(Verdict::Unsure)])).len(), 4);
         assert_eq!(missing(&report(&[])), ["the project has no pairs"]);
-        let mut retired = ReportAccumulator::default();
-        retired.set_retired(2);
-        let expected = ["all 2 pairs of the project are retired"];
-        assert_eq!(missing(&retired.finish()), expected);
     }
 
     #[test]
@@ -110,6 +106,30 @@ mod tests {
         tally.add(&test_fixtures::done("a", 0.8, &[Verdict::Pass]), &none);
         tally.add(&test_fixtures::failed("b", FailureClass::Io, "gone"), &none);
         assert_eq!(missing(&tally.finish()), ["failed pairs: 1"]);
+    }
+
+    #[test]
+    fn a_report_without_pairs_that_count_names_the_retired_ones() {
+        for (number, clause) in [
+            (1, "the only pair of the project is retired"),
+            (2, "all 2 pairs of the project are retired"),
+        ] {
+            let mut retired = ReportAccumulator::default();
+            retired.set_retired(number);
+            let report = retired.finish();
+            let sentence = format!(
+                "There is nothing to report: {clause}; `mocban status --retired` says why."
+            );
+            assert_eq!(report.headline, [sentence]);
+            assert_eq!(missing(&report), [clause]);
+        }
+        let mut others = ReportAccumulator::default();
+        others.set_retired(2);
+        let pair = test_fixtures::done("a", 0.8, &[Verdict::Pass]);
+        others.add(&pair, &TruthEvaluation::default());
+        let report = others.finish();
+        assert!(report.headline[0].starts_with("The only pair is aligned"));
+        assert!(missing(&report).is_empty());
     }
 
     #[test]
