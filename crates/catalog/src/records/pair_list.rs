@@ -59,6 +59,8 @@ pub struct PairFilter {
     pub class: Option<FailureClass>,
     /// A verdict of a reviewer on the current result of the metric.
     pub verdict: Option<Verdict>,
+    /// Whether this verdict, a pass or a fail, must be the joint verdict of all reviewers, as a report counts it.
+    pub is_joint: bool,
     /// Whether the current result of the metric must have no verdict.
     pub is_unjudged: bool,
     /// Whether the result of the default metric must have a low confidence.
@@ -113,6 +115,7 @@ from_row! { ListedRow { id, confidence, iou, passes } }
 
 /// Selects pairs from a source with a column `id`, of which `?4` rows are read, and says whether they pass the filter.
 /// Retired pairs, which have no job, never do.
+/// A joint verdict is undisputed, or both sides of a dispute judged alone and the adjudications have only this verdict.
 /// Sources use `?2` and `?3`, the key and the row id of the last pair of the page before; `?5` is the metric.
 macro_rules! listed {
     ($source:literal) => {
@@ -122,6 +125,15 @@ macro_rules! listed {
         AND (?10 IS NULL OR EXISTS (SELECT 1 ",
             from_current_verdicts!(),
             " AND v.pair = c.id AND v.metric = ?5 AND v.verdict = ?10))
+        AND (?16 = 0 OR 1 = (SELECT CASE
+            WHEN count(CASE WHEN v.verdict NOT IN (?10, 'unsure') THEN 1 END) = 0 THEN 1
+            WHEN count(CASE WHEN v.verdict = ?10 AND coalesce(v.review_order, '') <> 'adjudicate' THEN 1 END) > 0
+                AND count(CASE WHEN v.verdict NOT IN (?10, 'unsure') AND coalesce(v.review_order, '') <> 'adjudicate' THEN 1 END) > 0
+                AND count(CASE WHEN v.verdict = ?10 AND v.review_order = 'adjudicate' THEN 1 END) > 0
+                AND count(CASE WHEN v.verdict NOT IN (?10, 'unsure') AND v.review_order = 'adjudicate' THEN 1 END) = 0 THEN 1
+            ELSE 0 END ",
+            from_current_verdicts!(),
+            " AND v.pair = c.id AND v.metric = ?5))
         AND (?11 = 0 OR NOT EXISTS (SELECT 1 ",
             from_current_verdicts!(),
             " AND v.pair = c.id AND v.metric = ?5))
@@ -291,7 +303,8 @@ impl<'l> ListReader<'l> {
                 filter
                     .differs
                     .map_or(0.0, |differs| differs.min_iou - ROUNDING),
-            );
+            )
+            .bind(i64::from(filter.is_joint));
         query.fetch_all(conn).await
     }
 

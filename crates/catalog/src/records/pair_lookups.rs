@@ -8,10 +8,11 @@ use mocban_core::domain::{PairName, UnixMillis};
 /// How many attempts are searched for the latest results.
 const RECENT_ATTEMPTS: usize = 2000;
 
-/// Pairs whose last stage was stored most recently, the newest first.
+/// Completed pairs whose last stage was stored most recently, the newest first.
 const RECENT: &str = "
-SELECT pair FROM attempt WHERE stage = 3 AND class IS NULL AND id > (SELECT coalesce(max(id), 0) - ?1 FROM attempt)
-ORDER BY id DESC LIMIT ?2";
+SELECT a.pair FROM attempt AS a CROSS JOIN job AS j ON j.pair = a.pair
+WHERE a.stage = 3 AND a.class IS NULL AND j.status = 3 AND a.id > (SELECT coalesce(max(id), 0) - ?1 FROM attempt)
+ORDER BY a.id DESC LIMIT ?2";
 
 const LAST_ATTEMPT: &str = "SELECT at FROM attempt ORDER BY id DESC LIMIT 1";
 
@@ -24,7 +25,7 @@ const NEIGHBOURS: [&str; 2] = [
 const NEXT_BLOCK: &str = "SELECT min(block) FROM pair WHERE block > ?1";
 
 impl Catalog {
-    /// Returns the pairs whose last stage was stored most recently, the newest first.
+    /// Returns the completed pairs whose last stage was stored most recently, the newest first.
     pub async fn recent_results(&self, limit: usize) -> Result<Vec<PairResults>> {
         let mut conn = self.snapshot().await?;
         let query = query_as(RECENT).bind(RECENT_ATTEMPTS as i64);

@@ -1,11 +1,11 @@
 //! Lists of pairs: filters, orders and pages.
 
-use super::{Place, World, done, name, row};
+use super::{Place, World, done, fingerprints, name, row};
 use crate::{
     CheckpointOutcome, ImportRow, ListedNames, MetricDifference, NewVerdict, PairCursor,
-    PairFilter, PairOrder, StageCheckpoint,
+    PairFilter, PairOrder, RerunPolicy, ReviewContext, StageCheckpoint,
 };
-use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict};
+use mocban_core::domain::{FailureClass, JobStatus, ReviewOrder, Stage, ThresholdMetric, Verdict};
 
 /// Imports `count` pairs of two blocks and gives the first `done` of them results whose confidence falls and then rises.
 async fn world(count: usize, finished: usize) -> World {
@@ -175,6 +175,51 @@ async fn retired_pairs_are_in_no_list_and_verdicts_are_found() {
 }
 
 #[tokio::test]
+async fn a_joint_verdict_is_undisputed_or_settled_by_adjudications() {
+    let world = world(7, 7).await;
+    let settles = Some(ReviewOrder::Adjudicate);
+    for (pair, reviewer, given, review_order) in [
+        ("p000", "ana", Verdict::Pass, None),
+        ("p001", "ana", Verdict::Pass, None),
+        ("p001", "bo", Verdict::Fail, None),
+        ("p002", "ana", Verdict::Pass, None),
+        ("p002", "bo", Verdict::Fail, None),
+        ("p002", "chi", Verdict::Fail, settles),
+        ("p003", "ana", Verdict::Pass, None),
+        ("p003", "bo", Verdict::Unsure, None),
+        ("p004", "ana", Verdict::Pass, None),
+        ("p004", "bo", Verdict::Fail, None),
+        ("p004", "chi", Verdict::Unsure, settles),
+        ("p005", "ana", Verdict::Unsure, None),
+    ] {
+        let given = NewVerdict {
+            pair: name(pair),
+            context: ReviewContext {
+                review_order,
+                ..ReviewContext::default()
+            },
+            ..super::verdicts::verdict(reviewer, given)
+        };
+        let stored = world.catalog.verdict_set(vec![given], 9).await;
+        stored.expect("a verdict");
+    }
+    for (verdict, is_joint, expected) in [
+        (Verdict::Pass, false, &[0, 1, 2, 3, 4][..]),
+        (Verdict::Pass, true, &[0, 3]),
+        (Verdict::Fail, false, &[1, 2, 4]),
+        (Verdict::Fail, true, &[2]),
+    ] {
+        let filter = PairFilter {
+            verdict: Some(verdict),
+            is_joint,
+            ..PairFilter::default()
+        };
+        let found = listed(&world, &filter, PairOrder::Imported, 2).await;
+        assert_eq!(found, expected, "{verdict} {is_joint}");
+    }
+}
+
+#[tokio::test]
 async fn the_latest_results_come_first() {
     let world = world(6, 4).await;
     let recent = world.catalog.recent_results(3).await.expect("pairs");
@@ -183,6 +228,11 @@ async fn the_latest_results_come_first() {
         .map(|pair| pair.attributes.name.as_str())
         .collect();
     assert_eq!(names, ["p003", "p002", "p001"]);
+    let (current, all) = (fingerprints([1; 4]), RerunPolicy::All(Stage::Fit));
+    let requeued = world.catalog.requeue_stale(&current, None, all);
+    assert_eq!(requeued.await.expect("requeued"), 4);
+    let recent = world.catalog.recent_results(3).await.expect("pairs");
+    assert_eq!(recent.len(), 0, "their results are computed again");
     let blocks = world.catalog.first_listed_blocks(9).await.expect("blocks");
     assert_eq!(blocks, ["b0", "b1"]);
 }
