@@ -92,6 +92,11 @@ fn two_reviewers_are_compared_and_a_third_settles_a_conflict() {
     let after = json_output(&project, &["agreement", "--json"]);
     assert_eq!(count(&after["conflicts"]), n - agreed - 1);
     assert_eq!(after["reviewer_pairs"], found["reviewer_pairs"]);
+    let settling = &after["reviewers"][0];
+    assert_eq!(
+        (&settling["reviewer"], &settling["judged"]),
+        (&json!("ba"), &json!(1))
+    );
     let pair = settled_by_a_command(&project, &after);
     let after = json_output(&project, &["agreement", "--json"]);
     let waiting = count(&after["conflicts"]);

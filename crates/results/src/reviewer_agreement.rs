@@ -1,6 +1,6 @@
 //! Agreement of reviewers with each other and with themselves, and their answers to attention checks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -89,7 +89,7 @@ pub struct VerdictAgreement {
 pub struct ReviewerRecord {
     /// The reviewer.
     pub reviewer: String,
-    /// Current results that they judged.
+    /// Current results that they judged, also to settle a conflict.
     pub judged: u64,
     /// Share of results shown twice that got the same verdict both times.
     pub duplicates: Rate,
@@ -190,9 +190,11 @@ impl AgreementCounts {
         for group in group_identical(&pair.metrics) {
             let is_conflict = |record: &&MetricRecord| Consensus::of(record) == Consensus::Conflict;
             self.conflicts += u64::from(group.iter().any(is_conflict));
+            for reviewer in reviewers_of(&group) {
+                self.record(reviewer).judged += 1;
+            }
             let verdicts: Vec<(&str, Verdict)> = independent_verdicts(&group).into_iter().collect();
             for (i, (a, first)) in verdicts.iter().enumerate() {
-                self.record(a).judged += 1;
                 for (b, second) in &verdicts[i + 1..] {
                     let two = ((*a).to_owned(), (*b).to_owned());
                     let table = self.reviewer_pairs.entry(two).or_default();
@@ -250,6 +252,12 @@ impl AgreementCounts {
             reviewers,
         }
     }
+}
+
+/// Returns everybody who judged results with the same threshold and alignment, or settled a conflict about them.
+fn reviewers_of<'a>(group: &[&'a MetricRecord]) -> BTreeSet<&'a str> {
+    let verdicts = group.iter().flat_map(|record| &record.verdicts);
+    verdicts.map(|given| given.reviewer.as_str()).collect()
 }
 
 /// Returns each reviewer's independent verdict on results with the same threshold and alignment.
@@ -313,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn an_adjudicator_is_compared_with_nobody() {
+    fn an_adjudicator_is_counted_and_compared_with_nobody() {
         let mut counts = AgreementCounts::default();
         let mut pair = test_fixtures::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]);
         let adjudicate = |record: &mut MetricRecord| {
@@ -328,7 +336,11 @@ mod tests {
         counts.add(&pair);
         let found = counts.finish();
         assert_eq!((found.conflicts, found.reviewer_pairs.len()), (0, 1));
-        assert_eq!(found.reviewers.len(), 2);
+        let judged = found.reviewers.iter();
+        let judged: Vec<_> = judged
+            .map(|record| (record.reviewer.as_str(), record.judged))
+            .collect();
+        assert_eq!(judged, [("r0", 1), ("r1", 1), ("third", 1)]);
     }
 
     #[test]
