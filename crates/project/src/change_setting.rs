@@ -25,7 +25,7 @@ pub struct SettingChange {
 }
 
 /// Looks at a change of a setting. `value` is written as in a settings file; text needs no quotes, and a number may have a
-/// decimal comma.
+/// decimal comma, and a whole number signs between its groups of digits.
 ///
 /// # Errors
 /// Returns an error if there is no such setting, or its value is refused.
@@ -42,6 +42,8 @@ pub async fn preview(
     let mut changed = location.with_saved_settings();
     let value = if before.value.is_float() {
         value.replacen(',', ".", 1)
+    } else if before.value.is_integer() {
+        without_groups(value).unwrap_or_else(|| value.to_owned())
     } else {
         value.to_owned()
     };
@@ -57,6 +59,22 @@ pub async fn preview(
         stale: plan.again(),
         changes_method: plan.changes_method(),
     })
+}
+
+/// Returns a whole number such as `30.000.000`, `30,000,000` or `30 000 000` without the signs between its groups of three
+/// digits. `None` if it has no such groups.
+fn without_groups(value: &str) -> Option<String> {
+    let mut groups = value.trim().split(['.', ',', ' ', '\u{a0}', '\u{202f}']);
+    let first = groups.next()?;
+    let others: Vec<&str> = groups.collect();
+    let is_number = |group: &&str| group.bytes().all(|byte| byte.is_ascii_digit());
+    let is_grouped = (1..=3).contains(&first.len())
+        && is_number(&first)
+        && !others.is_empty()
+        && others
+            .iter()
+            .all(|group| group.len() == 3 && is_number(group));
+    is_grouped.then(|| first.to_owned() + &others.concat())
 }
 
 /// Stores a change in the settings file of the project, which is created if there is none.
@@ -85,5 +103,27 @@ pub fn save(change: &SettingChange, location: &Location) -> ProjectResult<()> {
             change.after.key
         ))
         .into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_groups;
+
+    #[test]
+    fn whole_numbers_may_have_groups_of_three_digits() {
+        for text in [
+            "30.000.000",
+            "30,000,000",
+            " 30 000 000",
+            "30\u{202f}000\u{202f}000",
+        ] {
+            assert_eq!(without_groups(text).as_deref(), Some("30000000"), "{text}");
+        }
+        for other in [
+            "30", "30.00", "3000.000", ".000", "a.000", "1.5e3", "", "-1.000",
+        ] {
+            assert_eq!(without_groups(other), None, "{other}");
+        }
     }
 }
