@@ -113,6 +113,6 @@ pub use options::{NamedWork, RunOptions, RunPart};
 pub use run::{fingerprints, run};
 pub use run_guard::is_running;
 pub use run_metrics::RunMetrics;
-pub use run_plan::{RunPlan, changes_method, plan};
+pub use run_plan::{RunPlan, changes_method, plan, planned_blocks};
 pub use stage_output::{metric_results, result_hash};
 pub use stop::{Stop, StopLevel};

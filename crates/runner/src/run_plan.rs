@@ -40,6 +40,18 @@ pub async fn changes_method(
     Ok(planned.changes_method())
 }
 
+/// Returns the blocks that a run would work on by what the catalog knows, without a look at their files.
+///
+/// # Errors
+/// Returns an error if the catalog cannot be read.
+pub async fn planned_blocks(
+    catalog: &Catalog,
+    options: &RunOptions,
+) -> Result<Vec<BlockPlanEntry>, RunError> {
+    let settings = block_settings(&BlockPipeline::new(options));
+    Ok(catalog.plan_blocks(&settings, options.rerun, None).await?)
+}
+
 /// Returns what `run` would do, for `--dry-run`. Stores in the catalog which input files have changed. A read-only catalog
 /// cannot take this, so the plan is then one without these changes.
 ///
