@@ -386,9 +386,24 @@ fn a_setting_is_saved_with_what_it_costs() {
     assert!(comma.contains("<code>0.4</code>"), "{comma}");
     let refused = text(&page.get("/p/p/settings?key=register.min_confidence&value=7"));
     assert!(refused.contains("is outside the range 0 to 1"), "{refused}");
+    let grouped = text(&page.get("/p/p/settings?key=limits.image.max_pixels&value=20.000.000"));
+    assert!(grouped.contains("<code>20000000</code>"), "{grouped}");
+    let word = text(&page.get("/p/p/settings?key=run.workers&value=hai&language=vi"));
+    assert!(word.contains("cần số nguyên từ 0 trở lên"), "{word}");
+    assert!(!word.contains("--set"), "{word}");
+    page.get("/?language=en");
     let body = json!({"key": "register.min_confidence", "value": "0.4"});
     let reply = act(&page, "/p/p/actions/setting", &body, |_| {});
     assert_eq!(reply.status, 200, "{}", text(&reply));
+    let go = reply.json()["go"].as_str().expect("a page").to_owned();
+    let saved = text(&page.get(&format!("/p/p/{go}")));
+    for part in [
+        "Saved",
+        "the default is",
+        "aria-label=\"Put back register.min_confidence\"",
+    ] {
+        assert!(saved.contains(part), "{part}: {saved}");
+    }
     let file = std::fs::read_to_string(dir.path().join("p/mocban.toml")).expect("settings");
     assert!(file.contains("[register]\nmin_confidence = 0.4"), "{file}");
     let hidden = json!({"key": "storage.catalog", "value": "postgres://x"});

@@ -41,6 +41,10 @@ fn a_finished_block_is_listed_described_and_drawn() {
         assert!(block.contains(part), "{part}: {block}");
     }
     let view = format!("{BLOCK}view/");
+    let back = "<nav class=\"scan-back\"><a href=\"../\">← b1</a></nav>";
+    for path in [view.clone(), format!("{view}correct")] {
+        assert!(html(&page, &path).contains(back), "{path}");
+    }
     assert!(html(&page, &view).contains("block-view.js"));
     let described = page.get(&format!("{view}block.json")).json();
     assert_eq!(described["characters"].as_array().map(Vec::len), Some(6));
@@ -80,6 +84,10 @@ fn a_refused_block_is_aligned_by_places_chosen_on_its_page() {
     assert_eq!(saved.status, 200, "{}", text(&saved));
     assert_eq!(saved.json()["next"], Value::Null, "the page has a button");
     assert!(html(&session.page, BLOCK).contains("places were chosen by a person"));
+    let run = html(&session.page, "/p/p/");
+    for part in ["Align 1 block<", "1 block has other chosen places"] {
+        assert!(run.contains(part), "{part}: {run}");
+    }
     mocban(dir.path(), &["-C", "p", "run"]).expect(0);
     // The block is read again, and is aligned now.
     let view = html(&session.page, &format!("{BLOCK}view/"));
@@ -93,6 +101,8 @@ fn a_project_without_blocks_says_how_they_come_in() {
     let page = open_app(dir.path());
     let list = html(&page, BLOCKS);
     assert!(list.contains("Import a list of blocks"), "{list}");
+    let sample = "block,mesh,page,labels,unit\nb04,scans/b04.ply,pages/b04.jpg";
+    assert!(list.contains(sample), "{list}");
 }
 
 #[test]

@@ -241,6 +241,7 @@ fn all_that_match_are_found_up_to_a_limit() {
     assert_eq!(all.len(), 15);
     assert_eq!(all[3], "upright-0003");
     assert_eq!(listed("state=failed").json()["pairs"], json!([]));
+    assert_eq!(listed("sort=iou").json()["open"], json!([]));
     import_many(dir.path());
     for (language, expected) in [
         ("en", "more than 1000 pairs match"),
@@ -253,6 +254,7 @@ fn all_that_match_are_found_up_to_a_limit() {
     }
     let waiting = listed("state=waiting").json();
     assert_eq!(waiting["pairs"].as_array().map(Vec::len), Some(1000));
+    assert_eq!(waiting["open"], waiting["pairs"]);
 }
 
 #[test]

@@ -55,6 +55,8 @@ fn a_range_is_chosen_with_shift_and_acted_on() {
     tab.click(&choice_of(4), false);
     assert_eq!(chosen(&tab), [2, 3, 5, 6]);
     assert_eq!(said(&tab), "Chosen: 4, 4 of them on this page");
+    let resume = "document.querySelector('#resume').hidden";
+    assert_eq!(tab.eval(resume), true, "none of them waits or has failed");
     let retire = "document.querySelector('#retire')";
     assert_eq!(
         tab.eval(&format!("{retire}.textContent")),

@@ -141,6 +141,35 @@ fn folders_without_a_pair_can_be_mended_too() {
 }
 
 #[test]
+fn one_scan_and_its_page_are_imported_as_a_whole_block() {
+    let (dir, page) = with_project();
+    let dir = dir.path();
+    copy_inputs(
+        dir,
+        &[
+            ("meshes/upright-0000.ply", "x/scans/b04.ply"),
+            ("prints/upright-0000.jpg", "x/prints/page 4.jpg"),
+        ],
+    );
+    let alone = folders(&page, dir, "");
+    for part in ["id=\"join\"", "id=\"whole-block\""] {
+        assert!(alone.contains(part), "{part}: {alone}");
+    }
+    let block = folders(&page, dir, "&whole_block=yes");
+    for part in [
+        "<b>1</b> whole blocks",
+        "<th scope=\"row\">b04</th>",
+        "page 4.jpg",
+    ] {
+        assert!(block.contains(part), "{part}: {block}");
+    }
+    let reply = import(&page, &fields(&block));
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    let blocks = text(&page.get("/p/new/blocks"));
+    assert!(blocks.contains("href=\"block/b04/\""), "{blocks}");
+}
+
+#[test]
 fn an_import_is_refused_if_the_files_changed_after_they_were_shown() {
     let (dir, page) = with_project();
     let dir = dir.path();

@@ -12,6 +12,7 @@
 
 pub mod app;
 pub mod local_server;
+mod messages;
 mod on_thread;
 pub mod review;
 pub mod view;

@@ -152,12 +152,12 @@ mod tests {
                 meshes.join("b.glb").display()
             ),
             format!(
-                "ignored, a BMP image is not read: {} and 2 more; convert them, such as with ImageMagick: \
+                "ignored, a BMP image is not read: {} and 2 more; open them in a program and save them as PNG; for many files, with ImageMagick: \
                  `magick mogrify -format png *.BMP *.bmp`",
                 prints.join("a.bmp").display()
             ),
             format!(
-                "ignored, a PDF document is not read: {}; save their pages as images, such as with \
+                "ignored, a PDF document is not read: {}; open them in a program and save their pages as PNG; for many files: \
                  `pdftoppm -r 600 -png FILE.pdf page`",
                 prints.join("d.pdf").display()
             ),

@@ -212,11 +212,11 @@ impl FileKind {
         let (extensions, _) = images.find(|(_, kind)| *kind == self)?;
         let extension = extensions[0];
         Some(if extension == "pdf" {
-            "save their pages as images, such as with `pdftoppm -r 600 -png FILE.pdf page`"
+            "open them in a program and save their pages as PNG; for many files: `pdftoppm -r 600 -png FILE.pdf page`"
                 .to_owned()
         } else {
             format!(
-                "convert them, such as with ImageMagick: `magick mogrify -format png *.{extension}`"
+                "open them in a program and save them as PNG; for many files, with ImageMagick: `magick mogrify -format png *.{extension}`"
             )
         })
     }

@@ -17,6 +17,11 @@ use mocban_core::domain::{BlockStage, JobStatus, one_line};
 /// Most blocks that are listed.
 const SHOWN: usize = 1000;
 
+/// A list of blocks, as an example.
+const SAMPLE: &str = "block,mesh,page,labels,unit
+b04,scans/b04.ply,pages/b04.jpg,labels/b04.json,mm
+b05,scans/b05.stl,pages/b05.png,,mm";
+
 /// What the list can show, by the name in its address.
 const STATES: [(&str, &[JobStatus]); 3] = [
     ("done", &[JobStatus::Done]),
@@ -61,7 +66,18 @@ fn none(visit: &Visit, key: &str) -> Markup {
     let import = format!("{}import?project={}", visit.root, encoded(key));
     empty(
         text,
-        &html! { p { a.button href=(import) { (visit.t("Import a list of blocks", "Nhập danh sách ván")) } } },
+        &html! {
+            p { (visit.t(
+                "The columns of such a list are block, mesh (the scan) and page (the image); labels (boxes of the characters), unit and side may follow. Paths are relative to the list.",
+                "Các cột của danh sách là block (mã ván), mesh (bản quét) và page (hình trang in); có thể thêm labels (khung các chữ), unit và side. Đường dẫn tính từ danh sách.",
+            )) }
+            pre #block-sample tabindex="0" role="region" aria-label=(visit.t("Example of a list", "Ví dụ về danh sách")) { (SAMPLE) }
+            p { (visit.t(
+                "One block alone needs no list: choose its scan and the image of its page on the page Import.",
+                "Chỉ một ván thì không cần danh sách: hãy chọn bản quét và hình trang in của nó ở trang Nhập dữ liệu.",
+            )) }
+            p { a.button href=(import) { (visit.t("Import a list of blocks", "Nhập danh sách ván")) } }
+        },
     )
 }
 
@@ -94,7 +110,7 @@ fn table(visit: &Visit, blocks: &[&BlockState]) -> Markup {
                     th scope="col" { (visit.t("State", "Trạng thái")) }
                     th.number scope="col" { (visit.t("Characters", "Số chữ")) }
                     th.number scope="col" { (visit.t("Uncertain place", "Vị trí chưa chắc")) }
-                    th.number scope="col" { (visit.t("Left out", "Bỏ ra")) }
+                    th.number scope="col" { (visit.t("Left out", "Bỏ qua")) }
                 } }
                 tbody { @for block in blocks.iter().take(SHOWN) { (row(visit, block)) } }
             }

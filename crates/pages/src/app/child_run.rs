@@ -8,9 +8,9 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use super::failure::{AppFailure, AppResult};
-use super::message_words;
 use super::sentence::{Sentence, without_commands};
 use super::state::AppState;
+use crate::messages;
 use mocban_catalog::{Catalog, WorkerRecord, WorkerState};
 use mocban_project::ExitCode;
 use mocban_project::location::now;
@@ -122,7 +122,7 @@ fn failure(status: ExitStatus, messages: File) -> Option<Sentence> {
 
 fn why(message: &str) -> Sentence {
     let plain = without_commands(message);
-    let vietnamese = message_words::vietnamese(&plain).unwrap_or_else(|| plain.clone());
+    let vietnamese = messages::vietnamese(&plain).unwrap_or_else(|| plain.clone());
     Sentence::new(
         format!("The run failed: {plain}"),
         format!("Lần chạy bị lỗi: {vietnamese}"),

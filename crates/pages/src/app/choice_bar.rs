@@ -2,17 +2,20 @@
 
 use maud::{Markup, html};
 
-use super::chosen_pairs::{MAX_CHOSEN, list_field, without_done};
+use super::chosen_pairs::{MAX_CHOSEN, RESUMED, list_field, without_done};
 use super::components::{action_form, choice};
 use super::exports::PURPOSES;
 use super::visit::Visit;
+use mocban_catalog::PairResults;
 use mocban_core::domain::one_line;
 
-/// Returns the field that chooses a pair of the list.
-pub(super) fn choice_box(visit: &Visit, name: &str) -> Markup {
+/// Returns the field that chooses a pair of the list. It says whether the pair waits or has failed.
+pub(super) fn choice_box(visit: &Visit, pair: &PairResults) -> Markup {
+    let name = pair.attributes.name.as_str();
+    let is_open = RESUMED.contains(&pair.status);
     html! {
         label.pick {
-            input type="checkbox" data-pair=(name) autocomplete="off"
+            input type="checkbox" data-pair=(name) data-open[is_open] autocomplete="off"
                 aria-label={ (visit.t("Choose", "Chọn")) " " (one_line(name)) };
         }
     }
@@ -55,7 +58,7 @@ fn changes(visit: &Visit, kept: &str) -> Markup {
             (list_field(visit))
             button #compute name="change" value="compute" data-text=(visit.t("Compute again ({n})", "Tính lại ({n})"))
                 data-ask=(visit.t("Pairs whose results are computed again: {n}. Continue?", "Số cặp sẽ được tính lại: {n}. Tiếp tục?")) {}
-            button #resume name="change" value="resume"
+            button #resume name="change" value="resume" data-counts="open"
                 data-text=(visit.t("Run the waiting and failed of them ({n})", "Chạy các cặp chờ hoặc lỗi trong đó ({n})")) {}
             button #judge name="change" value="review" data-text=(visit.t("Judge these ({n})", "Đánh giá các cặp này ({n})")) {}
             button #retire name="change" value="retire" data-text=(visit.t("Take out of every count ({n})", "Đưa ra khỏi thống kê ({n})"))

@@ -21,8 +21,8 @@ use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
-use mocban_catalog::ListedNames;
-use mocban_core::domain::{ErrorCode, PairName, UnixMillis};
+use mocban_catalog::{ListedNames, PairFilter};
+use mocban_core::domain::{ErrorCode, JobStatus, PairName, UnixMillis};
 use mocban_project::ProjectError;
 use mocban_project::retire::{RetireChoice, RetireOutcome, retire, retired_at, undo};
 use mocban_project::retry::{RetryRequest, retry};
@@ -30,6 +30,10 @@ use mocban_project::selection;
 
 /// Most pairs that are chosen at a time.
 pub(super) const MAX_CHOSEN: usize = 1000;
+
+/// Statuses of the pairs that are run if they are chosen to go on.
+pub(super) const RESUMED: [JobStatus; 3] =
+    [JobStatus::Ready, JobStatus::Backoff, JobStatus::Quarantined];
 
 /// Parts of the address of a list that say what was done.
 const DONE: [&str; 4] = ["done", "count", "at", "still_out"];
@@ -72,7 +76,7 @@ pub(super) struct RestoreBody {
     list: Option<String>,
 }
 
-/// Responds with the ids of all pairs of a list, which the page then chooses.
+/// Responds with the ids of all pairs of a list, which the page then chooses, and with those of them that wait or have failed.
 pub(super) async fn listed(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
@@ -92,7 +96,10 @@ pub(super) async fn listed(
     let (filter, order, metric) = (&query.filter, query.order, query.metric);
     let names = open.catalog.listed_names(filter, order, metric, MAX_CHOSEN);
     let refusal = match names.await? {
-        ListedNames::All(names) => return Ok(Json(json!({ "pairs": names }))),
+        ListedNames::All(names) => {
+            let open_names = resumed_names(&open, &query).await?;
+            return Ok(Json(json!({ "pairs": names, "open": open_names })));
+        }
         ListedNames::TooMany => Sentence::new(
             format!(
                 "more than {MAX_CHOSEN} pairs match, and at most {MAX_CHOSEN} can be chosen: narrow the filter"
@@ -111,6 +118,27 @@ pub(super) async fn listed(
         ),
     };
     Err(AppFailure::refused(refusal))
+}
+
+/// Returns the ids of the pairs of a list that wait or have failed.
+async fn resumed_names(open: &OpenProject, query: &PairQuery) -> AppResult<Vec<PairName>> {
+    let asked = &query.filter.statuses;
+    let is_asked = |status: &JobStatus| asked.is_empty() || asked.contains(status);
+    let statuses: Vec<JobStatus> = RESUMED.into_iter().filter(is_asked).collect();
+    if statuses.is_empty() {
+        return Ok(Vec::new());
+    }
+    let filter = PairFilter {
+        statuses,
+        ..query.filter.clone()
+    };
+    let names = open
+        .catalog
+        .listed_names(&filter, query.order, query.metric, MAX_CHOSEN);
+    Ok(match names.await? {
+        ListedNames::All(names) => names,
+        ListedNames::TooMany | ListedNames::NotSearched { .. } => Vec::new(),
+    })
 }
 
 /// Says that a difference of IoU needs another metric.

@@ -4,12 +4,11 @@ use axum::response::Html;
 use maud::{Markup, html};
 
 use super::address::encoded;
-use super::message_words;
 pub(super) use super::number_text::grouped;
-use super::number_text::with_decimal_sign;
 use super::sentence::without_commands;
 use super::visit::Visit;
 use crate::local_server::document;
+use crate::messages;
 use crate::review::Language;
 use mocban_core::domain::{LengthUnit, one_line};
 
@@ -166,7 +165,7 @@ pub(super) fn stored_message(visit: &Visit, message: &str) -> Markup {
     let plain = without_commands(message);
     let known = match visit.language {
         Language::English => None,
-        Language::Vietnamese => message_words::vietnamese(&plain),
+        Language::Vietnamese => messages::vietnamese(&plain),
     };
     html! {
         @match known {
@@ -181,7 +180,8 @@ pub(super) fn score(visit: &Visit, value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| visit.decimal(value, 3))
 }
 
-/// Returns a number minus another one with its sign, or a dash if one is missing.
+/// Returns a number minus another one with its sign, or a dash if one is missing. It is the difference of the numbers as they are
+/// shown with the same digits.
 pub(super) fn difference(
     visit: &Visit,
     value: Option<f64>,
@@ -191,16 +191,14 @@ pub(super) fn difference(
     let Some((value, other)) = value.zip(other) else {
         return "–".to_owned();
     };
-    let text = format!("{:+.digits$}", value - other);
-    let is_zero = text
-        .bytes()
-        .all(|byte| matches!(byte, b'+' | b'-' | b'0' | b'.'));
-    let text = if is_zero {
-        text[1..].to_owned()
+    let unit = 10_f64.powi(digits as i32);
+    let [value, other] = [value, other].map(|number| (number * unit).round());
+    let text = visit.decimal((value - other) / unit, digits);
+    if value > other {
+        format!("+{text}")
     } else {
-        text.replace('-', "−")
-    };
-    with_decimal_sign(visit.language, text)
+        text
+    }
 }
 
 /// Returns an option of a choice.
@@ -226,6 +224,7 @@ mod tests {
         assert_eq!(of(Some(9.0), Some(2.5), 1), "+6.5");
         assert_eq!(of(Some(1.0), Some(1.0001), 2), "0.00");
         assert_eq!(of(None, Some(1.0), 2), "–");
+        assert_eq!(of(Some(0.7336), Some(0.7244), 3), "+0.010", "0.734 − 0.724");
         let vietnamese = Visit::in_language(Language::Vietnamese);
         assert_eq!(score(&vietnamese, Some(0.98765)), "0,988");
         assert_eq!(difference(&vietnamese, Some(0.5), Some(0.75), 3), "−0,250");

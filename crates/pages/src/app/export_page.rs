@@ -22,15 +22,18 @@ use super::exports::{
     OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, purpose_of, recover_exports,
 };
 use super::failure::{AppFailure, AppResult};
-use super::message_words::vietnamese;
+use super::run_blocks::{failed_blocks, failed_blocks_part};
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
-use super::tasks::{TaskKind, TaskLines};
+use super::tasks::{FinishedTask, TaskKind};
 use super::visit::Visit;
+use crate::messages::vietnamese;
+use crate::review::Language;
 use mocban_core::domain::{PairName, ThresholdMetric, one_line};
 use mocban_export::{ExportFormat, ExportOptions, ResultFilter};
 use mocban_project::ProjectResult;
+use mocban_project::block_status::BlockStatus;
 use mocban_project::export::export;
 use mocban_project::location::Location;
 
@@ -72,7 +75,9 @@ pub(super) async fn page(
         }
     }
     let folders = exported(&open.dir);
+    let blocks = BlockStatus(open.catalog.block_states().await?);
     let body = html! {
+        (failed_blocks_part(&visit, "./", failed_blocks(&blocks)))
         (form(&visit))
         div #live data-live="1500" {
             (task_part(&visit, task.as_ref()))
@@ -149,13 +154,15 @@ fn folder_part(
     zip: &Markup,
 ) -> Markup {
     let purpose = purpose_of(name);
-    let title = purpose.map_or(name, |((.., texts), _)| texts[visit.index()]);
-    let is_of_chosen = purpose.is_some_and(|(_, is_of_chosen)| is_of_chosen);
+    let title = purpose.map_or_else(
+        || name.to_owned(),
+        |((.., titles), is_of_chosen)| export_title(visit.language, *titles, is_of_chosen),
+    );
     let folder = exports_dir(dir).join(name);
     let folder = std::path::absolute(&folder).unwrap_or(folder);
     html! {
         section.card {
-            h3 { (title) @if is_of_chosen { " (" (visit.t("chosen pairs", "các cặp đã chọn")) ")" } }
+            h3 { (title) }
             (zip)
             p.muted { (visit.t("Folder", "Thư mục")) ": " code { (one_line(&folder.to_string_lossy())) } }
             ul { @for (file, bytes) in files {
@@ -166,7 +173,27 @@ fn folder_part(
                     " " span.muted { (visit.file_size(*bytes)) }
                 }
             } }
+            @if has_folders(&folder) {
+                p.muted { (visit.t("Pictures, scans and other files in its folders are in the ZIP.", "Hình ảnh, bản quét và các tệp khác trong các thư mục con có trong tệp ZIP.")) }
+            }
         }
+    }
+}
+
+/// Returns whether a folder has folders in it.
+fn has_folders(folder: &FilePath) -> bool {
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.any(|entry| entry.path().is_dir())
+}
+
+/// Returns the title of an export: what it is for, and whether it has only chosen pairs.
+fn export_title(language: Language, titles: [&str; 2], is_of_chosen: bool) -> String {
+    let [english, vietnamese] = titles;
+    match (language, is_of_chosen) {
+        (Language::English, false) => english.to_owned(),
+        (Language::English, true) => format!("{english} (chosen pairs)"),
+        (Language::Vietnamese, false) => vietnamese.to_owned(),
+        (Language::Vietnamese, true) => format!("{vietnamese} (các cặp đã chọn)"),
     }
 }
 
@@ -201,12 +228,12 @@ pub(super) async fn start(
 }
 
 async fn run(
-    (name, format, _): Purpose,
+    (name, format, titles): Purpose,
     only: ResultFilter,
     metric: Option<ThresholdMetric>,
     pairs: Option<BTreeSet<PairName>>,
     location: Location,
-) -> ProjectResult<TaskLines> {
+) -> ProjectResult<FinishedTask> {
     let of_chosen = if pairs.is_some() { OF_CHOSEN } else { "" };
     let limits = location.settings()?.config.limits;
     let metrics: Vec<ThresholdMetric> = metric.into_iter().collect();
@@ -221,10 +248,21 @@ async fn run(
     let output = exports_dir(&location.dir).join(format!("{name}{of_chosen}"));
     let summary = export(&output, &[format], options, &location, &()).await?;
     let done = grouped(summary.pairs.done);
-    let mut lines = vec![[
-        format!("{done} pairs were exported."),
-        format!("Đã xuất {done} cặp."),
-    ]];
+    let is_of_chosen = !of_chosen.is_empty();
+    let [english, vietnamese_title] = [Language::English, Language::Vietnamese]
+        .map(|language| export_title(language, titles, is_of_chosen));
+    let is_empty = summary.pairs.done == 0;
+    let mut lines = vec![if is_empty {
+        [
+            format!("{english}: no pair has a result to export."),
+            format!("{vietnamese_title}: không có cặp nào có kết quả để xuất."),
+        ]
+    } else {
+        [
+            format!("{english}: {done} pairs were exported."),
+            format!("{vietnamese_title}: đã xuất {done} cặp."),
+        ]
+    }];
     if summary.kept_earlier {
         lines.push([
             "The earlier export was kept, because files of results are missing; check the project first.".to_owned(),
@@ -236,7 +274,10 @@ async fn run(
         let vietnamese = vietnamese(&line).unwrap_or_else(|| line.clone());
         lines.push([line, vietnamese]);
     }
-    Ok(lines)
+    Ok(FinishedTask {
+        is_warning: is_empty || summary.kept_earlier || !summary.unreadable.is_empty(),
+        lines,
+    })
 }
 
 /// Responds with a file of an export. Only files that the page lists are found.

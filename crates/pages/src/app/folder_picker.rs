@@ -2,9 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use super::exports::exports_dir;
 use super::failure::{AppFailure, AppResult};
+use super::projects::is_project;
 use super::sentence::Sentence;
+use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
+use mocban_store::Project;
 
 /// Most entries of all folders that are counted for one page.
 const COUNTED: usize = 20_000;
@@ -124,6 +128,9 @@ impl PickerRoots {
             }
             let entry = entry.path();
             if entry.is_dir() {
+                if holds_results(&path, &entry) {
+                    continue;
+                }
                 if folders.len() < SHOWN && entry.canonicalize().is_ok_and(|path| self.has(&path)) {
                     folders.push((name, FileCounts::below(&entry, &mut budget)));
                 }
@@ -167,7 +174,11 @@ impl FileCounts {
                 let is_hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
                 match entry.file_type() {
                     _ if is_hidden => {}
-                    Ok(kind) if kind.is_dir() => open.push(entry.path()),
+                    Ok(kind) if kind.is_dir() => {
+                        if !holds_results(&folder, &entry.path()) {
+                            open.push(entry.path());
+                        }
+                    }
                     Ok(_) => counts.add(&entry.path()),
                     Err(_) => {}
                 }
@@ -187,6 +198,13 @@ impl FileCounts {
     }
 }
 
+/// Returns whether a folder in another one has results of a project, or is an export.
+fn holds_results(parent: &Path, folder: &Path) -> bool {
+    let is_named_so =
+        folder == exports_dir(parent) || folder == Project::at(parent).artifacts_dir();
+    is_named_so && is_project(parent) || folder.join(EXPORT_MANIFEST).exists()
+}
+
 fn is_list(file: &Path) -> bool {
     let extension = file.extension().and_then(|extension| extension.to_str());
     extension.is_some_and(|extension| LISTS.contains(&extension.to_ascii_lowercase().as_str()))
@@ -194,13 +212,20 @@ fn is_list(file: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{FileCounts, PickerRoots};
+    use super::{EXPORT_MANIFEST, FileCounts, PickerRoots};
 
     #[test]
     fn a_folder_is_counted_and_nothing_outside_the_roots_is_read() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let root = dir.path().join("allowed");
-        for folder in ["allowed/scans/b1", "allowed/.hidden", "secret"] {
+        for folder in [
+            "allowed/scans/b1",
+            "allowed/.hidden",
+            "allowed/p/artifacts/00",
+            "allowed/p/exports/excel",
+            "allowed/table",
+            "secret",
+        ] {
             std::fs::create_dir_all(dir.path().join(folder)).expect("a folder");
         }
         for file in [
@@ -210,9 +235,14 @@ mod tests {
             "pairs.csv",
             "x.txt",
             ".hidden/4.stl",
+            "p/catalog.sqlite",
+            "p/artifacts/00/5.png",
+            "p/exports/excel/6.png",
+            "table/7.png",
         ] {
             std::fs::write(root.join(file), "x").expect("written");
         }
+        std::fs::write(root.join("table").join(EXPORT_MANIFEST), "{}").expect("written");
         std::fs::write(dir.path().join("secret/5.stl"), "x").expect("written");
         let roots = PickerRoots::of([root.clone()]);
         let read = roots.read(&root).expect("a folder");
@@ -220,9 +250,15 @@ mod tests {
             (read.counts.meshes, read.counts.prints, read.counts.lists),
             (2, 1, 1)
         );
-        assert_eq!(read.folders.len(), 1);
+        let names: Vec<&str> = read.folders.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(
-            read.folders[0].1,
+            names,
+            ["p", "scans"],
+            "no exports, and no results in a project"
+        );
+        assert_eq!(read.folders[0].1, FileCounts::default());
+        assert_eq!(
+            read.folders[1].1,
             FileCounts {
                 meshes: 2,
                 ..FileCounts::default()
@@ -242,7 +278,7 @@ mod tests {
             let link = root.join("link");
             std::os::unix::fs::symlink(dir.path().join("secret"), &link).expect("a link");
             roots.read(&link).expect_err("a link that leads outside");
-            assert_eq!(roots.read(&root).expect("a folder").folders.len(), 1);
+            assert_eq!(roots.read(&root).expect("a folder").folders.len(), 2);
         }
         roots
             .allowed(std::path::Path::new("/etc/passwd"))

@@ -19,7 +19,7 @@ use super::number_text::file_size;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
-use super::tasks::{TaskKind, TaskLines};
+use super::tasks::{FinishedTask, TaskKind};
 use super::visit::Visit;
 use crate::review::Language;
 use mocban_core::domain::one_line;
@@ -111,7 +111,7 @@ pub(super) struct CheckBody {
     what: String,
 }
 
-async fn check_lines(location: Location, repair: bool) -> ProjectResult<TaskLines> {
+async fn check_lines(location: Location, repair: bool) -> ProjectResult<FinishedTask> {
     let options = CheckOptions {
         repair,
         ..CheckOptions::default()
@@ -154,7 +154,10 @@ async fn check_lines(location: Location, repair: bool) -> ProjectResult<TaskLine
             lines.push(what.map(|what| format!("{} {what}: {first}", grouped(notes.count))));
         }
     }
-    Ok(lines)
+    Ok(FinishedTask {
+        lines,
+        is_warning: summary.left() > 0,
+    })
 }
 
 /// Returns what the findings of a check or a repair mean, and what to do.
@@ -237,15 +240,18 @@ pub(super) async fn start_backup(
     Ok(Json(json!({ "reload": true })))
 }
 
-async fn backup_lines(location: Location) -> ProjectResult<TaskLines> {
+async fn backup_lines(location: Location) -> ProjectResult<FinishedTask> {
     let stored = backup(&location.dir.join(BACKUP), &location, &()).await?;
     let [pairs, verdicts] = [stored.pairs, stored.verdicts].map(grouped);
     let [english, vietnamese] =
         [Language::English, Language::Vietnamese].map(|language| file_size(language, stored.bytes));
-    Ok(vec![[
-        format!("{pairs} pairs and {verdicts} verdicts are in the backup ({english})."),
-        format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({vietnamese})."),
-    ]])
+    Ok(FinishedTask {
+        lines: vec![[
+            format!("{pairs} pairs and {verdicts} verdicts are in the backup ({english})."),
+            format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({vietnamese})."),
+        ]],
+        is_warning: false,
+    })
 }
 
 /// Responds with the backup.

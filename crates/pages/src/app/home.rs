@@ -9,11 +9,13 @@ use maud::{Markup, html};
 use super::components::{NavSection, action_form, empty, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::projects::{find, is_project};
+use super::run_blocks::{failed_blocks, failed_blocks_part, outdated_blocks};
 use super::state::AppState;
 use super::visit::Visit;
 use crate::review::Language;
 use mocban_catalog::StatusCounts;
 use mocban_core::domain::{JobStatus, one_line};
+use mocban_project::block_status::BlockStatus;
 use mocban_project::location::now;
 use mocban_runner::{fingerprints, is_running};
 use mocban_system::platform;
@@ -21,9 +23,18 @@ use mocban_system::platform;
 /// What the home page says of a project.
 struct Overview {
     key: String,
-    /// Counts and whether a run is active, or why they cannot be read.
-    state: Result<(StatusCounts, bool), AppFailure>,
+    /// What is known of the project, or why it cannot be read.
+    state: Result<ProjectState, AppFailure>,
     last_change: Option<i64>,
+}
+
+/// The counts of a project.
+struct ProjectState {
+    counts: StatusCounts,
+    is_running: bool,
+    failed_blocks: u64,
+    /// Number of blocks that a run would work on or works on.
+    open_blocks: u64,
 }
 
 pub(super) async fn page(
@@ -71,7 +82,19 @@ async fn read(state: &AppState, key: String) -> Overview {
             let running = is_running(&open.project, &open.catalog, now()).await?;
             let fingerprints = fingerprints(&settings.config.stages);
             let counts = open.catalog.status(&fingerprints).await?;
-            Ok::<_, mocban_project::ProjectError>((counts, running))
+            let blocks = BlockStatus(open.catalog.block_states().await?);
+            let options = mocban_project::run::options(&settings.config);
+            let outdated = if running {
+                0
+            } else {
+                outdated_blocks(&open.catalog, &options, &blocks).await?
+            };
+            Ok::<_, mocban_project::ProjectError>(ProjectState {
+                counts,
+                is_running: running,
+                failed_blocks: failed_blocks(&blocks),
+                open_blocks: blocks.waiting() + blocks.leased() + outdated,
+            })
         };
         read.await.map_err(|error| AppFailure::of(error, &open.dir))
     };
@@ -109,12 +132,13 @@ fn card(visit: &Visit, project: &Overview) -> Markup {
             h2 { a href=(href) { (one_line(&project.key)) } }
             @match &project.state {
                 Err(failure) => p.notice.bad { (failure.text(visit.language)) },
-                Ok((counts, running)) => {
-                    (summary(visit, counts, *running))
+                Ok(found) => {
+                    (summary(visit, &found.counts, found.is_running))
+                    (failed_blocks_part(visit, &href, found.failed_blocks))
                     @if let Some(time) = project.last_change {
                         p.muted { (visit.t("Last result", "Kết quả mới nhất")) ": " (visit.time(time)) }
                     }
-                    p { a.button href=(href) { (next_step(visit, counts, *running)) } }
+                    p { a.button href=(href) { (next_step(visit, found)) } }
                 }
             }
         }
@@ -138,17 +162,20 @@ fn summary(visit: &Visit, counts: &StatusCounts, running: bool) -> Markup {
 }
 
 /// Names what a project needs next.
-fn next_step(visit: &Visit, counts: &StatusCounts, running: bool) -> &'static str {
+fn next_step(visit: &Visit, found: &ProjectState) -> &'static str {
+    let counts = &found.counts;
     let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
     // Without a run, leases are those of an interrupted one.
     let outstanding = [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased].map(jobs);
     let outstanding: u64 = outstanding.iter().sum();
-    if running {
+    if found.is_running {
         visit.t("Watch the run", "Xem tiến trình")
     } else if outstanding + counts.stale + counts.other_files > 0 {
         visit.t("Align the pairs", "Căn chỉnh các cặp")
-    } else if jobs(JobStatus::Quarantined) > 0 {
-        visit.t("See what failed", "Xem các cặp lỗi")
+    } else if found.open_blocks > 0 {
+        visit.t("Align the blocks", "Căn chỉnh các ván")
+    } else if jobs(JobStatus::Quarantined) + found.failed_blocks > 0 {
+        visit.t("See what failed", "Xem các mục lỗi")
     } else {
         visit.t("Open", "Mở")
     }

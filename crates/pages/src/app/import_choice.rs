@@ -12,10 +12,14 @@ use super::plan_cache::{KEPT_PAIRS, PlanCache};
 use super::projects::{find, is_project};
 use super::sentence::Sentence;
 use super::uploads::FOLDER as UPLOADS;
-use mocban_core::domain::LengthUnit;
-use mocban_lists::manifest::{ChosenColumns, ListHead, PairingChanges, read_head};
-use mocban_project::files::is_jsonl;
-use mocban_project::import_blocks::{ListedItems, list_warnings};
+use mocban_core::domain::{BlockName, LengthUnit};
+use mocban_lists::manifest::{
+    BlockRow, ChosenColumns, ListHead, PairingChanges, is_named_like_mesh, is_named_like_print,
+    parse_blocks, read_head,
+};
+use mocban_project::ProjectError;
+use mocban_project::files::{is_jsonl, list_below};
+use mocban_project::import_blocks::{BlockSource, ImportedBlock, ListedItems, list_warnings};
 use mocban_project::import_pairs::PairSource;
 use mocban_project::import_plan::{ImportPlan, plan_import};
 use mocban_project::location::Location;
@@ -51,6 +55,8 @@ pub(super) struct ImportChoice {
     pub(super) matches: String,
     /// Hash of the pairs that were shown.
     pub(super) shown: String,
+    /// Whether the only scan and the only image are a whole block and its page.
+    pub(super) whole_block: String,
     id_column: String,
     mesh_column: String,
     print_column: String,
@@ -64,8 +70,8 @@ pub(super) struct ImportChoice {
 pub(super) enum Planned {
     /// Pairs. The page shows some from a position in the plan.
     Pairs(Arc<ImportPlan>, usize),
-    /// A list of whole blocks, whose pairs a run finds, with warnings about it.
-    Blocks(Vec<String>),
+    /// Whole blocks, whose pairs a run finds, with warnings about their list.
+    Blocks(Vec<BlockRow>, Vec<String>),
 }
 
 /// What the page shows of a choice.
@@ -88,7 +94,9 @@ impl ImportChoice {
             prints: get("prints"),
             list: get("list"),
             unit: get("unit"),
+            changed: get("changed"),
             matches: get("matches"),
+            whole_block: get("whole_block"),
             id_column: get("id_column"),
             mesh_column: get("mesh_column"),
             print_column: get("print_column"),
@@ -119,6 +127,7 @@ impl ImportChoice {
             ("prints", &*self.prints),
             ("list", &*self.list),
             ("matches", &*self.matches),
+            ("whole_block", &*self.whole_block),
         ];
         let all = others.into_iter().chain(columns);
         all.filter(|(_, value)| !value.is_empty()).collect()
@@ -159,11 +168,42 @@ impl ImportChoice {
         if self.meshes.is_empty() || self.prints.is_empty() {
             return Ok(None);
         }
+        if !self.whole_block.is_empty() {
+            let block = self.only_block(roots)?;
+            return Ok(Some(ListedItems::Blocks(BlockSource::One(block))));
+        }
         Ok(Some(ListedItems::Pairs(PairSource::Folders {
             meshes: roots.allowed(Path::new(&self.meshes))?,
             prints: roots.allowed(Path::new(&self.prints))?,
             unit: self.unit.parse::<LengthUnit>().ok(),
         })))
+    }
+
+    /// Returns the only scan of its folder with the only image of the other one, as a block with its page.
+    ///
+    /// # Errors
+    /// Refuses folders with several scans or images.
+    fn only_block(&self, roots: &PickerRoots) -> AppResult<ImportedBlock> {
+        let only = |folder: &str, is_wanted: fn(&Path) -> bool| {
+            let folder = roots.allowed(Path::new(folder))?;
+            let mut files = list_below(&folder).map_err(ProjectError::from)?;
+            files.retain(|file| is_wanted(file));
+            match files.as_slice() {
+                [only] => Ok(only.clone()),
+                _ => Err(AppFailure::refused(Sentence::new(
+                    "a whole block needs exactly one scan and one image of its page: import several with a list of blocks",
+                    "một ván nguyên cần đúng một bản quét và một hình của trang in: hãy nhập nhiều ván bằng danh sách ván",
+                ))),
+            }
+        };
+        Ok(ImportedBlock {
+            mesh: only(&self.meshes, is_named_like_mesh)?,
+            page: only(&self.prints, is_named_like_print)?,
+            labels: None,
+            side: None,
+            name: None,
+            unit: self.unit.parse::<LengthUnit>().ok(),
+        })
     }
 
     /// Returns the folder of the project, which need not exist.
@@ -216,9 +256,10 @@ impl ImportChoice {
     ) -> Option<ImportPreview> {
         let (mut head, items) = (None, self.items(roots).transpose()?);
         let planned = items.and_then(|items| match items {
-            ListedItems::Blocks(source) => Ok(Planned::Blocks(
-                list_warnings(&source).map_err(AppFailure::from)?,
-            )),
+            ListedItems::Blocks(source) => {
+                let warnings = list_warnings(&source).map_err(AppFailure::from)?;
+                Ok(Planned::Blocks(block_rows(&source)?, warnings))
+            }
             ListedItems::Pairs(source) => {
                 let choices = self.choices()?;
                 if let PairSource::List { file, bytes } = &source {
@@ -240,7 +281,7 @@ impl ImportChoice {
         });
         let last = match &planned {
             Ok(Planned::Pairs(plan, _)) => plan.pairs.saturating_sub(1) / SHOWN_PAIRS * SHOWN_PAIRS,
-            Ok(Planned::Blocks(_)) | Err(_) => from,
+            Ok(Planned::Blocks(..)) | Err(_) => from,
         };
         if from > last {
             return self.preview(folder, roots, last, plans);
@@ -250,6 +291,34 @@ impl ImportChoice {
             planned,
             from,
         })
+    }
+}
+
+/// Returns the blocks of a source, as their list has them.
+///
+/// # Errors
+/// Refuses a list with problems, and a scan whose name cannot be that of a block.
+fn block_rows(source: &BlockSource) -> AppResult<Vec<BlockRow>> {
+    let refused = |why: String| AppFailure::refused(Sentence::of_program(&why));
+    match source {
+        BlockSource::List { bytes, .. } => {
+            parse_blocks(bytes).map_err(|problems| refused(problems.to_string()))
+        }
+        BlockSource::One(block) => {
+            let shown = block.mesh.display();
+            let stem = block.mesh.file_stem().unwrap_or_default().to_string_lossy();
+            let name = BlockName::new(&stem)
+                .map_err(|error| refused(format!("{shown}: {error}; rename the file")))?;
+            Ok(vec![BlockRow {
+                line: 1,
+                name,
+                mesh: block.mesh.clone(),
+                page: block.page.clone(),
+                labels: block.labels.clone(),
+                unit: block.unit,
+                side: block.side,
+            }])
+        }
     }
 }
 

@@ -16,6 +16,7 @@ use super::failure::{AppFailure, AppResult};
 use super::folder_picker::{FileCounts, PickedFolder, PickerRoots};
 use super::import_choice::{ImportChoice, ImportPreview, Planned, with_change};
 use super::import_columns::columns_part;
+use super::import_partners::{ImportPartners, mending_part};
 use super::import_preview::{changes_part, plan_part};
 use super::plan_cache::PlanCache;
 use super::projects::find;
@@ -24,7 +25,7 @@ use super::state::AppState;
 use super::upload_form::upload_part;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
-use mocban_core::domain::one_line;
+use mocban_core::domain::{PairName, one_line};
 use mocban_project::import_blocks::{BlockSource, ListedItems, import_blocks};
 use mocban_project::import_pairs::{AllowedChanges, PairImport, import_pairs};
 use mocban_project::location::Location;
@@ -32,7 +33,7 @@ use mocban_project::pair_choices::PairChoices;
 use mocban_project::{ProjectError, ProjectResult};
 
 /// Values of the address that belong to the files that were chosen, beside the columns of a list.
-const OF_FILES: [&str; 3] = ["matches", "from", "left_out"];
+const OF_FILES: [&str; 5] = ["matches", "from", "left_out", "whole_block", "changed"];
 
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
@@ -53,15 +54,26 @@ pub(super) async fn page(
             let found = find(&folder).into_iter();
             let is_known = found.into_iter().any(|found| found.key == chosen.project);
             let preview = chosen.preview(&folder, &roots, from, &state.plans);
-            (picked, preview, roots, is_known)
+            let uploads = state.uploads.folder();
+            let partners = preview.as_ref().and_then(|preview| {
+                ImportPartners::find(preview, Path::new(&chosen.meshes), &roots, uploads)
+            });
+            (picked, preview, partners, roots, is_known)
         }
     };
-    let (picked, preview, roots, is_known) = tokio::task::spawn_blocking(read)
+    let (picked, preview, mut partners, roots, is_known) = tokio::task::spawn_blocking(read)
         .await
         .map_err(|error| ProjectError::from(mocban_project::error::TaskStopped(error)))?;
+    if let (true, Some(partners), Some(preview)) = (is_known, &mut partners, &preview) {
+        let open = state.open(&chosen.project).await?;
+        partners.add_replacements(&open, preview, &roots).await?;
+    }
+    let mended = visit.query.parsed::<PairName>("mend");
     let body = html! {
+        @if let Some(pair) = &mended { (mending_part(&visit, pair)) }
         (chosen_part(&visit, &chosen))
         @if let Some(preview) = preview { (preview_part(&visit, &chosen, &preview)) }
+        @if let Some(partners) = partners { (partners.part(&visit)) }
         (upload_part(&visit, &state.uploads, &chosen.project))
         @if is_known {
             div data-load={ "p/" (encoded(&chosen.project)) "/last-import" } aria-live="polite" {}

@@ -6,12 +6,12 @@ use maud::{Markup, html};
 
 use super::components::{action_form, choice, grouped};
 use super::import_choice::{ImportChoice, NAME_CHARS, Planned, SHOWN_PAIRS};
-use super::message_words;
-use super::sentence::Sentence;
+use super::sentence::{Sentence, without_commands};
 use super::visit::Visit;
+use crate::messages;
 use crate::review::Language;
 use mocban_core::domain::{LengthUnit, one_line};
-use mocban_lists::manifest::PairingChanges;
+use mocban_lists::manifest::{BlockRow, PairingChanges};
 use mocban_project::import_plan::{ImportPlan, PlannedPair};
 use mocban_project::manifest_file::{IGNORED, RENAMED};
 
@@ -31,9 +31,11 @@ pub(super) fn plan_part(
         section.card {
             h2 { (visit.t("What would be imported", "Sẽ nhập những gì")) }
             @match planned {
-                Planned::Blocks(warnings) => {
-                    p { (visit.t("A list of whole blocks with their pages. A run finds the characters and makes the pairs.", "Một danh sách ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) }
+                Planned::Blocks(rows, warnings) => {
+                    p { b { (grouped(rows.len() as u64)) } " " (visit.t("whole blocks", "ván nguyên")) }
+                    p { (visit.t("Scans of whole blocks with their pages. A run finds the characters and makes the pairs.", "Bản quét ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) }
                     @for line in warnings { p.notice { (one_line(&warning(visit, line))) } }
+                    (block_table(visit, rows))
                 },
                 Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
             }
@@ -75,29 +77,93 @@ fn pairs_part(
         }
         (changes_part(visit, &changes))
         (join_form(visit, plan))
+        (whole_block_form(visit, plan))
+    }
+}
+
+/// Returns the form that takes a scan and an image that are alone for a whole block and its page.
+fn whole_block_form(visit: &Visit, plan: &ImportPlan) -> Markup {
+    let [meshes, prints] = &plan.alone;
+    html! {
+        @if plan.pairs == 0 && meshes.len() == 1 && prints.len() == 1 {
+            form #whole-block.fields method="get" action=(visit.here) {
+                @for (name, value) in visit.query.pairs() { input type="hidden" name=(name) value=(value); }
+                input type="hidden" name="whole_block" value="yes";
+                button { (visit.t("Take them as one whole block with its page", "Coi là một ván nguyên với trang in của nó")) }
+            }
+        }
+    }
+}
+
+/// Returns the first blocks that would be imported.
+fn block_table(visit: &Visit, rows: &[BlockRow]) -> Markup {
+    let label = visit.t("Blocks", "Các ván");
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(label) {
+            table {
+                thead { tr {
+                    @for title in [visit.t("Block", "Ván"), visit.t("Scan", "Bản quét"), visit.t("Page", "Trang in"), visit.t("Labels", "Nhãn")] {
+                        th scope="col" { (title) }
+                    }
+                } }
+                tbody { @for row in rows.iter().take(SHOWN_PAIRS as usize) {
+                    tr {
+                        th scope="row" { (one_line(row.name.as_str())) }
+                        td { (file_name(&row.mesh)) }
+                        td { (file_name(&row.page)) }
+                        td { (row.labels.as_deref().map_or_else(|| "–".to_owned(), file_name)) }
+                    }
+                } }
+            }
+        }
+        @if rows.len() > SHOWN_PAIRS as usize {
+            p.muted { (visit.t("Only the first are listed:", "Chỉ liệt kê các ván đầu tiên:")) " " (grouped(SHOWN_PAIRS)) }
+        }
     }
 }
 
 /// Returns a warning of an import, which is translated if its beginning is known, or else quoted.
 fn warning(visit: &Visit, line: &str) -> String {
+    let line = &without_commands(line);
     let [mesh_alone, print_alone, other] = IGNORED;
     let beginnings = [
-        (mesh_alone, "Bỏ qua, bản quét không có bản in"),
-        (print_alone, "Bỏ qua, bản in không có bản quét"),
-        (other, "Bỏ qua, không phải bản quét hay bản in"),
-        (RENAMED, "Đã hiểu các cột có tên khác"),
+        (mesh_alone, [mesh_alone, "Bỏ qua, bản quét không có bản in"]),
+        (
+            print_alone,
+            [print_alone, "Bỏ qua, bản in không có bản quét"],
+        ),
+        // A scan may lie in the folder of the prints.
+        (
+            other,
+            [
+                "ignored, no scan in the folder of scans, or no image in the folder of prints",
+                "Bỏ qua, không phải bản quét trong thư mục bản quét, hoặc không phải hình trong thư mục bản in",
+            ],
+        ),
+        (RENAMED, [RENAMED, "Đã hiểu các cột có tên khác"]),
     ];
-    let found = beginnings.into_iter().find_map(|(english, vietnamese)| {
-        let rest = line.strip_prefix(english)?;
-        Some(format!("{}{rest}", visit.t(english, vietnamese)))
-    });
+    let found = beginnings
+        .into_iter()
+        .find_map(|(known, [english, vietnamese])| {
+            let rest = line.strip_prefix(known)?;
+            Some(match visit.language {
+                Language::English => format!("{english}{rest}"),
+                Language::Vietnamese => format!("{vietnamese}{}", with_vietnamese_rest(rest)),
+            })
+        });
     found.unwrap_or_else(|| match visit.language {
         Language::English => line.to_owned(),
         Language::Vietnamese => {
-            let known = message_words::vietnamese(line);
+            let known = messages::vietnamese(line);
             known.unwrap_or_else(|| format!("Chương trình báo: {line}"))
         }
     })
+}
+
+/// Returns the end of a list of names or columns in Vietnamese.
+fn with_vietnamese_rest(rest: &str) -> String {
+    let rest = rest.replace("\" as ", "\" là ");
+    messages::with_more(&rest, "tệp khác").unwrap_or(rest)
 }
 
 fn pair_row(
@@ -123,7 +189,7 @@ fn pair_row(
             td {
                 @if is_joined { (visit.t("joined by you", "do bạn ghép")) }
                 @else {
-                    a href={ (visit.here) (leave) } aria-label={ (visit.t("leave out", "bỏ ra")) " " (one_line(name)) } { (visit.t("leave out", "bỏ ra")) }
+                    a href={ (visit.here) (leave) } aria-label={ (visit.t("leave out", "bỏ qua")) " " (one_line(name)) } { (visit.t("leave out", "bỏ qua")) }
                 }
             }
         }
@@ -173,7 +239,7 @@ pub(super) fn changes_part(visit: &Visit, changes: &PairingChanges) -> Markup {
                     li { (visit.t("joined", "ghép")) ": " (one_line(scan)) " + " (one_line(print)) " " (undo("split", &index.to_string())) }
                 }
                 @for id in &changes.left_out {
-                    li { (visit.t("left out", "bỏ ra")) ": " (one_line(id)) " " (undo("take", id)) }
+                    li { (visit.t("left out", "bỏ qua")) ": " (one_line(id)) " " (undo("take", id)) }
                 }
             }
         }
@@ -211,7 +277,7 @@ fn join_form(visit: &Visit, plan: &ImportPlan) -> Markup {
 fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Markup {
     let plan = match planned {
         Planned::Pairs(plan, _) => Some(plan),
-        Planned::Blocks(_) => None,
+        Planned::Blocks(..) => None,
     };
     let missing = plan.is_some_and(|plan| plan.missing.count > 0);
     let is_nothing = plan.is_some_and(|plan| plan.pairs == 0);
@@ -235,7 +301,7 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
             @if missing {
                 label.check { input type="checkbox" name="missing" value="yes"; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
             }
-            label.check { input type="checkbox" name="changed" value="yes"; " " (visit.t("Known pairs may get other files", "Cho phép đổi tệp của các cặp đã có")) }
+            label.check { input type="checkbox" name="changed" value="yes" checked[!chosen.changed.is_empty()]; " " (visit.t("Known pairs may get other files", "Cho phép đổi tệp của các cặp đã có")) }
             button.primary #import disabled[is_nothing] { (visit.t("Import", "Nhập")) }
         },
     )

@@ -25,9 +25,16 @@ pub(super) fn with_decimal_sign(language: Language, text: String) -> String {
     }
 }
 
-/// Returns a number with some digits behind the decimal sign.
+/// Returns a number with some digits behind the decimal sign. Zero has no sign.
 pub(super) fn decimal(language: Language, value: f64, digits: usize) -> String {
-    with_decimal_sign(language, format!("{value:.digits$}"))
+    let text = format!("{value:.digits$}");
+    let is_zero = !text.bytes().any(|byte| matches!(byte, b'1'..=b'9'));
+    let text = match text.strip_prefix('-') {
+        Some(zero) if is_zero => zero.to_owned(),
+        Some(number) => format!("−{number}"),
+        None => text,
+    };
+    with_decimal_sign(language, text)
 }
 
 /// Returns a number of bytes in the unit that fits.
@@ -77,7 +84,8 @@ mod tests {
         assert_eq!(grouped(7), "7");
         assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(decimal(English, 0.98765, 3), "0.988");
-        assert_eq!(decimal(Vietnamese, -0.98765, 3), "-0,988");
+        assert_eq!(decimal(Vietnamese, -0.98765, 3), "−0,988");
+        assert_eq!(decimal(English, -0.0004, 3), "0.000");
         for (bytes, english, vietnamese) in [
             (7, "7 B", "7 B"),
             (12_345, "12 kB", "12 kB"),

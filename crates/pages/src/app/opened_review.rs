@@ -12,13 +12,19 @@ use crate::on_thread::on_thread;
 use crate::review::{
     CheckRates, Language, PictureWork, QueueOptions, ReviewOptions, ReviewPages, key_map,
 };
-use mocban_catalog::CatalogError;
-use mocban_core::domain::{PairName, ReviewOrder};
+use mocban_catalog::{Catalog, CatalogError, MetricRecord};
+use mocban_core::domain::{JobStatus, PairName, ReviewOrder, ThresholdMetric};
+use mocban_project::block_status::BlockStatus;
 use mocban_project::location::{Location, now};
 use mocban_project::{ProjectResult, Refusal};
+use mocban_results::consensus::{Consensus, partition_verdicts};
+use mocban_results::pair_artifacts::group_identical;
 
 /// Shortest time that an image is shown before a verdict is accepted, as in `review`.
 const MIN_VIEW_MS: u64 = 250;
+
+/// Number of pairs that are read from the catalog at a time.
+const PAGE_PAIRS: usize = 256;
 
 /// Where a reviewer judges: in this app, or as a guest with an invitation.
 #[derive(Debug)]
@@ -58,7 +64,8 @@ pub(super) async fn open_review(
     place: ReviewPlace,
     pairs: Option<BTreeSet<PairName>>,
 ) -> AppResult<ReviewPages> {
-    let (location, reviewer) = (open.location(), reviewer.to_owned());
+    let (location, name) = (open.location(), reviewer.to_owned());
+    let (reviewer, metric) = (name.clone(), query.parsed("metric"));
     let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
     let query = query.clone();
     let opened =
@@ -66,20 +73,69 @@ pub(super) async fn open_review(
     let pages = opened
         .await
         .map_err(|error| AppFailure::of(error, &open.dir))?;
-    if pages.counts().items == 0 {
-        return Err(AppFailure::refused(if is_settling {
-            Sentence::new(
-                "no two reviewers disagree on a result of this metric",
-                "không có hai người đánh giá nào bất đồng về kết quả của phương pháp này",
-            )
-        } else {
-            Sentence::new(
-                "there is no result to judge yet: press Align on the page Run first",
-                "chưa có kết quả nào để đánh giá: trước hết hãy bấm Căn chỉnh ở trang Căn chỉnh",
-            )
-        }));
+    if pages.counts().items > 0 {
+        return Ok(pages);
     }
-    Ok(pages)
+    Err(AppFailure::refused(if is_settling {
+        match own_conflicts(&open.catalog, &name, metric).await? {
+            0 => Sentence::new(
+                "no two reviewers disagree on a result of this metric",
+                "không có hai người đánh giá nào bất đồng về kết quả của độ đo này",
+            ),
+            own => Sentence::new(
+                format!(
+                    "you are one of the two who disagree (results: {own}): a third person must settle it, under another name"
+                ),
+                format!(
+                    "bạn là một trong hai người bất đồng (số kết quả: {own}): một người thứ ba phải quyết định, với tên khác"
+                ),
+            ),
+        }
+    } else {
+        nothing_to_judge(&open.catalog).await?
+    }))
+}
+
+/// Returns on how many results a reviewer and others disagree, which look the same counted once.
+async fn own_conflicts(
+    catalog: &Catalog,
+    reviewer: &str,
+    metric: Option<ThresholdMetric>,
+) -> AppResult<usize> {
+    let is_own = |record: &&MetricRecord| {
+        let (_, alone) = partition_verdicts(record);
+        Consensus::of(record) == Consensus::Conflict
+            && metric.is_none_or(|metric| metric == record.outcome.metric)
+            && alone.iter().any(|given| given.reviewer == reviewer)
+    };
+    let (mut own, mut pages) = (0, catalog.result_pages(PAGE_PAIRS));
+    while let Some(page) = pages.next().await? {
+        let pairs = page.iter();
+        own += pairs
+            .map(|pair| group_identical(pair.metrics.iter().filter(is_own)).len())
+            .sum::<usize>();
+    }
+    Ok(own)
+}
+
+/// Says why there is no result to judge: blocks or pairs failed, or nothing was aligned yet.
+async fn nothing_to_judge(catalog: &Catalog) -> AppResult<Sentence> {
+    let blocks = BlockStatus(catalog.block_states().await?);
+    let failed = blocks.number(&[JobStatus::Quarantined]);
+    if failed > 0 && blocks.waiting() + blocks.leased() == 0 {
+        return Ok(Sentence::new(
+            format!(
+                "there is no result to judge, because blocks failed ({failed}): the page Blocks says why"
+            ),
+            format!(
+                "chưa có kết quả nào để đánh giá vì có ván bị lỗi ({failed}): trang Các ván cho biết lý do"
+            ),
+        ));
+    }
+    Ok(Sentence::new(
+        "there is no result to judge yet: press Align on the page Run first",
+        "chưa có kết quả nào để đánh giá: trước hết hãy bấm Căn chỉnh ở trang Căn chỉnh",
+    ))
 }
 
 async fn review_pages(

@@ -191,7 +191,7 @@ mod tests {
         let visit = Visit::in_language(Language::English);
         let of = |name: &str| NUMBERS.iter().find(|number| number.name[0] == name);
         let rotation = of("Rotation").expect("an angle");
-        assert_eq!(rotation.text(&visit, &first), "-179.0°");
+        assert_eq!(rotation.text(&visit, &first), "−179.0°");
         assert_eq!(rotation.difference(&visit, &first, &second), "+2.5°");
         let confidence = of("Confidence").expect("a confidence");
         assert_eq!(confidence.text(&visit, &first), "0.250");
@@ -199,6 +199,6 @@ mod tests {
         let iou = of("IoU").expect("a score");
         assert_eq!(iou.difference(&visit, &first, &second), "0.000");
         let vietnamese = Visit::in_language(Language::Vietnamese);
-        assert_eq!(rotation.text(&vietnamese, &first), "-179,0°");
+        assert_eq!(rotation.text(&vietnamese, &first), "−179,0°");
     }
 }

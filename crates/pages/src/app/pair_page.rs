@@ -9,26 +9,27 @@ use maud::{Markup, html};
 use super::address::encoded;
 use super::components::{NavSection, action_form, frame, scan_file, stored_message};
 use super::failure::AppResult;
+use super::pair_history::{history, verdict_line};
 use super::pair_numbers::numbers;
 use super::retired_pairs::retired_band;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::view::{page as scan_page, scan_asset};
-use mocban_catalog::{PairDetail, VerdictEvent};
-use mocban_core::domain::{FailureClass, JobStatus, PairName, ThresholdMetric, one_line};
+use mocban_catalog::PairDetail;
+use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage, ThresholdMetric, one_line};
 use mocban_project::details::{self, Details, PairOverview};
 
+/// A picture: its key, and its name in both languages.
+type Layer = (&'static str, [&'static str; 2]);
+
 /// Pictures that can be chosen, with their keys and names.
-const LAYERS: [(&str, [&str; 2]); 5] = [
+const LAYERS: [Layer; 5] = [
     ("print", ["Print", "Bản in"]),
     ("relief", ["Relief (depth)", "Mặt khắc (độ sâu)"]),
     ("print_mask", ["Ink of the print", "Mực của bản in"]),
     ("depth_mask", ["Strokes of the relief", "Nét của mặt khắc"]),
     ("overlay", ["Print with outline", "Bản in và đường viền"]),
 ];
-
-/// Most events of the history that are shown.
-const SHOWN_EVENTS: usize = 50;
 
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
@@ -77,14 +78,14 @@ pub(super) async fn page(
         @if let Some(record) = record {
             @let (metric, other_metric) = (record.outcome.metric, other.map(|other| other.outcome.metric));
             (metric_links(&visit, &overview.detail, metric, other_metric))
-            (pictures(&visit, Some(metric), other_metric))
+            (pictures(&visit, &LAYERS, Some(metric), other_metric))
             (numbers(&visit, record, other))
         } @else {
-            (pictures(&visit, None, None))
+            (pictures(&visit, &layers_without_result(&overview.detail), None, None))
         }
         (files(&visit, &overview.detail))
-        (history(&visit, &overview.detail))
-        (pair_actions(&visit, &overview.detail))
+        (history(&visit, &overview))
+        (pair_actions(&visit, &key, &overview.detail))
         script type="module" src={ (visit.root) "assets/pair.js" } {}
     };
     let title = match &overview.detail.results.attributes.character {
@@ -103,7 +104,7 @@ pub(super) async fn scan_view(
     let open = state.open(&key).await?;
     let results = super::pictures::results(&open, &pair).await?;
     let name = results.attributes.name.as_str();
-    let page = scan_page::view(name, Some(visit.language));
+    let page = scan_page::view(name, Some(visit.language), Some("../"));
     Ok(Html(page).into_response())
 }
 
@@ -182,10 +183,23 @@ fn metric_links(
     }
 }
 
-/// Returns the pictures of the result of a metric, and of another one beside it. A pair without a result has only its
-/// print.
+/// Returns the pictures of a pair without a result: its print, and what its finished stages have made.
+fn layers_without_result(detail: &PairDetail) -> Vec<Layer> {
+    let has = |stage| detail.results.stage(stage).is_some();
+    let shown = LAYERS.into_iter().filter(|(name, _)| match *name {
+        "print" => true,
+        "relief" => has(Stage::Depth),
+        "print_mask" => has(Stage::Normalize),
+        _ => false,
+    });
+    shown.collect()
+}
+
+/// Returns the pictures of the result of a metric, and of another one beside it. Without a result, the relief is not
+/// aligned.
 fn pictures(
     visit: &Visit,
+    layers: &[Layer],
     metric: Option<ThresholdMetric>,
     other: Option<ThresholdMetric>,
 ) -> Markup {
@@ -198,7 +212,6 @@ fn pictures(
     } else {
         ("print", visit.t("Print", "Bản in"))
     };
-    let layers = &LAYERS[..if metric.is_some() { LAYERS.len() } else { 1 }];
     let blink = match other {
         Some(_) => visit.t("Blink the two metrics", "Nháy hai độ đo"),
         None => visit.t("Blink print and relief", "Nháy bản in và mặt khắc"),
@@ -211,10 +224,10 @@ fn pictures(
                 @if let Some(other) = other { (stage(visit, "other-stage", shown, alt, other, true)) }
             }
             div.controls {
-                @if metric.is_some() {
+                @if layers.len() > 1 {
                     button #blink type="button" aria-pressed="false" { (blink) " " kbd { "B" } }
-                    a.button href="3d/" { (visit.t("3D view", "Xem 3D")) }
                 }
+                @if metric.is_some() { a.button href="3d/" { (visit.t("3D view", "Xem 3D")) } }
                 @for (layer, names) in layers { (layer_button(visit, layer, names, [Some(first), other], *layer == shown)) }
             }
         }
@@ -274,41 +287,7 @@ fn files(visit: &Visit, detail: &PairDetail) -> Markup {
     }
 }
 
-fn history(visit: &Visit, detail: &PairDetail) -> Markup {
-    let hidden = detail.attempts.len().saturating_sub(SHOWN_EVENTS);
-    html! {
-        section {
-            details {
-                summary { h2 { (visit.t("History", "Lịch sử")) } }
-                ul.history {
-                    @for attempt in detail.attempts.iter().skip(hidden) {
-                        li {
-                            (visit.time(attempt.at)) " · " (visit.stage(attempt.stage)) " · "
-                            @match &attempt.failure {
-                                Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(visit, &failure.message)) },
-                                None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (visit.duration(ms)) ")" } }
-                            }
-                        }
-                    }
-                    @for event in &detail.verdict_log { (verdict_line(visit, event)) }
-                }
-            }
-        }
-    }
-}
-
-/// Returns a line of the verdict log.
-fn verdict_line(visit: &Visit, event: &VerdictEvent) -> Markup {
-    html! {
-        li {
-            (visit.time(event.at)) " · " (one_line(&event.reviewer)) " · " (visit.verdict(event.verdict))
-            " (" (visit.metric(event.metric)) ")"
-            @if event.undone_at.is_some() { " · " (visit.t("taken back", "đã rút lại")) }
-        }
-    }
-}
-
-fn pair_actions(visit: &Visit, detail: &PairDetail) -> Markup {
+fn pair_actions(visit: &Visit, key: &str, detail: &PairDetail) -> Markup {
     let name = detail.results.attributes.name.as_str();
     let failed = detail.results.status == JobStatus::Quarantined;
     let class = detail
@@ -319,6 +298,11 @@ fn pair_actions(visit: &Visit, detail: &PairDetail) -> Markup {
     let may_help = class.is_some_and(|class| class != FailureClass::BadInput);
     html! {
         section.actions {
+            @if failed {
+                a.button #mend href={ (visit.root) "import?project=" (encoded(key)) "&mend=" (encoded(name)) } {
+                    (visit.t("Replace the scan or the print", "Thay bản quét hoặc bản in"))
+                }
+            }
             @if failed && may_help {
                 (action_form("../../actions/retry", "inline", &html! {
                     input type="hidden" name="pair" value=(name);

@@ -12,6 +12,10 @@ const STATES: [(&str, &[JobStatus]); 4] = [
     ("running", &[JobStatus::Leased]),
 ];
 
+/// Values of the joint verdict of all reviewers in an address.
+pub(super) const JOINT_VERDICTS: [(&str, Verdict); 2] =
+    [("joint-pass", Verdict::Pass), ("joint-fail", Verdict::Fail)];
+
 /// State by which a list asks for retired pairs, which have no job.
 pub(super) const RETIRED: &str = "retired";
 
@@ -43,6 +47,9 @@ impl PairQuery {
         let state = query.get("state");
         let statuses = STATES.iter().find(|(name, _)| Some(*name) == state);
         let verdict = query.get("verdict");
+        let joint = JOINT_VERDICTS
+            .iter()
+            .find(|(name, _)| Some(*name) == verdict);
         let class = query.parsed("class");
         // Pairs without a result have no score by which they could be sorted.
         let has_results = class.is_none() && statuses.is_none_or(|(name, _)| *name == "aligned");
@@ -62,7 +69,8 @@ impl PairQuery {
             filter: PairFilter {
                 statuses: statuses.map_or_else(Vec::new, |(_, statuses)| statuses.to_vec()),
                 class,
-                verdict: verdict.and_then(|name| name.parse::<Verdict>().ok()),
+                verdict: joint.map_or_else(|| verdict?.parse().ok(), |(_, verdict)| Some(*verdict)),
+                is_joint: joint.is_some(),
                 is_unjudged: verdict == Some("none"),
                 is_low_confidence: query.get("confidence") == Some("low"),
                 block: query.get("block").map(str::to_owned),
@@ -112,7 +120,7 @@ mod tests {
     use super::{PairQuery, cursor_text};
     use crate::app::address::PageQuery;
     use mocban_catalog::{PairCursor, PairOrder};
-    use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric};
+    use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict};
 
     #[test]
     fn an_address_names_a_list() {
@@ -128,6 +136,13 @@ mod tests {
         assert_eq!(query.metric, ThresholdMetric::Relief);
         assert!(query.filter.is_unjudged && query.is_table && !query.is_retired);
         assert!(of("state=retired").is_retired);
+        let joint = of("verdict=joint-fail").filter;
+        assert_eq!((joint.verdict, joint.is_joint), (Some(Verdict::Fail), true));
+        let given = of("verdict=fail").filter;
+        assert_eq!(
+            (given.verdict, given.is_joint),
+            (Some(Verdict::Fail), false)
+        );
         let failed = of("class=io&state=waiting&sort=iou");
         assert_eq!(failed.filter.class, Some(FailureClass::Io));
         assert_eq!(

@@ -13,7 +13,8 @@ use super::components::{
     NavSection, choice, difference, empty, frame, grouped, score, stored_message,
 };
 use super::failure::AppResult;
-use super::pair_query::{DIFFERENCES, PairQuery, RETIRED, cursor_text};
+use super::number_text::with_decimal_sign;
+use super::pair_query::{DIFFERENCES, JOINT_VERDICTS, PairQuery, RETIRED, cursor_text};
 use super::projects::OpenProject;
 use super::retired_pairs::{filter_name, retired_list};
 use super::state::AppState;
@@ -94,7 +95,7 @@ pub(super) async fn page(
             div.gallery { @for pair in &list.pairs {
                 div.pick-card {
                     (pair_card(&visit, &visit.project_page(&key, ""), pair, query.metric, &query.of_pair()))
-                    (choice_box(&visit, pair.attributes.name.as_str()))
+                    (choice_box(&visit, pair))
                 }
             } }
         }
@@ -161,10 +162,9 @@ fn filter_form(visit: &Visit, blocks: &[String], retired: u64) -> Markup {
     let classes = FailureClass::ALL.map(|class| (class.name(), visit.class(class)));
     let mut classes = classes.to_vec();
     classes.insert(0, ("", any));
-    let mut verdicts = Verdict::ALL
-        .map(|one| (one.name(), visit.given_by_somebody(one)))
-        .to_vec();
-    verdicts.insert(0, ("", any));
+    let mut verdicts = vec![("", any)];
+    verdicts.extend(JOINT_VERDICTS.map(|(name, one)| (name, visit.joint_verdict(one))));
+    verdicts.extend(Verdict::ALL.map(|one| (one.name(), visit.given_by_somebody(one))));
     verdicts.push(("none", visit.t("not judged", "chưa đánh giá")));
     let metrics = ThresholdMetric::ALL.map(|metric| (metric.name(), visit.metric(metric)));
     let metric = visit
@@ -227,7 +227,9 @@ fn comparison_fields(visit: &Visit, metrics: &[(&str, &str)]) -> Markup {
     let none = [("", visit.t("none", "không"))];
     let others: Vec<_> = none.iter().chain(metrics).copied().collect();
     let any = [("", visit.t("any", "bất kỳ"))];
-    let differences = DIFFERENCES.map(|text| (text, text));
+    let shown = DIFFERENCES.map(|text| with_decimal_sign(visit.language, text.to_owned()));
+    let differences = DIFFERENCES.iter().zip(&shown);
+    let differences = differences.map(|(value, text)| (*value, text.as_str()));
     let differences: Vec<_> = any.into_iter().chain(differences).collect();
     html! {
         (field(visit, "compare", visit.t("Compare with", "So sánh với"), &others))
@@ -340,7 +342,7 @@ fn table_row(visit: &Visit, query: &PairQuery, pair: &PairResults) -> Markup {
     let failure = pair.failure.as_ref().map(|stored| &stored.failure);
     html! {
         tr {
-            td { (choice_box(visit, name)) }
+            td { (choice_box(visit, pair)) }
             th scope="row" { a href={ "pair/" (encoded(name)) "/" (query.of_pair().text()) } { (one_line(name)) } }
             td { (pair.attributes.character.as_deref().map(one_line).unwrap_or_default()) }
             td { (pair.attributes.block.as_deref().map(one_line).unwrap_or_default()) }

@@ -146,11 +146,19 @@ fn draw(
             let ink = artifacts.print_mask().ok()?;
             Some(mask(&view.mask(&ink, &Affine2::IDENTITY)))
         }
-        (_, None) => None,
-        (PairPicture::Relief, Some(outcome)) => {
+        (PairPicture::Relief, outcome) => {
             let depth = artifacts.depth().ok()?;
-            Some(jpeg(&view.relief(&depth, &outcome.print_from_depth)))
+            let print = &source.picture.rgb;
+            let aligned = outcome.map(|outcome| outcome.print_from_depth);
+            let print_from_depth = aligned.unwrap_or_else(|| {
+                centred(
+                    [depth.levels.width(), depth.levels.height()],
+                    [print.width(), print.height()],
+                )
+            });
+            Some(jpeg(&view.relief(&depth, &print_from_depth)))
         }
+        (_, None) => None,
         (PairPicture::DepthMask, Some(outcome)) => {
             let strokes = artifacts.depth().ok()?.stroke_mask(outcome.threshold_level);
             Some(mask(&view.mask(&strokes, &outcome.print_from_depth)))
@@ -161,6 +169,15 @@ fn draw(
             Some(jpeg(&overlay))
         }
     }
+}
+
+/// Returns the map from the pixels of a picture to those of another one, in whose centre it is as large as fits. Sizes are
+/// widths and heights in pixels.
+fn centred(from: [usize; 2], to: [usize; 2]) -> Affine2 {
+    let [from, to] = [from, to].map(|size| size.map(|side| side.max(1) as f64));
+    let scale = (to[0] / from[0]).min(to[1] / from[1]);
+    let shift = [0, 1].map(|axis| (to[axis] - 1.0 - scale * (from[axis] - 1.0)) / 2.0);
+    Affine2::scale_shift(scale, shift)
 }
 
 fn jpeg(picture: &Grid<[u8; 3]>) -> Encoded {
@@ -180,4 +197,21 @@ fn placeholder() -> Encoded {
         }
     };
     ("image/svg+xml", drawing.into_string().into_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::centred;
+
+    #[test]
+    fn a_picture_is_centred_and_as_large_as_fits() {
+        let map = centred([10, 20], [100, 50]);
+        for (from, to) in [([4.5, 9.5], [49.5, 24.5]), ([-0.5, -0.5], [37.0, -0.5])] {
+            let [x, y] = map.apply(from);
+            assert!(
+                (x - to[0]).abs() < 1e-9 && (y - to[1]).abs() < 1e-9,
+                "{x} {y}"
+            );
+        }
+    }
 }

@@ -10,6 +10,7 @@ use super::attachment::attachment;
 use super::components::{NavSection, empty, frame, grouped, number_table, score, stored_message};
 use super::failure::{AppFailure, AppResult};
 use super::report_sentences::{headline, limits};
+use super::run_blocks::failed_blocks_part;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
@@ -74,6 +75,7 @@ pub(super) async fn numbers(
 fn numbers_part(visit: &Visit, report: &Report) -> Markup {
     html! {
         @for sentence in headline(visit, report) { p { (sentence) } }
+        (failed_blocks_part(visit, "./", report.block_progress.map_or(0, |blocks| blocks.failed)))
         @if report.rows.iter().all(|row| row.n == 0) {
             (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! { a.button href="./" { (visit.t("Run", "Căn chỉnh")) } }))
         } @else {
@@ -97,7 +99,7 @@ fn table(visit: &Visit, report: &Report) -> Markup {
         html! { @if number > 0 { a href={ "pairs?" (query) } { (grouped(number)) } } @else { "0" } }
     };
     let titles = [
-        visit.t("Method", "Phương pháp"),
+        visit.t("Metric", "Độ đo"),
         "n",
         visit.t("judged", "đã đánh giá"),
         visit.t("passed", "đạt"),
@@ -115,8 +117,8 @@ fn table(visit: &Visit, report: &Report) -> Markup {
                 th scope="row" { (visit.metric(row.metric)) }
                 td.number { (link(format!("state=aligned&metric={metric}"), row.n)) }
                 td.number { (grouped(row.judged)) }
-                td.number { (link(format!("verdict=pass&metric={metric}"), row.passed)) }
-                td.number { (link(format!("verdict=fail&metric={metric}"), row.failed)) }
+                td.number { (link(format!("verdict=joint-pass&metric={metric}"), row.passed)) }
+                td.number { (link(format!("verdict=joint-fail&metric={metric}"), row.failed)) }
                 td.number { (percent(visit, row.acc)) }
                 td.number { (interval(visit, row)) }
                 td.number { (score(visit, row.ssim)) } td.number { (score(visit, row.iou)) } td.number { (score(visit, row.dice)) }

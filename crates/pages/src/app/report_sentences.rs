@@ -19,9 +19,7 @@ pub(super) fn headline(visit: &Visit, report: &Report) -> Vec<String> {
                 "Không có gì để báo cáo: mọi cặp của dự án ({retired}) đã được đưa ra khỏi thống kê."
             )]
         }
-        Language::Vietnamese if report.pairs == 0 => {
-            vec!["Dự án chưa có cặp nào: hãy thêm ở trang Nhập dữ liệu.".to_owned()]
-        }
+        Language::Vietnamese if report.pairs == 0 => vec![without_pairs(report)],
         Language::Vietnamese if report.progress.done == 0 => vec![aligned(report)],
         Language::Vietnamese => vec![
             aligned(report),
@@ -48,6 +46,20 @@ fn plain(sentences: &[String]) -> Vec<String> {
 
 fn vietnamese_number(text: String) -> String {
     with_decimal_sign(Language::Vietnamese, text)
+}
+
+/// Says why there are no pairs: blocks are not finished, or nothing was imported.
+fn without_pairs(report: &Report) -> String {
+    let blocks = report.block_progress.map(|blocks| {
+        let known = [(blocks.failed, "bị lỗi"), (blocks.pending, "chưa xong")];
+        let known = known.iter().filter(|(number, _)| *number > 0);
+        let parts = known.map(|(number, what)| format!("{} ván {what}", grouped(*number)));
+        parts.collect::<Vec<String>>().join(", ")
+    });
+    match blocks.filter(|text| !text.is_empty()) {
+        Some(blocks) => format!("Dự án chưa có cặp nào: {blocks}."),
+        None => "Dự án chưa có cặp nào: hãy thêm ở trang Nhập dữ liệu.".to_owned(),
+    }
 }
 
 /// Says how many pairs are aligned, failed and not finished.
@@ -106,7 +118,7 @@ fn differences(visit: &Visit, report: &Report) -> String {
     };
     let mut families = Basis::ALL.into_iter().map(|basis| (basis, of(basis)));
     let Some((basis, family)) = families.find(|(_, family)| !family.is_empty()) else {
-        return "Chưa đủ đánh giá để so sánh các phương pháp.".to_owned();
+        return "Chưa đủ đánh giá để so sánh các độ đo.".to_owned();
     };
     let basis = match basis {
         Basis::Verdicts => "đánh giá",
@@ -128,7 +140,7 @@ fn differences(visit: &Visit, report: &Report) -> String {
     });
     let significant: Vec<String> = significant.collect();
     if significant.is_empty() {
-        return format!("Theo {basis}, không có khác biệt có ý nghĩa giữa các phương pháp.");
+        return format!("Theo {basis}, không có khác biệt có ý nghĩa giữa các độ đo.");
     }
     format!(
         "Theo {basis}, khác biệt có ý nghĩa: {}.",

@@ -96,8 +96,19 @@ fn chosen_part(visit: &Visit, pairs: usize) -> Markup {
 
 /// Returns the form that starts a review, of all pairs or of as many chosen ones.
 fn start_form(visit: &Visit, chosen: Option<usize>) -> Markup {
-    let sample = chosen.is_none().then_some(SAMPLE);
     let metrics = ThresholdMetric::ALL.map(|metric| (metric.name(), visit.metric(metric)));
+    // An address with an order has the choices of another review, of which all results have no sample.
+    let asked = visit.query.get("order");
+    let (metric, sample) = match asked {
+        Some(_) => (
+            visit.query.get("metric").unwrap_or(""),
+            visit.query.parsed("sample"),
+        ),
+        None => (
+            ThresholdMetric::DEFAULT.name(),
+            chosen.is_none().then_some(SAMPLE),
+        ),
+    };
     action_form(
         "actions/review",
         "card fields",
@@ -108,8 +119,8 @@ fn start_form(visit: &Visit, chosen: Option<usize>) -> Markup {
             }
             label { span { (visit.t("Results of", "Kết quả của")) }
                 select name="metric" {
-                    @for (value, text) in metrics { (choice(value, text, Some(ThresholdMetric::DEFAULT.name()))) }
-                    (choice("", visit.t("all metrics", "mọi độ đo"), Some(ThresholdMetric::DEFAULT.name())))
+                    @for (value, text) in metrics { (choice(value, text, Some(metric))) }
+                    (choice("", visit.t("all metrics", "mọi độ đo"), Some(metric)))
                 }
             }
             label { span { (visit.t("How many results (empty: all)", "Bao nhiêu kết quả (để trống: tất cả)")) }
@@ -117,12 +128,12 @@ fn start_form(visit: &Visit, chosen: Option<usize>) -> Markup {
             }
             label { span { (visit.t("Order", "Thứ tự")) }
                 select name="order" {
-                    (choice(ReviewOrder::Random.name(), visit.t("random, for an unbiased accuracy", "ngẫu nhiên, để độ chính xác không bị thiên lệch"), None))
-                    (choice(ReviewOrder::LeastConfident.name(), visit.t("least confident first, to find failures", "độ tin cậy thấp trước, để tìm lỗi"), None))
-                    (choice(ReviewOrder::Adjudicate.name(), visit.t("disagreements of two others", "chỗ hai người khác bất đồng"), None))
+                    (choice(ReviewOrder::Random.name(), visit.t("random, for an unbiased accuracy", "ngẫu nhiên, để độ chính xác không bị thiên lệch"), asked))
+                    (choice(ReviewOrder::LeastConfident.name(), visit.t("least confident first, to find failures", "độ tin cậy thấp trước, để tìm lỗi"), asked))
+                    (choice(ReviewOrder::Adjudicate.name(), visit.t("disagreements of two others", "chỗ hai người khác bất đồng"), asked))
                 }
             }
-            label.check { input type="checkbox" name="is_new" value="yes"; " " (visit.t("another person with a similar name", "người khác có tên gần giống")) }
+            label.check { input type="checkbox" name="is_new" value="yes"; " " (visit.t("another person with a similar name (only if the page asks)", "người khác có tên gần giống (chỉ khi trang hỏi)")) }
             button.primary { (visit.t("Start or continue", "Bắt đầu hoặc tiếp tục")) }
             button name="invite" value="yes" { (visit.t("Invite", "Mời")) }
             p.muted { (visit.t(

@@ -13,6 +13,9 @@ use super::failure::AppResult;
 use super::home::free_space;
 use super::pairs_page::pair_card;
 use super::projects::OpenProject;
+use super::run_blocks::{
+    blocks_text, failed_block_list, failed_blocks, outdated_blocks, outdated_blocks_text,
+};
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
@@ -34,8 +37,6 @@ const LATEST: usize = 12;
 const EXAMPLES: usize = 3;
 /// Most pairs that failed or have other files with which the page asks what the next run would do: each is inspected.
 const MAX_INSPECTED: u64 = 1000;
-/// Most blocks in progress that are named.
-const MAX_BLOCKS: usize = 5;
 
 /// What the page shows of a project.
 struct RunState {
@@ -45,6 +46,8 @@ struct RunState {
     latest: Vec<PairResults>,
     failures: Vec<(FailureClass, u64, Vec<PairResults>)>,
     blocks: BlockStatus,
+    /// Number of finished or failed blocks that the next run would align again. 0 during a run.
+    outdated_blocks: u64,
     /// Why the last run that the app started ended, if it failed.
     failed_run: Option<Sentence>,
     /// Number of pairs at the same time, as the settings give it.
@@ -72,11 +75,11 @@ impl RunState {
         let counts = catalog.status(&current).await?;
         let failed = counts.jobs.get(&JobStatus::Quarantined).copied();
         let inspected = failed.unwrap_or(0) + counts.other_files;
+        let options = mocban_project::run::options(&settings.config);
         let plan = if running || inspected > MAX_INSPECTED {
             None
         } else {
-            let rerun = mocban_project::run::options(&settings.config).rerun;
-            Some(catalog.plan(&current, None, rerun).await?)
+            Some(catalog.plan(&current, None, options.rerun).await?)
         };
         let mut classes = catalog.failure_counts().await?;
         classes.sort_by_key(|(class, number)| (std::cmp::Reverse(*number), *class));
@@ -92,6 +95,11 @@ impl RunState {
             failures.push((class, number, list.await?.pairs));
         }
         let blocks = BlockStatus(catalog.block_states().await?);
+        let outdated_blocks = if running {
+            0
+        } else {
+            outdated_blocks(catalog, &options, &blocks).await?
+        };
         Ok(Self {
             counts,
             is_running: running,
@@ -99,8 +107,9 @@ impl RunState {
             latest: catalog.recent_results(LATEST).await?,
             failures,
             blocks,
+            outdated_blocks,
             failed_run,
-            jobs: mocban_project::run::options(&settings.config).workers,
+            jobs: options.workers,
             plan,
         })
     }
@@ -133,7 +142,21 @@ impl RunState {
 
     /// Returns the number of blocks that a run would work on or works on, whose pairs are not yet all known.
     fn open_blocks(&self) -> u64 {
-        self.blocks.waiting() + self.blocks.leased()
+        self.blocks.waiting() + self.blocks.leased() + self.outdated_blocks
+    }
+
+    /// Returns the number of pairs that are computed now, and of pairs that wait. Workers also lease the next pairs, which
+    /// they read ahead.
+    fn computed_and_waiting(&self) -> [u64; 2] {
+        let leased = self.jobs(JobStatus::Leased);
+        let waiting = self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff);
+        let jobs = |worker: &WorkerRecord| worker.metrics.as_ref().map(|metrics| metrics.jobs);
+        let at_a_time: Option<u64> = self.workers.iter().map(jobs).sum();
+        let computed = match at_a_time {
+            Some(most) if self.is_running && most > 0 => leased.min(most),
+            _ => leased,
+        };
+        [computed, waiting + leased - computed]
     }
 
     /// Returns the pairs that the present workers settle in a second, since they started.
@@ -180,6 +203,7 @@ pub(super) async fn page(
             (controls(&visit, &run))
             (disk(&visit, &open))
             (latest(&visit, &run))
+            (failed_block_list(&visit, &run.blocks))
             (failures(&visit, &run))
         }
     };
@@ -188,8 +212,12 @@ pub(super) async fn page(
 }
 
 fn figures(visit: &Visit, run: &RunState) -> Markup {
-    let waiting = run.jobs(JobStatus::Ready) + run.jobs(JobStatus::Backoff);
-    let running = run.jobs(JobStatus::Leased);
+    let [running, waiting] = run.computed_and_waiting();
+    // The lists have pairs by their jobs, of which more are leased than computed.
+    let is_listed = running == run.jobs(JobStatus::Leased);
+    let list = |address: &'static str| is_listed.then_some(address);
+    let failed_blocks = failed_blocks(&run.blocks);
+    let running_blocks = run.blocks.leased();
     let running_name = if run.is_running {
         visit.t("running", "đang chạy")
     } else {
@@ -201,11 +229,13 @@ fn figures(visit: &Visit, run: &RunState) -> Markup {
             (figure(run.counts.pairs, visit.t("pairs", "cặp"), Some("pairs"), ""))
             (figure(run.jobs(JobStatus::Done), visit.t("aligned", "đã căn chỉnh"), Some("pairs?state=aligned"), "good"))
             (figure(run.jobs(JobStatus::Quarantined), visit.t("failed", "lỗi"), Some("pairs?state=failed&view=table"), "bad"))
-            (figure(waiting, visit.t("waiting", "đang chờ"), Some("pairs?state=waiting"), ""))
-            (figure(running, running_name, Some("pairs?state=running"), ""))
+            (figure(waiting, visit.t("waiting", "đang chờ"), list("pairs?state=waiting"), ""))
+            @if running > 0 || running_blocks == 0 { (figure(running, running_name, list("pairs?state=running"), "")) }
+            @if running_blocks > 0 { (figure(running_blocks, &format!("{} {running_name}", visit.t("blocks", "ván")), Some("blocks?state=waiting"), "")) }
             (figure(run.counts.low_confidence, visit.t("low confidence", "độ tin cậy thấp"), Some("pairs?confidence=low&sort=confidence"), "warn"))
             (figure(judged, visit.t("verdicts", "đánh giá"), Some("review"), ""))
             @if !run.blocks.is_empty() { (figure(run.blocks.0.len() as u64, visit.t("blocks", "ván"), Some("blocks"), "")) }
+            @if failed_blocks > 0 { (figure(failed_blocks, visit.t("blocks failed", "ván lỗi"), Some("blocks?state=failed"), "bad")) }
         }
     }
 }
@@ -229,26 +259,6 @@ fn progress(visit: &Visit, run: &RunState) -> Markup {
         }
         @if !run.blocks.is_empty() { p.muted #blocks { (blocks_text(visit, &run.blocks)) } }
     }
-}
-
-/// Returns the stages of the blocks in progress and how many blocks are done, such as `b04: registration with the page, 1 of 3 done`.
-fn blocks_text(visit: &Visit, blocks: &BlockStatus) -> String {
-    let mut parts: Vec<String> = (blocks.in_progress())
-        .take(MAX_BLOCKS)
-        .map(|(block, stage)| {
-            let (block, stage) = (one_line(block.as_str()), visit.block_stage(stage));
-            format!("{block}: {stage}")
-        })
-        .collect();
-    let done = grouped(blocks.number(&[JobStatus::Done]));
-    let all = grouped(blocks.0.len() as u64);
-    parts.push(match visit.language {
-        Language::English => format!("{done} of {all} done"),
-        Language::Vietnamese => format!("xong {done} trên {all}"),
-    });
-    let failed = blocks.number(&[JobStatus::Quarantined]);
-    parts.extend((failed > 0).then(|| format!("{} {}", grouped(failed), visit.t("failed", "lỗi"))));
-    parts.join(", ")
 }
 
 /// Returns a number of pairs a second, or a minute if they are few.
@@ -297,6 +307,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
     let other_files = run.counts.other_files + run.blocks.other_files();
     html! {
         @if let Some(text) = outdated_text(visit, run) { p.notice #outdated { (text) } }
+        @if let Some(text) = outdated_blocks_text(visit, run.outdated_blocks) { p.notice #outdated-blocks { (text) } }
         @if let Some(text) = other_files_text(visit, run) { p.notice #other-files { (text) } }
         @if let Some(text) = other_blocks_text(visit, &run.blocks) { p.notice #other-block-files { (text) } }
         (action_form("actions/run", "inline run-form", &html! {
@@ -315,7 +326,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
                 button name="which" value="failed" { (visit.t("Try failed pairs again", "Thử lại các cặp lỗi")) }
             }
         }))
-        @if is_idle && failed == 0 && other_files == 0 && run.counts.pairs > 0 {
+        @if is_idle && failed + failed_blocks(&run.blocks) == 0 && other_files == 0 && run.counts.pairs > 0 {
             p.good { (visit.t("Everything is aligned. Next: judge a sample of the results.", "Mọi thứ đã được căn chỉnh. Tiếp theo: đánh giá một mẫu kết quả.")) " "
                 a href="review" { (visit.t("Review", "Đánh giá")) } }
         }

@@ -1,6 +1,6 @@
 //! Sentences in both languages, without commands, because the app has buttons for them.
 
-use super::message_words;
+use crate::messages;
 use crate::review::Language;
 use mocban_core::domain::ErrorCode;
 use mocban_project::ProjectError;
@@ -29,7 +29,7 @@ impl Sentence {
     /// is not known is quoted.
     pub(super) fn of_program(text: &str) -> Self {
         let plain = without_commands(text);
-        let known = message_words::vietnamese(&plain);
+        let known = messages::vietnamese(&plain);
         let vietnamese = known.unwrap_or_else(|| format!("Chương trình báo: {plain}"));
         Self::new(plain, vietnamese)
     }
@@ -118,7 +118,8 @@ pub(super) fn without_commands(text: &str) -> String {
 }
 
 fn line_without_commands(line: &str) -> Option<String> {
-    let text = without_remarks(line);
+    // The pages send settings as the program takes them with this option.
+    let text = without_remarks(line.strip_prefix("--set: ").unwrap_or(line));
     let sentences = text.trim_end_matches('.').split(". ");
     let sentences: Vec<String> = sentences
         .filter_map(|sentence| {
@@ -186,6 +187,10 @@ mod tests {
             (
                 "/home/lan/mocban data/list.csv:3: the id a is there twice; rename it",
                 "/home/lan/mocban data/list.csv:3: the id a is there twice; rename it",
+            ),
+            (
+                "--set: run.workers = \"x\": invalid type: string \"x\", expected usize",
+                "run.workers = \"x\": invalid type: string \"x\", expected usize",
             ),
             ("use `x`", "use x"),
             (

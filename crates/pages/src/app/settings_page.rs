@@ -10,6 +10,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::action_body::ActionBody;
+use super::address::PageQuery;
 use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
@@ -18,7 +19,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
 use mocban_catalog::Catalog;
-use mocban_config::{Origin, Setting};
+use mocban_config::{BaseLayer, Origin, Setting, Sources, load};
 use mocban_project::ProjectResult;
 use mocban_project::change_setting::{SettingChange, preview, save};
 use mocban_project::location::Location;
@@ -40,6 +41,7 @@ pub(super) async fn page(
     let location = open.location();
     let settings = location.settings();
     let settings = settings.map_err(|error| AppFailure::of(error, &open.dir))?;
+    let current = settings.tree.settings();
     let change = match (visit.query.get("key"), visit.query.get("value")) {
         (Some(name), Some(_)) if is_hidden(name) => return Err(AppFailure::not_found()),
         (Some(name), Some(value)) => {
@@ -61,7 +63,8 @@ pub(super) async fn page(
             Some(Ok(change)) => (change_part(&visit, change)),
             Some(Err(error)) => p.notice.bad role="alert" { (Sentence::of_error(error, &open.dir).text(visit.language)) },
         }
-        (sections(&visit, &settings.tree.settings()))
+        (saved_part(&visit, &current))
+        (sections(&visit, &current, &defaults(&current)))
     };
     let title = visit.t("Settings", "Thiết lập");
     Ok(frame(
@@ -71,6 +74,33 @@ pub(super) async fn page(
         NavSection::Settings,
         &body,
     ))
+}
+
+/// Returns the settings of a project without a file, with the preset that its file names.
+fn defaults(current: &[Setting]) -> Vec<Setting> {
+    let preset = current.iter().find_map(|setting| match setting.origin {
+        Origin::Preset(name) => name.parse().ok(),
+        _ => None,
+    });
+    let sources = Sources {
+        base: preset.map_or_else(BaseLayer::default, BaseLayer::Preset),
+        ..Sources::default()
+    };
+    load(&sources).map_or_else(|_| Vec::new(), |loaded| loaded.tree.settings())
+}
+
+/// Says that a setting was saved, as the address has it.
+fn saved_part(visit: &Visit, current: &[Setting]) -> Markup {
+    let saved = visit.query.get("saved");
+    let saved = current.iter().find(|setting| Some(&*setting.key) == saved);
+    html! {
+        @if let Some(setting) = saved.filter(|setting| !is_hidden(&setting.key)) {
+            p #saved.notice.good role="status" {
+                (visit.t("Saved", "Đã lưu")) ": " code { (setting.key) " = " (setting.value) } ". "
+                (visit.t("The next run uses it.", "Lần chạy sau sẽ dùng giá trị này."))
+            }
+        }
+    }
 }
 
 async fn looked_at(
@@ -112,7 +142,8 @@ pub(super) const fn two_methods(visit: &Visit) -> &'static str {
 }
 
 /// Returns the settings by section. Those with a value of their own are open.
-fn sections(visit: &Visit, settings: &[Setting]) -> Markup {
+fn sections(visit: &Visit, settings: &[Setting], defaults: &[Setting]) -> Markup {
+    let default_of = |setting: &Setting| defaults.iter().find(|default| default.key == setting.key);
     let section = |setting: &Setting| {
         let (section, _) = setting.key.rsplit_once('.').unwrap_or(("", ""));
         section.to_owned()
@@ -124,23 +155,24 @@ fn sections(visit: &Visit, settings: &[Setting]) -> Markup {
             names.push(name);
         }
     }
-    let asked = visit.query.get("key");
+    let asked = visit.query.get("key").or_else(|| visit.query.get("saved"));
     html! {
         @for name in &names {
             @let of_section: Vec<&Setting> = settings.iter().filter(|setting| section(setting) == *name).collect();
             @let is_open = of_section.iter().any(|setting| setting.origin != Origin::Default || asked == Some(&setting.key));
             details.card open[is_open] {
                 summary { h2 { (visit.setting_section(name)) } " " code { (name) } }
-                @for setting in of_section { (setting_part(visit, setting)) }
+                @for setting in of_section { (setting_part(visit, setting, default_of(setting))) }
             }
         }
     }
 }
 
-fn setting_part(visit: &Visit, setting: &Setting) -> Markup {
+fn setting_part(visit: &Visit, setting: &Setting, default: Option<&Setting>) -> Markup {
     let (text, language) = visit.setting(&setting.key);
-    let value = setting.value.to_string();
-    let value = value.trim_matches('"');
+    let text_of = |setting: &Setting| setting.value.to_string().trim_matches('"').to_owned();
+    let value = text_of(setting);
+    let default = default.filter(|default| default.value != setting.value);
     let id = format!("setting-{}", setting.key);
     html! {
         form.setting method="get" action=(visit.here) {
@@ -151,6 +183,14 @@ fn setting_part(visit: &Visit, setting: &Setting) -> Markup {
             p.muted lang=(language.name()) {
                 (text)
                 @if let Some(origin) = visit.origin(&setting.origin) { " · " (origin) }
+            }
+        }
+        @if let Some(default) = default {
+            form.inline.put-back method="get" action=(visit.here) {
+                input type="hidden" name="key" value=(setting.key);
+                input type="hidden" name="value" value=(text_of(default));
+                span { b { (visit.t("Changed", "Đã thay đổi")) } "; " (visit.t("the default is", "giá trị mặc định là")) " " code { (default.value) } }
+                button aria-label={ (visit.t("Put back", "Đặt lại")) " " (setting.key) } { (visit.t("Put back", "Đặt lại")) }
             }
         }
     }
@@ -167,11 +207,12 @@ pub(super) async fn store(
     }
     let open = state.open(&key).await?;
     let (catalog, location) = (open.catalog.clone(), open.location());
+    let go = PageQuery::default().with("saved", &body.key).text();
     let stored = on_thread(async move || {
         let change = preview(&body.key, &body.value, &catalog, &location).await?;
         save(&change, &location)
     });
     let stored = stored.await;
     stored.map_err(|error| AppFailure::of(error, &open.dir))?;
-    Ok(Json(json!({ "go": "settings" })))
+    Ok(Json(json!({ "go": format!("settings{go}") })))
 }

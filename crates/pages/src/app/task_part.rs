@@ -15,8 +15,8 @@ pub(super) fn task_part(visit: &Visit, state: Option<&TaskState>) -> Markup {
                 p { (visit.t("Working…", "Đang làm…")) }
                 progress aria-label=(visit.t("Working", "Đang làm")) {}
             },
-            Some(TaskState::Done(lines)) => div.notice.good role="status" data-task="done" {
-                @for line in lines { p { (one_line(&line[visit.index()])) } }
+            Some(TaskState::Done(done)) => div.notice.good[!done.is_warning].bad[done.is_warning] role="status" data-task="done" {
+                @for line in &done.lines { p { (one_line(&line[visit.index()])) } }
             },
             Some(TaskState::Failed(why)) => div.notice.bad role="alert" data-task="failed" { p { (why.text(visit.language)) } },
         }

@@ -21,11 +21,19 @@ pub(super) enum TaskKind {
 /// Lines that say what was done, each in English and Vietnamese.
 pub(super) type TaskLines = Vec<[String; 2]>;
 
+/// What a task has done.
+#[derive(Debug, Clone)]
+pub(super) struct FinishedTask {
+    pub(super) lines: TaskLines,
+    /// Whether the lines say that something is wrong.
+    pub(super) is_warning: bool,
+}
+
 /// What became of a task.
 #[derive(Debug, Clone)]
 pub(super) enum TaskState {
     Running,
-    Done(TaskLines),
+    Done(FinishedTask),
     Failed(Sentence),
 }
 
@@ -45,7 +53,7 @@ impl AppTasks {
         work: impl FnOnce(Location) -> F + Send + 'static,
     ) -> AppResult<()>
     where
-        F: Future<Output = ProjectResult<TaskLines>>,
+        F: Future<Output = ProjectResult<FinishedTask>>,
     {
         let id = (open.key.clone(), kind);
         {
@@ -63,7 +71,7 @@ impl AppTasks {
         tokio::spawn(async move {
             let done = on_thread(move || work(location)).await;
             let state = match done {
-                Ok(lines) => TaskState::Done(lines),
+                Ok(done) => TaskState::Done(done),
                 Err(error) => TaskState::Failed(Sentence::of_error(&error, &dir)),
             };
             tasks.lock().insert(id, state);

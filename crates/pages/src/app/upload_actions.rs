@@ -182,9 +182,8 @@ fn chosen(folder: &FilePath, placed: &FilePath, query: &PageQuery) -> AppResult<
     let query = query.with("path", &at);
     Ok(match picked.lists.as_slice() {
         [list] => query.with("list", &utf8(&picked.path.join(list))?),
-        _ if picked.counts.meshes > 0 && picked.counts.prints > 0 => {
-            query.with("meshes", &at).with("prints", &at)
-        }
+        // The page says what is missing, and which files are not read.
+        [] => query.with("meshes", &at).with("prints", &at),
         _ => query,
     })
 }

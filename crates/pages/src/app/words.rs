@@ -36,6 +36,21 @@ impl Visit {
         }
     }
 
+    /// Returns the name of the joint verdict of all reviewers, which the report counts.
+    pub(super) const fn joint_verdict(&self, verdict: Verdict) -> &'static str {
+        match verdict {
+            Verdict::Pass => self.t("passed, as the report counts", "đạt, như báo cáo tính"),
+            Verdict::Fail => self.t(
+                "failed, as the report counts",
+                "không đạt, như báo cáo tính",
+            ),
+            Verdict::Unsure => self.t(
+                "unsure, as the report counts",
+                "chưa chắc, như báo cáo tính",
+            ),
+        }
+    }
+
     /// Returns a reason to fail a result, as the review page names it.
     pub(super) fn reason(&self, reason: Reason) -> &'static str {
         self.language.translate(reason.name())
@@ -65,7 +80,7 @@ impl Visit {
     pub(super) const fn character_state(&self, state: BlockCharacterState) -> &'static str {
         match state {
             BlockCharacterState::Cut => self.t("is a pair", "là một cặp"),
-            BlockCharacterState::Left => self.t("left out", "bỏ ra"),
+            BlockCharacterState::Left => self.t("left out", "bỏ qua"),
             BlockCharacterState::Retired => {
                 self.t("not on the page any more", "không còn trên trang in")
             }

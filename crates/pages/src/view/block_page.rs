@@ -58,6 +58,7 @@ const LONGEST_SIDE: usize = 3000;
 struct ShownBlock {
     view: BlockView,
     language: Option<Language>,
+    back: Option<&'static str>,
     work: Arc<WorkThread>,
     overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
 }
@@ -72,7 +73,7 @@ pub(super) fn block_page(
 ) -> Router {
     let work = Arc::new(WorkThread::default());
     let pages = match view {
-        Some(view) => page_routes(view, language, Arc::clone(&work)),
+        Some(view) => page_routes(view, language, store.back(), Arc::clone(&work)),
         None => Router::new().route("/", get(async || Redirect::to("correct"))),
     };
     pages
@@ -86,10 +87,16 @@ pub(super) fn block_page(
 }
 
 /// Returns the routes of the page of a block that is aligned.
-fn page_routes(view: BlockView, language: Option<Language>, work: Arc<WorkThread>) -> Router {
+fn page_routes(
+    view: BlockView,
+    language: Option<Language>,
+    back: Option<&'static str>,
+    work: Arc<WorkThread>,
+) -> Router {
     let shown = ShownBlock {
         view,
         language,
+        back,
         work,
         overviews: PageLayer::ALL.map(|_| OnceLock::new()),
     };
@@ -121,7 +128,11 @@ impl ShownBlock {
 }
 
 async fn index(State(shown): State<Arc<ShownBlock>>) -> Html<String> {
-    Html(page::block(shown.view.name.as_str(), shown.language))
+    Html(page::block(
+        shown.view.name.as_str(),
+        shown.language,
+        shown.back,
+    ))
 }
 
 async fn asset(Path(name): Path<String>) -> Response {

@@ -64,6 +64,11 @@ impl BlockPoints {
         self.next_command.clone()
     }
 
+    /// Returns the relative address of the page of the block. Only the app has one, and it has no command.
+    pub(super) fn back(&self) -> Option<&'static str> {
+        self.next_command.is_none().then_some("../")
+    }
+
     async fn read_block(&self) -> ProjectResult<BlockCorrection> {
         let (project, catalog) = self.location.open_read_only().await?;
         let limits = self.location.settings()?.config.limits.image;

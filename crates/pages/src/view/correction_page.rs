@@ -17,6 +17,7 @@ use super::block_points::{BlockPoints, PointsSaved};
 use super::page;
 use super::scan_page::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
+use crate::messages::vietnamese;
 use crate::review::Language;
 use mocban_core::domain::{BlockName, BlockSide, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
@@ -146,7 +147,8 @@ impl CorrectionState {
 }
 
 async fn index(State(state): CorrectionPage) -> Html<String> {
-    Html(page::correction(state.block.as_str(), state.language))
+    let (block, back) = (state.block.as_str(), state.store.back());
+    Html(page::correction(block, state.language, back))
 }
 
 async fn block_json(
@@ -256,8 +258,13 @@ async fn image(
     jpeg(&state.work, move || draw(&shown).map(Bytes::from)).await
 }
 
+/// Responds with why something was refused, also in Vietnamese if that is known.
 fn refused(status: StatusCode, why: &str) -> Response {
-    (status, Json(json!({"error": why}))).into_response()
+    (
+        status,
+        Json(json!({"error": why, "error_vi": vietnamese(why)})),
+    )
+        .into_response()
 }
 
 fn unavailable(why: &str) -> Response {

@@ -13,8 +13,13 @@ fn chosen(language: Option<Language>) -> Markup {
     html! { @if let Some(language) = language { meta name="page-language" content=(language.name()); } }
 }
 
-/// Returns the page of a pair. Its script loads the data and creates the controls.
-pub(crate) fn view(pair: &str, language: Option<Language>) -> String {
+/// Returns the link to the page in the app from which a view was opened, if there is one.
+fn back_link(name: &str, back: Option<&str>) -> Markup {
+    html! { @if let Some(back) = back { nav.scan-back { a href=(back) { "← " (name) } } } }
+}
+
+/// Returns the page of a pair, with a link to `back`. Its script loads the data and creates the controls.
+pub(crate) fn view(pair: &str, language: Option<Language>, back: Option<&str>) -> String {
     let head = html! {
         (chosen(language))
         link rel="stylesheet" href="assets/scan-viewer.css";
@@ -22,6 +27,7 @@ pub(crate) fn view(pair: &str, language: Option<Language>) -> String {
     };
     let body = html! {
         body.scan-page {
+            (back_link(pair, back))
             main #scan-viewer {}
             noscript { p { "This page needs JavaScript. All of it is served by your own computer." } }
         }
@@ -30,17 +36,17 @@ pub(crate) fn view(pair: &str, language: Option<Language>) -> String {
     document(language.name(), pair, &head, &body).into_string()
 }
 
-/// Returns the page of a block. Its script loads the data and creates the controls.
-pub(super) fn block(name: &str, language: Option<Language>) -> String {
-    block_page(name, language, "assets/block-view.js")
+/// Returns the page of a block, with a link to `back`. Its script loads the data and creates the controls.
+pub(super) fn block(name: &str, language: Option<Language>, back: Option<&str>) -> String {
+    block_page(name, language, back, "assets/block-view.js")
 }
 
-/// Returns the page on which the alignment of a block is corrected.
-pub(super) fn correction(name: &str, language: Option<Language>) -> String {
-    block_page(name, language, "assets/block-correct.js")
+/// Returns the page on which the alignment of a block is corrected, with a link to `back`.
+pub(super) fn correction(name: &str, language: Option<Language>, back: Option<&str>) -> String {
+    block_page(name, language, back, "assets/block-correct.js")
 }
 
-fn block_page(name: &str, language: Option<Language>, script: &str) -> String {
+fn block_page(name: &str, language: Option<Language>, back: Option<&str>, script: &str) -> String {
     let head = html! {
         (chosen(language))
         link rel="stylesheet" href="assets/scan-viewer.css";
@@ -49,7 +55,8 @@ fn block_page(name: &str, language: Option<Language>, script: &str) -> String {
     };
     let body = html! {
         body.scan-page {
-            main #block-view {}
+            (back_link(name, back))
+            main #block-view { p.block-line.block-busy { "…" } }
             dialog #scan .scan-dialog {}
             noscript { p { "This page needs JavaScript. All of it is served by your own computer." } }
         }
@@ -67,12 +74,22 @@ mod tests {
         for page in pages(None) {
             assert!(!page.contains("//"), "{page}");
         }
-        assert!(view("a<b", None).contains("<title>a&lt;b</title>"));
+        assert!(view("a<b", None, None).contains("<title>a&lt;b</title>"));
     }
 
     fn pages(language: Option<Language>) -> [String; 3] {
         let pages = [view, block, correction];
-        pages.map(|page| page("a<b", language))
+        pages.map(|page| page("a<b", language, None))
+    }
+
+    #[test]
+    fn a_page_of_the_app_leads_back() {
+        let link = r#"<nav class="scan-back"><a href="../">← a&lt;b</a></nav>"#;
+        for page in [view, block, correction] {
+            let shown = page("a<b", None, Some("../"));
+            assert!(shown.contains(link), "{shown}");
+            assert!(!page("a<b", None, None).contains("scan-back"));
+        }
     }
 
     #[test]

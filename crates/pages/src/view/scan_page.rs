@@ -40,7 +40,7 @@ pub fn scan_page(pair: &str, view: &ScanView, language: Option<Language>) -> Rou
 }
 
 async fn index(State(shown): State<Arc<ShownScan>>) -> Html<String> {
-    Html(page::view(&shown.pair, shown.language))
+    Html(page::view(&shown.pair, shown.language, None))
 }
 
 /// Responds with a script or style of the page.

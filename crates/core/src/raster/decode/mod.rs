@@ -298,8 +298,8 @@ mod tests {
             ),
             (
                 b"%PDF-1.7\n",
-                "the file is a PDF document; PNG, JPEG and TIFF images are read: save their pages as images, \
-                such as with `pdftoppm -r 600 -png FILE.pdf page`",
+                "the file is a PDF document; PNG, JPEG and TIFF images are read: open them in a program and save \
+                their pages as PNG; for many files: `pdftoppm -r 600 -png FILE.pdf page`",
             ),
             (
                 b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n",

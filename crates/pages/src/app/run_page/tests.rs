@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{RunState, blocks_text, controls, progress};
+use super::{RunState, controls, figures, progress};
+use crate::app::run_blocks::{blocks_text, failed_block_list};
 use crate::app::visit::Visit;
 use crate::review::Language;
 use mocban_catalog::{
@@ -69,6 +70,7 @@ fn running(blocks: Vec<BlockState>) -> RunState {
         latest: Vec::new(),
         failures: Vec::new(),
         blocks: BlockStatus(blocks),
+        outdated_blocks: 0,
         failed_run: None,
         jobs: 2,
         plan: None,
@@ -232,4 +234,65 @@ fn an_interrupted_pair_with_outdated_results_is_counted_once() {
         "{all}"
     );
     assert_eq!(all.matches("4 ").count(), 1, "one number: {all}");
+}
+
+#[test]
+fn blocks_to_align_again_keep_the_project_unfinished() {
+    let mut run = running(vec![block("b1", JobStatus::Done)]);
+    run.is_running = false;
+    run.counts.jobs = BTreeMap::from([(JobStatus::Done, 20)]);
+    let shown = |run: &RunState, language| {
+        let visit = Visit::in_language(language);
+        controls(&visit, run).into_string()
+    };
+    let before = shown(&run, Language::English);
+    assert!(before.contains("Everything is aligned"), "{before}");
+    run.outdated_blocks = 1;
+    let english = shown(&run, Language::English);
+    for part in ["Align 1 block<", "1 block has other chosen places"] {
+        assert!(english.contains(part), "{part}: {english}");
+    }
+    assert!(!english.contains("Everything is aligned"), "{english}");
+    let vietnamese = shown(&run, Language::Vietnamese);
+    assert!(vietnamese.contains("1 ván có điểm tự chọn"), "{vietnamese}");
+}
+
+#[test]
+fn failed_blocks_are_counted_and_listed() {
+    let mut run = running(vec![block("b1", JobStatus::Quarantined)]);
+    run.is_running = false;
+    run.counts.jobs = BTreeMap::from([(JobStatus::Done, 20)]);
+    let visit = Visit::in_language(Language::English);
+    let counted = figures(&visit, &run).into_string();
+    let figure = "href=\"blocks?state=failed\"><b>1</b><span>blocks failed<";
+    assert!(counted.contains(figure), "{counted}");
+    let listed = failed_block_list(&visit, &run.blocks).into_string();
+    assert!(listed.contains("href=\"block/b1/\">b1<"), "{listed}");
+    let next = controls(&visit, &run).into_string();
+    assert!(!next.contains("Everything is aligned"), "{next}");
+}
+
+#[test]
+fn pairs_that_are_only_read_ahead_count_as_waiting() {
+    let mut run = running(vec![block("b1", JobStatus::Leased)]);
+    run.counts.jobs = BTreeMap::from([
+        (JobStatus::Done, 10),
+        (JobStatus::Leased, 3),
+        (JobStatus::Ready, 7),
+    ]);
+    if let Some(metrics) = &mut run.workers[0].metrics {
+        metrics.jobs = 1;
+    }
+    let visit = Visit::in_language(Language::English);
+    let shown = figures(&visit, &run).into_string();
+    for part in [
+        "<b>9</b><span>waiting<",
+        "<b>1</b><span>running<",
+        "<b>1</b><span>blocks running<",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    run.counts.jobs.remove(&JobStatus::Leased);
+    let shown = figures(&visit, &run).into_string();
+    assert!(!shown.contains("<b>0</b><span>running<"), "{shown}");
 }

@@ -2,11 +2,9 @@
 //! by their wording.
 
 use super::message_table::{KINDS, MESSAGES};
-use super::number_text::with_decimal_sign;
-use crate::review::Language;
 
 /// Returns a message of the program in Vietnamese if its beginning is known. Parts that are not known stay as they are.
-pub(super) fn vietnamese(text: &str) -> Option<String> {
+pub(crate) fn vietnamese(text: &str) -> Option<String> {
     let mut lines = text.lines();
     let first = line(lines.next()?)?;
     let rest = lines.map(|one| line(one).unwrap_or_else(|| one.to_owned()));
@@ -86,18 +84,33 @@ fn filled(pattern: &str, parts: &[&str]) -> String {
     text
 }
 
+/// Returns a list that ends in words such as `and 3 more` in Vietnamese, where `others` names the rest. `None` if it
+/// does not end like this.
+pub(crate) fn with_more(list: &str, others: &str) -> Option<String> {
+    let (names, count) = list.strip_suffix(" more")?.rsplit_once(" and ")?;
+    count.parse::<u64>().ok()?;
+    Some(format!("{names} và {count} {others}"))
+}
+
 /// Returns a part of a message: numbers with a decimal comma, and kinds of files by their Vietnamese names.
 fn part_text(part: &str) -> String {
     if part.parse::<f64>().is_ok() {
-        return with_decimal_sign(Language::Vietnamese, part.to_owned());
+        return part.replace('.', ",");
     }
     match part {
-        "text" => return "văn bản".to_owned(),
+        "text" | "a string" => return "văn bản".to_owned(),
+        "usize" | "u64" | "u32" | "u16" | "u8" => return "số nguyên từ 0 trở lên".to_owned(),
+        "i64" | "i32" => return "số nguyên".to_owned(),
+        "f64" | "f32" => return "số".to_owned(),
+        "a boolean" => return "true hoặc false".to_owned(),
         "a pointer of Git LFS" => return "con trỏ của Git LFS".to_owned(),
         "MeshLab, Blender or CloudCompare" => {
             return "MeshLab, Blender hoặc CloudCompare".to_owned();
         }
         _ => {}
+    }
+    if let Some(listed) = with_more(part, "mục khác") {
+        return listed;
     }
     let name = part.strip_prefix("a ").or_else(|| part.strip_prefix("an "));
     let kind = name.and_then(|name| {
@@ -174,6 +187,26 @@ mod tests {
             (
                 "p/mocban.toml: fit.seed = 7 is outside the range 0 to 1; new words",
                 "p/mocban.toml: fit.seed = 7 nằm ngoài khoảng 0 đến 1; new words",
+            ),
+            (
+                "run.workers = \"hai\": invalid type: string \"hai\", expected usize",
+                "run.workers = \"hai\": giá trị không đúng kiểu, cần số nguyên từ 0 trở lên",
+            ),
+            (
+                "fit.rounds = 2.5: invalid value: floating point `2.5`, expected a boolean",
+                "fit.rounds = 2,5: giá trị không hợp lệ, cần true hoặc false",
+            ),
+            (
+                "the control points contradict each other: no common position is nearer than 12 mm to all of them; choose them again on the same strokes of both images, or add a fourth one",
+                "các điểm mâu thuẫn với nhau: không có vị trí chung nào gần tất cả các điểm hơn 12 mm; hãy chọn lại trên cùng các nét của hai hình, hoặc thêm điểm thứ tư",
+            ),
+            (
+                "control point 2 contradicts the others, which put it 31 mm away: choose it again on the same stroke of both images",
+                "điểm 2 mâu thuẫn với các điểm khác, vốn cho vị trí cách đó 31 mm: hãy chọn lại điểm đó trên cùng một nét của hai hình",
+            ),
+            (
+                "there is no pair b4; similar ids: b04, b14 and 3 more",
+                "không có cặp b4; mã gần giống: b04, b14 và 3 mục khác",
             ),
             (
                 "p/data/meshes/0.ply is not there",

@@ -91,13 +91,18 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "hãy chuyển đổi tệp, chẳng hạn bằng ImageMagick: {0}, rồi dùng tệp mới",
     ),
     (
-        "convert them, such as with ImageMagick: {}",
-        "hãy chuyển đổi chúng, chẳng hạn bằng ImageMagick: {0}",
+        "open them in a program and save them as PNG",
+        "hãy mở chúng bằng một chương trình rồi lưu thành PNG",
     ),
     (
-        "save their pages as images, such as with {}",
-        "hãy lưu các trang thành hình, chẳng hạn bằng {0}",
+        "open them in a program and save their pages as PNG",
+        "hãy mở chúng bằng một chương trình rồi lưu các trang thành PNG",
     ),
+    (
+        "for many files, with ImageMagick: {}",
+        "nếu có nhiều tệp, hãy dùng ImageMagick: {0}",
+    ),
+    ("for many files: {}", "nếu có nhiều tệp: {0}"),
     // Ids.
     ("there is no pair or block {}", "không có cặp hay ván {0}"),
     ("there is no pair {}", "không có cặp {0}"),
@@ -189,6 +194,14 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     (
         "{} = {}: must be below {} = {}",
         "{0} = {1}: phải nhỏ hơn {2} = {3}",
+    ),
+    (
+        "{} = {}: invalid type: {}, expected {}",
+        "{0} = {1}: giá trị không đúng kiểu, cần {3}",
+    ),
+    (
+        "{} = {}: invalid value: {}, expected {}",
+        "{0} = {1}: giá trị không hợp lệ, cần {3}",
     ),
     // Exports.
     (
@@ -332,6 +345,47 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     (
         "the scan shows no carved face: {}",
         "bản quét không có mặt khắc: {0}",
+    ),
+    (
+        "{} control points are too few: choose at least {}",
+        "{0} điểm là quá ít: hãy chọn ít nhất {1} điểm",
+    ),
+    (
+        "the control points lie within {} mm of each other: choose points that are at least {} mm apart, best near the corners of the text",
+        "các điểm chỉ cách nhau {0} mm: hãy chọn các điểm cách nhau ít nhất {1} mm, tốt nhất gần các góc của phần chữ",
+    ),
+    (
+        "the control points contradict each other: no common position is nearer than {} mm to all of them",
+        "các điểm mâu thuẫn với nhau: không có vị trí chung nào gần tất cả các điểm hơn {0} mm",
+    ),
+    (
+        "choose them again on the same strokes of both images, or add a fourth one",
+        "hãy chọn lại trên cùng các nét của hai hình, hoặc thêm điểm thứ tư",
+    ),
+    (
+        "control point {} contradicts the others, which put it {} mm away: choose it again on the same stroke of both images",
+        "điểm {0} mâu thuẫn với các điểm khác, vốn cho vị trí cách đó {1} mm: hãy chọn lại điểm đó trên cùng một nét của hai hình",
+    ),
+    (
+        "relief and ink do not agree at the control points: {} % of the places agree",
+        "mặt khắc và mực không khớp tại các điểm: {0} % số chỗ khớp nhau",
+    ),
+    (
+        "choose points on the same strokes of both images",
+        "hãy chọn các điểm trên cùng các nét của hai hình",
+    ),
+    // The correction of a block.
+    (
+        "the points of this block were changed since this page was opened: reload the page to see them",
+        "các điểm của ván này đã được thay đổi sau khi mở trang: hãy tải lại trang để xem",
+    ),
+    (
+        "{} was replaced since this page was opened: reload the page, and choose the points again",
+        "{0} đã được thay sau khi mở trang: hãy tải lại trang rồi chọn lại các điểm",
+    ),
+    (
+        "the page was opened again, or other points were tried: try these again before saving them",
+        "trang đã được mở lại, hoặc các điểm khác đã được thử: hãy thử lại các điểm này trước khi lưu",
     ),
     (
         "is this the scan of a whole block?",

@@ -1,0 +1,121 @@
+//! What pages say of the whole blocks of a project: which are in progress, which the next run aligns again, and which failed.
+
+use std::collections::BTreeSet;
+
+use maud::{Markup, html};
+
+use super::address::encoded;
+use super::components::{grouped, stored_message};
+use super::visit::Visit;
+use crate::review::Language;
+use mocban_catalog::Catalog;
+use mocban_core::domain::{BlockName, JobStatus, one_line};
+use mocban_project::ProjectResult;
+use mocban_project::block_status::BlockStatus;
+use mocban_runner::{RunOptions, planned_blocks};
+
+/// Most blocks in progress that are named.
+const MAX_BLOCKS: usize = 5;
+/// Most failed blocks that are named.
+const MAX_FAILED: usize = 3;
+
+/// Returns how many finished or failed blocks the next run would align again, because their control points, settings or
+/// files have changed.
+pub(super) async fn outdated_blocks(
+    catalog: &Catalog,
+    options: &RunOptions,
+    blocks: &BlockStatus,
+) -> ProjectResult<u64> {
+    if blocks.is_empty() {
+        return Ok(0);
+    }
+    let planned = planned_blocks(catalog, options).await?;
+    let planned: BTreeSet<BlockName> = planned.into_iter().map(|entry| entry.block).collect();
+    let outdated = blocks.0.iter().filter(|state| {
+        matches!(state.status, JobStatus::Done | JobStatus::Quarantined)
+            && planned.contains(&state.attributes.name)
+    });
+    Ok(outdated.count() as u64)
+}
+
+/// Returns the stages of the blocks in progress and how many blocks are done, such as `b04: registration with the page, 1 of 3 done`.
+pub(super) fn blocks_text(visit: &Visit, blocks: &BlockStatus) -> String {
+    let mut parts: Vec<String> = (blocks.in_progress())
+        .take(MAX_BLOCKS)
+        .map(|(block, stage)| {
+            let (block, stage) = (one_line(block.as_str()), visit.block_stage(stage));
+            format!("{block}: {stage}")
+        })
+        .collect();
+    let done = grouped(blocks.number(&[JobStatus::Done]));
+    let all = grouped(blocks.0.len() as u64);
+    parts.push(match visit.language {
+        Language::English => format!("{done} of {all} done"),
+        Language::Vietnamese => format!("xong {done} trên {all}"),
+    });
+    let failed = failed_blocks(blocks);
+    parts.extend((failed > 0).then(|| format!("{} {}", grouped(failed), visit.t("failed", "lỗi"))));
+    parts.join(", ")
+}
+
+/// Says that blocks have other control points, settings or files than when they were aligned.
+pub(super) fn outdated_blocks_text(visit: &Visit, outdated: u64) -> Option<String> {
+    let blocks = grouped(outdated);
+    match (visit.language, outdated) {
+        (_, 0) => None,
+        (Language::English, 1) => Some(
+            "1 block has other chosen places, settings or files than in its last run: the next run aligns and cuts it again."
+                .to_owned(),
+        ),
+        (Language::English, _) => Some(format!(
+            "{blocks} blocks have other chosen places, settings or files than in their last run: the next run aligns and cuts them again."
+        )),
+        (Language::Vietnamese, _) => Some(format!(
+            "{blocks} ván có điểm tự chọn, thiết lập hoặc tệp khác so với lần chạy trước: lần chạy tới sẽ căn chỉnh và cắt lại."
+        )),
+    }
+}
+
+/// Returns the number of failed blocks.
+pub(super) fn failed_blocks(blocks: &BlockStatus) -> u64 {
+    blocks.number(&[JobStatus::Quarantined])
+}
+
+/// Says how many blocks failed, with a link to them. `base` is the relative address of the project.
+pub(super) fn failed_blocks_part(visit: &Visit, base: &str, failed: u64) -> Markup {
+    let number = grouped(failed);
+    let text = match (visit.language, failed) {
+        (Language::English, 1) => "1 block failed, so its characters are missing.".to_owned(),
+        (Language::English, _) => {
+            format!("{number} blocks failed, so their characters are missing.")
+        }
+        (Language::Vietnamese, _) => format!("{number} ván bị lỗi nên thiếu các chữ của ván."),
+    };
+    html! {
+        @if failed > 0 {
+            p.notice.bad #failed-blocks { (text) " " a href={ (base) "blocks?state=failed" } { (visit.t("See why", "Xem lý do")) } }
+        }
+    }
+}
+
+/// Returns the first failed blocks with their reasons.
+pub(super) fn failed_block_list(visit: &Visit, blocks: &BlockStatus) -> Markup {
+    let failed = failed_blocks(blocks);
+    html! {
+        @if failed > 0 {
+            section {
+                h2 { (visit.t("Failed blocks", "Các ván lỗi")) }
+                article.card {
+                    ul { @for state in blocks.failed().take(MAX_FAILED) {
+                        @let name = state.attributes.name.as_str();
+                        li {
+                            a href={ "block/" (encoded(name)) "/" } { (one_line(name)) }
+                            @if let Some(stored) = &state.failure { ": " (stored_message(visit, &stored.failure.message)) }
+                        }
+                    } }
+                    a.button href="blocks?state=failed" { (visit.t("Show them", "Xem các ván này")) " (" (grouped(failed)) ")" }
+                }
+            }
+        }
+    }
+}

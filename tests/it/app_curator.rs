@@ -1,0 +1,257 @@
+//! What a curator relies on in the app: numbers and lists that agree, who settles a disagreement, failed blocks on every page, and
+//! files that are replaced.
+
+use std::path::Path;
+
+use mocban::raster::{Grid, png_grey8};
+use serde_json::json;
+
+use crate::app::{act, open_app, text, with_project};
+use crate::app_uploads::{begun, encode, end, put};
+use crate::block_correction::refused_block;
+use crate::cli::mocban;
+use crate::page::Page;
+use crate::waiting::wait_until;
+
+fn html(page: &Page, path: &str) -> String {
+    let reply = page.get(path);
+    assert_eq!(reply.status, 200, "{path}: {}", text(&reply));
+    text(&reply)
+}
+
+/// Stores a verdict on the ensemble's result of a pair.
+fn judge(project: &Path, pair: &str, verdict: &str, reviewer: &str, more: &[&str]) {
+    let set = ["verdict", "set", pair, verdict, "--reviewer", reviewer];
+    let set = [&set[..], &["--metric", "ensemble"], more].concat();
+    mocban(project, &set).expect(0);
+}
+
+#[test]
+fn the_list_behind_a_number_of_the_report_has_the_counted_pairs() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    judge(&project, "upright-0000", "pass", "lan", &[]);
+    judge(&project, "upright-0000", "fail", "minh", &[]);
+    judge(&project, "upright-0001", "pass", "lan", &[]);
+    let report = html(&page, "/p/p/report/numbers");
+    let link = "href=\"pairs?verdict=joint-pass&amp;metric=ensemble\">1<";
+    assert!(report.contains(link), "{report}");
+    let counted = html(&page, "/p/p/pairs?verdict=joint-pass&metric=ensemble");
+    assert!(counted.contains("pair/upright-0001/"), "{counted}");
+    assert!(!counted.contains("pair/upright-0000/"), "{counted}");
+    let given = html(&page, "/p/p/pairs?verdict=pass&metric=ensemble");
+    assert!(given.contains("pair/upright-0000/"), "{given}");
+}
+
+#[test]
+fn one_of_two_who_disagree_hears_that_a_third_person_must_settle_it() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    judge(&project, "upright-0000", "pass", "lan", &[]);
+    judge(&project, "upright-0000", "fail", "minh", &[]);
+    let start = |reviewer: &str, metric: &str| {
+        let form =
+            json!({"reviewer": reviewer, "metric": metric, "sample": "", "order": "adjudicate"});
+        act(&page, "/p/p/actions/review", &form, |_| {})
+    };
+    let own = start("lan", "ensemble");
+    assert_eq!(own.status, 422);
+    let said = text(&own);
+    assert!(
+        said.contains("you are one of the two who disagree (results: 1)"),
+        "{said}"
+    );
+    let other = text(&start("lan", "relief"));
+    assert!(other.contains("no two reviewers disagree"), "{other}");
+    assert_eq!(start("hoa", "ensemble").status, 200);
+}
+
+#[test]
+fn a_review_for_another_person_begins_with_the_same_choices() {
+    let (_dir, page) = with_project();
+    let plain = html(&page, "/p/p/review");
+    assert!(
+        plain.contains("name=\"sample\" min=\"1\" value=\"50\""),
+        "{plain}"
+    );
+    let all = html(&page, "/p/p/review?metric=relief&order=least_confident");
+    for part in [
+        "value=\"relief\" selected",
+        "value=\"least_confident\" selected",
+    ] {
+        assert!(all.contains(part), "{part}: {all}");
+    }
+    assert!(!all.contains("value=\"50\""), "all results: {all}");
+    let some = html(&page, "/p/p/review?sample=7&order=random");
+    assert!(
+        some.contains("name=\"sample\" min=\"1\" value=\"7\""),
+        "{some}"
+    );
+    assert!(
+        some.contains("<option value=\"\" selected>all metrics"),
+        "{some}"
+    );
+}
+
+#[test]
+fn a_failed_block_is_named_on_every_page() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    refused_block(dir.path());
+    let page = open_app(dir.path());
+    for path in ["/", "/p/p/report/numbers", "/p/p/export"] {
+        let shown = html(&page, path);
+        assert!(shown.contains("1 block failed"), "{path}: {shown}");
+        assert!(shown.contains("blocks?state=failed"), "{path}: {shown}");
+    }
+    let run = html(&page, "/p/p/");
+    for part in [
+        "<b>1</b><span>blocks failed<",
+        "href=\"block/b1/\">b1<",
+        "does not belong to this block",
+    ] {
+        assert!(run.contains(part), "{part}: {run}");
+    }
+    let review = json!({"reviewer": "lan", "metric": "", "sample": "", "order": "random"});
+    let refused = act(&page, "/p/p/actions/review", &review, |_| {});
+    assert!(
+        text(&refused).contains("blocks failed (1)"),
+        "{}",
+        text(&refused)
+    );
+    let export = json!({"purpose": "excel", "only": "all", "metric": ""});
+    assert_eq!(
+        act(&page, "/p/p/actions/export", &export, |_| {}).status,
+        200
+    );
+    let done = "data-task=\"done\"";
+    wait_until("the export is done", || {
+        html(&page, "/p/p/export").contains(done)
+    });
+    let exported = html(&page, "/p/p/export");
+    assert!(
+        exported.contains("a table for Excel: no pair has a result"),
+        "{exported}"
+    );
+    let report = html(&page, "/p/p/report/numbers?language=vi");
+    assert!(
+        report.contains("Dự án chưa có cặp nào: 1 ván bị lỗi."),
+        "{report}"
+    );
+}
+
+#[test]
+fn an_export_says_which_one_was_made() {
+    let (_dir, page) = with_project();
+    let export =
+        json!({"purpose": "mesh", "only": "all", "metric": "ensemble", "pairs": ["upright-0000"]});
+    assert_eq!(
+        act(&page, "/p/p/actions/export", &export, |_| {}).status,
+        200
+    );
+    let done = "data-task=\"done\"";
+    wait_until("the export is done", || {
+        html(&page, "/p/p/export").contains(done)
+    });
+    let shown = html(&page, "/p/p/export");
+    let title = "scans with their prints for MeshLab or CloudCompare (chosen pairs)";
+    assert!(
+        shown.contains(&format!("{title}: 1 pairs were exported.")),
+        "{shown}"
+    );
+}
+
+#[test]
+fn scans_or_unread_files_alone_get_a_next_step() {
+    let (dir, page) = with_project();
+    let send = |name: &str, file: &str, bytes: &[u8]| {
+        let upload = begun(&page, name, 1);
+        assert_eq!(put(&page, &upload, file, bytes).status, 200, "{file}");
+        let reply = end(&page, &upload, "finish").json();
+        let go = reply["go"].as_str().expect("an address").to_owned();
+        html(&page, &format!("/{go}"))
+    };
+    let scene = send("scene", "x.glb", b"glTF");
+    for part in ["a glTF scene is not read", "export them as PLY"] {
+        assert!(scene.contains(part), "{part}: {scene}");
+    }
+    let document = send("document", "x.pdf", b"%PDF-1.7");
+    assert!(document.contains("save their pages as PNG"), "{document}");
+    let print = dir.path().join("p/data/prints/upright-0000.jpg");
+    let print = std::fs::read(print).expect("a print");
+    let prints = send("prints", "1.jpg", &print);
+    assert!(
+        prints.contains("Where are the scans of these prints?"),
+        "{prints}"
+    );
+    let scans = send("scans", "1.stl", b"solid x");
+    for part in [
+        "Where are the prints of these scans?",
+        "Use the prints of prints (1)",
+    ] {
+        assert!(scans.contains(part), "{part}: {scans}");
+    }
+}
+
+#[test]
+fn a_file_of_a_failed_pair_is_replaced_by_one_of_its_name() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    let mesh = project.join("data/meshes/upright-0000.ply");
+    let sound = std::fs::read(&mesh).expect("a mesh");
+    std::fs::write(&mesh, "solid x").expect("written");
+    mocban(&project, &["run"]).expect(3);
+    let failed = html(&page, "/p/p/pair/upright-0000/");
+    assert!(
+        failed.contains("import?project=p&amp;mend=upright-0000"),
+        "{failed}"
+    );
+    let hint = html(&page, "/import?project=p&mend=upright-0000");
+    assert!(hint.contains("<code>upright-0000.ply</code>"), "{hint}");
+    let folder = dir.path().join("x");
+    std::fs::create_dir(&folder).expect("a folder");
+    std::fs::write(folder.join("upright-0000.ply"), sound).expect("written");
+    let at = encode(folder.to_str().expect("UTF-8"));
+    let offered = html(&page, &format!("/import?project=p&meshes={at}&prints={at}"));
+    assert!(
+        offered.contains("Replace its file by upright-0000.ply"),
+        "{offered}"
+    );
+    let prints = encode(project.join("data/prints").to_str().expect("UTF-8"));
+    let address = format!("/import?project=p&meshes={at}&prints={prints}&changed=yes");
+    let joined = html(&page, &address);
+    for part in ["<b>1</b> pairs", "name=\"changed\" value=\"yes\" checked"] {
+        assert!(joined.contains(part), "{part}: {joined}");
+    }
+}
+
+#[test]
+fn a_pair_without_a_result_shows_what_its_stages_have_made() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    let blank = png_grey8(&Grid::new(120, 120, 255));
+    std::fs::write(project.join("blank.png"), blank).expect("written");
+    let list = "id,mesh,print\nblank,data/meshes/upright-0001.ply,blank.png\n";
+    std::fs::write(project.join("more.csv"), list).expect("written");
+    mocban(&project, &["import", "more.csv"]).expect(0);
+    mocban(&project, &["run"]).expect(3);
+    let shown = html(&page, "/p/p/pair/blank/");
+    assert!(shown.contains("data-layer=\"relief\""), "{shown}");
+    assert!(!shown.contains("data-layer=\"overlay\""), "{shown}");
+    let relief = page.get("/p/p/pair/blank/picture/relief-ensemble");
+    assert_eq!(relief.header("content-type"), Some("image/jpeg"));
+}
+
+#[test]
+fn the_history_of_a_pair_has_notes_in_order_of_time() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    let note = ["--reason", "angle", "--note", "nghiêng"];
+    judge(&project, "upright-0000", "fail", "lan", &note);
+    let shown = html(&page, "/p/p/pair/upright-0000/");
+    let history = shown.split("class=\"history\"").nth(1).expect("a history");
+    let registered = history
+        .find("registration with the print")
+        .expect("a stage");
+    let judged = history.find("<q>nghiêng</q>").expect("a note");
+    assert!(registered < judged, "{history}");
+}
