@@ -3,6 +3,11 @@
 /** The token that they carry. */
 export const token = document.querySelector('meta[name="csrf-token"]').content;
 
+/** Says, in the language of the page, that the program does not answer. */
+export function noAnswer() {
+  return new Error(document.getElementById("offline").textContent.trim());
+}
+
 /** Returns what a reply says; throws the sentence of a refusal, with its status and the retired pairs that it names. */
 export function read(status, text) {
   let reply = {};
@@ -24,6 +29,8 @@ export async function act(address, fields, isLast = false) {
     headers: { "content-type": "application/json", "x-csrf-token": token },
     body: JSON.stringify(fields),
     keepalive: isLast,
+  }).catch(() => {
+    throw noAnswer();
   });
   return read(response.status, await response.text());
 }

@@ -122,6 +122,7 @@ if (live) {
 /** Loads the parts of a page that take long. */
 for (const part of document.querySelectorAll("[data-load]")) {
   const response = await fetch(part.dataset.load, PAGE).catch(() => null);
+  if (!response) offline.hidden = false;
   const text = await response?.text();
   const page = new DOMParser().parseFromString(text ?? "", "text/html");
   const shown = response?.ok ? page.body : page.querySelector("main") ?? page.body;
@@ -132,7 +133,7 @@ for (const part of document.querySelectorAll("[data-load]")) {
 // The language was chosen with this address; a later one may be chosen on another page. What was done is said once, except
 // for retired pairs, whose number is read anew.
 const here = new URL(location.href);
-const once = ["language"];
+const once = ["language", "saved"];
 if (here.searchParams.get("done") !== "retire") once.push("done", "count", "still_out");
 if (once.some((name) => here.searchParams.has(name))) {
   for (const name of once) here.searchParams.delete(name);

@@ -1,6 +1,8 @@
 // Chooses pairs in a list: with a click, with Shift a range, and with the arrow keys. This tab keeps the choice, so it stays
 // while the list is paged through.
 
+import { noAnswer } from "./action.js";
+
 const bar = document.getElementById("choice");
 const status = document.getElementById("chosen");
 const problem = document.getElementById("choice-problem");
@@ -8,11 +10,18 @@ const none = document.getElementById("choose-none");
 const boxes = [...document.querySelectorAll("[data-pair]")];
 const most = Number(bar.dataset.max);
 const chosen = new Set(JSON.parse(sessionStorage.getItem(bar.dataset.kept) ?? "[]"));
+const keptOpen = `${bar.dataset.kept}:open`;
+/** Pairs that wait or have failed, as far as this tab has seen them. */
+const open = new Set(JSON.parse(sessionStorage.getItem(keptOpen) ?? "[]"));
+for (const box of boxes) {
+  if ("open" in box.dataset) open.add(box.dataset.pair);
+  else open.delete(box.dataset.pair);
+}
 /** Where a range begins. */
 let anchor = -1;
 
-function withNumber(text) {
-  return text.replaceAll("{n}", chosen.size);
+function withNumber(text, number = chosen.size) {
+  return text.replaceAll("{n}", number);
 }
 
 function show() {
@@ -24,7 +33,9 @@ function show() {
   status.textContent = chosen.size ? withNumber(status.dataset.text).replace("{here}", here) : status.dataset.none;
   none.hidden = document.getElementById("choice-actions").hidden = chosen.size === 0;
   for (const button of bar.querySelectorAll("button[data-text]")) {
-    button.textContent = withNumber(button.dataset.text);
+    const number = button.dataset.counts === "open" ? [...chosen].filter((name) => open.has(name)).length : chosen.size;
+    button.textContent = withNumber(button.dataset.text, number);
+    button.hidden = number === 0;
     if (button.dataset.ask) button.dataset.confirm = withNumber(button.dataset.ask);
   }
 }
@@ -45,6 +56,7 @@ function change(added, removed = []) {
     chosen.clear();
     for (const name of next) chosen.add(name);
     sessionStorage.setItem(bar.dataset.kept, JSON.stringify([...chosen]));
+    sessionStorage.setItem(keptOpen, JSON.stringify([...chosen].filter((name) => open.has(name))));
   }
   show();
 }
@@ -98,10 +110,16 @@ all.addEventListener("click", async () => {
   if (all.getAttribute("aria-busy") === "true") return;
   all.setAttribute("aria-busy", "true");
   try {
-    const response = await fetch(all.dataset.from);
+    const response = await fetch(all.dataset.from).catch(() => {
+      throw noAnswer();
+    });
     const reply = await response.json();
-    if (response.ok) change(reply.pairs);
-    else showProblem(reply.error);
+    if (response.ok) {
+      for (const name of reply.open) open.add(name);
+      change(reply.pairs);
+    } else {
+      showProblem(reply.error);
+    }
   } catch (error) {
     showProblem(error.message);
   } finally {

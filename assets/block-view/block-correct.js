@@ -209,6 +209,7 @@ class CorrectionPage {
   }
 
   update() {
+    this.status.classList.toggle("block-busy", this.isBusy === true);
     this.face.mark(this.points.map((point) => point.face));
     this.page.mark(this.points.map((point) => point.page));
     this.tryButton.disabled = this.isBusy || this.complete().length < this.block.min_points;
@@ -257,9 +258,10 @@ class CorrectionPage {
 
   async send(path, body) {
     const headers = { "content-type": "application/json", "x-csrf-token": this.block.csrf_token };
-    const response = await fetch(path, { method: "POST", headers, body: JSON.stringify(body) });
+    const response = await fetch(path, { method: "POST", headers, body: JSON.stringify(body) }).catch(() => null);
+    if (!response) throw new Error(text("no_answer"));
     const answer = await response.json().catch(() => ({ error: response.statusText }));
-    if (!response.ok) throw new Error(answer.error);
+    if (!response.ok) throw new Error(answer[`error_${language}`] ?? answer.error);
     return answer;
   }
 
@@ -302,7 +304,10 @@ document.documentElement.lang = language;
 const container = document.getElementById("block-view");
 try {
   const response = await fetch("correct/block.json");
-  if (!response.ok) throw new Error((await response.json()).error);
+  if (!response.ok) {
+    const answer = await response.json();
+    throw new Error(answer[`error_${language}`] ?? answer.error);
+  }
   window.mocbanCorrection = new CorrectionPage(container, await response.json());
 } catch (error) {
   container.textContent = text("no_data", { why: error.message });

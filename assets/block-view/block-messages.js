@@ -68,6 +68,7 @@ const BLOCK_MESSAGES = {
     en: "click, Enter: choose a place · click on a number: remove the point · Backspace: remove the last one · T: turn the relief · wheel, + −: zoom · 0: whole · drag, arrow keys: move",
     vi: "nhấp, Enter: chọn chỗ · nhấp vào số: bỏ điểm · Backspace: bỏ điểm cuối · T: xoay mặt khắc · con lăn, + −: phóng · 0: toàn bộ · kéo, phím mũi tên: di chuyển",
   },
+  no_answer: { en: "The program does not answer. If it was ended, start it again.", vi: "Chương trình không trả lời. Nếu chương trình đã dừng, hãy mở lại." },
   no_data: { en: "The block cannot be displayed: {why}", vi: "Không hiển thị được ván: {why}" },
 };
 

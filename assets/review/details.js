@@ -14,7 +14,7 @@ export async function showDetails(item) {
   const verdicts = others.map((other) => `${other.reviewer}: ${ui.answerText(other)}${other.note ? ` (${other.note})` : ""}`);
   const parts = [
     pair,
-    `${translate("metrics")}: ${metrics.join(", ")}`,
+    `${translate("metrics")}: ${metrics.map((title) => translate(title)).join(", ")}`,
     `${translate("iou")} ${number(iou)}`,
     `${translate("dice")} ${number(dice)}`,
     ...(verdicts.length > 0 ? [`${translate("other_reviewers")}: ${verdicts.join("; ")}`] : []),

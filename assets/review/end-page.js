@@ -1,6 +1,6 @@
 // The page after the last image: what the reviewer has done, and what to do next.
 
-import { translate } from "./config.js";
+import { reviewOrder, translate } from "./config.js";
 
 const element = document.getElementById("end");
 
@@ -25,6 +25,11 @@ function lines({ results, reviewer, is_inattentive: isInattentive, others }) {
   return texts;
 }
 
+/** Returns the choices of this review, with which another person gets the same results: the last part of its address in the app. */
+function choices() {
+  return decodeURIComponent(location.pathname.split("/").at(-2));
+}
+
 /** Returns what a reviewer does next: with the app, with commands, or, if invited, nothing. */
 function nextSteps(summary) {
   if (summary.project_page) {
@@ -33,7 +38,10 @@ function nextSteps(summary) {
       link.href = `${summary.project_page}${name}`;
       return create("p", "", link);
     };
-    return [page("report", translate("open_report")), page("review", translate("open_review"))];
+    const next = [page("report", translate("open_report"))];
+    // Settled disagreements are not judged by yet another person.
+    if (reviewOrder !== "adjudicate") next.push(page(`review?${choices()}`, translate("open_review")));
+    return next;
   }
   if (!summary.command) return [create("p", translate("invited_end"))];
   const command = (text) => create("code", `${summary.command} ${text}`);

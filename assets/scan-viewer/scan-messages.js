@@ -44,7 +44,7 @@ export function preferredLanguage() {
 export function localNumber(value, digits = 0) {
   const format = { minimumFractionDigits: digits, maximumFractionDigits: digits };
   const text = value.toLocaleString(document.documentElement.lang || "en", format);
-  return text.replace(/^-(0([.,]0*)?)$/, "$1");
+  return text.replace(/^-(0([.,]0*)?)$/, "$1").replace(/^-/, "−");
 }
 
 /** Returns a text with `{name}` replaced by the values. */
