@@ -110,6 +110,8 @@ impl Sentence {
 /// Returns a text without the remarks in brackets and the clauses that name commands or options, and without lines that have
 /// nothing else.
 pub(super) fn without_commands(text: &str) -> String {
+    // The pages send settings as the program takes them with this option.
+    let text = text.strip_prefix("--set: ").unwrap_or(text);
     let lines: Vec<String> = text.lines().filter_map(line_without_commands).collect();
     if lines.is_empty() {
         return text.replace('`', "");
@@ -118,8 +120,7 @@ pub(super) fn without_commands(text: &str) -> String {
 }
 
 fn line_without_commands(line: &str) -> Option<String> {
-    // The pages send settings as the program takes them with this option.
-    let text = without_remarks(line.strip_prefix("--set: ").unwrap_or(line));
+    let text = without_remarks(line);
     let sentences = text.trim_end_matches('.').split(". ");
     let sentences: Vec<String> = sentences
         .filter_map(|sentence| {
@@ -191,6 +192,10 @@ mod tests {
             (
                 "--set: run.workers = \"x\": invalid type: string \"x\", expected usize",
                 "run.workers = \"x\": invalid type: string \"x\", expected usize",
+            ),
+            (
+                "--set: run.workers = -3: invalid value: integer `-3`, expected usize",
+                "run.workers = -3: invalid value: integer -3, expected usize",
             ),
             ("use `x`", "use x"),
             (
