@@ -1,6 +1,7 @@
 //! The demo of a whole block.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use crate::cli::{empty, mocban};
 
@@ -99,6 +100,31 @@ fn the_report_has_the_accuracy_of_found_boxes() {
     assert_eq!(r50, matched / whole as f64);
     let text = mocban(dir.path(), &["-C", "d", "report"]).expect(0).out;
     assert!(text.contains("Block  true  found  right %"), "{text}");
+    check_round_trip(dir.path(), truth["page"].as_str().expect("a name"));
+}
+
+/// Checks that found boxes that are exported, and imported as labels without a change, leave all pairs as they are.
+fn check_round_trip(dir: &Path, page: &str) {
+    let export = ["-C", "d", "export", "--to", "annotations", "-o", "boxes"];
+    mocban(dir, &export).expect(0);
+    let page = format!("d/data/{page}");
+    let import = [
+        "-C",
+        "d",
+        "import",
+        "--block",
+        "d/data/block.ply",
+        "--page",
+        &page,
+        "--labels",
+        "boxes/pages/block.json",
+        "--name",
+        "block",
+    ];
+    mocban(dir, &import).expect(0);
+    let run = mocban(dir, &["-C", "d", "run"]).expect(0).err;
+    let unchanged = "block block: 0 pairs added, 0 changed, 0 retired";
+    assert!(run.contains(unchanged), "{run}");
 }
 
 #[test]

@@ -209,6 +209,31 @@ fn check_page_labels(dir: &Path) {
     let run = project(dir, &["run", "--json"]).expect(0).json();
     assert_eq!(run["blocks"]["done"], 1, "{run}");
     assert_eq!(project(dir, &["report", "--json"]).expect(0).out, before);
+    // Fractions of the page are no whole pixels.
+    let line = |one: &Value| {
+        let [x, y, width, height]: [f64; 4] = numbers(&one["bbox"]);
+        let side = |name: &str| coco["images"][0][name].as_f64().expect("pixels");
+        let [x, width] = [x + width / 2.0, width].map(|at| at / side("width"));
+        let [y, height] = [y + height / 2.0, height].map(|at| at / side("height"));
+        format!("0 {x:.5} {y:.5} {width:.5} {height:.5}\n")
+    };
+    let boxes = coco["annotations"].as_array().expect("a list").iter();
+    fs::write(
+        dir.join("fractions.txt"),
+        boxes.map(line).collect::<String>(),
+    )
+    .expect("written");
+    let run_with = |labels: &'static str| {
+        let mut import = import;
+        import[6] = labels;
+        project(dir, &import).expect(0);
+        project(dir, &["run"]).expect(0).err
+    };
+    run_with("fractions.txt");
+    project(dir, &["export", "--to", "annotations", "-o", "boxes"]).expect(0);
+    let run = run_with("boxes/pages/b1.json");
+    let unchanged = "block b1: 0 pairs added, 0 changed, 0 retired";
+    assert!(run.contains(unchanged), "{run}");
 }
 
 #[test]

@@ -6,7 +6,8 @@ use super::page_map::PageMap;
 use super::relief::surface_height;
 use mocban_core::domain::{Affine2, PrintFromMesh};
 
-/// Step of the rounded pixels, as a part of the longer edge of the character's box.
+/// Step of the rounded pixels, as a part of the longer edge of the character's box in whole pixels: a box that another
+/// program wrote with fewer digits gets the same step.
 const ROUNDED_PART: f64 = 0.002;
 /// Step of the point at which a rounded map is linearized, mm.
 const ROUNDED_MM: f64 = 1.0;
@@ -37,7 +38,7 @@ impl CharacterMap {
         px_per_mm: f64,
     ) -> Self {
         let [left, top, right, bottom] = character.label.page_box;
-        let longer = (right - left).max(bottom - top);
+        let longer = (right - left).max(bottom - top).round();
         let round = |value: f64, step: f64| (value / step).round() * step;
         let middle = middle_mm(character).map(|at| round(at, ROUNDED_MM));
         let page = map.page_from_face(middle);

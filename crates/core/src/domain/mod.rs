@@ -6,6 +6,7 @@ mod artifact;
 pub mod artifact_role;
 mod attention_check;
 mod block;
+mod box_edge;
 mod box_iou;
 mod box_matching;
 mod box_name;
@@ -28,6 +29,7 @@ mod mesh_losses;
 mod metric;
 mod outcome;
 mod pair_name;
+mod plain_path;
 mod print_outline;
 mod retire_cause;
 mod review_order;
@@ -51,6 +53,7 @@ pub use attention_check::AttentionCheck;
 pub use block::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
 };
+pub use box_edge::rounded_edge;
 pub use box_iou::box_iou;
 pub use box_matching::BoxMatches;
 pub use box_name::{BoxName, NotABoxName, NotePart};
@@ -77,6 +80,7 @@ pub use outcome::{
     SideEvidence, ThresholdChoice,
 };
 pub use pair_name::{NO_BREAK_SPACES, PairName, PairNameError, is_device};
+pub use plain_path::plain_path;
 pub use print_outline::PrintOutline;
 pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;

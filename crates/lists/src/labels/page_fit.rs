@@ -7,7 +7,7 @@ use super::message::{boxes, for_count, list, quoted};
 use super::model::{LabelBox, PageFile, bounds};
 use super::page_choice::is_same_file;
 use super::region::{Corners, LabelRegion, PageRegions};
-use mocban_core::domain::PairName;
+use mocban_core::domain::{PairName, rounded_edge};
 
 /// Maximum number of boxes of a page.
 pub const MAX_BOXES: usize = 100_000;
@@ -52,7 +52,10 @@ pub(super) fn fit_to_page(
     let unique = without_repeats(inside, &mut warnings);
     let names = names(&unique)?;
     check_overlap(&unique, page)?;
-    let pixel_centres = |corners: Corners| corners.into_iter().map(|[x, y]| [x - 0.5, y - 0.5]);
+    let pixel_centres = |corners: Corners| {
+        let corners = corners.into_iter();
+        corners.map(|corner| corner.map(|edge| rounded_edge(edge - 0.5)))
+    };
     let finished = unique
         .into_iter()
         .zip(names)
@@ -91,8 +94,10 @@ fn check_overlap(placed: &[PlacedRegion], page: &PageFile<'_>) -> Result<(), Lab
 /// Warns about another file name and another size in bytes.
 fn page_warnings(file: &PageRegions, page: &PageFile<'_>) -> Vec<String> {
     let mut warnings = Vec::new();
+    // A page of the same length is a copy under another name, such as that of an export.
     if let Some(name) = file.file_name.as_deref()
         && !is_same_file(name, page.name)
+        && file.bytes != Some(page.bytes)
     {
         let (labelled, name) = (quoted(name), quoted(page.name));
         warnings.push(format!("the labels are of {labelled}, the page is {name}"));

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::model::{LabelBox, PageFile};
+use mocban_core::domain::rounded_edge;
 
 /// Category of boxes without a character.
 const NO_TEXT: &str = "character";
@@ -133,7 +134,7 @@ fn sides(label: &LabelBox) -> [f64; 4] {
 
 /// Returns a number rounded to thousandths, without a decimal point if it is whole.
 fn number(value: f64) -> Value {
-    let rounded = (value * 1000.0).round() / 1000.0;
+    let rounded = rounded_edge(value);
     if rounded.fract() == 0.0 && rounded.abs() < 1e15 {
         json!(rounded as i64)
     } else {

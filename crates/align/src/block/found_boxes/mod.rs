@@ -27,7 +27,7 @@ use self::rows::{RowPitches, find_rows};
 use super::align::CarvedFace;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
-use mocban_core::domain::{BoxName, NotePart};
+use mocban_core::domain::{BoxName, NotePart, rounded_edge};
 
 /// Least area of a character, mm^2, and least length of its longer side, in pitches.
 const MIN_AREA_MM2: f64 = 0.8;
@@ -124,6 +124,18 @@ fn is_on_page(strokes: &Strokes, [width, height]: [usize; 2]) -> bool {
     left >= -1.5 && top >= -1.5 && right <= width as f64 + 0.5 && bottom <= height as f64 + 0.5
 }
 
+/// Returns the box of a character, cut at the edges of the page and rounded, as labels are.
+fn on_page(strokes: &Strokes, [width, height]: [usize; 2]) -> [f64; 4] {
+    let [left, top, right, bottom] = strokes.page_bounds;
+    let edge = |at: f64, side: usize| rounded_edge(at.clamp(-0.5, side as f64 - 0.5));
+    [
+        edge(left, width),
+        edge(top, height),
+        edge(right, width),
+        edge(bottom, height),
+    ]
+}
+
 /// Numbers the characters in reading order and leaves out what the block or the page does not show.
 fn numbered(
     places: &[CharacterPlace],
@@ -180,7 +192,7 @@ fn numbered(
             continue;
         }
         boxes.push(FoundBox {
-            page_box: strokes.page_bounds,
+            page_box: on_page(strokes, page_size),
             place: BoxName {
                 column: column + 1 - first_column,
                 row: number,

@@ -61,6 +61,12 @@ fn another_page_file_is_noticed() {
             "via.json: the labels were made for a file of 512345 bytes, the page has 512346",
         ]
     );
+    let copied = PageFile {
+        bytes: 512_345,
+        ..page
+    };
+    let labels = read(single.as_bytes(), "via.json", &copied).expect("a copy of the page");
+    assert_eq!(labels.warnings, [""; 0]);
 }
 
 #[test]

@@ -106,11 +106,8 @@ pub(crate) fn cut(
 }
 
 /// Returns the quarter turns that make the prints upright. Boxes that were found are named by column and row, which gives
-/// the reading direction; a page with labels is shown as it is.
+/// the reading direction. They keep these names in exported labels; a page whose boxes have other names is shown as it is.
 fn turns_of(boxes: &BoxesOutcome) -> u8 {
-    if boxes.labels.is_some() {
-        return 0;
-    }
     let characters = boxes.characters.iter();
     let places = characters.filter_map(|c| Some((c.label.name.parse().ok()?, c.label.page_box)));
     reading_turns(&places.collect::<Vec<_>>())
