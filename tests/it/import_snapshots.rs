@@ -200,3 +200,27 @@ fn workbooks_of_blocks_and_of_verdicts_are_read() {
         assert_eq!(line["verdict"], verdict, "{pair}");
     }
 }
+
+#[test]
+fn the_same_files_under_another_spelling_or_another_id_are_recognized() {
+    let dir = empty();
+    let root = dir.path();
+    for folder in ["lists/old", "a"] {
+        std::fs::create_dir_all(root.join(folder)).expect("folders");
+    }
+    for file in ["a/1.ply", "a/1.png", "a/2.ply", "a/2.png"] {
+        write(root, file, "x");
+    }
+    let old = "id,mesh,print\n1,../../a/1.ply,../../a/1.png\n2,../../a/2.ply,../../a/2.png\n";
+    write(root, "lists/old/pairs.csv", old);
+    write(root, "pairs.csv", &old.replace("../../", ""));
+    write(root, "more.csv", "id,mesh,print\nm,./a/1.ply,a/1.png\n");
+    let import = |list: &str| mocban(root, &["-C", "p", "import", list]).expect(0).err;
+    import("lists/old/pairs.csv");
+    let again = import("pairs.csv");
+    let unchanged = "0 pairs added, 0 changed, 2 unchanged";
+    assert!(again.contains(unchanged), "{again}");
+    let more = import("more.csv");
+    let known = "pairs with the same mesh and print as one of the project: 1, first m, as 1";
+    assert!(more.contains(known), "{more}");
+}

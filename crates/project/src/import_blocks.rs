@@ -14,7 +14,7 @@ use crate::manifest_file::{locate_file, refuse};
 use crate::missing_files::MissingFiles;
 use crate::new_project::import_with;
 use crate::repeated_files::RepeatedFiles;
-use mocban_catalog::{BlockAttributes, BlockImportSummary};
+use mocban_catalog::{BlockAttributes, BlockImportSummary, SameFiles};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
 use mocban_lists::manifest::{BlockRow, is_block_list, is_named_like_mesh, parse_blocks};
 use mocban_store::Project;
@@ -152,8 +152,15 @@ pub async fn import_blocks(
             .import_blocks(rows.clone(), allowed.files, now())
             .await?)
     });
+    let summary = summary.await?;
+    let same_files = summary.same_files.as_ref().map(
+        |SameFiles { id, known, count }| {
+            format!("blocks with the same scan and page as one of the project: {count}, first {id}, as {known}")
+        },
+    );
+    listing.warnings.extend(same_files);
     Ok(BlockImportOutcome {
-        summary: summary.await?,
+        summary,
         missing,
         warnings: listing.warnings,
     })

@@ -17,7 +17,7 @@ use crate::new_project::import_with;
 use crate::pair_choices::PairChoices;
 use crate::row_spool::RowSpool;
 use crate::truth_file::{self, TruthRow};
-use mocban_catalog::{Catalog, ImportRow, ImportSummary, ImportTerms};
+use mocban_catalog::{Catalog, ImportRow, ImportSummary, ImportTerms, SameFiles};
 use mocban_core::domain::cancel::{ThreadToken, poll};
 use mocban_core::domain::{LengthUnit, PairName};
 use mocban_lists::manifest::{ManifestRow, RowIds};
@@ -138,6 +138,12 @@ pub async fn import_pairs(
     );
     let store = async |catalog: &Catalog| store_in(catalog, &rows, terms.clone()).await;
     let (summary, truths) = import_with(&project, url.as_deref(), store).await?;
+    let same_files = summary.same_files.as_ref().map(
+        |SameFiles { id, known, count }| {
+            format!("pairs with the same mesh and print as one of the project: {count}, first {id}, as {known}")
+        },
+    );
+    warnings.extend(same_files);
     Ok(ImportOutcome {
         summary,
         truths,

@@ -307,6 +307,7 @@ pub fn locate_file(
     let problem = match exists {
         Ok(true) if place_of(path, project).is_dir() => IS_FOLDER.to_owned(),
         Ok(true) => return None,
+        Ok(false) if path.is_symlink() => "is a link to a file that does not exist".to_owned(),
         Ok(false) if has_scheme(path, "file://") => {
             "does not exist; write its path without file://".to_owned()
         }
@@ -375,7 +376,8 @@ mod tests {
 
     #[test]
     fn the_same_files_under_two_ids_are_counted_with_the_first() {
-        let list = "id,mesh,print\na,a.stl,a.png\nb,./a.stl,a.png\nc,a.stl,c.png\nd,a.stl,a.png\n";
+        let list =
+            "id,mesh,print\na,a.stl,a.png\nb,./a.stl,a.png\nc,a.stl,c.png\nd,x/../a.stl,a.png\n";
         let read = |choices: &PairChoices| {
             let listing = Listing::from_bytes(Path::new("pairs.csv"), list.into(), choices);
             listing.expect("valid").warnings
@@ -427,5 +429,19 @@ mod tests {
         assert_eq!(odd.len(), 3, "{odd:?}");
         let refused = from_file(dir.path()).expect_err("a directory");
         assert!(refused.to_string().contains("--meshes"), "{refused}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_a_missing_file_is_named() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let file = dir.path().join("pairs.csv");
+        std::fs::write(&file, "id,mesh,print\na,a.stl,pairs.csv\n").expect("written");
+        std::os::unix::fs::symlink("gone.stl", dir.path().join("a.stl")).expect("a link");
+        let mut missing = Vec::new();
+        let listing = from_file(&file).expect("valid");
+        listing.rows(&Project::at(dir.path()), |_, lines| missing.extend(lines));
+        let end = "a.stl of a is a link to a file that does not exist";
+        assert!(missing[0].ends_with(end), "{missing:?}");
     }
 }

@@ -1,9 +1,9 @@
 //! Finds pairs or blocks of a list with the same files under several ids.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
-use mocban_core::domain::ContentHash;
+use mocban_core::domain::{ContentHash, plain_path};
 
 /// Counts the rows whose mesh and image an earlier row has, too.
 #[derive(Debug, Default)]
@@ -18,7 +18,7 @@ pub(crate) struct RepeatedFiles {
 impl RepeatedFiles {
     /// Adds a row.
     pub(crate) fn add(&mut self, line: usize, id: &str, mesh: &Path, image: &Path) {
-        let files = format!("{:?}", (plain(mesh), plain(image)));
+        let files = format!("{:?}", (plain_path(mesh), plain_path(image)));
         let hash = ContentHash::of(files.as_bytes());
         let key = hash.as_bytes().first_chunk().copied();
         let key = key.map_or(0, u64::from_le_bytes);
@@ -37,12 +37,4 @@ impl RepeatedFiles {
             format!("{what} as an earlier one: {count}, first {id}, as on line {line}")
         })
     }
-}
-
-/// Returns a path without `.` components.
-fn plain(path: &Path) -> PathBuf {
-    let components = path.components();
-    components
-        .filter(|part| *part != Component::CurDir)
-        .collect()
 }

@@ -187,8 +187,8 @@ impl Project {
 
     /// Returns the form in which a path is stored. A path below a named root is stored relative to the root, and so is
     /// a path that already has this form, such as `scans:1/mesh.obj`. A path below the project is stored relative to
-    /// the project, so that the project can be moved with its data. Any other path is stored as absolute. The file need
-    /// not exist.
+    /// the project, so that the project can be moved with its data. Any other path is stored as absolute. A file has the
+    /// same form however its folders are written, such as `lists/../scans/1.stl`. The file need not exist.
     ///
     /// # Errors
     /// Returns an error if the working directory is unknown, or the path is not UTF-8.
@@ -196,14 +196,14 @@ impl Project {
         if let Some(text) = path.to_str().filter(|text| self.is_below_root(text)) {
             return Ok(text.to_owned());
         }
-        let absolute = std::path::absolute(path).map_err(StoreError::io(path))?;
+        let absolute = plain_absolute(path).map_err(StoreError::io(path))?;
         if let Some(below) = self
             .storage()
             .and_then(|storage| storage.path_below_root(&absolute))
         {
             return Ok(with_slashes(below));
         }
-        let dir = std::path::absolute(&self.dir).map_err(StoreError::io(&self.dir))?;
+        let dir = plain_absolute(&self.dir).map_err(StoreError::io(&self.dir))?;
         let stored = match absolute.strip_prefix(&dir) {
             Ok(below) => below.to_owned(),
             Err(_) => below_resolved(&absolute, &dir).unwrap_or(absolute),
@@ -227,6 +227,19 @@ fn exists(path: &Path) -> std::io::Result<bool> {
     }
 }
 
+/// Returns an absolute path without `..` and the folder before it, unless this folder is a link, which may lead elsewhere.
+fn plain_absolute(path: &Path) -> std::io::Result<PathBuf> {
+    let mut plain = PathBuf::new();
+    for part in std::path::absolute(path)?.components() {
+        if part == Component::ParentDir && plain.file_name().is_some() && !plain.is_symlink() {
+            plain.pop();
+        } else {
+            plain.push(part);
+        }
+    }
+    Ok(plain)
+}
+
 /// Returns the path relative to `dir` after links are resolved, or `None` if it does not exist or is not below `dir`.
 fn below_resolved(path: &Path, dir: &Path) -> Option<PathBuf> {
     let path = path.canonicalize().ok()?;
@@ -239,6 +252,31 @@ mod tests {
     use std::path::Path;
 
     use super::{Project, StoreError};
+
+    #[test]
+    fn a_file_is_stored_under_one_path_however_its_folders_are_written() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(&dir.path().join("project")).expect("a project");
+        let stored = |path: &str| project.stored_path(&dir.path().join(path)).expect("a path");
+        assert_eq!(stored("lists/../scans/./1.stl"), stored("scans/1.stl"));
+        assert_eq!(stored("a/b/../../scans/1.stl"), stored("scans/1.stl"));
+        assert_eq!(stored("lists/../project/data/1.stl"), "data/1.stl");
+        let project = Project::at(&dir.path().join("lists/../project"));
+        let inside = project.stored_path(&dir.path().join("project/data/1.stl"));
+        assert_eq!(inside.expect("a path"), "data/1.stl");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_folder_above_a_link_is_that_of_its_target() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(&dir.path().join("project")).expect("a project");
+        std::fs::create_dir_all(dir.path().join("disk/lists")).expect("folders");
+        std::os::unix::fs::symlink("disk/lists", dir.path().join("lists")).expect("a link");
+        let path = dir.path().join("lists/../1.stl");
+        let stored = project.stored_path(&path).expect("a path");
+        assert_eq!(Path::new(&stored), path);
+    }
 
     #[test]
     fn a_file_below_the_project_is_stored_relative_to_it() {

@@ -9,7 +9,9 @@ use crate::db::row::FromRow as _;
 use crate::db::transaction::in_transaction;
 use crate::queue::requeue::{self, RetrySelection};
 use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::import::is_same_file;
 use crate::records::left_out::is_counted;
+use crate::records::same_files::{self, SameFiles};
 use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
@@ -25,7 +27,11 @@ pub struct BlockImportSummary {
     pub other_files: u64,
     /// Number of existing blocks with the same values.
     pub unchanged: u64,
+    /// New blocks with the scan and page of earlier ones.
+    pub same_files: Option<SameFiles>,
 }
+
+const LAST: &str = "SELECT coalesce(max(id), 0) FROM block";
 
 const SELECT: &str =
     "SELECT name, mesh_path, page_path, labels_path, unit, side FROM block WHERE name = ?1";
@@ -67,6 +73,7 @@ impl Catalog {
     ) -> Result<BlockImportSummary> {
         in_transaction!(self, |conn| {
             let mut summary = BlockImportSummary::default();
+            let last = query_scalar(LAST).fetch_one(&mut *conn).await?;
             for row in &rows {
                 import_block(conn, row, now, &mut summary).await?;
             }
@@ -80,6 +87,7 @@ impl Catalog {
             requeue::retry(conn, &moved, &mut uncounted()).await?;
             if summary.added > 0 {
                 similar_names::refuse_blocks(conn).await?;
+                summary.same_files = same_files::blocks(conn, last).await?;
             }
             if !changed_files {
                 refuse_changed_files(&summary)?;
@@ -147,10 +155,13 @@ async fn import_block(
     let stored = stored.map(|row| BlockAttributes::from_row(&row).ok());
     match stored {
         None => summary.added += 1,
-        Some(Some(old)) if old == *row => summary.unchanged += 1,
         Some(old) => {
             let changed = old.map_or_else(|| vec!["a damaged value"], |old| differing(&old, row));
-            summary.changed.push((row.name.clone(), changed));
+            if changed.is_empty() {
+                summary.unchanged += 1;
+            } else {
+                summary.changed.push((row.name.clone(), changed));
+            }
         }
     }
     let id: i64 = query_scalar(UPSERT)
@@ -169,10 +180,14 @@ async fn import_block(
 }
 
 fn differing(old: &BlockAttributes, new: &BlockAttributes) -> Vec<&'static str> {
+    let are_same_labels = match (&old.labels_path, &new.labels_path) {
+        (Some(old), Some(new)) => is_same_file(old, new),
+        (old, new) => old == new,
+    };
     [
-        ("mesh", old.mesh_path != new.mesh_path),
-        ("page", old.page_path != new.page_path),
-        ("labels", old.labels_path != new.labels_path),
+        ("mesh", !is_same_file(&old.mesh_path, &new.mesh_path)),
+        ("page", !is_same_file(&old.page_path, &new.page_path)),
+        ("labels", !are_same_labels),
         ("unit", old.unit != new.unit),
         ("side", old.side != new.side),
     ]

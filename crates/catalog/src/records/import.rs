@@ -1,6 +1,7 @@
 //! Import of pairs: names, paths and attributes.
 
 use std::collections::{BTreeMap, HashSet};
+use std::path::Path;
 
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
@@ -19,9 +20,10 @@ use crate::queue::selection::{PairSelection, select, unknown_names};
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::ground_truth;
 use crate::records::model::PairAttributes;
+use crate::records::same_files::{self, SameFiles};
 use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};
-use mocban_core::domain::{PairName, UnixMillis};
+use mocban_core::domain::{PairName, UnixMillis, plain_path};
 
 /// A row to import.
 pub type ImportRow = PairAttributes;
@@ -66,6 +68,8 @@ pub struct ImportSummary {
     pub restored: u64,
     /// Number of listed pairs that a person has retired, so that they stay out of every count.
     pub still_retired: u64,
+    /// New pairs with the mesh and print of earlier ones, which are counted twice.
+    pub same_files: Option<SameFiles>,
 }
 
 /// A pair whose values an import changed.
@@ -189,6 +193,9 @@ impl Catalog {
                 let retired = retired::retire_unlisted(conn, &listed, now, &mut deltas);
                 summary.retired = retired.await?;
             }
+            if summary.added > 0 && last > 0 {
+                summary.same_files = same_files::pairs(conn, last).await?;
+            }
             deltas.apply(conn).await?;
             summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
             let stored = ground_truth::set(conn, &terms.truths).await?;
@@ -298,13 +305,13 @@ pub(crate) async fn import_chunk(
                 deltas.add(CounterKey::NEW, 1);
                 continue;
             }
-            Some(Some(old)) if old == *row => {
-                summary.unchanged += 1;
-                continue;
-            }
             Some(Some(old)) => differing(&old, row),
             Some(None) => vec!["a damaged value"],
         };
+        if fields.is_empty() {
+            summary.unchanged += 1;
+            continue;
+        }
         if fields
             .iter()
             .any(|field| matches!(*field, "mesh" | "print"))
@@ -364,8 +371,8 @@ fn result_attributes(row: &ImportRow) -> String {
 
 fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
     [
-        ("mesh", old.mesh_path != new.mesh_path),
-        ("print", old.print_path != new.print_path),
+        ("mesh", !is_same_file(&old.mesh_path, &new.mesh_path)),
+        ("print", !is_same_file(&old.print_path, &new.print_path)),
         ("character", old.character != new.character),
         ("block", old.block != new.block),
         ("unit", old.unit != new.unit),
@@ -379,4 +386,10 @@ fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
     .into_iter()
     .filter_map(|(name, differs)| differs.then_some(name))
     .collect()
+}
+
+/// Returns whether two stored paths are those of one file. If a folder before `..` is a link, they may not be; a run finds
+/// out, because it reads a file whose path is written differently.
+pub(crate) fn is_same_file(old: &str, new: &str) -> bool {
+    old == new || plain_path(Path::new(old)) == plain_path(Path::new(new))
 }

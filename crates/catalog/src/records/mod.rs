@@ -21,6 +21,7 @@ pub(crate) mod review_answers;
 pub(crate) mod review_context;
 pub(crate) mod review_rights;
 pub(crate) mod reviewer_names;
+pub(crate) mod same_files;
 pub(crate) mod set_apart;
 pub(crate) mod similar_names;
 pub(crate) mod stage_results;

@@ -2,7 +2,7 @@
 
 use super::blocks::{attributes, block, inputs, world};
 use super::{World, name, row};
-use crate::{CatalogError, ImportChunk, ImportRow, ImportTerms};
+use crate::{BlockAttributes, CatalogError, ImportChunk, ImportRow, ImportTerms, SameFiles};
 use mocban_core::domain::{PairId, Stage};
 
 #[tokio::test]
@@ -305,4 +305,70 @@ async fn a_block_with_another_scan_and_another_page_is_refused_unless_asked_for(
     );
     let changed = catalog.import_blocks(vec![other], true, 4).await;
     assert_eq!(changed.expect("asked for").changed.len(), 1);
+}
+
+#[tokio::test]
+async fn a_path_that_is_written_differently_is_the_same_file() {
+    let world = World::new(2).await;
+    let other = |id: &str| {
+        let mut other = row(id);
+        other.mesh_path = format!("lists/../{id}.stl");
+        other.print_path = format!("./{id}.png");
+        other
+    };
+    let rows = vec![other("p0"), other("p1")];
+    let summary = world.catalog.import(rows, 2).await.expect("imported");
+    assert_eq!((summary.unchanged, summary.other_files), (2, 0));
+    assert!(summary.changed.is_empty(), "{summary:?}");
+    world.assert_counters().await;
+    let blocks = super::blocks::world().await;
+    let mut other = attributes("b");
+    for path in [&mut other.mesh_path, &mut other.page_path] {
+        path.insert_str(0, "lists/../");
+    }
+    other.labels_path = Some("x/./../b.json".to_owned());
+    let summary = blocks.catalog.import_blocks(vec![other], false, 2).await;
+    let summary = summary.expect("imported");
+    assert_eq!((summary.unchanged, summary.other_files), (1, 0));
+}
+
+#[tokio::test]
+async fn new_pairs_and_blocks_with_the_files_of_earlier_ones_are_counted() {
+    let world = World::new(2).await;
+    let again = |id: &str, known: &str| ImportRow {
+        name: name(id),
+        ..row(known)
+    };
+    let import = async |rows: Vec<ImportRow>| {
+        let summary = world.catalog.import(rows, 2).await.expect("imported");
+        summary.same_files
+    };
+    assert_eq!(import(vec![row("p0"), row("q")]).await, None);
+    let same = |id: &str, known: &str, count: u64| {
+        Some(SameFiles {
+            id: id.to_owned(),
+            known: known.to_owned(),
+            count,
+        })
+    };
+    let rows = vec![again("a", "p1"), row("r"), again("b", "q")];
+    assert_eq!(import(rows).await, same("a", "p1", 2));
+    // What is in no count is not counted twice.
+    let retired = [name("p0")];
+    world
+        .catalog
+        .retire_pairs(&retired, 3)
+        .await
+        .expect("retired");
+    assert_eq!(import(vec![again("c", "p0")]).await, None);
+    let blocks = super::blocks::world().await;
+    let again = BlockAttributes {
+        name: block("c"),
+        ..attributes("b")
+    };
+    let summary = blocks
+        .catalog
+        .import_blocks(vec![attributes("b"), again], false, 2)
+        .await;
+    assert_eq!(summary.expect("imported").same_files, same("c", "b", 1));
 }

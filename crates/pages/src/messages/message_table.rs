@@ -41,6 +41,14 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "{0}: dòng {1}: bản in {2} của {3} là thư mục, không phải tệp",
     ),
     (
+        "{}: line {}: mesh {} of {} is a link to a file that does not exist",
+        "{0}: dòng {1}: bản quét {2} của {3} là liên kết đến một tệp không tồn tại",
+    ),
+    (
+        "{}: line {}: print {} of {} is a link to a file that does not exist",
+        "{0}: dòng {1}: bản in {2} của {3} là liên kết đến một tệp không tồn tại",
+    ),
+    (
         "it is a path of a Windows computer: write paths relative to the list",
         "đây là đường dẫn của máy Windows: hãy viết đường dẫn tính từ danh sách",
     ),
@@ -67,6 +75,10 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     (
         "blocks with the same scan and page as an earlier one: {}, first {}, as on line {}",
         "số ván có cùng bản quét và trang in với một ván trước: {0}, ván đầu tiên là {1}, giống dòng {2}",
+    ),
+    (
+        "pairs with the same mesh and print as one of the project: {}, first {}, as {}",
+        "số cặp có cùng bản quét và bản in với một cặp của dự án: {0}, cặp đầu tiên là {1}, giống {2}",
     ),
     // Formats that are not read.
     (
