@@ -182,7 +182,10 @@ fn the_newest_import_is_undone_and_done_again() {
     assert_eq!((&undone["retired"], &pairs()), (&json!(3), &json!(3)));
     at(&["show", PAIRS[0]]).expect(0);
     // A second call does not undo the import before.
-    let twice = at(&["retire", "--last-import", "--json"]).expect(0).json();
+    let twice = at(&["retire", "--last-import", "--json"]).expect(0);
+    let text = "the newest import that added pairs was on ";
+    assert!(twice.err.contains(text), "{}", twice.err);
+    let twice = twice.json();
     assert_eq!((&twice["unchanged"], &pairs()), (&json!(3), &json!(3)));
     at(&["retire", "--undo", "--last-import"]).expect(0);
     assert_eq!(pairs(), 6);

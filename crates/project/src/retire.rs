@@ -7,7 +7,8 @@ use crate::exit::Refusal;
 use crate::location::{Location, now};
 use crate::selection;
 use mocban_catalog::{Catalog, CatalogError};
-use mocban_core::domain::{PairName, RetireCause, UnixMillis};
+use mocban_core::domain::{BlockName, PairName, RetireCause, UnixMillis};
+use mocban_runner::NamedWork;
 
 /// What became of some pairs.
 #[derive(Debug)]
@@ -16,70 +17,110 @@ pub struct RetireOutcome {
     pub names: Vec<PairName>,
     /// How many of them changed.
     pub changed: u64,
+    /// Blocks without pairs that were removed.
+    pub removed_blocks: Vec<BlockName>,
+    /// When the pairs were imported, if those of the newest import were meant.
+    pub imported: Option<UnixMillis>,
     /// When they were retired. `None` if none changed, or if they were brought back.
     pub at: Option<UnixMillis>,
-    /// Why pairs did not come back, one line each.
+    /// Why pairs did not come back or blocks were not removed, one line each.
     pub warnings: Vec<String>,
 }
 
 /// Which pairs are retired or brought back.
 #[derive(Debug, Clone)]
 pub enum RetireChoice {
-    /// These ids; the id of a block stands for the pairs that it has now.
+    /// These ids; the id of a block stands for the pairs that it has now, or for the block itself if it has none.
     Ids(Vec<String>),
-    /// The pairs that the newest import of a list or of folders added. With a time, only if that import was then.
+    /// The pairs of the newest import of a list or of folders that added any. With a time, only if that import was then.
     LastImport(Option<UnixMillis>),
     /// The pairs that a person retired at this time, which are brought back.
     RetiredAt(UnixMillis),
 }
 
+/// The pairs and blocks of a choice.
+#[derive(Debug, Default)]
+struct ChosenPairs {
+    pairs: Vec<PairName>,
+    /// Blocks without pairs.
+    blocks: Vec<BlockName>,
+    /// When the pairs were imported, if those of the newest import are meant.
+    imported: Option<UnixMillis>,
+}
+
 impl RetireChoice {
-    async fn names(&self, catalog: &Catalog) -> ProjectResult<Vec<PairName>> {
+    async fn chosen(&self, catalog: &Catalog) -> ProjectResult<ChosenPairs> {
         let at = match self {
-            Self::Ids(typed) => return selection::known_pairs_of(catalog, typed).await,
-            Self::RetiredAt(at) => return retired_at(catalog, *at).await,
+            Self::Ids(typed) => {
+                let NamedWork { pairs, blocks } = selection::known_pairs_of(catalog, typed).await?;
+                return Ok(ChosenPairs {
+                    pairs,
+                    blocks,
+                    imported: None,
+                });
+            }
+            Self::RetiredAt(at) => {
+                return Ok(ChosenPairs {
+                    pairs: retired_at(catalog, *at).await?,
+                    ..ChosenPairs::default()
+                });
+            }
             Self::LastImport(at) => *at,
         };
         let added = catalog.last_import().await?;
-        let Some(first) = added.first() else {
+        let Some(imported) = added.first().map(|first| first.imported) else {
             let text = "no list or folder has added a pair yet";
             return Err(Refusal::NothingSelected(text.to_owned()).into());
         };
-        if at.is_some_and(|at| at != first.imported) {
+        if at.is_some_and(|at| at != imported) {
             let text = "another import has added pairs meanwhile; look at it before you undo it";
             return Err(Refusal::Usage(text.to_owned()).into());
         }
-        Ok(added.into_iter().map(|pair| pair.name).collect())
+        Ok(ChosenPairs {
+            pairs: added.into_iter().map(|pair| pair.name).collect(),
+            blocks: Vec::new(),
+            imported: Some(imported),
+        })
     }
 
-    /// Returns the pairs that come back. Of an import, only the pairs of the last command come back:
-    /// others were retired for their own reasons.
-    async fn names_to_restore(&self, catalog: &Catalog) -> ProjectResult<Vec<PairName>> {
-        let names = self.names(catalog).await?;
-        if !matches!(self, Self::LastImport(_)) {
-            return Ok(names);
+    /// Returns what comes back. Of an import, only the pairs of the last command come back: others were retired for their own
+    /// reasons.
+    async fn chosen_to_restore(&self, catalog: &Catalog) -> ProjectResult<ChosenPairs> {
+        let mut chosen = self.chosen(catalog).await?;
+        if let Some(block) = chosen.blocks.first() {
+            return Err(selection::no_pairs(block, false).into());
         }
-        let names: BTreeSet<PairName> = names.into_iter().collect();
+        if !matches!(self, Self::LastImport(_)) {
+            return Ok(chosen);
+        }
+        let names: BTreeSet<PairName> = chosen.pairs.into_iter().collect();
         let mut retired = catalog.retired_pairs().await?;
         retired.retain(|pair| names.contains(&pair.name));
         let last = retired.iter().map(|pair| pair.at).max();
         let retired = retired.into_iter().filter(|pair| Some(pair.at) == last);
-        Ok(retired.map(|pair| pair.name).collect())
+        chosen.pairs = retired.map(|pair| pair.name).collect();
+        Ok(chosen)
     }
 }
 
-/// Takes pairs out of every count. A process that works on one of them stores nothing more of it.
+/// Takes pairs out of every count. A process that works on one of them stores nothing more of it. Removes blocks without
+/// pairs, of which there is nothing to keep.
 pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
-    let names = choice.names(&catalog).await?;
+    let chosen = choice.chosen(&catalog).await?;
     let at = now();
-    let changed = catalog.retire_pairs(&names, at).await?;
+    let changed = catalog.retire_pairs(&chosen.pairs, at).await?;
+    let removed_blocks = catalog.remove_blocks(&chosen.blocks).await?;
     catalog.close().await;
+    let left = chosen.blocks.iter();
+    let left = left.filter(|block| !removed_blocks.contains(block));
     Ok(RetireOutcome {
-        names,
+        warnings: left.map(is_in_use).collect(),
+        names: chosen.pairs,
         changed,
+        removed_blocks,
+        imported: chosen.imported,
         at: (changed > 0).then_some(at),
-        warnings: Vec::new(),
     })
 }
 
@@ -90,9 +131,11 @@ pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult
 /// blocks.
 pub async fn undo(choice: &RetireChoice, location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
-    let names = choice.names_to_restore(&catalog).await?;
-    let changed = catalog.restore_pairs(&names).await?;
-    let still_retired = still_retired(&catalog, &names).await?;
+    let ChosenPairs {
+        pairs, imported, ..
+    } = choice.chosen_to_restore(&catalog).await?;
+    let changed = catalog.restore_pairs(&pairs).await?;
+    let still_retired = still_retired(&catalog, &pairs).await?;
     catalog.close().await;
     let warnings: Vec<String> = still_retired.iter().map(box_is_gone).collect();
     if changed == 0 {
@@ -101,8 +144,10 @@ pub async fn undo(choice: &RetireChoice, location: &Location) -> ProjectResult<R
         return Err(Refusal::NothingSelected(text).into());
     }
     Ok(RetireOutcome {
-        names,
+        names: pairs,
         changed,
+        removed_blocks: Vec::new(),
+        imported,
         at: None,
         warnings,
     })
@@ -131,5 +176,11 @@ async fn still_retired(
 fn box_is_gone(pair: &PairName) -> String {
     format!(
         "pair {pair} has no box any more in the labels of its block; it comes back with its box, when the block runs again"
+    )
+}
+
+fn is_in_use(block: &BlockName) -> String {
+    format!(
+        "block {block} stays, because a run works on it or has just cut its pairs; stop the run, and retire it again"
     )
 }

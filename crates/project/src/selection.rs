@@ -13,6 +13,8 @@ use mocban_system::time_text::local;
 
 /// Largest number of similar ids in a message.
 const MAX_SIMILAR: usize = 3;
+/// Largest number of blocks of lists that are compared with a mistyped id.
+const MAX_COMPARED_BLOCKS: usize = 1000;
 /// Fewest characters by which ids that contain a text are similar to it, such as `b1_c01-r01` to `c01-r01`.
 const MIN_PART_CHARS: usize = 3;
 
@@ -116,7 +118,7 @@ fn keep_each_once(pairs: &mut Vec<PairName>) {
 }
 
 /// Refuses a block without pairs.
-fn no_pairs(block: &BlockName, are_retired: bool) -> Refusal {
+pub(crate) fn no_pairs(block: &BlockName, are_retired: bool) -> Refusal {
     Refusal::NothingSelected(if are_retired {
         format!("all pairs of block {block} are retired; `status --retired` lists them")
     } else {
@@ -186,15 +188,18 @@ pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectRes
     Ok(found)
 }
 
-/// Looks up pairs by their ids or those of their blocks, also retired ones. Returns each pair once, sorted. An id of both is
-/// that of the pair.
+/// Looks up pairs by their ids or those of their blocks, also retired ones. Returns each pair once, sorted, and the blocks
+/// from which no pair was cut. An id of both is that of the pair.
 ///
 /// # Errors
-/// Returns an error if there is neither a pair nor a block with an id, or a block has no pairs.
-pub async fn known_pairs_of(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
+/// Returns an error if there is neither a pair nor a block with an id.
+pub(crate) async fn known_pairs_of(
+    catalog: &Catalog,
+    typed: &[String],
+) -> ProjectResult<NamedWork> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
-    let mut found = BTreeSet::new();
+    let (mut found, mut blocks) = (BTreeSet::new(), Vec::new());
     for text in typed {
         let pair = text.parse::<PairName>().ok();
         if let Some(pair) = pair.filter(|name| !unknown.contains(name)) {
@@ -206,15 +211,15 @@ pub async fn known_pairs_of(catalog: &Catalog, typed: &[String]) -> ProjectResul
         let of_block = catalog.pairs_of_block_with_retired(id).await?;
         if of_block.is_empty() {
             let all = catalog.block_names().await?;
-            let refusal = match block.filter(|name| all.contains(name)) {
-                Some(block) => no_pairs(&block, false),
-                None => no_such_pair_or_block(catalog, text, &all).await?,
-            };
-            return Err(refusal.into());
+            match block.filter(|name| all.contains(name)) {
+                Some(block) => blocks.push(block),
+                None => return Err(no_such_pair_or_block(catalog, text, &all).await?.into()),
+            }
         }
         found.extend(of_block);
     }
-    Ok(found.into_iter().collect())
+    let pairs = found.into_iter().collect();
+    Ok(NamedWork { pairs, blocks })
 }
 
 async fn no_such_pair_or_block(
@@ -223,8 +228,11 @@ async fn no_such_pair_or_block(
     blocks: &[BlockName],
 ) -> ProjectResult<Refusal> {
     let pairs = catalog.pair_names().await?;
+    let listed = catalog.first_listed_blocks(MAX_COMPARED_BLOCKS).await?;
     let blocks = blocks.iter().map(BlockName::as_str);
-    let all = pairs.iter().map(PairName::as_str).chain(blocks);
+    let blocks: BTreeSet<&str> = blocks.chain(listed.iter().map(String::as_str)).collect();
+    let all = pairs.iter().map(PairName::as_str);
+    let all = all.chain(blocks.iter().copied());
     Ok(no_such("pair or block", typed, all))
 }
 
@@ -298,11 +306,9 @@ mod tests {
             found.pairs.iter().map(PairName::as_str).collect::<Vec<_>>(),
             ["a", "c"]
         );
-        assert!(
-            pairs_and_blocks(&catalog, &["Ván 03".to_owned()])
-                .await
-                .is_err()
-        );
+        let refused = pairs_and_blocks(&catalog, &["ván 1".to_owned()]).await;
+        let text = refused.expect_err("another case").to_string();
+        assert!(text.contains("; similar ids: Ván 01"), "{text}");
         // Pairs that are named beside their block.
         let typed = ["c", "Ván 01", "c"].map(str::to_owned);
         let chosen = some_or_all(&catalog, &typed).await.expect("pairs");

@@ -8,14 +8,15 @@ use crate::cli::output::table::count;
 use mocban_project::retire::{self, RetireChoice, RetireOutcome};
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult};
+use mocban_system::time_text::local;
 
 /// Arguments of `retire`.
 #[derive(Debug, Args)]
 pub(crate) struct RetireArgs {
-    /// The pairs, or the blocks of which all pairs are meant
+    /// Pairs, or blocks for all their pairs; a block without pairs is removed
     #[arg(value_name = "PAIR|BLOCK", required_unless_present = "last_import")]
     pub(crate) pairs: Vec<String>,
-    /// The pairs that the newest import of a list or of folders added
+    /// The pairs of the newest import of a list or of folders that added any
     #[arg(long, conflicts_with = "pairs")]
     pub(crate) last_import: bool,
     /// Bring the pairs back, with their results and verdicts
@@ -32,6 +33,8 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
     let RetireOutcome {
         names,
         changed,
+        removed_blocks,
+        imported,
         warnings,
         at: _,
     } = if args.undo {
@@ -46,7 +49,20 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
         let text = "out of every count; results and verdicts are kept";
         ("retired", text)
     };
-    context.print_json(&json!({"schema": 1, key: changed, "unchanged": others}))?;
+    let mut printed = json!({"schema": 1, key: changed, "unchanged": others});
+    if !removed_blocks.is_empty() {
+        printed["removed_blocks"] = json!(removed_blocks);
+    }
+    context.print_json(&printed)?;
+    if let Some(imported) = imported {
+        let date = local(imported);
+        context.info(&format!("the newest import that added pairs was on {date}"));
+    }
+    for block in &removed_blocks {
+        context.info(&format!(
+            "block {block} is removed, because it has no pairs; an import brings it back"
+        ));
+    }
     if changed > 0 {
         context.info(&format!("{} {text}", count(changed, "pair")));
     }
@@ -60,7 +76,7 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
         context.next("run");
     } else if args.last_import && others == 0 {
         context.next("retire --undo --last-import");
-    } else if let ([typed], 0) = (args.pairs.as_slice(), others) {
+    } else if let ([typed], 0, true) = (args.pairs.as_slice(), others, changed > 0) {
         context.next(&format!("retire --undo {}", shell_quoted(typed)));
     }
     Ok(ExitCode::Done)

@@ -13,6 +13,7 @@ pub(crate) mod import;
 pub(crate) mod model;
 pub(crate) mod queue;
 pub(crate) mod records;
+pub(crate) mod removal;
 pub(crate) mod selection;
 pub(crate) mod staleness;
 pub(crate) mod true_boxes;

@@ -166,6 +166,14 @@ INSERT INTO checksum (record, row, value, previous)
 SELECT ?1, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint) FROM json_each(?2)",
 );
 
+const REMOVE: &str = "DELETE FROM checksum WHERE record = ?1 AND row = ?2";
+
+/// Removes the checksum of a row, which the caller removes in the same transaction.
+pub(crate) async fn remove(conn: &mut Conn, table: ChecksummedTable, row: i64) -> Result<()> {
+    let remove = query(REMOVE).bind(table.code()).bind(row);
+    remove.execute(conn).await
+}
+
 /// Stores the checksums of new or changed rows. The caller writes the rows earlier in the same transaction.
 pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]) -> Result<()> {
     let Some(first) = rows.iter().min() else {

@@ -1,7 +1,7 @@
 //! Pairs that a person or a shorter list takes out of every count, and that come back.
 
 use super::block_pairs::{judge, names_of, status_of};
-use super::blocks::{block, character, world};
+use super::blocks::{attributes, block, character, world};
 use super::{World, fingerprints, name, row};
 use crate::{
     CatalogError, CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, ListedRetiredPair,
@@ -263,4 +263,29 @@ async fn retired_pairs_are_listed_in_pages_and_found_by_name() {
             None
         );
     }
+}
+
+#[tokio::test]
+async fn a_block_without_pairs_is_removed_and_one_with_pairs_or_a_lease_is_not() {
+    let world = world().await;
+    world
+        .finish_block(vec![character("r01", "first content")])
+        .await;
+    world.import_block(attributes("c")).await;
+    let names = ["b", "c", "d"].map(block);
+    let catalog = &world.catalog;
+    let (lease, _) = world.leased_block().await;
+    let removed = catalog.remove_blocks(&names).await.expect("asked");
+    assert!(removed.is_empty(), "{removed:?}");
+    assert!(catalog.release_block(lease).await.expect("released"));
+    let removed = catalog.remove_blocks(&names).await.expect("removed");
+    assert_eq!(removed, [block("c")]);
+    let left = catalog.block_names().await.expect("a read");
+    assert_eq!(left, [block("b")]);
+    let faulty = catalog.faulty_rows().await.expect("a read");
+    assert!(faulty.is_empty(), "{faulty:?}");
+    // It comes back as a new one.
+    world.import_block(attributes("c")).await;
+    let states = catalog.block_states().await.expect("a read");
+    assert_eq!(states[1].status, JobStatus::Ready);
 }
