@@ -151,6 +151,19 @@ fn a_refused_block_is_named_by_run_status_show_and_retry() {
     project(dir.path(), &["retry", "b2"]).expect(4);
     let run = project(dir.path(), &["run", "--json"]).expect(3).json();
     assert_eq!(run["blocks"]["failed"], 1);
+    // There is nothing to keep of a block without pairs.
+    let retired = project(dir.path(), &["retire", "b1"]).expect(0);
+    assert!(
+        retired.err.contains("block b1 is removed"),
+        "{}",
+        retired.err
+    );
+    assert_eq!(retired.next(), [""; 0]);
+    project(dir.path(), &["run"]).expect(0);
+    project(dir.path(), &["check"]).expect(0);
+    project(dir.path(), &["show", "b1"]).expect(4);
+    let again = project(dir.path(), &["import", "blocks.csv", "--json"]).expect(0);
+    assert_eq!(again.json()["blocks"]["added"], 1);
 }
 
 #[test]
@@ -170,6 +183,11 @@ fn a_block_whose_missing_file_is_back_runs_again() {
     };
     assert_eq!([failed_now(), failed_now()], [Some(1), Some(0)]);
     assert!(error().contains("is not there"), "{}", error());
+    fs::create_dir(&mesh).expect("a folder in place of the file");
+    project(dir.path(), &["retry", "b1"]).expect(0);
+    assert_eq!([failed_now(), failed_now()], [Some(1), Some(0)]);
+    assert!(error().contains("is a directory"), "{}", error());
+    fs::remove_dir(&mesh).expect("removed");
     fs::rename(&away, &mesh).expect("moved back");
     assert_eq!(failed_now(), Some(1));
     assert!(!error().contains("is not there"), "{}", error());

@@ -8,7 +8,7 @@ use super::input_reads::{ReadItem, ReadLimits, read_each};
 use super::retry::retried;
 use mocban_catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
 use mocban_core::domain::PairId;
-use mocban_store::{Input, InputError, Project, hash_input, stat_input};
+use mocban_store::{Input, Project, hash_input, stat_input};
 
 /// Pairs compared in one page.
 const PAGE: usize = 1_000;
@@ -162,7 +162,7 @@ fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Opti
     match stat_input(&input) {
         Ok(stat) if stat == known.stat => None,
         Ok(_) => current(&input),
-        Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion::gone()),
+        Err(error) if error.is_correctable() && known.stat.is_empty() => Some(InputVersion::gone()),
         Err(_) => None,
     }
 }

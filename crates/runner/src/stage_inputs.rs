@@ -187,9 +187,9 @@ impl StageInputs {
     }
 }
 
-/// Stores with the failure that a file is missing, so that a later run takes the pair up when it is there.
+/// Stores with the failure that there is no file to read, so that a later run takes the pair up when it is there.
 fn unopened(error: InputError, version: &mut Option<InputVersion>) -> PairStageError {
-    if let InputError::NotThere(_) = error {
+    if error.is_correctable() {
         *version = Some(InputVersion::gone());
     }
     unreadable(error)

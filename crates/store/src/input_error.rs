@@ -98,6 +98,14 @@ impl InputError {
         }
     }
 
+    /// Returns whether the user can correct the file at its place: it is missing, is a folder, or may not be read.
+    pub const fn is_correctable(&self) -> bool {
+        matches!(
+            self,
+            Self::NotThere(_) | Self::NotAFile { .. } | Self::Denied(_)
+        )
+    }
+
     /// Returns whether a retry may succeed without a change by the user.
     pub fn is_transient(&self) -> bool {
         match self {

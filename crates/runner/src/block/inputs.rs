@@ -77,7 +77,7 @@ fn change(input: &Input, known: &InputVersion) -> Option<InputVersion> {
     match stat_input(input) {
         Ok(stat) if stat == known.stat => None,
         Ok(_) => hash_input(input).ok(),
-        Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion::gone()),
+        Err(error) if error.is_correctable() && known.stat.is_empty() => Some(InputVersion::gone()),
         Err(_) => None,
     }
 }
@@ -134,8 +134,8 @@ impl BlockSources {
     /// Returns the versions of the files that are missing. May block.
     pub(crate) fn missing(&self) -> BlockInputVersions {
         let gone = |input: &Input| {
-            let is_gone = matches!(stat_input(input), Err(InputError::NotThere(_)));
-            is_gone.then(InputVersion::gone)
+            let error = stat_input(input).err()?;
+            error.is_correctable().then(InputVersion::gone)
         };
         BlockInputVersions {
             mesh: gone(&self.mesh),
