@@ -67,9 +67,20 @@ fn only_affected_stages_run_again() {
     assert_eq!(finished(&project), [[1; 4]; 2]);
 
     // New content affects that pair only.
+    let name = pairs(&project)[0].results.attributes.name.clone();
+    let show = |args: &[&str]| {
+        let args = [&["show", name.as_str()][..], args].concat();
+        mocban(project.dir(), &args).expect(0)
+    };
+    let changed = || show(&["--json"]).json()["changed_inputs"].clone();
+    assert_eq!(changed(), serde_json::json!([]));
     append_byte(&print(&project, 0));
+    assert_eq!(changed(), serde_json::json!(["print"]));
+    let text = "print changed since the last run; `run` computes the pair again";
+    assert!(show(&[]).out.contains(text), "{}", show(&[]).out);
     call(&mut run(&project, &[])).expect(0);
     assert_eq!(finished(&project), [[2; 4], [1; 4]]);
+    assert_eq!(changed(), serde_json::json!([]));
 
     // A setting of the last stage affects no other stage.
     let mut changed = run(&project, &[]);
@@ -92,6 +103,7 @@ fn a_pair_whose_missing_file_is_back_runs_again() {
     for file in &files {
         std::fs::rename(file, file.with_extension("away")).expect("moved");
     }
+    std::fs::create_dir(&files[1]).expect("a folder in place of a file");
     for _ in 0..2 {
         call(&mut run(&project, &[])).expect(3);
     }
@@ -104,6 +116,7 @@ fn a_pair_whose_missing_file_is_back_runs_again() {
         .expect(0)
         .json();
     assert_eq!(status["missing_inputs"], serde_json::Value::Null);
+    std::fs::remove_dir(&files[1]).expect("removed");
     for file in &files {
         std::fs::rename(file.with_extension("away"), file).expect("moved back");
     }

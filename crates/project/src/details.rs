@@ -1,6 +1,7 @@
 //! Everything about one pair or block, and the ids of all.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use serde::Serialize;
 
@@ -13,10 +14,14 @@ use mocban_catalog::{
     StoredCharacter,
 };
 use mocban_core::domain::{
-    BlockName, DepthOutcome, MetricOutcome, PairName, Stage, ThresholdMetric,
+    BlockName, DepthOutcome, InputVersion, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
 use mocban_results::ManualCorrection;
 use mocban_runner::{NamedWork, fingerprints};
+use mocban_store::{Project, hash_input, stat_input};
+
+/// Longest time for looking at the files of a pair. A disk may hang.
+const MAX_LOOK: Duration = Duration::from_secs(10);
 
 /// A pair or a block.
 #[derive(Debug)]
@@ -36,8 +41,10 @@ pub struct PairOverview {
     pub detail: PairDetail,
     /// Its manual alignments, oldest first, without the undone ones.
     pub manual: Vec<ManualResult>,
-    /// What the next run would do.
+    /// What the next run would do, as far as the catalog knows.
     pub next_run: Option<PlanEntry>,
+    /// Which files were replaced since they were read: `mesh`, `print`. The next run finds out, and computes the pair again.
+    pub changed_inputs: Vec<&'static str>,
 }
 
 /// A manual alignment beside the automatic result.
@@ -95,7 +102,39 @@ pub async fn read(id: &str, catalog: &Catalog, location: &Location) -> ProjectRe
         detail,
         manual,
         next_run,
+        changed_inputs: changed_inputs(name, catalog, location).await?,
     })))
+}
+
+/// Looks at the files of a pair, and reads those whose size, time or inode changed. Returns the changed ones; none if the
+/// disk does not answer in time.
+async fn changed_inputs(
+    name: &PairName,
+    catalog: &Catalog,
+    location: &Location,
+) -> ProjectResult<Vec<&'static str>> {
+    let (storage, _) = location.data_locations()?;
+    let project = Project::at(&location.dir).with_storage(storage);
+    let pair = catalog.select(std::slice::from_ref(name)).await?;
+    let known = catalog.known_inputs(None, 1, Some(&pair)).await?;
+    let look = tokio::task::spawn_blocking(move || {
+        let files = known.into_iter().flat_map(|known| {
+            [
+                ("mesh", known.mesh_path, known.mesh),
+                ("print", known.print_path, known.print),
+            ]
+        });
+        let is_changed = |path: &str, read: &InputVersion| {
+            let input = project.input(path);
+            stat_input(&input).is_ok_and(|stat| stat != read.stat)
+                && hash_input(&input).is_ok_and(|found| found.hash != read.hash)
+        };
+        let changed = files
+            .filter(|(_, path, read)| read.as_ref().is_some_and(|read| is_changed(path, read)));
+        changed.map(|(kind, ..)| kind).collect()
+    });
+    let looked = tokio::time::timeout(MAX_LOOK, look).await;
+    Ok(looked.ok().and_then(Result::ok).unwrap_or_default())
 }
 
 /// Returns the names of all blocks and of all pairs that are not retired.

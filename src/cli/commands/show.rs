@@ -10,7 +10,7 @@ use crate::cli::output::pair_table::pair_table as table_text;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::show_text::{PairPage, manual_text};
 use crate::cli::output::streams;
-use mocban_catalog::{Catalog, PairDetail, PlanEntry};
+use mocban_catalog::{Catalog, PairDetail};
 use mocban_core::domain::{JobStatus, MetricOutcome, PairName, ThresholdMetric};
 use mocban_project::details::{self, Details, PairOverview};
 use mocban_project::failures::may_succeed_unchanged;
@@ -54,17 +54,19 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<Exi
         }
     };
     let (detail, palette) = (&pair.detail, context.stdout);
-    let next_run = pair.next_run.as_ref();
     let page = PairPage {
         detail,
         project: &project,
         palette,
     };
     context.print(&as_json(&pair, &project)?, || {
-        let tail = tail(detail, next_run, palette);
+        let tail = tail(&pair, palette);
         [page.text(), manual_text(&pair.manual, palette), tail].concat()
     })?;
-    for command in next_steps(detail, next_run.is_some()) {
+    for command in next_steps(
+        detail,
+        pair.next_run.is_some() || !pair.changed_inputs.is_empty(),
+    ) {
         context.next(&command);
     }
     Ok(ExitCode::Done)
@@ -110,7 +112,13 @@ async fn show_low(catalog: &Catalog, context: &Context) -> ProjectResult<ExitCod
 }
 
 /// Formats the verdicts and what the next run would do.
-fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> String {
+fn tail(pair: &PairOverview, palette: Palette) -> String {
+    let PairOverview {
+        detail,
+        next_run,
+        changed_inputs,
+        ..
+    } = pair;
     let mut lines = Vec::new();
     if !detail.verdict_log.is_empty() {
         lines.push(palette.paint(Tone::Strong, "verdicts"));
@@ -118,8 +126,12 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
         lines.extend(log.lines().map(|line| format!("  {line}")));
     }
     lines.push(palette.paint(Tone::Strong, "next run"));
-    lines.push(match (why, detail.results.status) {
+    lines.push(match (next_run, detail.results.status) {
         (Some(entry), _) => format!("  from {}: {entry}", entry.from),
+        (None, JobStatus::Quarantined | JobStatus::Done) if !changed_inputs.is_empty() => {
+            let changed = changed_inputs.join(" and ");
+            format!("  {changed} changed since the last run; `run` computes the pair again")
+        }
         (None, JobStatus::Quarantined) if !may_retry(detail) => {
             "  nothing; correct the file, its row in the list or a setting, and `run` computes the pair again".to_owned()
         }
@@ -148,11 +160,11 @@ fn may_retry(detail: &PairDetail) -> bool {
 fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
     let name = shell_quoted(detail.results.attributes.name.as_str());
     match detail.results.status {
+        JobStatus::Quarantined | JobStatus::Done if has_work => vec![format!("run {name}")],
         JobStatus::Quarantined if !may_retry(detail) => Vec::new(),
         JobStatus::Quarantined => vec![format!("retry {name}")],
         JobStatus::Leased => vec!["status --watch".to_owned()],
         JobStatus::Ready | JobStatus::Backoff => vec![format!("run {name}")],
-        JobStatus::Done if has_work => vec![format!("run {name}")],
         JobStatus::Done => Vec::new(),
     }
 }
@@ -173,6 +185,7 @@ fn as_json(pair: &PairOverview, project: &Project) -> ProjectResult<Value> {
     value["files"] = paths.collect::<serde_json::Map<_, _>>().into();
     value["manual_alignments"] = serde_json::to_value(&pair.manual)?;
     value["next_run"] = serde_json::to_value(&pair.next_run)?;
+    value["changed_inputs"] = json!(pair.changed_inputs);
     value["schema"] = json!(1);
     Ok(value)
 }

@@ -139,7 +139,7 @@ fn state_line(visit: &Visit, overview: &PairOverview) -> Markup {
         p {
             span.state.(results.status.name()) { (visit.status(results.status)) }
             @if let Some(block) = &results.attributes.block { " · " (visit.t("block", "ván:")) " " (one_line(block)) }
-            @if results.status == JobStatus::Done && overview.next_run.is_some() {
+            @if results.status == JobStatus::Done && (overview.next_run.is_some() || !overview.changed_inputs.is_empty()) {
                 " · " span.warn { (visit.t("settings or files have changed; the next run computes it again", "thiết lập hoặc tệp đã đổi; lần chạy sau sẽ tính lại")) }
             }
         }
