@@ -114,6 +114,13 @@ fn restore_finds_inputs_in_another_directory() {
             "{text}"
         );
     }
+    let plan = at(&restored, &["run", "--dry-run"]).expect(0);
+    assert!(
+        plan.err
+            .contains("the depth maps and masks of the results are not here"),
+        "{}",
+        plan.err
+    );
     at(&restored, &["check", "--repair", "--accept-missing"]).expect(0);
     at(&restored, &["run"]).expect(0);
     let told = at(&restored, &["status"]).expect(0);

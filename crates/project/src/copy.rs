@@ -6,6 +6,7 @@ use crate::error::{ProjectError, ProjectResult};
 use crate::events::{Listener, LongWork, warn};
 use crate::exit::Refusal;
 use crate::location::{now, refuse_password, settings_of};
+use crate::missing_inputs;
 use crate::new_project::check_new_folder;
 use mocban_catalog::{Catalog, CatalogCopy, CatalogError};
 use mocban_core::domain::is_address;
@@ -32,7 +33,27 @@ pub async fn copy(from: &str, to: &str, listener: &dyn Listener) -> ProjectResul
     let copied = write(&source, from, to).await;
     drop(work);
     source.close().await;
+    if copied.is_ok() && !is_address(to) {
+        warn_about_inputs(to, listener).await;
+    }
     copied
+}
+
+/// Warns about input files that a copy in a project folder lacks, such as those below the folder of the original.
+async fn warn_about_inputs(dir: &str, listener: &dyn Listener) {
+    // The copy is there already, so what cannot be looked up is no error.
+    let find = async {
+        let project = Project::open(Path::new(dir))?;
+        let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
+        let pairs: u64 = catalog.counters().await?.values().sum();
+        let pairs = pairs + catalog.retired_count().await?;
+        let found = missing_inputs::find(&project, &catalog, pairs).await;
+        catalog.close().await;
+        found
+    };
+    if let Ok(Some(missing)) = find.await {
+        warn(listener, format!("{missing}; put them there as well"));
+    }
 }
 
 fn of_source(error: impl Into<ProjectError>, from: &str) -> ProjectError {

@@ -13,7 +13,7 @@ use crate::status::{all_retired, are_results_missing};
 use mocban_catalog::Catalog;
 use mocban_config::Config;
 use mocban_core::domain::ErrorCode;
-use mocban_runner::{self as runner, RunOptions, RunPlan, RunSummary, Stop};
+use mocban_runner::{self as runner, RunOptions, RunPlan, RunSummary, Stop, fingerprints};
 use mocban_store::{Project, ProjectStorage};
 
 /// What a run with another method than before would do to the results.
@@ -50,6 +50,19 @@ pub struct PreparedRun {
     catalog: Catalog,
     config: Box<Config>,
     options: RunOptions,
+}
+
+/// What a run would do.
+#[derive(Debug)]
+pub struct PlannedRun {
+    /// What would run and why.
+    pub plan: RunPlan,
+    /// Whether another process works on the project.
+    pub is_running: bool,
+    /// Whether there are results, but none of their files.
+    pub are_results_missing: bool,
+    /// Input files that are no longer at their places.
+    pub missing_inputs: Option<MissingInputs>,
 }
 
 /// How a run ended.
@@ -107,13 +120,21 @@ impl PreparedRun {
         all_retired(&self.catalog).await
     }
 
-    /// Returns what would run and why, and whether another process works on the project.
-    pub async fn plan(self) -> ProjectResult<(RunPlan, bool)> {
+    /// Returns what would run and why, and which files are missing: a missing file counts as unchanged.
+    pub async fn plan(self) -> ProjectResult<PlannedRun> {
         let (project, catalog) = (&self.project, &self.catalog);
         let plan = runner::plan(project, catalog, &self.config.stages, &self.options).await?;
         let is_running = runner::is_running(project, catalog, now()).await?;
+        let status = catalog.status(&fingerprints(&self.config.stages)).await?;
+        let pairs = status.pairs + status.retired;
+        let missing_inputs = missing_inputs::find(project, catalog, pairs).await?;
         self.catalog.close().await;
-        Ok((plan, is_running))
+        Ok(PlannedRun {
+            plan,
+            is_running,
+            are_results_missing: are_results_missing(project, &status.jobs),
+            missing_inputs,
+        })
     }
 
     /// Runs until nothing is left or `stop` is set. Before that, warns if the method differs from that of the results.

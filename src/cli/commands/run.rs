@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
+use crate::cli::input::any_case::any_case;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::missing_results;
@@ -15,10 +16,10 @@ use mocban_catalog::RerunPolicy;
 use mocban_config::Config;
 use mocban_core::domain::Stage;
 use mocban_project::files;
-use mocban_project::run::{self, PreparedRun, RunOutcome, TWO_METHODS};
+use mocban_project::run::{self, PlannedRun, PreparedRun, RunOutcome, TWO_METHODS};
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
-use mocban_runner::{RunOptions, RunPart, RunPlan, RunSummary, Stop};
+use mocban_runner::{RunOptions, RunPart, RunSummary, Stop};
 
 /// Arguments of `run`.
 #[derive(Debug, Default, Args)]
@@ -50,7 +51,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "WHICH", value_parser = rerun)]
     pub(crate) rerun: Option<RerunPolicy>,
     /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
-    #[arg(long, value_name = "STAGE")]
+    #[arg(long, value_name = "STAGE", value_parser = any_case::<Stage>)]
     pub(crate) stage: Option<Stage>,
     #[command(flatten)]
     pub(crate) metrics: MetricsArgs,
@@ -84,9 +85,9 @@ pub(crate) async fn execute(
     let prepared = PreparedRun::new(&names, options, args.dry_run, location, &terminal).await?;
     if args.dry_run {
         let retired = prepared.all_retired().await?;
-        let (plan, running) = prepared.plan().await?;
+        let planned = prepared.plan().await?;
         let command = command_without_dry_run(&args, &names);
-        return print_plan(&plan, running, (&command, retired), context);
+        return print_plan(&planned, (&command, retired), context);
     }
     let serving = server.map(|server| server.serve(metrics, context));
     let outcome = drive(prepared, context).await;
@@ -151,6 +152,11 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     };
     let (number, shift) = units.into_iter().find_map(split).unwrap_or((text, 0));
     let number: Option<u64> = number.parse().ok();
+    if let Some(bytes) = number.filter(|bytes| shift == 0 && (1..1 << 20).contains(bytes)) {
+        return Err(format!(
+            "{bytes} without K, M, G or T are {bytes} bytes; write a size such as {bytes}G"
+        ));
+    }
     number
         .and_then(|number| number.checked_mul(1 << shift))
         .filter(|bytes| *bytes > 0)
@@ -219,12 +225,15 @@ pub(crate) const fn code(summary: &RunSummary) -> ExitCode {
 
 /// Prints what `command` would run. `retired` says that all pairs are retired.
 fn print_plan(
-    plan: &RunPlan,
-    running: bool,
+    planned: &PlannedRun,
     (command, retired): (&str, Option<String>),
     context: &Context,
 ) -> ProjectResult<ExitCode> {
-    let (blocks, plan) = (&plan.blocks, &plan.pairs);
+    let (blocks, plan, running) = (
+        &planned.plan.blocks,
+        &planned.plan.pairs,
+        planned.is_running,
+    );
     let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan, "blocks": blocks});
     context.print(&json, || {
         plan_text(plan, running) + &block_plan_text(blocks)
@@ -234,6 +243,12 @@ fn print_plan(
     }
     if plan.changes_method() {
         context.info(TWO_METHODS);
+    }
+    if planned.are_results_missing {
+        context.warn(missing_results::TEXT);
+    }
+    if let Some(missing) = &planned.missing_inputs {
+        context.warn(&missing.to_string());
     }
     if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
         context.next(command);
@@ -324,7 +339,9 @@ mod tests {
     fn sizes_may_have_a_unit() {
         assert_eq!(bytes("4G"), Ok(4 << 30));
         assert_eq!(bytes("512m"), Ok(512 << 20));
-        assert_eq!(bytes("1000"), Ok(1000));
+        assert_eq!(bytes("4000000"), Ok(4_000_000));
+        let refused = bytes("8").expect_err("8 bytes");
+        assert!(refused.ends_with("such as 8G"), "{refused}");
         for wrong in ["", "G", "0", "-1G", "1.5G", "99999999999T", "4Gé"] {
             assert!(bytes(wrong).is_err(), "{wrong}");
         }

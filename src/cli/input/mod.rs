@@ -1,5 +1,6 @@
 //! What users name: flags, pairs, folders, signals.
 
+pub(crate) mod any_case;
 pub(crate) mod browser;
 pub(crate) mod examples;
 pub(crate) mod global;
