@@ -3,6 +3,7 @@
 use ::csv::{Terminator, WriterBuilder};
 use serde_json::{Map, Value};
 
+use super::csv_cell::{cell, list_cell, text_cell};
 use crate::export_folder::{FolderError, SharedFile};
 use crate::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
 use crate::pair_pictures::PictureError;
@@ -56,10 +57,20 @@ const LISTS: [(&str, &[usize]); 12] = [
     ("print_from_depth", &[3, 3]),
 ];
 
+/// Beginning of the pointers of the columns of the user's list.
+const META: &str = "/meta/";
+
 /// A column and where its value is in the JSON of a row.
 struct ResultColumn {
     name: String,
     pointer: String,
+}
+
+impl ResultColumn {
+    /// Returns whether this is a column of the user's list.
+    fn is_meta(&self) -> bool {
+        self.pointer.starts_with(META)
+    }
 }
 
 /// A table of an export.
@@ -91,11 +102,12 @@ impl CsvTable {
     /// Returns rows of the table from the fields of results.
     fn encode(&self, results: &[Value]) -> Vec<u8> {
         let cells = |result: &Value| {
-            let cell = |column: &ResultColumn| {
+            let cell_of = |column: &ResultColumn| {
                 let value = result.pointer(&column.pointer);
-                value.map_or_else(String::new, |value| cell(value, self.has_decimal_commas))
+                let encode = if column.is_meta() { list_cell } else { cell };
+                value.map_or_else(String::new, |value| encode(value, self.has_decimal_commas))
             };
-            self.columns.iter().map(cell).collect()
+            self.columns.iter().map(cell_of).collect()
         };
         rows(results.iter().map(cells), self.has_decimal_commas)
     }
@@ -235,7 +247,7 @@ fn columns(fields: &[&str], meta: &[String]) -> Vec<ResultColumn> {
         match *name {
             "meta" => columns.extend(meta.iter().map(|key| ResultColumn {
                 name: format!("meta_{key}"),
-                pointer: format!("/meta/{}", key.replace('~', "~0").replace('/', "~1")),
+                pointer: format!("{META}{}", key.replace('~', "~0").replace('/', "~1")),
             })),
             "height_from_mesh" => {
                 add_list(&mut columns, "curvature", "/height_from_mesh/curvature");
@@ -308,35 +320,6 @@ fn judgements(verdicts: &[ReviewerFields]) -> String {
     each.collect::<Vec<_>>().join("; ")
 }
 
-/// Returns a value as a cell: numbers with all digits, lists and objects as JSON.
-fn cell(value: &Value, has_decimal_commas: bool) -> String {
-    match value {
-        Value::Null => String::new(),
-        Value::String(text) => text_cell(text),
-        // Display of f64 has no exponent, unlike JSON.
-        Value::Number(number) if number.is_f64() => {
-            let text = number.as_f64().map(|number| number.to_string());
-            let text = text.unwrap_or_default();
-            if has_decimal_commas {
-                text.replace('.', ",")
-            } else {
-                text
-            }
-        }
-        other => other.to_string(),
-    }
-}
-
-/// First characters of a text that a spreadsheet may run as a formula, as OWASP lists them ("CSV Injection"), with their
-/// full-width forms.
-const FORMULA_STARTS: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
-
-/// Returns a text as a cell. A leading `'` keeps spreadsheets from running it as a formula.
-fn text_cell(text: &str) -> String {
-    let is_formula = text.starts_with(FORMULA_STARTS);
-    if is_formula { "'" } else { "" }.to_owned() + text
-}
-
 /// Returns rows as CSV (RFC 4180), with semicolons between the columns beside decimal commas.
 fn rows(rows: impl IntoIterator<Item = Vec<String>>, has_decimal_commas: bool) -> Vec<u8> {
     let mut writer = WriterBuilder::new()
@@ -355,11 +338,7 @@ fn rows(rows: impl IntoIterator<Item = Vec<String>>, has_decimal_commas: bool) -
 mod tests {
     use serde_json::json;
 
-    use super::{FIRST_FIELDS, all_fields, columns, matrix_fields, rows, table_fields};
-
-    fn cell(value: &serde_json::Value) -> String {
-        super::cell(value, false)
-    }
+    use super::{FIRST_FIELDS, all_fields, cell, columns, matrix_fields, rows, table_fields};
 
     fn names(fields: &[&str]) -> Vec<String> {
         let columns = columns(fields, &["tờ".to_owned()]);
@@ -418,23 +397,9 @@ mod tests {
     }
 
     #[test]
-    fn no_text_is_a_formula_and_numbers_stay_numbers() {
-        for text in [
-            "=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "＝1", "＋1", "－1", "＠1",
-        ] {
-            assert_eq!(cell(&json!(text)), format!("'{text}"));
-        }
-        for text in ["", "1-1", "a=1", "'=1", "天"] {
-            assert_eq!(cell(&json!(text)), text);
-        }
-        assert_eq!(cell(&json!(-1.5e-7)), "-0.00000015");
-        assert_eq!(cell(&json!(-3)), "-3");
-    }
-
-    #[test]
     fn decimal_commas_come_with_semicolons() {
         let values = [json!("a;b"), json!(-0.25), json!(3), json!("1.5")];
-        let row = values.iter().map(|value| super::cell(value, true));
+        let row = values.iter().map(|value| cell(value, true));
         let row = rows([row.collect()], true);
         assert_eq!(row, b"\"a;b\";-0,25;3;1.5\r\n");
     }

@@ -2,6 +2,7 @@
 
 mod annotations;
 mod csv;
+mod csv_cell;
 mod fiji;
 mod huggingface;
 mod jsonl;

@@ -151,7 +151,9 @@ fn columns_of(
         let similar = optional.find(|column| similar_column(&found, column));
         let hint = similar.map(|column| format!("; rename it to {column:?} if it is meant"));
         let (hint, known) = (hint.unwrap_or_default(), COLUMNS.names.join(", "));
-        let reason = format!("column {name:?} is unknown{hint}; a list of blocks has: {known}");
+        let reason = format!(
+            "column {name:?} is unknown{hint}; a list of blocks has: {known}; remove other columns, which are kept only of pairs"
+        );
         problems.add(at_line(line, &reason));
     }
     problems.check(false)?;
@@ -289,7 +291,7 @@ mod tests {
             ),
             (
                 "block,mesh,page,color\nb,m,p,l\n",
-                "column \"color\" is unknown; a list of blocks has",
+                "; remove other columns, which are kept only of pairs",
             ),
             ("block,mesh,page\nb,m\n", "line 2: the row has 2 cells"),
             ("block,mesh,page\nb,,p\n", "line 2: mesh is empty"),

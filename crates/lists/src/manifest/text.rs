@@ -200,7 +200,8 @@ fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, N
 /// Returns the first line that is not blank.
 fn header(bytes: &[u8]) -> &[u8] {
     let start = bytes.trim_ascii_start();
-    start.split(|byte| *byte == b'\n').next().unwrap_or(start)
+    let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
+    start.split(is_end).next().unwrap_or(start)
 }
 
 /// Returns the column separator: the most frequent of tab, semicolon and comma in the first line that is not blank.
@@ -241,8 +242,15 @@ impl<B: AsRef<[u8]>> LineCounter<B> {
             .iter()
             .take_while(|byte| matches!(**byte, b'\r' | b'\n'))
             .count();
-        let passed = &bytes[self.at..from + blank];
-        self.line += passed.split(|byte| *byte == b'\n').count() - 1;
+        let at = self.at;
+        let passed = &bytes[at..from + blank];
+        // Old programs for the Macintosh end lines with a carriage return alone.
+        let is_end = |(k, byte): &(usize, &u8)| match **byte {
+            b'\n' => true,
+            b'\r' => bytes.get(at + k + 1) != Some(&b'\n'),
+            _ => false,
+        };
+        self.line += passed.iter().enumerate().filter(is_end).count();
         self.at = from + blank;
         self.line
     }
@@ -250,7 +258,7 @@ impl<B: AsRef<[u8]>> LineCounter<B> {
 
 #[cfg(test)]
 mod tests {
-    use super::{CsvText, NotText, as_utf8, delimiter};
+    use super::{CsvText, LineCounter, NotText, as_utf8, delimiter};
 
     fn text(list: &str) -> (String, char) {
         let found = CsvText::new(list.as_bytes()).expect("text");
@@ -269,6 +277,19 @@ mod tests {
         assert_eq!(text("sep=,\r\n\na;b;c\n1;2,5;3\n").1, ';');
         assert_eq!(text("sep=|\na|b\n").1, '|');
         assert_eq!(text("sep,a\n").1, ',');
+    }
+
+    #[test]
+    fn lines_are_counted_with_any_line_end() {
+        for end in ["\n", "\r", "\r\n"] {
+            let list = ["a,b", "c,d", "", "e,f"].join(end);
+            let mut position = ::csv::Position::new();
+            position.set_byte(list.find("c,d").expect("a record") as u64);
+            let mut lines = LineCounter::new(list.as_bytes());
+            assert_eq!(lines.at(Some(&position)), 2, "{end:?}");
+            position.set_byte(list.find("e,f").expect("a record") as u64);
+            assert_eq!(lines.at(Some(&position)), 4, "{end:?}");
+        }
     }
 
     #[test]

@@ -8,6 +8,8 @@ pub(super) enum NumberFormat {
     Plain,
     /// With at least this many digits before the point, and after it, such as `0000` and `0.00`.
     Digits(usize, usize),
+    /// In percent with at least this many digits after the point, such as `0%`.
+    Percent(usize),
     /// As a power of ten, such as `1.00E+05`.
     Scientific,
     /// As a date, a time, or both.
@@ -24,6 +26,8 @@ impl NumberFormat {
     pub(super) fn built_in(id: u32) -> Self {
         match id {
             2 => Self::Digits(1, 2),
+            9 => Self::Percent(0),
+            10 => Self::Percent(2),
             11 | 48 => Self::Scientific,
             id if DATE_FORMATS.iter().any(|ids| ids.contains(&id)) => Self::Date,
             _ => Self::Plain,
@@ -32,14 +36,19 @@ impl NumberFormat {
 
     /// Returns the format that a code such as `0000` or `dd/mm/yyyy` describes.
     pub(super) fn of_code(code: &str) -> Self {
-        let (whole, decimals) = code.split_once('.').unwrap_or((code, ""));
+        let percent = code.strip_suffix('%').map(str::trim_end);
+        let shown = percent.unwrap_or(code);
+        let (whole, decimals) = shown.split_once('.').unwrap_or((shown, ""));
         let are_zeros = |digits: &str| digits.bytes().all(|byte| byte == b'0');
         if !whole.is_empty()
             && (2..=MAX_DIGITS).contains(&code.len())
             && are_zeros(whole)
             && are_zeros(decimals)
         {
-            return Self::Digits(whole.len(), decimals.len());
+            return match percent {
+                Some(_) => Self::Percent(decimals.len()),
+                None => Self::Digits(whole.len(), decimals.len()),
+            };
         }
         let (mut in_quotes, mut in_brackets, mut is_escaped) = (false, false, false);
         let is_of_date = |c: char| {
@@ -71,7 +80,7 @@ impl NumberFormat {
         match self {
             Self::Date => Some(("a date", "3-4")),
             Self::Scientific => Some(("a power of ten", "1E5")),
-            Self::Plain | Self::Digits(..) => None,
+            Self::Plain | Self::Digits(..) | Self::Percent(_) => None,
         }
     }
 
@@ -80,8 +89,12 @@ impl NumberFormat {
         let Ok(number) = written.trim().parse::<f64>() else {
             return written.to_owned();
         };
+        let number = as_shown(number);
         let is_whole = number.fract() == 0.0 && number.abs() < 1e15;
         match self {
+            Self::Percent(decimals) if number.abs() < 1e13 => {
+                padded(&as_shown(100.0 * number).to_string(), 1, decimals) + "%"
+            }
             Self::Date => date(number, is_1904).unwrap_or_else(|| number.to_string()),
             Self::Digits(whole, decimals) if (0.0..1e15).contains(&number) => {
                 padded(&number.to_string(), whole, decimals)
@@ -90,6 +103,14 @@ impl NumberFormat {
             _ => number.to_string(),
         }
     }
+}
+
+/// Rounds a fraction to the 15 digits that spreadsheet programs show: 0.1 + 0.2 is 0.3.
+fn as_shown(number: f64) -> f64 {
+    if number.fract() == 0.0 {
+        return number;
+    }
+    format!("{number:.14e}").parse().unwrap_or(number)
 }
 
 /// Adds zeros to a number, and takes no digit away.
@@ -187,7 +208,7 @@ mod tests {
 
     #[test]
     fn numbers_and_dates_become_text() {
-        use NumberFormat::{Date, Digits, Plain};
+        use NumberFormat::{Date, Digits, Percent, Plain};
         for (format, number, expected) in [
             (Plain, "117", "117"),
             (Plain, "0.1", "0.1"),
@@ -196,6 +217,10 @@ mod tests {
             (Plain, "-2.5", "-2.5"),
             (Plain, "x", "x"),
             (Plain, "1.1000000000000001", "1.1"),
+            (Plain, "0.30000000000000004", "0.3"),
+            (Percent(0), "0.25", "25%"),
+            (Percent(2), "0.07", "7.00%"),
+            (Percent(0), "-0.125", "-12.5%"),
             (Digits(4, 0), "117", "0117"),
             (Digits(2, 0), "1234", "1234"),
             (Digits(4, 0), "1.5", "0001.5"),
