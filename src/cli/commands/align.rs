@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
 use crate::cli::output::digits::{LENGTH_DIGITS, length, significant};
 use crate::cli::output::table::columns;
@@ -23,7 +24,7 @@ pub(crate) struct AlignArgs {
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Unit of the mesh: mm, cm, m or in [default: unknown]
-    #[arg(long)]
+    #[arg(long, value_parser = any_case::<LengthUnit>)]
     pub(crate) unit: Option<LengthUnit>,
     /// Whether the carved face points towards -z of the mesh [default: found out]
     #[arg(long, value_name = "BOOL")]

@@ -109,10 +109,11 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
     lines.extend(repairs(summary, args.repair));
     lines.extend(set_apart(summary));
     lines.extend(notes(&summary.inputs_missing, "missing"));
-    lines.extend(notes(
-        &summary.inputs_changed,
-        "changed since they were read",
-    ));
+    let changed = match summary.inputs_changed.count {
+        1 => "changed since it was read",
+        _ => "changed since they were read",
+    };
+    lines.extend(notes(&summary.inputs_changed, changed));
     lines.extend(notes(&summary.inputs_unreadable, "unreadable"));
     lines.extend(unreferenced(summary.unreferenced.as_ref(), args));
     lines.retain(|line| !line.is_empty());

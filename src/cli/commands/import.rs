@@ -7,6 +7,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::import_blocks::{self, BlockArgs};
+use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use crate::cli::output::terminal::Terminal;
@@ -44,7 +45,7 @@ pub(crate) struct ImportArgs {
     #[command(flatten)]
     pub(crate) block: BlockArgs,
     /// Unit of the meshes in --meshes or of --block: mm, cm, m or in
-    #[arg(long, conflicts_with = "file")]
+    #[arg(long, conflicts_with = "file", value_parser = any_case::<LengthUnit>)]
     pub(crate) unit: Option<LengthUnit>,
     /// True alignments, one JSON object per line; the report then gives the errors against them
     #[arg(long, value_name = "FILE")]

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
+use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use mocban_core::domain::{BlockSide, LengthUnit};
@@ -29,7 +30,7 @@ pub(crate) struct BlockArgs {
     pub(crate) labels: Option<PathBuf>,
     /// The side of --block that the page shows: front (towards the positive direction of the nearest axis of the mesh)
     /// or back [default: found by `run`]
-    #[arg(long, requires = "block")]
+    #[arg(long, requires = "block", value_parser = any_case::<BlockSide>)]
     pub(crate) side: Option<BlockSide>,
     /// Id of --block [default: the file name of the mesh without extension]
     #[arg(long, requires = "block")]

@@ -6,6 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::compare::side_by_side;
+use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
 use crate::cli::output::terminal::Terminal;
@@ -26,7 +27,7 @@ pub(crate) struct ReportArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// Confidence intervals of Acc: wilson, or exact (Clopper-Pearson)
-    #[arg(long, value_name = "METHOD", default_value = "wilson")]
+    #[arg(long, value_name = "METHOD", default_value = "wilson", value_parser = any_case::<IntervalMethod>)]
     pub(crate) ci: IntervalMethod,
     /// Include computing times by stage and the time of the last result, as html always does; the output then differs
     /// from run to run
