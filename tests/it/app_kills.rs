@@ -87,7 +87,7 @@ const ACTIONS: [KilledAction; 8] = [
     KilledAction {
         action: "export",
         body: |_| json!({"purpose": "excel", "only": "all", "metric": ""}),
-        at: ["write", "p/exports/.excel.*"],
+        at: ["write", "p/exports/.excel.*/new/*"],
         state: |project| project.join("exports/excel").exists().into(),
         said: Some(EXPORT_KILLED),
     },

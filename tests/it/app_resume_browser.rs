@@ -29,7 +29,7 @@ const RECORD: &str = "(() => {
 
 /// Writes two small files and a large one.
 fn files(dir: &Path) -> [PathBuf; 3] {
-    [("1.stl", 10), ("1.png", 10), ("2.stl", 2_000_000)].map(|(name, bytes)| {
+    [("1.stl", 10), ("1.png", 10), ("2.stl", 20_000_000)].map(|(name, bytes)| {
         let file = dir.join(name);
         std::fs::write(&file, "x".repeat(bytes)).expect("written");
         file

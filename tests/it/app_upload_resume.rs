@@ -153,7 +153,8 @@ fn another_page_takes_over_an_upload_of_which_nothing_arrives() {
         end(&page, &first, "finish"),
         page.get(&format!("/uploads/{first}")),
     ] {
-        let why = refusal(&refused);
+        let why = text(&refused);
+        assert_eq!(refused.status, 422, "{why}");
         assert!(why.contains("another page has taken over"), "{why}");
     }
     // The first page is closed at last.

@@ -221,9 +221,10 @@ mod tests {
         let picture = view.overlay(&blank_print(), &depth(), &outcome, Some(&part));
         let shown = |x, y| picture.at(x, y);
         // The bar begins at column 8 above the line, and at column 17 below it.
-        assert_eq!([shown(8, 10), shown(17, 10)], [EDGE, [255; 3]]);
-        assert_eq!([shown(8, 20), shown(17, 20)], [[255; 3], DISPLACED_EDGE]);
-        assert_eq!([shown(2, 14), shown(2, 15)], [[255; 3], DISPLACED_EDGE]);
+        let blank = shown(28, 2);
+        assert_eq!([shown(8, 10), shown(17, 10)], [EDGE, blank]);
+        assert_eq!([shown(8, 20), shown(17, 20)], [blank, DISPLACED_EDGE]);
+        assert_eq!([shown(2, 14), shown(2, 15)], [blank, DISPLACED_EDGE]);
     }
 
     #[test]
