@@ -39,7 +39,7 @@ function nextSteps(summary) {
       return create("p", "", link);
     };
     const next = [page("report", translate("open_report"))];
-    // Settled disagreements are not judged by yet another person.
+    // Settled conflicts need no further reviewer.
     if (reviewOrder !== "adjudicate") next.push(page(`review?${choices()}`, translate("open_review")));
     return next;
   }

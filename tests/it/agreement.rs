@@ -117,7 +117,7 @@ fn settled_by_a_command(project: &Project, agreement: &Value) -> Value {
     let pair = conflicting.as_str().expect("an id");
     let args = ["verdict", "set", pair, "fail", "--adjudicate", "--reviewer"];
     let party = mocban(project.dir(), &[&args[..], &["lan"]].concat()).expect(4);
-    let why = format!("{pair}: no two others disagree on a result that lan has not judged");
+    let why = format!("{pair} has no open conflict that lan may settle");
     assert!(party.err.contains(&why), "{}", party.err);
     let settled = mocban(project.dir(), &[&args[..], &["chi"]].concat()).expect(0);
     assert!(

@@ -389,7 +389,10 @@ fn a_setting_is_saved_with_what_it_costs() {
     let grouped = text(&page.get("/p/p/settings?key=limits.image.max_pixels&value=20.000.000"));
     assert!(grouped.contains("<code>20000000</code>"), "{grouped}");
     let word = text(&page.get("/p/p/settings?key=run.workers&value=hai&language=vi"));
-    assert!(word.contains("cần số nguyên từ 0 trở lên"), "{word}");
+    assert!(
+        word.contains("không phải là số nguyên từ 0 trở lên"),
+        "{word}"
+    );
     assert!(!word.contains("--set"), "{word}");
     page.get("/?language=en");
     let body = json!({"key": "register.min_confidence", "value": "0.4"});

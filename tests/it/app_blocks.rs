@@ -85,7 +85,7 @@ fn a_refused_block_is_aligned_by_places_chosen_on_its_page() {
     assert_eq!(saved.json()["next"], Value::Null, "the page has a button");
     assert!(html(&session.page, BLOCK).contains("places were chosen by a person"));
     let run = html(&session.page, "/p/p/");
-    for part in ["Align 1 block<", "1 block has other chosen places"] {
+    for part in ["Align 1 block<", "1 block has other control points"] {
         assert!(run.contains(part), "{part}: {run}");
     }
     mocban(dir.path(), &["-C", "p", "run"]).expect(0);

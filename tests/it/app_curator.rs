@@ -58,7 +58,7 @@ fn one_of_two_who_disagree_hears_that_a_third_person_must_settle_it() {
     assert_eq!(own.status, 422);
     let said = text(&own);
     assert!(
-        said.contains("you are one of the two who disagree (results: 1)"),
+        said.contains("you have judged these results yourself (1)"),
         "{said}"
     );
     let other = text(&start("lan", "relief"));

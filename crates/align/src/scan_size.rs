@@ -96,8 +96,8 @@ pub fn short_face(longest_mm: f64, unit: LengthUnit) -> String {
     )
 }
 
-/// Returns a doubt about the unit of a block if its characters have a size that characters do not have. `side_mm` is the longer
-/// side of most of them.
+/// Returns a warning about the unit of a block whose characters are smaller than 2.5 mm or larger than 40 mm. `side_mm` is
+/// the median of their longer sides, mm.
 pub fn doubtful_characters(side_mm: f64, unit: LengthUnit) -> Option<String> {
     if side_mm.is_nan() || POSSIBLE_CHARACTER_MM.contains(&side_mm) {
         return None;

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::{ProjectError, ProjectResult};
 use crate::events::{Listener, LongWork, warn};
 use crate::exit::Refusal;
-use crate::location::{now, refuse_password, settings_of};
+use crate::location::{Location, now, refuse_password, settings_of};
 use crate::missing_inputs;
 use crate::new_project::check_new_folder;
 use mocban_catalog::{Catalog, CatalogCopy, CatalogError};
@@ -43,7 +43,8 @@ pub async fn copy(from: &str, to: &str, listener: &dyn Listener) -> ProjectResul
 async fn warn_about_inputs(dir: &str, listener: &dyn Listener) {
     // The copy is there already, so what cannot be looked up is no error.
     let find = async {
-        let project = Project::open(Path::new(dir))?;
+        let (storage, _) = Location::new(dir).data_locations()?;
+        let project = Project::open(Path::new(dir))?.with_storage(storage);
         let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
         let pairs: u64 = catalog.counters().await?.values().sum();
         let pairs = pairs + catalog.retired_count().await?;

@@ -109,8 +109,9 @@ pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult
     let (_project, catalog) = location.open().await?;
     let chosen = choice.chosen(&catalog).await?;
     let at = now();
-    let changed = catalog.retire_pairs(&chosen.pairs, at).await?;
+    // First, because a role may lack the right for it.
     let removed_blocks = catalog.remove_blocks(&chosen.blocks).await?;
+    let changed = catalog.retire_pairs(&chosen.pairs, at).await?;
     catalog.close().await;
     let left = chosen.blocks.iter();
     let left = left.filter(|block| !removed_blocks.contains(block));
@@ -181,6 +182,6 @@ fn box_is_gone(pair: &PairName) -> String {
 
 fn is_in_use(block: &BlockName) -> String {
     format!(
-        "block {block} stays, because a run works on it or has just cut its pairs; stop the run, and retire it again"
+        "block {block} stays: a run works on it or has just cut its pairs, or people chose points or gave boxes for it"
     )
 }

@@ -127,11 +127,13 @@ fn parsed(line: &[u8]) -> Result<(VerdictLine, GivenTime), String> {
 fn text_of(fields: &Map<String, Value>, field: &str) -> Result<Option<String>, String> {
     let text = match fields.get(field) {
         None | Some(Value::Null) => return Ok(None),
+        // Notes are stored as they were given.
+        Some(Value::String(text)) if field == "note" => text.clone(),
         Some(Value::String(text)) => text.trim().to_owned(),
         Some(Value::Number(number)) => number.to_string(),
         Some(other) => return Err(format!("{field} is {other}, not text")),
     };
-    Ok((!text.is_empty()).then_some(text))
+    Ok((!text.trim().is_empty()).then_some(text))
 }
 
 /// Returns the row of a parsed line, or `None` if the verdict was undone.

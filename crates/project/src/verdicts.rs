@@ -74,8 +74,8 @@ pub async fn record_on(
     Ok((verdict, recorded))
 }
 
-/// Records a verdict that settles a conflict: on those current results of a pair on which two reviewers disagree, as a review of
-/// conflicts does. Returns the verdict, and the metrics of these results.
+/// Records a verdict that settles a conflict: on those current results of a pair that are in an open conflict, as
+/// `review --adjudicate` does. Returns the verdict, and the metrics of these results.
 ///
 /// # Errors
 /// As for [`record`]; also if there is no such result, or the reviewer has judged it.
@@ -102,7 +102,7 @@ pub async fn settle(
     if open.is_empty() {
         let NewVerdict { pair, reviewer, .. } = &verdict;
         let text = format!(
-            "{pair}: no two others disagree on a result that {reviewer} has not judged; `agreement` names the pairs in conflict"
+            "{pair} has no open conflict that {reviewer} may settle, as a person without a verdict on it; `agreement` names the pairs"
         );
         return Err(Refusal::NothingSelected(text).into());
     }
@@ -365,7 +365,10 @@ pub async fn undo(
         match catalog.verdict_undo(reviewer, now()).await {
             Ok(earlier) => undone.extend(earlier),
             Err(CatalogError::NothingToUndo(_)) => break,
-            Err(error) => return Err(error.into()),
+            Err(error) => {
+                let before = format!("{} verdicts were undone before this", undone.len());
+                return Err(ProjectError::from(error).context(before));
+            }
         }
     }
     catalog.close().await;

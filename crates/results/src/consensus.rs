@@ -75,8 +75,8 @@ fn is_disputed(verdicts: &[&ReviewerVerdict]) -> bool {
     any(Verdict::Pass) && any(Verdict::Fail)
 }
 
-/// Returns whether a result is disputed and this reviewer may adjudicate it. The reviewer must not be a party to the
-/// dispute, and the dispute must not have been settled by another reviewer.
+/// Returns whether a result is in conflict and this reviewer may settle it: the reviewer is no party to the conflict, and no
+/// other reviewer has settled it.
 pub fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
     let (rulings, verdicts) = partition_verdicts(record);
     let is_party = verdicts.iter().any(|read| read.reviewer == reviewer);

@@ -49,7 +49,7 @@ pub fn parse_utc(text: &str) -> Option<i64> {
     time.map(Timestamp::as_millisecond).ok()
 }
 
-/// Parses a time that is written with the day first, as spreadsheets write it: `21/11/2026` or `21.11.2026 04:10:03`. `None`
+/// Parses a time with the day first, such as `21/11/2026` or `21.11.2026 04:10:03`. `None`
 /// for other forms. The time is in UTC.
 pub fn parse_day_first(text: &str) -> Option<i64> {
     let (date, time) = text.split_once(' ').unwrap_or((text, "00:00"));

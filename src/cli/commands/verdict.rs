@@ -162,8 +162,12 @@ fn settled_text((new, metrics): &(NewVerdict, Vec<ThresholdMetric>)) -> String {
     } = new;
     let metrics: Vec<&str> = metrics.iter().map(|metric| metric.name()).collect();
     let (metrics, reviewer) = (metrics.join(", "), shell_quoted(reviewer));
+    let what = match verdict {
+        Verdict::Unsure => "is recorded, and the conflict stays open",
+        Verdict::Pass | Verdict::Fail => "settles the conflict",
+    };
     format!(
-        "{pair}, {metrics}: {verdict} settles the conflict; `verdict undo --reviewer {reviewer}` takes it back"
+        "{pair}, {metrics}: {verdict} {what}; `verdict undo --reviewer {reviewer}` takes it back"
     )
 }
 

@@ -156,9 +156,15 @@ async fn import_block(
     match stored {
         None => summary.added += 1,
         Some(old) => {
-            let changed = old.map_or_else(|| vec!["a damaged value"], |old| differing(&old, row));
+            let changed = old
+                .as_ref()
+                .map_or_else(|| vec!["a damaged value"], |old| differing(old, row));
             if changed.is_empty() {
                 summary.unchanged += 1;
+                // Another spelling of the same paths would drop what is known of the files.
+                if old.is_some_and(|old| !has_same_paths(&old, row)) {
+                    return Ok(());
+                }
             } else {
                 summary.changed.push((row.name.clone(), changed));
             }
@@ -177,6 +183,13 @@ async fn import_block(
         .await?;
     checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
     query(NEW_JOB).bind(id).execute(conn).await
+}
+
+/// Returns whether the paths of a block are written in the same way.
+fn has_same_paths(old: &BlockAttributes, new: &BlockAttributes) -> bool {
+    old.mesh_path == new.mesh_path
+        && old.page_path == new.page_path
+        && old.labels_path == new.labels_path
 }
 
 fn differing(old: &BlockAttributes, new: &BlockAttributes) -> Vec<&'static str> {

@@ -7,10 +7,10 @@ use crate::records::checksums::{self, ChecksummedTable};
 use crate::{Catalog, Result};
 use mocban_core::domain::BlockName;
 
-/// Selects a block that no process works on, and from which no pair was cut.
+/// Selects a block that no process works on, from which no pair was cut, and for which nobody chose points or gave boxes.
 const WITHOUT_PAIRS: &str = "
 SELECT b.id FROM block AS b JOIN block_job AS j ON j.block = b.id
-WHERE b.name = ?1 AND j.status <> 1 AND NOT EXISTS (
+WHERE b.name = ?1 AND j.status <> 1 AND b.control_points IS NULL AND b.true_boxes IS NULL AND NOT EXISTS (
     SELECT 1 FROM block_character AS c WHERE c.block = b.id AND c.pair IS NOT NULL)";
 
 /// Remove all rows of a block, those that refer to others first.
@@ -24,8 +24,8 @@ const REMOVE: [&str; 6] = [
 ];
 
 impl Catalog {
-    /// Removes blocks, except for those from which pairs were cut and those that a process works on. Returns the blocks that
-    /// it removed.
+    /// Removes blocks, except for those from which pairs were cut, those that a process works on, and those with control
+    /// points or true boxes. Returns the blocks that it removed.
     ///
     /// # Errors
     /// Returns an error if a database operation fails, such as for a role without the right to remove blocks. In that case

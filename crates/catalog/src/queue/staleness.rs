@@ -33,9 +33,8 @@ pub enum RerunPolicy {
     All(Stage),
 }
 
-/// Returns the hash of an input file of a pair `p` with the job `j`, which the stages `$readers` read. While the file is missing
-/// and the next stage is one of them, it cannot succeed and the results are those of the file that was there, so the hash is
-/// `NULL`, and no comparison with it finds a difference.
+/// Selects the hash of an input file of the pair `p` with the job `j`, which the stages `$readers` read. `NULL` while the
+/// file is missing and one of these stages is next: the stage cannot run, so the stored results count as unchanged.
 macro_rules! input_hash {
     ($file:literal, $readers:literal) => {
         concat!(

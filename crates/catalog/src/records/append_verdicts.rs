@@ -300,9 +300,9 @@ fn judged(
     }
 }
 
-/// Removes the verdicts that are stored already: those whose event is stored for the metric; those with a time or a day if the
-/// same values are stored; those without a time and a context that equal the reviewer's newest verdict on the result. Also removes
-/// those with an earlier time than this newest verdict, and returns their rows.
+/// Removes the verdicts that are stored already: with an event, if it is stored for the metric; with a time or a day, if the
+/// same values are stored; without both and without a context, if they equal the reviewer's newest verdict on the result.
+/// Also removes those that are earlier than this newest verdict, and returns their rows.
 async fn without_stored<'v>(
     conn: &mut Conn,
     candidates: Vec<VerdictRowDraft<'v>>,

@@ -115,7 +115,7 @@ from_row! { ListedRow { id, confidence, iou, passes } }
 
 /// Selects pairs from a source with a column `id`, of which `?4` rows are read, and says whether they pass the filter.
 /// Retired pairs, which have no job, never do.
-/// A joint verdict is undisputed, or both sides of a dispute judged alone and the adjudications have only this verdict.
+/// A verdict is joint if no reviewer gave the opposite one, or if all adjudications of the conflict have this verdict.
 /// Sources use `?2` and `?3`, the key and the row id of the last pair of the page before; `?5` is the metric.
 macro_rules! listed {
     ($source:literal) => {

@@ -1,7 +1,6 @@
-//! Own words for the messages of `serde` about values of another type.
+//! Rewords the messages of `serde` about values of another type.
 
-/// Returns a message of `serde` about a value in own words, such as `"many" is not a whole number from 0`. Other messages
-/// are returned as they are.
+/// Rewords a message of `serde` about a value: `"many" is not a whole number from 0`. Returns other messages unchanged.
 pub fn value_error_text(message: &str) -> String {
     let translated = wrong_type(message)
         .or_else(|| unknown_name(message))

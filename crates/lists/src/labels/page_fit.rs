@@ -94,7 +94,7 @@ fn check_overlap(placed: &[PlacedRegion], page: &PageFile<'_>) -> Result<(), Lab
 /// Warns about another file name and another size in bytes.
 fn page_warnings(file: &PageRegions, page: &PageFile<'_>) -> Vec<String> {
     let mut warnings = Vec::new();
-    // A page of the same length is a copy under another name, such as that of an export.
+    // A page of the same size in bytes is a copy under another name, such as that of an export.
     if let Some(name) = file.file_name.as_deref()
         && !is_same_file(name, page.name)
         && file.bytes != Some(page.bytes)

@@ -40,16 +40,16 @@ pub(super) struct AnnouncedFiles {
     pub(super) content: String,
     /// Number of files and archives.
     pub(super) files: u64,
-    /// Bytes of all.
+    /// Total size of the files and archives, bytes.
     pub(super) bytes: u64,
     /// Whether the upload of the same files by another page is interrupted first, if nothing more of it arrives.
     #[serde(default)]
     pub(super) take_over: bool,
 }
 
-/// How an upload stands in the way of another one of the same files.
+/// Whether files of an upload arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum SameFiles {
+pub(super) enum UploadActivity {
     /// Files are arriving.
     Arriving,
     /// Files have arrived, and then nothing for a while.
@@ -71,7 +71,7 @@ pub(super) struct FileUpload {
     state: Mutex<UploadState>,
 }
 
-/// What becomes of an upload.
+/// State of an upload.
 #[derive(Debug)]
 pub(super) enum UploadState {
     /// Waits for the next file since then.
@@ -106,9 +106,9 @@ impl FileUpload {
         !content.is_empty() && *content == files.content
     }
 
-    /// Returns how the upload stands in the way of another one of the same files. `None` if it was interrupted or has ended,
+    /// Returns whether files arrive or have stopped arriving. `None` if the upload was interrupted or has ended,
     /// or seems to be lost before a file had arrived.
-    pub(super) fn in_the_way(&self, now: Instant) -> Option<SameFiles> {
+    pub(super) fn activity(&self, now: Instant) -> Option<UploadActivity> {
         let last = match *self.lock() {
             UploadState::Ready(_, since) => since,
             // While an archive is unpacked, no piece is the last one.
@@ -117,12 +117,12 @@ impl FileUpload {
             UploadState::Paused(..) | UploadState::Ended(_) => return None,
         };
         if now.duration_since(last) <= MAX_SILENT {
-            return Some(SameFiles::Arriving);
+            return Some(UploadActivity::Arriving);
         }
-        (self.arrived.load(Ordering::Relaxed) > 0).then_some(SameFiles::Silent)
+        (self.arrived.load(Ordering::Relaxed) > 0).then_some(UploadActivity::Silent)
     }
 
-    /// Interrupts the upload, so that another page can resume it. Returns when its files are there, or if that takes long.
+    /// Interrupts the upload, so that another page can resume it. Returns when its files are released, or after 10 s.
     pub(super) async fn cut_off(&self) {
         let settled = self.settled.notified();
         tokio::pin!(settled);
@@ -253,8 +253,8 @@ impl FileUpload {
         }
     }
 
-    /// Gives away the files of an upload that was interrupted or whose browser is closed, so that another page resumes it. The
-    /// page of this one, if it is open after all, can send nothing more.
+    /// Returns the files of an upload that was interrupted or whose browser is closed, and ends it, so that another page can
+    /// resume it. The first page, if it is still open, can send nothing more.
     pub(super) fn give_up(&self) -> Option<Box<ReceivedFiles>> {
         let mut state = self.lock();
         match std::mem::replace(&mut *state, UploadState::Ended(Some(taken_over()))) {
@@ -298,7 +298,7 @@ impl FileUpload {
         }
     }
 
-    /// Stores what became of the files, unless the upload was cancelled meanwhile.
+    /// Stores the next state of the upload, unless the upload was cancelled meanwhile.
     fn settle(&self, next: UploadState) {
         let mut state = self.lock();
         let unused = match &*state {
@@ -355,7 +355,7 @@ impl FileUpload {
     }
 }
 
-/// Stores what became of the files of an upload when it is dropped, also after a panic.
+/// Stores the next state of an upload when it is dropped, also after a panic.
 pub(super) struct UploadEnding {
     upload: Arc<FileUpload>,
     next: UploadState,

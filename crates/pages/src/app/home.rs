@@ -93,7 +93,7 @@ async fn read(state: &AppState, key: String) -> Overview {
                 counts,
                 is_running: running,
                 failed_blocks: failed_blocks(&blocks),
-                open_blocks: blocks.waiting() + blocks.leased() + outdated,
+                open_blocks: blocks.waiting() + blocks.leased() + blocks.other_files() + outdated,
             })
         };
         read.await.map_err(|error| AppFailure::of(error, &open.dir))

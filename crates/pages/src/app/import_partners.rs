@@ -44,8 +44,8 @@ pub(super) struct ImportPartners {
 }
 
 impl ImportPartners {
-    /// Returns the ways for a preview with only scans or only prints. `uploads` is the folder of files from browsers. Reads
-    /// folders.
+    /// Finds folders with the missing files for a preview with only scans or only prints. `uploads` is the folder of files
+    /// from browsers. Reads folders.
     pub(super) fn find(
         preview: &ImportPreview,
         chosen: &Path,
@@ -184,7 +184,7 @@ pub(super) fn mending_part(visit: &Visit, pair: &PairName) -> Markup {
     let name = one_line(pair.as_str());
     html! {
         p.notice #mending {
-            (visit.t("To mend the pair", "Để sửa cặp")) " " b { (name) } ": "
+            (visit.t("To replace a file of the pair", "Để thay tệp của cặp")) " " b { (name) } ": "
             (visit.t("name the new scan", "hãy đặt tên bản quét mới là")) " " code { (name) ".ply" } " "
             (visit.t("(or .stl, .obj), or the new print", "(hoặc .stl, .obj), hoặc bản in mới là")) " " code { (name) ".png" } " "
             (visit.t(

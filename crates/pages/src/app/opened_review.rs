@@ -84,10 +84,10 @@ pub(super) async fn open_review(
             ),
             own => Sentence::new(
                 format!(
-                    "you are one of the two who disagree (results: {own}): a third person must settle it, under another name"
+                    "you have judged these results yourself ({own}): a third person must settle them, under another name"
                 ),
                 format!(
-                    "bạn là một trong hai người bất đồng (số kết quả: {own}): một người thứ ba phải quyết định, với tên khác"
+                    "chính bạn đã đánh giá các kết quả này ({own}): một người thứ ba phải quyết định, với tên khác"
                 ),
             ),
         }

@@ -19,6 +19,19 @@ const MAX_BLOCKS: usize = 5;
 /// Most failed blocks that are named.
 const MAX_FAILED: usize = 3;
 
+/// Says that an import named other files of finished blocks, which no run has read.
+pub(super) fn other_blocks_text(visit: &Visit, blocks: &BlockStatus) -> Option<String> {
+    let number = grouped(blocks.other_files());
+    (blocks.other_files() > 0).then(|| match visit.language {
+        Language::English => format!(
+            "Blocks with another scan, page or labels than before: {number}. The next run reads them."
+        ),
+        Language::Vietnamese => format!(
+            "Số ván có bản quét, trang in hoặc nhãn khác so với trước: {number}. Lần chạy tới sẽ đọc các tệp đó."
+        ),
+    })
+}
+
 /// Returns how many finished or failed blocks the next run would align again, because their control points, settings or
 /// files have changed.
 pub(super) async fn outdated_blocks(
@@ -64,11 +77,11 @@ pub(super) fn outdated_blocks_text(visit: &Visit, outdated: u64) -> Option<Strin
     match (visit.language, outdated) {
         (_, 0) => None,
         (Language::English, 1) => Some(
-            "1 block has other chosen places, settings or files than in its last run: the next run aligns and cuts it again."
+            "1 block has other control points, settings or files than in its last run: the next run aligns and cuts it again."
                 .to_owned(),
         ),
         (Language::English, _) => Some(format!(
-            "{blocks} blocks have other chosen places, settings or files than in their last run: the next run aligns and cuts them again."
+            "{blocks} blocks have other control points, settings or files than in their last run: the next run aligns and cuts them again."
         )),
         (Language::Vietnamese, _) => Some(format!(
             "{blocks} ván có điểm tự chọn, thiết lập hoặc tệp khác so với lần chạy trước: lần chạy tới sẽ căn chỉnh và cắt lại."

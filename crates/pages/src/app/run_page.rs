@@ -14,7 +14,8 @@ use super::home::free_space;
 use super::pairs_page::pair_card;
 use super::projects::OpenProject;
 use super::run_blocks::{
-    blocks_text, failed_block_list, failed_blocks, outdated_blocks, outdated_blocks_text,
+    blocks_text, failed_block_list, failed_blocks, other_blocks_text, outdated_blocks,
+    outdated_blocks_text,
 };
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -372,19 +373,6 @@ fn other_files_text(visit: &Visit, run: &RunState) -> Option<String> {
             "{pairs} cặp đã căn chỉnh có bản quét hoặc bản in khác trong danh sách so với trước: lần chạy tới sẽ đọc các tệp đó."
         )),
     }
-}
-
-/// Says that an import named other files of finished blocks, which no run has read.
-fn other_blocks_text(visit: &Visit, blocks: &BlockStatus) -> Option<String> {
-    let number = grouped(blocks.other_files());
-    (blocks.other_files() > 0).then(|| match visit.language {
-        Language::English => format!(
-            "Blocks with another scan, page or labels than before: {number}. The next run reads them."
-        ),
-        Language::Vietnamese => format!(
-            "Số ván có bản quét, trang in hoặc nhãn khác so với trước: {number}. Lần chạy tới sẽ đọc các tệp đó."
-        ),
-    })
 }
 
 /// Returns the number of blocks and pairs that a run would align, such as `1 block and 3 pairs`.

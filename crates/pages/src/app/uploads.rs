@@ -1,4 +1,4 @@
-//! The uploads of files from browsers: how they begin, are resumed, and make place for others.
+//! Uploads of files from browsers: begins, resumes and evicts them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use super::failure::{AppFailure, AppResult};
-use super::file_upload::{AnnouncedFiles, FileUpload, SameFiles};
+use super::file_upload::{AnnouncedFiles, FileUpload, UploadActivity};
 use super::received_files::{ArrivedFile, ReceivedFiles, check_room};
 use super::sentence::Sentence;
 use super::upload_sentence::{
@@ -118,7 +118,7 @@ impl Uploads {
         let silent = {
             let (open, now) = (self.lock(), Instant::now());
             let mut same = open.values().filter(|upload| upload.is_of(files));
-            let silent = same.find(|upload| upload.in_the_way(now) == Some(SameFiles::Silent));
+            let silent = same.find(|upload| upload.activity(now) == Some(UploadActivity::Silent));
             silent.cloned()
         };
         if let Some(silent) = silent {
@@ -126,8 +126,8 @@ impl Uploads {
         }
     }
 
-    /// Removes uploads that ended, and those whose browser is closed and of which nothing has arrived. Interrupted ones stay for a
-    /// while, except for the oldest if there is no place. Returns whether there is place for another.
+    /// Removes uploads that ended, and those of closed browsers of which nothing has arrived. Keeps interrupted ones for an
+    /// hour, but evicts the oldest if the limit is reached. Returns whether another upload may begin.
     fn make_place(&self) -> bool {
         let removed: Vec<_> = {
             let mut open = self.lock();
@@ -177,10 +177,10 @@ impl Uploads {
 fn refuse_same(open: &OpenUploads, files: &AnnouncedFiles) -> AppResult<()> {
     let now = Instant::now();
     let mut same = open.values().filter(|upload| upload.is_of(files));
-    match same.find_map(|upload| upload.in_the_way(now)) {
+    match same.find_map(|upload| upload.activity(now)) {
         None => Ok(()),
-        Some(SameFiles::Arriving) => Err(AppFailure::refused(same_files())),
-        Some(SameFiles::Silent) => Err(AppFailure::conflict(silent())),
+        Some(UploadActivity::Arriving) => Err(AppFailure::refused(same_files())),
+        Some(UploadActivity::Silent) => Err(AppFailure::conflict(silent())),
     }
 }
 

@@ -207,14 +207,8 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "{} = {}: must be below {} = {}",
         "{0} = {1}: phải nhỏ hơn {2} = {3}",
     ),
-    (
-        "{} = {}: invalid type: {}, expected {}",
-        "{0} = {1}: giá trị không đúng kiểu, cần {3}",
-    ),
-    (
-        "{} = {}: invalid value: {}, expected {}",
-        "{0} = {1}: giá trị không hợp lệ, cần {3}",
-    ),
+    ("{} = {} is not text", "{0} = {1} không phải là văn bản"),
+    ("{} = {} is not a list", "{0} = {1} không phải là danh sách"),
     // Exports.
     (
         "the settings compute no {}",
@@ -351,9 +345,11 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "hãy kiểm tra tên tệp và đơn vị",
     ),
     (
-        "characters of about {} mm, but most have 6 to 30 mm; is the unit {}?",
-        "các chữ khoảng {0} mm, trong khi đa số có 6 đến 30 mm; đơn vị có phải là {1} không?",
+        "characters of about {} mm, but most have 6 to 30 mm",
+        "các chữ khoảng {0} mm, trong khi đa số có 6 đến 30 mm",
     ),
+    ("is the unit {}?", "đơn vị có phải là {0} không?"),
+    ("check the unit", "hãy kiểm tra đơn vị"),
     (
         "the scan shows no carved face: {}",
         "bản quét không có mặt khắc: {0}",

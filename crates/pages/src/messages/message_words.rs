@@ -99,10 +99,6 @@ fn part_text(part: &str) -> String {
     }
     match part {
         "text" | "a string" => return "văn bản".to_owned(),
-        "usize" | "u64" | "u32" | "u16" | "u8" => return "số nguyên từ 0 trở lên".to_owned(),
-        "i64" | "i32" => return "số nguyên".to_owned(),
-        "f64" | "f32" => return "số".to_owned(),
-        "a boolean" => return "true hoặc false".to_owned(),
         "a pointer of Git LFS" => return "con trỏ của Git LFS".to_owned(),
         "MeshLab, Blender or CloudCompare" => {
             return "MeshLab, Blender hoặc CloudCompare".to_owned();
@@ -189,12 +185,8 @@ mod tests {
                 "p/mocban.toml: fit.seed = 7 nằm ngoài khoảng 0 đến 1; new words",
             ),
             (
-                "run.workers = \"hai\": invalid type: string \"hai\", expected usize",
-                "run.workers = \"hai\": giá trị không đúng kiểu, cần số nguyên từ 0 trở lên",
-            ),
-            (
-                "fit.rounds = 2.5: invalid value: floating point `2.5`, expected a boolean",
-                "fit.rounds = 2,5: giá trị không hợp lệ, cần true hoặc false",
+                "storage.catalog = 2.5 is not text",
+                "storage.catalog = 2,5 không phải là văn bản",
             ),
             (
                 "the control points contradict each other: no common position is nearer than 12 mm to all of them; choose them again on the same strokes of both images, or add a fourth one",

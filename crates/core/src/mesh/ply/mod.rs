@@ -30,6 +30,8 @@ pub(super) fn read(
         && header.encoding != PlyEncoding::Ascii
         && !matches!(body, Ok(PlyBody { padding: 0, .. }))
         && let Ok(other) = read(rest)
+        // A truncated file may seem whole by chance if bytes after its rows are ignored.
+        && (body.is_ok() || other.padding == 0)
     {
         if body.is_ok() || !header.has_lists() {
             let reason = "a line break follows end_header that may be data; save it again";
@@ -68,6 +70,18 @@ mod tests {
             error.to_string(),
             "the ascii PLY has 9 bytes after the rows that its header counts; save it again with the right counts"
         );
+    }
+
+    #[test]
+    fn a_truncated_file_whose_data_begin_with_a_line_break_is_refused() {
+        let header = format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex 1\n{XYZ}element face 1\n{CORNERS}end_header\n"
+        );
+        let rows = [b"\r\xb2\xc2\x40".as_slice(), &[0; 8], &[3], &[0; 12]].concat();
+        let whole = [header.as_bytes(), &rows].concat();
+        assert_eq!(read(&whole).expect("reads").triangles, [[0, 0, 0]]);
+        let error = read(&whole[..whole.len() - 1]).expect_err("truncated");
+        assert!(error.to_string().contains("is truncated"), "{error}");
     }
 
     #[test]

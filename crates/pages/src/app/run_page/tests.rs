@@ -249,7 +249,7 @@ fn blocks_to_align_again_keep_the_project_unfinished() {
     assert!(before.contains("Everything is aligned"), "{before}");
     run.outdated_blocks = 1;
     let english = shown(&run, Language::English);
-    for part in ["Align 1 block<", "1 block has other chosen places"] {
+    for part in ["Align 1 block<", "1 block has other control points"] {
         assert!(english.contains(part), "{part}: {english}");
     }
     assert!(!english.contains("Everything is aligned"), "{english}");

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::{ArrivedFile, MAX_OPEN, Uploads};
 use crate::app::failure::AppResult;
 use crate::app::file_upload::{
-    AnnouncedFiles, FileUpload, MAX_KEPT, MAX_SILENT, SameFiles, UploadEnding, UploadState,
+    AnnouncedFiles, FileUpload, MAX_KEPT, MAX_SILENT, UploadActivity, UploadEnding, UploadState,
 };
 use crate::app::upload_sentence::{cut, taken_over};
 use crate::review::Language;
@@ -142,8 +142,8 @@ fn files_are_not_sent_twice_while_another_page_may_send_them() {
     let now = Instant::now();
     let later = now + MAX_SILENT * 2;
     upload.last_piece.set(Some(now));
-    assert_eq!(upload.in_the_way(later), Some(SameFiles::Silent));
-    assert_eq!(upload.in_the_way(now), Some(SameFiles::Arriving));
+    assert_eq!(upload.activity(later), Some(UploadActivity::Silent));
+    assert_eq!(upload.activity(now), Some(UploadActivity::Arriving));
     let refused = |content| {
         let begun = uploads.begin(&files(content)).expect_err("another page");
         begun.text(Language::English).to_owned()
@@ -155,11 +155,11 @@ fn files_are_not_sent_twice_while_another_page_may_send_them() {
     assert!(refused("x").contains("Take over"));
     uploads.begin(&files("y")).expect("other files");
     upload.last_piece.set(None);
-    let unpacking = Some(SameFiles::Arriving);
-    assert_eq!(upload.in_the_way(later), unpacking, "an archive");
+    let unpacking = Some(UploadActivity::Arriving);
+    assert_eq!(upload.activity(later), unpacking, "an archive");
     upload.last_piece.set(Some(before));
     upload.arrived.store(0, Ordering::Relaxed);
-    assert_eq!(upload.in_the_way(later), None, "no file has arrived");
+    assert_eq!(upload.activity(later), None, "no file has arrived");
     uploads.begin(&files("x")).expect("nothing can be resumed");
 }
 
