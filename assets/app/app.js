@@ -38,7 +38,7 @@ document.addEventListener("submit", async (event) => {
     const kept = keptName(form);
     const pairs = kept && { pairs: JSON.parse(sessionStorage.getItem(kept) ?? "[]") };
     const reply = await act(form.dataset.post, { ...fields(form, event.submitter), ...pairs });
-    if (kept) sessionStorage.removeItem(kept);
+    if (kept) for (const name of [kept, `${kept}:open`]) sessionStorage.removeItem(name);
     if (reply.go) location.assign(reply.go);
     else if (reply.reload) await refresh(true);
   } catch (error) {

@@ -136,7 +136,9 @@ fn another_tab_takes_over_an_upload_of_which_nothing_arrives() {
     second.eval("document.querySelector('#upload-take-over').focus(), null");
     second.press("Space", false);
     second.wait(STORED);
-    assert_eq!(kept(&second, "sent"), json!(["2.stl"]));
+    // The browser may have sent the third file from the first page after all.
+    let sent = kept(&second, "sent");
+    assert!(sent.is_null() || sent == json!(["2.stl"]), "{sent}");
     are_stored(dir.path(), &files);
     first.limit_sending(-1);
     first.wait(&format!(
