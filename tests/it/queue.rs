@@ -68,16 +68,13 @@ fn only_affected_stages_run_again() {
 
     // New content affects that pair only.
     let name = pairs(&project)[0].results.attributes.name.clone();
-    let show = |args: &[&str]| {
-        let args = [&["show", name.as_str()][..], args].concat();
-        mocban(project.dir(), &args).expect(0)
+    let changed = || {
+        let shown = mocban(project.dir(), &["show", name.as_str(), "--json"]).expect(0);
+        shown.json()["changed_inputs"].clone()
     };
-    let changed = || show(&["--json"]).json()["changed_inputs"].clone();
     assert_eq!(changed(), serde_json::json!([]));
     append_byte(&print(&project, 0));
     assert_eq!(changed(), serde_json::json!(["print"]));
-    let text = "print changed since the last run; `run` computes the pair again";
-    assert!(show(&[]).out.contains(text), "{}", show(&[]).out);
     call(&mut run(&project, &[])).expect(0);
     assert_eq!(finished(&project), [[2; 4], [1; 4]]);
     assert_eq!(changed(), serde_json::json!([]));

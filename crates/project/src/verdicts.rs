@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use crate::error::ProjectResult;
+use crate::error::{ProjectError, ProjectResult};
 use crate::exit::Refusal;
 use crate::files::{self, ListFile, MAX_SHOWN, RefusedLine};
 use crate::location::{Location, now};
