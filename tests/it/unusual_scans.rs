@@ -173,7 +173,7 @@ fn scans_of_another_format_are_refused_or_named_once_when_a_list_has_them() {
     let import = ["-C", "p", "import", "pairs.csv"];
     let sentences = [
         "a glTF scene is not read: 0.glb and 59 more; open",
-        "a PDF document is not read: page.pdf; save",
+        "a PDF document is not read: page.pdf; open",
     ];
     let refused = mocban(dir.path(), &import).expect(2).err;
     for sentence in sentences {

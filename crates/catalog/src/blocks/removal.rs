@@ -13,7 +13,7 @@ SELECT b.id FROM block AS b JOIN block_job AS j ON j.block = b.id
 WHERE b.name = ?1 AND j.status <> 1 AND b.control_points IS NULL AND b.true_boxes IS NULL AND NOT EXISTS (
     SELECT 1 FROM block_character AS c WHERE c.block = b.id AND c.pair IS NOT NULL)";
 
-/// Remove all rows of a block, those that refer to others first.
+/// Remove all rows of a block. Rows that refer to others come first.
 const REMOVE: [&str; 6] = [
     "DELETE FROM block_job WHERE block = ?1",
     "DELETE FROM block_failure WHERE block = ?1",
@@ -24,8 +24,8 @@ const REMOVE: [&str; 6] = [
 ];
 
 impl Catalog {
-    /// Removes blocks, except for those from which pairs were cut, those that a process works on, and those with control
-    /// points or true boxes. Returns the blocks that it removed.
+    /// Removes blocks. Keeps blocks from which pairs were cut, on which a process works, or with control points or true
+    /// boxes. Returns the removed blocks.
     ///
     /// # Errors
     /// Returns an error if a database operation fails, such as for a role without the right to remove blocks. In that case

@@ -302,7 +302,7 @@ fn judged(
 
 /// Removes the verdicts that are stored already: with an event, if it is stored for the metric; with a time or a day, if the
 /// same values are stored; without both and without a context, if they equal the reviewer's newest verdict on the result.
-/// Also removes those that are earlier than this newest verdict, and returns their rows.
+/// Also removes verdicts earlier than this newest one, and returns their rows.
 async fn without_stored<'v>(
     conn: &mut Conn,
     candidates: Vec<VerdictRowDraft<'v>>,
