@@ -315,7 +315,8 @@ fn processes_suspended_at_random_moments_for_two_leases_change_nothing() {
     for _ in 0..trials(2) {
         let p = target.copy_of(&target.fresh);
         let scale = ("MOCBAN_TIME_SCALE", "50");
-        let mut first = quiet(run(&p, &["-j", "1"]).envs([scale]));
+        // Suspended before it has begun, the first run comes after the second one.
+        let mut first = quiet(run(&p, &["--join", "-j", "1"]).envs([scale]));
         target.wait(&mut first, Duration::from_secs(1));
         let pid = Pid::from_child(&first);
         // Fails if the run has ended.
