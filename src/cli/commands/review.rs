@@ -296,17 +296,18 @@ fn announce(
     Ok(open_page(&url, args.no_open, context))
 }
 
-/// Returns the `review` command as a next step, or `None` if there are verdicts or the name of the user is not known.
+/// Returns the `review` command as a next step, or `None` if there are verdicts.
 pub(crate) fn review_step(counts: &StatusCounts) -> Option<String> {
     let is_unjudged = counts.verdicts.values().all(|number| *number == 0);
-    let user = user_name().filter(|_| is_unjudged)?;
-    review_command(&user)
+    is_unjudged.then(|| review_command(user_name().as_deref()))
 }
 
-/// Returns the `review` command with the user's name as the reviewer, or `None` if no reviewer can have this name.
-fn review_command(user: &str) -> Option<String> {
-    let name = reviewer_name(user).ok()?;
-    Some(format!("review --reviewer {}", shell_quoted(&name)))
+/// Returns the `review` command with the user's name as the reviewer, or `me` if it is not known: a next step can be run as
+/// it is.
+fn review_command(user: Option<&str>) -> String {
+    let name = user.and_then(|user| reviewer_name(user).ok());
+    let name = name.unwrap_or_else(|| "me".to_owned());
+    format!("review --reviewer {}", shell_quoted(&name))
 }
 
 /// Returns the name of the user, as Unix or Windows gives it.
@@ -365,8 +366,7 @@ mod tests {
 
     #[test]
     fn the_suggested_reviewer_is_the_user() {
-        let command = "review --reviewer 'lê văn'".to_owned();
-        assert_eq!(review_command("lê văn"), Some(command));
-        assert_eq!(review_command(" "), None);
+        assert_eq!(review_command(Some("lê văn")), "review --reviewer 'lê văn'");
+        assert_eq!(review_command(None), "review --reviewer me");
     }
 }
