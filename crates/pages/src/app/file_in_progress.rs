@@ -33,7 +33,7 @@ pub(super) struct FileInProgress {
     pub(super) pieces: mpsc::Sender<FilePiece>,
     pub(super) written: JoinHandle<Result<(), Sentence>>,
     pub(super) last_piece: LastPiece,
-    /// Becomes ready if no more of the file is wanted, such as when another page goes on with the upload.
+    /// Completes when the upload of this file must stop, such as when another page takes over the upload.
     pub(super) interrupted: oneshot::Receiver<()>,
     /// Ends the work if nobody waits for it any more.
     pub(super) cancels: CancelGuard,

@@ -138,7 +138,7 @@ impl FileUpload {
         }
         self.is_taken.store(true, Ordering::Relaxed);
         drop(interrupt);
-        // Otherwise the files are still in use, and the other page is asked again.
+        // After a timeout the files are still in use, and the next request to begin the upload is refused.
         let _ = tokio::time::timeout(MAX_SETTLING, settled).await;
     }
 

@@ -194,7 +194,7 @@ pub(super) fn same_files() -> Sentence {
     )
 }
 
-/// Says that another page goes on with an upload.
+/// Returns the message for a page whose upload another page has taken over.
 pub(super) fn taken_over() -> Sentence {
     Sentence::new(
         "another page has taken over this upload: follow it there",
