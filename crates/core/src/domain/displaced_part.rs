@@ -34,7 +34,7 @@ pub struct DisplacedPart {
     pub shift_px: [f64; 2],
     /// Rotation of this part against the rest in degrees, in (-180, 180], positive clockwise on the screen.
     pub angle_deg: f64,
-    /// Maps depth-map pixels to print pixels on this part. It is found at a low resolution: 2 % of the print are usual.
+    /// Maps depth-map pixels to print pixels on this part. It is found on images of about 60 pixels, so it is coarse.
     pub print_from_depth: Affine2,
 }
 
