@@ -3,9 +3,11 @@
 use std::num::NonZeroU32;
 use std::sync::OnceLock;
 
-use super::binarize::{BinarizeError, InkMask, hypotheses, hypotheses_within, require_strokes};
+use super::binarize::{
+    BinarizeError, InkMask, hypotheses, hypotheses_within, keep_shares, require_strokes,
+};
 use mocban_core::domain::{MaskReduction, MaskScale, PrintOutline};
-use mocban_core::raster::{PrintImage, enlarge, reduce};
+use mocban_core::raster::{PixelBox, PrintImage, enlarge, reduce};
 
 /// A print whose shorter side has fewer pixels is enlarged before its ink is found: strokes of one or two pixels have no
 /// shape of their own.
@@ -19,6 +21,19 @@ const MOST_PX: usize = 1 << 20;
 const ENOUGH_PX: usize = 1_000 * 1_000;
 /// Pixels that the shorter side of a reduced print has at least.
 const REDUCED_SIDE_PX: usize = 500;
+
+/// Sigma of the Gaussian that smooths about as much as the pixels of an image, in pixels.
+const PIXEL_SIGMA: f64 = 0.29;
+
+/// Returns the sigma of the Gaussian that smooths about as much as the pixels of an enlarged print, as a fraction of the
+/// longest side of `known`, the box of the known pixels of its masks. A scan is smoothed like the print, because a
+/// sharper one agrees less with it. Returns 0 for other prints, whose pixels are smaller than strokes.
+pub(super) fn pixel_sigma(scale: MaskScale, known: Option<PixelBox>) -> f64 {
+    let (Some(times), Some(known)) = (scale.enlargement(), known) else {
+        return 0.0;
+    };
+    PIXEL_SIGMA * f64::from(times.get()) / known.longest_side() as f64
+}
 
 /// A decoded image of a print, and its binarizations, which are computed on first use.
 #[derive(Debug, Clone)]
@@ -82,12 +97,15 @@ impl Print {
         };
         let resized = rgb.map(PrintImage::from);
         let picture = resized.as_ref().unwrap_or(&self.picture);
-        let inks = match &self.outline {
+        let mut inks = match &self.outline {
             Some(outline) => hypotheses_within(picture, &outline.mapped(&scale.masks_from_print())),
             None => hypotheses(picture),
         }?;
         if let MaskScale::Enlarged(times) = scale {
             require_strokes(&inks, times.get())?;
+            for ink in &mut inks {
+                keep_shares(ink, times.get() as usize);
+            }
         }
         Ok(inks)
     }
@@ -105,9 +123,9 @@ impl From<PrintImage> for Print {
 
 #[cfg(test)]
 mod tests {
-    use super::Print;
+    use super::{Print, pixel_sigma};
     use mocban_core::domain::MaskScale;
-    use mocban_core::raster::{Grid, Mask, PrintImage, mask_of_print};
+    use mocban_core::raster::{Grid, Mask, PrintImage, mask_of_print, reduce};
 
     fn print(width: usize, height: usize, is_ink: impl Fn(usize, usize) -> bool) -> Print {
         let grey = |x, y| if is_ink(x, y) { 9_000 } else { 50_000 };
@@ -162,6 +180,47 @@ mod tests {
             text.starts_with("print shows the character with 5 px"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn strokes_narrower_than_a_pixel_keep_their_width() {
+        // Pixels of 10 x 10 parts: a wide stroke and a thin one, which lies across two pixels.
+        let is_wide = |x: usize| (30..60).contains(&x);
+        let is_thin = |x: usize| (96..103).contains(&x);
+        let paper = Grid::from_fn(160, 160, |x, y| {
+            let is_ink = (is_wide(x) || is_thin(x)) && (20..140).contains(&y);
+            [if is_ink { 9_000 } else { 50_000 }; 3]
+        });
+        let small = Print::from(PrintImage::from(reduce(&paper, 10)));
+        let mask = &small.hypotheses().expect("ink")[0].mask;
+        let parts_per_px = 160.0 / mask.width() as f64;
+        let width = |from: usize, to: usize| {
+            let row = mask.row(mask.height() / 2).iter().enumerate();
+            let inside = row.filter(|(x, ink)| {
+                let part = (*x as f64 + 0.5) * parts_per_px;
+                **ink && (from as f64..to as f64).contains(&part)
+            });
+            inside.count() as f64 * parts_per_px
+        };
+        let [wide, thin] = [width(10, 80), width(80, 120)];
+        assert!(
+            (wide - 30.0).abs() < 4.0 && (thin - 7.0).abs() < 2.0,
+            "{wide} {thin}"
+        );
+    }
+
+    #[test]
+    fn only_small_prints_smooth_a_scan() {
+        let sigma = |width| {
+            let print = print(width, width, |x, y| x.abs_diff(y) < 3);
+            let known = print.hypotheses().expect("ink")[0]
+                .soft
+                .known
+                .bounding_box();
+            pixel_sigma(print.mask_scale(), known)
+        };
+        assert_eq!(sigma(64), 0.0);
+        assert!((sigma(20) - 0.29 / 20.0).abs() < 1e-9);
     }
 
     #[test]

@@ -35,7 +35,9 @@ const NOISE: f64 = 0.012;
 const LEAST_INK: f64 = 0.002;
 
 /// Least longest side of the ink of a small print, in pixels of the print.
-const LEAST_CHARACTER_PX: f64 = 8.0;
+const LEAST_CHARACTER_PX: f64 = 6.0;
+/// An image is small if its shorter side has fewer pixels. Small prints are enlarged to about half of it.
+const SMALL_PX: usize = 128;
 
 /// Why a print shows no ink. A retry does not help.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -97,6 +99,8 @@ pub(crate) struct InkMask {
     pub(crate) threshold: f64,
     /// Whether ink is lighter than the background, as in a rubbing.
     pub(crate) light_on_dark: bool,
+    /// Grey divided by the background. `None` if the image is not small.
+    pub(super) even: Option<Grid<f32>>,
 }
 
 /// Returns the Rec. 601 luma, 0..=1.
@@ -122,6 +126,7 @@ pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeE
         mask: ink,
         threshold,
         light_on_dark: false,
+        even: None,
     })
 }
 
@@ -215,6 +220,7 @@ pub(super) fn binarize_even(
         mask: ink,
         threshold: split.threshold,
         light_on_dark,
+        even: (even.width().min(even.height()) < SMALL_PX).then(|| even.clone()),
     })
 }
 

@@ -5,6 +5,7 @@ mod colour;
 mod ground;
 mod hypotheses;
 mod ink;
+mod ink_shares;
 mod outlined;
 mod polarity;
 #[cfg(test)]
@@ -13,6 +14,7 @@ mod test_strokes;
 pub(super) use hypotheses::hypotheses;
 pub(super) use ink::BinarizeError;
 pub(super) use ink::{InkMask, fixed, require_strokes};
+pub(super) use ink_shares::keep_shares;
 pub(super) use mocban_core::raster::otsu::{Split, split, split_inner};
 pub(super) use outlined::{hypotheses_within, inside};
 pub(super) use polarity::rim_share;

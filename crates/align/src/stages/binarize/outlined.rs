@@ -41,6 +41,7 @@ pub(crate) fn hypotheses_within(
                 amount,
                 known: mask(&ink.soft.known),
             },
+            even: None,
             ..ink
         }
     };

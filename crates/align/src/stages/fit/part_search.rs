@@ -11,6 +11,9 @@ use crate::stages::print::Print;
 use crate::stages::zbuffer::IndexedSurface;
 use mocban_core::domain::{PrintOutline, Rigid3};
 
+/// The parts of a print that is enlarged more times are not tried: they show too few pixels of a character.
+const MOST_ENLARGED: u32 = 2;
+
 /// Compares both sides of `start`'s plane with the parts of the print. Returns the side that resembles a part best,
 /// with the outline of the part. Returns `None` if no agreement reaches [`LEAST`], or if the finer fit of the side
 /// finds no carving.
@@ -20,8 +23,15 @@ pub(super) fn search(
     print: &Print,
     params: &FitParams,
 ) -> Option<FoundSide> {
+    let scale = print.mask_scale();
+    if scale
+        .enlargement()
+        .is_some_and(|times| times.get() > MOST_ENLARGED)
+    {
+        return None;
+    }
     let inks = print.hypotheses().ok()?;
-    let print_from_mask = print.mask_scale().print_from_masks();
+    let print_from_mask = scale.print_from_masks();
     let mut parts: Vec<PrintOutline> = inks
         .iter()
         .flat_map(|ink| print_parts(&ink.mask))

@@ -5,7 +5,7 @@ use crate::stages::binarize::inside;
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, RefinementPass, Refiner, SearchRange, SoftMask, search_coarse_to_fine,
 };
-use crate::stages::print::Print;
+use crate::stages::print::{Print, pixel_sigma};
 use mocban_core::domain::PrintOutline;
 
 /// Lower bound of the agreement.
@@ -48,18 +48,24 @@ const BASE_PX: usize = 72;
 
 /// Image pyramids of all interpretations of a print, to be compared with many sides.
 #[derive(Debug)]
-pub(super) struct InkPyramids(Vec<ImagePyramid>);
+pub(super) struct InkPyramids {
+    inks: Vec<ImagePyramid>,
+    /// Least smoothing, see [`pixel_sigma`].
+    pixel_sigma: f64,
+}
 
 impl InkPyramids {
     /// Builds the pyramids of a print. Returns `None` if the print cannot be binarized.
     pub(super) fn new(print: &Print) -> Option<Self> {
-        let inks: Vec<ImagePyramid> = print
-            .hypotheses()
-            .ok()?
+        let read = print.hypotheses().ok()?;
+        let inks = read
             .iter()
-            .filter_map(|ink| ImagePyramid::new(&ink.soft, BASE_PX))
-            .collect();
-        Some(Self(inks))
+            .filter_map(|ink| ImagePyramid::new(&ink.soft, BASE_PX));
+        let known = &read.first()?.soft.known;
+        Some(Self {
+            inks: inks.collect(),
+            pixel_sigma: pixel_sigma(print.mask_scale(), known.bounding_box()),
+        })
     }
 
     /// Builds the pyramids of the part of a print inside an outline in pixels of the print. Returns `None` if the outline
@@ -82,28 +88,35 @@ impl InkPyramids {
             };
             inks.extend(ImagePyramid::new(&part, BASE_PX));
         }
-        Some(Self(inks))
+        Some(Self {
+            inks,
+            pixel_sigma: pixel_sigma(print.mask_scale(), Some(bounds)),
+        })
     }
 
     /// Returns the best agreement of a side with any interpretation of the print, from `LEAST_AGREEMENT` to 1.
     pub(super) fn agreement(&self, side: &FittedSide) -> f64 {
         // The samples show the block from outside, so the tops are in mirror writing.
         let tops = side.samples.soft_tops(&side.surface, side.relief);
-        let scores = self.0.iter().map(|ink| best_score(ink, &tops));
+        let passes = PASSES.map(|pass| pass.smoothed(self.pixel_sigma));
+        let scores = self.inks.iter().map(|ink| best_score(ink, &tops, &passes));
         scores.fold(LEAST_AGREEMENT, f64::max)
     }
 }
 
 /// Returns the best agreement of a side with the ink: the correlation times the fraction of the stroke tops that
-/// printed.
-fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
+/// printed. It is measured at the size and the smoothing of the last pass.
+fn best_score(ink: &ImagePyramid, tops: &SoftMask, passes: &[RefinementPass; 2]) -> f64 {
     let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
         return 0.0;
     };
-    let found = search_coarse_to_fine(ink, &wood, LIMITS, &PASSES);
-    let print = ink.level(JUDGED_PX, 1.0);
+    let found = search_coarse_to_fine(ink, &wood, LIMITS, passes);
+    let RefinementPass {
+        size_px, sigma_px, ..
+    } = passes[1];
+    let print = ink.level(size_px, sigma_px);
     let tops = wood
-        .level_builder(JUDGED_PX, 1.0)
+        .level_builder(size_px, sigma_px)
         .mapped_level(|near| ((near - PRINTS) / (1.0 - PRINTS)).max(0.0));
     let judge = Refiner::new(&print, &tops);
     let scores = found

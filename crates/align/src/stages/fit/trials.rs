@@ -30,6 +30,10 @@ const CUT: f64 = 0.02;
 /// The floor and the ceiling of a widened box recede by this fraction of the growth, as the plane may be tilted.
 const TILT: f64 = 0.05;
 
+/// Factor of the confidence of a side whose faces point inward, for a small print: a few pixels resemble the back of a
+/// block by chance, and the faces of most files point outward.
+const INWARD: f64 = 0.3;
+
 /// Settings of the trials. They do not depend on the project's settings, so that the result of the fit does not either.
 const DEPTH: DepthParams = DepthParams {
     resolution_by: ResolutionBy::LongestSide,
@@ -103,6 +107,8 @@ impl<'a> Trials<'a> {
         } else {
             self.widened(candidate)
         };
+        let is_small = self.print.mask_scale().enlargement().is_some();
+        let confidence = confidence * factor_of_winding(is_small, candidate.side.winding);
         let before = self.tried.len() - 1;
         let is_better = |(_, best): &(FitOutcome, f64)| replaces(confidence, *best, before);
         if self.best.as_ref().is_none_or(is_better) {
@@ -236,6 +242,14 @@ impl TrialPose {
     }
 }
 
+/// Returns the factor of the confidence of a side. `outward` is the share of the faces that point outward.
+fn factor_of_winding(is_small: bool, outward: Option<f64>) -> f64 {
+    match outward {
+        Some(outward) if is_small => INWARD + (1.0 - INWARD) * outward,
+        _ => 1.0,
+    }
+}
+
 /// Returns whether a candidate replaces the best one of the `before` candidates that were registered earlier. One that
 /// matches is preferred to one that does not.
 fn replaces(confidence: f64, best: f64, before: usize) -> bool {
@@ -266,7 +280,7 @@ fn on_print(ink: PixelBox, print_from_masks: &Affine2) -> [[f64; 2]; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Trials, replaces};
+    use super::{Trials, factor_of_winding, replaces};
     use crate::stages::fit::fit;
     use crate::stages::testing::settings;
     use crate::stages::{Print, Scan};
@@ -309,6 +323,15 @@ mod tests {
         let region = trials.into_best(true).and_then(|found| found.region);
         let [.., to] = region.expect("a box").bounds;
         assert!(to[0] > low[0] + 0.9 * width, "{to:?} {low:?} {width}");
+    }
+
+    #[test]
+    fn faces_that_point_inward_count_against_a_side_for_small_prints_only() {
+        assert!(replaces(0.5 * factor_of_winding(true, Some(0.98)), 0.3, 1));
+        assert!(!replaces(0.5 * factor_of_winding(true, Some(0.02)), 0.1, 1));
+        for outward in [None, Some(0.0)] {
+            assert_eq!(factor_of_winding(false, outward), 1.0);
+        }
     }
 
     #[test]

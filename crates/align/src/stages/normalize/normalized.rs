@@ -3,6 +3,7 @@
 use super::params::{NormalizeError, NormalizeParams};
 use crate::stages::binarize::InkMask;
 use crate::stages::pose::SoftMask;
+use crate::stages::print::pixel_sigma;
 use mocban_core::domain::{Affine2, InkHypothesis, MaskScale, NormalizeOutcome, ReliefHeights};
 use mocban_core::raster::{Grid, Mask, mask_of_print};
 
@@ -70,6 +71,11 @@ impl PrintMasks {
     /// Returns the map from pixels of the print to pixels of the masks.
     pub(crate) fn masks_from_print(&self) -> Affine2 {
         self.scale.masks_from_print()
+    }
+
+    /// Returns how much a scan is smoothed to be compared with a small print, see [`pixel_sigma`].
+    pub(crate) fn pixel_sigma(&self) -> f64 {
+        pixel_sigma(self.scale, self.known.bounding_box())
     }
 
     /// Returns the ink mask as a soft mask of zeros and ones.

@@ -16,6 +16,16 @@ pub(crate) struct RefinementPass {
     pub(crate) beam_width: BeamWidth,
 }
 
+impl RefinementPass {
+    /// Returns the pass with a least smoothing, as a fraction of the level's size.
+    pub(crate) fn smoothed(self, least: f64) -> Self {
+        Self {
+            sigma_px: self.sigma_px.max(least * self.size_px as f64),
+            ..self
+        }
+    }
+}
+
 /// Searches for poses of the moving image on the fixed image. Returns upright and mirrored candidates, best first.
 pub(crate) fn search_coarse_to_fine(
     fixed: &ImagePyramid,

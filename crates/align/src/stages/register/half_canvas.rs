@@ -17,6 +17,9 @@ pub(super) struct HalfCanvas {
     pub(super) edge: InkEdge,
     /// Mean width of the ink's strokes in pixels of this canvas, at least 1.
     pub(super) stroke_width: f64,
+    /// Side of the pixels of a small print, in pixels of this canvas. 0 for other prints, whose pixels are smaller than
+    /// strokes.
+    pub(super) print_px: f64,
 }
 
 impl HalfCanvas {
@@ -43,6 +46,7 @@ impl HalfCanvas {
         }
         Self {
             specks: scattered(&print.specks, &half_from_masks, side),
+            print_px: (print.scale.enlargement()).map_or(0.0, |_| half_from_print.scale()),
             ..Self::of(levels, ink)
         }
     }
@@ -56,8 +60,16 @@ impl HalfCanvas {
             ink,
             specks,
             stroke_width: stroke_width(&edge),
+            print_px: 0.0,
             edge,
         }
+    }
+
+    /// Subtracts from a deviation of the ink's edge, in stroke widths, what the pixels of a small print add to it. This is
+    /// `least` if pixels are as wide as strokes.
+    pub(super) fn without_pixels(&self, deviation: f64, least: f64) -> f64 {
+        let added = least * (self.print_px / self.stroke_width).powi(2);
+        (deviation.powi(2) - added.powi(2)).max(0.0).sqrt()
     }
 
     /// Returns the stroke mask of a level above 0.
@@ -132,4 +144,23 @@ fn scattered(mask: &Mask, canvas_from_mask: &Affine2, side: usize) -> Mask {
         }
     }
     canvas
+}
+
+#[cfg(test)]
+mod tests {
+    use super::HalfCanvas;
+    use mocban_core::raster::{Grid, Mask};
+
+    #[test]
+    fn pixels_as_wide_as_strokes_explain_a_part_of_a_deviation() {
+        let bar = Mask::from_fn(40, 40, |x, _| (16..24).contains(&x));
+        let canvas = HalfCanvas::of(Grid::new(40, 40, 1), bar);
+        assert_eq!(canvas.without_pixels(0.25, 0.15), 0.25);
+        let small = HalfCanvas {
+            print_px: canvas.stroke_width,
+            ..canvas
+        };
+        assert!((small.without_pixels(0.25, 0.15) - 0.2).abs() < 1e-9);
+        assert_eq!(small.without_pixels(0.1, 0.15), 0.0);
+    }
 }

@@ -258,7 +258,8 @@ fn find_poses(
         max_scale: params.scale_band,
         beam_width: KEEP,
     };
-    let mut found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
+    let passes = PASSES.map(|pass| pass.smoothed(print.pixel_sigma()));
+    let mut found = search_coarse_to_fine(&print_base, wood, limits, &passes);
     let print_bounds = print.known.bounding_box();
     let print_px = longest(print_bounds);
     let (mut prior, mut kept) = (0.0, None);

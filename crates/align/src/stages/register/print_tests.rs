@@ -3,8 +3,9 @@
 use crate::stages::register::RegisterError;
 use crate::stages::testing::settings;
 use crate::stages::{AlignedPair, Print, Scan, StageError};
+use mocban_core::domain::Affine2;
 use mocban_core::mesh::Mesh;
-use mocban_core::raster::{ImageLimits, decode};
+use mocban_core::raster::{Grid, ImageLimits, PrintImage, decode, resample};
 use mocban_demo::{PairGenerator, Tier};
 
 fn try_align(mesh: Mesh, print: &[u8]) -> Result<AlignedPair, StageError> {
@@ -64,6 +65,35 @@ fn the_larger_part_of_a_torn_print_is_aligned_and_trusted_less() {
 #[test]
 fn a_torn_half_on_a_dark_ground_is_aligned() {
     assert!(confidence(Tier::HalfPrint, 8) > 0.5);
+}
+
+#[test]
+fn a_print_of_12_px_is_aligned() {
+    let pairs = PairGenerator::new(Tier::Hard, 12).with_vertices(Some(20_000));
+    let pair = pairs.pair(3).expect("images encode");
+    let full = decode(&pair.print, &ImageLimits::SUGGESTED).expect("an image");
+    let sides = [full.rgb.width(), full.rgb.height()];
+    let scale = 12.0 / sides[0].max(sides[1]) as f64;
+    let to = sides.map(|side| (side as f64 * scale + 1e-6) as usize);
+    let channel = |k: usize| {
+        let values = full.rgb.map(|colour| f32::from(colour[k]));
+        resample(&values, scale, [(scale - 1.0) / 2.0; 2], to)
+    };
+    let channels = [channel(0), channel(1), channel(2)];
+    let colour = |x, y| [0, 1, 2].map(|k: usize| channels[k].at(x, y).round() as u16);
+    let small = Print::from(PrintImage::from(Grid::from_fn(to[0], to[1], colour)));
+    let aligned = AlignedPair::new(&Scan::from(pair.mesh), &small, &settings());
+    let aligned = aligned.expect("an alignment");
+    let outcome = aligned.first_metric();
+    let full_from_small = Affine2::scale_shift(1.0 / scale, [(1.0 / scale - 1.0) / 2.0; 2]);
+    let [found, wanted] = [aligned.print_from_mesh(outcome), pair.truth.print_from_mesh];
+    for landmark in &pair.truth.landmarks {
+        let [u, v, _] = found.apply(*landmark);
+        let (a, b) = (full_from_small.apply([u, v]), wanted.apply(*landmark));
+        let apart = (a[0] - b[0]).hypot(a[1] - b[1]) / pair.truth.char_height_px;
+        assert!(apart < 0.05, "{apart}");
+    }
+    assert!(outcome.confidence.expect("a confidence") > 0.5);
 }
 
 #[test]

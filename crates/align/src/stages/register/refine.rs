@@ -208,12 +208,15 @@ struct WorkingImages<'a> {
     params: &'a RegisterParams,
     /// Middle of the depth map, pixels.
     middle: [f64; 2],
+    /// Least smoothing, see [`PrintMasks::pixel_sigma`].
+    pixel_sigma: f64,
 }
 
 impl<'a> WorkingImages<'a> {
     fn new(depths: &SoftMask, print: &PrintMasks, params: &'a RegisterParams) -> Option<Self> {
         let px = params.working_px as usize;
         Some(Self {
+            pixel_sigma: print.pixel_sigma(),
             ink: ImagePyramid::new(&print.soft_ink(), px)?,
             depths: ImagePyramid::new(depths, px)?,
             params,
@@ -224,7 +227,7 @@ impl<'a> WorkingImages<'a> {
     /// Scales print and relief to a fraction of the working size.
     fn at(&self, share: f64) -> ScaledImages<'_> {
         let px = (f64::from(self.params.working_px) * share).round() as usize;
-        let sigma = self.params.smoothing_px * share.sqrt();
+        let sigma = (self.params.smoothing_px * share.sqrt()).max(self.pixel_sigma * px as f64);
         ScaledImages {
             ink: self.ink.level(px, sigma),
             depths: self.depths.level_builder(px, sigma),

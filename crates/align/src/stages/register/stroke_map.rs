@@ -55,7 +55,7 @@ impl StrokeMap {
         let mut distances = canvas.distances_at_edges(|at| mask.data()[at], &canvas.edge);
         let spread = InkEdge::mean_near(&mut distances);
         let width = canvas.stroke_width;
-        let tolerance = tolerance_px(width);
+        let tolerance = tolerance_px(width, canvas.print_px);
         // Heavy ink lies outside the strokes, and dry ink ends inside them.
         let sides = [
             (&mask, &canvas.edge, (-spread).max(0.0)),

@@ -12,10 +12,14 @@ use mocban_core::domain::ReliefHeights;
 /// Typical spread of the ink, and its deviation, as fractions of the stroke width. Dry ink has negative spreads.
 const SPREAD: f64 = 0.03;
 const SPREAD_DEVIATION: f64 = 0.05;
+/// Deviation that the pixels of a small print add, as a fraction of their side.
+const PIXEL_DEVIATION: f64 = 0.1;
 /// Smallest deviation of the logarithm of the depth that the relief shows.
 const LEAST_DEVIATION: f64 = 0.02;
 /// Largest intersection over union with the true tops that a mask of the best depth is expected to have.
 const BEST_IOU: f64 = 0.93;
+/// Part of [`BEST_IOU`] that is lost if the pixels of a small print are as wide as the strokes: the pose is less exact.
+const PIXEL_IOU: f64 = 0.08;
 /// A mask is right if its intersection over union with the true tops is at least this.
 const RIGHT_IOU: f64 = 0.7;
 
@@ -27,6 +31,8 @@ pub(super) struct TopsEdge {
     spreads: Vec<f64>,
     /// Probability of each candidate. Their sum is 1.
     probabilities: Vec<f64>,
+    /// Largest intersection over union that is expected, see [`BEST_IOU`].
+    best_iou: f64,
 }
 
 impl TopsEdge {
@@ -51,6 +57,7 @@ impl TopsEdge {
             .map(|distances| InkEdge::mean_near(distances))
             .collect();
         let width = canvas.stroke_width;
+        let deviation = SPREAD_DEVIATION.hypot(PIXEL_DEVIATION * canvas.print_px / width);
         let weight = |(k, (share, _)): (usize, &(f64, u16))| {
             if areas[k] == 0.0 {
                 return 0.0;
@@ -58,7 +65,7 @@ impl TopsEdge {
             let depth = (share / relief.tops_end.max(f64::MIN_POSITIVE)).ln();
             let spread = spreads[k] / width - SPREAD;
             heavy_tailed(depth / relief.tops_end_log_deviation.max(LEAST_DEVIATION))
-                * heavy_tailed(spread / SPREAD_DEVIATION)
+                * heavy_tailed(spread / deviation)
         };
         let mut probabilities: Vec<f64> = levels.iter().enumerate().map(weight).collect();
         let sum: f64 = probabilities.iter().sum();
@@ -69,6 +76,7 @@ impl TopsEdge {
             areas,
             spreads,
             probabilities,
+            best_iou: BEST_IOU - PIXEL_IOU * (canvas.print_px / width).powi(2),
         }
     }
 
@@ -89,7 +97,7 @@ impl TopsEdge {
     /// Returns the probability that a candidate's mask is right.
     pub(super) fn probability_right(&self, candidate: usize) -> f64 {
         self.expected(candidate, |iou| {
-            f64::from(u8::from(BEST_IOU * iou >= RIGHT_IOU))
+            f64::from(u8::from(self.best_iou * iou >= RIGHT_IOU))
         })
     }
 

@@ -14,6 +14,11 @@ use mocban_core::raster::components::ConnectedComponents;
 const TOLERANCE: f64 = 0.3;
 /// Least tolerance in pixels of the half canvas.
 const TOLERANCE_PX: f64 = 1.5;
+/// Least tolerance in pixels of a small print.
+const TOLERANCE_PRINT_PX: f64 = 0.4;
+/// Edge scatter that the pixels of a small print cause if they are as wide as strokes. Measured on right pairs with prints
+/// of 12 to 24 px.
+const PIXEL_SCATTER: f64 = 0.15;
 /// Edges that deviate by at least this fraction of the stroke width do not count for the scatter.
 const NEAR: f64 = 0.5;
 /// Pieces within this many pixels of the border of the common area are left out. Walls, stains and neighbouring strokes
@@ -21,10 +26,12 @@ const NEAR: f64 = 0.5;
 pub(super) const BORDER_PX: i64 = 2;
 
 /// Returns the distance from the strokes of the other image, in pixels of the half canvas, from which a pixel has no
-/// partner. `stroke_width` is in the same pixels. Distances of [`REACH`] and more are not measured, so the result is
-/// smaller.
-pub(super) fn tolerance_px(stroke_width: f64) -> f64 {
-    (TOLERANCE * stroke_width).clamp(TOLERANCE_PX, (REACH - 1) as f64)
+/// partner. `stroke_width` and `print_px`, the side of the pixels of a small print, are in the same pixels. Distances of
+/// [`REACH`] and more are not measured, so the result is smaller.
+pub(super) fn tolerance_px(stroke_width: f64, print_px: f64) -> f64 {
+    (TOLERANCE * stroke_width)
+        .max(TOLERANCE_PRINT_PX * print_px)
+        .clamp(TOLERANCE_PX, (REACH - 1) as f64)
 }
 
 /// Strokes without a partner.
@@ -49,7 +56,7 @@ impl Unmatched {
     pub(super) fn of(canvas: &HalfCanvas, [highest, lowest]: [u16; 2]) -> Self {
         let wood = InkEdge::of(&canvas.mask(lowest));
         let width = canvas.stroke_width;
-        let tolerance = tolerance_px(width) as f32;
+        let tolerance = tolerance_px(width, canvas.print_px) as f32;
         let is_far = |distance: &f32| *distance < -tolerance;
         let unknown = canvas.levels.map(|level| *level == 0);
         let squares = |alone: &Mask| {
@@ -82,7 +89,8 @@ impl Unmatched {
 pub(super) fn edge_scatter(canvas: &HalfCanvas, strokes: &InkEdge) -> f64 {
     let width = canvas.stroke_width;
     let mut distances = canvas.distances_at_edges(|at| canvas.ink.data()[at], strokes);
-    mean_deviation(&mut distances, NEAR * width) / width
+    let scatter = mean_deviation(&mut distances, NEAR * width) / width;
+    canvas.without_pixels(scatter, PIXEL_SCATTER)
 }
 
 /// Returns the mean of the absolute deviations from the median, of the values that deviate by less than `most`. Returns
@@ -144,9 +152,11 @@ mod tests {
 
     #[test]
     fn tolerance_grows_with_the_strokes_up_to_the_largest_measured_distance() {
-        assert_eq!(tolerance_px(1.0), TOLERANCE_PX);
-        assert_eq!(tolerance_px(20.0), 6.0);
-        assert_eq!(tolerance_px(30.0), 7.0);
+        assert_eq!(tolerance_px(1.0, 0.0), TOLERANCE_PX);
+        assert_eq!(tolerance_px(20.0, 0.0), 6.0);
+        assert_eq!(tolerance_px(30.0, 0.0), 7.0);
+        // Pixels of a small print that are as wide as strokes.
+        assert_eq!(tolerance_px(10.0, 10.0), 4.0);
     }
 
     #[test]
