@@ -41,7 +41,8 @@ impl Numbers {
         self.add("inputs.character", &inputs.character)?;
         self.add("inputs.share", &inputs.doubts.share)?;
         self.add("inputs.smooth_misfit", &inputs.doubts.smooth_misfit)?;
-        self.add("inputs.seen_ink", &inputs.doubts.seen_ink)
+        self.add("inputs.seen_ink", &inputs.doubts.seen_ink)?;
+        self.add("inputs.pixel_width", &inputs.pixel_width)
     }
 
     /// Returns a value as text.

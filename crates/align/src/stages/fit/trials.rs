@@ -186,14 +186,15 @@ impl<'a> Trials<'a> {
         let normalized = normalize::normalize(&map, print, &NORMALIZE).ok()?;
         let registered = register::register(&map, &normalized, None, &REGISTER).ok()?;
         let outcome = &registered.outcome;
-        let mut metrics = outcome.metrics.iter();
-        let relief = metrics.find(|found| found.metric == ThresholdMetric::Relief)?;
+        let mut metrics = outcome.metrics.iter().zip(&registered.confidence_inputs);
+        let (relief, inputs) =
+            metrics.find(|(found, _)| found.metric == ThresholdMetric::Relief)?;
         let masks = &normalized.prints[outcome.ink];
         let ink = masks.ink.bounding_box()?;
         let masks_from_depth = masks.masks_from_print().after(&relief.print_from_depth);
         let print_from_plane = relief.print_from_depth.after(&map.scale.depth_from_plane);
         Some(TrialPose {
-            confidence: relief.confidence?,
+            confidence: inputs.of_candidate(),
             plane_from_print: print_from_plane.inverse()?,
             seen_ink: seen_ink(&masks.ink, &map, &masks_from_depth.inverse()?),
             ink: on_print(ink, &masks.print_from_masks()),

@@ -8,7 +8,7 @@
 //! describes. `MASK` was set manually, because few masks are wrong. It lowers the confidence if the pose is a few
 //! percent off. On generated pairs, the mean confidence is slightly below the fraction that is right.
 
-use super::doubts::Doubts;
+use super::doubts::{Doubts, of_pixels};
 use mocban_core::domain::{MetricOutcome, PoseFeatures};
 
 /// Number of inputs of the pose model: the constant 1, and the logarithms of the first five pose features.
@@ -64,11 +64,18 @@ pub struct ConfidenceInputs {
     pub prior: f64,
     /// What lowers the confidence further.
     pub doubts: Doubts,
+    /// Side of the pixels of a small print as a fraction of the stroke width, 0 for other prints.
+    pub pixel_width: f64,
 }
 
 impl ConfidenceInputs {
     /// Returns the confidence, 0..=1, under the built-in weights.
     pub fn confidence(&self) -> f64 {
+        self.of_candidate() * of_pixels(self.pixel_width, self.prior)
+    }
+
+    /// Returns the confidence apart from the size of the print's pixels, which is the same for all candidates of a fit.
+    pub(crate) fn of_candidate(&self) -> f64 {
         pose_probability(&self.pose, self.prior)
             * logistic(&MASK, &self.mask)
             * logistic(&CHARACTER, &self.character)
@@ -195,13 +202,14 @@ fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N]) -> f64 {
 }
 
 /// Sets the confidence of each metric, and returns each metric's model inputs. `rendered` are the features of the depth
-/// map as rendered, which differ from `features` if the map was levelled. `prior` is as in [`of_pose`]. `probabilities`
-/// holds the probability that the mask is right, for each metric.
+/// map as rendered, which differ from `features` if the map was levelled. `prior` is as in [`of_pose`], `pixel_width` as in
+/// [`ConfidenceInputs`]. `probabilities` holds the probability that the mask is right, for each metric.
 pub(super) fn set_confidence(
     metrics: &mut [MetricOutcome],
     [features, rendered]: [&PoseFeatures; 2],
     prior: f64,
     doubts: Doubts,
+    pixel_width: f64,
     probabilities: impl Iterator<Item = f64>,
 ) -> Vec<ConfidenceInputs> {
     let pose = pose_inputs(less_likely(of_pair_alone, [rendered, features]));
@@ -213,6 +221,7 @@ pub(super) fn set_confidence(
             character,
             prior,
             doubts,
+            pixel_width,
         };
         outcome.confidence = Some(inputs.confidence());
         inputs
@@ -306,6 +315,7 @@ mod tests {
             character: character_inputs(&PLAIN),
             prior: 0.0,
             doubts,
+            pixel_width: 0.0,
         };
         let without = inputs(NO_DOUBTS).confidence();
         let with = |doubts| inputs(doubts).confidence() / without;

@@ -9,6 +9,11 @@ const OTHER_BLOCK_DEVIATION: f64 = 0.0035;
 const LEAST_SEEN: f64 = 0.6;
 /// Factor of the confidence of a part with hardly any ink. It is 1 for a whole print.
 const OF_PART: f64 = 0.5;
+/// Range of the side of a print's pixels, as a fraction of the stroke width, in which the confidence falls to [`COARSE`].
+const PIXEL_WIDTHS: [f64; 2] = [0.88, 1.02];
+/// Factor of the confidence of a print whose pixels are about as wide as its strokes. Prints of 12 pixels by another hand, or
+/// of a similar character, agree as well as the right ones.
+const COARSE: f64 = 0.5;
 
 /// What lowers the confidence of an alignment, apart from the three logistic models.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,9 +54,20 @@ fn of_seen_ink(seen_ink: f64) -> f64 {
     (seen_ink / LEAST_SEEN).clamp(0.0, 1.0)
 }
 
+/// Returns the factor of the confidence for the side of a print's pixels as a fraction of the stroke width. It is 1 if the
+/// whole page agrees with the block, by the odds `prior`: then print and wood belong together.
+pub(super) fn of_pixels(pixel_width: f64, prior: f64) -> f64 {
+    if prior > 0.0 {
+        return 1.0;
+    }
+    let [fine, coarse] = PIXEL_WIDTHS;
+    let part = ((pixel_width - fine) / (coarse - fine)).clamp(0.0, 1.0);
+    1.0 - (1.0 - COARSE) * part
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Doubts, of_same_block, of_seen_ink};
+    use super::{COARSE, Doubts, of_pixels, of_same_block, of_seen_ink};
 
     #[test]
     fn little_ink_on_the_scan_lowers_the_confidence() {
@@ -79,5 +95,13 @@ mod tests {
     fn strokes_that_are_displaced_are_evidence_against_the_block() {
         assert!(of_same_block(0.05) > 0.99 && of_same_block(0.068) > 0.9);
         assert!(of_same_block(0.09) < 0.05);
+    }
+
+    #[test]
+    fn pixels_as_wide_as_strokes_lower_the_confidence_of_a_pair_alone() {
+        assert_eq!(of_pixels(0.0, 0.0), 1.0);
+        assert_eq!(of_pixels(1.2, 0.0), COARSE);
+        assert!(of_pixels(0.9, 0.0) > of_pixels(1.0, 0.0));
+        assert_eq!(of_pixels(1.2, 3.0), 1.0);
     }
 }
