@@ -14,7 +14,7 @@ use crate::small_block::{demo_block, few_labels, few_labels_with};
 const TRIANGLE: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 300 0 0\nvertex 0 200 0\nendloop\nendfacet\nendsolid a\n";
 
 /// Writes the files of some blocks, and a list of them.
-fn write_blocks(dir: &Path, names: &[&str]) {
+pub(crate) fn write_blocks(dir: &Path, names: &[&str]) {
     let mut list = "block,mesh,page,labels,unit,side\n".to_owned();
     for name in names {
         fs::write(dir.join(format!("{name}.stl")), TRIANGLE).expect("written");

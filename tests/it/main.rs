@@ -30,6 +30,8 @@ mod bit_flips;
 mod block_correction;
 mod block_demo;
 mod block_export;
+#[cfg(unix)]
+mod block_outage;
 mod block_view;
 mod blocks;
 mod browser;

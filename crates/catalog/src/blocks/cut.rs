@@ -12,6 +12,7 @@ use crate::db::rows::names_json;
 use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::queue::checkpoint::{self, LeasedCheckpoints};
+use crate::queue::commit::known_leases::stored_before;
 use crate::queue::counters::Deltas;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::{Lease, StageCheckpoint};
@@ -48,9 +49,6 @@ pub enum CutReply {
     /// that was, so that their files would fall together on Windows and macOS; nothing was stored.
     NameTaken(PairName),
 }
-
-/// Finds out whether the last stage was stored already under the same lease, although its reply was lost.
-const IS_DONE: &str = "SELECT 1 FROM block_job WHERE block = ?1 AND token = ?2 AND status = 3";
 
 const NAME: &str = "SELECT name FROM block WHERE id = ?1";
 
@@ -130,11 +128,11 @@ async fn finish(
         return Ok(CutReply::NameTaken(taken));
     }
     if !checkpoint::store(conn, done, &mut uncounted()).await? {
-        let finished = query_scalar(IS_DONE).bind(lease.unit.0).bind(lease.token);
-        let finished: Option<i64> = finished.fetch_optional(conn).await?;
-        return Ok(match finished {
-            Some(_) => CutReply::Stored(CutSummary::default()),
-            None => CutReply::Refused,
+        let stored = stored_before(conn, [done].into_iter(), [].into_iter()).await?;
+        return Ok(if lease.is_in(&stored) {
+            CutReply::Stored(CutSummary::default())
+        } else {
+            CutReply::Refused
         });
     }
     let mut deltas = Deltas::default();

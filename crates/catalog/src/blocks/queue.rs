@@ -11,6 +11,7 @@ use crate::db::row::{FromRow as _, from_row};
 use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::queue::claim::{ClaimRequest, add_claim, add_release, in_order, leases, release_due};
+use crate::queue::commit::known_leases::is_end_stored;
 use crate::queue::counters::Deltas;
 use crate::queue::kind::{StoredKind as _, Template};
 use crate::queue::lease::{CheckpointOutcome, FencedRow, Lease, StageCheckpoint, StageFailure};
@@ -110,7 +111,8 @@ impl Catalog {
         })
     }
 
-    /// Stores a failed stage of a block. Returns `false`, and stores nothing, if the lease was lost.
+    /// Stores a failed stage of a block. Returns `false`, and stores nothing, if the lease was lost. A call again, because
+    /// the reply was lost, stores nothing and returns `true`.
     pub async fn fail_block(
         &self,
         lease: Lease<BlockJob>,
@@ -118,17 +120,19 @@ impl Catalog {
     ) -> Result<bool> {
         let item = (lease, failed);
         in_transaction!(self, |conn| {
-            fail::store(conn, &item, &mut uncounted()).await
+            let is_stored = fail::store(conn, &item, &mut uncounted()).await?;
+            Ok(is_stored || is_end_stored(conn, &item.0).await?)
         })
     }
 
-    /// Gives a lease back. Returns `false` if it was lost.
+    /// Gives a lease back. Returns `false` if it was lost. A call again, because the reply was lost, returns `true`.
     pub async fn release_block(&self, lease: Lease<BlockJob>) -> Result<bool> {
         in_transaction!(self, |conn| {
             let mut script = Script::default();
             let statement = add_release(&mut script, [&lease].into_iter())?;
             let rows = script.run(conn).await?;
-            Ok(lease.is_in(&rows.read_if_any(statement.as_ref())?))
+            let is_released = lease.is_in(&rows.read_if_any(statement.as_ref())?);
+            Ok(is_released || is_end_stored(conn, &lease).await?)
         })
     }
 

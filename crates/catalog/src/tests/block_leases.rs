@@ -1,8 +1,11 @@
 //! Leases of blocks that are lost: what a worker stores under them is refused.
 
-use super::blocks::{continued, done, inputs, world};
+use super::blocks::{block, continued, done, failed, inputs, world};
 use super::register;
-use crate::{BlockInputVersions, BlockJob, CheckpointOutcome, DeadWorker, Lease};
+use crate::{
+    BlockInputVersions, BlockJob, CheckpointOutcome, DeadWorker, FailureAction, Lease,
+    RetrySelection,
+};
 use mocban_core::domain::BlockStage;
 
 #[tokio::test]
@@ -44,6 +47,37 @@ async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
     // The reply was lost, and the worker sends the same checkpoint again.
     let again = world.catalog.checkpoint_block(lease, stage).await;
     assert_eq!(again.expect("a reply"), CheckpointOutcome::Lease(advanced));
+}
+
+/// A worker sends a failure or a release again if the connection broke, because it may have been stored.
+#[tokio::test]
+async fn a_failure_or_a_release_that_is_sent_again_is_stored_once() {
+    let world = world().await;
+    let (lease, work) = world.leased_block().await;
+    for _ in 0..2 {
+        let released = world.catalog.release_block(lease.clone()).await;
+        assert!(released.expect("a reply"));
+    }
+    let (lease, _) = world.leased_block().await;
+    assert_eq!(lease.attempt(), 1);
+    let refused = failed(&work, BlockStage::Face, FailureAction::Quarantine);
+    for _ in 0..2 {
+        let stored = world.catalog.fail_block(lease.clone(), refused.clone());
+        assert!(stored.await.expect("a reply"));
+    }
+    let detail = world.catalog.block(&block("b")).await.expect("a read");
+    assert_eq!(detail.expect("the block").attempts.len(), 1);
+    let names = RetrySelection::Names(vec![block("b")]);
+    let none = RetrySelection::Names(Vec::new());
+    let retried = world.catalog.retry_pairs_and_blocks(&none, &names).await;
+    assert_eq!(retried.expect("stored"), [0, 1]);
+    // Another lease has begun, so neither was stored under this one.
+    let (other, _) = world.leased_block().await;
+    let late = world.catalog.fail_block(lease.clone(), refused).await;
+    assert!(!late.expect("a reply"));
+    let late = world.catalog.release_block(lease).await;
+    assert!(!late.expect("a reply"));
+    assert_eq!(world.leased_block().await.0, other);
 }
 
 #[tokio::test]

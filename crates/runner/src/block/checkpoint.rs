@@ -179,7 +179,8 @@ pub(crate) async fn store_failure(
     let attributes = &block.work.attributes;
     let paths = [&attributes.mesh_path, &attributes.page_path];
     if let Err(error) = check_folders(context, paths.map(String::clone)).await {
-        if let Err(error) = context.catalog.release_block(block.lease).await {
+        let (catalog, lease) = (&context.catalog, &block.lease);
+        if let Err(error) = stored!(catalog.release_block(lease.clone())) {
             tracing::warn!(%error, "the block could not be given back");
         }
         return Err(error);
@@ -205,7 +206,8 @@ pub(crate) async fn store_failure(
         at: now,
         alive_since: context.alive_since(),
     };
-    if !context.catalog.fail_block(block.lease, failed).await? {
+    let (catalog, lease) = (&context.catalog, &block.lease);
+    if !stored!(catalog.fail_block(lease.clone(), failed.clone()))? {
         return Ok(AfterStage::End(BlockEnd::LeaseLost));
     }
     let block = block.work.attributes.name;

@@ -102,7 +102,7 @@ impl BlockSlot {
         if !pairs.reserve_for_block(&work.attributes.name, bytes) {
             // Pairs that wait for a slot start before the block is claimed again, but no others are claimed.
             self.waits_for_memory = true;
-            self.context.catalog.release_block(lease).await?;
+            retried!(catalog.release_block(lease.clone()))?;
             return Ok(true);
         }
         let task = process_block(Arc::clone(&self.context), lease, work);

@@ -99,7 +99,8 @@ async fn end_without_store(
 }
 
 async fn release(context: &RunContext, lease: Lease<BlockJob>) -> Result<BlockEnd, RunError> {
-    context.catalog.release_block(lease).await?;
+    let catalog = &context.catalog;
+    stored!(catalog.release_block(lease.clone()))?;
     Ok(BlockEnd::Released)
 }
 
