@@ -8,6 +8,7 @@ use tokio::sync::{mpsc, oneshot};
 
 use crate::db::conn::{Conn, ConnectionKind, Work};
 use crate::db::error::{CatalogError, Result};
+use crate::db::left_out::LeftOut;
 use crate::db::open;
 use crate::db::postgres_address::PostgresAddress;
 use crate::db::retry_wait::RetryWait;
@@ -15,7 +16,6 @@ use crate::queue::commit::commit_delay::CommitDelay;
 use crate::queue::commit::request::{Message, Reply};
 use crate::queue::commit::write_connection::WriteConnection;
 use crate::queue::commit::writer;
-use crate::records::left_out::LeftOut;
 
 /// Capacity of the writer's channel.
 const INBOX: usize = 1024;

@@ -3,10 +3,10 @@
 use crate::blocks::block_job::BlockJob;
 use crate::db::conn::Conn;
 use crate::db::transaction::in_transaction;
-use crate::queue::pair_job::PairJob;
-use crate::queue::recovery::{
+use crate::jobs::recovery::{
     self as recovery, DeadWorker, Recovered, RecoveredJobs, holders_but, mark_dead,
 };
+use crate::queue::pair_job::PairJob;
 use crate::{Catalog, Result};
 use mocban_core::domain::{UnixMillis, WorkerId};
 

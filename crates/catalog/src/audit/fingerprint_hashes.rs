@@ -6,7 +6,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::Row;
 use crate::db::transaction::in_transaction;
-use crate::queue::fingerprint::hash_of;
+use crate::jobs::fingerprint::hash_of;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, Stage};
 

@@ -9,9 +9,9 @@ use crate::db::dialect::Sql;
 use crate::db::error_kind::CatalogErrorKind;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::schema;
+use crate::jobs::job_counts::count_jobs;
 use crate::queue::counters::{CounterKey, JobGroup};
 use crate::queue::fragments::inconsistent;
-use crate::queue::job_counts::count_jobs;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::JobStatus;
 

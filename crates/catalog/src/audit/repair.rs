@@ -10,11 +10,11 @@ use crate::db::query::query;
 use crate::db::rows::json_array;
 use crate::db::schema::{self, SchemaDifference, wanted_objects};
 use crate::db::transaction::in_transaction;
+use crate::jobs::job_counts::count_jobs;
+use crate::jobs::requeue::send_back;
 use crate::queue::counters::Deltas;
 use crate::queue::fragments::{fingerprint_before, inconsistent};
-use crate::queue::job_counts::count_jobs;
 use crate::queue::pair_job::PairJob;
-use crate::queue::requeue::send_back;
 use crate::{Catalog, Result};
 use mocban_core::domain::{PairId, Stage};
 

@@ -1,8 +1,9 @@
 //! Stores the control points of blocks.
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::query::{query, query_scalar};
 use crate::db::transaction::in_transaction;
-use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::checksums;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 

@@ -3,14 +3,15 @@
 use crate::blocks::block_job::BlockJob;
 use crate::blocks::model::BlockAttributes;
 use crate::blocks::queue::uncounted;
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
+use crate::db::left_out::is_counted;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::transaction::in_transaction;
-use crate::queue::requeue::{self, RetrySelection};
-use crate::records::checksums::{self, ChecksummedTable};
+use crate::jobs::requeue::{self, RetrySelection};
+use crate::records::checksums;
 use crate::records::import::is_same_file;
-use crate::records::left_out::is_counted;
 use crate::records::same_files::{self, SameFiles};
 use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};

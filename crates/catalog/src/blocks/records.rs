@@ -4,12 +4,12 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::blocks::model::{BlockAttributes, BlockInputVersions};
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
+use crate::db::left_out::is_counted;
 use crate::db::query::query_as;
 use crate::db::row::{FromRow, Row, from_row};
 use crate::db::value::Json;
-use crate::records::checksums::ChecksummedTable;
-use crate::records::left_out::is_counted;
 use crate::records::model::{AttemptRecord, StoredFailure, stored_failure};
 use crate::{Catalog, Result};
 use mocban_core::domain::{

@@ -1,9 +1,10 @@
 //! Removes blocks that were imported by mistake, or with files that cannot be read.
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::transaction::in_transaction;
-use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::checksums;
 use crate::{Catalog, Result};
 use mocban_core::domain::BlockName;
 

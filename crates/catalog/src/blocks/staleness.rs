@@ -15,11 +15,11 @@ use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow, Row};
 use crate::db::transaction::in_transaction;
 use crate::db::value::Json;
-use crate::queue::block_settings::BlockSettings;
+use crate::jobs::block_settings::BlockSettings;
+use crate::jobs::requeue::{requeue, send_back};
+use crate::jobs::staleness::RerunPolicy;
 use crate::queue::counters::{CounterKey, KeyedJob};
 use crate::queue::lease::position;
-use crate::queue::requeue::{requeue, send_back};
-use crate::queue::staleness::RerunPolicy;
 use crate::{Catalog, InputVersion, Result};
 use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
 

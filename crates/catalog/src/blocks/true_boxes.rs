@@ -1,9 +1,9 @@
 //! Boxes on the pages of blocks that are known to be right, where a dataset has them.
 
+use crate::db::checksummed_table::ChecksummedTable;
+use crate::db::left_out::is_counted;
 use crate::db::query::query;
 use crate::db::value::Json;
-use crate::records::checksums::ChecksummedTable;
-use crate::records::left_out::is_counted;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, TrueBox};
 

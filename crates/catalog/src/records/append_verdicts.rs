@@ -5,12 +5,13 @@ use std::ops::RangeInclusive;
 
 use serde_json::{Value, json};
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::transaction::in_transaction;
-use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::checksums;
 use crate::records::judged_results::{JudgedResult, current_results};
 use crate::records::review_context::ReviewContext;
 use crate::records::reviewer_names::{Spellings, person_name, to_store};

@@ -10,42 +10,13 @@
 use serde_json::json;
 
 use crate::Result;
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::Row;
 use crate::db::rows::json_array;
-use mocban_core::domain::{ContentHash, enum_names};
-
-/// A table whose rows have checksums.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum ChecksummedTable {
-    /// Pairs as imported.
-    Pair,
-    /// True alignments.
-    Truth,
-    /// The log of verdicts.
-    Verdict,
-    /// Undone verdicts.
-    VerdictUndo,
-    /// The log of answers to attention checks.
-    Answer,
-    /// Undone answers to attention checks.
-    AnswerUndo,
-    /// The log of manual alignments.
-    ManualAlignment,
-    /// Undone manual alignments.
-    ManualAlignmentUndo,
-    /// Blocks as imported.
-    Block,
-}
-
-enum_names! { pub ChecksummedTable, "a table with checksums":
-    Pair = "pair", Truth = "truth", Verdict = "verdict", VerdictUndo = "verdict_undo",
-    Answer = "attention_check_answer", AnswerUndo = "attention_check_undo",
-    ManualAlignment = "manual_alignment", ManualAlignmentUndo = "manual_alignment_undo",
-    Block = "block",
-}
+use mocban_core::domain::ContentHash;
 
 /// The statements of one table.
 pub(super) struct Statements {

@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value as Json, json};
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::Row;
 use crate::db::value::Value;
-use crate::records::checksums::{COVERED, ChecksummedTable, checksum};
+use crate::records::checksums::{COVERED, checksum};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{Affine2, AttentionCheck, PrintFromMesh, enum_names};
 

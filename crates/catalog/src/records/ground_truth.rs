@@ -2,10 +2,11 @@
 
 use serde_json::{Value, json};
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
 use crate::db::query::query_scalar;
 use crate::db::rows::json_array;
-use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::checksums;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::PairName;
 

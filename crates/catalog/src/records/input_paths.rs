@@ -2,10 +2,11 @@
 
 use serde_json::{Value, json};
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as};
-use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::checksums;
 use crate::{Catalog, Result};
 use mocban_core::domain::ArtifactRef;
 

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::db::checksummed_table::ChecksummedTable;
+use crate::db::left_out::is_counted;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::transaction::in_transaction;
-use crate::records::checksums::{self, ChecksummedTable};
-use crate::records::left_out::is_counted;
+use crate::records::checksums;
 use crate::records::review_answers::pair_id;
 use crate::records::reviewer_names::{of_row, to_store};
 use crate::{Catalog, Result};

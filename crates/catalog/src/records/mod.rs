@@ -8,7 +8,6 @@ pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod input_paths;
 pub(crate) mod judged_results;
-pub(crate) mod left_out;
 pub(crate) mod listed_names;
 pub(crate) mod manual_alignments;
 pub(crate) mod model;

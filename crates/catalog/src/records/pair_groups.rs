@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::dialect::Sql;
+use crate::db::left_out::is_counted;
 use crate::db::query::{query, query_scalar};
-use crate::records::checksums::ChecksummedTable;
-use crate::records::left_out::is_counted;
 use crate::{Catalog, Result};
 use mocban_core::domain::PairName;
 

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
+use crate::db::left_out::{LeftOut, is_counted};
 use crate::db::query::{Query, query, query_as};
 use crate::db::row::{FromRow as _, Row};
 use crate::db::rows::json_array;
 use crate::db::value::Json;
 use crate::queue::counters::Cursor;
-use crate::records::checksums::ChecksummedTable;
-use crate::records::left_out::{LeftOut, is_counted};
 use crate::records::model::{
     FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord, stored_failure,
 };

@@ -2,12 +2,13 @@
 
 use serde::Serialize;
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
+use crate::db::left_out::is_counted;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::row::{FromRow, Row, from_row};
 use crate::db::transaction::in_transaction;
-use crate::records::checksums::{self, ChecksummedTable};
-use crate::records::left_out::is_counted;
+use crate::records::checksums;
 use crate::records::review_context::ReviewContext;
 use crate::records::reviewer_names::{Spellings, of_row, to_store};
 use crate::records::verdicts::{self, NewVerdict};

@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::json;
 
+use crate::db::left_out::LeftOut;
 use crate::db::query::{query, query_scalar};
 use crate::db::rows::json_array;
 use crate::db::transaction::in_transaction;
 use crate::records::faulty_rows::FaultyRow;
-use crate::records::left_out::LeftOut;
 use crate::{Catalog, Result};
 use mocban_core::domain::{UnixMillis, one_line};
 

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
+use crate::jobs::fingerprint::{Fingerprints, current_json};
+use crate::jobs::retired::RETIRED_COUNT;
+use crate::jobs::staleness::count_stale;
 use crate::queue::counters::{JobCounts, by_status, counters};
-use crate::queue::fingerprint::{Fingerprints, current_json};
-use crate::queue::retired::RETIRED_COUNT;
-use crate::queue::staleness::count_stale;
 use crate::records::model::{StageCounts, StatusCounts};
 use crate::records::reviewer_names::Spellings;
 use crate::{Catalog, Result};

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
+use crate::db::left_out::{LeftOut, is_counted};
 use crate::db::query::{As, Query, query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::transaction::in_transaction;
-use crate::records::checksums::{self, ChecksummedTable};
-use crate::records::left_out::{LeftOut, is_counted};
+use crate::records::checksums;
 use crate::records::review_context::ReviewContext;
 use crate::records::reviewer_names::{Spellings, of_row};
 use crate::{Catalog, CatalogError, Result};

@@ -188,7 +188,7 @@ impl World {
     /// Counts stale pairs by inspecting every result.
     async fn count_stale(&self, fingerprints: &Fingerprints) -> u64 {
         let mut conn = self.catalog.read_conn().await.expect("a reader");
-        let current = super::queue::fingerprint::current_json(&mut conn, fingerprints).await;
+        let current = super::jobs::fingerprint::current_json(&mut conn, fingerprints).await;
         let n: i64 = query_scalar(
             "SELECT count(*) FROM job AS j JOIN pair AS p ON p.id = j.pair WHERE EXISTS (
                 SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::queue::fingerprint::differences;
-use crate::queue::plan::FieldChange;
+use crate::jobs::fingerprint::differences;
+use crate::jobs::plan::FieldChange;
 use mocban_core::domain::BlockStage;
 
 /// The settings of the stages of a block, by stage: each stage's revision and settings.

@@ -12,10 +12,10 @@ use crate::db::conn::Conn;
 use crate::db::error::Result;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::{FromRow as _, Row};
+use crate::jobs::fingerprint::FingerprintChains;
+use crate::jobs::plan::StaleReason;
 use crate::queue::counters::{CounterKey, Cursor, counters};
-use crate::queue::fingerprint::FingerprintChains;
 use crate::queue::fragments::inconsistent;
-use crate::queue::plan::StaleReason;
 use crate::queue::selection::PairSelection;
 use mocban_core::domain::{JobStatus, PairId, Stage};
 

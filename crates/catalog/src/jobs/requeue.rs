@@ -7,15 +7,15 @@ use serde_json::json;
 use crate::db::conn::{Conn, Work};
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
-use crate::queue::counters::{CounterKey, Cursor, Deltas, KeyedJob, cursor};
-use crate::queue::fingerprint::{FingerprintChains, Fingerprints, current_json};
-use crate::queue::kind::{JobKind, StoredKind, Template};
-use crate::queue::pair_job::PairJob;
-use crate::queue::plan::StaleReason;
-use crate::queue::selection::{PairSelection, unknown_names};
-use crate::queue::staleness::{
+use crate::jobs::fingerprint::{FingerprintChains, Fingerprints, current_json};
+use crate::jobs::plan::StaleReason;
+use crate::jobs::staleness::{
     PAGE, RerunPolicy, StaleJob, clear_dirty, decide, groups, inspect, inspect_marked,
 };
+use crate::queue::counters::{CounterKey, Cursor, Deltas, KeyedJob, cursor};
+use crate::queue::kind::{JobKind, StoredKind, Template};
+use crate::queue::pair_job::PairJob;
+use crate::queue::selection::{PairSelection, unknown_names};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{FailureClass, JobStatus, Stage};
 

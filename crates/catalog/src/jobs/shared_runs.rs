@@ -7,10 +7,10 @@ use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::transaction::in_transaction;
-use crate::queue::fingerprint::{differences, fields_of};
-use crate::queue::plan::FieldChange;
+use crate::jobs::fingerprint::{differences, fields_of};
+use crate::jobs::plan::FieldChange;
+use crate::jobs::workers::WorkerSettings;
 use crate::queue::provenance::FingerprintId;
-use crate::queue::workers::WorkerSettings;
 use crate::{Catalog, Result};
 use mocban_core::domain::{Stage, UnixMillis};
 

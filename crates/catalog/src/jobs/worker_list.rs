@@ -2,7 +2,7 @@
 
 use crate::db::query::query_as;
 use crate::db::row::from_row;
-use crate::queue::shared_runs::SHOWN_ACTIVE_MS;
+use crate::jobs::shared_runs::SHOWN_ACTIVE_MS;
 use crate::{Catalog, Result};
 use mocban_core::domain::{UnixMillis, WorkerId, WorkerMetrics, enum_names};
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::records::checksums::ChecksummedTable;
+use crate::db::checksummed_table::ChecksummedTable;
 
 /// The numbers of rows that a catalog leaves out, as JSON arrays by table.
 #[derive(Debug, Default)]

@@ -10,7 +10,7 @@ use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
 use crate::db::transaction::in_transaction;
 use crate::db::value::Json;
-use crate::queue::plan::{FieldChange, METHOD};
+use crate::jobs::plan::{FieldChange, METHOD};
 use crate::queue::provenance::FingerprintId;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, Stage};

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::db::conn::Conn;
-use crate::queue::fingerprint::{
+use crate::jobs::fingerprint::{
     FingerprintChains, Fingerprints, current_json, differences, fields_of,
 };
-use crate::queue::plan::{Plan, PlanEntry, StaleReason};
+use crate::jobs::plan::{Plan, PlanEntry, StaleReason};
+use crate::jobs::staleness::{RerunPolicy, StaleJob, count_stale, decide, inspect, inspect_all};
 use crate::queue::selection::{PairSelection, select};
-use crate::queue::staleness::{RerunPolicy, StaleJob, count_stale, decide, inspect, inspect_all};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{PairName, Stage};
 
