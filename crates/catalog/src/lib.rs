@@ -110,4 +110,5 @@ pub use records::same_files::SameFiles;
 pub use records::set_apart::SetApart;
 pub use records::verdict_rules::{InvalidVerdict, NOTE_CHARS, check_event, reviewer_name};
 pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};
-pub use transfer::{CatalogCopy, CopiedTable, CopyProgress};
+pub use transfer::rows::CopiedTable;
+pub use transfer::{CatalogCopy, CopyProgress};

@@ -5,12 +5,12 @@
 //! holds rows is only compared. `backup.rs` copies a file as a whole.
 
 pub(crate) mod backup;
-mod rows;
+pub(crate) mod rows;
 mod tables;
 
 use std::path::Path;
 
-use self::rows::{TableReader, content, insert};
+use self::rows::{CopiedTable, TableReader, content, insert};
 use self::tables::TABLES;
 use crate::audit::repair::recount;
 use crate::db::conn::{Conn, ConnectionKind};
@@ -34,17 +34,6 @@ SELECT EXISTS (SELECT 1 FROM pg_locks
         AND database = (SELECT oid FROM pg_database WHERE datname = current_database())
         AND (CAST(classid AS bigint) << 32) | CAST(objid AS bigint) = CAST(?1 AS bigint))";
 const SCHEMA: &str = "SELECT current_setting('search_path')";
-
-/// What a table of a copy contains.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct CopiedTable {
-    /// The table.
-    pub name: &'static str,
-    /// Number of its rows.
-    pub rows: u64,
-    /// Hash of its rows, the same in every database.
-    pub hash: ContentHash,
-}
 
 /// Result of a copy.
 #[derive(Debug, Clone, PartialEq, Eq)]

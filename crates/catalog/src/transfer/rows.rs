@@ -2,7 +2,6 @@
 
 use sqlx::{AssertSqlSafe, Sqlite};
 
-use super::CopiedTable;
 use super::tables::CopyTable;
 use crate::db::conn::Conn;
 use crate::db::dialect::add_literal;
@@ -14,6 +13,17 @@ use mocban_core::domain::ContentHash;
 
 /// Rows in one statement. SQLite allows 32,766 parameters, and a table has at most 23 columns.
 const PAGE: i64 = 1_000;
+
+/// What a table of a copy contains.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct CopiedTable {
+    /// The table.
+    pub name: &'static str,
+    /// Number of its rows.
+    pub rows: u64,
+    /// Hash of its rows, the same in every database.
+    pub hash: ContentHash,
+}
 
 /// Reads a table in the order of its keys, and counts and hashes its rows.
 pub(super) struct TableReader {
