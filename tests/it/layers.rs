@@ -1,8 +1,9 @@
 //! Checks the dependencies of the crates, and that neither files nor folders import each other in cycles.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 
+use crate::import_graph::ImportGraph;
 use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 
 /// Dependencies that only these crates may have.
@@ -106,233 +107,12 @@ fn only_progress_and_screen_draw() {
     }
 }
 
-/// The import graph of the files of a crate.
-struct ImportGraph {
-    files: Vec<SourceFile>,
-    by_module: BTreeMap<Vec<String>, usize>,
-    /// Names that a module re-exports, with the paths that they stand for.
-    re_exports: BTreeMap<(Vec<String>, String), Vec<String>>,
-}
-
-impl ImportGraph {
-    /// Returns the graph of each crate.
-    fn of_all_crates() -> Vec<Self> {
-        let mut crates: BTreeMap<String, Vec<SourceFile>> = BTreeMap::new();
-        for file in source_files() {
-            if !file.is_test && file.name != "src/main.rs" {
-                crates
-                    .entry(file.crate_name.clone())
-                    .or_default()
-                    .push(file);
-            }
-        }
-        crates.into_values().map(Self::new).collect()
-    }
-
-    fn new(files: Vec<SourceFile>) -> Self {
-        let by_module = files
-            .iter()
-            .enumerate()
-            .map(|(index, file)| (file.module(), index))
-            .collect();
-        let mut graph = Self {
-            files,
-            by_module,
-            re_exports: BTreeMap::new(),
-        };
-        for index in 0..graph.files.len() {
-            let module = graph.files[index].module();
-            for path in graph.re_exported_paths(index) {
-                if let Some(name) = path.last() {
-                    graph
-                        .re_exports
-                        .insert((module.clone(), name.clone()), path);
-                }
-            }
-        }
-        graph
-    }
-
-    /// Returns the modules that a file declares.
-    fn children(&self, index: usize) -> Vec<String> {
-        let module = self.files[index].module();
-        let is_child =
-            |other: &&Vec<String>| other.len() == module.len() + 1 && other.starts_with(&module);
-        self.by_module
-            .keys()
-            .filter(is_child)
-            .filter_map(|child| child.last().cloned())
-            .collect()
-    }
-
-    /// Returns the absolute paths in `pub use` declarations.
-    fn re_exported_paths(&self, index: usize) -> Vec<Vec<String>> {
-        let code = self.files[index].production_code();
-        let declarations = code.split("\npub").skip(1).filter_map(|text| {
-            let text = text
-                .strip_prefix("(crate)")
-                .or_else(|| text.strip_prefix("(super)"))
-                .unwrap_or(text);
-            let declaration = text.strip_prefix(" use ")?;
-            Some(format!("use {};", declaration.split(';').next()?))
-        });
-        declarations
-            .flat_map(|declaration| self.absolute_paths(index, &declaration))
-            .collect()
-    }
-
-    /// Returns the paths that a piece of a file's code uses, as paths from the crate root.
-    fn absolute_paths(&self, index: usize, code: &str) -> Vec<Vec<String>> {
-        let module = self.files[index].module();
-        let below = |base: &[String], paths: Vec<Vec<String>>| {
-            let join = |path| [base.to_vec(), path].concat();
-            paths.into_iter().map(join).collect::<Vec<_>>()
-        };
-        let mut found = below(&[], paths_after(code, "crate::"));
-        let mut prefix = String::from("super::");
-        for depth in (0..module.len()).rev() {
-            let paths = paths_after(code, &prefix);
-            found.extend(
-                below(&module[..depth], paths)
-                    .into_iter()
-                    .filter(|path| path.last().is_none_or(|name| name != "super")),
-            );
-            prefix.push_str("super::");
-        }
-        for child in self.children(index) {
-            let base = [module.clone(), vec![child.clone()]].concat();
-            found.extend(below(&base, paths_after(code, &format!("{child}::"))));
-        }
-        found
-    }
-
-    /// Returns the file that defines what a path names.
-    fn file_of(&self, path: &[String]) -> Option<usize> {
-        for length in (1..=path.len()).rev() {
-            let (module, rest) = path.split_at(length);
-            let Some(index) = self.by_module.get(module) else {
-                continue;
-            };
-            let target = rest
-                .first()
-                .and_then(|name| self.re_exports.get(&(module.to_vec(), name.clone())));
-            return match target {
-                Some(target) if target != path => self.file_of(target).or(Some(*index)),
-                Some(_) | None => Some(*index),
-            };
-        }
-        None
-    }
-
-    /// Returns the files that a file imports from. A re-export is no import, because it does not use the item.
-    fn imports(&self, index: usize) -> BTreeSet<usize> {
-        let code = without_visibility_paths(&self.files[index].production_code());
-        let mut used = String::new();
-        for (at, text) in code.split("\npub").enumerate() {
-            let visible = text
-                .strip_prefix("(crate)")
-                .or_else(|| text.strip_prefix("(super)"))
-                .unwrap_or(text);
-            let body = if at > 0 && visible.starts_with(" use ") {
-                visible.split_once(';').map_or("", |(_, rest)| rest)
-            } else {
-                text
-            };
-            used.push_str(body);
-            used.push('\n');
-        }
-        let paths = self.absolute_paths(index, &used);
-        let files = paths.iter().filter_map(|path| self.file_of(path));
-        files.filter(|file| *file != index).collect()
-    }
-
-    /// Returns the groups of files that import each other.
-    fn cycles(&self) -> Vec<BTreeSet<String>> {
-        let imports: Vec<BTreeSet<usize>> = (0..self.files.len())
-            .map(|index| self.imports(index))
-            .collect();
-        let name = |index: usize| self.files[index].name.clone();
-        cycles(&imports, name)
-    }
-
-    /// Returns the groups of folders that import each other, a folder with its own folders as one. A file beside the
-    /// folders counts as one, except `mod.rs` and `lib.rs`, which may import from all of them.
-    fn folder_cycles(&self, parent: &[String]) -> Vec<BTreeSet<String>> {
-        let child_of = |index: usize| {
-            let module = self.files[index].module();
-            (module.len() > parent.len() && module.starts_with(parent))
-                .then(|| module[parent.len()].clone())
-        };
-        let children: Vec<String> = (0..self.files.len())
-            .filter_map(child_of)
-            .collect::<BTreeSet<_>>()
-            .into_iter()
-            .collect();
-        let position = |child: &String| children.binary_search(child).expect("a child");
-        let mut imports = vec![BTreeSet::new(); children.len()];
-        for index in 0..self.files.len() {
-            let Some(from) = child_of(index).as_ref().map(position) else {
-                continue;
-            };
-            let targets = self.imports(index).into_iter().filter_map(child_of);
-            let others = targets
-                .map(|child| position(&child))
-                .filter(|to| *to != from);
-            imports[from].extend(others);
-        }
-        let name = |index: usize| [parent, &[children[index].clone()]].concat().join("/");
-        cycles(&imports, name)
-    }
-}
-
-/// Returns the groups of nodes that reach each other.
-fn cycles(imports: &[BTreeSet<usize>], name: impl Fn(usize) -> String) -> Vec<BTreeSet<String>> {
-    let starts = 0..imports.len();
-    let reached: Vec<BTreeSet<usize>> = starts.map(|start| reachable(imports, start)).collect();
-    let mut groups = BTreeSet::new();
-    for (index, from_here) in reached.iter().enumerate() {
-        if from_here.contains(&index) {
-            let group = from_here
-                .iter()
-                .filter(|other| reached[**other].contains(&index));
-            groups.insert(group.map(|other| name(*other)).collect::<BTreeSet<_>>());
-        }
-    }
-    groups.into_iter().collect()
-}
-
-/// Replaces `pub(in path)` by `pub(crate)`, because the path of a visibility is not an import.
-fn without_visibility_paths(code: &str) -> String {
-    let mut parts = code.split("pub(in ");
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        text.push_str("pub(crate");
-        text.push_str(part.find(')').map_or("", |end| &part[end..]));
-    }
-    text
-}
-
-/// Returns the nodes reachable from a node over at least one edge.
-fn reachable(edges: &[BTreeSet<usize>], start: usize) -> BTreeSet<usize> {
-    let mut found = BTreeSet::new();
-    let mut open: Vec<usize> = edges[start].iter().copied().collect();
-    while let Some(node) = open.pop() {
-        if found.insert(node) {
-            open.extend(&edges[node]);
-        }
-    }
-    found
-}
-
 #[test]
 fn files_do_not_import_each_other_in_cycles() {
     let graphs = ImportGraph::of_all_crates();
     let cycles: Vec<_> = graphs.iter().flat_map(ImportGraph::cycles).collect();
     assert!(cycles.is_empty(), "import cycles: {cycles:#?}");
 }
-
-/// Folders whose children may import each other in cycles. Remove a folder when its cycle is broken; add none.
-const CYCLIC_FOLDERS: &[&str] = &[];
 
 #[test]
 fn folders_do_not_import_each_other_in_cycles() {
@@ -344,10 +124,8 @@ fn folders_do_not_import_each_other_in_cycles() {
             .collect();
         for parent in parents {
             let name = format!("{}:{}", graph.files[0].crate_name, parent.join("/"));
-            if !CYCLIC_FOLDERS.contains(&name.as_str()) {
-                let cycles = graph.folder_cycles(&parent);
-                found.extend(cycles.into_iter().map(|cycle| (name.clone(), cycle)));
-            }
+            let cycles = graph.folder_cycles(&parent);
+            found.extend(cycles.into_iter().map(|cycle| (name.clone(), cycle)));
         }
     }
     assert!(found.is_empty(), "import cycles: {found:#?}");

@@ -78,6 +78,7 @@ mod hostile;
 #[cfg(target_os = "linux")]
 mod hostile_pairs;
 mod image_pages;
+mod import_graph;
 mod import_snapshots;
 mod invariance;
 mod kill;

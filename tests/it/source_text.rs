@@ -18,6 +18,17 @@ pub(crate) struct SourceFile {
 }
 
 impl SourceFile {
+    /// Returns a file with this path below the `src` of a crate, to test a check.
+    pub(crate) fn of_text(path: &str, text: &str) -> Self {
+        Self {
+            name: path.to_owned(),
+            crate_name: "sample".to_owned(),
+            path: path.to_owned(),
+            text: text.to_owned(),
+            is_test: false,
+        }
+    }
+
     /// Returns the code without comments and unit tests. Returns an empty text if the file contains only tests.
     pub(crate) fn production_code(&self) -> String {
         if self.is_test {
