@@ -1,15 +1,19 @@
 //! The catalog: pairs, blocks, jobs, leases, results and verdicts in SQLite or PostgreSQL.
 //!
-//! - `queue`: the job queue; `blocks`: the data of whole blocks; `records`: the data of pairs, verdicts and imports;
-//!   `audit`: checks and repairs; `transfer`: copies to another catalog; `db`: connections, statements, errors
+//! - From the lowest to the highest, each imports only from those before it. `db`: connections, statements, errors; `queue`:
+//!   leases, and what workers store under them; `handle.rs`: the open catalog; `jobs`: plans, recovery and workers;
+//!   `records`: the data of pairs, verdicts and imports; `blocks`: the data of whole blocks; `audit`: checks and repairs;
+//!   `transfer`: copies to another catalog
 //! - A process has one write connection, which a task owns. It commits the requests of several pairs together, each at most
 //!   250 ms after it arrived. Reads use other connections and go on during a run. Callers pass the current time.
-//! - A statement has one text for both databases, which `db/dialect.rs` translates; claims, and checkpoints of pairs, have
-//!   one for each. In SQLite, a group of these of pairs is one transaction. In PostgreSQL, each is one statement that commits
-//!   by itself, with one array per column, and claims begin behind the last claimed pair, because a snapshot that another
-//!   session holds would keep dead rows in the way. For blocks, each is a transaction of its own.
-//! - If the server is unavailable, the writer reconnects and repeats its commit; the fencing token shows whether an earlier
-//!   attempt was stored. The write connection of a worker holds a lock, by which others see that it is gone.
+//! - A statement has one text for both databases, which `db/dialect.rs` translates. Claims, and checkpoints of pairs, have a
+//!   text for each database. In SQLite, the requests for pairs that are committed together are one transaction. In
+//!   PostgreSQL, the checkpoints among them, and each claim, are one statement that commits by itself; claims begin behind
+//!   the last claimed pair, because a snapshot that another session holds would keep dead rows in the way. Each request for a
+//!   block is a transaction of its own.
+//! - If the server is unavailable, the writer reconnects and repeats requests for pairs, and the runner those for blocks. The
+//!   fencing token shows whether an earlier attempt was stored (`queue/commit/known_leases.rs`). The write connection of a
+//!   worker holds a lock, by which others see that it is gone.
 //! - Rows that no run can compute again, such as verdicts, have checksums (`records/checksums.rs`).
 //! - `db init --roles` gives the tables to group roles: the database refuses what a role may not do.
 //!

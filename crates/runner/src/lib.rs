@@ -15,41 +15,42 @@
 //! # A lost lease
 //!
 //! ```text
-//!             claim                    checkpoint of the last stage
-//!   ready ------------> leased ------------------------------------> done
-//!     ^                  |  ^ |
-//!     |   release        |  | | checkpoint: the deadline of the next stage; heartbeat of the worker: its leases stay valid
-//!     +------------------+  +-+
-//!     |                  |
-//!     |                  | the worker sends no heartbeat for 50 s (PostgreSQL: 7 s without lock and heartbeat, unless it
-//!     |                  | was never seen connected; SQLite: at once, if a run starts alone), or its stage is overdue: recovery; or a repair
-//!     |                  | or a new cut of its block resets the job
-//!     |   a new fencing token
-//!     +------------------+------------> quarantined, if the job has crashed too many workers
+//!   ready ---- claim ----> leased ---- checkpoint of the last stage ----> done
+//!     ^                      |
+//!     +- release, recovery --+---- recovery, if the job has crashed too many workers ----> quarantined
 //! ```
 //!
-//! A lease is valid while the last heartbeat of its worker is at most 50 s old (`RunContext::alive_since`) and its job has its
-//! token. A checkpoint does not renew it. A passed deadline ends nothing by itself: another worker recovers the job if the
-//! deadline is more than 60 s past and it has read the catalog without a gap for two stage timeouts.
+//! A write under a lease is stored if the worker has not ended, its last heartbeat is at most 50 s old
+//! (`RunContext::alive_since`), and the job has the token of the lease; a checkpoint of a pair on PostgreSQL also needs its
+//! stage. A release needs only worker and token. A checkpoint does not renew the lease. A repair, a new cut of its block and a
+//! recovery give a job a new token, and retiring a pair removes its job. A job is recovered when its worker has sent no
+//! heartbeat for 50 s (`timing.rs`), when a run starts alone on SQLite, or when its deadline is more than 60 s past and another
+//! worker has read the catalog without a gap for two stage timeouts; a passed deadline alone ends nothing. On PostgreSQL, 7 s
+//! without lock and heartbeat are enough for a worker that has been connected, or has appeared, since the last gap in the reads
+//! of the process that recovers (`liveness.rs`).
 //!
 //! | who finds out | by | refused by (in `crates/catalog/src`) | what happens |
 //! |---|---|---|---|
 //! | `checkpointer.rs` | a checkpoint of a pair is refused | SQLite: `ADVANCE` in `queue/checkpoint.rs`; PostgreSQL: `queue/server_checkpoint.rs` | this and later results are dropped; the stage that runs is cancelled |
-//! | `block/checkpoint.rs` | a checkpoint of a block is refused | `ADVANCE`; then `IS_DONE` in `blocks/cut.rs` finds a cut that was stored without a reply | the task ends; no stage runs meanwhile |
-//! | `block/task.rs` | the versions of the files of a block are refused | `LEASED` in `blocks/queue.rs` | the same |
+//! | `block/checkpoint.rs`, `block/task.rs` | a checkpoint of a block, or versions of its files, are refused | `ADVANCE` in `queue/checkpoint.rs`, `LEASED` in `blocks/queue.rs` | the task ends; no stage runs meanwhile |
 //! | `pair_failure.rs`, `block/checkpoint.rs` | a failure is refused | `FAIL` in `queue/fail.rs` | the failure is not stored |
-//! | `worker_session.rs` | a heartbeat is refused | `HEARTBEAT` in `queue/claim.rs` | `prefetch.rs` releases what has not started; the process registers as a new worker, and recovers the jobs of its old id. The new id ends the waits for `RunContext::expired`, which cancels the stages that run: in `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of `block/task.rs`. Heartbeats do not show that another worker recovered a job, or that a repair or a new cut reset it: the stage runs on, and its next write is refused |
-//! | the catalog | files were written more than 30 minutes ago | pairs on PostgreSQL: `is_late` in `queue/commit/server_commit.rs`; blocks: `store` in `queue/checkpoint.rs`; pairs on SQLite: not checked | nothing is stored; the job stays leased to this worker, which claims it again. Here it is a refused checkpoint |
-//! | `checkpointer.rs`, `block/task.rs` | a release is refused | `RELEASE` in `queue/claim.rs` | the pair ends as `LeaseLost`, the block as `Released` |
+//! | `worker_session.rs`, for `scheduler.rs` | a heartbeat is refused | `HEARTBEAT` in `queue/claim.rs` | the process becomes a new worker: see below |
+//! | the worker, as a refused checkpoint | files were written more than 30 minutes ago | pairs on PostgreSQL: `is_late` in `queue/commit/server_commit.rs`; blocks: `store` in `queue/checkpoint.rs`; pairs on SQLite: not checked | nothing is stored; the job stays leased to this worker, which claims it again |
+//! | `checkpointer.rs`; others ignore it | a release is refused | `RELEASE` in `queue/claim.rs` | the pair ends as `LeaseLost` |
 //!
-//! In the other rows, a pair or block that ran ends as `LeaseLost`, which counts neither as done nor as failed. Stages
-//! stored before stay. On PostgreSQL, `queue/commit/known_leases.rs` finds refused writes of pairs that an earlier commit
-//! without a reply has stored. The job of a retired pair is removed, which ends its lease too. A pair that another worker
-//! recovered may have killed the worker, so it runs with no other pair beside it (on PostgreSQL: on its host): in its process
-//! until it ends, in others until its next stage is stored. `liveness.rs` decides when a
-//! worker counts as dead, and `timing.rs` has the times. If heartbeats fail with an error for as long as a lease lasts, or
-//! the log of SQLite is lost, the run finishes the stages in progress and ends with that error. An unavailable server is waited
-//! for; a heartbeat that comes too late is refused.
+//! A pair or block that loses its lease while it runs ends as `LeaseLost`, which counts neither as done nor as failed; after a
+//! refused heartbeat, a pair may also end as `Released`. Stages stored before stay. A recovered pair may have killed its
+//! worker, so no other pair runs beside it (on PostgreSQL: on its host): in its own process until it has ended, in others until
+//! its next stage is stored.
+//!
+//! After a refused heartbeat, `prefetch.rs` releases what has not started, and the process registers as a new worker and
+//! recovers the jobs of its old id. The new id ends the waits for `RunContext::expired`, which cancels the stages that run: in
+//! `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of `block/task.rs`. Heartbeats do not show that another worker
+//! recovered a job, or that a repair or a new cut reset it: the stage runs on, and its next write is refused. If heartbeats
+//! fail with an error for as long as a lease lasts, or the log of SQLite is lost, the run finishes the stages in progress and
+//! ends with that error. If the connection to a server breaks, writes are sent again until a stop request ends the waits, and
+//! `queue/commit/known_leases.rs` finds those that were stored before without a reply. A checkpoint of a block before `cut` is
+//! accepted twice, and then has two rows in `block_attempt`.
 //!
 //! # Cancellation
 //!
