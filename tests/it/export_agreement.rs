@@ -2,17 +2,21 @@
 //! canvas show the same pixels.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use mocban::export::ExportFormat;
 use mocban::raster::{Grid, decode_grey8, decode_grey16};
 use mocban::store::Project;
 use serde_json::Value;
+use tiff::decoder::{Decoder, DecodingResult};
 
 use crate::check::at;
 use crate::cli::mocban;
-use crate::export_readback::{agreeing_lines, every_format, lines};
+use crate::export_readback::{
+    agreeing_lines, every_format, images_of_parquet, lines, members, parts,
+};
 use crate::resume::copy;
 
 /// Returns whether an export with certain options must hold a line.
@@ -39,7 +43,7 @@ static JUDGED: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
         names.sort();
         format!("{folder}/{}", names[number].to_string_lossy())
     };
-    let list = fs::File::create(data.join("pairs.csv")).expect("a file");
+    let list = File::create(data.join("pairs.csv")).expect("a file");
     let mut list = csv::Writer::from_writer(list);
     list.write_record(["id", "mesh", "print", "character", "block"])
         .expect("written");
@@ -224,6 +228,65 @@ fn agreement<T: PartialEq + Copy>(
     (equal as f64 / compared as f64, compared)
 }
 
+/// Returns the last channel of a stack, the strokes, as 255 and 0.
+fn mask_of_stack(path: &Path) -> Grid<u8> {
+    let stack = File::open(path).expect("a stack");
+    let mut stack = Decoder::new(stack).expect("a TIFF");
+    while stack.more_images() {
+        stack.next_image().expect("a channel");
+    }
+    let (width, height) = stack.dimensions().expect("a size");
+    let DecodingResult::F32(values) = stack.read_image().expect("a channel") else {
+        unreachable!("a stack has floats");
+    };
+    let is_stroke = values.iter().map(|value| u8::from(*value > 0.0) * 255);
+    Grid::from_vec(width as usize, height as usize, is_stroke.collect()).expect("a channel")
+}
+
+/// Returns the strokes on the print of each pair in a format as 255 and 0, or `None` if it has no pictures in the frame of
+/// the print.
+fn aligned_masks(export: &Path, format: ExportFormat) -> Option<BTreeMap<String, Grid<u8>>> {
+    const ROLE: &str = "aligned_mask";
+    let folder = export.join(format.name());
+    let id = |line: &Value| line["id"].as_str().expect("an id").to_owned();
+    let files: BTreeMap<String, Vec<u8>> = match format {
+        ExportFormat::Jsonl => {
+            let of_pairs = lines(&folder).into_iter();
+            let masks = of_pairs.map(|line| (id(&line), grey8(&folder, &line, ROLE)));
+            return Some(masks.collect());
+        }
+        ExportFormat::Fiji => {
+            let of_pairs = lines(&folder).into_iter();
+            let masks = of_pairs.map(|line| {
+                let stack = line["files"]["stack"].as_str().expect("a stack");
+                (id(&line), mask_of_stack(&folder.join(stack)))
+            });
+            return Some(masks.collect());
+        }
+        ExportFormat::Parquet => images_of_parquet(&folder.join("pairs.parquet"), ROLE),
+        ExportFormat::HuggingFace => {
+            let tables = parts(&folder.join("data"), "parquet").into_iter();
+            let images = tables.flat_map(|(_, table)| images_of_parquet(&table, ROLE));
+            images.collect()
+        }
+        ExportFormat::WebDataset => {
+            let shards = parts(&folder, "tar").into_iter();
+            let files = shards.flat_map(|(_, shard)| members(&shard));
+            let ending = format!(".{ROLE}.png");
+            let masks = files
+                .filter_map(|(name, file)| Some((name.strip_suffix(&ending)?.to_owned(), file)));
+            masks.collect()
+        }
+        ExportFormat::Csv
+        | ExportFormat::Mesh
+        | ExportFormat::Annotations
+        | ExportFormat::Viewer => return None,
+    };
+    let decoded = files.into_iter();
+    let decoded = decoded.map(|(id, file)| (id, decode_grey8(&file).expect("a mask")));
+    Some(decoded.collect())
+}
+
 #[test]
 fn pictures_on_a_canvas_show_the_same_pixels() {
     const PX: usize = 200;
@@ -234,7 +297,7 @@ fn pictures_on_a_canvas_show_the_same_pixels() {
     let whole = export(
         &project,
         "canvas",
-        &[&args[..], &["--canvas", "200"]].concat(),
+        &[&args[..], &["--canvas", "200", "--images"]].concat(),
     );
     let canvas = whole.join("jsonl");
     let pairs = lines(&native);
@@ -266,13 +329,14 @@ fn pictures_on_a_canvas_show_the_same_pixels() {
             share > 0.99 && compared > PX * PX / 4,
             "{share} of {compared}: {line}"
         );
-        let stack = whole.join(format!(
-            "fiji/pairs/{}/stack.tif",
-            line["id"].as_str().expect("an id")
-        ));
-        let stack = fs::File::open(stack).expect("a stack");
-        let mut stack = tiff::decoder::Decoder::new(stack).expect("a TIFF");
-        assert_eq!(stack.dimensions().expect("a size"), (PX as u32, PX as u32));
+    }
+    let masks = aligned_masks(&whole, ExportFormat::Jsonl).expect("pictures");
+    assert_eq!(masks.len(), pairs.len());
+    for format in ExportFormat::ALL {
+        let found = aligned_masks(&whole, format);
+        let name = format.name();
+        assert_eq!(found.is_some(), format.writes_pictures(), "{name}");
+        assert!(found.is_none_or(|found| found == masks), "{name}");
     }
 }
 

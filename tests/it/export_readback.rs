@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use mocban::export::ExportFormat;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
-use parquet::record::Field;
+use parquet::record::{Field, Row};
 use serde_json::Value;
 
 /// Returns every format, as `--to` expects them.
@@ -59,7 +59,7 @@ pub(crate) fn lines(folder: &Path) -> Vec<Value> {
 
 /// Returns the files of a folder with this extension, each with its part of the dataset. The part is the first word of
 /// the name.
-fn parts(folder: &Path, extension: &str) -> Vec<(String, PathBuf)> {
+pub(crate) fn parts(folder: &Path, extension: &str) -> Vec<(String, PathBuf)> {
     let entries = fs::read_dir(folder).expect("a folder");
     let paths = entries.map(|entry| entry.expect("an entry").path());
     let is_wanted = |path: &PathBuf| path.extension().is_some_and(|found| found == extension);
@@ -86,11 +86,35 @@ fn of_csv(path: &Path) -> Vec<ResultLabel> {
         .collect()
 }
 
-/// Returns the labels of a Parquet table.
-fn of_parquet(path: &Path) -> Vec<ResultLabel> {
+/// Returns the rows of a Parquet table.
+fn rows_of_parquet(path: &Path) -> Vec<Row> {
     let table = SerializedFileReader::new(File::open(path).expect("a file")).expect("a table");
     let rows = table.get_row_iter(None).expect("rows");
-    let rows = rows.map(|row| row.expect("a row"));
+    rows.map(|row| row.expect("a row")).collect()
+}
+
+/// Returns the image files in a column of a Parquet table, by the ids of the pairs.
+pub(crate) fn images_of_parquet(path: &Path, column: &str) -> BTreeMap<String, Vec<u8>> {
+    let rows = rows_of_parquet(path).into_iter();
+    rows.map(|row| {
+        let cells: BTreeMap<_, _> = row.get_column_iter().collect();
+        let (Field::Str(id), Field::Group(image)) =
+            (cells[&"id".to_owned()], cells[&column.to_owned()])
+        else {
+            unreachable!("{column} is no image")
+        };
+        let bytes = image.get_column_iter().find_map(|(_, part)| match part {
+            Field::Bytes(bytes) => Some(bytes.data().to_vec()),
+            _ => None,
+        });
+        (id.clone(), bytes.expect("the bytes of an image"))
+    })
+    .collect()
+}
+
+/// Returns the labels of a Parquet table.
+fn of_parquet(path: &Path) -> Vec<ResultLabel> {
+    let rows = rows_of_parquet(path).into_iter();
     rows.map(|row| {
         let cells: BTreeMap<_, _> = row.get_column_iter().collect();
         ResultLabel::of(|name| match cells[&name.to_owned()] {
