@@ -36,7 +36,6 @@ mod postgres_server;
 mod query_plans;
 mod queue;
 mod records;
-mod retry;
 #[cfg(any(test, feature = "test-helpers"))]
 mod test_helpers;
 #[cfg(test)]

@@ -1,6 +1,6 @@
-//! Stores the stages of one pair under its lease, in order. A separate task does this, so that the compute thread does
-//! not wait for the disk. The files of a stage are on the disk before the stage's row is stored. Stages that arrive
-//! during a transaction share the next transaction. At its end, the task returns the lease.
+//! Stores the stages of one pair under its lease, in order, and its failure. A separate task stores stages, so that the compute
+//! thread does not wait for the disk. The files of a stage are on the disk before the stage's row is stored. Stages that
+//! arrive during a transaction share the next transaction. At its end, the task returns the lease.
 
 use std::sync::Arc;
 
@@ -11,10 +11,12 @@ use super::blocking::task_result;
 use super::compute_thread::ComputedStage;
 use super::error::RunError;
 use super::events::RunEvent;
-use super::pair_failure::PairFailure;
+use super::policy::{self, FailedAttempt};
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stage_files::{Unwritten, write_batch};
-use mocban_catalog::{CheckpointOutcome, Lease};
+use mocban_catalog::{
+    CheckpointOutcome, FailureAction, InputVersions, Lease, PairProvenance, StageFailure,
+};
 use mocban_core::domain::{Failure, FailureClass, PairName, Stage, WorkerId};
 use mocban_system::failpoint::{self, Point};
 
@@ -186,5 +188,75 @@ fn report_stored(context: &RunContext, pair: PairName, stage: Stage, ms: u64) {
     });
     if stage == context.until {
         context.emit(RunEvent::PairDone { pair });
+    }
+}
+
+/// A stage of a pair that failed.
+pub(super) struct PairFailure {
+    pub(super) name: PairName,
+    /// The manifest attributes as JSON.
+    pub(super) attributes: String,
+    pub(super) stage: Stage,
+    pub(super) failure: Failure,
+    /// Whether a retry may succeed.
+    pub(super) is_transient: bool,
+    /// The input files as read.
+    pub(super) inputs: InputVersions,
+    pub(super) ms: Option<u64>,
+}
+
+impl PairFailure {
+    /// Stores the failure under the lease. Returns how the pair ended.
+    pub(super) async fn store(
+        self,
+        context: &RunContext,
+        lease: Lease,
+    ) -> Result<PairEnd, RunError> {
+        let Self { stage, failure, .. } = self;
+        let now = context.clock.now();
+        let attempt = FailedAttempt {
+            id: lease.id(),
+            class: failure.class,
+            is_transient: self.is_transient,
+            attempt: lease.attempt(),
+            ran_alone: lease.exclusive(),
+        };
+        let action = policy::failure_action(attempt, now);
+        let record = StageFailure {
+            stage,
+            failure: failure.clone(),
+            action,
+            provenance: PairProvenance::new(
+                context.fingerprints.of(stage),
+                &self.inputs,
+                self.attributes,
+            ),
+            inputs: self.inputs,
+            ms: self.ms,
+            at: now,
+            alive_since: context.alive_since(),
+        };
+        if !context.catalog.fail(lease, record).await? {
+            tracing::info!(pair = %self.name, "the lease is lost, so its failure is not stored");
+            return Ok(PairEnd::LeaseLost);
+        }
+        let pair = self.name;
+        if action == FailureAction::Quarantine {
+            let skipped = (context.until.index() + 1).saturating_sub(stage.index()) as u64;
+            context.emit(RunEvent::PairFailed {
+                pair,
+                stage,
+                failure,
+                skipped,
+            });
+            return Ok(PairEnd::Failed);
+        }
+        context.emit(RunEvent::PairBackingOff {
+            pair,
+            stage,
+            failure,
+            wait_ms: action.wait_ms(now),
+        });
+        Ok(PairEnd::Retry)
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::checkpointer::Checkpointer;
+use super::checkpointer::{Checkpointer, PairFailure};
 use super::compute_thread::{ComputeEvent, ComputeThread};
 use super::error::RunError;
 use super::events::RunEvent;
@@ -13,7 +13,6 @@ use super::folder_check::check_folders;
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::pair_context::{FileInUse, PairContext};
-use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::{Stop, StopLevel};
 use mocban_catalog::{InputVersions, Lease, PairAttributes, PairWork};
