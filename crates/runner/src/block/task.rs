@@ -51,7 +51,7 @@ pub(crate) async fn process_block(
     });
     loop {
         if context.is_draining() {
-            return release(&context, block.lease).await;
+            return release(&context, &block.lease).await;
         }
         let after = match run_stage(&context, &mut block, stage).await {
             Ok(computed) => store_stage(&context, block, stage, computed).await,
@@ -68,11 +68,11 @@ pub(crate) async fn process_block(
                 store_failure(&context, block, stage, error, ms).await
             }
             Err(Interruption::Stopped) => {
-                return release(&context, block.lease).await;
+                return release(&context, &block.lease).await;
             }
             Err(Interruption::LeaseLost) => return Ok(BlockEnd::LeaseLost),
             Err(Interruption::Store(error)) => {
-                return end_without_store(&context, block.lease, error).await;
+                return end_without_store(&context, &block.lease, error).await;
             }
             Err(Interruption::Run(error)) => Err(error),
         };
@@ -87,7 +87,7 @@ pub(crate) async fn process_block(
 /// again later. Any other error, such as refused credentials, concerns all blocks and ends the run.
 async fn end_without_store(
     context: &RunContext,
-    lease: Lease<BlockJob>,
+    lease: &Lease<BlockJob>,
     error: ArtifactError,
 ) -> BlockReport {
     let end = release(context, lease).await?;
@@ -98,7 +98,7 @@ async fn end_without_store(
     Err(error.into())
 }
 
-async fn release(context: &RunContext, lease: Lease<BlockJob>) -> Result<BlockEnd, RunError> {
+async fn release(context: &RunContext, lease: &Lease<BlockJob>) -> Result<BlockEnd, RunError> {
     let catalog = &context.catalog;
     stored!(catalog.release_block(lease.clone()))?;
     Ok(BlockEnd::Released)
