@@ -1,5 +1,5 @@
-//! The queue of pairs and blocks: leases, checkpoints, failures, and the task that writes them. Only functions on connections, on
-//! which the handle of the catalog stands; its methods are in `jobs`, `blocks` and `records`.
+//! The queue of pairs and blocks: leases, checkpoints, failures, and the task that writes them. Its functions take
+//! connections. The handle of the catalog uses them; methods of the handle are in `jobs`, `blocks` and `records`.
 
 pub(crate) mod checkpoint;
 pub(crate) mod claim;
