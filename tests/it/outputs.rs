@@ -65,6 +65,7 @@ fn files_of_a_project_are_never_an_output() {
         "mocban.toml",
         "run.lock",
         "run.members",
+        "empty-import.txt",
         "artifacts/x.html",
         "artifacts",
     ] {

@@ -176,20 +176,71 @@ fn the_newest_import_is_undone_and_done_again() {
     fs::write(dir.path().join("p/data/again.csv"), again).expect("written");
     at(&["import", "p/data/again.csv"]).expect(0);
     assert_eq!(pairs(), 6);
-    // An import that adds nothing is not the newest one.
-    at(&["import", "p/data/manifest.csv"]).expect(0);
     let undone = at(&["retire", "--last-import", "--json"]).expect(0).json();
     assert_eq!((&undone["retired"], &pairs()), (&json!(3), &json!(3)));
     at(&["show", PAIRS[0]]).expect(0);
     // A second call does not undo the import before.
     let twice = at(&["retire", "--last-import", "--json"]).expect(0);
-    let text = "the newest import that added pairs was on ";
+    let text = "the import that added these pairs was on ";
     assert!(twice.err.contains(text), "{}", twice.err);
     let twice = twice.json();
     assert_eq!((&twice["unchanged"], &pairs()), (&json!(3), &json!(3)));
     at(&["retire", "--undo", "--last-import"]).expect(0);
     assert_eq!(pairs(), 6);
     at(&["retire", "--last-import", PAIRS[0]]).expect(2);
+}
+
+#[test]
+fn an_import_without_new_pairs_is_not_undone_as_the_one_before() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
+    let list = |name: &str, ids: &[&str]| {
+        let rows: String = ids
+            .iter()
+            .map(|id| format!("{id},{id}.stl,{id}.png\n"))
+            .collect();
+        fs::write(dir.path().join(name), format!("id,mesh,print\n{rows}")).expect("written");
+    };
+    list("a.csv", &["a1", "a2"]);
+    list("b.csv", &["b1", "b2", "b3"]);
+    fs::write(
+        dir.path().join("blocks.csv"),
+        "block,mesh,page\nv1,v.stl,v.png\n",
+    )
+    .expect("written");
+    let import = |name: &str| at(&["import", name, "--allow-missing"]).expect(0);
+    for name in ["a.csv", "b.csv"] {
+        import(name);
+    }
+    for empty in ["a.csv", "blocks.csv"] {
+        import(empty);
+        for undo in [&["--last-import"][..], &["--undo", "--last-import"]] {
+            let refused = at(&[&["retire"], undo].concat()).expect(2);
+            for text in [
+                "the newest import, on ",
+                ", added no pair; the newest one that did was on ",
+                " and added 3 pairs, first b1: give --import 1 in place of --last-import",
+            ] {
+                assert!(refused.err.contains(text), "{text}: {}", refused.err);
+            }
+        }
+        assert_eq!(pairs_and_retired(dir.path()), [5, 0]);
+    }
+    let undo = at(&["retire", "--import", "2"]).expect(0).next();
+    assert!(undo[0].ends_with("retire --undo --import 2"), "{undo:?}");
+    assert_eq!(pairs_and_retired(dir.path()), [3, 2]);
+    at(&["retire", "--import", "1"]).expect(0);
+    assert_eq!(pairs_and_retired(dir.path()), [0, 5]);
+    at(&["retire", "--undo", "--import", "2"]).expect(0);
+    assert_eq!(pairs_and_retired(dir.path()), [2, 3]);
+    let none = at(&["retire", "--import", "3"]).expect(4);
+    let reason = "fewer than 3 imports have added pairs";
+    assert!(none.err.contains(reason), "{}", none.err);
+    // An import that adds pairs is the newest one again.
+    list("c.csv", &["c1"]);
+    import("c.csv");
+    at(&["retire", "--last-import"]).expect(0);
+    assert_eq!(pairs_and_retired(dir.path()), [2, 4]);
 }
 
 #[test]

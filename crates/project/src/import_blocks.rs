@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::block_files;
+use crate::empty_import;
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
@@ -159,6 +160,8 @@ pub async fn import_blocks(
         },
     );
     listing.warnings.extend(same_files);
+    // Pairs are cut from blocks by a run.
+    listing.warnings.extend(empty_import::note(&project, now()));
     Ok(BlockImportOutcome {
         summary,
         missing,

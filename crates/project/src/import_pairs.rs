@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::empty_import;
 use crate::error::{ProjectResult, TaskStopped, WithContext as _};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
@@ -144,6 +145,9 @@ pub async fn import_pairs(
         },
     );
     warnings.extend(same_files);
+    if summary.added == 0 {
+        warnings.extend(empty_import::note(&project, now()));
+    }
     Ok(ImportOutcome {
         summary,
         truths,

@@ -36,6 +36,7 @@ pub mod closing;
 pub mod copy;
 pub mod demo_folder;
 pub mod details;
+mod empty_import;
 pub mod error;
 pub mod events;
 pub mod exit;

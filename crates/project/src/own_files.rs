@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::empty_import::EMPTY_IMPORT_FILE;
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::files::is_backup;
@@ -28,7 +29,8 @@ pub(crate) fn project_role(path: &Path) -> Option<&'static str> {
     // Copies such as `catalog.sqlite.bak` are not files of the project.
     let rest = name.strip_prefix(CATALOG_FILE);
     let is_catalog = rest.is_some_and(|rest| ["", "-wal", "-shm", "-journal"].contains(&rest));
-    let is_known = is_catalog || [SETTINGS_FILE, "run.lock", "run.members"].contains(&&*name);
+    let is_known = is_catalog
+        || [SETTINGS_FILE, EMPTY_IMPORT_FILE, "run.lock", "run.members"].contains(&&*name);
     // The parent of a bare file name is empty.
     let folder = Path::new(".").join(real.parent().unwrap_or(&real));
     if is_known && is_project(&folder) {

@@ -2,13 +2,17 @@
 
 use std::collections::BTreeSet;
 
+use crate::empty_import;
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::location::{Location, now};
 use crate::selection;
-use mocban_catalog::{Catalog, CatalogError};
+use mocban_catalog::{Catalog, CatalogError, ImportedPair};
 use mocban_core::domain::{BlockName, PairName, RetireCause, UnixMillis};
+use mocban_results::number_format::counted;
 use mocban_runner::NamedWork;
+use mocban_store::Project;
+use mocban_system::time_text::local;
 
 /// What became of some pairs.
 #[derive(Debug)]
@@ -19,7 +23,7 @@ pub struct RetireOutcome {
     pub changed: u64,
     /// Blocks without pairs that were removed.
     pub removed_blocks: Vec<BlockName>,
-    /// When the pairs were imported, if those of the newest import were meant.
+    /// When the pairs were imported, if those of an import were meant.
     pub imported: Option<UnixMillis>,
     /// When they were retired. `None` if none changed, or if they were brought back.
     pub at: Option<UnixMillis>,
@@ -32,8 +36,11 @@ pub struct RetireOutcome {
 pub enum RetireChoice {
     /// These ids; the id of a block stands for the pairs that it has now, or for the block itself if it has none.
     Ids(Vec<String>),
-    /// The pairs of the newest import of a list or of folders that added any. With a time, only if that import was then.
+    /// The pairs of the newest import, if it added any. With a time, those of the newest import of a list or of folders that
+    /// added any, if it was then.
     LastImport(Option<UnixMillis>),
+    /// The pairs of one of the imports of lists or folders that added any, counted back from the newest one, which is 1.
+    NthImport(u32),
     /// The pairs that a person retired at this time, which are brought back.
     RetiredAt(UnixMillis),
 }
@@ -44,13 +51,13 @@ struct ChosenPairs {
     pairs: Vec<PairName>,
     /// Blocks without pairs.
     blocks: Vec<BlockName>,
-    /// When the pairs were imported, if those of the newest import are meant.
+    /// When the pairs were imported, if those of an import are meant.
     imported: Option<UnixMillis>,
 }
 
 impl RetireChoice {
-    async fn chosen(&self, catalog: &Catalog) -> ProjectResult<ChosenPairs> {
-        let at = match self {
+    async fn chosen(&self, project: &Project, catalog: &Catalog) -> ProjectResult<ChosenPairs> {
+        let (later, at) = match self {
             Self::Ids(typed) => {
                 let NamedWork { pairs, blocks } = selection::known_pairs_of(catalog, typed).await?;
                 return Ok(ChosenPairs {
@@ -65,13 +72,20 @@ impl RetireChoice {
                     ..ChosenPairs::default()
                 });
             }
-            Self::LastImport(at) => *at,
+            Self::LastImport(at) => (0, *at),
+            Self::NthImport(number) => (number.saturating_sub(1), None),
         };
-        let added = catalog.last_import().await?;
+        let added = catalog.import_before(later).await?;
         let Some(imported) = added.first().map(|first| first.imported) else {
-            let text = "no list or folder has added a pair yet";
-            return Err(Refusal::NothingSelected(text.to_owned()).into());
+            let text = match later {
+                0 => "no list or folder has added a pair yet".to_owned(),
+                _ => format!("fewer than {} imports have added pairs", later + 1),
+            };
+            return Err(Refusal::NothingSelected(text).into());
         };
+        if matches!(self, Self::LastImport(None)) {
+            refuse_after_empty(project, &added)?;
+        }
         if at.is_some_and(|at| at != imported) {
             let text = "another import has added pairs meanwhile; look at it before you undo it";
             return Err(Refusal::Usage(text.to_owned()).into());
@@ -85,12 +99,16 @@ impl RetireChoice {
 
     /// Returns what comes back. Of an import, only the pairs of the last command come back: others were retired for their own
     /// reasons.
-    async fn chosen_to_restore(&self, catalog: &Catalog) -> ProjectResult<ChosenPairs> {
-        let mut chosen = self.chosen(catalog).await?;
+    async fn chosen_to_restore(
+        &self,
+        project: &Project,
+        catalog: &Catalog,
+    ) -> ProjectResult<ChosenPairs> {
+        let mut chosen = self.chosen(project, catalog).await?;
         if let Some(block) = chosen.blocks.first() {
             return Err(selection::no_pairs(block, false).into());
         }
-        if !matches!(self, Self::LastImport(_)) {
+        if !matches!(self, Self::LastImport(_) | Self::NthImport(_)) {
             return Ok(chosen);
         }
         let names: BTreeSet<PairName> = chosen.pairs.into_iter().collect();
@@ -103,11 +121,28 @@ impl RetireChoice {
     }
 }
 
+/// Refuses the newest import if it added no pair, so that an earlier one, which added these, is not undone by mistake.
+fn refuse_after_empty(project: &Project, added: &[ImportedPair]) -> Result<(), Refusal> {
+    let Some(first) = added.first() else {
+        return Ok(());
+    };
+    let Some(empty) = empty_import::noted(project).filter(|empty| *empty > first.imported) else {
+        return Ok(());
+    };
+    let (empty, imported) = (local(empty), local(first.imported));
+    let pairs = counted(added.len() as u64, "pair");
+    Err(Refusal::Usage(format!(
+        "the newest import, on {empty}, added no pair; the newest one that did was on {imported} and added {pairs}, first {}: \
+         give --import 1 in place of --last-import if it is meant",
+        first.name
+    )))
+}
+
 /// Takes pairs out of every count. A process that works on one of them stores nothing more of it. Removes blocks without
 /// pairs, of which there is nothing to keep.
 pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult<RetireOutcome> {
-    let (_project, catalog) = location.open().await?;
-    let chosen = choice.chosen(&catalog).await?;
+    let (project, catalog) = location.open().await?;
+    let chosen = choice.chosen(&project, &catalog).await?;
     let at = now();
     // First, because a role may lack the right for it.
     let removed_blocks = catalog.remove_blocks(&chosen.blocks).await?;
@@ -131,10 +166,10 @@ pub async fn retire(choice: &RetireChoice, location: &Location) -> ProjectResult
 /// Returns an error if none comes back, because none is retired or they have no boxes any more in the labels of their
 /// blocks.
 pub async fn undo(choice: &RetireChoice, location: &Location) -> ProjectResult<RetireOutcome> {
-    let (_project, catalog) = location.open().await?;
+    let (project, catalog) = location.open().await?;
     let ChosenPairs {
         pairs, imported, ..
-    } = choice.chosen_to_restore(&catalog).await?;
+    } = choice.chosen_to_restore(&project, &catalog).await?;
     let changed = catalog.restore_pairs(&pairs).await?;
     let still_retired = still_retired(&catalog, &pairs).await?;
     catalog.close().await;

@@ -14,21 +14,25 @@ use mocban_system::time_text::local;
 #[derive(Debug, Args)]
 pub(crate) struct RetireArgs {
     /// Pairs, or blocks for all their pairs; a block without pairs is removed
-    #[arg(value_name = "PAIR|BLOCK", required_unless_present = "last_import")]
+    #[arg(value_name = "PAIR|BLOCK", required_unless_present_any = ["last_import", "import"])]
     pub(crate) pairs: Vec<String>,
-    /// The pairs of the newest import of a list or of folders that added any
+    /// The pairs that the newest import added
     #[arg(long, conflicts_with = "pairs")]
     pub(crate) last_import: bool,
+    /// The pairs of one import: 1 is the newest that added any, 2 the one before it
+    #[arg(long, value_name = "N", conflicts_with_all = ["pairs", "last_import"],
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) import: Option<u32>,
     /// Bring the pairs back, with their results and verdicts
     #[arg(long)]
     pub(crate) undo: bool,
 }
 
 pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let choice = if args.last_import {
-        RetireChoice::LastImport(None)
-    } else {
-        RetireChoice::Ids(args.pairs.clone())
+    let choice = match args.import {
+        Some(number) => RetireChoice::NthImport(number),
+        None if args.last_import => RetireChoice::LastImport(None),
+        None => RetireChoice::Ids(args.pairs.clone()),
     };
     let RetireOutcome {
         names,
@@ -56,7 +60,7 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
     context.print_json(&printed)?;
     if let Some(imported) = imported {
         let date = local(imported);
-        context.info(&format!("the newest import that added pairs was on {date}"));
+        context.info(&format!("the import that added these pairs was on {date}"));
     }
     for block in &removed_blocks {
         context.info(&format!(
@@ -74,6 +78,8 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
     }
     if args.undo {
         context.next("run");
+    } else if let (Some(number), 0) = (args.import, others) {
+        context.next(&format!("retire --undo --import {number}"));
     } else if args.last_import && others == 0 {
         context.next("retire --undo --last-import");
     } else if let ([typed], 0, true) = (args.pairs.as_slice(), others, changed > 0) {

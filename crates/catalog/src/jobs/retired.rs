@@ -79,11 +79,12 @@ pub(crate) const RETIRED_COUNT: &str = "SELECT count(*) FROM retired_pair";
 const LISTED_JOBS: &str = "
 SELECT j.pair FROM job AS j WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = j.pair) ORDER BY j.pair";
 
-/// The pairs that the newest import of a list or of folders added. Retired ones have no job.
-const LAST_IMPORT: &str = "
+/// The pairs that an import of a list or of folders added, the newest one without any offset. Retired ones have no job.
+const NTH_IMPORT: &str = "
 SELECT p.name, p.imported, (SELECT count(*) FROM job AS j WHERE j.pair = p.id) AS jobs FROM pair AS p
 WHERE p.imported = (SELECT q.imported FROM pair AS q
-        WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id) ORDER BY q.id DESC LIMIT 1)
+        WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id)
+        GROUP BY q.imported ORDER BY max(q.id) DESC LIMIT 1 OFFSET ?1)
     AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
 ORDER BY p.name";
 
@@ -187,8 +188,15 @@ impl Catalog {
 
     /// Returns the pairs that the newest import of a list or of folders added, sorted by name.
     pub async fn last_import(&self) -> Result<Vec<ImportedPair>> {
+        self.import_before(0).await
+    }
+
+    /// Returns the pairs that an import of a list or of folders added, sorted by name: after it, `later` imports have added
+    /// pairs.
+    pub async fn import_before(&self, later: u32) -> Result<Vec<ImportedPair>> {
         let mut conn = self.read_conn().await?;
-        query_as(LAST_IMPORT).fetch_all(&mut conn).await
+        let query = query_as(NTH_IMPORT).bind(i64::from(later));
+        query.fetch_all(&mut conn).await
     }
 
     /// Retires pairs for a person. Their leases end. Returns how many were not retired before.
