@@ -109,7 +109,7 @@ pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Show
 pub use records::review_context::ReviewContext;
 pub use records::review_rights::ReviewRights;
 pub use records::reviewer_names::person_name;
-pub use records::same_files::SameFiles;
+pub use records::same_files::{SameContents, SameFiles};
 pub use records::set_apart::SetApart;
 pub use records::verdict_rules::{InvalidVerdict, NOTE_CHARS, check_event, reviewer_name};
 pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};

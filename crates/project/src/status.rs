@@ -9,10 +9,13 @@ use crate::events::{Listener, warn};
 use crate::failures::Failures;
 use crate::location::{Location, now};
 use crate::missing_inputs::{self, MissingInputs};
-use mocban_catalog::{Catalog, StatusCounts};
+use mocban_catalog::{Catalog, SameContents, StatusCounts};
 use mocban_core::domain::JobStatus;
 use mocban_runner::{fingerprints, is_running};
 use mocban_store::Project;
+
+/// Most pairs among which those with the contents of others are looked for. `check` looks among all.
+const MAX_COMPARED: u64 = 20_000;
 
 /// The state of a project.
 #[derive(Debug)]
@@ -27,6 +30,8 @@ pub struct ProjectStatus {
     pub are_results_missing: bool,
     /// Input files that are no longer at their places. They are not looked at during a run.
     pub missing_inputs: Option<MissingInputs>,
+    /// Pairs and blocks with the contents of others. They are not looked for during a run, nor in a very large project.
+    pub same_contents: SameContents,
 }
 
 impl ProjectStatus {
@@ -47,7 +52,13 @@ impl ProjectStatus {
         } else {
             missing_inputs::find(project, catalog, counts.pairs + counts.retired).await?
         };
+        let same_contents = if running || counts.pairs > MAX_COMPARED {
+            SameContents::default()
+        } else {
+            catalog.same_contents().await?
+        };
         Ok(Self {
+            same_contents,
             missing_inputs,
             are_results_missing: are_results_missing(project, &counts.jobs),
             counts,
@@ -87,6 +98,9 @@ impl ProjectStatus {
         json["running"] = Value::from(self.running);
         if let Some(missing) = &self.missing_inputs {
             json["missing_inputs"] = serde_json::to_value(missing)?;
+        }
+        if !self.same_contents.is_empty() {
+            json["same_contents"] = serde_json::to_value(&self.same_contents)?;
         }
         if !self.failures.blocks.is_empty() {
             json["blocks"] = self.failures.blocks.json();

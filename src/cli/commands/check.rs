@@ -115,6 +115,7 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
     };
     lines.extend(notes(&summary.inputs_changed, changed));
     lines.extend(notes(&summary.inputs_unreadable, "unreadable"));
+    lines.extend(summary.same_contents.sentences());
     lines.extend(unreferenced(summary.unreferenced.as_ref(), args));
     lines.retain(|line| !line.is_empty());
     let lines = lines.iter().map(|line| line.trim_end());

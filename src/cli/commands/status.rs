@@ -197,7 +197,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
 mod tests {
     use super::{ProjectStatus, next_steps, screen};
     use crate::cli::output::screen::Palette;
-    use mocban_catalog::{FailedPair, StageCounts, StatusCounts, StoredFailure};
+    use mocban_catalog::{FailedPair, SameContents, StageCounts, StatusCounts, StoredFailure};
     use mocban_core::domain::{Failure, FailureClass, JobStatus, Stage, Verdict};
     use mocban_project::failures::Failures;
     use mocban_project::missing_inputs::MissingInputs;
@@ -224,6 +224,7 @@ mod tests {
             failures: Failures::default(),
             are_results_missing: false,
             missing_inputs: None,
+            same_contents: SameContents::default(),
         }
     }
 

@@ -1,8 +1,11 @@
 //! Imports that are streamed in chunks.
 
-use super::blocks::{attributes, block, inputs, world};
+use super::blocks::{attributes, block, inputs, version, world};
 use super::{World, name, row};
-use crate::{BlockAttributes, CatalogError, ImportChunk, ImportRow, ImportTerms, SameFiles};
+use crate::{
+    BlockAttributes, CatalogError, ImportChunk, ImportRow, ImportTerms, InputVersion,
+    InputVersions, SameContents, SameFiles,
+};
 use mocban_core::domain::{PairId, Stage};
 
 #[tokio::test]
@@ -371,4 +374,61 @@ async fn new_pairs_and_blocks_with_the_files_of_earlier_ones_are_counted() {
         .import_blocks(vec![attributes("b"), again], false, 2)
         .await;
     assert_eq!(summary.expect("imported").same_files, same("c", "b", 1));
+}
+
+#[tokio::test]
+async fn pairs_and_blocks_with_the_contents_of_earlier_ones_are_counted_after_they_were_read() {
+    let world = World::new(6).await;
+    let same = async || world.catalog.same_contents().await.expect("a read");
+    assert_eq!(same().await, SameContents::default());
+    let read = [
+        (version("mesh"), version("print")),
+        (version("mesh"), version("another")),
+        (InputVersion::gone(), InputVersion::gone()),
+        (InputVersion::gone(), InputVersion::gone()),
+        (version("mesh"), version("print")),
+        (version("mesh"), version("print")),
+    ];
+    let read = (1..).zip(read).map(|(pair, (mesh, print))| {
+        let inputs = InputVersions {
+            mesh: Some(mesh),
+            print: Some(print),
+        };
+        (PairId(pair), inputs)
+    });
+    let stored = world.catalog.store_inputs(read.collect()).await;
+    stored.expect("stored");
+    let found = |id: &str, count: u64| {
+        Some(SameFiles {
+            id: id.to_owned(),
+            known: "p0".to_owned(),
+            count,
+        })
+    };
+    assert_eq!(same().await.pairs, found("p4", 2));
+    // A copy that is in no count is no longer counted.
+    let retired = world.catalog.retire_pairs(&[name("p4")], 3).await;
+    retired.expect("retired");
+    assert_eq!(same().await.pairs, found("p5", 1));
+
+    let blocks = super::blocks::world().await;
+    let again = BlockAttributes {
+        name: block("c"),
+        ..attributes("b")
+    };
+    let imported = blocks.catalog.import_blocks(vec![again], false, 2).await;
+    imported.expect("imported");
+    let known = blocks.catalog.known_blocks().await.expect("a read");
+    let read = known
+        .iter()
+        .map(|known| (known.block, inputs(["mesh", "page", "labels"])));
+    let stored = blocks.catalog.store_block_inputs(read.collect()).await;
+    stored.expect("stored");
+    let found = blocks.catalog.same_contents().await.expect("a read");
+    assert_eq!(
+        found.sentences(),
+        [
+            "blocks with the same scan and page as an earlier one: 1, first c, as b; `retire` takes a copy out of every count"
+        ]
+    );
 }

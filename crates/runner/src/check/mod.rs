@@ -206,6 +206,7 @@ async fn rows_and_files(
             summary.count(check, options.repair);
         }
     }
+    summary.same_contents = catalog.same_contents().await?;
     back.blocks = check_blocks(project, catalog, options.quick, &mut named, summary).await?;
     let is_withheld =
         options.repair && !repair_jobs(catalog, options.accept_missing, back, summary).await?;

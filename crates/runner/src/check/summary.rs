@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::finding::{Finding, Kind};
 use super::pairs::PairCheck;
-use mocban_catalog::SetApart;
+use mocban_catalog::{SameContents, SetApart};
 use mocban_store::{UnreferencedFile, UnreferencedKind};
 
 /// Number of findings listed per kind, and of input files listed.
@@ -28,6 +28,9 @@ pub struct CheckSummary {
     /// Damaged rows that the owner has set apart. They are not counted, and are no damage any more.
     #[serde(skip_serializing_if = "SetApart::is_empty")]
     pub set_apart: SetApart,
+    /// Pairs and blocks with the contents of others. This is not damage.
+    #[serde(skip_serializing_if = "SameContents::is_empty")]
+    pub same_contents: SameContents,
     /// Missing input files. This is not damage: results computed from them stay valid.
     pub inputs_missing: Notes,
     /// Input files that changed after they were read. This is not damage: the next run handles it.
@@ -115,6 +118,7 @@ impl CheckSummary {
             files: 0,
             damage: BTreeMap::new(),
             set_apart: SetApart::default(),
+            same_contents: SameContents::default(),
             inputs_missing: Notes::default(),
             inputs_changed: Notes::default(),
             inputs_unreadable: Notes::default(),
