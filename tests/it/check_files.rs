@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use serde_json::json;
+
 use mocban::domain::Stage;
 
 use crate::check::{artifact, at, done, exported, kinds};
@@ -107,4 +109,58 @@ fn what_is_in_the_place_of_an_artifact_is_named_and_concerns_its_pair_alone() {
     at(&project, &["run"]).expect(0);
     at(&project, &["check"]).expect(0);
     assert!(exported(&project, "after") == before, "another export");
+}
+
+#[test]
+fn copies_under_other_ids_and_changed_inputs_are_named() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let data = project.dir().join("data");
+    let list = std::fs::read_to_string(data.join("manifest.csv")).expect("a list");
+    let row: Vec<&str> = list.lines().nth(1).expect("a pair").split(',').collect();
+    let [known, mesh, print, ..] = row[..] else {
+        unreachable!("a list has an id, a mesh and a print");
+    };
+    let file = |path: &str| {
+        let extension = Path::new(path).extension().expect("an extension");
+        format!("copy.{}", extension.display())
+    };
+    let copied = [mesh, print].map(|path| {
+        let to = file(path);
+        std::fs::copy(data.join(path), data.join(&to)).expect("copied");
+        to
+    });
+    let rows = format!("id,mesh,print\ncopy,{},{}\n", copied[0], copied[1]);
+    std::fs::write(data.join("copies.csv"), rows).expect("written");
+    let copies = data.join("copies.csv").display().to_string();
+    at(&project, &["import", &copies]).expect(0);
+    let status = || at(&project, &["status", "--json"]).expect(0).json();
+    assert_eq!(status()["same_contents"], json!(null), "nothing was read");
+    at(&project, &["run"]).expect(0);
+    let same = json!({"pairs": {"id": "copy", "known": known, "count": 1}});
+    assert_eq!(status()["same_contents"], same);
+    let check = at(&project, &["check", "--json"]).expect(0).json();
+    assert_eq!(check["same_contents"], same);
+    let text = at(&project, &["check"]).expect(0).out;
+    let sentence = "pairs with the same mesh and print as an earlier one: 1, first copy, as ";
+    assert!(text.contains(sentence), "{text}");
+
+    // Bytes after the end of an image are no part of it.
+    let print = data.join(&copied[1]);
+    let mut bytes = std::fs::read(&print).expect("a file");
+    bytes.push(0);
+    std::fs::write(&print, bytes).expect("written");
+    let changed = status();
+    assert_eq!(changed["changed_inputs"]["changed"], 1);
+    let first = changed["changed_inputs"]["first"].as_str();
+    assert!(
+        first.is_some_and(|first| first.ends_with(&copied[1])),
+        "{changed}"
+    );
+    let next = at(&project, &["status"]).expect(0).next();
+    assert!(next[0].ends_with(" run"), "{next:?}");
+    at(&project, &["run"]).expect(0);
+    let read = status();
+    assert_eq!(read["changed_inputs"], json!(null));
+    assert_eq!(read["same_contents"], json!(null));
 }

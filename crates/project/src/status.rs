@@ -8,7 +8,7 @@ use crate::error::ProjectResult;
 use crate::events::{Listener, warn};
 use crate::failures::Failures;
 use crate::location::{Location, now};
-use crate::missing_inputs::{self, MissingInputs};
+use crate::missing_inputs::{self, ChangedInputs, InputsLook, MissingInputs};
 use mocban_catalog::{Catalog, SameContents, StatusCounts};
 use mocban_core::domain::JobStatus;
 use mocban_runner::{fingerprints, is_running};
@@ -30,6 +30,8 @@ pub struct ProjectStatus {
     pub are_results_missing: bool,
     /// Input files that are no longer at their places. They are not looked at during a run.
     pub missing_inputs: Option<MissingInputs>,
+    /// Input files that were changed since they were read. They are not looked at during a run.
+    pub changed_inputs: Option<ChangedInputs>,
     /// Pairs and blocks with the contents of others. They are not looked for during a run, nor in a very large project.
     pub same_contents: SameContents,
 }
@@ -47,10 +49,10 @@ impl ProjectStatus {
         let running = is_running(project, catalog, now()).await?;
         let failures = Failures::read(catalog, all_failures).await?;
         let counts = catalog.status(&fingerprints).await?;
-        let missing_inputs = if running {
-            None
+        let InputsLook { missing, changed } = if running {
+            InputsLook::default()
         } else {
-            missing_inputs::find(project, catalog, counts.pairs + counts.retired).await?
+            missing_inputs::look(project, catalog, counts.pairs + counts.retired).await?
         };
         let same_contents = if running || counts.pairs > MAX_COMPARED {
             SameContents::default()
@@ -59,7 +61,8 @@ impl ProjectStatus {
         };
         Ok(Self {
             same_contents,
-            missing_inputs,
+            missing_inputs: missing,
+            changed_inputs: changed,
             are_results_missing: are_results_missing(project, &counts.jobs),
             counts,
             running,
@@ -98,6 +101,9 @@ impl ProjectStatus {
         json["running"] = Value::from(self.running);
         if let Some(missing) = &self.missing_inputs {
             json["missing_inputs"] = serde_json::to_value(missing)?;
+        }
+        if let Some(changed) = &self.changed_inputs {
+            json["changed_inputs"] = serde_json::to_value(changed)?;
         }
         if !self.same_contents.is_empty() {
             json["same_contents"] = serde_json::to_value(&self.same_contents)?;

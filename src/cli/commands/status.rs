@@ -171,7 +171,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     let waiting = status.waiting() + status.failures.blocks.waiting();
     let interrupted = status.interrupted() + if status.running { 0 } else { leased };
     let other_files = status.counts.other_files + status.failures.blocks.other_files();
-    let changed = status.counts.stale + other_files;
+    let changed = status.counts.stale + other_files + u64::from(status.changed_inputs.is_some());
     let has_work = waiting + interrupted + changed > 0;
     if !running && (has_work || status.are_results_missing) {
         steps.push("run".to_owned());
@@ -197,10 +197,12 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
 mod tests {
     use super::{ProjectStatus, next_steps, screen};
     use crate::cli::output::screen::Palette;
-    use mocban_catalog::{FailedPair, SameContents, StageCounts, StatusCounts, StoredFailure};
+    use mocban_catalog::{
+        FailedPair, SameContents, SameFiles, StageCounts, StatusCounts, StoredFailure,
+    };
     use mocban_core::domain::{Failure, FailureClass, JobStatus, Stage, Verdict};
     use mocban_project::failures::Failures;
-    use mocban_project::missing_inputs::MissingInputs;
+    use mocban_project::missing_inputs::{ChangedInputs, MissingInputs};
 
     fn status(done: u64, ready: u64) -> ProjectStatus {
         let stage = StageCounts {
@@ -224,6 +226,7 @@ mod tests {
             failures: Failures::default(),
             are_results_missing: false,
             missing_inputs: None,
+            changed_inputs: None,
             same_contents: SameContents::default(),
         }
     }
@@ -288,6 +291,33 @@ mod tests {
         let line = "changed      2 pairs with another mesh or print in the list than before; the next run reads them\n";
         assert!(text.ends_with(line), "{text}");
         assert_eq!(next_steps(&status)[0], "run");
+    }
+
+    #[test]
+    fn changed_inputs_are_run_and_copies_named() {
+        let mut status = status(3, 0);
+        status.running = false;
+        status.changed_inputs = Some(ChangedInputs {
+            changed: 1,
+            looked_at: 6,
+            first: "d/1.stl".to_owned(),
+        });
+        status.same_contents.pairs = Some(SameFiles {
+            id: "b".to_owned(),
+            known: "a".to_owned(),
+            count: 2,
+        });
+        assert_eq!(next_steps(&status)[0], "run");
+        let text = screen(&status, "demo", false, Palette::PLAIN);
+        for line in [
+            "inputs       1 of 6 input files that were looked at have another size than when they were read, first d/1.stl; `run` reads them\n",
+            "copies       pairs with the same mesh and print as an earlier one: 2, first b, as a; `retire` takes a copy out of every count\n",
+        ] {
+            assert!(text.contains(line), "{text}");
+        }
+        let json = status.json(false).expect("JSON");
+        assert_eq!(json["changed_inputs"]["changed"], 1);
+        assert_eq!(json["same_contents"]["pairs"]["count"], 2);
     }
 
     #[test]

@@ -62,6 +62,9 @@ pub(crate) fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Pale
     if let Some(missing) = &status.missing_inputs {
         parts.push(line("inputs", &missing.to_string()));
     }
+    if let Some(changed) = &status.changed_inputs {
+        parts.push(line("inputs", &changed.to_string()));
+    }
     let same = status.same_contents.sentences();
     parts.extend(same.iter().map(|text| line("copies", text)));
     parts.extend(low_confidence_line(&status.counts).map(|text| line("confidence", &text)));
