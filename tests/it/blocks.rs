@@ -80,7 +80,7 @@ fn a_list_with_a_wrong_column_or_a_missing_file_imports_nothing() {
         ),
         (
             "block,mesh,page,lables\nb1,b1.stl,b1.png,\n",
-            "rename it to \"labels\"",
+            "to \"labels\" if it is meant",
         ),
         (
             "block,mesh,page\nb1,b1.stl,gone.png\n",

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::exit::Refusal;
 use super::files;
 use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form, is_windows_path};
-use super::missing_files::{IS_FOLDER, WINDOWS_HINT};
+use super::missing_files::{IS_FOLDER, LINE_BREAK_HINT, WINDOWS_HINT, has_line_break};
 use super::repeated_files::RepeatedFiles;
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
@@ -314,6 +314,7 @@ pub fn locate_file(
         Ok(false) if has_scheme(path, "://") => {
             "is a web address; download the file and write the path of the copy".to_owned()
         }
+        Ok(false) if has_line_break(path) => format!("does not exist{LINE_BREAK_HINT}"),
         Ok(false) if is_windows_path(path) => format!("does not exist{WINDOWS_HINT}"),
         Ok(false) => {
             let similar = searches
@@ -414,7 +415,8 @@ mod tests {
             "{missing:?}"
         );
         std::fs::create_dir(dir.path().join("d.stl")).expect("a folder");
-        let list = "id,mesh,print\na,d.stl,https://museum.vn/1.png\nb,file:///d/1.stl,pairs.csv\n";
+        let list =
+            "id,mesh,print\na,d.stl,https://museum.vn/1.png\nb,file:///d/1.stl,\"a\nb.png\"\n";
         std::fs::write(&file, list).expect("written");
         let mut odd = Vec::new();
         let listing = from_file(&file).expect("valid");
@@ -423,10 +425,11 @@ mod tests {
             "d.stl of a is a folder, not a file",
             "https://museum.vn/1.png of a is a web address; download the file and write the path of the copy",
             "file:///d/1.stl of b does not exist; write its path without file://",
+            "b.png of b does not exist; its path has a line break: write the cell on one line",
         ]) {
             assert!(line.ends_with(end), "{line}");
         }
-        assert_eq!(odd.len(), 3, "{odd:?}");
+        assert_eq!(odd.len(), 4, "{odd:?}");
         let refused = from_file(dir.path()).expect_err("a directory");
         assert!(refused.to_string().contains("--meshes"), "{refused}");
     }

@@ -1,5 +1,7 @@
 //! Files of a list that do not exist.
 
+use std::path::Path;
+
 use super::exit::Refusal;
 use super::files::listed;
 
@@ -10,8 +12,16 @@ const MAX_MISSING: usize = 1000;
 pub const WINDOWS_HINT: &str =
     "; it is a path of a Windows computer: write paths relative to the list";
 
+/// Ends the message of a missing file whose path is on several lines.
+pub(crate) const LINE_BREAK_HINT: &str = "; its path has a line break: write the cell on one line";
+
 /// Ends the message of a path that leads to a folder.
 pub const IS_FOLDER: &str = "is a folder, not a file";
+
+/// Returns whether a path is on several lines. A file may have such a name.
+pub(crate) fn has_line_break(path: &Path) -> bool {
+    path.to_string_lossy().contains(['\n', '\r'])
+}
 
 /// Files of a list that do not exist.
 #[derive(Debug, Default)]

@@ -46,6 +46,9 @@ pub enum PairNameError {
     /// The id has a character that is not allowed.
     #[error("id \"{shown}\" holds {1:?}; an id has no slashes, control or invisible characters", shown = sanitize(.0, 48))]
     Character(String, char),
+    /// The id has several lines.
+    #[error("id \"{shown}\" has a line break; write it on one line", shown = sanitize(.0, 48))]
+    LineBreak(String),
     /// The id begins with a dot.
     #[error("id \"{shown}\" begins with a dot", shown = sanitize(.0, 48))]
     LeadingDot(String),
@@ -77,6 +80,9 @@ impl PairName {
         }
         let is_bad = |c: &char| matches!(c, '/' | '\\') || is_hidden(*c);
         if let Some(bad) = text.chars().find(is_bad) {
+            if matches!(bad, '\n' | '\r') {
+                return Err(PairNameError::LineBreak(text.to_owned()));
+            }
             return Err(PairNameError::Character(text.to_owned(), bad));
         }
         if text.starts_with('.') {
@@ -239,7 +245,13 @@ mod tests {
         assert_eq!(PairName::new(""), Err(PairNameError::Empty));
         assert_eq!(PairName::new("a/b"), character("a/b", '/'));
         assert_eq!(PairName::new("a\\b"), character("a\\b", '\\'));
-        assert_eq!(PairName::new("a\nb"), character("a\nb", '\n'));
+        assert_eq!(PairName::new("a\tb"), character("a\tb", '\t'));
+        for text in ["a\nb", "a\r\nb"] {
+            let refused = PairName::new(text).expect_err("two lines");
+            assert_eq!(refused, PairNameError::LineBreak(text.into()));
+            let sentence = refused.to_string();
+            assert!(sentence.ends_with("\" has a line break; write it on one line"));
+        }
         assert_eq!(
             PairName::new("a\u{202e}b"),
             character("a\u{202e}b", '\u{202e}')

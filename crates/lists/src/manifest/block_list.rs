@@ -13,7 +13,7 @@ use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::KnownColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
-use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
+use mocban_core::domain::{BlockName, BlockSide, LengthUnit, first_names, sanitize};
 
 /// A block of a list.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -140,24 +140,39 @@ fn columns_of(
     problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
     // A misspelt name is also unknown; say it once.
     problems.check(false)?;
-    let mut problems = ManifestError::default();
-    for (name, _) in names
-        .iter()
-        .zip(&columns)
-        .filter(|(_, known)| known.is_none())
-    {
+    let unknown = names.iter().zip(&columns);
+    let unknown = unknown.filter_map(|(name, known)| known.is_none().then_some(*name));
+    let unknown: Vec<&str> = unknown.collect();
+    if !unknown.is_empty() {
+        return Err(at_line(line, &unknown_columns(&unknown)).into());
+    }
+    Ok(columns.into_iter().flatten().collect())
+}
+
+/// Says that columns are unknown, and what the names mean that are similar to those of optional ones.
+fn unknown_columns(unknown: &[&str]) -> String {
+    const MAX_NAMES: usize = 3;
+    const MAX_NAME_CHARS: usize = 40;
+    let quoted = |name: &&str| format!("{:?}", sanitize(name, MAX_NAME_CHARS));
+    let shown: Vec<String> = unknown.iter().map(quoted).collect();
+    let hint = |name: &&str| {
         let found = name.to_lowercase();
         let mut optional = COLUMNS.names[REQUIRED..].iter();
-        let similar = optional.find(|column| similar_column(&found, column));
-        let hint = similar.map(|column| format!("; rename it to {column:?} if it is meant"));
-        let (hint, known) = (hint.unwrap_or_default(), COLUMNS.names.join(", "));
-        let reason = format!(
-            "column {name:?} is unknown{hint}; a list of blocks has: {known}; remove other columns, which are kept only of pairs"
-        );
-        problems.add(at_line(line, &reason));
-    }
-    problems.check(false)?;
-    Ok(columns.into_iter().flatten().collect())
+        let column = optional.find(|column| similar_column(&found, column))?;
+        Some(format!(
+            "; rename {} to {column:?} if it is meant",
+            quoted(name)
+        ))
+    };
+    let hints: String = unknown.iter().filter_map(hint).take(1).collect();
+    let (columns, are) = match unknown {
+        [_] => ("column", "is"),
+        _ => ("columns", "are"),
+    };
+    let (shown, known) = (first_names(&shown, MAX_NAMES), COLUMNS.names.join(", "));
+    format!(
+        "{columns} {shown} {are} unknown{hints}; a list of blocks has: {known}; remove other columns, which are kept only of pairs"
+    )
 }
 
 /// Returns a row, or records why it is not valid.
@@ -287,11 +302,15 @@ mod tests {
             ),
             (
                 "block,mesh,page,lables\nb,m,p,l\n",
-                "rename it to \"labels\" if it is meant",
+                "column \"lables\" is unknown; rename \"lables\" to \"labels\" if it is meant; a list of blocks has: ",
             ),
             (
                 "block,mesh,page,color\nb,m,p,l\n",
                 "; remove other columns, which are kept only of pairs",
+            ),
+            (
+                "block,mesh,page,color,year\nb,m,p,l,1\n",
+                "line 1: columns \"color\", \"year\" are unknown; a list of blocks has: block, mesh, page, labels, unit, side; ",
             ),
             ("block,mesh,page\nb,m\n", "line 2: the row has 2 cells"),
             ("block,mesh,page\nb,,p\n", "line 2: mesh is empty"),

@@ -29,6 +29,6 @@ pub use jsonl::{parse_jsonl, read_jsonl};
 pub use later_header::later_header;
 pub use list_head::{ListHead, read_head};
 pub use misspelt_columns::MisspeltColumns;
-pub(crate) use row::is_text_column;
 pub use row::{ManifestRow, ReadRows, RowIds};
+pub(crate) use row::{is_id_or_path_column, is_text_column};
 pub use text::{CsvText, LineCounter, NotText, as_utf8, trimmed};

@@ -97,6 +97,28 @@ pub(crate) fn is_text_column(header: &str) -> bool {
         .any(|name| name == plain)
 }
 
+/// Returns whether the values of a column in such a list are ids or paths, which are on one line.
+pub(crate) fn is_id_or_path_column(header: &str) -> bool {
+    const OTHERS: [&str; 8] = [
+        "pair",
+        "cap",
+        "ma_cap",
+        "page",
+        "trang",
+        "anh_trang",
+        "labels",
+        "nhan",
+    ];
+    let plain = plain_name(header);
+    let others = COLUMNS.other_names.iter();
+    let others = others.filter(|(_, name)| REQUIRED.contains(name));
+    REQUIRED
+        .into_iter()
+        .chain(OTHERS)
+        .chain(others.map(|(other, _)| *other))
+        .any(|name| name == plain)
+}
+
 /// What was read of a list whose rows were passed on.
 #[derive(Debug, Default)]
 pub struct ReadRows {

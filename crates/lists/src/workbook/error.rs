@@ -70,6 +70,14 @@ pub enum WorkbookError {
         /// The error, such as `#REF!`.
         value: String,
     },
+    /// An id or a path on several lines.
+    #[error("cell {cell} of column \"{}\" has a line break; write it on one line", sanitize(.column, MAX_SHOWN))]
+    LineBreak {
+        /// The cell, such as `B5`.
+        cell: String,
+        /// Name of its column.
+        column: String,
+    },
     /// Several cells.
     #[error("{count} cells cannot be read:{}", lines(.first, *.count))]
     Cells {
@@ -89,6 +97,7 @@ impl WorkbookError {
                 | Self::LongCell { .. }
                 | Self::NoResult { .. }
                 | Self::CellError { .. }
+                | Self::LineBreak { .. }
         )
     }
 }

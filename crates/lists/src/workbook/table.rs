@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::archive::damaged;
 use super::error::WorkbookError;
 use super::parts::{TextCollector, Workbook, read_part, value};
-use crate::manifest::is_text_column;
+use crate::manifest::{is_id_or_path_column, is_text_column};
 use crate::xml::{XmlPart, local_name};
 
 /// Largest sheet: rows and columns of Excel.
@@ -54,7 +54,8 @@ struct TableWriter<'w> {
 /// Largest number of cells that are named because they cannot be read.
 const MAX_REFUSED: usize = 10;
 
-/// Returns the text of a sheet as CSV. Columns without a name in the header are left out. Line breaks in cells become blanks.
+/// Returns the text of a sheet as CSV. Columns without a name in the header are left out. Line breaks in cells that are no ids and
+/// no paths become blanks.
 ///
 /// The header is the first row with a value that is no title: see [`is_header`]. A parser refuses titles above it.
 pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>, WorkbookError> {
@@ -195,7 +196,7 @@ impl TableWriter<'_> {
                 let string = index.and_then(|index| self.workbook.strings.get(index));
                 let string =
                     string.ok_or_else(|| damaged(&format!("there is no string {value}")))?;
-                self.check_length(column, string)?;
+                self.check_text(column, string)?;
                 string.clone()
             }
             "b" if value.trim() == "1" => "true".to_owned(),
@@ -205,7 +206,7 @@ impl TableWriter<'_> {
                 return Err(WorkbookError::CellError { cell, value });
             }
             "str" | "inlineStr" | "d" => {
-                self.check_length(column, &value)?;
+                self.check_text(column, &value)?;
                 value
             }
             _ if value.trim().is_empty() && has_formula => {
@@ -238,12 +239,20 @@ impl TableWriter<'_> {
         format!("{}{}", letters(column), self.row)
     }
 
-    fn check_length(&self, column: usize, text: &str) -> Result<(), WorkbookError> {
-        if text.len() <= MAX_CELL_BYTES {
-            return Ok(());
+    /// Refuses a text that is too long, and an id or a path on several lines.
+    fn check_text(&self, column: usize, text: &str) -> Result<(), WorkbookError> {
+        if text.len() > MAX_CELL_BYTES {
+            let (cell, limit) = (self.name(column), MAX_CELL_BYTES);
+            return Err(WorkbookError::LongCell { cell, limit });
         }
-        let (cell, limit) = (self.name(column), MAX_CELL_BYTES);
-        Err(WorkbookError::LongCell { cell, limit })
+        if let Some(header) = self.text_columns.get(&column)
+            && text.trim().contains(['\n', '\r'])
+            && is_id_or_path_column(header)
+        {
+            let (cell, column) = (self.name(column), header.clone());
+            return Err(WorkbookError::LineBreak { cell, column });
+        }
+        Ok(())
     }
 
     /// Writes the open row. Rows before it that are missing become blank lines.

@@ -17,10 +17,11 @@ const STYLES: &str = "<styleSheet><numFmts><numFmt numFmtId=\"164\" formatCode=\
 
 /// A sheet with all kinds of cells, a gap of rows, and a value beside the table.
 const ROWS: &str = "<row r=\"2\"><c r=\"A2\" t=\"s\"><v>0</v></c><c r=\"B2\" t=\"s\"><v>1</v></c><c r=\"C2\" t=\"s\"><v>2</v></c>\
-    <c r=\"D2\" t=\"str\"><f>A1</f><v>made</v></c><c r=\"E2\" t=\"inlineStr\"><is><t>seen</t></is></c></row>\
+    <c r=\"D2\" t=\"str\"><f>A1</f><v>made</v></c><c r=\"E2\" t=\"inlineStr\"><is><t>seen</t></is></c>\
+    <c r=\"F2\" t=\"str\"><v>note</v></c></row>\
     <row r=\"3\"/>\
-    <row r=\"5\"><c r=\"A5\" s=\"1\"><v>117</v></c><c r=\"B5\" t=\"s\"><v>3</v></c><c r=\"C5\" t=\"s\"><v>4</v></c>\
-    <c r=\"D5\" s=\"2\"><v>46347</v></c><c r=\"E5\" t=\"b\"><v>1</v></c><c r=\"XFD5\"><v>9</v></c></row>\
+    <row r=\"5\"><c r=\"A5\" s=\"1\"><v>117</v></c><c r=\"B5\" t=\"s\"><v>3</v></c><c r=\"C5\" t=\"str\"><v>p.png&#10;</v></c>\
+    <c r=\"D5\" s=\"2\"><v>46347</v></c><c r=\"E5\" t=\"b\"><v>1</v></c><c r=\"F5\" t=\"s\"><v>4</v></c><c r=\"XFD5\"><v>9</v></c></row>\
     <row r=\"6\"><c r=\"A6\"><v>12</v></c><c r=\"C6\" t=\"s\"><v>5</v></c><c r=\"D6\"><v>0.25</v></c></row>";
 
 fn csv(bytes: &[u8]) -> String {
@@ -38,8 +39,8 @@ fn a_sheet_becomes_lines_with_the_numbers_of_its_rows() {
     assert!(is_workbook(&bytes));
     assert_eq!(
         csv(&bytes),
-        "\n\"id\",\"mesh \",\"print\",\"made\",\"seen\"\n\n\n\
-         \"0117\",\"stl/1, \"\"a\"\" & b.stl\",\"x y\",\"2026-11-21\",\"true\"\n\"12\",,,\"0.25\",\n"
+        "\n\"id\",\"mesh \",\"print\",\"made\",\"seen\",\"note\"\n\n\n\
+         \"0117\",\"stl/1, \"\"a\"\" & b.stl\",\"p.png \",\"2026-11-21\",\"true\",\"x y\"\n\"12\",,,\"0.25\",,\n"
     );
     let rows = parse_csv(csv(&bytes).as_bytes()).expect_err("a row without files");
     assert_eq!(
@@ -54,6 +55,32 @@ fn cells_without_places_follow_each_other_also_after_empty_ones() {
         <row><c><v>7</v></c><c/><c><v>9</v></c></row>";
     let bytes = workbook(&[("a", rows)], STRINGS, "");
     assert_eq!(csv(&bytes), "\"id\",\"mesh \",\"print\"\n\"7\",,\"9\"\n");
+}
+
+#[test]
+fn ids_and_paths_are_on_one_line() {
+    for (header, is_refused) in [
+        ("Mã số", true),
+        ("bản\nquét", true),
+        ("page", true),
+        ("pair", true),
+        ("character", false),
+        ("note", false),
+    ] {
+        let rows = format!(
+            "<row r=\"1\"><c t=\"str\"><v>unit</v></c><c t=\"str\"><v>{header}</v></c></row>\
+             <row r=\"2\"><c t=\"str\"><v>mm</v></c><c t=\"str\"><v>a&#10;b</v></c></row>"
+        );
+        let bytes = workbook(&[("a", &rows)], STRINGS, "");
+        if is_refused {
+            let shown = header.replace('\n', " ");
+            let expected =
+                format!("cell B2 of column \"{shown}\" has a line break; write it on one line");
+            assert_eq!(refusal(&bytes), expected);
+        } else {
+            assert!(csv(&bytes).ends_with("\"mm\",\"a b\"\n"), "{header}");
+        }
+    }
 }
 
 #[test]
