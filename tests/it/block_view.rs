@@ -73,7 +73,12 @@ fn check_pictures(dir: &Path) {
     let args = ["-C", "p", "--json", "contact-sheet", "--block", "b1"];
     let written = mocban(dir, &args).expect(0).json();
     assert_eq!(written["characters"], 6);
-    let page = picture(&dir.join("p/page.png"));
+    let page = dir.join("p/page-b1.png");
+    assert_eq!(
+        written["file"],
+        page.strip_prefix(dir).expect("below").to_str()
+    );
+    let page = picture(&page);
     let outlines = pixels(&page, INK_ONLY);
     assert!(outlines > 6 * 4 * 60 * 3, "{outlines} pixels of outlines");
     let overlay = [&args[..], &["--overlay", "-o", "relief.png"]].concat();

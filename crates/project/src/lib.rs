@@ -71,6 +71,7 @@ pub mod shell;
 pub mod status;
 pub mod truth_file;
 mod unread_files;
+mod verdict_columns;
 pub mod verdict_file;
 mod verdict_json;
 pub mod verdict_row;

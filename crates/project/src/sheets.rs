@@ -65,7 +65,7 @@ pub async fn contact_sheet(
 }
 
 /// Draws the page of a block with the boxes of its characters, or relief and ink over each other, and writes the picture. By
-/// default, it is `page.png` or `overlay.png` in the project. Returns its path and the number of characters.
+/// default, it is in the project, as `page-` or `overlay-` with the name of the block. Returns its path and the number of characters.
 ///
 /// # Errors
 /// Returns an error if the block does not exist or is not aligned, or if the catalog or the disk fails.
@@ -78,8 +78,10 @@ pub async fn block_sheet(
     listener: &dyn Listener,
 ) -> ProjectResult<(PathBuf, usize)> {
     let (project, catalog) = location.open_read_only().await?;
-    let default = ["page.png", "overlay.png"][usize::from(is_overlay)];
-    let path = output.map_or_else(|| project.dir().join(default), Path::to_owned);
+    let name = selection::existing_block(&catalog, block).await?;
+    let kind = ["page", "overlay"][usize::from(is_overlay)];
+    let default = || format!("{kind}-{}.png", name.as_pair().file_name());
+    let path = output.map_or_else(|| project.dir().join(default()), Path::to_owned);
     refuse_used_file(&path, &project, &catalog).await?;
     files::require_png(output)?;
     let work = LongWork::begin(listener, "drawing the page");

@@ -10,43 +10,16 @@ use csv::StringRecord;
 
 use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use super::location::now;
+use super::verdict_columns::{COLUMNS, REQUIRED};
 use super::verdict_json::json_rows;
 use super::verdict_row::{GivenTime, VerdictRow, at_line};
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{PairName, UnixMillis};
-use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn};
+use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, later_header, trimmed};
 use mocban_lists::quotes::check_quotes;
-
-/// The columns, and their other names in English and Vietnamese. Every file must have the first three.
-const COLUMNS: KnownColumns = KnownColumns {
-    names: &[
-        "pair", "verdict", "reviewer", "metric", "reason", "note", "at",
-    ],
-    other_names: &[
-        ("id", "pair"),
-        ("ma_so", "pair"),
-        ("so_hieu", "pair"),
-        ("ma_cap", "pair"),
-        ("cap", "pair"),
-        ("ma", "pair"),
-        ("danh_gia", "verdict"),
-        ("ket_qua", "verdict"),
-        ("ket_luan", "verdict"),
-        ("reader", "reviewer"),
-        ("nguoi_danh_gia", "reviewer"),
-        ("nguoi_cham", "reviewer"),
-        ("thuoc_do", "metric"),
-        ("ly_do", "reason"),
-        ("li_do", "reason"),
-        ("ghi_chu", "note"),
-        ("thoi_gian", "at"),
-        ("ngay", "at"),
-    ],
-};
-const REQUIRED: usize = 3;
 
 /// The text of a verdict file. Its rows are parsed whenever they are needed, so that a long file takes little memory.
 #[derive(Debug, Clone)]
@@ -191,7 +164,7 @@ pub fn unread_fields(first_lines: &BTreeMap<String, usize>) -> Option<String> {
     (!first_lines.is_empty()).then(|| {
         let fields = fields_with_lines(first_lines);
         format!(
-            "fields that no verdict has are not read: {fields}; besides pair, verdict and reviewer, {read} and angle_read_deg are"
+            "fields that no verdict has are not read: {fields}; besides pair, verdict and reviewer, {read} are"
         )
     })
 }
@@ -202,7 +175,7 @@ fn positions(
     headers: &StringRecord,
     line: usize,
     below: Option<usize>,
-) -> Result<[Option<usize>; 7], RefusedLine> {
+) -> Result<[Option<usize>; 8], RefusedLine> {
     let names: Vec<&str> = headers.iter().map(trimmed).collect();
     let refuse = |reason: &str| RefusedLine::new(line, reason);
     let same = |same: SameColumn| refuse(&same.reason(&names));
@@ -221,7 +194,7 @@ fn positions(
             None => columns_reason(&missing, &unknown),
         }));
     }
-    let mut positions = [None; 7];
+    let mut positions = [None; 8];
     for (position, name) in positions.iter_mut().zip(COLUMNS.names) {
         *position = columns.iter().position(|column| *column == Some(name));
     }
@@ -253,7 +226,7 @@ fn columns_reason(missing: &[&str], unknown: &[&str]) -> String {
 fn row(
     record: &StringRecord,
     line: usize,
-    positions: &[Option<usize>; 7],
+    positions: &[Option<usize>; 8],
 ) -> Result<VerdictRow, RefusedLine> {
     let cell = |column: usize| {
         positions[column]
@@ -273,6 +246,11 @@ fn row(
         day,
         is_day_first,
     } = cell(6).map(time).transpose()?.unwrap_or_default();
+    let angle = |text| at_line(line, parsed_angle(text));
+    let context = ReviewContext {
+        angle_read_deg: cell(7).map(angle).transpose()?,
+        ..ReviewContext::default()
+    };
     let verdict = NewVerdict {
         pair: value(required(0)?, line)?,
         verdict: at_line(line, verdict_words::verdict(required(1)?))?,
@@ -280,7 +258,7 @@ fn row(
         metric: cell(3).map(metric).transpose()?,
         reason: cell(4).map(reason).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
-        context: ReviewContext::default(),
+        context,
         at,
     };
     let listed = ListedVerdict {
@@ -294,6 +272,12 @@ fn row(
         unread: Vec::new(),
         is_day_first,
     })
+}
+
+/// Parses the rotation that a reviewer found missing, in degrees. A list may have decimal commas.
+fn parsed_angle(text: &str) -> Result<f64, String> {
+    let angle = text.replacen(',', ".", 1).parse();
+    angle.map_err(|_| format!("angle_read_deg is {text:?}, not a number of degrees such as -4.5"))
 }
 
 fn value<T>(text: &str, line: usize) -> Result<T, RefusedLine>

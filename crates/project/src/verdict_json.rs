@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 
 use super::files::RefusedLine;
 use super::location::now;
+use super::verdict_columns::COLUMNS;
 use super::verdict_row::{GivenTime, VerdictRow, at_line};
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, person_name};
@@ -99,6 +100,12 @@ fn parsed(line: &[u8]) -> Result<(VerdictLine, GivenTime), String> {
     let Value::Object(mut fields) = value else {
         return Err("each line is a JSON object with pair, verdict and reviewer".to_owned());
     };
+    if fields
+        .keys()
+        .any(|field| !LOG_FIELDS.contains(&field.as_str()))
+    {
+        fields = with_known_names(fields)?;
+    }
     for (field, stored) in TEXTS {
         match text_of(&fields, field)? {
             Some(text) => fields.insert(field.to_owned(), stored(&text)?.into()),
@@ -120,6 +127,19 @@ fn parsed(line: &[u8]) -> Result<(VerdictLine, GivenTime), String> {
     }
     let read = serde_json::from_value(Value::Object(fields));
     Ok((read.map_err(|error| json_error(&error))?, given))
+}
+
+/// Returns the fields under the names of the columns in CSV, whose other names and spellings they may have.
+fn with_known_names(fields: Map<String, Value>) -> Result<Map<String, Value>, String> {
+    let names: Vec<&str> = fields.keys().map(|name| name.trim()).collect();
+    let found = COLUMNS.assign(&names).map_err(|same| {
+        let (one, other) = (names[same.first - 1], names[same.second - 1]);
+        format!("the fields {one:?} and {other:?} are the same; leave one of them out")
+    })?;
+    let named = fields.into_iter().zip(found.columns);
+    Ok(named
+        .map(|((name, value), known)| (known.map_or(name, ToOwned::to_owned), value))
+        .collect())
 }
 
 /// Returns the text of a field without blanks at its ends, or `None` if there is none. Numbers are accepted, because ids are

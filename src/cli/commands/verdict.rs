@@ -24,8 +24,8 @@ use mocban_system::time_text::{duration, local};
 pub(crate) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(VerdictSetArgs),
-    /// Record the verdicts of a CSV or XLSX file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
-    /// of the verdicts.jsonl of an export
+    /// Record the verdicts of a CSV or XLSX file (columns pair, verdict, reviewer, and optionally metric, reason, note, at,
+    /// `angle_read_deg`), or of the verdicts.jsonl of an export
     Import(VerdictImportArgs),
     /// Print the log, oldest first
     Log(VerdictLogArgs),

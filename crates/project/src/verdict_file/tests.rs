@@ -62,6 +62,60 @@ fn headers_and_words_may_be_capitals_or_vietnamese() {
 }
 
 #[test]
+fn fields_of_json_have_the_names_of_columns() {
+    let plain = r#"{"pair":"1","verdict":"fail","reviewer":"lan","note":"x","act":1}"#;
+    let plain = &parse_jsonl(plain.as_bytes()).expect("valid")[0].listed;
+    for line in [
+        r#"{"Pair":"1","VERDICT":"fail","reviewer ":"lan","Note":"x"}"#,
+        r#"{"Mã số":1,"Đánh giá":"không đạt","người chấm":"lan","Ghi chú":"x"}"#,
+        r#"{"id":"1","kết quả":"fail","reader":"lan","ghi_chu":"x"}"#,
+    ] {
+        let rows = parse_jsonl(line.as_bytes()).expect(line);
+        assert_eq!(
+            (&rows[0].listed, rows[0].unread.len()),
+            (plain, 0),
+            "{line}"
+        );
+    }
+    // Beside a pair, the id is that of the verdict.
+    let log = r#"{"id":7,"pair":"1","verdict":"fail","reviewer":"lan","note":"x","who":""}"#;
+    let rows = parse_jsonl(log.as_bytes()).expect("valid");
+    assert_eq!((&rows[0].listed, &*rows[0].unread[0]), (plain, "who"));
+    let twice = r#"{"pair":"1","verdict":"fail","reviewer":"lan","Pair":"2"}"#;
+    let refused = parse_jsonl(twice.as_bytes())
+        .expect_err("twice")
+        .to_string();
+    let reason = "line 1: the fields \"Pair\" and \"pair\" are the same; leave one of them out";
+    assert_eq!(refused, reason);
+}
+
+#[test]
+fn a_list_may_have_the_angles_that_reviewers_read() {
+    let rows = parse_csv(
+        b"pair;verdict;reviewer;Angle read deg\n1;fail;lan;-4.5\n1;fail;lan;12,25\n1;pass;lan;\n",
+    );
+    let rows = rows.expect("valid");
+    let angles = rows
+        .iter()
+        .map(|row| row.listed.verdict.context.angle_read_deg);
+    let angles: Vec<Option<f64>> = angles.collect();
+    assert_eq!(angles, [Some(-4.5), Some(12.25), None]);
+    assert_eq!(
+        error("pair,verdict,reviewer,angle_read_deg\n1,fail,lan,left\n"),
+        "line 2: angle_read_deg is \"left\", not a number of degrees such as -4.5"
+    );
+    for wrong in ["900", "NaN"] {
+        let text = format!("pair,verdict,reviewer,angle_read_deg\n1,fail,lan,{wrong}\n");
+        let row = &parse_csv(text.as_bytes()).expect("a number")[0];
+        let refused = check_values(row, 1_795_219_200_000).expect_err(wrong);
+        assert!(
+            refused.to_string().contains("an angle is from"),
+            "{refused}"
+        );
+    }
+}
+
+#[test]
 fn json_of_python_has_no_values_for_missing_ones() {
     let rows =
         parse_jsonl(br#"{"pair":"1","verdict":"pass","reviewer":"lan","note":NaN,"metric":NaN}"#);
@@ -134,7 +188,7 @@ fn invalid_line_is_reported_by_number() {
     assert_eq!(
         error("id,result,who\n"),
         "line 1: columns verdict, reviewer are missing; columns result, who are unknown; needed are pair, verdict and \
-         reviewer, and possible metric, reason, note, at"
+         reviewer, and possible metric, reason, note, at, angle_read_deg"
     );
     assert!(error("pair,verdict,reveiwer\n").contains("did you mean \"reviewer\"?"));
     let title = error("Ván 4\n\npair;verdict;reviewer\n1;pass;lan\n");
@@ -311,7 +365,7 @@ fn fields_that_no_verdict_has_are_named() {
         unread_fields(&fields.into()).as_deref(),
         Some(
             "fields that no verdict has are not read: angle (line 2), who (line 3); besides pair, verdict and reviewer, \
-             metric, reason, note, at and angle_read_deg are"
+             metric, reason, note, at, angle_read_deg are"
         )
     );
 }
