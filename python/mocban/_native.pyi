@@ -129,6 +129,7 @@ class NativeProject:
         note: str | None,
         expect: str | None,
         new_reviewer: bool,
+        adjudicate: bool,
     ) -> bool: ...
     def import_pairs(self, file: str, rows: bytes, allow_missing: bool, allow_changed_files: bool, replace: bool) -> str: ...
     def import_block(

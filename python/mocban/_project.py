@@ -288,6 +288,7 @@ class Project:
         reviewer: str,
         expect: str | None = None,
         new_reviewer: bool = False,
+        adjudicate: bool = False,
     ) -> bool:
         """Record a verdict on the current result of a pair, under the rules of ``mocban verdict set``.
 
@@ -305,6 +306,8 @@ class Project:
             ``result_hash`` of the result that was looked at.
         new_reviewer : bool
             Whether a new reviewer's name may differ from that of another only in case or accents.
+        adjudicate : bool
+            Whether the verdict settles a conflict: it is recorded only for results on which two others disagree.
 
         Returns
         -------
@@ -315,13 +318,15 @@ class Project:
         ------
         StaleResult
             If the current result is not ``expect``. Nothing is recorded.
+        ProjectError
+            If there is no such pair, or with ``adjudicate``, no conflict that the reviewer may settle.
         InputError
             If an argument is none of these words, or cannot be recorded.
         ReadOnlyProject
             If the project was opened for reading.
         """
         return self._writable().add_verdict(
-            id, metric, verdict, reviewer, reason, note, expect, new_reviewer
+            id, metric, verdict, reviewer, reason, note, expect, new_reviewer, adjudicate
         )
 
     def import_pairs(

@@ -109,6 +109,29 @@ def test_verdicts_have_the_rules_of_the_command_line(copied: Path, pair: DemoPai
         assert (refused.value.errno, refused.value.filename) == (errno.EACCES, str(copied))
 
 
+def test_a_third_person_settles_a_conflict(copied: Path, pair: DemoPair) -> None:
+    project = mocban.open(copied, readonly=False)
+
+    def settle(reviewer: str, **more: str) -> bool:
+        return project.add_verdict(pair.id, "relief", "pass", reviewer=reviewer, adjudicate=True, **more)
+
+    with pytest.raises(mocban.ProjectError, match="no open conflict") as none:
+        settle("Hoa")
+    assert none.value.code == "nothing_selected"
+    project.add_verdict(pair.id, "relief", "pass", reviewer="Lan")
+    project.add_verdict(pair.id, "relief", "fail", reviewer="Minh")
+    with pytest.raises(mocban.ProjectError, match="no open conflict"):
+        settle("Lan")
+    with pytest.raises(mocban.StaleResult):
+        settle("Hoa", expect="0" * 64)
+    assert len(project.verdicts()) == 2
+    assert settle("Hoa", expect=project.pair(pair.id).metrics["relief"]["result_hash"])
+    last = project.verdicts()[-1]
+    assert (last["reviewer"], last["metric"], last["review_order"]) == ("Hoa", "relief", "adjudicate")
+    with pytest.raises(mocban.ProjectError, match="no open conflict"):
+        settle("Mai")
+
+
 def test_rows_are_imported_and_run_with_progress(pairs: list[DemoPair], tmp_path: Path) -> None:
     folder = tmp_path / "mới"
     rows = [{"id": p.id, "mesh": p.mesh, "print": p.print, "note": float("nan"), "unit": p.unit} for p in pairs[:3]]

@@ -74,9 +74,10 @@ fn check_pictures(dir: &Path) {
     let written = mocban(dir, &args).expect(0).json();
     assert_eq!(written["characters"], 6);
     let page = dir.join("p/page-b1.png");
-    assert_eq!(
-        written["file"],
-        page.strip_prefix(dir).expect("below").to_str()
+    let file = written["file"].as_str();
+    assert!(
+        file.is_some_and(|file| file.ends_with("page-b1.png")),
+        "{file:?}"
     );
     let page = picture(&page);
     let outlines = pixels(&page, INK_ONLY);

@@ -85,17 +85,39 @@ pub async fn settle(
     is_new_allowed: bool,
     location: &Location,
 ) -> ProjectResult<(NewVerdict, Vec<ThresholdMetric>)> {
+    settle_on(pair, None, verdict, is_new_allowed, location).await
+}
+
+/// Records a verdict like [`settle`], but only on the result with the hash `judged`, if it is given. If no current result
+/// has it, nothing is recorded, and no metric is returned.
+///
+/// # Errors
+/// As for [`settle`].
+pub async fn settle_on(
+    pair: &str,
+    judged: Option<ContentHash>,
+    verdict: impl FnOnce(PairName) -> NewVerdict,
+    is_new_allowed: bool,
+    location: &Location,
+) -> ProjectResult<(NewVerdict, Vec<ThresholdMetric>)> {
     let (_project, catalog) = location.open().await?;
     let mut verdict = verdict(selection::pair(&catalog, pair).await?);
     verdict.context.review_order = Some(ReviewOrder::Adjudicate);
     let verdict = checked(&catalog, verdict, is_new_allowed).await?;
     let found = catalog.pair(&verdict.pair).await?;
     let records = found.into_iter().flat_map(|pair| pair.results.metrics);
-    let open = records.filter(|record| {
-        let metric = record.outcome.metric;
-        verdict.metric.is_none_or(|wanted| wanted == metric)
-            && is_open_conflict(record, &verdict.reviewer)
+    let meant = records.filter(|record| {
+        let is_wanted = |wanted| wanted == record.outcome.metric;
+        verdict.metric.is_none_or(is_wanted)
+            && judged.is_none_or(|judged| judged == record.result_hash)
     });
+    let meant: Vec<_> = meant.collect();
+    if judged.is_some() && meant.is_empty() {
+        catalog.close().await;
+        return Ok((verdict, Vec::new()));
+    }
+    let open = meant.iter();
+    let open = open.filter(|record| is_open_conflict(record, &verdict.reviewer));
     let open: Vec<_> = open
         .map(|record| (record.outcome.metric, record.result_hash))
         .collect();

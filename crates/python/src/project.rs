@@ -219,6 +219,7 @@ impl NativeProject {
         note: Option<String>,
         expect: Option<&str>,
         new_reviewer: bool,
+        adjudicate: bool,
     ) -> PyResult<bool> {
         let metric = metric.map(|name| parsed_metric(py, name)).transpose()?;
         let verdict = verdict_words::verdict(verdict).map_err(|text| wrong_argument(py, &text))?;
@@ -237,11 +238,13 @@ impl NativeProject {
                 context: ReviewContext::default(),
                 at: None,
             };
-            Ok(
-                verdicts::record_on(&id, judged, new, new_reviewer, &location)
-                    .await?
-                    .1,
-            )
+            if !adjudicate {
+                let recorded = verdicts::record_on(&id, judged, new, new_reviewer, &location);
+                return Ok(recorded.await?.1);
+            }
+            let settled = verdicts::settle_on(&id, judged, new, new_reviewer, &location);
+            let is_stale = settled.await?.1.is_empty();
+            Ok([RecordedVerdict::New, RecordedVerdict::Stale][usize::from(is_stale)])
         })?;
         // The library refuses other arguments, such as the name of a reviewer.
         let recorded = recorded.map_err(|error| match error.code() {
