@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::json;
 
-use super::screen::{Palette, Screen, Tone};
+use super::screen::{Palette, Screen, Tone, warning_label};
 use super::streams;
 use crate::cli::input::global::Global;
 use mocban_catalog::SetApart;
@@ -72,7 +72,7 @@ impl Context {
 
     /// Writes a warning to stderr, also with `-q`. Of equal ones, only the first few are written, unless `-v` is given.
     pub(crate) fn warn(&self, text: &str) {
-        let label = format!("{} ", self.stderr.paint(Tone::Warn, "warning:"));
+        let label = warning_label(self.stderr);
         if self.global.verbose > 0 {
             self.screen.line(&format!("{label}{}", indented(text)));
         } else {
@@ -170,7 +170,7 @@ fn location(global: &Global) -> Location {
 
 /// Indents the lines after the first, so that a line break in the name of a file cannot imitate another message. Cuts
 /// lines that are longer than `MAX_LINE_CHARS`.
-fn indented(text: &str) -> String {
+pub(super) fn indented(text: &str) -> String {
     let shown = |line: &str| match line.char_indices().nth(MAX_LINE_CHARS) {
         Some((end, _)) => format!("{}...", &line[..end]),
         None => line.to_owned(),

@@ -4,10 +4,16 @@ use std::fs::OpenOptions;
 use std::io::IsTerminal as _;
 use std::sync::Mutex;
 
+use tracing::field::{Field, Visit};
+use tracing::{Event, Level, Metadata, Subscriber};
 use tracing_subscriber::EnvFilter;
-use tracing_subscriber::fmt::writer::BoxMakeWriter;
+use tracing_subscriber::fmt::format::{Format, Writer};
+use tracing_subscriber::fmt::writer::{BoxMakeWriter, MakeWriter};
+use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
+use tracing_subscriber::registry::LookupSpan;
 
-use super::screen::{Palette, Screen};
+use super::context::indented;
+use super::screen::{Palette, Screen, warning_label};
 use crate::cli::input::global::{Global, LogFormat};
 use mocban_core::domain::FileKind;
 use mocban_lists::manifest::is_named_like_input;
@@ -26,9 +32,13 @@ pub(crate) fn start(global: &Global, screen: &Screen) -> ProjectResult<()> {
         .with_env_filter(filter)
         .with_ansi(!to_file && colours.is_on())
         .with_writer(writer);
+    let format = EventFormat {
+        has_plain_warnings: !to_file && global.verbose == 0,
+        log: Format::default().with_target(false),
+    };
     // Only a test starts a second log in one process; the first one stays.
     let _ = match global.log_format {
-        LogFormat::Text => builder.with_target(false).try_init(),
+        LogFormat::Text => builder.event_format(format).try_init(),
         LogFormat::Json => builder.json().flatten_event(true).try_init(),
     };
     Ok(())
@@ -44,9 +54,10 @@ fn writer(
             screen: screen.clone(),
             format: global.log_format,
             colours,
-            counts_equal: global.verbose == 0,
+            has_plain_warnings: global.verbose == 0,
+            is_warning: false,
         };
-        return Ok((BoxMakeWriter::new(move || writer.clone()), false));
+        return Ok((BoxMakeWriter::new(writer), false));
     };
     refuse_project_file(path)?;
     // Which files are inputs of the project is not known yet.
@@ -67,14 +78,97 @@ fn writer(
     Ok((BoxMakeWriter::new(Mutex::new(file)), true))
 }
 
+/// The fields of a warning.
+#[derive(Debug, Default)]
+struct PlainWarning {
+    message: String,
+    error: String,
+    /// Names and values of other fields.
+    others: Vec<String>,
+}
+
+impl PlainWarning {
+    /// Returns a sentence such as `1.ply: 5 vertices are left out (pair b04-0117)`.
+    fn text(&self) -> String {
+        let error = if self.error.is_empty() {
+            String::new()
+        } else {
+            format!(": {}", self.error)
+        };
+        let others = if self.others.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", self.others.join(", "))
+        };
+        format!("{}{error}{others}", self.message)
+    }
+}
+
+impl Visit for PlainWarning {
+    fn record_str(&mut self, field: &Field, value: &str) {
+        self.record_debug(field, &format_args!("{value}"));
+    }
+
+    fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
+        match field.name() {
+            "message" => self.message = format!("{value:?}"),
+            "error" => self.error = format!("{value:?}"),
+            name => self.others.push(format!("{name} {value:?}")),
+        }
+    }
+}
+
 /// Writes log lines to the screen.
 #[derive(Debug, Clone)]
 struct LogWriter {
     screen: Screen,
     format: LogFormat,
     colours: Palette,
-    /// Whether only the first of equal warnings is written.
-    counts_equal: bool,
+    /// Whether warnings are written like those of the commands, of equal ones only the first.
+    has_plain_warnings: bool,
+    /// Whether the event is a warning.
+    is_warning: bool,
+}
+
+impl MakeWriter<'_> for LogWriter {
+    type Writer = Self;
+
+    fn make_writer(&self) -> Self {
+        self.clone()
+    }
+
+    fn make_writer_for(&self, meta: &Metadata<'_>) -> Self {
+        Self {
+            is_warning: *meta.level() == Level::WARN,
+            ..self.clone()
+        }
+    }
+}
+
+/// Formats events. Unless a log was asked for, warnings have no time and no level.
+struct EventFormat {
+    has_plain_warnings: bool,
+    log: Format,
+}
+
+impl<S, N> FormatEvent<S, N> for EventFormat
+where
+    S: Subscriber + for<'l> LookupSpan<'l>,
+    N: for<'w> FormatFields<'w> + 'static,
+{
+    fn format_event(
+        &self,
+        context: &FmtContext<'_, S, N>,
+        mut writer: Writer<'_>,
+        event: &Event<'_>,
+    ) -> std::fmt::Result {
+        if self.has_plain_warnings && *event.metadata().level() == Level::WARN {
+            let mut warning = PlainWarning::default();
+            event.record(&mut warning);
+            return writeln!(writer, "{}", warning.text());
+        }
+        self.log.format_event(context, writer, event)
+    }
 }
 
 impl std::io::Write for LogWriter {
@@ -83,8 +177,9 @@ impl std::io::Write for LogWriter {
         let text = String::from_utf8_lossy(bytes);
         let line = text.trim_end_matches('\n');
         match self.format {
-            LogFormat::Text if self.counts_equal && line.contains("WARN") => {
-                self.screen.log_warning(line);
+            LogFormat::Text if self.has_plain_warnings && self.is_warning => {
+                let label = warning_label(self.colours);
+                self.screen.warning(&label, &indented(line));
             }
             LogFormat::Text if self.colours.is_on() => self.screen.log_line(line),
             LogFormat::Text => self.screen.line(line),
@@ -110,7 +205,54 @@ const fn level(verbose: u8, quiet: bool, to_file: bool) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::level;
+    use std::sync::{Arc, Mutex};
+
+    use super::{EventFormat, Format, level};
+
+    /// Keeps what is written.
+    #[derive(Debug, Clone, Default)]
+    struct Written(Arc<Mutex<Vec<u8>>>);
+
+    impl std::io::Write for Written {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.lock().expect("no panic").write(bytes)
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn warnings_of_the_log_are_sentences_unless_a_log_was_asked_for() {
+        let lines = |has_plain_warnings| {
+            let (written, log) = (Written::default(), Format::default().with_target(false));
+            let writer = written.clone();
+            let subscriber = tracing_subscriber::fmt()
+                .with_ansi(false)
+                .with_writer(move || writer.clone())
+                .event_format(EventFormat {
+                    has_plain_warnings,
+                    log,
+                });
+            tracing::subscriber::with_default(subscriber.finish(), || {
+                let (pair, error) = ("b1", "it is full");
+                tracing::warn!(%pair, times = 2, "1.ply: 5 vertices are left out");
+                tracing::warn!(%error, "not stored");
+                tracing::info!("the run ends");
+            });
+            let bytes = written.0.lock().expect("no panic").clone();
+            String::from_utf8(bytes).expect("text")
+        };
+        let plain = lines(true);
+        let plain: Vec<&str> = plain.lines().collect();
+        let sentence = "1.ply: 5 vertices are left out (pair b1, times 2)";
+        assert_eq!(plain[..2], [sentence, "not stored: it is full"]);
+        assert!(plain[2].contains("INFO the run ends"), "{plain:?}");
+        let log = lines(false);
+        assert!(log.contains("WARN 1.ply: 5 vertices"), "{log}");
+        assert!(log.contains("pair=b1"), "{log}");
+    }
 
     #[test]
     fn each_v_logs_more_and_a_file_more_than_the_terminal() {

@@ -90,11 +90,6 @@ impl Screen {
         self.line(&text.replace("\u{1b}[", &OWN_CODE));
     }
 
-    /// Writes a warning of the log with colours, or counts it if an equal one was written before.
-    pub(crate) fn log_warning(&self, text: &str) {
-        self.warning("", &text.replace("\u{1b}[", &OWN_CODE));
-    }
-
     /// Writes a line of a log in JSON.
     pub(crate) fn json_log_line(&self, text: &str) {
         self.write(&visible_json(text));
@@ -174,6 +169,11 @@ impl Palette {
             text.to_string()
         }
     }
+}
+
+/// Returns the word before a warning, in the colours of stderr.
+pub(crate) fn warning_label(palette: Palette) -> String {
+    format!("{} ", palette.paint(Tone::Warn, "warning:"))
 }
 
 /// Returns whether the terminal cannot move its cursor.
