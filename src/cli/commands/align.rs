@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
-use crate::cli::output::digits::{LENGTH_DIGITS, length, significant};
+use crate::cli::output::digits::{
+    DEGREES, LENGTH_DIGITS, PIXELS, SCORE, fixed, length, significant,
+};
 use crate::cli::output::table::columns;
 use clap::Args;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
@@ -87,12 +89,12 @@ fn write_files(
 /// Returns what was found in five lines.
 fn text(pair: &AlignedPair) -> String {
     let metric = pair.first_metric();
-    let [x, y] = metric.shift_px;
+    let shift = metric.shift_px.map(|px| fixed(px, PIXELS)).join(", ");
     let confidence = match metric.confidence {
         Some(confidence) if metric.is_low_confidence() => {
-            format!("{confidence:.2}: look at it before you use it")
+            format!("{}: look at it before you use it", fixed(confidence, SCORE))
         }
-        Some(confidence) => format!("{confidence:.2}"),
+        Some(confidence) => fixed(confidence, SCORE),
         None => "not known under this method".to_owned(),
     };
     let map = pair.print_from_mesh(metric);
@@ -102,8 +104,8 @@ fn text(pair: &AlignedPair) -> String {
         (
             "pose",
             format!(
-                "turned by {:.2} degrees, shifted by {x:.1}, {y:.1} px, {}",
-                metric.angle_deg,
+                "turned by {}\u{b0}, shifted by {shift} px, {}",
+                fixed(metric.angle_deg, DEGREES),
                 scale_text(pixels_per_unit(&map.0), unit)
             ),
         ),
@@ -119,8 +121,10 @@ fn text(pair: &AlignedPair) -> String {
         (
             "agreement",
             format!(
-                "SSIM {:.3}, IoU {:.3}, Dice {:.3}",
-                metric.scores.ssim, metric.scores.iou, metric.scores.dice
+                "SSIM {}, IoU {}, Dice {}",
+                fixed(metric.scores.ssim, SCORE),
+                fixed(metric.scores.iou, SCORE),
+                fixed(metric.scores.dice, SCORE)
             ),
         ),
     ];

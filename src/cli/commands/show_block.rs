@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use crate::cli::output::context::Context;
-use crate::cli::output::digits::significant;
+use crate::cli::output::digits::{SCORE, fixed, significant};
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::show_text::state_name;
 use crate::cli::output::table::{columns, count};
@@ -218,7 +218,7 @@ fn characters_text(
     let uncertain = characters.iter().filter(is_low).take(MAX_CHARACTERS);
     let left = characters.iter().filter(is_left).take(MAX_CHARACTERS);
     let rows = uncertain.chain(left).map(|one| {
-        let confidence = one.confidence.map(|value| format!("{value:.2}"));
+        let confidence = one.confidence.map(|value| fixed(value, SCORE));
         vec![
             format!("  {}", one_line(&one.label)),
             confidence.unwrap_or_default(),

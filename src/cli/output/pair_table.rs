@@ -1,5 +1,6 @@
 //! The table of pairs that `status --pairs` and `show --low` print.
 
+use super::digits::{DEGREES, SCALE, SCORE, fixed};
 use super::screen::{Palette, Tone};
 use super::show_text::state_name;
 use super::table::columns;
@@ -35,7 +36,7 @@ pub(crate) fn pair_table(rows: &[PairRow], palette: Palette) -> String {
 
 fn line(row: &PairRow, palette: Palette) -> [String; 9] {
     let number = |value: Option<f64>, digits: usize| {
-        value.map_or_else(String::new, |value| format!("{value:.digits$}"))
+        value.map_or_else(String::new, |value| fixed(value, digits))
     };
     let (tone, at) = match row.status {
         JobStatus::Done => (Tone::Good, None),
@@ -43,16 +44,16 @@ fn line(row: &PairRow, palette: Palette) -> [String; 9] {
         JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => (Tone::Warn, None),
     };
     let at = at.map_or_else(String::new, |stage| format!(" at {stage}"));
-    let confidence = number(row.confidence, 3);
+    let confidence = number(row.confidence, SCORE);
     let is_low = |value| value < MetricOutcome::LOW_CONFIDENCE;
     [
         row.id.to_string(),
         row.character.clone().unwrap_or_default(),
         row.block.clone().unwrap_or_default(),
         palette.paint(tone, format!("{}{at}", state_name(row.status))),
-        number(row.angle_deg, 2),
-        number(row.scale, 4),
-        number(row.iou, 3),
+        number(row.angle_deg, DEGREES),
+        number(row.scale, SCALE),
+        number(row.iou, SCORE),
         if row.confidence.is_some_and(is_low) {
             palette.paint(Tone::Warn, confidence)
         } else {

@@ -1,6 +1,8 @@
 //! The text that `show` prints about one pair.
 
-use super::digits::{LENGTH_DIGITS, length, significant, unit_name};
+use super::digits::{
+    DEGREES, LENGTH_DIGITS, PIXELS, SCALE, SCORE, fixed, length, significant, unit_name,
+};
 use super::screen::{Palette, Tone};
 use super::table::columns;
 use mocban_align::scan_size;
@@ -216,9 +218,10 @@ fn fit_numbers(fit: &FitOutcome, hints: ScanHints) -> String {
         format!("; {}", notes.join("; "))
     };
     let [relief, rms] = [fit.relief, fit.rms].map(|value| length(value, hints.unit));
+    let [inliers, side] = [fit.inlier_ratio, fit.side.confidence].map(|share| fixed(share, SCORE));
     format!(
-        "relief {relief}, rms {rms}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{notes}",
-        fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
+        "relief {relief}, rms {rms}, inliers {inliers}, side confidence {side}{curvature}; {} vertices, {} triangles{notes}",
+        fit.vertices, fit.triangles
     )
 }
 
@@ -267,20 +270,20 @@ fn metric_row(record: &MetricRecord) -> Vec<String> {
     let bound = if result.at_bound { " at a limit" } else { "" };
     vec![
         format!("  {}", result.metric),
-        format!("{:.2}", result.angle_deg),
-        format!("{:.4}", result.scale),
-        format!("{:.1}, {:.1}", result.shift_px[0], result.shift_px[1]),
+        fixed(result.angle_deg, DEGREES),
+        fixed(result.scale, SCALE),
+        result.shift_px.map(|px| fixed(px, PIXELS)).join(", "),
         significant(result.threshold_depth, LENGTH_DIGITS),
-        format!("{:.3}", result.scores.ssim),
-        format!("{:.3}", result.scores.iou),
-        format!("{:.3}", result.scores.iou_box),
-        format!("{:.3}", result.scores.dice),
+        fixed(result.scores.ssim, SCORE),
+        fixed(result.scores.iou, SCORE),
+        fixed(result.scores.iou_box, SCORE),
+        fixed(result.scores.dice, SCORE),
         percent(result.disagreement.missing_ink),
         percent(result.disagreement.missing_wood),
-        format!("{:.3}", result.margin),
+        fixed(result.margin, SCORE),
         result
             .confidence
-            .map_or_else(|| "-".to_owned(), |confidence| format!("{confidence:.3}")),
+            .map_or_else(|| "-".to_owned(), |confidence| fixed(confidence, SCORE)),
         format!("{}{bound}", verdicts(record)),
     ]
 }
@@ -335,11 +338,10 @@ fn adjustment_text(adjustment: &Adjustment, iou: f64) -> String {
         scale,
         mirrored,
     } = adjustment.by;
-    // Adding zero turns -0.0 into 0.0.
-    let rotation_deg = (rotation_deg * 10.0).round() / 10.0 + 0.0;
+    let rotation_deg = fixed(rotation_deg, 1);
     let mirrored = if mirrored { ", mirrored" } else { "" };
     format!(
-        "rotated {rotation_deg:.1}\u{b0}, shifted {:.1} px, scaled {scale:.3}{mirrored} from {}; IoU {iou:.3}, before {:.3}",
+        "rotated {rotation_deg}\u{b0}, shifted {:.1} px, scaled {scale:.3}{mirrored} from {}; IoU {iou:.3}, before {:.3}",
         x.hypot(y),
         adjustment.from,
         adjustment.from_iou
