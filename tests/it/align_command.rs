@@ -201,13 +201,37 @@ fn what_is_said_of_a_scan_is_compared_with_what_was_found() {
     fs::write(dir.path().join("list.csv"), list).expect("a list");
     mocban(dir.path(), &["-C", "p", "import", "list.csv"]).expect(0);
     let ran = mocban(dir.path(), &["-C", "p", "run"]).expect(0);
-    assert!(ran.err.contains("mm deep, but most blocks"), "{}", ran.err);
+    // A warning of the log looks like one of the command.
+    let is_warning = |line: &str| line.starts_with("warning: ") && line.ends_with(" (pair a)");
+    let mut lines = ran.err.lines();
+    let warned = lines.any(|line| line.contains("mm deep, but most blocks") && is_warning(line));
+    assert!(warned, "{}", ran.err);
     let shown = mocban(dir.path(), &["-C", "p", "show", "a"]).expect(0);
     assert!(
         shown.out.contains("scanned_face_down says"),
         "{}",
         shown.out
     );
+}
+
+#[test]
+fn the_text_has_the_decimals_of_show() {
+    let dir = empty();
+    exported(dir.path(), "pose");
+    let lines = crate::export_readback::lines(&dir.path().join("e"));
+    let [mesh, print] = ["mesh", "print"].map(|name| {
+        let path = lines[0][name].as_str().expect("a path");
+        format!("d/{path}")
+    });
+    let text = mocban(dir.path(), &["align", &mesh, &print]).expect(0).out;
+    let line = |name: &str| {
+        let line = text.lines().find(|line| line.starts_with(name));
+        line.unwrap_or_default()
+    };
+    let number = line("confidence").split_whitespace().nth(1);
+    let decimals = number.and_then(|number| number.trim_end_matches(':').split_once('.'));
+    assert_eq!(decimals.map(|(_, digits)| digits.len()), Some(3), "{text}");
+    assert!(line("pose").contains("\u{b0}, shifted by "), "{text}");
 }
 
 #[test]

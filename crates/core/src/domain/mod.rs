@@ -35,6 +35,7 @@ mod retire_cause;
 mod review_order;
 mod sanitize;
 mod seeded_random;
+mod significant;
 pub mod spelling;
 mod stage;
 #[cfg(any(test, feature = "test-helpers"))]
@@ -86,6 +87,7 @@ pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;
 pub use sanitize::{first_names, is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;
+pub use significant::significant;
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};
 pub use unique_keys::KEY_TWICE;

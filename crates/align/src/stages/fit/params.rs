@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::stages::zbuffer::LARGEST_OVERLAP;
-use mocban_core::domain::FailureClass;
+use mocban_core::domain::{FailureClass, significant};
 
 /// Settings of the fit stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,8 +54,8 @@ pub enum FitError {
     Overlap(usize),
     /// Nothing is carved.
     #[error(
-        "no carving found: the likeliest side has a relief of {relief:.4} on an extent of {extent:.4} (mesh units), a \
-         share below fit.min_relief {min_relief}{}", if *searched { "; no other side or part resembles the print" } else { "" }
+        "no carving found: the likeliest side has a relief of {} on an extent of {} (mesh units), a share below \
+         fit.min_relief {min_relief}{}", significant(*relief, 3), significant(*extent, 3), if *searched { "; no other side or part resembles the print" } else { "" }
     )]
     NoRelief {
         /// Relief found, in mesh units.

@@ -278,3 +278,18 @@ fn points_that_span_no_surface_are_rejected() {
         assert_eq!(refused.class(), FailureClass::NoSolution, "method {k}");
     }
 }
+
+#[test]
+fn a_missing_relief_has_significant_digits_in_any_unit() {
+    let refused = FitError::NoRelief {
+        relief: 0.000_004_7,
+        extent: 0.019_915,
+        min_relief: 0.005,
+        searched: false,
+    };
+    assert_eq!(
+        refused.to_string(),
+        "no carving found: the likeliest side has a relief of 0.00000470 on an extent of 0.0199 (mesh units), a share below \
+         fit.min_relief 0.005"
+    );
+}
