@@ -277,7 +277,9 @@ fn row(
 /// Parses the rotation that a reviewer found missing, in degrees. A list may have decimal commas.
 fn parsed_angle(text: &str) -> Result<f64, String> {
     let angle = text.replacen(',', ".", 1).parse();
-    angle.map_err(|_| format!("angle_read_deg is {text:?}, not a number of degrees such as -4.5"))
+    angle.map_err(|_error| {
+        format!("angle_read_deg is {text:?}, not a number of degrees such as -4.5")
+    })
 }
 
 fn value<T>(text: &str, line: usize) -> Result<T, RefusedLine>

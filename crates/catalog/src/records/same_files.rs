@@ -1,5 +1,5 @@
-//! Finds pairs and blocks with the files of other ones, which are then counted twice: new ones by their paths, and those
-//! that were read by their contents.
+//! Finds pairs and blocks with the files of other ones, which are then counted twice: new ones by their paths, and after
+//! a run by their contents.
 
 use serde::Serialize;
 
@@ -43,7 +43,7 @@ pub struct SameFiles {
     pub id: String,
     /// An earlier one with the same files.
     pub known: String,
-    /// Number of those that are not the first with their files.
+    /// Number of pairs or blocks that are not the first with their files.
     pub count: u64,
 }
 
