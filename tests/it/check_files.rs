@@ -117,8 +117,10 @@ fn copies_under_other_ids_and_changed_inputs_are_named() {
     let project = done(dir.path());
     let data = project.dir().join("data");
     let list = std::fs::read_to_string(data.join("manifest.csv")).expect("a list");
-    let row: Vec<&str> = list.lines().nth(1).expect("a pair").split(',').collect();
-    let [known, mesh, print, ..] = row[..] else {
+    let mut lines = list.lines();
+    let header = lines.next().expect("a header");
+    let row: Vec<&str> = lines.next().expect("a pair").split(',').collect();
+    let [known, mesh, print, ref others @ ..] = row[..] else {
         unreachable!("a list has an id, a mesh and a print");
     };
     let file = |path: &str| {
@@ -130,7 +132,9 @@ fn copies_under_other_ids_and_changed_inputs_are_named() {
         std::fs::copy(data.join(path), data.join(&to)).expect("copied");
         to
     });
-    let rows = format!("id,mesh,print\ncopy,{},{}\n", copied[0], copied[1]);
+    let files = ["copy", copied[0].as_str(), copied[1].as_str()];
+    let row = [&files[..], others].concat().join(",");
+    let rows = format!("{header}\n{row}\n");
     std::fs::write(data.join("copies.csv"), rows).expect("written");
     let copies = data.join("copies.csv").display().to_string();
     at(&project, &["import", &copies]).expect(0);
