@@ -98,9 +98,9 @@ impl Catalog {
     pub async fn same_contents(&self) -> Result<SameContents> {
         let mut conn = self.read_conn().await?;
         let missing = InputVersion::gone().hash;
-        let pairs = query_as(PAIR_CONTENTS).bind(missing);
+        let pairs = query_as(PAIR_CONTENTS).bind(&missing.as_bytes()[..]);
         let pairs = pairs.fetch_optional(&mut conn).await?;
-        let blocks = query_as(BLOCK_CONTENTS).bind(missing);
+        let blocks = query_as(BLOCK_CONTENTS).bind(&missing.as_bytes()[..]);
         let blocks = blocks.fetch_optional(&mut conn).await?;
         Ok(SameContents { pairs, blocks })
     }
