@@ -405,7 +405,7 @@ fn exactly_the_chosen_pairs_are_judged() {
 }
 
 #[test]
-fn a_review_of_chosen_pairs_goes_on_after_a_restart_when_they_are_chosen_again() {
+fn a_review_of_chosen_pairs_goes_on_after_a_restart() {
     let (dir, mut page) = with_project();
     let pairs = ["upright-0001", "upright-0004"];
     let choose = |page: &Page, pairs: &[&str]| {
@@ -427,6 +427,15 @@ fn a_review_of_chosen_pairs_goes_on_after_a_restart_when_they_are_chosen_again()
     };
     assert_eq!(send(&page, "e-1", &first), 200);
     page.kill();
+    let mut page = open_app(dir.path());
+    let shown = text(&page.get(&format!("/p/p/review?chosen={key}")));
+    let part = "Only the chosen pairs are judged: <b>2</b>";
+    assert!(shown.contains(part), "{shown}");
+    assert_eq!(page.get(&review).status, 200);
+    assert_eq!(items(&page).as_array().map(Vec::len), Some(pairs.len()));
+    // Without the file of the choice, the page acts on no pair and says what to do.
+    page.kill();
+    std::fs::remove_dir_all(dir.path().join("p/chosen")).expect("the choice");
     let page = open_app(dir.path());
     let asked = page.get(&review);
     assert_eq!(asked.status, 422);

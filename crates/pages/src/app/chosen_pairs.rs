@@ -207,7 +207,7 @@ pub(super) async fn change(
             ("retire", ["at", &at.to_string()].map(str::to_owned))
         }
         ChosenChange::Review => {
-            let key = state.chosen.keep(&open.key, &chosen);
+            let key = state.chosen.keep(&open.key, &open.dir, &chosen).await;
             return Ok(Json(json!({ "go": format!("review?{CHOSEN}={key}") })));
         }
     };

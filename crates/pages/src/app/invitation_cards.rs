@@ -65,7 +65,7 @@ async fn guest_pages(
     choice: &str,
 ) -> AppResult<(Router, Arc<GuestReview>)> {
     let query = PageQuery::parse(choice);
-    let pairs = state.chosen.of(&open.key, &query)?;
+    let pairs = state.chosen.of(&open.key, &open.dir, &query).await?;
     let pages = open_review(
         open,
         reviewer,

@@ -58,14 +58,15 @@ pub(super) async fn page(
     Path(key): Path<String>,
     visit: Visit,
 ) -> AppResult<Html<String>> {
-    state.open(&key).await?;
+    let open = state.open(&key).await?;
+    let chosen = state.chosen.of(&key, &open.dir, &visit.query).await;
     let invited = state.invitations.of_project(&key).await;
     let body = html! {
         p { (visit.t(
             "The question is always the same: is the rotation within 5 degrees, and is the whole character there? Results come in random order, without scores, and each answer is stored at once.",
             "Câu hỏi luôn như nhau: góc xoay có lệch không quá 5 độ, và chữ có đủ không? Kết quả xuất hiện theo thứ tự ngẫu nhiên, không kèm điểm, và mỗi câu trả lời được lưu ngay.",
         )) }
-        @match state.chosen.of(&key, &visit.query) {
+        @match chosen {
             Ok(chosen) => (start_form(&visit, chosen.map(|pairs| pairs.len()))),
             Err(failure) => {
                 p.notice.bad role="alert" { (failure.text(visit.language)) }
@@ -236,7 +237,7 @@ async fn review(
         work: Arc::clone(&state.review_work),
     };
     let query = PageQuery::parse(choice);
-    let pairs = state.chosen.of(&open.key, &query)?;
+    let pairs = state.chosen.of(&open.key, &open.dir, &query).await?;
     let opened = open_review(open, reviewer, &query, of_app, pairs).await?;
     Ok(state.reviews.keep(id, open, opened.routes()))
 }
