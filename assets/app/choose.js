@@ -2,6 +2,7 @@
 // while the list is paged through.
 
 import { noAnswer } from "./action.js";
+import { withValues } from "./scan-messages.js";
 
 const bar = document.getElementById("choice");
 const status = document.getElementById("chosen");
@@ -20,23 +21,19 @@ for (const box of boxes) {
 /** Where a range begins. */
 let anchor = -1;
 
-function withNumber(text, number = chosen.size) {
-  return text.replaceAll("{n}", number);
-}
-
 function show() {
   for (const box of boxes) {
     box.checked = chosen.has(box.dataset.pair);
     box.closest(".pick-card, tr").classList.toggle("is-chosen", box.checked);
   }
   const here = boxes.filter((box) => box.checked).length;
-  status.textContent = chosen.size ? withNumber(status.dataset.text).replace("{here}", here) : status.dataset.none;
+  status.textContent = chosen.size ? withValues(status.dataset.text, { n: chosen.size, here }) : status.dataset.none;
   none.hidden = document.getElementById("choice-actions").hidden = chosen.size === 0;
   for (const button of bar.querySelectorAll("button[data-text]")) {
     const number = button.dataset.counts === "open" ? [...chosen].filter((name) => open.has(name)).length : chosen.size;
-    button.textContent = withNumber(button.dataset.text, number);
+    button.textContent = withValues(button.dataset.text, { n: number });
     button.hidden = number === 0;
-    if (button.dataset.ask) button.dataset.confirm = withNumber(button.dataset.ask);
+    if (button.dataset.ask) button.dataset.confirm = withValues(button.dataset.ask, { n: chosen.size });
   }
 }
 

@@ -1,6 +1,7 @@
 // Files from the browser: they are chosen or dragged, and sent one after another.
 
 import { act, read, token } from "./action.js";
+import { localNumber } from "./scan-messages.js";
 
 const form = document.getElementById("upload");
 const texts = form.dataset;
@@ -37,14 +38,13 @@ function isWanted({ path }) {
 function size(bytes) {
   const [unit, divisor, digits] = bytes < 1e6 ? ["kB", 1e3, 0] : bytes < 1e9 ? ["MB", 1e6, 1] : ["GB", 1e9, 1];
   const rounded = digits === 0 ? Math.ceil(bytes / divisor) : bytes / divisor;
-  const format = { minimumFractionDigits: digits, maximumFractionDigits: digits };
-  return `${rounded.toLocaleString(document.documentElement.lang, format)} ${unit}`;
+  return `${localNumber(rounded, digits)} ${unit}`;
 }
 
 function show(files, count, sent, bytes) {
   bar.max = Math.max(bytes, 1);
   bar.value = sent;
-  done.textContent = `${files} / ${count} ${texts.files}, ${size(sent)} / ${size(bytes)}`;
+  done.textContent = `${localNumber(files)} / ${localNumber(count)} ${texts.files}, ${size(sent)} / ${size(bytes)}`;
 }
 
 /** Sends a file; `sent` hears how much of it is on its way. */
@@ -77,7 +77,7 @@ async function follow(upload) {
   if (upload !== current || phase.textContent !== texts.unpacking) return;
   const reply = await fetch(`uploads/${upload.id}`, { headers: { accept: "application/json" } }).catch(() => null);
   const count = reply?.ok ? await reply.json() : null;
-  if (count && upload === current) done.textContent = `${count.files} ${texts.files}, ${size(count.bytes)}`;
+  if (count && upload === current) done.textContent = `${localNumber(count.files)} ${texts.files}, ${size(count.bytes)}`;
 }
 
 /** Returns why an upload was cut off. */
@@ -104,7 +104,7 @@ async function begin(files, bytes, takesOver) {
 
 /** Says how many files are not sent again. */
 function showArrived(count) {
-  arrived.textContent = `${texts.arrived}: ${count}`;
+  arrived.textContent = `${texts.arrived}: ${localNumber(count)}`;
   arrived.hidden = count === 0;
 }
 

@@ -1,5 +1,7 @@
 // Texts of the page of a block in English and Vietnamese.
 
+import { withValues } from "./scan-messages.js";
+
 const BLOCK_MESSAGES = {
   page_view: { en: "Page of the block", vi: "Trang in của ván" },
   layers: { en: "Layer", vi: "Lớp" },
@@ -74,5 +76,5 @@ const BLOCK_MESSAGES = {
 
 /** Returns a text with `{name}` replaced by the values. */
 export function blockText(language, key, values = {}) {
-  return BLOCK_MESSAGES[key][language].replace(/\{(\w+)\}/g, (placeholder, name) => values[name] ?? placeholder);
+  return withValues(BLOCK_MESSAGES[key][language], values);
 }

@@ -1,5 +1,7 @@
 // Configuration from the server: CSRF token, key bindings, messages.
 
+import { withValues } from "./scan-messages.js";
+
 export const language = document.documentElement.lang;
 
 const config = await load();
@@ -22,6 +24,5 @@ export const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scal
 
 /** Returns the message of a key, with `{name}` replaced by the values. */
 export function translate(key, values = {}) {
-  const text = config.messages[language]?.[key] ?? key;
-  return text.replace(/\{(\w+)\}/g, (placeholder, name) => values[name] ?? placeholder);
+  return withValues(config.messages[language]?.[key] ?? key, values);
 }

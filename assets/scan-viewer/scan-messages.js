@@ -40,14 +40,24 @@ export function preferredLanguage() {
   return given ?? navigator.languages?.find((language) => /^(vi|en)\b/.test(language))?.slice(0, 2) ?? "en";
 }
 
-/** Formats a number with a fixed number of digits, without a sign on zero, in the language of the page. */
-export function localNumber(value, digits = 0) {
-  const format = { minimumFractionDigits: digits, maximumFractionDigits: digits };
+/**
+ * Formats a number in the language of the page, with a thin space between groups of three digits and without a sign on
+ * zero. `digits` is the number of decimals; without it, the number has as many as it needs.
+ */
+export function localNumber(value, digits) {
+  const format = { minimumFractionDigits: digits ?? 0, maximumFractionDigits: digits ?? 10, useGrouping: false };
   const text = value.toLocaleString(document.documentElement.lang || "en", format);
-  return text.replace(/^-(0([.,]0*)?)$/, "$1").replace(/^-/, "−");
+  const [whole, ...decimals] = text.replace(/^-(0([.,]0*)?)$/, "$1").replace(/^-/, "−").split(/(?=[.,])/);
+  return [whole.replace(/\B(?=(\d{3})+$)/g, "\u202f"), ...decimals].join("");
+}
+
+/** Returns a text with `{name}` replaced by the values, of which numbers are written as in the language of the page. */
+export function withValues(text, values) {
+  const shown = (value) => (typeof value === "number" ? localNumber(value) : value);
+  return text.replace(/\{(\w+)\}/g, (placeholder, name) => shown(values[name]) ?? placeholder);
 }
 
 /** Returns a text with `{name}` replaced by the values. */
 export function scanText(language, key, values = {}) {
-  return SCAN_MESSAGES[key][language].replace(/\{(\w+)\}/g, (placeholder, name) => values[name] ?? placeholder);
+  return withValues(SCAN_MESSAGES[key][language], values);
 }

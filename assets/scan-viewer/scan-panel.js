@@ -35,7 +35,7 @@ export class ScanPanel {
     this.slider("lightDirection", text("light_direction"), 0, 360, 5, (value) => `${value}°`);
     this.slider("lightHeight", text("light_height"), 2, 90, 1, (value) => `${value}°`);
     this.slider("shading", text("shading"), 0, 1, 0.05, (value) => `${Math.round(100 * value)} %`);
-    this.slider("exaggeration", text("exaggeration"), 1, 5, 0.25, (value) => `×${value}`);
+    this.slider("exaggeration", text("exaggeration"), 1, 5, 0.25, (value) => `×${localNumber(value)}`);
     this.toggle("showsThreshold", text("threshold"), "T", "above");
     const ends = [Math.min(low, header.threshold), Math.max(high, header.threshold)];
     this.slider("threshold", text("threshold_height"), ...ends, fine, this.heightText);

@@ -76,9 +76,9 @@ class MountedScan {
   summary() {
     const { triangles, vertices, source_elements: source, unit } = this.scan.header;
     const count = triangles || vertices;
-    const shown = this.text(triangles ? "triangles" : "points", { n: localNumber(count) });
-    const step = this.text("grid_step", { step: `${this.scene.gridStep} ${unit ?? ""}`.trim() });
-    const from = count < source ? [this.text("simplified", { n: localNumber(source) })] : [];
+    const shown = this.text(triangles ? "triangles" : "points", { n: count });
+    const step = this.text("grid_step", { step: `${localNumber(this.scene.gridStep)} ${unit ?? ""}`.trim() });
+    const from = count < source ? [this.text("simplified", { n: source })] : [];
     return [shown, ...from, step].join(" · ");
   }
 

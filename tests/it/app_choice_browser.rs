@@ -185,6 +185,15 @@ fn pairs_are_chosen_by_touch_and_on_several_pages() {
     tab.tap("#choose-all");
     tab.wait("!document.querySelector('#choice-problem').hidden");
     assert!(said(&tab).contains("48"), "{}", said(&tab));
+    open_list(&tab, &home, "?state=waiting");
+    tab.tap("#choose-none");
+    tab.tap("#choose-all");
+    tab.wait("document.querySelectorAll('[data-pair]:checked').length === 48");
+    let thousand = "1\u{202f}000";
+    let expected = format!("Đã chọn: {thousand}, trong đó 48 ở trang này");
+    assert_eq!(said(&tab), expected);
+    let judge = tab.eval("document.querySelector('#judge').textContent");
+    assert_eq!(judge, format!("Đánh giá các cặp này ({thousand})"));
     open_list(&tab, &home, "?state=aligned");
     tab.tap("#choose-none");
     tab.tap("#choose-all");

@@ -4,6 +4,8 @@ use axum::extract::Path;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 
+use mocban_export::scan_view;
+
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
@@ -47,10 +49,17 @@ const ASSETS: [(&str, &str, &str); 7] = [
 ];
 
 pub(super) async fn asset(Path(name): Path<String>) -> Response {
-    match ASSETS.iter().find(|(asset, ..)| *asset == name) {
-        Some((_, kind, text)) => ([(header::CONTENT_TYPE, *kind)], *text).into_response(),
+    match find(&name) {
+        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
         None => StatusCode::NOT_FOUND.into_response(),
     }
+}
+
+/// Returns content type and text of an asset of the app or of the 3D view.
+fn find(name: &str) -> Option<(&'static str, &'static str)> {
+    let own = ASSETS.iter().find(|(asset, ..)| *asset == name);
+    let own = own.map(|(_, kind, text)| (*kind, *text));
+    own.or_else(|| scan_view::assets::find(name))
 }
 
 #[cfg(test)]
@@ -62,6 +71,16 @@ mod tests {
     fn assets_refer_to_no_other_host() {
         for (name, _, text) in ASSETS {
             assert_loads_nothing(name, text);
+        }
+    }
+
+    #[test]
+    fn every_imported_module_exists() {
+        for (name, _, text) in ASSETS {
+            for after in text.split(" from \"./").skip(1) {
+                let module = after.split('"').next().unwrap_or_default();
+                assert!(super::find(module).is_some(), "{name} imports {module}");
+            }
         }
     }
 }

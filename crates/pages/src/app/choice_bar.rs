@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::chosen_pairs::{MAX_CHOSEN, RESUMED, list_field, without_done};
-use super::components::{action_form, choice};
+use super::components::{action_form, choice, grouped};
 use super::exports::PURPOSES;
 use super::visit::Visit;
 use mocban_catalog::PairResults;
@@ -42,7 +42,7 @@ pub(super) fn choice_bar(visit: &Visit, key: &str) -> Markup {
                 "Shift with a click or an arrow key chooses a range.",
                 "Giữ Shift rồi bấm chuột hoặc phím mũi tên để chọn một dãy.",
             )) }
-            p #choice-problem.problem role="alert" data-most={ (most) ": " (MAX_CHOSEN) } hidden {}
+            p #choice-problem.problem role="alert" data-most={ (most) ": " (grouped(MAX_CHOSEN as u64)) } hidden {}
             div #choice-actions.row hidden { (changes(visit, &kept)) (export_form(visit, &kept)) }
         }
         script type="module" src={ (visit.root) "assets/choose.js" } {}
