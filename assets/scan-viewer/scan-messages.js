@@ -27,6 +27,14 @@ const SCAN_MESSAGES = {
   grid_step: { en: "grid {step}", vi: "ô lưới {step}" },
   picked: { en: "height {height}, print pixel {x}, {y}", vi: "độ cao {height}, điểm ảnh {x}, {y}" },
   picked_beside: { en: "height {height}, beside the print", vi: "độ cao {height}, ngoài bản in" },
+  alone: {
+    en: "This pair has no result yet: the scan is shown alone, without a plane and a print.",
+    vi: "Cặp này chưa có kết quả: chỉ hiện bản quét, chưa có mặt phẳng và bản in.",
+  },
+  alone_key_list: {
+    en: "arrow keys: turn · Shift + arrow keys: move · + −: closer, farther · 0: reset",
+    vi: "phím mũi tên: xoay · Shift + mũi tên: di chuyển · + −: gần, xa · 0: đặt lại",
+  },
   no_webgl: {
     en: "This browser cannot draw in 3D (WebGL 2 is not available).",
     vi: "Trình duyệt này không vẽ được 3D (không có WebGL 2).",

@@ -30,11 +30,19 @@ export class ScanPanel {
     const fine = 10 ** Math.floor(Math.log10(Math.max(high - low, 1e-9) / 100));
     const digits = Math.max(0, Math.ceil(-Math.log10(fine)));
     this.heightText = (value) => `${localNumber(value, digits)} ${unit}`.trim();
-    this.slider("ink", text("colour"), 0, 1, 0.01, (value) => `${Math.round(100 * value)} %`);
+    const isAlone = header.is_alone === true;
+    if (!isAlone) this.slider("ink", text("colour"), 0, 1, 0.01, (value) => `${Math.round(100 * value)} %`);
     this.lightPad();
     this.slider("lightDirection", text("light_direction"), 0, 360, 5, (value) => `${value}°`);
     this.slider("lightHeight", text("light_height"), 2, 90, 1, (value) => `${value}°`);
     this.slider("shading", text("shading"), 0, 1, 0.05, (value) => `${Math.round(100 * value)} %`);
+    if (!isAlone) this.resultControls(header, text, fine);
+    this.refresh();
+  }
+
+  /** Adds the controls that need heights or a print. `fine` is a small difference of heights. */
+  resultControls(header, text, fine) {
+    const [low, high] = header.height_range;
     this.slider("exaggeration", text("exaggeration"), 1, 5, 0.25, (value) => `×${localNumber(value)}`);
     this.toggle("showsThreshold", text("threshold"), "T", "above");
     const ends = [Math.min(low, header.threshold), Math.max(high, header.threshold)];
@@ -43,7 +51,6 @@ export class ScanPanel {
     this.toggle("showsInkOutline", text("ink_outline"), "O", "ink");
     this.toggle("showsPlane", text("plane"), "G");
     if (header.writing_is_mirrored) this.toggle("asPrinted", text("as_printed"), "M");
-    this.refresh();
   }
 
   /** Changes settings, updates the controls and draws. */

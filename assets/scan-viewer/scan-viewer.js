@@ -33,6 +33,8 @@ class MountedScan {
   constructor(container, scan, text, close) {
     this.container = container;
     this.scan = scan;
+    /** Whether the scan has no plane, no heights and no print. */
+    this.isAlone = scan.header.is_alone === true;
     this.text = text;
     this.close = close;
     this.frame = null;
@@ -66,10 +68,11 @@ class MountedScan {
     const level = this.container.closest("dialog") ? "h2" : "h1";
     return element("div", { class: "scan-side" },
       element(level, { class: "scan-title" }, this.scan.header.pair ?? text("view")),
+      ...(this.isAlone ? [element("p", { class: "scan-note" }, text("alone"))] : []),
       this.panel.root,
       element("div", { class: "scan-buttons" }, ...buttons),
       this.status,
-      element("details", {}, element("summary", {}, text("keys")), element("p", { id: "scan-keys" }, text("key_list"))));
+      element("details", {}, element("summary", {}, text("keys")), element("p", { id: "scan-keys" }, text(this.isAlone ? "alone_key_list" : "key_list"))));
   }
 
   /** Returns the size of the scan as text. */
@@ -77,9 +80,10 @@ class MountedScan {
     const { triangles, vertices, source_elements: source, unit } = this.scan.header;
     const count = triangles || vertices;
     const shown = this.text(triangles ? "triangles" : "points", { n: count });
-    const step = this.text("grid_step", { step: `${localNumber(this.scene.gridStep)} ${unit ?? ""}`.trim() });
+    const step = `${localNumber(this.scene.gridStep)} ${unit ?? ""}`.trim();
+    const grid = this.isAlone ? [] : [this.text("grid_step", { step })];
     const from = count < source ? [this.text("simplified", { n: source })] : [];
-    return [shown, ...from, step].join(" · ");
+    return [shown, ...from, ...grid].join(" · ");
   }
 
   /** Draws before the next frame of the screen, once for several changes. */
@@ -100,7 +104,7 @@ class MountedScan {
   }
 
   showPicked(x, y) {
-    const found = this.scene.pick(x, y);
+    const found = this.isAlone ? null : this.scene.pick(x, y);
     if (!found) return;
     const height = this.panel.heightText(found.height);
     const [px, py] = found.pixel?.map(Math.round) ?? [];
@@ -128,7 +132,7 @@ class MountedScan {
       const [right, up] = ARROWS[code];
       return shiftKey ? () => orbit.move(right * 0.05, up * 0.05) : () => orbit.turn(right * TURN_STEP, up * TURN_STEP);
     }
-    if (code in SWITCH_KEYS) {
+    if (code in SWITCH_KEYS && !this.isAlone) {
       const name = SWITCH_KEYS[code];
       if (name === "asPrinted" && !this.scan.header.writing_is_mirrored) return null;
       return () => this.panel.set({ [name]: !this.settings[name] });
@@ -137,11 +141,12 @@ class MountedScan {
     if (key === "+" || code === "Equal" || code === "NumpadAdd") return () => orbit.zoomBy(1.15);
     if (key === "-" || code === "Minus" || code === "NumpadSubtract") return () => orbit.zoomBy(1 / 1.15);
     if (code === "Digit0" || code === "Numpad0") return () => this.reset();
+    if (key === "?") return () => this.container.querySelector("details").toggleAttribute("open");
+    if (code === "Escape" && this.close) return () => this.close();
+    if (this.isAlone) return null;
     if (code === "KeyW") return () => this.panel.set({ ink: ink < 0.5 ? 1 : 0 });
     if (code === "BracketLeft") return relief(-0.5);
     if (code === "BracketRight") return relief(0.5);
-    if (key === "?") return () => this.container.querySelector("details").toggleAttribute("open");
-    if (code === "Escape" && this.close) return () => this.close();
     return null;
   }
 

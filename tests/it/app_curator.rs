@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use mocban::raster::{Grid, png_grey8};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::app::{act, open_app, text, with_project};
 use crate::app_uploads::{begun, encode, end, put};
@@ -239,6 +239,15 @@ fn a_pair_without_a_result_shows_what_its_stages_have_made() {
     assert!(!shown.contains("data-layer=\"overlay\""), "{shown}");
     let relief = page.get("/p/p/pair/blank/picture/relief-ensemble");
     assert_eq!(relief.header("content-type"), Some("image/jpeg"));
+    assert!(shown.contains("href=\"3d/\""), "{shown}");
+    let scan = page.get("/p/p/pair/blank/3d/scan");
+    assert_eq!(scan.status, 200, "{}", text(&scan));
+    let (length, rest) = scan.body.split_at(4);
+    let length = u32::from_le_bytes(length.try_into().expect("four bytes"));
+    let header = serde_json::from_slice::<Value>(&rest[..length as usize]);
+    let header = header.expect("a header");
+    assert_eq!(header["is_alone"], true, "{header}");
+    assert!(header["triangles"].as_u64() > Some(100), "{header}");
 }
 
 #[test]

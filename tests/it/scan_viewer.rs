@@ -5,8 +5,11 @@ use std::path::{Path, PathBuf};
 
 use mocban::mesh::MeshLimits;
 use mocban::raster::{Grid, ImageLimits, decode};
-use serde_json::Value;
+use serde_json::{Value, json};
 
+use crate::app::app;
+use crate::app_browser;
+use crate::app_choice::import_more;
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
 use crate::made_once::copy_of;
@@ -286,6 +289,47 @@ fn a_point_set_is_shown() {
         })()",
     );
     assert!(colours.as_u64() > Some(10), "{colours} colours");
+}
+
+#[test]
+fn a_pair_without_a_result_shows_its_scan_alone() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    import_more(dir.path(), ["late".to_owned()]);
+    let page = Page::of(app(dir.path()).args(["--lang", "vi"]));
+    let (tab, home) = app_browser::enter(&browser, &page, [900, 600]);
+    let address = format!("{home}p/p/pair/late/3d/");
+    tab.open(&address);
+    tab.wait("window.mocbanViewer");
+    let note = tab.eval("document.querySelector('.scan-note').textContent");
+    let expected = "Cặp này chưa có kết quả: chỉ hiện bản quét, chưa có mặt phẳng và bản in.";
+    assert_eq!(note, expected);
+    let controls = "[...document.querySelectorAll('.scan-controls input')].map((input) => input.dataset.setting)";
+    assert_eq!(
+        tab.eval(controls),
+        json!(["lightDirection", "lightHeight", "shading"])
+    );
+    tab.screenshot("scan-alone");
+    let mut seen = BTreeSet::from([canvas(&tab)]);
+    tab.eval("mocbanViewer.set({ lightDirection: 315, lightHeight: 8 }), null");
+    assert!(seen.insert(canvas(&tab)), "the scan is drawn");
+    // Keys of what is not there do nothing.
+    for (code, is_drawn) in [("ArrowLeft", true), ("KeyG", false), ("KeyW", false)] {
+        tab.key(code);
+        assert_eq!(seen.insert(canvas(&tab)), is_drawn, "{code}");
+    }
+    let scan = project.dir().join("data/meshes/upright-0000.ply");
+    std::fs::write(scan, "solid x").expect("written");
+    tab.open(&address);
+    let said = "document.getElementById('scan-viewer').textContent";
+    tab.wait(&format!(
+        "{said}.includes('Không hiển thị được bản quét: ')"
+    ));
+    let said = tab.eval(said);
+    assert!(!said.to_string().contains('{'), "{said}");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use mocban_catalog::{MetricRecord, PairResults};
 use mocban_core::InputLimits;
 use mocban_core::domain::artifact_role::DEPTH;
 use mocban_core::domain::{Affine2, ArtifactRef, DepthScale, Explained, MetricOutcome, Stage};
-use mocban_core::mesh::{self, Mesh, MeshError, MeshReadError};
+use mocban_core::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
 use mocban_core::raster::{
     DepthMap, Grid, Mask, png_grey16, png_rgb8, warp_depth, warp_mask, warp_rgb,
 };
@@ -276,23 +276,32 @@ impl<'a> PairPictures<'a> {
 
     /// Reads the mesh file, and checks that it is the one that was aligned.
     pub(super) fn mesh(&self) -> Result<Mesh, PictureError> {
-        let stored = &self.pair.attributes.mesh_path;
-        let (input, limits) = (self.project.input(stored), &self.limits.mesh);
-        let mut file = open_input(&input, limits.max_bytes, "limits.mesh.max_bytes")?;
-        let size = file.size();
-        let mesh = match mesh::read_from(&mut file, size, stored, limits) {
-            Err(MeshReadError::Io(error)) => return Err(file.error(error).into()),
-            Err(MeshReadError::Mesh(source)) => Err(source),
-            Ok(read) => Ok(read.mesh),
-        };
-        let digest = file.finish()?;
-        let aligned = self.pair.stage(Stage::Fit).map(|record| record.mesh_hash);
-        if aligned.is_some_and(|hash| hash != digest.hash) {
-            return Err(PictureError::MeshChanged(input.path().to_owned()));
-        }
-        let path = input.path().to_owned();
-        mesh.map_err(|source| PictureError::Mesh { path, source })
+        read_mesh(self.project, self.pair, &self.limits.mesh)
     }
+}
+
+/// Reads the mesh file of a pair, and checks that it is the one that was aligned, if it was.
+pub(super) fn read_mesh(
+    project: &Project,
+    pair: &PairResults,
+    limits: &MeshLimits,
+) -> Result<Mesh, PictureError> {
+    let stored = &pair.attributes.mesh_path;
+    let input = project.input(stored);
+    let mut file = open_input(&input, limits.max_bytes, "limits.mesh.max_bytes")?;
+    let size = file.size();
+    let mesh = match mesh::read_from(&mut file, size, stored, limits) {
+        Err(MeshReadError::Io(error)) => return Err(file.error(error).into()),
+        Err(MeshReadError::Mesh(source)) => Err(source),
+        Ok(read) => Ok(read.mesh),
+    };
+    let digest = file.finish()?;
+    let aligned = pair.stage(Stage::Fit).map(|record| record.mesh_hash);
+    if aligned.is_some_and(|hash| hash != digest.hash) {
+        return Err(PictureError::MeshChanged(input.path().to_owned()));
+    }
+    let path = input.path().to_owned();
+    mesh.map_err(|source| PictureError::Mesh { path, source })
 }
 
 /// Returns the map from print pixels to a square canvas of `side` pixels. `None` if the print's interpretation is not

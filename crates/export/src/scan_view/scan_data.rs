@@ -119,22 +119,7 @@ impl ScanView {
             ("print", textures.print.clone()),
             ("masks", textures.masks.clone()),
         ];
-        let mut header = self.header();
-        let mut offset = 0;
-        for (name, bytes) in &arrays {
-            header["arrays"][*name] = json!({"offset": offset, "bytes": bytes.len()});
-            offset += bytes.len().next_multiple_of(4);
-        }
-        let mut text = header.to_string().into_bytes();
-        text.resize(text.len().next_multiple_of(4), b' ');
-        let mut file = Vec::with_capacity(4 + text.len() + offset);
-        file.extend((text.len() as u32).to_le_bytes());
-        file.extend(text);
-        for (_, bytes) in arrays {
-            file.extend(bytes);
-            file.resize(file.len().next_multiple_of(4), 0);
-        }
-        file
+        encode(self.header(), arrays)
     }
 
     /// Returns the header without the list of arrays.
@@ -170,7 +155,29 @@ fn with_unit(scale: &DepthScale, pair: &PairResults) -> DepthScale {
     }
 }
 
-fn bytes_of(values: &[f32]) -> Vec<u8> {
+/// Returns the file of a header, to which the places of the arrays are added, and arrays by name.
+pub(super) fn encode<const N: usize>(
+    mut header: Value,
+    arrays: [(&'static str, Vec<u8>); N],
+) -> Vec<u8> {
+    let mut offset = 0;
+    for (name, bytes) in &arrays {
+        header["arrays"][*name] = json!({"offset": offset, "bytes": bytes.len()});
+        offset += bytes.len().next_multiple_of(4);
+    }
+    let mut text = header.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut file = Vec::with_capacity(4 + text.len() + offset);
+    file.extend((text.len() as u32).to_le_bytes());
+    file.extend(text);
+    for (_, bytes) in arrays {
+        file.extend(bytes);
+        file.resize(file.len().next_multiple_of(4), 0);
+    }
+    file
+}
+
+pub(super) fn bytes_of(values: &[f32]) -> Vec<u8> {
     values
         .iter()
         .flat_map(|value| value.to_le_bytes())

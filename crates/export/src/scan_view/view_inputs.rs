@@ -4,6 +4,7 @@ use crate::mesh::{MeshPlacement, PlacedMesh};
 use crate::pair_pictures::{PairPictures, PictureError};
 use crate::pictures::PrintView;
 use mocban_core::domain::{Affine2, DepthScale, MetricOutcome};
+use mocban_core::mesh::Mesh;
 use mocban_core::raster::{Grid, Mask, PrintImage, png_rgb8};
 
 /// Maximum number of triangles, or of points of a point set. Larger scans are simplified.
@@ -71,11 +72,7 @@ impl ViewInputs {
         let strokes = pictures.mask_on_print(outcome)?;
         let textures = ViewTextures::new(picture, strokes, pictures.source_mask()?);
         let mesh = pictures.mesh()?.welded();
-        let source_elements = if mesh.triangles.is_empty() {
-            mesh.vertices.len()
-        } else {
-            mesh.triangles.len()
-        };
+        let source_elements = element_count(&mesh);
         // The scan is simplified before it is placed, so that heights and texture coordinates are exact.
         let scan = PlacedMesh::new(mesh.clustered(MAX_ELEMENTS), &placement, &print);
         Ok(Self {
@@ -84,5 +81,14 @@ impl ViewInputs {
             source_elements,
             textures,
         })
+    }
+}
+
+/// Returns the number of triangles, or of points of a point set.
+pub(super) fn element_count(mesh: &Mesh) -> usize {
+    if mesh.triangles.is_empty() {
+        mesh.vertices.len()
+    } else {
+        mesh.triangles.len()
     }
 }

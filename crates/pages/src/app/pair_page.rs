@@ -227,7 +227,7 @@ fn pictures(
                 @if layers.len() > 1 {
                     button #blink type="button" aria-pressed="false" { (blink) " " kbd { "B" } }
                 }
-                @if metric.is_some() { a.button href="3d/" { (visit.t("3D view", "Xem 3D")) } }
+                a.button href="3d/" { (visit.t("3D view", "Xem 3D")) }
                 @for (layer, names) in layers { (layer_button(visit, layer, names, [Some(first), other], *layer == shown)) }
             }
         }

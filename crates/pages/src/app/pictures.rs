@@ -14,9 +14,9 @@ use mocban_catalog::PairResults;
 use mocban_core::InputLimits;
 use mocban_core::domain::{Affine2, PairName, ThresholdMetric, enum_names};
 use mocban_core::raster::{Grid, Mask, jpeg_rgb8, png_mask};
-use mocban_export::SourcePrint;
 use mocban_export::pictures::PrintView;
-use mocban_export::scan_view::ScanView;
+use mocban_export::scan_view::{ScanView, scan_alone};
+use mocban_export::{PictureError, SourcePrint};
 use mocban_results::pair_artifacts::PairArtifacts;
 
 /// Longer side of a picture on a card, pixels.
@@ -84,7 +84,7 @@ pub(super) async fn picture(
     Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
 }
 
-/// Responds with the data of the 3D view.
+/// Responds with the data of the 3D view, which of a pair without a result has only the scan.
 pub(super) async fn scan(
     State(state): State<Arc<AppState>>,
     Path((key, pair)): Path<(String, String)>,
@@ -93,18 +93,17 @@ pub(super) async fn scan(
     let results = results(&open, &pair).await?;
     let limits = limits(&open)?;
     let dir = open.dir.clone();
-    let read = move || {
+    let read = move || -> Result<Vec<u8>, PictureError> {
         let metric = results.metric(ThresholdMetric::DEFAULT);
-        let metric = metric.or_else(|| results.metrics.first())?;
-        let view = ScanView::read(&open.project, &results, metric.outcome.metric, limits);
-        view.map(|view| view.map(|view| view.to_bytes()))
-            .transpose()
+        let metric = metric.or_else(|| results.metrics.first());
+        let metric = metric.map(|record| record.outcome.metric);
+        let view = metric.map(|metric| ScanView::read(&open.project, &results, metric, limits));
+        match view.transpose()?.flatten() {
+            Some(view) => Ok(view.to_bytes()),
+            None => scan_alone(&open.project, &results, &limits),
+        }
     };
-    let read = state
-        .work
-        .call(read)
-        .await?
-        .ok_or_else(AppFailure::not_found)?;
+    let read = state.work.call(read).await?;
     let bytes = read.map_err(|error| AppFailure::of(error, &dir))?;
     let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
     Ok((kind, bytes).into_response())
