@@ -60,6 +60,8 @@ fn no_page_names_a_command_or_an_option() {
         numbers.contains("Chưa ai đánh giá kết quả nào"),
         "{numbers}"
     );
+    let truth = "kết quả của Kết hợp là đúng";
+    assert!(numbers.contains(truth), "{numbers}");
     assert!(!numbers.contains("lang=\"en\""), "{numbers}");
     let english = text(&page.get("/p/p/report/numbers?language=en"));
     assert!(english.contains("All 15 pairs are aligned"), "{english}");

@@ -71,7 +71,7 @@ fn none(visit: &Visit, key: &str) -> Markup {
                 "The columns of such a list are block, mesh (the scan) and page (the image); labels (boxes of the characters), unit and side may follow. Paths are relative to the list.",
                 "Các cột của danh sách là block (mã ván), mesh (bản quét) và page (hình trang in); có thể thêm labels (khung các chữ), unit và side. Đường dẫn tính từ danh sách.",
             )) }
-            pre #block-sample tabindex="0" role="region" aria-label=(visit.t("Example of a list", "Ví dụ về danh sách")) { (SAMPLE) }
+            pre.scroll #block-sample tabindex="0" role="region" aria-label=(visit.t("Example of a list", "Ví dụ về danh sách")) { (SAMPLE) }
             p { (visit.t(
                 "One block alone needs no list: choose its scan and the image of its page on the page Import.",
                 "Chỉ một ván thì không cần danh sách: hãy chọn bản quét và hình trang in của nó ở trang Nhập dữ liệu.",

@@ -156,16 +156,18 @@ fn picker(visit: &Visit, picked: &PickedFolder) -> Markup {
         let both = fresh.with("meshes", &path.to_string_lossy());
         let both = both.with("prints", &path.to_string_lossy());
         html! {
-            @if counts.meshes > 0 { a.button href=(at("meshes", path)) { (visit.t("Scans are here", "Bản quét ở đây")) } " " }
-            @if counts.prints > 0 { a.button href=(at("prints", path)) { (visit.t("Prints are here", "Bản in ở đây")) } " " }
-            @if counts.meshes > 0 && counts.prints > 0 {
-                a.button href={ (visit.here) (both.text()) } { (visit.t("Both are here", "Cả hai ở đây")) }
+            div.row {
+                @if counts.meshes > 0 { a.button href=(at("meshes", path)) { (visit.t("Scans are here", "Bản quét ở đây")) } }
+                @if counts.prints > 0 { a.button href=(at("prints", path)) { (visit.t("Prints are here", "Bản in ở đây")) } }
+                @if counts.meshes > 0 && counts.prints > 0 {
+                    a.button href={ (visit.here) (both.text()) } { (visit.t("Both are here", "Cả hai ở đây")) }
+                }
             }
         }
     };
     html! {
         p { code #folder { (one_line(&picked.path.to_string_lossy())) } " " span.muted { (counts_text(visit, &picked.counts)) } }
-        p { (choose(&picked.path, &picked.counts)) }
+        (choose(&picked.path, &picked.counts))
         div.scroll tabindex="0" role="region" aria-label=(visit.t("Folders of this computer", "Thư mục trên máy này")) {
             table {
                 tbody {

@@ -149,11 +149,11 @@ fn reasons(visit: &Visit, report: &Report) -> Markup {
         @if !report.failures.is_empty() {
             h2 { (visit.t("Pairs without a result", "Các cặp không có kết quả")) }
             ul { @for group in &report.failures {
-                li {
+                li { p {
                     a href={ "pairs?view=table&state=failed&class=" (group.class) } { (grouped(group.count)) }
                     " · " (visit.class(group.class))
                     @if let Some(first) = group.pairs.first() { span.muted { " (" (stored_message(visit, &first.error)) ")" } }
-                }
+                } }
             } }
         }
     }

@@ -23,7 +23,11 @@ pub(super) fn headline(visit: &Visit, report: &Report) -> Vec<String> {
         Language::Vietnamese if report.progress.done == 0 => vec![aligned(report)],
         Language::Vietnamese => vec![
             aligned(report),
-            accuracy(visit, report),
+            [Some(accuracy(visit, report)), truth(visit, report)]
+                .into_iter()
+                .flatten()
+                .collect::<Vec<String>>()
+                .join(" "),
             differences(visit, report),
         ],
     }
@@ -79,6 +83,25 @@ fn aligned(report: &Report) -> String {
         }
     }
     text + "."
+}
+
+/// Says how many results of the default metric, or of the first that has them, agree with the ground truth.
+fn truth(visit: &Visit, report: &Report) -> Option<String> {
+    let default = report.row(ThresholdMetric::DEFAULT).into_iter();
+    let mut rows = default.chain(&report.rows);
+    rows.find_map(|row| {
+        let truth = row.truth.as_ref()?;
+        let interval = truth.acc_ci95;
+        let interval = interval.map(|bounds| format_interval(bounds, NumberStyle::Share));
+        Some(format!(
+            "Theo đáp án, {} trên {} kết quả của {} là đúng, {} % ({}).",
+            grouped(truth.passed),
+            grouped(truth.n),
+            visit.metric(row.metric),
+            vietnamese_number(format_share(truth.acc?)),
+            vietnamese_number(interval.unwrap_or_default()),
+        ))
+    })
 }
 
 /// Says how often reviewers passed results of the default metric, or of the first that they judged.

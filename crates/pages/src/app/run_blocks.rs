@@ -121,10 +121,10 @@ pub(super) fn failed_block_list(visit: &Visit, blocks: &BlockStatus) -> Markup {
                 article.card {
                     ul { @for state in blocks.failed().take(MAX_FAILED) {
                         @let name = state.attributes.name.as_str();
-                        li {
+                        li { p {
                             a href={ "block/" (encoded(name)) "/" } { (one_line(name)) }
                             @if let Some(stored) = &state.failure { ": " (stored_message(visit, &stored.failure.message)) }
-                        }
+                        } }
                     } }
                     a.button href="blocks?state=failed" { (visit.t("Show them", "Xem các ván này")) " (" (grouped(failed)) ")" }
                 }

@@ -435,10 +435,10 @@ fn example(visit: &Visit, pair: &PairResults) -> Markup {
     let name = pair.attributes.name.as_str();
     let message = pair.failure.as_ref().map(|stored| &stored.failure.message);
     html! {
-        li {
+        li { p {
             a href={ "pair/" (super::address::encoded(name)) "/" } { (one_line(name)) }
             @if let Some(message) = message { ": " (stored_message(visit, message)) }
-        }
+        } }
     }
 }
 

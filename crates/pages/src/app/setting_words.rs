@@ -1,5 +1,6 @@
 //! What each setting means, in the language of a page. The English texts are the comments of the settings file.
 
+use super::number_text::grouped;
 use super::visit::Visit;
 use crate::review::Language;
 use mocban_config::{Origin, explanation};
@@ -158,13 +159,35 @@ const VIETNAMESE: [(&str, &str); 35] = [
     ),
 ];
 
+/// Returns a text in which large whole numbers such as `86400` and `1e9` are written in groups of digits.
+fn with_grouped_numbers(text: &str) -> String {
+    let words = text.split(' ').map(|word| {
+        let (number, end) = word.split_at(word.trim_end_matches(['.', ',', ';']).len());
+        large_number(number).map_or_else(|| word.to_owned(), |number| grouped(number) + end)
+    });
+    words.collect::<Vec<String>>().join(" ")
+}
+
+/// Parses a whole number of at least five digits, or one such as `1e9`.
+fn large_number(text: &str) -> Option<u64> {
+    let (digits, zeros) = text.split_once('e').unwrap_or((text, "0"));
+    let number = digits.parse::<u64>().ok()?;
+    let number = number.checked_mul(10_u64.checked_pow(zeros.parse().ok()?)?)?;
+    (number >= 10_000).then_some(number)
+}
+
 impl Visit {
     /// Returns what a setting means, with its unit, range and reason, and the language of the text.
     pub(super) fn setting(&self, key: &str) -> (String, Language) {
         let mut known = VIETNAMESE.iter().filter(|(known, _)| *known == key);
         match (self.language, known.next()) {
-            (Language::Vietnamese, Some((_, text))) => ((*text).to_owned(), Language::Vietnamese),
-            _ => (explanation(key).join(" "), Language::English),
+            (Language::Vietnamese, Some((_, text))) => {
+                (with_grouped_numbers(text), Language::Vietnamese)
+            }
+            _ => (
+                with_grouped_numbers(&explanation(key).join(" ")),
+                Language::English,
+            ),
         }
     }
 
@@ -204,7 +227,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::path::PathBuf;
 
-    use super::{VIETNAMESE, is_hidden};
+    use super::{VIETNAMESE, is_hidden, with_grouped_numbers};
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_config::{Origin, Sources, explanation, load};
@@ -233,6 +256,13 @@ mod tests {
                 .collect();
             assert!(missing.is_empty(), "{key}: {missing:?} of {english:?}");
         }
+    }
+
+    #[test]
+    fn large_numbers_are_written_in_groups() {
+        let text = "từ 1 đến 86400; tối đa 1e9. Mã e1, 0.5, 1024 và 30000_x.";
+        let expected = "từ 1 đến 86\u{202f}400; tối đa 1\u{202f}000\u{202f}000\u{202f}000. Mã e1, 0.5, 1024 và 30000_x.";
+        assert_eq!(with_grouped_numbers(text), expected);
     }
 
     #[test]

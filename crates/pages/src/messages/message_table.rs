@@ -256,6 +256,22 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "OBJ, PLY and STL meshes and XYZ points are read",
         "chỉ đọc được lưới OBJ, PLY, STL và điểm XYZ",
     ),
+    (
+        "the {} is truncated: it holds {} of {} {}",
+        "tệp {0} bị cắt cụt: chỉ có {1} trong số {2} phần tử",
+    ),
+    (
+        "the {} is truncated: it ends after {} facets without {}",
+        "tệp {0} bị cắt cụt: hết sau {1} mặt mà chưa có {2}",
+    ),
+    (
+        "the {} is truncated: it ends before the image does",
+        "tệp {0} bị cắt cụt: hết trước khi hết hình",
+    ),
+    (
+        "face {} refers to vertex {}, but the file has {} vertices",
+        "mặt {0} dùng đỉnh {1}, nhưng tệp chỉ có {2} đỉnh",
+    ),
     ("the mesh has no faces", "bản quét không có mặt tam giác"),
     ("the mesh has no vertices", "bản quét không có đỉnh"),
     (

@@ -209,6 +209,14 @@ mod tests {
                 "no labels for x: không có tệp y",
             ),
             (
+                "1.stl: the ascii STL is truncated: it ends after 0 facets without endsolid",
+                "1.stl: tệp ascii STL bị cắt cụt: hết sau 0 mặt mà chưa có endsolid",
+            ),
+            (
+                "1.ply: the binary PLY is truncated: it holds 3 of 9 vertices",
+                "1.ply: tệp binary PLY bị cắt cụt: chỉ có 3 trong số 9 phần tử",
+            ),
+            (
                 "b1: p/1.ply may not be read: permission denied",
                 "b1: không có quyền đọc p/1.ply",
             ),
