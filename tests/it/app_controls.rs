@@ -13,10 +13,10 @@ use crate::page::{Page, read_project};
 const SMALLEST: u32 = 44;
 
 /// A page of the app is shown.
-const SHOWN: &str = "document.body?.dataset.ready && [...document.querySelectorAll('[data-load]')].every((part) => part.dataset.loaded)";
+pub(crate) const SHOWN: &str = "document.body?.dataset.ready && [...document.querySelectorAll('[data-load]')].every((part) => part.dataset.loaded)";
 
 /// Pages of the app.
-const PAGES: [&str; 16] = [
+pub(crate) const PAGES: [&str; 16] = [
     "",
     "p/p/",
     "p/p/pairs",
@@ -36,7 +36,7 @@ const PAGES: [&str; 16] = [
 ];
 
 /// Makes a project with a failed and a retired pair.
-fn varied_project(dir: &tempfile::TempDir) {
+pub(crate) fn varied_project(dir: &tempfile::TempDir) {
     let project = read_project(dir);
     std::fs::write(project.dir().join("broken.stl"), "solid x").expect("written");
     let list = "id,mesh,print,block\nbroken,broken.stl,data/prints/upright-0001.jpg,b 01\n";
@@ -47,7 +47,7 @@ fn varied_project(dir: &tempfile::TempDir) {
 }
 
 /// Fails if a control that is shown is smaller than a finger. A link within a sentence is as high as its line.
-fn fits_fingers(tab: &Tab<'_>, what: &str) {
+pub(crate) fn fits_fingers(tab: &Tab<'_>, what: &str) {
     let small = tab.eval(&format!(
         "(() => {{
             const controls = [...document.querySelectorAll('a[href], button, select, summary, input:not([type=hidden])')];

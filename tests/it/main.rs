@@ -17,6 +17,7 @@ mod app_import;
 mod app_invitations;
 #[cfg(target_os = "linux")]
 mod app_kills;
+mod app_phone;
 mod app_resume_browser;
 mod app_sentences;
 mod app_upload_archives;
