@@ -8,6 +8,7 @@
 //! cargo bench --bench queue -- --postgres postgres://me@localhost/bench --pairs 1000000
 //! cargo bench --bench queue -- --postgres postgres://me@localhost/bench --pairs 300000 --hold-snapshot
 //! cargo bench --bench queue -- --peer target/peers-queue/release/peers-queue
+//! cargo bench --bench queue -- --pages --pairs 1000000
 //! ```
 //!
 //! Catalogs are created in the target directory and removed afterwards. Stages are faked: they compute nothing, and
@@ -23,6 +24,7 @@ mod loops;
 #[path = "../accuracy/markdown.rs"]
 mod markdown;
 mod options;
+mod pages;
 mod postgres;
 mod process;
 mod queues;
@@ -53,6 +55,10 @@ fn main() -> anyhow::Result<()> {
     // The same runtime as for `mocban run`.
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     let runtime = runtime.enable_all().build()?;
+    if options.pages {
+        let text = runtime.block_on(pages::table(&options))?;
+        return Ok(std::io::stdout().write_all(text.as_bytes())?);
+    }
     let mut tables = runtime.block_on(scale::tables(&options))?;
     tables.push(runtime.block_on(queues::table(&options))?);
     if let Some(pairs) = options.real_pairs() {

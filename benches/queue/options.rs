@@ -46,6 +46,9 @@ pub(super) struct Options {
     /// under `cargo test`]
     #[arg(long, value_name = "N")]
     real: Option<u64>,
+    /// Measure only the time to the first byte of each page of the app, for catalogs of the sizes of `--pairs`
+    #[arg(long)]
+    pub(super) pages: bool,
     /// Only import and query: run no pair
     #[arg(long)]
     pub(super) import_only: bool,

@@ -81,15 +81,8 @@ async fn size(options: &Options, pairs: usize, tables: &mut Tables) -> anyhow::R
         catalog.close().await;
         return Ok(());
     }
-    let to_do = pairs - LEFT.min(pairs / 3);
     process::reset_peak();
-    let worked = to_do.min(WORKED);
-    let time = work(&world, &catalog, worked, IN_PROGRESS).await?;
-    let rate = worked as f64 / time.as_secs_f64();
-    let peak = process::peak_mib("self").unwrap_or(0.0);
-    catalog.close().await;
-    fill::copy(&world.project.catalog_path(), worked, to_do).await?;
-    let catalog = world.catalog().await?;
+    let (catalog, [rate, peak]) = filled(&world, catalog, pairs, WORKED).await?;
     let size = world.bytes()? as f64 / 1_048_576.0;
     let numbers = [(rate, 0), (rate * 4.0, 0), (peak, 0), (size, 0)];
     push(&mut tables.fill, row(pairs, &numbers));
@@ -97,6 +90,24 @@ async fn size(options: &Options, pairs: usize, tables: &mut Tables) -> anyhow::R
     changed(&world, &catalog, pairs, tables).await?;
     catalog.close().await;
     Ok(())
+}
+
+/// Runs at most `worked` pairs of a catalog and copies their rows until few pairs are left. Returns the catalog, the pairs
+/// that were run in a second, and the peak memory meanwhile in MiB.
+pub(super) async fn filled(
+    world: &World,
+    catalog: Catalog,
+    pairs: usize,
+    worked: usize,
+) -> anyhow::Result<(Catalog, [f64; 2])> {
+    let to_do = pairs - LEFT.min(pairs / 3);
+    let worked = to_do.min(worked);
+    let time = work(world, &catalog, worked, IN_PROGRESS).await?;
+    let peak = process::peak_mib("self").unwrap_or(0.0);
+    catalog.close().await;
+    fill::copy(&world.project.catalog_path(), worked, to_do).await?;
+    let rate = worked as f64 / time.as_secs_f64();
+    Ok((world.catalog().await?, [rate, peak]))
 }
 
 /// Adds a row to a table and prints it immediately, because large catalogs take long and the bench may be interrupted.

@@ -122,7 +122,7 @@ pub(crate) struct CorrectionSession {
     pub(crate) page: Page,
     /// Address of the block's pages.
     place: &'static str,
-    token: String,
+    pub(crate) token: String,
 }
 
 impl CorrectionSession {

@@ -76,7 +76,7 @@ pub use jobs::fingerprint::{Fingerprint, FingerprintIds, Fingerprints};
 pub use jobs::plan::{FieldChange, Plan, PlanEntry, StaleReason};
 pub use jobs::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use jobs::requeue::RetrySelection;
-pub use jobs::retired::{ImportedPair, ListedRetiredPair, RetiredPair};
+pub use jobs::retired::{ImportedPair, LastImport, ListedRetiredPair, RetiredPair};
 pub use jobs::shared_runs::SharedSettings;
 pub use jobs::staleness::RerunPolicy;
 pub use jobs::worker_list::{WorkerRecord, WorkerState};

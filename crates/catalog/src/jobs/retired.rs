@@ -88,6 +88,14 @@ WHERE p.imported = (SELECT q.imported FROM pair AS q
     AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
 ORDER BY p.name";
 
+/// Counts the pairs that the newest import of a list or of folders added.
+const LAST_IMPORT_COUNTS: &str = "
+SELECT p.imported, count(*) AS pairs, count(j.pair) AS jobs FROM pair AS p LEFT JOIN job AS j ON j.pair = p.id
+WHERE p.imported = (SELECT q.imported FROM pair AS q
+        WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id) ORDER BY q.id DESC LIMIT 1)
+    AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
+GROUP BY p.imported";
+
 /// Number of pairs in one statement.
 const CHUNK: usize = 2_000;
 
@@ -131,6 +139,19 @@ pub struct ImportedPair {
 }
 
 from_row! { ImportedPair { name, imported, jobs } }
+
+/// How many pairs the newest import added.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LastImport {
+    /// When they were imported for the first time.
+    pub imported: UnixMillis,
+    /// Number of pairs, with the retired ones.
+    pub pairs: u64,
+    /// Number of pairs that are not retired.
+    pub jobs: u64,
+}
+
+from_row! { LastImport { imported, pairs, jobs } }
 
 /// A removed job.
 struct RemovedJob {
@@ -197,6 +218,12 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let query = query_as(NTH_IMPORT).bind(i64::from(later));
         query.fetch_all(&mut conn).await
+    }
+
+    /// Counts the pairs that the newest import of a list or of folders added. `None` if there was none.
+    pub async fn last_import_counts(&self) -> Result<Option<LastImport>> {
+        let mut conn = self.read_conn().await?;
+        query_as(LAST_IMPORT_COUNTS).fetch_optional(&mut conn).await
     }
 
     /// Retires pairs for a person. Their leases end. Returns how many were not retired before.

@@ -18,24 +18,24 @@ use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
-use mocban_catalog::ImportedPair;
+use mocban_catalog::LastImport;
 use mocban_core::domain::UnixMillis;
 use mocban_project::retire::{RetireChoice, retire, undo};
 
-/// Responds with a part of the page of imports. It reads all pairs, so the page loads it afterwards.
+/// Responds with a part of the page of imports. It counts all pairs, so the page loads it afterwards.
 pub(super) async fn part(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let added = open.catalog.last_import().await?;
-    Ok(Html(undo_part(&visit, &key, &added).into_string()))
+    let added = open.catalog.last_import_counts().await?;
+    let part = added.map(|added| undo_part(&visit, &key, added));
+    Ok(Html(part.unwrap_or_default().into_string()))
 }
 
-fn undo_part(visit: &Visit, key: &str, added: &[ImportedPair]) -> Markup {
-    let counted = added.iter().filter(|pair| pair.jobs > 0).count();
-    let (change, text, button) = if counted > 0 {
+fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
+    let (change, text, button) = if added.jobs > 0 {
         (
             "retire",
             visit.t(
@@ -54,23 +54,25 @@ fn undo_part(visit: &Visit, key: &str, added: &[ImportedPair]) -> Markup {
             visit.t("Bring them back", "Đưa trở lại"),
         )
     };
-    let number = if counted > 0 { counted } else { added.len() };
+    let number = if added.jobs > 0 {
+        added.jobs
+    } else {
+        added.pairs
+    };
     html! {
-        @if let Some(first) = added.first() {
-            h2 { (visit.t("Newest import", "Lần nhập mới nhất")) }
-            p { (text) " (" (visit.time(first.imported)) "): " b { (grouped(number as u64)) } ". "
-                span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
-            }
-            // The part stands on the page of imports, so the address is relative to that page.
-            (action_form(
-                &format!("p/{}/actions/last-import", encoded(key)),
-                "inline",
-                &html! {
-                    input type="hidden" name="at" value=(first.imported);
-                    button name="change" value=(change) { (button) }
-                },
-            ))
+        h2 { (visit.t("Newest import", "Lần nhập mới nhất")) }
+        p { (text) " (" (visit.time(added.imported)) "): " b { (grouped(number)) } ". "
+            span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
         }
+        // The part stands on the page of imports, so the address is relative to that page.
+        (action_form(
+            &format!("p/{}/actions/last-import", encoded(key)),
+            "inline",
+            &html! {
+                input type="hidden" name="at" value=(added.imported);
+                button name="change" value=(change) { (button) }
+            },
+        ))
     }
 }
 
@@ -103,8 +105,8 @@ pub(super) async fn change(
         .parse()
         .map_err(|_invalid| AppFailure::not_found())?;
     // `retire` checks this again; the reason is given here in both languages.
-    let newest = open.catalog.last_import().await?;
-    if newest.first().is_none_or(|pair| pair.imported != at) {
+    let newest = open.catalog.last_import_counts().await?;
+    if newest.is_none_or(|newest| newest.imported != at) {
         return Err(AppFailure::refused(Sentence::new(
             "another import has added pairs meanwhile: reload the page and look at it first",
             "một lần nhập khác vừa thêm cặp: hãy tải lại trang và xem lần nhập đó trước",
