@@ -144,6 +144,7 @@ fn a_link_works_once_for_one_guest_on_one_server() {
         ("host", "evil.example", 421),
         ("origin", "http://evil.example", 403),
         ("x-csrf-token", "0", 403),
+        ("x-csrf-token", minh.csrf_token.as_str(), 403),
     ] {
         let mut headers = lan.headers();
         headers.retain(|(known, _)| *known != name);

@@ -17,9 +17,13 @@ mod app_import;
 mod app_invitations;
 #[cfg(target_os = "linux")]
 mod app_kills;
+#[cfg(target_os = "linux")]
+mod app_load;
 mod app_phone;
 mod app_resume_browser;
 mod app_sentences;
+#[cfg(unix)]
+mod app_shared;
 mod app_upload_archives;
 mod app_upload_browser;
 mod app_upload_resume;

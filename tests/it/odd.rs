@@ -167,16 +167,19 @@ fn as_nobody(project: &Project, args: &[&str]) -> crate::cli::Call {
         .arg("-C")
         .arg(project.dir())
         .args(args);
-    let owner = std::fs::metadata(project.dir()).expect("a folder").uid();
-    // Root may write everywhere.
-    if owner == 0 {
-        command.uid(65534).gid(65534);
-    }
+    as_other_user(&mut command, project.dir());
     call(&mut command)
 }
 
+/// Lets a command run without the rights of root, who may write everywhere.
+pub(crate) fn as_other_user(command: &mut std::process::Command, dir: &Path) {
+    if std::fs::metadata(dir).expect("a folder").uid() == 0 {
+        command.uid(65534).gid(65534);
+    }
+}
+
 /// Removes the write permission below a directory, or restores it for the owner.
-fn set_writable(dir: &Path, writable: bool) {
+pub(crate) fn set_writable(dir: &Path, writable: bool) {
     use std::os::unix::fs::PermissionsExt as _;
     for entry in std::fs::read_dir(dir).expect("a folder") {
         let path = entry.expect("an entry").path();

@@ -1,0 +1,167 @@
+//! Two apps on one project, and an app on a project that cannot be written.
+
+use std::os::unix::fs::PermissionsExt as _;
+
+use serde_json::{Value, json};
+
+use crate::app::{act, open_app, text, with_project};
+use crate::app_choice::{chosen, import_more};
+use crate::cli::{binary_beside, mocban};
+use crate::odd::{as_other_user, set_writable};
+use crate::page::{Page, read_project};
+use crate::waiting::wait_until;
+
+const CHOSEN: &str = "/p/p/actions/chosen";
+
+fn html(page: &Page, path: &str) -> String {
+    let reply = page.get(path);
+    let shown = text(&reply);
+    assert_eq!(reply.status, 200, "{path}: {shown}");
+    shown
+}
+
+#[test]
+fn two_apps_on_one_project_show_and_change_the_same() {
+    let (dir, first) = with_project();
+    let second = open_app(dir.path());
+    let status = || {
+        let status = mocban(&dir.path().join("p"), &["status", "--json"]);
+        status.expect(0).json()
+    };
+    // Both change the project at the same time.
+    std::thread::scope(|scope| {
+        for (page, numbers) in [(&first, [1, 2, 3]), (&second, [4, 5, 6])] {
+            scope.spawn(move || {
+                for number in numbers {
+                    let pair = json!({"pair": format!("upright-{number:04}")});
+                    let reply = act(page, "/p/p/actions/retire", &pair, |_| {});
+                    assert_eq!(reply.status, 200, "{pair}: {}", text(&reply));
+                }
+            });
+        }
+    });
+    assert_eq!(status()["retired"], 6);
+    for (page, pair) in [(&first, "upright-0004"), (&second, "upright-0001")] {
+        let shown = html(page, &format!("/p/p/pair/{pair}/"));
+        assert!(shown.contains("This pair is retired."), "{shown}");
+        let twice = act(page, CHOSEN, &chosen("retire", &[pair]), |_| {});
+        assert_eq!(twice.status, 422, "{}", text(&twice));
+    }
+    for (page, value) in [(&first, "3"), (&second, "4")] {
+        let setting = json!({"key": "run.workers", "value": value});
+        let reply = act(page, "/p/p/actions/setting", &setting, |_| {});
+        assert_eq!(reply.status, 200, "{}", text(&reply));
+    }
+    let settings = std::fs::read_to_string(dir.path().join("p/mocban.toml"));
+    let settings = settings.expect("the settings");
+    assert!(settings.contains("workers = 4"), "the last one: {settings}");
+    let pairs = ["upright-0010", "upright-0011"];
+    let reply = act(&first, CHOSEN, &chosen("review", &pairs), |_| {}).json();
+    let go = reply["go"].as_str().expect("a page");
+    let judged = html(&second, &format!("/p/p/{go}"));
+    let part = "Only the chosen pairs are judged: <b>2</b>";
+    assert!(judged.contains(part), "{judged}");
+    // A run that one of them started is that of both.
+    import_more(dir.path(), ["late".to_owned()]);
+    let run = json!({"which": "all"});
+    let reply = act(&first, "/p/p/actions/run", &run, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    wait_until("both show the new result", || {
+        [&first, &second].iter().all(|page| {
+            let shown = html(page, "/p/p/");
+            shown.contains("pair/late/") && shown.contains("Look for changed files")
+        })
+    });
+    mocban(&dir.path().join("p"), &["check"]).expect(0);
+}
+
+#[test]
+fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let set_mode = |mode: u32| {
+        let mode = std::fs::Permissions::from_mode(mode);
+        std::fs::set_permissions(dir.path(), mode).expect("set");
+    };
+    let project = read_project(&dir).dir().to_owned();
+    let catalog = || std::fs::read(project.join("catalog.sqlite")).expect("a catalog");
+    let before = catalog();
+    let mut command = binary_beside(&project);
+    command.args(["--json", "app", "--no-open", "--lang", "en"]);
+    command.arg(dir.path());
+    set_writable(&project, false);
+    set_mode(0o555);
+    as_other_user(&mut command, &project);
+    let page = Page::of(&mut command).entered();
+    for path in [
+        "/",
+        "/p/p/",
+        "/p/p/pairs",
+        "/p/p/pair/upright-0000/",
+        "/p/p/review",
+        "/p/p/report/numbers",
+        "/p/p/export",
+        "/p/p/settings",
+        "/p/p/health",
+        "/import",
+    ] {
+        html(&page, path);
+    }
+    let upload = json!({
+        "name": "x", "content": "0".repeat(64), "files": 1, "bytes": 5, "take_over": false,
+    });
+    for (action, body, part) in [
+        (
+            "/p/p/actions/retire",
+            json!({"pair": "upright-0001"}),
+            "cannot be written to: check its rights",
+        ),
+        (
+            CHOSEN,
+            chosen("retire", &["upright-0002"]),
+            "cannot be written to: check its rights",
+        ),
+        (
+            "/p/p/actions/setting",
+            json!({"key": "run.workers", "value": "3"}),
+            "Permission denied",
+        ),
+        ("/actions/demo", Value::Null, "Permission denied"),
+        (
+            "/actions/upload",
+            upload,
+            "the files cannot be written (Permission denied",
+        ),
+    ] {
+        let reply = act(&page, action, &body, |_| {});
+        let said = text(&reply);
+        assert!([422, 503].contains(&reply.status), "{action}: {said}");
+        assert!(said.contains(part), "{action}: {said}");
+    }
+    // Long work says it on its page.
+    for (action, body) in [
+        (
+            "export",
+            json!({"purpose": "excel", "only": "all", "metric": ""}),
+        ),
+        ("backup", json!({})),
+    ] {
+        let path = format!("/p/p/actions/{action}");
+        assert_eq!(act(&page, &path, &body, |_| {}).status, 200, "{action}");
+    }
+    for path in ["/p/p/export", "/p/p/health"] {
+        wait_until(path, || {
+            let shown = html(&page, path);
+            shown.contains("data-task=\"failed\"") && shown.contains("Permission denied")
+        });
+    }
+    // Chosen pairs are kept until the app ends.
+    let pairs = ["upright-0001", "upright-0004"];
+    let reply = act(&page, CHOSEN, &chosen("review", &pairs), |_| {}).json();
+    let go = reply["go"].as_str().expect("a page");
+    let judged = html(&page, &format!("/p/p/{go}"));
+    let part = "Only the chosen pairs are judged: <b>2</b>";
+    assert!(judged.contains(part), "{judged}");
+    set_mode(0o755);
+    set_writable(&project, true);
+    assert!(catalog() == before, "nothing has changed");
+}
