@@ -16,14 +16,14 @@ use super::world::World;
 
 /// Pairs that are run. The others get copies of the rows of one of them.
 const WORKED: usize = 500;
-/// Requests for each page.
-const REQUESTS: usize = 20;
+/// Requests for each page, and for each part, which may take long.
+const REQUESTS: [usize; 2] = [20, 2];
 /// Most bytes that are read of the page with the session.
 const SESSION_BYTES: u64 = 16_384;
 
 const NOTE: &str = "\
 Milliseconds from the connection to the first byte of a reply, median / 95th percentile of 20 requests, one after another, \
-and of the very first one. Parts are loaded by their page after it is shown. MiB: peak memory of the app after the page.";
+and of the very first one. Parts, of which 2 are measured, are loaded by their page after it is shown. MiB: peak memory of the app after the page.";
 
 /// Pages below the project, and parts that pages load afterwards.
 const PAGES: [(&str, &str); 21] = [
@@ -96,7 +96,7 @@ pub(super) async fn table(options: &Options) -> anyhow::Result<String> {
         for (name, page) in others.chain(below) {
             let first = app.first_byte(&page)?;
             let mut spread = Spread::default();
-            for _ in 0..REQUESTS {
+            for _ in 0..REQUESTS[usize::from(name.starts_with("part"))] {
                 spread.add(app.first_byte(&page)?);
             }
             let first = format!("{:.1}", first.as_secs_f64() * 1000.0);
