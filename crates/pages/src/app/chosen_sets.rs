@@ -22,6 +22,8 @@ pub(super) const CHOSEN: &str = "chosen";
 const FOLDER: &str = "chosen";
 /// Most sets that are kept in memory, and in a project. The oldest is forgotten.
 const LIMIT: usize = 64;
+/// Length of a key, in hexadecimal digits.
+const KEY_LENGTH: usize = 12;
 /// Most bytes of a set: one id a line.
 const MAX_BYTES: u64 = (MAX_CHOSEN * (PairName::MAX_BYTES + 1)) as u64;
 
@@ -138,9 +140,9 @@ fn read(folder: &Path, key: &str) -> Option<String> {
     String::from_utf8(read_up_to(file, MAX_BYTES).ok()?).ok()
 }
 
-/// Returns whether a text can be a key, which names a file of the folder and no other.
+/// Returns whether a text can be a key, which names a file of the folder. Other files of a folder of this name are not ours.
 fn is_key(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_hexdigit())
+    text.len() == KEY_LENGTH && text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
 fn of_another(project: &str) -> Sentence {
@@ -229,6 +231,9 @@ mod tests {
         std::fs::write(&file, "a 1").expect("written");
         assert_eq!(found_later(dir, &key).await, None, "it was cut");
         std::fs::remove_file(&file).expect("removed");
+        // A person's own file.
+        let own = dir.join(FOLDER).join("0117");
+        std::fs::write(&own, "").expect("written");
         std::fs::create_dir(&file).expect("a folder");
         assert_eq!(found_later(dir, &key).await, None, "it is no file");
         for number in 0..=LIMIT {
@@ -236,6 +241,7 @@ mod tests {
         }
         let files = std::fs::read_dir(dir.join(FOLDER)).expect("a folder");
         let files = files.filter(|entry| entry.as_ref().is_ok_and(|entry| entry.path().is_file()));
-        assert_eq!(files.count(), LIMIT);
+        assert_eq!(files.count(), LIMIT + 1);
+        assert!(own.exists());
     }
 }
