@@ -195,11 +195,10 @@ fn an_import_without_new_pairs_is_not_undone_as_the_one_before() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
     let list = |name: &str, ids: &[&str]| {
-        let rows: String = ids
-            .iter()
-            .map(|id| format!("{id},{id}.stl,{id}.png\n"))
-            .collect();
-        fs::write(dir.path().join(name), format!("id,mesh,print\n{rows}")).expect("written");
+        let rows = ids.iter().map(|id| format!("{id},{id}.stl,{id}.png"));
+        let rows: Vec<String> = rows.collect();
+        let text = format!("id,mesh,print\n{}\n", rows.join("\n"));
+        fs::write(dir.path().join(name), text).expect("written");
     };
     list("a.csv", &["a1", "a2"]);
     list("b.csv", &["b1", "b2", "b3"]);
