@@ -10,7 +10,6 @@ use std::time::SystemTime;
 use tokio::task::spawn_blocking;
 
 use super::address::PageQuery;
-use super::chosen_pairs::MAX_CHOSEN;
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
 use mocban_core::domain::{ContentHash, PairName, one_line};
@@ -24,8 +23,8 @@ const FOLDER: &str = "chosen";
 const LIMIT: usize = 64;
 /// Length of a key, in hexadecimal digits.
 const KEY_LENGTH: usize = 12;
-/// Most bytes of a set: one id a line.
-const MAX_BYTES: u64 = (MAX_CHOSEN * (PairName::MAX_BYTES + 1)) as u64;
+/// Most bytes of a set, which has one id a line. More pairs than can be chosen fit.
+const MAX_BYTES: u64 = 1 << 20;
 
 /// Sets of pairs. Those of a project that cannot be written end with the app.
 #[derive(Debug, Default)]
