@@ -209,14 +209,6 @@ mod tests {
                 "no labels for x: không có tệp y",
             ),
             (
-                "1.stl: the ascii STL is truncated: it ends after 0 facets without endsolid",
-                "1.stl: tệp ascii STL bị cắt cụt: hết sau 0 mặt mà chưa có endsolid",
-            ),
-            (
-                "1.ply: the binary PLY is truncated: it holds 3 of 9 vertices",
-                "1.ply: tệp binary PLY bị cắt cụt: chỉ có 3 trong số 9 phần tử",
-            ),
-            (
                 "b1: p/1.ply may not be read: permission denied",
                 "b1: không có quyền đọc p/1.ply",
             ),
@@ -229,6 +221,22 @@ mod tests {
         }
         for other in ["", "a = 7 is too large", " is not there", "line 3: bad"] {
             assert_eq!(vietnamese(other), None, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn truncated_files_are_explained() {
+        for (english, expected) in [
+            (
+                "1.stl: the ascii STL is truncated: it ends after 0 facets without endsolid",
+                "1.stl: tệp ascii STL bị cắt cụt: hết sau 0 mặt mà chưa có endsolid",
+            ),
+            (
+                "1.ply: the binary PLY is truncated: it holds 3 of 9 vertices",
+                "1.ply: tệp binary PLY bị cắt cụt: chỉ có 3 trong số 9 phần tử",
+            ),
+        ] {
+            assert_eq!(vietnamese(english).as_deref(), Some(expected));
         }
     }
 
