@@ -148,7 +148,7 @@ impl App {
         };
         app.cookie = after("set-cookie: ", ';').context("no cookie")?;
         let session = after("data-session=\"", '"').context("no session")?;
-        app.session = session.trim_end_matches('/').to_owned();
+        session.trim_end_matches('/').clone_into(&mut app.session);
         Ok(app)
     }
 
