@@ -355,6 +355,7 @@ mod tests {
             character: character_inputs(&other_character),
             prior,
             doubts: NO_DOUBTS,
+            pixel_width: 0.0,
         };
         assert!(inputs(prior_of(1.0)).confidence() < of_character(&other_character));
         assert!(of_character(&other_character) < 0.3);
