@@ -15,12 +15,13 @@ pub(crate) const COLUMNS: KnownColumns = KnownColumns {
         "angle_read_deg",
     ],
     other_names: &[
-        ("id", "pair"),
         ("ma_so", "pair"),
         ("so_hieu", "pair"),
         ("ma_cap", "pair"),
         ("cap", "pair"),
         ("ma", "pair"),
+        // Last, because it may be the id of the verdict.
+        ("id", "pair"),
         ("danh_gia", "verdict"),
         ("ket_qua", "verdict"),
         ("ket_luan", "verdict"),

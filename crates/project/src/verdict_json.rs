@@ -100,10 +100,9 @@ fn parsed(line: &[u8]) -> Result<(VerdictLine, GivenTime), String> {
     let Value::Object(mut fields) = value else {
         return Err("each line is a JSON object with pair, verdict and reviewer".to_owned());
     };
-    if fields
-        .keys()
-        .any(|field| !LOG_FIELDS.contains(&field.as_str()))
-    {
+    let is_unknown = |field: &String| !LOG_FIELDS.contains(&field.as_str());
+    // Without a pair, `id` may be its name.
+    if !fields.contains_key("pair") || fields.keys().any(is_unknown) {
         fields = with_known_names(fields)?;
     }
     for (field, stored) in TEXTS {

@@ -69,6 +69,8 @@ fn fields_of_json_have_the_names_of_columns() {
         r#"{"Pair":"1","VERDICT":"fail","reviewer ":"lan","Note":"x"}"#,
         r#"{"Mã số":1,"Đánh giá":"không đạt","người chấm":"lan","Ghi chú":"x"}"#,
         r#"{"id":"1","kết quả":"fail","reader":"lan","ghi_chu":"x"}"#,
+        r#"{"id":"1","verdict":"fail","reviewer":"lan","note":"x"}"#,
+        r#"{"id":7,"Mã cặp":"1","verdict":"fail","reviewer":"lan","note":"x"}"#,
     ] {
         let rows = parse_jsonl(line.as_bytes()).expect(line);
         assert_eq!(
@@ -77,6 +79,9 @@ fn fields_of_json_have_the_names_of_columns() {
             "{line}"
         );
     }
+    let table = "id,mã cặp,verdict,reviewer,note\n7,1,fail,lan,x\n";
+    let rows = parse_csv(table.as_bytes()).expect("valid");
+    assert_eq!(&rows[0].listed, plain, "{table}");
     // Beside a pair, the id is that of the verdict.
     let log = r#"{"id":7,"pair":"1","verdict":"fail","reviewer":"lan","note":"x","who":""}"#;
     let rows = parse_jsonl(log.as_bytes()).expect("valid");
