@@ -29,10 +29,13 @@ WITH same AS (SELECT p.id, p.name, min(p.id) OVER (PARTITION BY p.mesh_hash, p.p
 SELECT s.name AS id, o.name AS known, count(*) OVER () AS count FROM same AS s JOIN pair AS o ON o.id = s.first_id
 WHERE s.id <> s.first_id ORDER BY s.id LIMIT 1";
 
-/// Blocks whose scan and page have the contents of those of an earlier block.
+/// Blocks whose scan and page have the contents of those of an earlier block. Blocks whose pairs are all retired are left
+/// out.
 const BLOCK_CONTENTS: &str = "
 WITH same AS (SELECT id, name, min(id) OVER (PARTITION BY mesh_hash, page_hash) AS first_id
-    FROM block WHERE mesh_hash <> ?1 AND page_hash <> ?1)
+    FROM block WHERE mesh_hash <> ?1 AND page_hash <> ?1 AND (
+        NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.block = block.id AND c.pair IS NOT NULL)
+        OR EXISTS (SELECT 1 FROM block_character AS c JOIN job AS j ON j.pair = c.pair WHERE c.block = block.id)))
 SELECT s.name AS id, o.name AS known, count(*) OVER () AS count FROM same AS s JOIN block AS o ON o.id = s.first_id
 WHERE s.id <> s.first_id ORDER BY s.id LIMIT 1";
 

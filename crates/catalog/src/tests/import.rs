@@ -1,6 +1,6 @@
 //! Imports that are streamed in chunks.
 
-use super::blocks::{attributes, block, inputs, version, world};
+use super::blocks::{attributes, block, character, inputs, version, world};
 use super::{World, name, row};
 use crate::{
     BlockAttributes, CatalogError, ImportChunk, ImportRow, ImportTerms, InputVersion,
@@ -424,11 +424,18 @@ async fn pairs_and_blocks_with_the_contents_of_earlier_ones_are_counted_after_th
         .map(|known| (known.block, inputs(["mesh", "page", "labels"])));
     let stored = blocks.catalog.store_block_inputs(read.collect()).await;
     stored.expect("stored");
-    let found = blocks.catalog.same_contents().await.expect("a read");
-    assert_eq!(
-        found.sentences(),
-        [
-            "blocks with the same scan and page as an earlier one: 1, first c, as b; `retire` takes a copy out of every count"
-        ]
-    );
+    let same = async || blocks.catalog.same_contents().await.expect("a read");
+    let sentence = "blocks with the same scan and page as an earlier one: 1, first c, as b; `retire` takes a copy out of every count";
+    assert_eq!(same().await.sentences(), [sentence]);
+    for content in ["1", "2"] {
+        let cut = vec![character("x", content)];
+        assert_eq!(
+            blocks.finish_block(cut).await,
+            super::blocks::stored(1, 0, 0, 0)
+        );
+    }
+    assert_eq!(same().await.sentences(), [sentence]);
+    let retired = blocks.catalog.retire_pairs(&[name("c_x")], 3).await;
+    assert_eq!(retired.expect("retired"), 1);
+    assert_eq!(same().await, SameContents::default());
 }
