@@ -84,39 +84,38 @@ pub(super) const COLUMNS: KnownColumns = KnownColumns {
     ],
 };
 
+/// Columns with ids or paths that only lists of blocks or of verdicts have, and their other names.
+const OTHER_LISTS: [&str; 8] = [
+    "pair",
+    "cap",
+    "ma_cap",
+    "page",
+    "trang",
+    "anh_trang",
+    "labels",
+    "nhan",
+];
+
 /// Returns whether the values of a column in a list of pairs, of blocks or of verdicts are names of things or of files, so
 /// that none is a date.
 pub(crate) fn is_text_column(header: &str) -> bool {
-    const OTHERS: [&str; 6] = ["pair", "cap", "ma_cap", "page", "trang", "labels"];
     let plain = plain_name(header);
     let others = COLUMNS.other_names.iter();
     let names = COLUMNS.names.iter().copied();
     names
-        .chain(OTHERS)
+        .chain(OTHER_LISTS)
         .chain(others.map(|(name, _)| *name))
         .any(|name| name == plain)
 }
 
 /// Returns whether the values of a column in such a list are ids or paths, which are on one line.
 pub(crate) fn is_id_or_path_column(header: &str) -> bool {
-    const OTHERS: [&str; 8] = [
-        "pair",
-        "cap",
-        "ma_cap",
-        "page",
-        "trang",
-        "anh_trang",
-        "labels",
-        "nhan",
-    ];
+    let is_one = |name: &str| REQUIRED.contains(&name) || name == "block";
     let plain = plain_name(header);
-    let others = COLUMNS.other_names.iter();
-    let others = others.filter(|(_, name)| REQUIRED.contains(name));
-    REQUIRED
-        .into_iter()
-        .chain(OTHERS)
-        .chain(others.map(|(other, _)| *other))
-        .any(|name| name == plain)
+    let mut others = COLUMNS.other_names.iter();
+    is_one(&plain)
+        || OTHER_LISTS.contains(&plain.as_str())
+        || others.any(|(other, name)| *other == plain && is_one(name))
 }
 
 /// What was read of a list whose rows were passed on.

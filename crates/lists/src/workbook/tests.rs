@@ -64,6 +64,9 @@ fn ids_and_paths_are_on_one_line() {
         ("bản\nquét", true),
         ("page", true),
         ("pair", true),
+        ("block", true),
+        ("Ảnh trang", true),
+        ("Nhãn", true),
         ("character", false),
         ("note", false),
     ] {
