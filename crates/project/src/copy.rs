@@ -48,7 +48,7 @@ async fn warn_about_inputs(dir: &str, listener: &dyn Listener) {
         let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
         let pairs: u64 = catalog.counters().await?.values().sum();
         let pairs = pairs + catalog.retired_count().await?;
-        let found = missing_inputs::find(&project, &catalog, pairs).await;
+        let found = missing_inputs::missing(&project, &catalog, pairs).await;
         catalog.close().await;
         found
     };

@@ -1,6 +1,6 @@
 //! Finds out with few lookups whether input files are missing, as after their folder has moved, or were changed.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -9,19 +9,21 @@ use mocban_catalog::{Catalog, InputVersion, PairSelection};
 use mocban_core::domain::{ArtifactRef, PairId, one_line};
 use mocban_store::{InputError, Project, stat_input};
 
-/// Largest number of pairs whose files are looked at. They are spread over the project.
-const MAX_PAIRS: u64 = 1000;
-/// Largest number of blocks whose files are looked at.
+/// Largest number of pairs whose files are inspected. They are spread over the project.
+const MAX_PAIRS: u64 = 300;
+/// Largest number of blocks whose files are inspected.
 const MAX_BLOCKS: usize = 50;
-/// Longest time for looking at the files. A disk may hang.
+/// Time after which no further file is inspected, as on a slow network drive.
+const INSPECTION_TIME: Duration = Duration::from_secs(4);
+/// Longest wait for the inspection. A disk may hang.
 const MAX_TIME: Duration = Duration::from_secs(5);
 
 /// Input files that were read before and are no longer at their places.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct MissingInputs {
-    /// Number of missing files among the files that were looked at.
+    /// Number of missing files among the inspected ones.
     pub missing: usize,
-    /// Number of files that were looked at.
+    /// Number of files that were inspected.
     pub looked_at: usize,
     /// Path of the first missing one.
     pub first: String,
@@ -45,9 +47,9 @@ impl std::fmt::Display for MissingInputs {
 /// Input files whose size has changed since they were read. Times are not compared: a copy of a folder has other ones.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ChangedInputs {
-    /// Number of changed files among the files that were looked at.
+    /// Number of changed files among the inspected ones.
     pub changed: usize,
-    /// Number of files that were looked at.
+    /// Number of files that were inspected.
     pub looked_at: usize,
     /// Path of the first changed one.
     pub first: String,
@@ -68,30 +70,34 @@ impl std::fmt::Display for ChangedInputs {
     }
 }
 
-/// What a look at input files found.
+/// Missing and changed files among the sampled inputs.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct InputsLook {
+pub struct InputInspection {
     /// Files that are missing.
     pub missing: Option<MissingInputs>,
     /// Files that were changed.
     pub changed: Option<ChangedInputs>,
 }
 
-/// Looks at the files of some pairs and blocks of a project, like [`look`], and returns the missing ones.
-pub async fn find(
+/// Inspects the files of some pairs and blocks of a project, like [`inspect`], and returns the missing ones.
+pub async fn missing(
     project: &Project,
     catalog: &Catalog,
     pairs: u64,
 ) -> ProjectResult<Option<MissingInputs>> {
-    Ok(look(project, catalog, pairs).await?.missing)
+    Ok(inspect(project, catalog, pairs).await?.missing)
 }
 
-/// Looks at the files of some pairs and blocks of a project. `pairs` counts the retired pairs too, because they have ids,
-/// but their files are not looked at. Finds nothing if inputs may be in an object store, or if the disk does not answer in
-/// time.
-pub async fn look(project: &Project, catalog: &Catalog, pairs: u64) -> ProjectResult<InputsLook> {
+/// Inspects the files of some pairs and blocks of a project. `pairs` counts the retired pairs too, because they have ids,
+/// but their files are not inspected. Finds nothing if inputs may be in an object store, or if the disk hangs. If the disk
+/// is slow, inspects fewer files.
+pub async fn inspect(
+    project: &Project,
+    catalog: &Catalog,
+    pairs: u64,
+) -> ProjectResult<InputInspection> {
     if project.has_remote_inputs() {
-        return Ok(InputsLook::default());
+        return Ok(InputInspection::default());
     }
     let sampled = pairs.min(MAX_PAIRS);
     // The ids of pairs are almost without gaps.
@@ -122,19 +128,24 @@ pub async fn look(project: &Project, catalog: &Catalog, pairs: u64) -> ProjectRe
     // The files of pairs that were cut from a block are artifacts.
     files.retain(|(path, _)| ArtifactRef::at_path(path).is_none());
     let project = project.clone();
-    let look = tokio::task::spawn_blocking(move || among(&project, &files));
-    let looked = tokio::time::timeout(MAX_TIME, look).await;
-    Ok(looked.ok().and_then(Result::ok).unwrap_or_default())
+    let until = Instant::now() + INSPECTION_TIME;
+    let inspection = tokio::task::spawn_blocking(move || among(&project, &files, until));
+    let inspected = tokio::time::timeout(MAX_TIME, inspection).await;
+    Ok(inspected.ok().and_then(Result::ok).unwrap_or_default())
 }
 
-/// Looks at files, each with what was stored about it when it was read.
-fn among(project: &Project, files: &[(String, String)]) -> InputsLook {
-    let looked_at = files.len();
+/// Inspects files until a time, each with what was stored about it when it was read.
+fn among(project: &Project, files: &[(String, String)], until: Instant) -> InputInspection {
+    let mut looked_at = 0;
     let (mut missing, mut changed) = (Vec::new(), Vec::new());
     for (path, read) in files {
+        if Instant::now() >= until {
+            break;
+        }
+        looked_at += 1;
         match stat_input(&project.input(path)) {
             Err(InputError::NotThere(_)) => missing.push(path),
-            // An import has changed the path of a file without a stat, which is said elsewhere.
+            // A file without a stat has a new path since an import; `other_files` counts it.
             Ok(now) if !read.is_empty() && size(&now) != size(read) => {
                 changed.push(path);
             }
@@ -142,7 +153,7 @@ fn among(project: &Project, files: &[(String, String)]) -> InputsLook {
         }
     }
     let shown = |path: &str| project.input(path).path().display().to_string();
-    InputsLook {
+    InputInspection {
         missing: missing.first().map(|first| MissingInputs {
             missing: missing.len(),
             looked_at,
@@ -163,7 +174,9 @@ fn size(stat: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use super::{InputsLook, among};
+    use std::time::{Duration, Instant};
+
+    use super::{InputInspection, among};
     use mocban_store::{Project, stat_input};
 
     #[test]
@@ -177,14 +190,16 @@ mod tests {
             let stat = stat_input(&project.input(&stored)).expect("a file");
             (stored, stat)
         });
-        assert_eq!(among(&project, &files), InputsLook::default());
+        let later = Instant::now() + Duration::from_secs(3600);
+        let none = InputInspection::default();
+        assert_eq!(among(&project, &files, later), none);
         // Another file with the same size, as in a copy of the folder.
         std::fs::write(dir.path().join("new.stl"), "y").expect("written");
         std::fs::rename(dir.path().join("new.stl"), dir.path().join("a.stl")).expect("moved");
-        assert_eq!(among(&project, &files), InputsLook::default());
+        assert_eq!(among(&project, &files, later), none);
         std::fs::write(dir.path().join("b.stl"), "longer").expect("written");
         std::fs::remove_file(dir.path().join("c.stl")).expect("removed");
-        let InputsLook { missing, changed } = among(&project, &files);
+        let InputInspection { missing, changed } = among(&project, &files, later);
         let (missing, changed) = (missing.expect("one"), changed.expect("one"));
         assert_eq!((missing.missing, missing.looked_at), (1, 3));
         assert!(missing.first.ends_with("c.stl"), "{missing}");
@@ -192,6 +207,7 @@ mod tests {
         assert!(changed.first.ends_with("b.stl"), "{changed}");
         let mut unread = files.clone();
         unread[1].1.clear();
-        assert_eq!(among(&project, &unread).changed, None);
+        assert_eq!(among(&project, &unread, later).changed, None);
+        assert_eq!(among(&project, &files, Instant::now()), none, "it is over");
     }
 }

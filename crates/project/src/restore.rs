@@ -73,7 +73,7 @@ pub async fn restore(
     if let (Ok(restored), None) = (&mut restored, inputs) {
         // The project is there already, so what cannot be looked up is no error.
         if let Ok((project, catalog)) = location.at(dir).open_read_only().await {
-            let missing = missing_inputs::find(&project, &catalog, restored.pairs).await;
+            let missing = missing_inputs::missing(&project, &catalog, restored.pairs).await;
             restored.not_in_place = missing.ok().flatten();
             catalog.close().await;
         }

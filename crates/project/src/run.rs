@@ -127,7 +127,7 @@ impl PreparedRun {
         let is_running = runner::is_running(project, catalog, now()).await?;
         let status = catalog.status(&fingerprints(&self.config.stages)).await?;
         let pairs = status.pairs + status.retired;
-        let missing_inputs = missing_inputs::find(project, catalog, pairs).await?;
+        let missing_inputs = missing_inputs::missing(project, catalog, pairs).await?;
         self.catalog.close().await;
         Ok(PlannedRun {
             plan,
@@ -168,7 +168,7 @@ impl PreparedRun {
         let missing_inputs = match &ended {
             Ok(summary) if !summary.stopped => {
                 let pairs = summary.status.pairs + summary.status.retired;
-                missing_inputs::find(project, catalog, pairs).await
+                missing_inputs::missing(project, catalog, pairs).await
             }
             _ => Ok(None),
         };

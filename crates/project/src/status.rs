@@ -8,13 +8,13 @@ use crate::error::ProjectResult;
 use crate::events::{Listener, warn};
 use crate::failures::Failures;
 use crate::location::{Location, now};
-use crate::missing_inputs::{self, ChangedInputs, InputsLook, MissingInputs};
+use crate::missing_inputs::{self, ChangedInputs, InputInspection, MissingInputs};
 use mocban_catalog::{Catalog, SameContents, StatusCounts};
 use mocban_core::domain::JobStatus;
 use mocban_runner::{fingerprints, is_running};
 use mocban_store::Project;
 
-/// Most pairs among which those with the contents of others are looked for. `check` looks among all.
+/// Most pairs that are compared to find those with the contents of others. `check` compares all.
 const MAX_COMPARED: u64 = 20_000;
 
 /// The state of a project.
@@ -28,46 +28,60 @@ pub struct ProjectStatus {
     pub failures: Failures,
     /// Whether there are results, but none of their files.
     pub are_results_missing: bool,
-    /// Input files that are no longer at their places. They are not looked at during a run.
+    /// Input files that are no longer at their places. They are not inspected during a run.
     pub missing_inputs: Option<MissingInputs>,
-    /// Input files that were changed since they were read. They are not looked at during a run.
+    /// Input files that were changed since they were read. They are not inspected during a run.
     pub changed_inputs: Option<ChangedInputs>,
-    /// Pairs and blocks with the contents of others. They are not looked for during a run, nor in a very large project.
+    /// Pairs and blocks with the contents of others. They are not compared during a run, nor in a very large project.
     pub same_contents: SameContents,
 }
 
 impl ProjectStatus {
-    /// Reads the state, with all failed pairs or the first ones.
+    /// Reads the state, with all failed pairs or the first ones. Inputs are inspected and compared only if none are `known`
+    /// from an earlier state that was read while nothing ran, because that takes longer than the rest.
     pub async fn read(
         project: &Project,
         catalog: &Catalog,
         all_failures: bool,
         location: &Location,
+        known: Option<&Self>,
     ) -> ProjectResult<Self> {
         let fingerprints = fingerprints(&location.settings()?.config.stages);
         // Read before the counts: a run that ends in between leaves no leases.
         let running = is_running(project, catalog, now()).await?;
         let failures = Failures::read(catalog, all_failures).await?;
         let counts = catalog.status(&fingerprints).await?;
-        let InputsLook { missing, changed } = if running {
-            InputsLook::default()
-        } else {
-            missing_inputs::look(project, catalog, counts.pairs + counts.retired).await?
-        };
-        let same_contents = if running || counts.pairs > MAX_COMPARED {
-            SameContents::default()
-        } else {
-            catalog.same_contents().await?
+        let (inspection, same_contents) = match known.filter(|known| !known.running) {
+            _ if running => (InputInspection::default(), SameContents::default()),
+            Some(known) => known.inputs(),
+            None => {
+                let pairs = counts.pairs + counts.retired;
+                let inspection = missing_inputs::inspect(project, catalog, pairs).await?;
+                let same = match counts.pairs {
+                    0..=MAX_COMPARED => catalog.same_contents().await?,
+                    _ => SameContents::default(),
+                };
+                (inspection, same)
+            }
         };
         Ok(Self {
             same_contents,
-            missing_inputs: missing,
-            changed_inputs: changed,
+            missing_inputs: inspection.missing,
+            changed_inputs: inspection.changed,
             are_results_missing: are_results_missing(project, &counts.jobs),
             counts,
             running,
             failures,
         })
+    }
+
+    /// Returns what was found out about the inputs.
+    fn inputs(&self) -> (InputInspection, SameContents) {
+        let inspection = InputInspection {
+            missing: self.missing_inputs.clone(),
+            changed: self.changed_inputs.clone(),
+        };
+        (inspection, self.same_contents.clone())
     }
 
     /// Returns the number of pairs with a status.

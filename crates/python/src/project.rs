@@ -166,7 +166,7 @@ impl NativeProject {
     fn status(&self, py: Python<'_>) -> PyResult<String> {
         self.simple(py, |location, _| async move {
             let (project, catalog) = location.open_read_only().await?;
-            let status = ProjectStatus::read(&project, &catalog, true, &location).await?;
+            let status = ProjectStatus::read(&project, &catalog, true, &location, None).await?;
             catalog.close().await;
             Ok(status.json(true)?.to_string())
         })

@@ -55,13 +55,14 @@ const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 pub(crate) async fn status(args: StatusArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (project, catalog) = context.location.open_read_only().await?;
     if !args.watch {
-        print_once(&project, &catalog, &args, context).await?;
+        print_once(&project, &catalog, &args, context, &mut None).await?;
         catalog.close().await;
         return Ok(ExitCode::Done);
     }
     let watching = async {
+        let mut last = None;
         loop {
-            print_once(&project, &catalog, &args, context).await?;
+            print_once(&project, &catalog, &args, context, &mut last).await?;
             tokio::time::sleep(WATCH_INTERVAL).await;
         }
     };
@@ -76,19 +77,21 @@ pub(crate) async fn status(args: StatusArgs, context: &Context) -> ProjectResult
     match ended? {}
 }
 
-/// Reads and prints the status.
+/// Reads and prints the status, and keeps it as the last one.
 async fn print_once(
     project: &Project,
     catalog: &Catalog,
     args: &StatusArgs,
     context: &Context,
+    last: &mut Option<ProjectStatus>,
 ) -> ProjectResult<()> {
     if args.hosts {
         let workers = WorkerTable::read(catalog, now()).await?;
         let (json, text) = (workers.json(), table_text(&workers, context.stdout));
         print_refreshed(args, context, &json, text)?;
     } else {
-        let status = ProjectStatus::read(project, catalog, args.failed, &context.location).await?;
+        let (failed, location) = (args.failed, &context.location);
+        let status = ProjectStatus::read(project, catalog, failed, location, last.as_ref()).await?;
         let mut lists = AddedLists::default();
         if args.pairs {
             lists.pairs = Some(pair_table::read(catalog, PairChoice::All).await?);
@@ -97,6 +100,7 @@ async fn print_once(
             lists.retired = Some(catalog.retired_pairs().await?);
         }
         print_status(&status, &lists, args, context)?;
+        *last = Some(status);
     }
     Ok(())
 }
