@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
@@ -57,8 +57,8 @@ impl ChosenSets {
                 pairs,
             });
         }
-        let (folder, file) = (dir.join(FOLDER), key.clone());
-        let stored = spawn_blocking(move || store(&folder, &file, &text)).await;
+        let (folder, project, file) = (dir.join(FOLDER), project.to_owned(), key.clone());
+        let stored = spawn_blocking(move || store(&folder, &project, &file, &text)).await;
         if let Ok(Err(error)) = stored {
             tracing::warn!("the chosen pairs are kept only until the app ends: {error}");
         }
@@ -111,23 +111,45 @@ fn key_of(project: &str, lines: &str) -> String {
 }
 
 /// Writes the set of a key, and removes the oldest sets if there are too many.
-fn store(folder: &Path, key: &str, lines: &str) -> io::Result<()> {
+fn store(folder: &Path, project: &str, key: &str, lines: &str) -> io::Result<()> {
     create_folders(folder)?;
     write_atomic(&folder.join(key), lines.as_bytes())?;
-    let mut sets: Vec<(SystemTime, PathBuf)> = Vec::new();
+    if let Err(error) = remove_oldest(folder, project, key) {
+        let folder = folder.display();
+        tracing::warn!("cannot remove the oldest chosen pairs in {folder}: {error}");
+    }
+    Ok(())
+}
+
+/// Removes the oldest sets of a project if there are too many, but never that of `newest`. Keeps files that are no sets: a
+/// person may have a folder of this name.
+fn remove_oldest(folder: &Path, project: &str, newest: &str) -> io::Result<()> {
+    let mut sets: Vec<(SystemTime, String)> = Vec::new();
     for entry in std::fs::read_dir(folder)? {
-        let (path, meta) = entry.and_then(|entry| Ok((entry.path(), entry.metadata()?)))?;
-        let name = path.file_name().unwrap_or_default();
-        if meta.is_file() && name.to_str().is_some_and(is_key) {
-            sets.push((meta.modified()?, path));
+        let entry = entry?;
+        let Ok(name) = entry.file_name().into_string() else {
+            continue;
+        };
+        let is_set = || read(folder, &name).is_some_and(|text| key_of(project, &text) == name);
+        if name != newest && is_set() {
+            let modified = entry.metadata().and_then(|meta| meta.modified());
+            sets.extend(unless_gone(modified)?.map(|modified| (modified, name)));
         }
     }
     sets.sort_unstable();
-    let surplus = sets.len().saturating_sub(LIMIT);
-    for (_, path) in sets.iter().take(surplus) {
-        std::fs::remove_file(path)?;
+    let surplus = (sets.len() + 1).saturating_sub(LIMIT);
+    for (_, name) in sets.iter().take(surplus) {
+        unless_gone(std::fs::remove_file(folder.join(name)))?;
     }
     Ok(())
+}
+
+/// Returns `None` for a file that is gone, because another app has removed it.
+fn unless_gone<T>(found: io::Result<T>) -> io::Result<Option<T>> {
+    match found {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        found => found.map(Some),
+    }
 }
 
 /// Reads the set of a key. `None` if it is not kept, or the key is not one.
@@ -141,7 +163,8 @@ fn read(folder: &Path, key: &str) -> Option<String> {
 
 /// Returns whether a text can be a key, which names a file of the folder. Other files of a folder of this name are not ours.
 fn is_key(text: &str) -> bool {
-    text.len() == KEY_LENGTH && text.bytes().all(|byte| byte.is_ascii_hexdigit())
+    let is_digit = |byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f');
+    text.len() == KEY_LENGTH && text.bytes().all(is_digit)
 }
 
 fn of_another(project: &str) -> Sentence {
@@ -165,7 +188,9 @@ fn forgotten() -> Sentence {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
     use std::path::Path;
+    use std::time::{Duration, SystemTime};
 
     use super::{CHOSEN, ChosenSets, FOLDER, LIMIT};
     use crate::app::address::PageQuery;
@@ -230,17 +255,31 @@ mod tests {
         std::fs::write(&file, "a 1").expect("written");
         assert_eq!(found_later(dir, &key).await, None, "it was cut");
         std::fs::remove_file(&file).expect("removed");
-        // A person's own file.
-        let own = dir.join(FOLDER).join("0117");
-        std::fs::write(&own, "").expect("written");
+        // A person's own files, one with a name that a set could have.
+        let own = ["0117", "20261129ab01"].map(|name| dir.join(FOLDER).join(name));
+        for own in &own {
+            std::fs::write(own, "a").expect("written");
+        }
         std::fs::create_dir(&file).expect("a folder");
         assert_eq!(found_later(dir, &key).await, None, "it is no file");
         for number in 0..=LIMIT {
             sets.keep("p", dir, &[name(&number.to_string())]).await;
         }
-        let files = std::fs::read_dir(dir.join(FOLDER)).expect("a folder");
-        let files = files.filter(|entry| entry.as_ref().is_ok_and(|entry| entry.path().is_file()));
-        assert_eq!(files.count(), LIMIT + 1);
-        assert!(own.exists());
+        let files = || {
+            let entries = std::fs::read_dir(dir.join(FOLDER)).expect("a folder");
+            let paths = entries.map(|entry| entry.expect("an entry").path());
+            paths.filter(|path| path.is_file()).collect::<Vec<_>>()
+        };
+        assert_eq!(files().len(), LIMIT + own.len());
+        // The clock was set back.
+        let later = SystemTime::now() + Duration::from_secs(3600);
+        for path in files() {
+            let file = File::options().write(true).open(path).expect("a file");
+            file.set_modified(later).expect("a time");
+        }
+        let newest = sets.keep("p", dir, &pairs[..1]).await;
+        assert_eq!(found_later(dir, &newest).await, Some(1));
+        assert_eq!(files().len(), LIMIT + own.len());
+        assert!(own.iter().all(|own| own.exists()));
     }
 }
