@@ -39,8 +39,8 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
         (
             "retire",
             visit.t(
-                "Pairs added by the newest import",
-                "Số cặp được thêm trong lần nhập mới nhất",
+                "Pairs added by the newest import that added pairs",
+                "Số cặp được thêm trong lần nhập gần nhất có thêm cặp",
             ),
             visit.t("Undo this import", "Hoàn tác lần nhập này"),
         )
@@ -48,8 +48,8 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
         (
             "restore",
             visit.t(
-                "Pairs of the newest import, which are in no count",
-                "Số cặp của lần nhập mới nhất, hiện không được tính",
+                "Pairs of the newest import that added pairs, which are in no count",
+                "Số cặp của lần nhập gần nhất có thêm cặp, hiện không được tính",
             ),
             visit.t("Bring them back", "Đưa trở lại"),
         )
@@ -60,7 +60,7 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
         added.pairs
     };
     html! {
-        h2 { (visit.t("Newest import", "Lần nhập mới nhất")) }
+        h2 { (visit.t("Newest import that added pairs", "Lần nhập gần nhất có thêm cặp")) }
         p { (text) " (" (visit.time(added.imported)) "): " b { (grouped(number)) } ". "
             span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
         }
