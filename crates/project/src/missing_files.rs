@@ -33,13 +33,15 @@ pub struct MissingFiles {
 }
 
 impl MissingFiles {
-    /// Adds the message of a file. Only the first hint on paths of Windows is kept.
+    /// Adds the message of a file. Only the first hint of each kind is kept.
     pub fn add(&mut self, mut line: String) {
         self.count += 1;
-        if let Some(end) = line.strip_suffix(WINDOWS_HINT).map(str::len)
-            && self.lines.iter().any(|line| line.ends_with(WINDOWS_HINT))
-        {
-            line.truncate(end);
+        for hint in [WINDOWS_HINT, LINE_BREAK_HINT] {
+            if let Some(end) = line.strip_suffix(hint).map(str::len)
+                && self.lines.iter().any(|line| line.ends_with(hint))
+            {
+                line.truncate(end);
+            }
         }
         if self.lines.len() < MAX_MISSING {
             self.lines.push(line);
@@ -83,7 +85,7 @@ impl MissingFiles {
 
 #[cfg(test)]
 mod tests {
-    use super::{IS_FOLDER, MissingFiles, WINDOWS_HINT};
+    use super::{IS_FOLDER, LINE_BREAK_HINT, MissingFiles, WINDOWS_HINT};
 
     #[test]
     fn one_file_and_several_are_named_with_what_is_in_their_place() {
@@ -107,17 +109,22 @@ mod tests {
     }
 
     #[test]
-    fn the_hint_on_windows_paths_is_given_once() {
+    fn each_hint_is_given_once() {
         let mut missing = MissingFiles::default();
-        for line in [
-            "line 2: C:\\1.stl does not exist",
-            "line 3: C:\\2.stl does not exist",
+        for (line, hint) in [
+            ("line 2: C:\\1.stl does not exist", WINDOWS_HINT),
+            ("line 3: 1 .stl does not exist", LINE_BREAK_HINT),
+            ("line 4: C:\\2.stl does not exist", WINDOWS_HINT),
+            ("line 5: 2 .stl does not exist", LINE_BREAK_HINT),
         ] {
-            missing.add(format!("{line}{WINDOWS_HINT}"));
+            missing.add(format!("{line}{hint}"));
         }
-        missing.add("line 4: 3.stl does not exist".to_owned());
+        missing.add("line 6: 3.stl does not exist".to_owned());
         let text = missing.refusal().to_string();
-        assert_eq!(text.matches(WINDOWS_HINT).count(), 1, "{text}");
+        for hint in [WINDOWS_HINT, LINE_BREAK_HINT] {
+            assert_eq!(text.matches(hint).count(), 1, "{text}");
+        }
         assert!(text.contains("C:\\2.stl does not exist\n"), "{text}");
+        assert!(text.contains("2 .stl does not exist\n"), "{text}");
     }
 }

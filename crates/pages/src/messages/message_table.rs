@@ -52,6 +52,18 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "it is a path of a Windows computer: write paths relative to the list",
         "đây là đường dẫn của máy Windows: hãy viết đường dẫn tính từ danh sách",
     ),
+    (
+        "its path has a line break: write the cell on one line",
+        "đường dẫn có ngắt dòng: hãy viết ô đó trên một dòng",
+    ),
+    (
+        "cell {} of column {} has a line break",
+        "ô {0} của cột {1} có ngắt dòng",
+    ),
+    ("id {} has a line break", "mã {0} có ngắt dòng"),
+    ("write it on one line", "hãy viết trên một dòng"),
+    ("columns {} are unknown", "không rõ các cột {0}"),
+    ("column {} is unknown", "không rõ cột {0}"),
     ("and {} more", "và {0} mục khác"),
     ("line {}: column {} is missing", "dòng {0}: thiếu cột {1}"),
     ("column {} is missing", "thiếu cột {0}"),

@@ -240,6 +240,30 @@ mod tests {
         }
     }
 
+    #[test]
+    fn lists_of_spreadsheets_are_explained() {
+        for (english, expected) in [
+            (
+                "cell B2 of column \"page\" has a line break; write it on one line",
+                "ô B2 của cột \"page\" có ngắt dòng; hãy viết trên một dòng",
+            ),
+            (
+                "id \"a b\" has a line break; write it on one line",
+                "mã \"a b\" có ngắt dòng; hãy viết trên một dòng",
+            ),
+            (
+                "a.csv: line 2: mesh a b of 1 does not exist; its path has a line break: write the cell on one line",
+                "a.csv: dòng 2: không có bản quét a b của 1; đường dẫn có ngắt dòng: hãy viết ô đó trên một dòng",
+            ),
+            (
+                "line 1: columns \"x\", \"y\" are unknown",
+                "line 1: không rõ các cột \"x\", \"y\"",
+            ),
+        ] {
+            assert_eq!(vietnamese(english).as_deref(), Some(expected));
+        }
+    }
+
     /// Returns the sources of all crates and tests as one text, with the strings that go on in the next line joined.
     fn sources() -> String {
         let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
