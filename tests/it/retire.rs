@@ -219,6 +219,7 @@ fn an_import_without_new_pairs_is_not_undone_as_the_one_before() {
                 "the newest import, on ",
                 ", added no pair; the newest one that did was on ",
                 " and added 3 pairs, first b1: give --import 1 in place of --last-import",
+                "; `retire BLOCK` takes out the pairs of a block",
             ] {
                 assert!(refused.err.contains(text), "{text}: {}", refused.err);
             }

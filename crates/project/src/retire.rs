@@ -36,8 +36,8 @@ pub struct RetireOutcome {
 pub enum RetireChoice {
     /// These ids; the id of a block stands for the pairs that it has now, or for the block itself if it has none.
     Ids(Vec<String>),
-    /// The pairs of the newest import, if it added any. With a time, those of the newest import of a list or of folders that
-    /// added any, if it was then.
+    /// The pairs of the newest import. `Some(time)`: of the newest import that added pairs, refused unless it was at this
+    /// time.
     LastImport(Option<UnixMillis>),
     /// The pairs of one of the imports of lists or folders that added any, counted back from the newest one, which is 1.
     NthImport(u32),
@@ -121,7 +121,7 @@ impl RetireChoice {
     }
 }
 
-/// Refuses the newest import if it added no pair, so that an earlier one, which added these, is not undone by mistake.
+/// Refuses if the newest import added no pair, because `added` is then from an earlier import.
 fn refuse_after_empty(project: &Project, added: &[ImportedPair]) -> Result<(), Refusal> {
     let Some(first) = added.first() else {
         return Ok(());
@@ -133,7 +133,7 @@ fn refuse_after_empty(project: &Project, added: &[ImportedPair]) -> Result<(), R
     let pairs = counted(added.len() as u64, "pair");
     Err(Refusal::Usage(format!(
         "the newest import, on {empty}, added no pair; the newest one that did was on {imported} and added {pairs}, first {}: \
-         give --import 1 in place of --last-import if it is meant",
+         give --import 1 in place of --last-import if it is meant; `retire BLOCK` takes out the pairs of a block",
         first.name
     )))
 }
