@@ -172,7 +172,7 @@ fn only_the_page_itself_acts_on_known_pairs() {
     for (pairs, expected, part) in [
         (&["upright-0001", "nobody"][..], 422, "nobody"),
         (&[], 422, "no pair is chosen"),
-        (&many, 422, "at most 1000 pairs can be chosen"),
+        (&many, 422, "at most 1\u{202f}000 pairs can be chosen"),
         (&[large.as_str()], 413, "at most 256 KiB"),
     ] {
         for change in ["retire", "compute", "resume"] {
@@ -244,8 +244,8 @@ fn all_that_match_are_found_up_to_a_limit() {
     assert_eq!(listed("sort=iou").json()["open"], json!([]));
     import_many(dir.path());
     for (language, expected) in [
-        ("en", "more than 1000 pairs match"),
-        ("vi", "có hơn 1000 cặp"),
+        ("en", "more than 1\u{202f}000 pairs match"),
+        ("vi", "có hơn 1\u{202f}000 cặp"),
     ] {
         page.get(&format!("/?language={language}"));
         let reply = listed("");

@@ -100,22 +100,26 @@ pub(super) async fn listed(
             let open_names = resumed_names(&open, &query).await?;
             return Ok(Json(json!({ "pairs": names, "open": open_names })));
         }
-        ListedNames::TooMany => Sentence::new(
-            format!(
-                "more than {MAX_CHOSEN} pairs match, and at most {MAX_CHOSEN} can be chosen: narrow the filter"
-            ),
-            format!(
-                "có hơn {MAX_CHOSEN} cặp phù hợp, và chỉ có thể chọn tối đa {MAX_CHOSEN}: hãy lọc bớt"
-            ),
-        ),
-        ListedNames::NotSearched { searched } => Sentence::new(
-            format!(
-                "only {searched} pairs were looked at, and more may match: narrow the filter by state or block"
-            ),
-            format!(
-                "mới xem {searched} cặp và có thể còn cặp phù hợp: hãy lọc bớt theo trạng thái hoặc ván"
-            ),
-        ),
+        ListedNames::TooMany => {
+            let most = grouped(MAX_CHOSEN as u64);
+            Sentence::new(
+                format!(
+                    "more than {most} pairs match, and at most {most} can be chosen: narrow the filter"
+                ),
+                format!("có hơn {most} cặp phù hợp, và chỉ có thể chọn tối đa {most}: hãy lọc bớt"),
+            )
+        }
+        ListedNames::NotSearched { searched } => {
+            let searched = grouped(searched as u64);
+            Sentence::new(
+                format!(
+                    "only {searched} pairs were looked at, and more may match: narrow the filter by state or block"
+                ),
+                format!(
+                    "mới xem {searched} cặp và có thể còn cặp phù hợp: hãy lọc bớt theo trạng thái hoặc ván"
+                ),
+            )
+        }
     };
     Err(AppFailure::refused(refusal))
 }
@@ -164,9 +168,10 @@ pub(super) async fn require_pairs(
         )));
     }
     if typed.len() > MAX_CHOSEN {
+        let most = grouped(MAX_CHOSEN as u64);
         return Err(AppFailure::refused(Sentence::new(
-            format!("at most {MAX_CHOSEN} pairs can be chosen"),
-            format!("chỉ có thể chọn tối đa {MAX_CHOSEN} cặp"),
+            format!("at most {most} pairs can be chosen"),
+            format!("chỉ có thể chọn tối đa {most} cặp"),
         )));
     }
     match selection::pairs(&open.catalog, typed).await {

@@ -6,7 +6,7 @@ use super::visit::Visit;
 use crate::review::Language;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric, sanitize};
 use mocban_report::{Basis, Comparison, MetricRow, Report};
-use mocban_results::number_format::{NumberStyle, format_interval, format_p, format_share};
+use mocban_results::number_format::{format_p, format_rate};
 use mocban_results::stats::SIGNIFICANCE_LEVEL;
 
 /// Returns the paragraphs of the answer.
@@ -91,15 +91,12 @@ fn truth(visit: &Visit, report: &Report) -> Option<String> {
     let mut rows = default.chain(&report.rows);
     rows.find_map(|row| {
         let truth = row.truth.as_ref()?;
-        let interval = truth.acc_ci95;
-        let interval = interval.map(|bounds| format_interval(bounds, NumberStyle::Share));
         Some(format!(
-            "Theo đáp án, {} trên {} kết quả của {} là đúng, {} % ({}).",
+            "Theo đáp án, {} trên {} kết quả của {} là đúng, {}.",
             grouped(truth.passed),
             grouped(truth.n),
             visit.metric(row.metric),
-            vietnamese_number(format_share(truth.acc?)),
-            vietnamese_number(interval.unwrap_or_default()),
+            vietnamese_number(format_rate(truth.acc?, truth.acc_ci95)),
         ))
     })
 }
@@ -109,15 +106,10 @@ fn accuracy(visit: &Visit, report: &Report) -> String {
     let default = report.row(ThresholdMetric::DEFAULT).into_iter();
     let mut rows = default.chain(&report.rows);
     let known = |row: &MetricRow| {
-        let acc = row.acc?;
-        let interval = row
-            .acc_ci95
-            .map(|bounds| format_interval(bounds, NumberStyle::Share));
         Some(format!(
-            "Acc của {} là {} % ({}): người đánh giá cho đạt {} trên {} kết quả.",
+            "Acc của {} là {}: người đánh giá cho đạt {} trên {} kết quả.",
             visit.metric(row.metric),
-            vietnamese_number(format_share(acc)),
-            vietnamese_number(interval.unwrap_or_default()),
+            vietnamese_number(format_rate(row.acc?, row.acc_ci95)),
             grouped(row.passed),
             grouped(row.passed + row.failed),
         ))
