@@ -25,7 +25,9 @@ use mocban_project::{ProjectResult, Refusal};
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
 pub(crate) fn start(global: &Global, screen: &Screen) -> ProjectResult<()> {
     let colours = Palette::choose(global.color, std::io::stderr().is_terminal());
-    let (writer, to_file) = writer(global, screen, colours)?;
+    // A log has times and levels.
+    let is_log = global.verbose > 0 || std::env::var_os("RUST_LOG").is_some();
+    let (writer, to_file) = writer(global, screen, colours, !is_log)?;
     let level = level(global.verbose, global.quiet, to_file);
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let builder = tracing_subscriber::fmt()
@@ -33,7 +35,7 @@ pub(crate) fn start(global: &Global, screen: &Screen) -> ProjectResult<()> {
         .with_ansi(!to_file && colours.is_on())
         .with_writer(writer);
     let format = EventFormat {
-        has_plain_warnings: !to_file && global.verbose == 0,
+        has_plain_warnings: !to_file && !is_log,
         log: Format::default().with_target(false),
     };
     // Only a test starts a second log in one process; the first one stays.
@@ -48,13 +50,14 @@ fn writer(
     global: &Global,
     screen: &Screen,
     colours: Palette,
+    has_plain_warnings: bool,
 ) -> ProjectResult<(BoxMakeWriter, bool)> {
     let Some(path) = &global.log_file else {
         let writer = LogWriter {
             screen: screen.clone(),
             format: global.log_format,
             colours,
-            has_plain_warnings: global.verbose == 0,
+            has_plain_warnings,
             is_warning: false,
         };
         return Ok((BoxMakeWriter::new(writer), false));
