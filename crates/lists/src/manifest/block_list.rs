@@ -149,7 +149,7 @@ fn columns_of(
     Ok(columns.into_iter().flatten().collect())
 }
 
-/// Says that columns are unknown, and what the names mean that are similar to those of optional ones.
+/// Returns a sentence about unknown columns, with a hint for the first that resembles an optional one.
 fn unknown_columns(unknown: &[&str]) -> String {
     const MAX_NAMES: usize = 3;
     const MAX_NAME_CHARS: usize = 40;
@@ -164,14 +164,14 @@ fn unknown_columns(unknown: &[&str]) -> String {
             quoted(name)
         ))
     };
-    let hints: String = unknown.iter().filter_map(hint).take(1).collect();
+    let hint = unknown.iter().find_map(hint).unwrap_or_default();
     let (columns, are) = match unknown {
         [_] => ("column", "is"),
         _ => ("columns", "are"),
     };
     let (shown, known) = (first_names(&shown, MAX_NAMES), COLUMNS.names.join(", "));
     format!(
-        "{columns} {shown} {are} unknown{hints}; a list of blocks has: {known}; remove other columns, which are kept only of pairs"
+        "{columns} {shown} {are} unknown{hint}; a list of blocks has: {known}; remove other columns, which are kept only of pairs"
     )
 }
 
