@@ -82,6 +82,8 @@ impl StoredKind for BlockJob {
         ("exclusive", "0"),
         ("fingerprint", "NULL"),
         ("and_advance", ""),
+        // A checkpoint that is sent again is stored once.
+        ("and_in_place", " AND block_job.stage = [stage]"),
         ("and_fail", ""),
         ("and_requeue", ""),
         ("and_send_back", ""),

@@ -12,7 +12,7 @@ use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::jobs::requeue::{RetrySelection, retry, retry_pairs};
 use crate::queue::claim::{ClaimRequest, add_claim, add_release, in_order, leases, release_due};
-use crate::queue::commit::known_leases::is_end_stored;
+use crate::queue::commit::known_leases::{is_end_stored, stored_before};
 use crate::queue::counters::Deltas;
 use crate::queue::kind::{StoredKind as _, Template};
 use crate::queue::lease::{CheckpointOutcome, FencedRow, Lease, StageCheckpoint, StageFailure};
@@ -92,17 +92,24 @@ impl Catalog {
     }
 
     /// Stores a finished stage and advances the job. Its artifacts must be on disk already. If the lease was lost, nothing
-    /// is stored. The last stage is stored with [`Catalog::finish_cut`].
+    /// is stored. A call again, because the reply was lost, returns the same and stores nothing more. The last stage is stored with [`Catalog::finish_cut`].
     pub async fn checkpoint_block(
         &self,
         lease: Lease<BlockJob>,
         stage: StageCheckpoint<BlockJob>,
     ) -> Result<CheckpointOutcome<BlockJob>> {
-        // An earlier stage than that of the lease may have been computed again.
+        // An earlier stage than that of the lease may have been computed again. If the job stays where it was, its position
+        // does not show whether an earlier call stored it.
         let next = lease.after(&stage);
+        let moves = next.as_ref().is_none_or(|next| next.cursor != lease.cursor);
         let item = (lease, vec![stage]);
         let stored = in_transaction!(self, |conn| {
-            checkpoint::store(conn, &item, &mut uncounted()).await
+            let is_stored = checkpoint::store(conn, &item, &mut uncounted()).await?;
+            if is_stored || !moves {
+                return Ok(is_stored);
+            }
+            let stored = stored_before(conn, [&item].into_iter(), [].into_iter()).await?;
+            Ok(item.0.is_in(&stored))
         });
         Ok(match (stored?, next) {
             (false, _) => CheckpointOutcome::Refused,

@@ -30,7 +30,7 @@ pub(crate) static ADVANCE: Template = Template::new(
 UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [status] = 1 THEN worker END,
     deadline = [deadline], attempt = 1, crashes = 0{and_advance}
 FROM jsonb_each(?) AS item
-WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status = 1 AND EXISTS (
+WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status = 1{and_in_place} AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= [alive_since])
 RETURNING {unit} AS unit, token",

@@ -118,6 +118,7 @@ impl StoredKind for PairJob {
         ("exclusive", "exclusive"),
         ("fingerprint", "fingerprint"),
         // Only in SQLite: in PostgreSQL, checkpoints of pairs have a statement of their own.
+        ("and_in_place", ""),
         (
             "and_advance",
             ", exclusive = 0, low_confidence = [low_confidence], fingerprint = [fingerprint],

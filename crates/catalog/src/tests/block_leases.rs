@@ -45,8 +45,14 @@ async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
     let advanced = continued(advanced.expect("a reply"));
     assert_eq!(advanced.cursor(), BlockStage::Align);
     // The reply was lost, and the worker sends the same checkpoint again.
+    let attempts = async || {
+        let detail = world.catalog.block(&block("b")).await.expect("a read");
+        detail.expect("the block").attempts.len()
+    };
+    let before = attempts().await;
     let again = world.catalog.checkpoint_block(lease, stage).await;
     assert_eq!(again.expect("a reply"), CheckpointOutcome::Lease(advanced));
+    assert_eq!(attempts().await, before);
 }
 
 /// A worker sends a failure or a release again if the connection broke, because it may have been stored.
