@@ -73,10 +73,10 @@ fn check_pictures(dir: &Path) {
     let args = ["-C", "p", "--json", "contact-sheet", "--block", "b1"];
     let written = mocban(dir, &args).expect(0).json();
     assert_eq!(written["characters"], 6);
-    let page = dir.join("p/page-b1.png");
+    let page = dir.join("p/page-b1-boxes.png");
     let file = written["file"].as_str();
     assert!(
-        file.is_some_and(|file| file.ends_with("page-b1.png")),
+        file.is_some_and(|file| file.ends_with("page-b1-boxes.png")),
         "{file:?}"
     );
     let page = picture(&page);

@@ -65,7 +65,8 @@ pub async fn contact_sheet(
 }
 
 /// Draws the page of a block with the boxes of its characters, or relief and ink over each other, and writes the picture. By
-/// default, it is in the project, as `page-` or `overlay-` with the name of the block. Returns its path and the number of characters.
+/// default, the file is `page-NAME-boxes.png` or `page-NAME-overlay.png` in the project. Returns its path and the number of
+/// characters.
 ///
 /// # Errors
 /// Returns an error if the block does not exist or is not aligned, or if the catalog or the disk fails.
@@ -79,8 +80,9 @@ pub async fn block_sheet(
 ) -> ProjectResult<(PathBuf, usize)> {
     let (project, catalog) = location.open_read_only().await?;
     let name = selection::existing_block(&catalog, block).await?;
-    let kind = ["page", "overlay"][usize::from(is_overlay)];
-    let default = || format!("{kind}-{}.png", name.as_pair().file_name());
+    let kind = ["boxes", "overlay"][usize::from(is_overlay)];
+    // A scan of the page may be `page-NAME.png`.
+    let default = || format!("page-{}-{kind}.png", name.as_pair().file_name());
     let path = output.map_or_else(|| project.dir().join(default()), Path::to_owned);
     refuse_used_file(&path, &project, &catalog).await?;
     files::require_png(output)?;

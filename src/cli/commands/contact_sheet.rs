@@ -25,7 +25,7 @@ pub(crate) struct ContactSheetArgs {
     /// With `--block`: draw relief and ink over each other, to see where the registration is off
     #[arg(long, requires = "block", conflicts_with = "metric")]
     pub(crate) overlay: bool,
-    /// The PNG to write [default: in the project, sheet.png, or for a block, page-NAME.png or overlay-NAME.png]
+    /// The PNG to write [default: in the project, sheet.png, or for a block, page-NAME-boxes.png or page-NAME-overlay.png]
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// Metric whose results are drawn: `nl_ssim`, density, ensemble or relief [default: ensemble]
