@@ -87,7 +87,7 @@ pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;
 pub use sanitize::{first_names, is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;
-pub use significant::significant;
+pub use significant::{fixed, significant};
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};
 pub use unique_keys::KEY_TWICE;

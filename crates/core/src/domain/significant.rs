@@ -1,4 +1,4 @@
-//! Numbers with a fixed number of significant digits, for lengths in any unit.
+//! Numbers with a fixed number of significant digits, for lengths in any unit, or with a fixed number of decimals.
 
 /// Most decimals: a nanometre in metres.
 const MAX_DECIMALS: i32 = 9;
@@ -18,9 +18,31 @@ pub fn significant(value: f64, digits: i32) -> String {
     }
 }
 
+/// Formats a number with this many decimals. A number that rounds to zero has no sign.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(zero) if !zero.contains(|c| matches!(c, '1'..='9')) => zero.to_owned(),
+        _ => text,
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::significant;
+    use super::{fixed, significant};
+
+    #[test]
+    fn a_number_that_rounds_to_zero_has_no_sign() {
+        for (value, decimals, expected) in [
+            (-0.004, 2, "0.00"),
+            (-0.005_1, 2, "-0.01"),
+            (-0.04, 1, "0.0"),
+            (0.998, 3, "0.998"),
+            (-12.0, 1, "-12.0"),
+        ] {
+            assert_eq!(fixed(value, decimals), expected);
+        }
+    }
 
     #[test]
     fn lengths_keep_their_digits_in_any_unit() {

@@ -1,7 +1,7 @@
 //! Numbers, sizes, times and durations as text, as they are written in the language of a page.
 
 use crate::review::Language;
-use mocban_core::domain::UnixMillis;
+use mocban_core::domain::{UnixMillis, fixed};
 use mocban_system::time_text;
 
 /// Returns a number with a thin space between groups of three digits, which both languages use.
@@ -27,14 +27,7 @@ pub(super) fn with_decimal_sign(language: Language, text: String) -> String {
 
 /// Returns a number with some digits behind the decimal sign. Zero has no sign.
 pub(super) fn decimal(language: Language, value: f64, digits: usize) -> String {
-    let text = format!("{value:.digits$}");
-    let is_zero = !text.bytes().any(|byte| matches!(byte, b'1'..=b'9'));
-    let text = match text.strip_prefix('-') {
-        Some(zero) if is_zero => zero.to_owned(),
-        Some(number) => format!("−{number}"),
-        None => text,
-    };
-    with_decimal_sign(language, text)
+    with_decimal_sign(language, fixed(value, digits).replace('-', "−"))
 }
 
 /// Returns a number of bytes in the unit that fits.
