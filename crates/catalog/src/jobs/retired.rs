@@ -79,7 +79,7 @@ pub(crate) const RETIRED_COUNT: &str = "SELECT count(*) FROM retired_pair";
 const LISTED_JOBS: &str = "
 SELECT j.pair FROM job AS j WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = j.pair) ORDER BY j.pair";
 
-/// The pairs that an import of a list or of folders added, the newest one without any offset. Retired ones have no job.
+/// The pairs of one import of a list or of folders; offset 0 is the newest. Retired ones have no job.
 const NTH_IMPORT: &str = "
 SELECT p.name, p.imported, (SELECT count(*) FROM job AS j WHERE j.pair = p.id) AS jobs FROM pair AS p
 WHERE p.imported = (SELECT q.imported FROM pair AS q
@@ -207,13 +207,8 @@ impl Catalog {
         query_scalar(RETIRED_COUNT).fetch_one(&mut conn).await
     }
 
-    /// Returns the pairs that the newest import of a list or of folders added, sorted by name.
-    pub async fn last_import(&self) -> Result<Vec<ImportedPair>> {
-        self.import_before(0).await
-    }
-
-    /// Returns the pairs that an import of a list or of folders added, sorted by name: after it, `later` imports have added
-    /// pairs.
+    /// Returns the pairs of one import of a list or of folders, sorted by name. `later` is the number of later imports that
+    /// added pairs.
     pub async fn import_before(&self, later: u32) -> Result<Vec<ImportedPair>> {
         let mut conn = self.read_conn().await?;
         let query = query_as(NTH_IMPORT).bind(i64::from(later));

@@ -46,7 +46,7 @@ pub struct SameFiles {
     pub id: String,
     /// An earlier one with the same files.
     pub known: String,
-    /// Number of pairs or blocks that are not the first with their files.
+    /// Number of copies, without the first of each.
     pub count: u64,
 }
 

@@ -62,7 +62,8 @@ pub fn scan_alone(
     Ok(encode(header, arrays))
 }
 
-/// Returns the vertices around the middle of the scan, with its shortest side along z. `scale` is the length of the unit.
+/// Returns the vertices around the middle of the scan, with its shortest side along z. `scale` is the
+/// number of millimetres in a mesh unit.
 fn centred(mesh: &Mesh, scale: f64) -> Vec<[f32; 3]> {
     let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
     for vertex in mesh.vertices.iter() {

@@ -7,7 +7,7 @@ use super::ink::InkMask;
 use mocban_core::raster::components::remove_specks;
 use mocban_core::raster::{Grid, Mask};
 
-/// Part of the pixels below the threshold that are darker than full ink: strokes cover few pixels fully.
+/// Quantile of the dark pixels that counts as full ink; few pixels are covered fully.
 const FULL_INK: f64 = 0.05;
 /// Part of the pixels above the threshold that are darker than the background: those at the edges of strokes.
 const BACKGROUND: f64 = 0.6;
