@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::{Value, json};
 
 use crate::app::{act, app, open_app, text, token};
@@ -253,15 +254,35 @@ fn a_killed_repair_leaves_the_damage_and_is_done_by_the_next_app() {
     assert_eq!(status()["jobs"]["done"], results);
 }
 
+/// Returns the processes whose command lines have a text.
+fn processes_with(text: &str) -> Vec<Pid> {
+    let found = std::fs::read_dir("/proc").expect("processes").flatten();
+    let found = found.filter_map(|entry| {
+        let id = entry.file_name().to_str()?.parse().ok()?;
+        // A process that has ended has an empty one.
+        let line = std::fs::read(entry.path().join("cmdline")).ok()?;
+        let has_text = String::from_utf8_lossy(&line).contains(text);
+        has_text.then(|| Pid::from_raw(id)).flatten()
+    });
+    found.collect()
+}
+
 #[test]
 fn a_killed_demo_is_whole_after_the_next_click() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let root = dir.path().canonicalize().expect("a path");
-    // The process that writes the demo goes on a moment later.
-    let held = Fault::slow("write", "*mocban-demo*/*", 2000).times(1);
+    let held = Fault::slow("write", "*mocban-demo*/*", UNTIL_KILLED);
     let held = HeldApp::start(&root, held, 20);
     let token = token(&held.page);
     held.kill_in("/actions/demo", token, &json!({}));
+    // The process that writes the demo outlives the app.
+    let demo = root.join("mocban-demo").display().to_string();
+    for writer in processes_with(&demo) {
+        // It may have ended meanwhile.
+        let _ = kill_process(writer, Signal::KILL);
+    }
+    wait_until("the writer ends", || processes_with(&demo).is_empty());
+    assert!(!root.join("mocban-demo/catalog.sqlite").exists());
     let next = open_app(&root);
     wait_until("the demo is made", || {
         act(&next, "/actions/demo", &json!({}), |_| {}).status == 200
