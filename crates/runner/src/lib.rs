@@ -49,8 +49,8 @@
 //! recovered a job, or that a repair or a new cut reset it: the stage runs on, and its next write is refused. If heartbeats
 //! fail with an error for as long as a lease lasts, or the log of SQLite is lost, the run finishes the stages in progress and
 //! ends with that error. If the connection to a server breaks, writes are sent again until a stop request ends the waits, and
-//! `queue/commit/known_leases.rs` finds the writes that were stored before, without a reply. A checkpoint of the
-//! stage of a block before the one that it is at is accepted twice, and then has two rows in `block_attempt`.
+//! `queue/commit/known_leases.rs` finds the writes that were stored before, without a reply. A checkpoint of a
+//! block whose stage before its position was computed again is accepted twice, and then has two rows in `block_attempt`.
 //!
 //! # Cancellation
 //!

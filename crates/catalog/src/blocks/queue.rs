@@ -92,7 +92,8 @@ impl Catalog {
     }
 
     /// Stores a finished stage and advances the job. Its artifacts must be on disk already. If the lease was lost, nothing
-    /// is stored. A call again, because the reply was lost, returns the same and stores nothing more. The last stage is stored with [`Catalog::finish_cut`].
+    /// is stored. A call again, because the reply was lost, returns the same and stores nothing more. The last
+    /// stage is stored with [`Catalog::finish_cut`].
     pub async fn checkpoint_block(
         &self,
         lease: Lease<BlockJob>,
