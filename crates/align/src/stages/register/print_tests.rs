@@ -93,9 +93,8 @@ fn a_print_of_12_px_is_aligned() {
         let apart = (a[0] - b[0]).hypot(a[1] - b[1]) / pair.truth.char_height_px;
         assert!(apart < 0.05, "{apart}");
     }
-    // A print by another hand would agree as well.
-    let confidence = outcome.confidence.expect("a confidence");
-    assert!((0.3..0.5).contains(&confidence), "{confidence}");
+    // Its strokes are wider than a pixel.
+    assert!(outcome.confidence.expect("a confidence") > 0.5);
 }
 
 #[test]
