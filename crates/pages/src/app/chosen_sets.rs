@@ -272,7 +272,7 @@ mod tests {
         };
         assert_eq!(files().len(), LIMIT + own.len());
         // The clock was set back.
-        let later = SystemTime::now() + Duration::from_secs(3600);
+        let later = SystemTime::now() + Duration::from_hours(1);
         for path in files() {
             let file = File::options().write(true).open(path).expect("a file");
             file.set_modified(later).expect("a time");
