@@ -310,23 +310,25 @@ fn no_result_names_files_that_were_removed_while_its_commit_waited() {
 /// Waiting does not help if the server refuses the user from now on.
 #[test]
 fn a_worker_that_may_not_connect_again_says_why_and_ends() {
-    let Some(fleet) = Fleet::new("30") else {
-        return;
-    };
+    let Some(fleet) = Fleet::new("4") else { return };
     fleet.shared(&["plan"]).expect(0);
     fleet.sql("CREATE ROLE grid LOGIN SUPERUSER");
     let url = fleet.server.url().replace("mocban@", "grid@");
     let mut command = binary();
     command.current_dir(fleet.path()).envs([TIME_SCALE]);
     command.args(["-C", "shared", "--catalog", &url, "worker", "-j", "1"]);
+    // The worker must not end before it loses its right.
+    let held = fleet.path().join("held");
+    let hold = ("MOCBAN_HOLD_FILE", held.to_str().expect("UTF-8"));
+    command.envs([("MOCBAN_HOLD_AT", "depth:synced"), hold]);
     let worker = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
-    let mut workers = [worker.expect("the binary starts")];
-    fleet.wait_for_work(&mut workers);
+    let mut worker = worker.expect("the binary starts");
+    until(&mut worker, || held.exists());
     fleet.sql(
         "ALTER ROLE grid NOLOGIN;
         SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE usename = 'grid';",
     );
-    let [worker] = workers;
+    std::fs::remove_file(&held).expect("removed");
     let ended = worker.wait_with_output().expect("an exit code");
     let text = String::from_utf8_lossy(&ended.stderr);
     assert!(!ended.status.success(), "{text}");

@@ -190,7 +190,7 @@ mod tests {
             let stat = stat_input(&project.input(&stored)).expect("a file");
             (stored, stat)
         });
-        let later = Instant::now() + Duration::from_secs(3600);
+        let later = Instant::now() + Duration::from_hours(1);
         let none = InputInspection::default();
         assert_eq!(among(&project, &files, later), none);
         // Another file with the same size, as in a copy of the folder.
