@@ -2,7 +2,7 @@
 
 use sqlx::{AssertSqlSafe, Row as _};
 
-use super::tests::{Place, World};
+use super::tests::{CatalogPlace, World};
 use crate::audit::audited_pairs;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
@@ -25,7 +25,7 @@ use crate::records::{listed_names, pair_list};
 /// Returns the lines of the query plan.
 async fn plan(sql: impl Into<Sql>) -> Vec<String> {
     let sql = sql.into().sqlite;
-    let world = World::at(Place::in_new_file(), 0).await;
+    let world = World::at(CatalogPlace::in_new_file(), 0).await;
     let Conn::Sqlite(mut conn) = world.place.conn().await else {
         panic!("the place is a file");
     };

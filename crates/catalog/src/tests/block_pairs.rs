@@ -256,7 +256,7 @@ async fn a_copy_holds_blocks_and_retired_pairs() {
     let reset = vec![(known[0].block, BlockStage::Cut)];
     world.catalog.reset_blocks(reset).await.expect("reset");
     world.finish_block(vec![character("a", "a")]).await;
-    let target = super::Place::new();
+    let target = super::CatalogPlace::new();
     let copy = target.create().await.expect("a catalog");
     world
         .catalog

@@ -8,7 +8,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::model::{LEASE, Process, Queue};
-use super::{Place, World, done, enter, fingerprints, inputs};
+use super::{CatalogPlace, World, done, enter, fingerprints, inputs};
 use crate::{
     Catalog, CheckpointOutcome, ClaimRequest, FailureAction, FingerprintIds, Fingerprints, Lease,
     StageFailure,
@@ -355,6 +355,6 @@ async fn random_histories_agree_with_the_model() {
     assert!(all.fenced > 50 && all.late > 10, "{all:?}");
     assert!(all.poisoned > 0 && all.overdue > 0, "{all:?}");
     // Only claims on a server begin behind earlier ones.
-    let is_shared = matches!(Place::new(), Place::Url(_));
+    let is_shared = matches!(CatalogPlace::new(), CatalogPlace::Url(_));
     assert_eq!(all.out_of_order > 0, is_shared, "{all:?}");
 }

@@ -1,6 +1,6 @@
 //! The identity of a catalog, by which it owns a place of artifacts.
 
-use super::{Place, World};
+use super::{CatalogPlace, World};
 use crate::Catalog;
 use mocban_core::domain::{ArtifactRef, ContentHash, Stage};
 
@@ -11,7 +11,7 @@ async fn a_catalog_keeps_its_identity_and_a_copy_has_one_of_its_own() {
     assert_eq!(identity.id.len(), 32);
     let again = world.place.open().await.expect("a catalog");
     assert_eq!(again.identity().await.expect("an identity"), identity);
-    let target = Place::new();
+    let target = CatalogPlace::new();
     let copy = target.create().await.expect("a catalog");
     let copied = world.catalog.copy_to(&copy, |_, _| {}).await;
     copied.expect("copied");

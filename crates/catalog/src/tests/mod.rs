@@ -32,7 +32,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Map, json};
 
-pub(crate) use self::place::Place;
+pub(crate) use self::place::CatalogPlace;
 use super::db::query::query_scalar;
 use super::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
@@ -49,7 +49,7 @@ pub(crate) struct World {
     catalog: Catalog,
     fingerprints: FingerprintIds,
     worker: WorkerId,
-    pub(crate) place: Place,
+    pub(crate) place: CatalogPlace,
 }
 
 fn name(text: &str) -> PairName {
@@ -78,10 +78,10 @@ fn fingerprints(revision: [u32; 4]) -> Fingerprints {
 
 impl World {
     async fn new(pairs: usize) -> Self {
-        Self::at(Place::new(), pairs).await
+        Self::at(CatalogPlace::new(), pairs).await
     }
 
-    pub(crate) async fn at(place: Place, pairs: usize) -> Self {
+    pub(crate) async fn at(place: CatalogPlace, pairs: usize) -> Self {
         let catalog = place.create().await.expect("a catalog");
         let rows = (0..pairs).map(|n| row(&format!("p{n}"))).collect();
         catalog.import(rows, 1).await.expect("imported");

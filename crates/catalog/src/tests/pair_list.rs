@@ -1,6 +1,6 @@
 //! Lists of pairs: filters, orders and pages.
 
-use super::{Place, World, done, fingerprints, name, row};
+use super::{CatalogPlace, World, done, fingerprints, name, row};
 use crate::{
     CheckpointOutcome, ImportRow, ListedNames, MetricDifference, NewVerdict, PairCursor,
     PairFilter, PairOrder, RerunPolicy, ReviewContext, StageCheckpoint,
@@ -9,7 +9,7 @@ use mocban_core::domain::{FailureClass, JobStatus, ReviewOrder, Stage, Threshold
 
 /// Imports `count` pairs of two blocks and gives the first `done` of them results whose confidence falls and then rises.
 async fn world(count: usize, finished: usize) -> World {
-    let world = World::at(Place::new(), 0).await;
+    let world = World::at(CatalogPlace::new(), 0).await;
     let rows = (0..count).map(|n| ImportRow {
         block: Some(format!("b{}", n % 2)),
         character: Some(["明", "堂", "木"][n % 3].to_owned()),

@@ -12,7 +12,7 @@ use crate::{Catalog, Result};
 
 /// Where a catalog is.
 #[derive(Debug)]
-pub(crate) enum Place {
+pub(crate) enum CatalogPlace {
     File {
         path: PathBuf,
         _dir: tempfile::TempDir,
@@ -20,7 +20,7 @@ pub(crate) enum Place {
     Url(String),
 }
 
-impl Place {
+impl CatalogPlace {
     /// Returns a place for a new catalog: in PostgreSQL in the module `tests_on_postgres`, if a server can be started.
     pub(super) fn new() -> Self {
         let wants_server = module_path!().contains("tests_on_postgres");

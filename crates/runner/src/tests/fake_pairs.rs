@@ -35,16 +35,16 @@ pub(super) struct FakePairs {
 }
 
 /// Counts a computation while it goes on.
-struct Counted(Arc<AtomicUsize>);
+struct RunningCount(Arc<AtomicUsize>);
 
-impl Counted {
+impl RunningCount {
     fn new(count: &Arc<AtomicUsize>) -> Self {
         count.fetch_add(1, Ordering::SeqCst);
         Self(Arc::clone(count))
     }
 }
 
-impl Drop for Counted {
+impl Drop for RunningCount {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::SeqCst);
     }
@@ -52,7 +52,7 @@ impl Drop for Counted {
 
 /// Computes until it is cancelled.
 pub(super) fn compute_without_end(endless: &Arc<AtomicUsize>) -> ! {
-    let _counted = Counted::new(endless);
+    let _counted = RunningCount::new(endless);
     loop {
         poll();
         std::hint::spin_loop();
