@@ -71,11 +71,11 @@ pub struct ConfidenceInputs {
 impl ConfidenceInputs {
     /// Returns the confidence, 0..=1, under the built-in weights.
     pub fn confidence(&self) -> f64 {
-        self.of_candidate() * of_pixels(self.pixel_width, self.prior)
+        self.without_pixel_doubt() * of_pixels(self.pixel_width, self.prior)
     }
 
     /// Returns the confidence apart from the size of the print's pixels, which is the same for all candidates of a fit.
-    pub(crate) fn of_candidate(&self) -> f64 {
+    pub(crate) fn without_pixel_doubt(&self) -> f64 {
         pose_probability(&self.pose, self.prior)
             * logistic(&MASK, &self.mask)
             * logistic(&CHARACTER, &self.character)

@@ -11,8 +11,8 @@ const LEAST_SEEN: f64 = 0.6;
 const OF_PART: f64 = 0.5;
 /// Range of the side of a print's pixels, as a fraction of the stroke width, in which the confidence falls to [`COARSE`].
 const PIXEL_WIDTHS: [f64; 2] = [0.88, 1.02];
-/// Factor of the confidence of a print whose pixels are about as wide as its strokes. Prints of 12 pixels by another hand, or
-/// of a similar character, agree as well as the right ones.
+/// Factor of the confidence of a print whose pixels are about as wide as its strokes. Prints by another hand or
+/// of a similar character may then agree as well as the right one.
 const COARSE: f64 = 0.5;
 
 /// What lowers the confidence of an alignment, apart from the three logistic models.
