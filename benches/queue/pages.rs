@@ -23,9 +23,10 @@ const SESSION_BYTES: u64 = 16_384;
 
 const NOTE: &str = "\
 Milliseconds from the connection to the first byte of a reply, median / 95th percentile of 20 requests, one after another, \
-and of the very first one. Parts, of which 2 are measured, are loaded by their page after it is shown. MiB: peak memory of the app after the page.";
+and of the first request for the page. A part is loaded by its page after the page is shown; its median is of 2 requests. MiB: peak \
+memory of the app after the page.";
 
-/// Pages below the project, and parts that pages load afterwards.
+/// Pages below the project.
 const PAGES: [(&str, &str); 21] = [
     ("Run", ""),
     ("Pairs", "pairs"),
@@ -55,6 +56,7 @@ const PAGES: [(&str, &str); 21] = [
     ),
     ("Health", "health"),
 ];
+/// Parts that pages load after they are shown.
 const PARTS: [(&str, &str); 3] = [
     ("part: newest import", "last-import"),
     ("part: agreement", "review/agreement"),
