@@ -13,7 +13,7 @@ use crate::page::{Page, read_project};
 const SMALLEST: u32 = 44;
 
 /// A page of the app is shown.
-pub(crate) const SHOWN: &str = "document.body?.dataset.ready && (document.getElementById('choice')?.dataset.ready ?? true) && [...document.querySelectorAll('[data-load]')].every((part) => part.dataset.loaded)";
+pub(crate) const SHOWN: &str = "document.body?.dataset.ready && !document.querySelector('#choice:not([data-ready])') && [...document.querySelectorAll('[data-load]')].every((part) => part.dataset.loaded)";
 
 /// Pages of the app.
 pub(crate) const PAGES: [&str; 16] = [

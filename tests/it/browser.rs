@@ -308,7 +308,9 @@ impl Tab<'_> {
                     result["result"]["value"],
                     true,
                     "never: {condition}; the page says {}",
-                    self.eval("[document.activeElement?.id, document.body.innerText]"),
+                    self.eval(
+                        "[location.href, document.activeElement?.id, document.body.innerText]"
+                    ),
                 );
                 return;
             }
