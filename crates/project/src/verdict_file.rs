@@ -1,4 +1,4 @@
-//! Parses verdict files in CSV or JSON Lines format. If a line is invalid, the whole file is refused.
+//! Parses verdict files in CSV or JSON. If a line is invalid, the whole file is refused.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,22 +11,32 @@ use csv::StringRecord;
 use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use super::location::now;
 use super::verdict_columns::{COLUMNS, REQUIRED};
-use super::verdict_json::json_rows;
+use super::verdict_json::{ArrayPlaces, array_places, array_rows, json_rows};
 use super::verdict_row::{GivenTime, VerdictRow, at_line};
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
-use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, later_header, trimmed};
+use mocban_lists::manifest::{
+    CsvText, LineCounter, NotText, as_utf8, is_array, later_header, trimmed,
+};
 use mocban_lists::quotes::check_quotes;
 
 /// The text of a verdict file. Its rows are parsed whenever they are needed, so that a long file takes little memory.
 #[derive(Debug, Clone)]
 pub struct VerdictList {
     text: ListText,
-    /// The separator of columns; `None` for JSON Lines.
-    delimiter: Option<u8>,
+    layout: VerdictLayout,
+}
+
+/// How the rows are written.
+#[derive(Debug, Clone)]
+enum VerdictLayout {
+    /// CSV with this separator.
+    Csv(u8),
+    JsonLines,
+    JsonArray(ArrayPlaces),
 }
 
 /// Text that clones share.
@@ -43,38 +53,42 @@ impl AsRef<[u8]> for ListText {
 type VerdictRows = Box<dyn Iterator<Item = Result<VerdictRow, RefusedLine>> + Send>;
 
 impl VerdictList {
-    /// Takes the bytes of a file in CSV, or in JSON Lines. Detects the separator and the encoding.
+    /// Takes the bytes of a file in CSV, or in JSON: one object on each line, or an array of objects. Detects the separator
+    /// and the encoding.
     ///
     /// # Errors
-    /// Returns an error if the bytes are not text, or if a quotation mark is never closed.
-    pub fn new(bytes: Vec<u8>, is_jsonl: bool) -> Result<Self, RefusedLine> {
+    /// Returns an error if the bytes are not text, if a quotation mark is never closed, or if an array is damaged.
+    pub fn new(bytes: Vec<u8>, is_json: bool) -> Result<Self, RefusedLine> {
         let refuse = |error: NotText| RefusedLine::new(1, &error.to_string());
-        let (text, delimiter) = if is_jsonl {
-            (as_utf8(&bytes).map_err(refuse)?, None)
+        let (text, layout) = if is_json {
+            let text = as_utf8(&bytes).map_err(refuse)?;
+            let layout = if is_array(&text) {
+                VerdictLayout::JsonArray(array_places(&text)?)
+            } else {
+                VerdictLayout::JsonLines
+            };
+            (text, layout)
         } else {
             let CsvText { bytes, delimiter } = CsvText::new(&bytes).map_err(refuse)?;
             check_quotes(&bytes, delimiter)
                 .map_err(|error| RefusedLine::new(error.line, &error.to_string()))?;
-            (bytes, Some(delimiter))
+            (bytes, VerdictLayout::Csv(delimiter))
         };
-        if is_jsonl && text.trim_ascii_start().starts_with(b"[") {
-            let reason = "the file is a JSON array; write one object on each line";
-            return Err(RefusedLine::new(1, reason));
-        }
         let text = match text {
             Cow::Borrowed(text) if text.len() == bytes.len() => bytes,
             decoded => decoded.into_owned(),
         };
         let text = ListText(Arc::new(text));
-        Ok(Self { text, delimiter })
+        Ok(Self { text, layout })
     }
 
     /// Parses the rows.
     pub fn rows(&self) -> VerdictRows {
         let text = self.text.clone();
-        match self.delimiter {
-            None => Box::new(json_rows(text)),
-            Some(delimiter) => match csv_rows(text, delimiter) {
+        match &self.layout {
+            VerdictLayout::JsonLines => Box::new(json_rows(text)),
+            VerdictLayout::JsonArray(places) => Box::new(array_rows(text, Arc::clone(places))),
+            VerdictLayout::Csv(delimiter) => match csv_rows(text, *delimiter) {
                 Ok(rows) => Box::new(rows),
                 Err(refused) => Box::new(std::iter::once(Err(refused))),
             },

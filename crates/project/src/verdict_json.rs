@@ -1,6 +1,8 @@
-//! Parses verdicts in JSON Lines, such as those of an export, one object on each line.
+//! Parses verdicts in JSON: JSON Lines, such as those of an export, with one object on each line, or an array of objects.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
 
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -15,6 +17,7 @@ use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
 use mocban_lists::json_numbers::nan_as_null;
+use mocban_lists::manifest::each_value;
 
 /// The fields of the log of verdicts, which JSON Lines may have.
 const LOG_FIELDS: [&str; 17] = [
@@ -86,7 +89,29 @@ pub(crate) fn json_rows(
     parsed.filter_map(|(line, parsed)| json_row(line, parsed).transpose())
 }
 
-/// Parses a line. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons, metrics and times may be as in
+/// The line of each value of an array, and its place in the text.
+pub(crate) type ArrayPlaces = Arc<Vec<(usize, Range<usize>)>>;
+
+/// Finds the values of an array of verdicts.
+pub(crate) fn array_places(text: &[u8]) -> Result<ArrayPlaces, RefusedLine> {
+    let mut places = Vec::new();
+    let ended = each_value(text, &mut |line, place| places.push((line, place)));
+    ended.map_err(|refused| RefusedLine::new(refused.line, refused.reason))?;
+    Ok(Arc::new(places))
+}
+
+/// Parses an array. Undone verdicts are ignored.
+pub(crate) fn array_rows(
+    text: impl AsRef<[u8]> + Send,
+    places: ArrayPlaces,
+) -> impl Iterator<Item = Result<VerdictRow, RefusedLine>> + Send {
+    (0..places.len()).filter_map(move |index| {
+        let (line, place) = places[index].clone();
+        json_row(line, parsed(&text.as_ref()[place])).transpose()
+    })
+}
+
+/// Parses a row. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons, metrics and times may be as in
 /// CSV.
 ///
 /// # Errors
@@ -98,7 +123,7 @@ fn parsed(line: &[u8]) -> Result<(VerdictLine, GivenTime), String> {
     });
     let UniqueKeys(value) = read.map_err(|error| json_error(&error))?;
     let Value::Object(mut fields) = value else {
-        return Err("each line is a JSON object with pair, verdict and reviewer".to_owned());
+        return Err("each row is a JSON object with pair, verdict and reviewer".to_owned());
     };
     let is_unknown = |field: &String| !LOG_FIELDS.contains(&field.as_str());
     // Without a pair, `id` may be its name.
@@ -155,7 +180,7 @@ fn text_of(fields: &Map<String, Value>, field: &str) -> Result<Option<String>, S
     Ok((!text.trim().is_empty()).then_some(text))
 }
 
-/// Returns the row of a parsed line, or `None` if the verdict was undone.
+/// Returns the row that was parsed from a line, or `None` if the verdict was undone.
 fn json_row(
     line: usize,
     parsed: Result<(VerdictLine, GivenTime), String>,

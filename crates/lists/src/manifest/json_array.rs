@@ -1,12 +1,29 @@
 //! Splits a JSON array into the texts of its values, which are then parsed like the lines of JSON Lines.
 
-use super::error::{Problem, at_line};
+use std::ops::Range;
 
-/// Calls `each` for every value of an array with the line on which it begins.
+/// Why a text is not an array, and where.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NotAnArray {
+    /// The line, counted from 1.
+    pub line: usize,
+    /// What was seen there.
+    pub reason: &'static str,
+}
+
+/// Returns whether a text begins as an array.
+pub fn is_array(list: &[u8]) -> bool {
+    list.trim_ascii_start().starts_with(b"[")
+}
+
+/// Calls `each` for every value of an array with the line on which it begins, from 1, and its place in `list`.
 ///
 /// # Errors
 /// Returns an error if the array ends early, a comma is missing between two values, or text follows its end.
-pub(super) fn each_value(list: &[u8], each: &mut dyn FnMut(usize, &[u8])) -> Result<(), Problem> {
+pub fn each_value(
+    list: &[u8],
+    each: &mut dyn FnMut(usize, Range<usize>),
+) -> Result<(), NotAnArray> {
     let mut place = ArrayPlace {
         list,
         at: 0,
@@ -22,18 +39,18 @@ pub(super) fn each_value(list: &[u8], each: &mut dyn FnMut(usize, &[u8])) -> Res
         }
         let (line, start) = (place.line, place.at);
         place.skip_value();
-        each(line, &list[start..place.at]);
+        each(line, start..place.at);
         place.skip_blanks();
         match place.byte()? {
             b',' => place.at += 1,
             b']' => break,
-            _ => return Err(at_line(place.line, "a comma is missing before this row")),
+            _ => return Err(place.refused("a comma is missing before this row")),
         }
     }
     place.at += 1;
     place.skip_blanks();
     if place.at < list.len() {
-        return Err(at_line(place.line, "text follows the end of the list"));
+        return Err(place.refused("text follows the end of the list"));
     }
     Ok(())
 }
@@ -47,9 +64,16 @@ struct ArrayPlace<'l> {
 }
 
 impl ArrayPlace<'_> {
-    fn byte(&self) -> Result<u8, Problem> {
+    fn refused(&self, reason: &'static str) -> NotAnArray {
+        NotAnArray {
+            line: self.line,
+            reason,
+        }
+    }
+
+    fn byte(&self) -> Result<u8, NotAnArray> {
         let byte = self.list.get(self.at).copied();
-        byte.ok_or_else(|| at_line(self.line, "the list ends early; save or copy it again"))
+        byte.ok_or_else(|| self.refused("the list ends early; save or copy it again"))
     }
 
     fn go_to(&mut self, at: usize) {
@@ -97,14 +121,13 @@ impl ArrayPlace<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::each_value;
+    use super::{NotAnArray, each_value};
 
-    fn values(list: &str) -> (Vec<(usize, String)>, Option<String>) {
+    fn values(list: &str) -> (Vec<(usize, String)>, Option<NotAnArray>) {
         let mut found = Vec::new();
-        let mut each =
-            |line, value: &[u8]| found.push((line, String::from_utf8_lossy(value).into_owned()));
+        let mut each = |line, place| found.push((line, list[place].to_owned()));
         let outcome = each_value(list.as_bytes(), &mut each);
-        (found, outcome.err().map(|problem| problem.to_string()))
+        (found, outcome.err())
     }
 
     #[test]
@@ -123,20 +146,16 @@ mod tests {
 
     #[test]
     fn damaged_arrays_are_refused_with_their_line() {
-        for (list, expected) in [
-            (
-                "[{}\n",
-                "line 2: the list ends early; save or copy it again",
-            ),
-            (
-                "[{\"a\": \"}]\n",
-                "line 2: the list ends early; save or copy it again",
-            ),
-            ("[{}\n {}]", "line 2: a comma is missing before this row"),
-            ("[{}]\n{}", "line 2: text follows the end of the list"),
-            ("[", "line 1: the list ends early; save or copy it again"),
+        let early = "the list ends early; save or copy it again";
+        for (list, line, reason) in [
+            ("[{}\n", 2, early),
+            ("[{\"a\": \"}]\n", 2, early),
+            ("[{}\n {}]", 2, "a comma is missing before this row"),
+            ("[{}]\n{}", 2, "text follows the end of the list"),
+            ("[", 1, early),
         ] {
-            assert_eq!(values(list).1.as_deref(), Some(expected), "{list}");
+            let expected = NotAnArray { line, reason };
+            assert_eq!(values(list).1, Some(expected), "{list}");
         }
         // The parser refuses what is no object.
         for list in ["[,]", "[}]", "[{},,{}]", "[}}}]", "[,,,"] {

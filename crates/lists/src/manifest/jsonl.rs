@@ -7,8 +7,8 @@ use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::Value;
 
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
-use super::error::{ManifestError, of_list};
-use super::json_array::each_value;
+use super::error::{ManifestError, at_line, of_list};
+use super::json_array::{each_value, is_array};
 use super::row::{COLUMNS, ManifestRow, ReadRows};
 use super::text::{as_utf8, trimmed};
 use crate::columns::HeaderColumns;
@@ -52,9 +52,10 @@ pub fn read_jsonl(
         rows.add_renamed(std::mem::take(&mut keys.columns.renamed));
         rows.push(line, draft);
     };
-    if bytes.trim_ascii_start().starts_with(b"[") {
-        if let Err(problem) = each_value(bytes, &mut push) {
-            rows.add_problem(problem);
+    if is_array(bytes) {
+        let ended = each_value(bytes, &mut |line, place| push(line, &bytes[place]));
+        if let Err(refused) = ended {
+            rows.add_problem(at_line(refused.line, refused.reason));
         }
         return rows.finish();
     }

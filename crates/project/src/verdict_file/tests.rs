@@ -125,11 +125,38 @@ fn json_of_python_has_no_values_for_missing_ones() {
     let rows =
         parse_jsonl(br#"{"pair":"1","verdict":"pass","reviewer":"lan","note":NaN,"metric":NaN}"#);
     assert_eq!(rows.expect("valid")[0].listed.verdict.note, None);
-    let array = parse_jsonl(b"[{}]").expect_err("an array").to_string();
-    assert_eq!(
-        array,
-        "line 1: the file is a JSON array; write one object on each line"
+}
+
+#[test]
+fn an_array_has_the_rows_of_json_lines() {
+    let one = r#"{"pair":"a","verdict":"pass","reviewer":"lan","note":"[x], {"}"#;
+    let other = r#"{"pair":2,"verdict":"fail","reviewer":"minh","at":1795234203000}"#;
+    let undone = r#"{"pair":"c","verdict":"pass","reviewer":"lan","undone_at":1795234203000}"#;
+    let lines = parse_jsonl(format!("{one}\n{undone}\n{other}\n").as_bytes()).expect("valid");
+    let array = format!(
+        "\u{feff}\n[{one},{undone},\n {}]\n",
+        other.replace(',', ",\n")
     );
+    let rows = parse_jsonl(array.as_bytes()).expect("valid");
+    let listed = |rows: &[super::VerdictRow]| {
+        let rows = rows.iter();
+        rows.map(|row| format!("{:?}", row.listed))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(listed(&rows), listed(&lines));
+    assert_eq!(rows.iter().map(|row| row.line).collect::<Vec<_>>(), [2, 3]);
+    for (list, expected) in [
+        ("[{}]", "line 1: pair is missing"),
+        (
+            "[\n1]",
+            "line 2: each row is a JSON object with pair, verdict and reviewer",
+        ),
+        ("[{}\n{}]", "line 2: a comma is missing before this row"),
+        ("[{}", "line 1: the list ends early; save or copy it again"),
+    ] {
+        let refused = parse_jsonl(list.as_bytes()).expect_err(list);
+        assert_eq!(refused.to_string(), expected, "{list}");
+    }
 }
 
 #[test]
@@ -406,7 +433,7 @@ fn invalid_json_line_is_reported_by_number() {
         ),
         (
             "[1]",
-            "each line is a JSON object with pair, verdict and reviewer",
+            "each row is a JSON object with pair, verdict and reviewer",
         ),
         ("pass", "not a JSON object, column 1: expected value"),
     ] {
