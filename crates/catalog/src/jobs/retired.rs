@@ -88,11 +88,14 @@ WHERE p.imported = (SELECT q.imported FROM pair AS q
     AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
 ORDER BY p.name";
 
-/// Counts the pairs that the newest import of a list or of folders added.
-const LAST_IMPORT_COUNTS: &str = "
-SELECT p.imported, count(*) AS pairs, count(j.pair) AS jobs FROM pair AS p LEFT JOIN job AS j ON j.pair = p.id
-WHERE p.imported = (SELECT q.imported FROM pair AS q
-        WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id) ORDER BY q.id DESC LIMIT 1)
+/// Counts the pairs that the newest import of a list or of folders added, up to `?1`. An import adds pairs in one
+/// transaction, so its pairs are next to each other by row id, and no more than `?1` rows are read.
+pub(crate) const LAST_IMPORT_COUNTS: &str = "
+WITH newest AS (SELECT q.id, q.imported FROM pair AS q
+    WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id) ORDER BY q.id DESC LIMIT 1)
+SELECT p.imported, count(*) AS pairs, count(j.pair) AS jobs FROM (SELECT q.id, q.imported FROM pair AS q
+        WHERE q.id <= (SELECT id FROM newest) ORDER BY q.id DESC LIMIT ?1) AS p LEFT JOIN job AS j ON j.pair = p.id
+WHERE p.imported = (SELECT imported FROM newest)
     AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
 GROUP BY p.imported";
 
@@ -145,9 +148,9 @@ from_row! { ImportedPair { name, imported, jobs } }
 pub struct LastImport {
     /// When they were imported for the first time.
     pub imported: UnixMillis,
-    /// Number of pairs, with the retired ones.
+    /// Number of counted pairs, with the retired ones.
     pub pairs: u64,
-    /// Number of pairs that are not retired.
+    /// Number of counted pairs that are not retired.
     pub jobs: u64,
 }
 
@@ -215,10 +218,12 @@ impl Catalog {
         query.fetch_all(&mut conn).await
     }
 
-    /// Counts the pairs that the newest import of a list or of folders added. `None` if there was none.
-    pub async fn last_import_counts(&self) -> Result<Option<LastImport>> {
+    /// Counts the pairs that the newest import of a list or of folders added, at most the last `most` of them. `None` if
+    /// there was none.
+    pub async fn last_import_counts(&self, most: u64) -> Result<Option<LastImport>> {
         let mut conn = self.read_conn().await?;
-        query_as(LAST_IMPORT_COUNTS).fetch_optional(&mut conn).await
+        let query = query_as(LAST_IMPORT_COUNTS).bind(most.cast_signed());
+        query.fetch_optional(&mut conn).await
     }
 
     /// Retires pairs for a person. Their leases end. Returns how many were not retired before.

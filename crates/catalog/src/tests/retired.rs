@@ -4,8 +4,8 @@ use super::block_pairs::{judge, names_of, status_of};
 use super::blocks::{attributes, block, character, world};
 use super::{World, fingerprints, name, row};
 use crate::{
-    CatalogError, CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, ListedRetiredPair,
-    RetiredPair, StatusCounts,
+    CatalogError, CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, LastImport,
+    ListedRetiredPair, RetiredPair, StatusCounts,
 };
 use mocban_core::domain::{BlockStage, JobStatus, PairName, RetireCause, Stage, Verdict};
 
@@ -288,4 +288,31 @@ async fn a_block_without_pairs_is_removed_and_one_with_pairs_or_a_lease_is_not()
     world.import_block(attributes("c")).await;
     let states = catalog.block_states().await.expect("a read");
     assert_eq!(states[1].status, JobStatus::Ready);
+}
+
+#[tokio::test]
+async fn the_newest_import_is_counted_to_a_limit() {
+    let world = World::new(3).await;
+    let rows = ["q0", "q1", "q2"].map(row).to_vec();
+    world.catalog.import(rows, 5).await.expect("imported");
+    // The list of the newest import may name pairs of earlier ones.
+    let rows = ["p0", "r0", "r1", "r2", "r3"].map(row).to_vec();
+    world.catalog.import(rows, 7).await.expect("imported");
+    let names = [name("p0"), name("r3")];
+    world
+        .catalog
+        .retire_pairs(&names, 9)
+        .await
+        .expect("retired");
+    let counts = async |most| {
+        let counted = world.catalog.last_import_counts(most).await;
+        let LastImport {
+            imported,
+            pairs,
+            jobs,
+        } = counted.expect("a read").expect("an import");
+        (imported, pairs, jobs)
+    };
+    assert_eq!(counts(3).await, (7, 3, 2));
+    assert_eq!(counts(100).await, (7, 4, 3));
 }

@@ -22,14 +22,17 @@ use mocban_catalog::LastImport;
 use mocban_core::domain::UnixMillis;
 use mocban_project::retire::{RetireChoice, retire, undo};
 
-/// Responds with a part of the page of imports. It counts all pairs, so the page loads it afterwards.
+/// Largest number of pairs that is counted, so that an import of a million pairs is shown as soon as a small one.
+const MAX_COUNTED: u64 = 10_000;
+
+/// Responds with a part of the page of imports, which the page loads afterwards.
 pub(super) async fn part(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let added = open.catalog.last_import_counts().await?;
+    let added = open.catalog.last_import_counts(MAX_COUNTED + 1).await?;
     let part = added.map(|added| undo_part(&visit, &key, added));
     Ok(Html(part.unwrap_or_default().into_string()))
 }
@@ -61,7 +64,8 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
     };
     html! {
         h2 { (visit.t("Newest import that added pairs", "Lần nhập gần nhất có thêm cặp")) }
-        p { (text) " (" (visit.time(added.imported)) "): " b { (grouped(number)) } ". "
+        p { (text) " (" (visit.time(added.imported)) "): "
+            b { @if number > MAX_COUNTED { (visit.t("more than", "hơn")) " " (grouped(MAX_COUNTED)) } @else { (grouped(number)) } } ". "
             span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
         }
         // The part stands on the page of imports, so the address is relative to that page.
@@ -105,7 +109,7 @@ pub(super) async fn change(
         .parse()
         .map_err(|_invalid| AppFailure::not_found())?;
     // `retire` checks this again; the reason is given here in both languages.
-    let newest = open.catalog.last_import_counts().await?;
+    let newest = open.catalog.last_import_counts(1).await?;
     if newest.is_none_or(|newest| newest.imported != at) {
         return Err(AppFailure::refused(Sentence::new(
             "another import has added pairs meanwhile: reload the page and look at it first",
@@ -127,4 +131,29 @@ pub(super) async fn change(
     Ok(Json(
         json!({ "go": format!("p/{}/pairs{list}", encoded(&key)) }),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MAX_COUNTED, undo_part};
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+    use mocban_catalog::LastImport;
+
+    #[test]
+    fn a_large_import_is_not_counted_to_its_end() {
+        let visit = Visit::in_language(Language::Vietnamese);
+        let shown = |pairs| {
+            let jobs = pairs;
+            let imported = 1;
+            let counts = LastImport {
+                imported,
+                pairs,
+                jobs,
+            };
+            undo_part(&visit, "p", counts).into_string()
+        };
+        assert!(shown(MAX_COUNTED).contains("<b>10\u{202f}000</b>"));
+        assert!(shown(MAX_COUNTED + 1).contains("<b>hơn 10\u{202f}000</b>"));
+    }
 }
