@@ -103,8 +103,8 @@ pub use records::model::{
     StageRecord, StatusCounts, StoredFailure, all_retired,
 };
 pub use records::pair_list::{MetricDifference, PairCursor, PairFilter, PairListPage, PairOrder};
-pub use records::pair_results::ResultPages;
 pub use records::pair_work::{KnownInputs, PairWork};
+pub use records::result_pages::ResultPages;
 pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};
 pub use records::review_context::ReviewContext;
 pub use records::review_rights::ReviewRights;

@@ -17,6 +17,7 @@ use crate::queue::fail;
 use crate::queue::pair_job::PairJob;
 use crate::records::pair_results;
 use crate::records::pair_work;
+use crate::records::result_pages;
 use crate::records::stage_results;
 use crate::records::status;
 use crate::records::verdicts;
@@ -213,6 +214,16 @@ async fn lists_of_pairs_read_part_of_an_index_in_its_order() {
         assert!(!sorts, "{name}: {plan:?}");
     }
     assert_only(&plan(listed_names::NAMES).await, &["VIRTUAL TABLE"]);
+}
+
+#[tokio::test]
+async fn counts_of_verdicts_scan_an_index_of_verdicts() {
+    let lines = plan(result_pages::JUDGED).await;
+    assert_only(&lines, &["COVERING INDEX verdict_pair", "SCAN v"]);
+    assert!(
+        lines.iter().any(|line| line.contains("INDEX verdict_pair")),
+        "{lines:?}"
+    );
 }
 
 /// Asserts that the plan contains only allowed scans.

@@ -29,6 +29,7 @@ pub use consensus::Consensus;
 pub use manual_alignment::{ManualAlignmentErrors, ManualCorrection, ManualErrors};
 pub use reviewer_agreement::{
     MIN_RESULTS, ReviewerAgreement, ReviewerPair, ReviewerRecord, VerdictAgreement, agreement,
+    agreement_of_verdicts,
 };
 pub use stats::{IntervalMethod, Rate, ResamplingUnit};
 pub use truth_evaluation::{TruthEvaluation, evaluate_pairs, mask_iou, tops_iou};

@@ -9,7 +9,8 @@ use super::consensus::{Consensus, partition_verdicts};
 use super::pair_artifacts::group_identical;
 use super::stats::{AgreementTable, Rate};
 use mocban_catalog::{
-    AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults, SetApart,
+    AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, FaultyRow, MetricRecord, PairResults,
+    SetApart,
 };
 use mocban_core::domain::{AttentionCheck, ContentHash, PairName, Verdict};
 
@@ -100,25 +101,41 @@ pub struct ReviewerRecord {
 /// Pairs in memory at a time.
 const PAIRS_PER_PAGE: usize = 256;
 
-/// Computes the agreement of a project's reviewers from the current state of its catalog.
+/// Computes the agreement of a project's reviewers from the current state of its catalog. Compares every row of the catalog
+/// with its checksum.
 ///
 /// # Errors
 /// Returns an error if the catalog cannot be read.
 pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
-    let (catalog, damaged) = &catalog.without_faulty_rows().await?;
+    let (sound, damaged) = catalog.without_faulty_rows().await?;
+    count(&sound, &damaged).await
+}
+
+/// Computes the same numbers as [`agreement`] in a time that grows with the number of verdicts, not with that of pairs.
+/// `set_apart` has only the damaged rows that these numbers depend on.
+///
+/// # Errors
+/// Returns an error if the catalog cannot be read.
+pub async fn agreement_of_verdicts(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
+    let (sound, damaged) = catalog.without_faulty_verdicts().await?;
+    count(&sound, &damaged).await
+}
+
+/// Counts the verdicts of a catalog without damaged rows. A pair without verdicts changes no count.
+async fn count(sound: &Catalog, damaged: &[FaultyRow]) -> Result<ReviewerAgreement, CatalogError> {
     let mut counts = AgreementCounts::default();
-    let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
+    let mut pages = sound.judged_pages(PAIRS_PER_PAGE).await?;
     while let Some(page) = pages.next().await? {
         for pair in &page {
             counts.add(pair);
         }
     }
-    for (reviewer, answers) in &attention_checks::answers_by_reviewer(catalog).await? {
-        let own = own_verdicts(catalog, reviewer).await?;
+    for (reviewer, answers) in &attention_checks::answers_by_reviewer(sound).await? {
+        let own = own_verdicts(sound, reviewer).await?;
         counts.add_checks(reviewer, answers, &own);
     }
     Ok(ReviewerAgreement {
-        retired: catalog.retired_count().await?,
+        retired: sound.retired_count().await?,
         set_apart: SetApart::of(damaged),
         ..counts.finish()
     })

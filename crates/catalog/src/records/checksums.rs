@@ -24,6 +24,8 @@ pub(super) struct Statements {
     listed: &'static str,
     /// Selects a page of rows with their checksums.
     pub(super) page: &'static str,
+    /// Selects the rows with the numbers of `?2`, with their checksums.
+    pub(super) some: &'static str,
     /// Selects the numbers of checksums without a row.
     pub(super) removed: &'static str,
     /// Whether a checksum also covers the previous row's checksum.
@@ -63,6 +65,21 @@ macro_rules! statements {
                 " WHERE t.",
                 $key,
                 " > ?2 ORDER BY 1 LIMIT ?3"
+            ),
+            some: concat!(
+                "SELECT t.",
+                $key,
+                ", c.value, c.previous, (SELECT p.name FROM pair AS p WHERE p.id = ",
+                $pair,
+                "), ",
+                $columns,
+                " FROM json_each(?2) AS wanted CROSS JOIN ",
+                $table,
+                " AS t ON t.",
+                $key,
+                " = CAST(wanted.atom AS bigint) LEFT JOIN checksum AS c ON c.record = ?1 AND c.row = t.",
+                $key,
+                " ORDER BY 1"
             ),
             removed: concat!(
                 "SELECT row FROM checksum AS c WHERE record = ?1 AND NOT EXISTS (SELECT 1 FROM ",

@@ -8,6 +8,7 @@ use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::Row;
+use crate::db::rows::json_array;
 use crate::db::value::Value;
 use crate::records::checksums::{COVERED, checksum};
 use crate::{Catalog, CatalogError, Result};
@@ -15,6 +16,14 @@ use mocban_core::domain::{Affine2, AttentionCheck, PrintFromMesh, enum_names};
 
 /// Number of rows that are read at a time.
 const PAGE: i64 = 2000;
+
+/// The tables of all that reviewers answered, but for manual alignments.
+const OF_VERDICTS: [ChecksummedTable; 4] = [
+    ChecksummedTable::Verdict,
+    ChecksummedTable::VerdictUndo,
+    ChecksummedTable::Answer,
+    ChecksummedTable::AnswerUndo,
+];
 
 /// What is wrong with a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,6 +103,23 @@ impl Catalog {
         self.faulty_rows_of(&ChecksummedTable::ALL).await
     }
 
+    /// Compares the verdicts, the answers to attention checks, their undos, and the pairs of verdicts with their checksums.
+    /// Returns the rows that do not agree.
+    pub(super) async fn faulty_rows_of_verdicts(&self) -> Result<Vec<FaultyRow>> {
+        let mut faulty = self.faulty_rows_of(&OF_VERDICTS).await?;
+        let statements = ChecksummedTable::Pair.statements();
+        let judged = self.judged_pairs().await?;
+        let mut conn = self.read_conn().await?;
+        for pairs in judged.chunks(PAGE as usize) {
+            let rows = query(statements.some).bind(ChecksummedTable::Pair.code());
+            let rows = rows.bind(json_array(pairs.iter().copied()));
+            for row in &rows.fetch_all(&mut conn).await? {
+                faulty.extend(faulty_row(ChecksummedTable::Pair, row)?);
+            }
+        }
+        Ok(faulty)
+    }
+
     async fn faulty_rows_of(&self, tables: &[ChecksummedTable]) -> Result<Vec<FaultyRow>> {
         let mut conn = self.snapshot().await?;
         let mut faulty = Vec::new();
@@ -169,7 +195,7 @@ async fn faulty_rows(
     Ok(())
 }
 
-/// Compares a row of [`Statements::page`] with its checksum. Returns the row if it is faulty.
+/// Compares a row of [`Statements::page`] or [`Statements::some`] with its checksum. Returns the row if it is faulty.
 fn faulty_row(table: ChecksummedTable, row: &Row) -> Result<Option<FaultyRow>> {
     let stored: Option<i64> = row.get(1)?;
     let before: Option<i64> = row.get(2)?;

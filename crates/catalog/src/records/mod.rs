@@ -16,6 +16,7 @@ pub(crate) mod pair_list;
 pub(crate) mod pair_lookups;
 pub(crate) mod pair_results;
 pub(crate) mod pair_work;
+pub(crate) mod result_pages;
 pub(crate) mod review_answers;
 pub(crate) mod review_context;
 pub(crate) mod review_rights;

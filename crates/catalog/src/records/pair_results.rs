@@ -221,35 +221,3 @@ fn metrics(
     });
     Ok(found)
 }
-
-/// Reads the results of all pairs page by page, sorted by name. Only one page is read into memory at a time.
-#[derive(Debug)]
-pub struct ResultPages<'a> {
-    catalog: &'a Catalog,
-    size: usize,
-    after: Option<PairName>,
-}
-
-impl Catalog {
-    /// Returns the results of all pairs in pages of at most `size`.
-    pub const fn result_pages(&self, size: usize) -> ResultPages<'_> {
-        ResultPages {
-            catalog: self,
-            size,
-            after: None,
-        }
-    }
-}
-
-impl ResultPages<'_> {
-    /// Returns the next page, which is never empty, or `None` after the last page.
-    pub async fn next(&mut self) -> Result<Option<Vec<PairResults>>> {
-        let page = self.catalog.results_page(self.after.as_ref(), self.size);
-        let page = page.await?;
-        let Some(last) = page.last() else {
-            return Ok(None);
-        };
-        self.after = Some(last.attributes.name.clone());
-        Ok(Some(page))
-    }
-}

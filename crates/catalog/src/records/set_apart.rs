@@ -69,14 +69,25 @@ impl Catalog {
     /// Compares all rows with their checksums. Returns the catalog without the rows that do not agree, and these rows.
     pub async fn without_faulty_rows(&self) -> Result<(Self, Vec<FaultyRow>)> {
         let faulty = self.faulty_rows().await?;
+        Ok((self.without(&faulty), faulty))
+    }
+
+    /// Like [`Self::without_faulty_rows`], but only compares the rows that counts of verdicts depend on: verdicts, answers to
+    /// attention checks, their undos, and the pairs of verdicts. The time grows with their number, not with that of all pairs.
+    pub async fn without_faulty_verdicts(&self) -> Result<(Self, Vec<FaultyRow>)> {
+        let faulty = self.faulty_rows_of_verdicts().await?;
+        Ok((self.without(&faulty), faulty))
+    }
+
+    /// Returns the catalog without some rows.
+    fn without(&self, faulty: &[FaultyRow]) -> Self {
         let mut by_table: BTreeMap<_, Vec<i64>> = BTreeMap::new();
-        for row in &faulty {
+        for row in faulty {
             by_table.entry(row.table).or_default().push(row.row);
         }
         let arrays = by_table.into_iter();
         let arrays = arrays.map(|(table, rows)| (table, json_array(rows)));
-        let left_out = LeftOut::new(arrays.collect());
-        Ok((self.leaving_out(left_out), faulty))
+        self.leaving_out(LeftOut::new(arrays.collect()))
     }
 
     /// Returns whether the user of the database may set rows apart: the owner, or anybody if the catalog is a file.

@@ -109,3 +109,40 @@ async fn a_removed_row_is_named_and_the_next_one_stays_valid() {
     let found = (faulty[0].table, faulty[0].row, faulty[0].fault);
     assert_eq!(found, (ChecksummedTable::Verdict, gone, RowFault::Removed));
 }
+
+#[tokio::test]
+async fn counts_of_verdicts_read_only_pairs_with_verdicts() {
+    let world = World::new(3).await;
+    world.finish_one().await;
+    world.finish_one().await;
+    judge(&world.catalog, "ana", Verdict::Pass).await;
+    let judged = async |catalog: &Catalog| {
+        let mut pages = catalog.judged_pages(1).await.expect("a read");
+        let mut names = Vec::new();
+        while let Some(page) = pages.next().await.expect("a read") {
+            names.extend(page.into_iter().map(|pair| pair.attributes.name));
+        }
+        names
+    };
+    assert_eq!(judged(&world.catalog).await, [name("p0")]);
+    let (sound, faulty) = world
+        .catalog
+        .without_faulty_verdicts()
+        .await
+        .expect("a read");
+    assert_eq!((faulty.len(), judged(&sound).await.len()), (0, 1));
+
+    let mut conn = world.place.conn().await;
+    let damage = query("UPDATE pair SET character = 'x'");
+    damage.execute(&mut conn).await.expect("changed");
+    let (_, faulty) = world.catalog.without_faulty_rows().await.expect("a read");
+    assert_eq!(faulty.len(), 3);
+    let (sound, faulty) = world
+        .catalog
+        .without_faulty_verdicts()
+        .await
+        .expect("a read");
+    let pairs = faulty.iter().map(|row| (row.pair.as_deref(), row.fault));
+    assert_eq!(pairs.collect::<Vec<_>>(), [(Some("p0"), RowFault::Changed)]);
+    assert_eq!(judged(&sound).await, []);
+}

@@ -11,16 +11,18 @@ use super::failure::AppResult;
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::domain::one_line;
-use mocban_results::{Rate, ReviewerAgreement, ReviewerPair, ReviewerRecord, agreement};
+use mocban_results::{
+    Rate, ReviewerAgreement, ReviewerPair, ReviewerRecord, agreement_of_verdicts,
+};
 
-/// Responds with a part of the page of reviews. It reads all results, so the page loads it afterwards.
+/// Responds with a part of the page of reviews. It reads all verdicts, so the page loads it afterwards.
 pub(super) async fn part(
     State(state): State<Arc<AppState>>,
     Path(key): Path<String>,
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let found = agreement(&open.catalog).await?;
+    let found = agreement_of_verdicts(&open.catalog).await?;
     Ok(Html(agreement_part(&visit, &found).into_string()))
 }
 

@@ -66,7 +66,11 @@ async fn all_items(
     options: &QueueOptions,
 ) -> Result<Vec<ReviewItem>, CatalogError> {
     let mut items = Vec::new();
-    let mut pages = catalog.result_pages(PAGE_PAIRS);
+    let mut pages = match options.order {
+        // Only results with verdicts are disputed.
+        ReviewOrder::Adjudicate => catalog.judged_pages(PAGE_PAIRS).await?,
+        ReviewOrder::Random | ReviewOrder::LeastConfident => catalog.result_pages(PAGE_PAIRS),
+    };
     while let Some(page) = pages.next().await? {
         let wanted = |pair: &&PairResults| options.has_pair(&pair.attributes.name);
         for pair in page.iter().filter(wanted) {

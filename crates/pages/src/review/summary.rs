@@ -6,7 +6,7 @@ use super::review_queue::ReviewQueue;
 use super::state::ServerState;
 use mocban_catalog::CatalogError;
 use mocban_core::domain::Verdict;
-use mocban_results::{ReviewerPair, ReviewerRecord, agreement, is_inattentive};
+use mocban_results::{ReviewerPair, ReviewerRecord, agreement_of_verdicts, is_inattentive};
 
 /// The summary of a review.
 #[derive(Debug, Serialize)]
@@ -64,7 +64,7 @@ impl ReviewSummary {
             return Ok(None);
         };
         let on_results = answers.iter().filter(|(is_result, _)| *is_result);
-        let agreement = agreement(&state.catalog).await?;
+        let agreement = agreement_of_verdicts(&state.catalog).await?;
         let own = &state.options.queue.reviewer;
         let mut others = agreement.reviewer_pairs;
         others.retain(|pair| pair.a == *own || pair.b == *own);
