@@ -19,7 +19,7 @@ use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
-use crate::on_thread::on_thread;
+use crate::on_thread::read_on_thread;
 use crate::review::Language;
 use crate::view::{BlockPoints, open_block};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
@@ -94,7 +94,7 @@ async fn opened(state: &AppState, open: &Arc<OpenProject>, block: &str) -> AppRe
     let (open, language) = (Arc::clone(open), state.language());
     let location = open.location();
     let own = Arc::clone(&open);
-    let read = on_thread(async move || {
+    let read = read_on_thread(async move || {
         let store = BlockPoints::new(&location, &name, None);
         let limits = location.settings()?.config.limits;
         open_block(

@@ -8,7 +8,7 @@ use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
-use crate::on_thread::on_thread;
+use crate::on_thread::read_on_thread;
 use crate::review::{
     CheckRates, Language, PictureWork, QueueOptions, ReviewOptions, ReviewPages, key_map,
 };
@@ -69,7 +69,7 @@ pub(super) async fn open_review(
     let is_settling = query.parsed("order") == Some(ReviewOrder::Adjudicate);
     let query = query.clone();
     let opened =
-        on_thread(async move || review_pages(&location, place, reviewer, &query, pairs).await);
+        read_on_thread(async move || review_pages(&location, place, reviewer, &query, pairs).await);
     let pages = opened
         .await
         .map_err(|error| AppFailure::of(error, &open.dir))?;
@@ -108,7 +108,7 @@ async fn own_conflicts(
             && metric.is_none_or(|metric| metric == record.outcome.metric)
             && alone.iter().any(|given| given.reviewer == reviewer)
     };
-    let (mut own, mut pages) = (0, catalog.result_pages(PAGE_PAIRS));
+    let (mut own, mut pages) = (0, catalog.judged_pages(PAGE_PAIRS).await?);
     while let Some(page) = pages.next().await? {
         let pairs = page.iter();
         own += pairs

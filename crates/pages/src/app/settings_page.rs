@@ -17,7 +17,7 @@ use super::sentence::Sentence;
 use super::setting_words::is_hidden;
 use super::state::AppState;
 use super::visit::Visit;
-use crate::on_thread::on_thread;
+use crate::on_thread::{on_thread, read_on_thread};
 use mocban_catalog::Catalog;
 use mocban_config::{BaseLayer, Origin, Setting, Sources, load};
 use mocban_project::ProjectResult;
@@ -108,7 +108,7 @@ async fn looked_at(
     catalog: Catalog,
     location: Location,
 ) -> ProjectResult<SettingChange> {
-    on_thread(async move || preview(&body.key, &body.value, &catalog, &location).await).await
+    read_on_thread(async move || preview(&body.key, &body.value, &catalog, &location).await).await
 }
 
 fn change_part(visit: &Visit, change: &SettingChange) -> Markup {

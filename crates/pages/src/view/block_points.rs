@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::on_thread::on_thread;
+use crate::on_thread::{on_thread, read_on_thread};
 use mocban_catalog::{Catalog, ControlPointsChange};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, replaced_file};
@@ -43,7 +43,7 @@ impl BlockPoints {
     /// Reads the block. Returns a sentence if that fails.
     pub(super) async fn read(&self) -> Result<BlockCorrection, String> {
         let own = self.clone();
-        let read = on_thread(async move || own.read_block().await).await;
+        let read = read_on_thread(async move || own.read_block().await).await;
         read.map_err(|error| error.text(&self.location.dir))
     }
 
