@@ -124,6 +124,15 @@ all.addEventListener("click", async () => {
   }
 });
 
+// In a narrow window the bar is one line, and what can be done is folded.
+const more = document.getElementById("choice-more");
+const narrow = matchMedia("(max-width: 760px)");
+const fold = () => {
+  more.open = !narrow.matches;
+};
+narrow.addEventListener("change", fold);
+fold();
+
 // Pairs that were retired meanwhile are not in the list any more, so the user cannot remove them from the choice.
 document.addEventListener("refused", ({ detail }) => change([], detail));
 

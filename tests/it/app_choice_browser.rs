@@ -21,6 +21,12 @@ fn listed(tab: &Tab<'_>) {
     tab.wait("document.body?.dataset.ready && document.querySelector('#choice')?.dataset.ready");
 }
 
+/// Opens what the bar of a narrow window folds.
+fn unfold(tab: &Tab<'_>) {
+    tab.tap("#choice-more > summary");
+    tab.wait("document.querySelector('#choice-more').open");
+}
+
 /// Returns the numbers of the chosen pairs of the page.
 fn chosen(tab: &Tab<'_>) -> Vec<u64> {
     let numbers = tab.eval(
@@ -170,6 +176,11 @@ fn pairs_are_chosen_by_touch_and_on_several_pages() {
     open_list(&tab, &home, "");
     tab.tap(&choice_of(1));
     tab.wait("document.querySelectorAll('[data-pair]:checked').length === 1");
+    let height = "document.querySelector('#choice').offsetHeight";
+    let folded = tab.eval(height).as_f64().expect("a height");
+    assert!(folded <= 90.0, "the bar covers {folded} of 800 px");
+    tab.screenshot("app_folded_bar");
+    unfold(&tab);
     tab.tap("#choose-page");
     tab.wait("document.querySelectorAll('[data-pair]:checked').length === 48");
     tab.tap(&choice_of(1));
@@ -182,10 +193,12 @@ fn pairs_are_chosen_by_touch_and_on_several_pages() {
     tab.tap("[data-pair]");
     tab.wait("document.querySelector('#chosen').textContent.includes('48')");
     // All that match are more than can be chosen.
+    unfold(&tab);
     tab.tap("#choose-all");
     tab.wait("!document.querySelector('#choice-problem').hidden");
     assert!(said(&tab).contains("48"), "{}", said(&tab));
     open_list(&tab, &home, "?state=waiting");
+    unfold(&tab);
     tab.tap("#choose-none");
     tab.tap("#choose-all");
     tab.wait("document.querySelectorAll('[data-pair]:checked').length === 48");
@@ -195,6 +208,7 @@ fn pairs_are_chosen_by_touch_and_on_several_pages() {
     let judge = tab.eval("document.querySelector('#judge').textContent");
     assert_eq!(judge, format!("Đánh giá các cặp này ({thousand})"));
     open_list(&tab, &home, "?state=aligned");
+    unfold(&tab);
     tab.tap("#choose-none");
     tab.tap("#choose-all");
     tab.wait("document.querySelectorAll('[data-pair]:checked').length === 15");

@@ -31,19 +31,23 @@ pub(super) fn choice_bar(visit: &Visit, key: &str) -> Markup {
     );
     html! {
         section #choice.choice-bar data-kept=(kept) data-max=(MAX_CHOSEN) aria-label=(visit.t("Chosen pairs", "Các cặp đã chọn")) {
-            p.row {
-                span #chosen role="status" data-text=(visit.t("Chosen: {n}, {here} of them on this page", "Đã chọn: {n}, trong đó {here} ở trang này"))
-                    data-none=(visit.t("Choose pairs to do something with them.", "Hãy chọn các cặp để thao tác với chúng.")) {}
-                button #choose-page type="button" { (visit.t("All on this page", "Tất cả ở trang này")) }
-                button #choose-all type="button" data-from={ "pairs/listed" (list) } { (visit.t("All that match", "Tất cả phù hợp")) }
-                button #choose-none type="button" hidden { (visit.t("None", "Bỏ chọn")) }
+            p #chosen role="status" data-text=(visit.t("Chosen: {n}, {here} of them on this page", "Đã chọn: {n}, trong đó {here} ở trang này"))
+                data-none=(visit.t("Choose pairs to do something with them.", "Hãy chọn các cặp để thao tác với chúng.")) {}
+            // A narrow window shows the list behind a low bar; the script folds this there.
+            details #choice-more open {
+                summary { (visit.t("Actions", "Thao tác")) }
+                p.row {
+                    button #choose-page type="button" { (visit.t("All on this page", "Tất cả ở trang này")) }
+                    button #choose-all type="button" data-from={ "pairs/listed" (list) } { (visit.t("All that match", "Tất cả phù hợp")) }
+                    button #choose-none type="button" hidden { (visit.t("None", "Bỏ chọn")) }
+                }
+                p.muted #choice-help { (visit.t(
+                    "Shift with a click or an arrow key chooses a range.",
+                    "Giữ Shift rồi bấm chuột hoặc phím mũi tên để chọn một dãy.",
+                )) }
+                div #choice-actions.row hidden { (changes(visit, &kept)) (export_form(visit, &kept)) }
             }
-            p.muted #choice-help { (visit.t(
-                "Shift with a click or an arrow key chooses a range.",
-                "Giữ Shift rồi bấm chuột hoặc phím mũi tên để chọn một dãy.",
-            )) }
             p #choice-problem.problem role="alert" data-most={ (most) ": " (grouped(MAX_CHOSEN as u64)) } hidden {}
-            div #choice-actions.row hidden { (changes(visit, &kept)) (export_form(visit, &kept)) }
         }
         script type="module" src={ (visit.root) "assets/choose.js" } {}
     }
