@@ -44,6 +44,25 @@ fn the_list_behind_a_number_of_the_report_has_the_counted_pairs() {
 }
 
 #[test]
+fn the_report_is_saved_as_the_command_prints_it() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    judge(&project, "upright-0000", "pass", "lan", &[]);
+    for (extension, format) in [
+        ("csv", "csv"),
+        ("tex", "latex"),
+        ("md", "markdown"),
+        ("json", "json"),
+    ] {
+        let saved = html(&page, &format!("/p/p/report/file/report.{extension}"));
+        let printed = mocban(&project, &["report", "--format", format]);
+        assert_eq!(saved, printed.expect(0).out, "{extension}");
+    }
+    let whole = html(&page, "/p/p/report/file/report.html");
+    assert!(whole.starts_with("<!DOCTYPE html>"), "{whole}");
+}
+
+#[test]
 fn one_of_two_who_disagree_hears_that_a_third_person_must_settle_it() {
     let (dir, page) = with_project();
     let project = dir.path().join("p");
