@@ -1,6 +1,7 @@
 //! Two apps on one project, and an app on a project that cannot be written.
 
 use std::os::unix::fs::PermissionsExt as _;
+use std::path::Path;
 
 use serde_json::{Value, json};
 
@@ -92,19 +93,23 @@ fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
     set_mode(0o555);
     as_other_user(&mut command, &project);
     let page = Page::of(&mut command).entered();
-    for path in [
-        "/",
-        "/p/p/",
-        "/p/p/pairs",
-        "/p/p/pair/upright-0000/",
-        "/p/p/review",
-        "/p/p/report/numbers",
-        "/p/p/export",
-        "/p/p/settings",
-        "/p/p/health",
-        "/import",
+    html(&page, "/p/p/report/numbers");
+    // Every page says it before anybody types.
+    for (path, what) in [
+        ("/", "This folder is read-only"),
+        ("/import", "This folder is read-only"),
+        ("/import?project=new", "This folder is read-only"),
+        ("/import?project=p", "This project is read-only"),
+        ("/p/p/", "This project is read-only"),
+        ("/p/p/pairs", "This project is read-only"),
+        ("/p/p/pair/upright-0000/", "This project is read-only"),
+        ("/p/p/review", "This project is read-only"),
+        ("/p/p/export", "This project is read-only"),
+        ("/p/p/settings", "This project is read-only"),
+        ("/p/p/health", "This project is read-only"),
     ] {
-        html(&page, path);
+        let shown = html(&page, path);
+        assert!(shown.contains(what), "{path}: {shown}");
     }
     let upload = json!({
         "name": "x", "content": "0".repeat(64), "files": 1, "bytes": 5, "take_over": false,
@@ -164,4 +169,35 @@ fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
     set_mode(0o755);
     set_writable(&project, true);
     assert!(catalog() == before, "nothing has changed");
+}
+
+#[test]
+fn a_review_of_a_read_only_catalog_is_refused_before_the_first_answer() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir).dir().to_owned();
+    let set_mode = |path: &Path, mode: u32| {
+        let mode = std::fs::Permissions::from_mode(mode);
+        std::fs::set_permissions(path, mode).expect("set");
+    };
+    // SQLite can make its other files, and so opens the catalog.
+    set_mode(dir.path(), 0o755);
+    set_mode(&project, 0o777);
+    let mut command = binary_beside(&project);
+    command.args(["--json", "app", "--no-open", "--lang", "en"]);
+    command.arg(dir.path());
+    as_other_user(&mut command, &project);
+    set_mode(&project.join("catalog.sqlite"), 0o444);
+    let page = Page::of(&mut command).entered();
+    let start = json!({"reviewer": "lan", "metric": "density", "sample": "", "order": "random"});
+    let reply = act(&page, "/p/p/actions/review", &start, |_| {});
+    let said = text(&reply);
+    assert_eq!(reply.status, 503, "{said}");
+    assert!(
+        said.contains("cannot be written to: check its rights"),
+        "{said}"
+    );
+    for (language, part) in [("en", "is read-only"), ("vi", "chỉ đọc được")] {
+        let shown = html(&page, &format!("/p/p/review?language={language}"));
+        assert!(shown.contains(part), "{shown}");
+    }
 }

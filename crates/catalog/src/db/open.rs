@@ -16,6 +16,7 @@ use crate::db::lock_owner::sidecar;
 use crate::db::network_fs;
 use crate::db::schema::{self, MIGRATOR};
 use mocban_core::domain::FileKind;
+use mocban_system::platform;
 
 /// SQLite's busy timeout of a connection.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
@@ -42,6 +43,10 @@ fn options(path: &Path) -> SqliteConnectOptions {
 pub(crate) async fn write_conn(path: &Path, allow_empty: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
     check_file(path, allow_empty)?;
+    // SQLite would open the file for reading, and refuse only the first write.
+    if !platform::may_write(path) {
+        return Err(CatalogError::NotWritable(path.to_owned()));
+    }
     let connected = retry_while_busy!(path, connect(path).await);
     let mut conn = connected.map_err(|error| {
         if is_read_only(&error) {

@@ -56,6 +56,11 @@ impl ReviewRights {
         self.is_limited_to_own.then_some(self.user.as_str())
     }
 
+    /// Returns whether the user may store verdicts. Whoever may change anything in a catalog may.
+    pub const fn may_store(&self) -> bool {
+        self.adds_verdicts
+    }
+
     /// Checks that the user may append verdicts of a reviewer.
     pub fn require_verdicts(&self, reviewer: &str) -> Result<()> {
         self.require(self.adds_verdicts, Some(reviewer))

@@ -91,6 +91,9 @@ pub(super) fn frame(
             }
             main #main tabindex="-1" {
                 h1 { (title) }
+                @if let Some(place) = visit.read_only {
+                    p #read-only.notice.warn role="status" { (place.sentence().text(visit.language)) }
+                }
                 (body)
             }
             p #offline.notice.bad role="status" hidden {

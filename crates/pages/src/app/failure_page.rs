@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::{FromRequestParts as _, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{Method, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
@@ -24,8 +24,8 @@ pub(super) async fn explain(
     let headers = request.headers();
     let reads_pages = !headers.contains_key(header::ACCEPT) || asks_for_page(headers);
     let is_page = request.method() == Method::GET && reads_pages;
-    let (mut head, body) = request.into_parts();
-    let Ok(visit) = Visit::from_request_parts(&mut head, &state).await;
+    let (head, body) = request.into_parts();
+    let visit = Visit::of(&head, &state);
     let response = next.run(Request::from_parts(head, body)).await;
     let Some(failure) = response.extensions().get::<AppFailure>().cloned() else {
         return response;

@@ -47,6 +47,7 @@ mod pictures;
 mod plan_cache;
 mod projects;
 mod qr_code;
+mod read_only;
 mod received_archive;
 mod received_files;
 mod report_page;

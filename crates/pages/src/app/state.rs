@@ -102,8 +102,7 @@ impl AppState {
 
     /// Returns an open project by its name. Only projects of the folder have names, so no address leads elsewhere.
     pub(super) async fn open(&self, key: &str) -> AppResult<Arc<OpenProject>> {
-        let known = self.lock_projects().get(key).cloned();
-        if let Some(open) = known.filter(|open| open.is_current()) {
+        if let Some(open) = self.known(key) {
             return Ok(open);
         }
         let folder = self.options.folder.clone();
@@ -120,6 +119,12 @@ impl AppState {
         let kept = kept.cloned().unwrap_or(open);
         projects.insert(key.to_owned(), Arc::clone(&kept));
         Ok(kept)
+    }
+
+    /// Returns a project that is open.
+    pub(super) fn known(&self, key: &str) -> Option<Arc<OpenProject>> {
+        let known = self.lock_projects().get(key).cloned();
+        known.filter(|open| open.is_current())
     }
 
     fn lock_projects(&self) -> MutexGuard<'_, BTreeMap<String, Arc<OpenProject>>> {

@@ -3,12 +3,13 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
-use axum::extract::FromRequestParts;
+use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::header;
 use axum::http::request::Parts;
 
 use super::address::PageQuery;
 use super::number_text;
+use super::read_only::ReadOnlyPlace;
 use super::state::AppState;
 use crate::local_server::AccessControl;
 use crate::review::Language;
@@ -25,6 +26,8 @@ pub(super) struct Visit {
     pub(super) query: PageQuery,
     /// The token that actions must carry.
     pub(super) csrf_token: String,
+    /// The place that actions of the page would write to, if they cannot.
+    pub(super) read_only: Option<ReadOnlyPlace>,
 }
 
 impl Visit {
@@ -37,6 +40,7 @@ impl Visit {
             here: "./".to_owned(),
             query: PageQuery::default(),
             csrf_token: String::new(),
+            read_only: None,
         }
     }
 
@@ -89,6 +93,20 @@ impl FromRequestParts<Arc<AppState>> for Visit {
         parts: &mut Parts,
         state: &Arc<AppState>,
     ) -> Result<Self, Self::Rejection> {
+        let visit = Self::of(parts, state);
+        let segments = RawPathParams::from_request_parts(parts, state).await.ok();
+        let mut segments = segments.iter().flatten();
+        let of_path = segments.find(|(name, _)| *name == "project");
+        let project = of_path.map(|(_, key)| key);
+        let project = project.or_else(|| visit.query.get("project"));
+        let read_only = ReadOnlyPlace::find(state, project).await;
+        Ok(Self { read_only, ..visit })
+    }
+}
+
+impl Visit {
+    /// Returns the visit of a request, without looking whether its place is read-only.
+    pub(super) fn of(parts: &Parts, state: &AppState) -> Self {
         let path = parts.uri.path();
         let query = PageQuery::parse(parts.uri.query().unwrap_or_default());
         if let Some(chosen) = query.parsed("language") {
@@ -105,7 +123,7 @@ impl FromRequestParts<Arc<AppState>> for Visit {
         };
         let here = path.rsplit('/').next().unwrap_or_default();
         let access = parts.extensions.get::<Arc<AccessControl>>();
-        Ok(Self {
+        Self {
             language: language.unwrap_or(Language::English),
             root,
             here: if here.is_empty() {
@@ -115,6 +133,7 @@ impl FromRequestParts<Arc<AppState>> for Visit {
             },
             query: query.with("language", ""),
             csrf_token: access.map_or_else(String::new, |access| access.csrf_token().to_owned()),
-        })
+            read_only: None,
+        }
     }
 }

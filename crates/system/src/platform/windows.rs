@@ -82,6 +82,11 @@ pub const fn free_bytes(_folder: &Path) -> Option<u64> {
     None
 }
 
+/// Returns whether a file is not marked as read-only. The rights of folders are not looked at.
+pub fn may_write(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|meta| meta.is_dir() || !meta.permissions().readonly())
+}
+
 /// Makes a command start a process that Ctrl-C in this terminal does not reach.
 pub fn detach(command: &mut std::process::Command) {
     use std::os::windows::process::CommandExt as _;
