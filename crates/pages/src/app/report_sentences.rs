@@ -106,23 +106,50 @@ fn accuracy(visit: &Visit, report: &Report) -> String {
     let default = report.row(ThresholdMetric::DEFAULT).into_iter();
     let mut rows = default.chain(&report.rows);
     let known = |row: &MetricRow| {
-        Some(format!(
-            "Acc của {} là {}: người đánh giá cho đạt {} trên {} kết quả.",
-            visit.metric(row.metric),
-            vietnamese_number(format_rate(row.acc?, row.acc_ci95)),
-            grouped(row.passed),
-            grouped(row.passed + row.failed),
-        ))
+        Some(
+            format!(
+                "Acc của {} là {}: người đánh giá cho đạt {} trên {} kết quả.",
+                visit.metric(row.metric),
+                vietnamese_number(format_rate(row.acc?, row.acc_ci95)),
+                grouped(row.passed),
+                grouped(row.passed + row.failed),
+            ) + &undecided(row),
+        )
     };
     let found = rows.find_map(known);
     found.unwrap_or_else(|| {
         if report.has_verdicts() {
-            "Chưa có Acc, vì mọi kết quả đã đánh giá đều được ghi là chưa chắc.".to_owned()
+            let sum = |count: fn(&MetricRow) -> u64| report.rows.iter().map(count).sum::<u64>();
+            let [conflicts, unsure] = [sum(|row| row.conflicts), sum(|row| row.unsure)];
+            let why = match conflicts {
+                0 => "mọi kết quả đã đánh giá đều được ghi là chưa chắc",
+                all if all == unsure => "người đánh giá bất đồng về mọi kết quả đã đánh giá",
+                _ => "mọi kết quả đã đánh giá đều được ghi là chưa chắc hoặc có bất đồng",
+            };
+            format!("Chưa có Acc, vì {why}.")
+        } else if report.rows.iter().any(|row| row.stale > 0) {
+            "Chưa có Acc, vì mọi đánh giá đều cho kết quả của lần tính trước.".to_owned()
         } else {
             "Chưa ai đánh giá kết quả nào, nên chưa có Acc: hãy bắt đầu ở trang Đánh giá."
                 .to_owned()
         }
     })
+}
+
+/// Says how many judged results count neither as passed nor as failed. Empty if there are none.
+fn undecided(row: &MetricRow) -> String {
+    let parts = [
+        (row.conflicts, "kết quả có bất đồng"),
+        (row.unsure - row.conflicts, "kết quả chưa chắc"),
+    ];
+    let parts = parts.into_iter().filter(|(number, _)| *number > 0);
+    let parts: Vec<String> = parts
+        .map(|(number, what)| format!("{} {what}", grouped(number)))
+        .collect();
+    match parts.as_slice() {
+        [] => String::new(),
+        parts => format!(" Không tính: {}.", parts.join(", ")),
+    }
 }
 
 /// Says which metrics are right more often than others.
@@ -165,6 +192,12 @@ fn differences(visit: &Visit, report: &Report) -> String {
 
 fn vietnamese_limits(visit: &Visit, report: &Report) -> Vec<String> {
     let mut limits = Vec::new();
+    if report.set_apart.count > 0 {
+        limits.push(format!(
+            "{} dòng dữ liệu bị hỏng hoặc mất được để riêng và không tính: hãy bấm Kiểm tra ngay ở trang Tình trạng.",
+            grouped(report.set_apart.count)
+        ));
+    }
     let progress = report.progress;
     let missing = progress.failed + progress.pending;
     if missing > 0 {
