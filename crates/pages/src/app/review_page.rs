@@ -18,7 +18,7 @@ use super::components::{NavSection, action_form, choice, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::invitation_cards::{invitation_list, invite};
 use super::opened_review::{ReviewPlace, open_review};
-use super::pass_on::pass_on;
+use super::pass_on::{pass_on, path_below};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -129,7 +129,7 @@ fn start_form(visit: &Visit, chosen: Option<usize>) -> Markup {
             }
             label { span { (visit.t("Order", "Thứ tự")) }
                 select name="order" {
-                    (choice(ReviewOrder::Random.name(), visit.t("random, for an unbiased accuracy", "ngẫu nhiên, để độ chính xác không bị thiên lệch"), asked))
+                    (choice(ReviewOrder::Random.name(), visit.t("random, for an unbiased accuracy", "ngẫu nhiên, để đo độ chính xác"), asked))
                     (choice(ReviewOrder::LeastConfident.name(), visit.t("least confident first, to find failures", "độ tin cậy thấp trước, để tìm lỗi"), asked))
                     (choice(ReviewOrder::Adjudicate.name(), visit.t("disagreements of two others", "chỗ hai người khác bất đồng"), asked))
                 }
@@ -211,7 +211,19 @@ pub(super) async fn pages(
         Err(failure) if request.method() == Method::POST => return Err(failure.for_later()),
         Err(failure) => return Err(failure),
     };
-    pass_on(router, access, request).await
+    pass_on(router, access, in_chosen_language(&state, request)).await
+}
+
+/// Asks for the page of a review in the language that the user has chosen since it was opened.
+fn in_chosen_language(state: &AppState, mut request: Request) -> Request {
+    let is_page = path_below(&request).is_empty() && request.uri().query().is_none();
+    if let Some(language) = state.language().filter(|_| is_page) {
+        let address = format!("{}?lang={}", request.uri().path(), language.name());
+        if let Ok(address) = address.parse() {
+            *request.uri_mut() = address;
+        }
+    }
+    request
 }
 
 /// Returns the pages of a reviewer, which are opened if they are not.
