@@ -44,6 +44,61 @@ fn the_list_behind_a_number_of_the_report_has_the_counted_pairs() {
 }
 
 #[test]
+fn an_open_review_is_shown_in_the_language_that_was_chosen_since() {
+    let (_dir, page) = with_project();
+    let form = json!({"reviewer": "lan", "metric": "density", "sample": "", "order": "random"});
+    let reply = act(&page, "/p/p/actions/review", &form, |_| {}).json();
+    let address = format!("/p/p/{}", reply["go"].as_str().expect("a page"));
+    for language in ["vi", "en", "vi"] {
+        html(&page, &format!("/p/p/review?language={language}"));
+        let shown = html(&page, &address);
+        assert!(
+            shown.contains(&format!("<html lang=\"{language}\"")),
+            "{shown}"
+        );
+    }
+}
+
+#[test]
+fn the_page_of_the_run_leads_to_the_least_certain_results() {
+    let (_dir, page) = with_project();
+    let run = html(&page, "/p/p/");
+    let link = "<a href=\"pairs?sort=confidence\">All results, least certain first</a>";
+    assert!(run.contains(link), "{run}");
+    html(&page, "/p/p/pairs?sort=confidence");
+}
+
+#[test]
+fn the_report_says_in_both_languages_what_is_not_counted() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    judge(&project, "upright-0000", "pass", "lan", &[]);
+    judge(&project, "upright-0000", "fail", "minh", &[]);
+    let shows = |language: &str, part: &str| {
+        let shown = html(&page, &format!("/p/p/report/numbers?language={language}"));
+        assert!(shown.contains(part), "{shown}");
+    };
+    shows(
+        "en",
+        "because reviewers disagree about every judged result.",
+    );
+    shows(
+        "vi",
+        "vì người đánh giá bất đồng về mọi kết quả đã đánh giá.",
+    );
+    judge(&project, "upright-0001", "pass", "lan", &[]);
+    judge(&project, "upright-0002", "unsure", "lan", &[]);
+    shows(
+        "en",
+        "Not counted: 1 on which reviewers disagree and 1 about which they were unsure.",
+    );
+    shows(
+        "vi",
+        "Không tính: 1 kết quả có bất đồng, 1 kết quả chưa chắc.",
+    );
+}
+
+#[test]
 fn the_report_is_saved_as_the_command_prints_it() {
     let (dir, page) = with_project();
     let project = dir.path().join("p");
