@@ -6,6 +6,7 @@ use tokio::runtime::Handle;
 use tokio::sync::oneshot;
 use tokio::task::spawn_blocking;
 
+use crate::local_server::{WorkFailed, WorkThread};
 use mocban_project::ProjectResult;
 use mocban_project::error::TaskStopped;
 
@@ -29,19 +30,42 @@ where
     T: Send + 'static,
     F: Future<Output = ProjectResult<T>>,
 {
-    let (mut wanted, _caller) = oneshot::channel::<Infallible>();
-    let read = async move || {
-        tokio::select! {
-            biased;
-            () = wanted.closed() => None,
-            done = work() => Some(done),
-        }
-    };
-    let done = spawn_blocking(move || Handle::current().block_on(read())).await;
-    match done.map_err(TaskStopped)? {
+    let (wanted, _caller) = oneshot::channel();
+    let read = move || Handle::current().block_on(until_left(wanted, work));
+    match spawn_blocking(read).await.map_err(TaskStopped)? {
         Some(done) => done,
         // The channel is closed only when this future is dropped.
         None => std::future::pending().await,
+    }
+}
+
+/// Like [`read_on_thread`], for work that needs much memory: one call after another on the given thread.
+pub(crate) async fn read_in_turn<T, F>(
+    thread: &WorkThread,
+    work: impl FnOnce() -> F + Send + 'static,
+) -> Result<ProjectResult<T>, WorkFailed>
+where
+    T: Send + 'static,
+    F: Future<Output = ProjectResult<T>>,
+{
+    let runtime = Handle::current();
+    let (wanted, _caller) = oneshot::channel();
+    let read = move || runtime.block_on(until_left(wanted, work));
+    match thread.call(read).await? {
+        Some(done) => Ok(done),
+        None => std::future::pending().await,
+    }
+}
+
+/// Returns what a future does, or `None` once the other end of the channel is closed.
+async fn until_left<F: Future>(
+    mut wanted: oneshot::Sender<Infallible>,
+    work: impl FnOnce() -> F,
+) -> Option<F::Output> {
+    tokio::select! {
+        biased;
+        () = wanted.closed() => None,
+        done = work() => Some(done),
     }
 }
 
@@ -49,7 +73,8 @@ where
 mod tests {
     use tokio::sync::oneshot;
 
-    use super::{on_thread, read_on_thread};
+    use super::{on_thread, read_in_turn, read_on_thread};
+    use crate::local_server::WorkThread;
     use mocban_project::ProjectResult;
 
     #[tokio::test]
@@ -95,5 +120,23 @@ mod tests {
     async fn what_was_read_is_returned() {
         let read = read_on_thread(async || Ok(7)).await;
         assert_eq!(read.ok(), Some(7));
+    }
+
+    #[tokio::test]
+    async fn reading_in_turn_ends_when_its_caller_leaves_and_the_next_follows() {
+        let thread = WorkThread::default();
+        let (started, start) = oneshot::channel();
+        let mut request = Box::pin(read_in_turn(&thread, async move || {
+            started.send(()).expect("a receiver");
+            std::future::pending::<ProjectResult<()>>().await
+        }));
+        tokio::select! {
+            biased;
+            _ = &mut request => unreachable!("the work has no end"),
+            begun = start => begun.expect("it starts"),
+        }
+        drop(request);
+        let next = read_in_turn(&thread, async || Ok(7)).await;
+        assert_eq!(next.expect("the thread is there").ok(), Some(7));
     }
 }

@@ -121,11 +121,13 @@ impl ArrayPlace<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::Range;
+
     use super::{NotAnArray, each_value};
 
     fn values(list: &str) -> (Vec<(usize, String)>, Option<NotAnArray>) {
         let mut found = Vec::new();
-        let mut each = |line, place| found.push((line, list[place].to_owned()));
+        let mut each = |line, place: Range<usize>| found.push((line, list[place].to_owned()));
         let outcome = each_value(list.as_bytes(), &mut each);
         (found, outcome.err())
     }

@@ -13,7 +13,7 @@ use super::report_sentences::{headline, limits};
 use super::run_blocks::failed_blocks_part;
 use super::state::AppState;
 use super::visit::Visit;
-use crate::on_thread::read_on_thread;
+use crate::on_thread::read_in_turn;
 use mocban_project::report::{ReportOptions, read, report};
 use mocban_report::{MetricRow, Report, ReportFormat};
 use mocban_results::IntervalMethod;
@@ -67,7 +67,7 @@ pub(super) async fn numbers(
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
     let location = open.location();
-    let found = read_on_thread(async move || read(&location).await).await;
+    let found = read_in_turn(&state.reports, async move || read(&location).await).await?;
     let found = found.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(Html(numbers_part(&visit, &found).into_string()))
 }
@@ -175,7 +175,8 @@ pub(super) async fn download(
         with_times: false,
     };
     let location = open.location();
-    let rendered = read_on_thread(async move || report(options, None, &location, &()).await).await;
+    let render = async move || report(options, None, &location, &()).await;
+    let rendered = read_in_turn(&state.reports, render).await?;
     let rendered = rendered.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(attachment(&file, kind, rendered.text.into_bytes()))
 }

@@ -62,6 +62,8 @@ pub(super) struct AppState {
     pub(super) uploads: Uploads,
     /// Draws pictures.
     pub(super) work: WorkThread,
+    /// Reads results for reports.
+    pub(super) reports: WorkThread,
 }
 
 impl AppState {
@@ -82,6 +84,7 @@ impl AppState {
             zip_sizes: ZipSizes::default(),
             plans: PlanCache::default(),
             work: WorkThread::default(),
+            reports: WorkThread::default(),
         }
     }
 
