@@ -2,7 +2,7 @@
 //! said of a scan with what was found.
 
 use crate::stages::{ScanHints, StageError};
-use mocban_core::domain::cancel::polled;
+use mocban_core::domain::cancel::poll;
 use mocban_core::domain::{FailureClass, FitOutcome, LengthUnit};
 use mocban_core::mesh::Vertices;
 use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
@@ -138,16 +138,38 @@ pub fn contradictions(fit: &FitOutcome, hints: ScanHints) -> Vec<String> {
     relief.into_iter().chain(side).collect()
 }
 
+/// Vertices between two polls for a cancellation.
+const VERTICES_PER_POLL: usize = 1 << 14;
+
 /// Returns the longest side of the bounding box of vertices without distant specks, in units of the mesh.
 pub fn length_of(vertices: &Vertices) -> f64 {
-    let bulk = match vertices {
-        Vertices::Single(all) => bulk_box(all),
-        Vertices::Double(all) => bulk_box(all),
-    };
+    match vertices {
+        Vertices::Single(all) => longest_side(all),
+        Vertices::Double(all) => longest_side(all),
+    }
+}
+
+fn longest_side<T: Copy + Into<f64>>(vertices: &[[T; 3]]) -> f64 {
+    let bulk = bulk_box(vertices);
     let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
-    for vertex in polled(vertices.iter()).filter(|vertex| is_in_box(&bulk, vertex)) {
-        for (bounds, value) in bounds.iter_mut().zip(vertex) {
-            *bounds = [bounds[0].min(value), bounds[1].max(value)];
+    for part in vertices.chunks(VERTICES_PER_POLL) {
+        poll();
+        for vertex in part {
+            let vertex = vertex.map(Into::into);
+            let is_inside = is_in_box(&bulk, &vertex);
+            for ([low, high], value) in bounds.iter_mut().zip(vertex) {
+                // Plain comparisons take less time than `min` and `max`.
+                *low = if is_inside && value < *low {
+                    value
+                } else {
+                    *low
+                };
+                *high = if is_inside && value > *high {
+                    value
+                } else {
+                    *high
+                };
+            }
         }
     }
     bounds

@@ -65,9 +65,16 @@ impl<T: Pod> PageVec<T> {
     #[inline]
     pub fn push(&mut self, element: T) {
         match &mut self.0 {
-            Storage::Heap(vec) => vec.push(element),
-            Storage::Pages { .. } => self.extend([element]),
+            Storage::Heap(vec) => return vec.push(element),
+            Storage::Pages { pages, len } => {
+                if let Some(place) = as_elements(pages).get_mut(*len) {
+                    *place = element;
+                    *len += 1;
+                    return;
+                }
+            }
         }
+        self.extend([element]);
     }
 
     /// Appends elements.

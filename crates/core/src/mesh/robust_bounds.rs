@@ -12,13 +12,8 @@ pub type Bounds<const N: usize> = [[f64; N]; 2];
 
 /// Returns the lowest and the highest value of the bulk. If there are no specks, these are the exact bounds.
 pub fn bulk_along(values: &[f32]) -> [f64; 2] {
-    let mut bulk = BulkRange::new(values.len(), |k| values[k]);
-    for lanes in values.chunks(LANES) {
-        // NaN is ignored.
-        bulk.add(std::array::from_fn(|k| {
-            lanes.get(k).copied().unwrap_or(f32::NAN)
-        }));
-    }
+    let mut bulk = BulkRange::new(&samples(values.len(), |k| values[k]));
+    bulk.add_all(values);
     bulk.range().map(f64::from)
 }
 
@@ -35,9 +30,9 @@ pub struct BulkRange {
 }
 
 impl BulkRange {
-    /// Samples `count` values to find the limits of the bulk; adds none.
-    pub fn new(count: usize, value: impl Fn(usize) -> f32) -> Self {
-        let [least, most] = limits(count, |k| f64::from(value(k)));
+    /// Finds the limits of the bulk from [`samples`] of its values; adds none.
+    pub fn new(samples: &[f32]) -> Self {
+        let [least, most] = limits(samples.iter().map(|v| f64::from(*v)));
         Self {
             least: least as f32,
             most: most as f32,
@@ -57,9 +52,14 @@ impl BulkRange {
         }
     }
 
-    /// Returns whether a value belongs to the bulk.
-    pub fn contains(&self, value: f32) -> bool {
-        (self.least..=self.most).contains(&value)
+    /// Adds any number of values.
+    pub fn add_all(&mut self, values: &[f32]) {
+        for lanes in values.chunks(LANES) {
+            // NaN is ignored.
+            self.add(std::array::from_fn(|k| {
+                lanes.get(k).copied().unwrap_or(f32::NAN)
+            }));
+        }
     }
 
     /// Returns the lowest and the highest of the values added so far that belong to the bulk.
@@ -73,19 +73,23 @@ impl BulkRange {
 
 /// Returns the bulk along each axis as a box. Points outside the box are specks.
 pub fn bulk_box<T: Copy + Into<f64>>(points: &[[T; 3]]) -> Bounds<3> {
-    let along = [0, 1, 2].map(|axis| limits(points.len(), |k| points[k][axis].into()));
+    let sampled = samples(points.len(), |k| points[k]);
+    let along = [0, 1, 2].map(|axis| limits(sampled.iter().map(|point| point[axis].into())));
     [0, 1].map(|end| along.map(|limits| limits[end]))
 }
 
-/// Returns the limits of the bulk of `count` values.
-fn limits(count: usize, value: impl Fn(usize) -> f64) -> [f64; 2] {
-    if count == 0 {
+/// Samples `count` values in equal steps, about [`SAMPLES`].
+pub fn samples<T>(count: usize, value: impl Fn(usize) -> T) -> Vec<T> {
+    let stride = count.div_ceil(SAMPLES).max(1);
+    (0..count).step_by(stride).map(value).collect()
+}
+
+/// Returns the limits of the bulk of sampled values.
+fn limits(values: impl ExactSizeIterator<Item = f64> + Clone) -> [f64; 2] {
+    if values.len() == 0 {
         return [f64::INFINITY, f64::NEG_INFINITY];
     }
-    let stride = count.div_ceil(SAMPLES);
-    let sampled = count.div_ceil(stride);
-    let specks = ((sampled - 1) as f64 * SPECK_SHARE) as usize;
-    let values = (0..sampled).map(|k| value(k * stride));
+    let specks = ((values.len() - 1) as f64 * SPECK_SHARE) as usize;
     let low = smallest(values.clone(), specks);
     let high = -smallest(values.map(|v| -v), specks);
     let slack = WIDENED * (high - low);

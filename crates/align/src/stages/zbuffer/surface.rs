@@ -5,7 +5,7 @@ use super::draw_effort::GivenUp;
 use super::triangle_block::{AffineForm, Coordinate, LANES, LaneArray, TriangleBlock, pack_block};
 use mocban_core::domain::Rigid3;
 use mocban_core::domain::cancel::{poll, polled};
-use mocban_core::mesh::robust_bounds::{Bounds, BulkRange, bulk_box};
+use mocban_core::mesh::robust_bounds::{Bounds, BulkRange, bulk_box, samples};
 use mocban_core::mesh::{Mesh, Vertices};
 use mocban_core::page_vec::PageVec;
 use mocban_core::simd::dispatch;
@@ -28,6 +28,8 @@ pub(crate) struct IndexedSurface {
     pub(super) blocks: PageVec<TriangleBlock>,
     /// Boxes of each [`LANES`] blocks.
     pub(super) bounds: Vec<BlockBounds>,
+    /// Samples of the corners, which show the bulk along any direction.
+    corners: Vec<[f32; 3]>,
     /// Number of triangles (or points) in the blocks.
     pub(super) triangle_count: usize,
     pub(super) has_faces: bool,
@@ -70,9 +72,14 @@ impl IndexedSurface {
                 bounds.push(BlockBounds::new(&blocks[first..], extent));
             }
         });
+        let corners = samples(blocks.len() * 3 * LANES, |k| {
+            let corner: &[LaneArray; 3] = &blocks[k / (3 * LANES)][k / LANES % 3];
+            [0, 1, 2].map(|axis| corner[axis][k % LANES])
+        });
         Self {
             origin,
             bulk,
+            corners,
             triangle_count: triangles.len(),
             bounds,
             blocks,
@@ -104,19 +111,10 @@ impl IndexedSurface {
 
     /// Returns the lowest and highest value of the bulk along an affine form.
     fn bulk_range_along(&self, row: &AffineForm) -> [f64; 2] {
-        let mut bulk = BulkRange::new(self.blocks.len() * 3 * LANES, |k| {
-            let corner = &self.blocks[k / (3 * LANES)][k / LANES % 3];
-            row.at([0, 1, 2].map(|axis| corner[axis][k % LANES]))
-        });
-        let add = |bulk: &mut BulkRange, block: &TriangleBlock| {
-            for corner in block {
-                bulk.add(row.at_lanes(corner));
-            }
-        };
-        // Extreme blocks come first, so that few of the others change the range.
-        for place in self.extreme_blocks(row, &bulk) {
-            add(&mut bulk, &self.blocks[place]);
-        }
+        // The samples come first, so that few blocks change the range.
+        let sampled: Vec<f32> = self.corners.iter().map(|corner| row.at(*corner)).collect();
+        let mut bulk = BulkRange::new(&sampled);
+        bulk.add_all(&sampled);
         let [mut low, mut high] = bulk.range();
         dispatch!({
             let groups = self.bounds.iter().zip(self.blocks.chunks(LANES));
@@ -125,37 +123,24 @@ impl IndexedSurface {
                     poll();
                 }
                 let [lows, highs] = bounds.range_along(row);
+                let mut is_wider = false;
+                for k in 0..LANES {
+                    is_wider |= (lows[k] < low) | (highs[k] > high);
+                }
+                if !is_wider {
+                    continue;
+                }
                 for (k, block) in blocks.iter().enumerate() {
                     if lows[k] < low || highs[k] > high {
-                        add(&mut bulk, block);
+                        for corner in block {
+                            bulk.add(row.at_lanes(corner));
+                        }
                         [low, high] = bulk.range();
                     }
                 }
             }
         });
         [low, high].map(f64::from)
-    }
-
-    /// Returns the indices of the two blocks whose bounds along `row` reach lowest and highest inside the bulk.
-    fn extreme_blocks(&self, row: &AffineForm, bulk: &BulkRange) -> [usize; 2] {
-        let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
-        dispatch!({
-            for (group, bounds) in self.bounds.iter().enumerate() {
-                if group.is_multiple_of(GROUPS_PER_POLL) {
-                    poll();
-                }
-                let [lows, highs] = bounds.range_along(row);
-                for k in 0..LANES {
-                    if lows[k] < low && bulk.contains(lows[k]) {
-                        (low, places[0]) = (lows[k], group * LANES + k);
-                    }
-                    if highs[k] > high && bulk.contains(highs[k]) {
-                        (high, places[1]) = (highs[k], group * LANES + k);
-                    }
-                }
-            }
-        });
-        places.map(|place| place.min(self.blocks.len() - 1))
     }
 
     /// Projects the surface along z of the frame. Returns the fraction of the projected area, 0..=1, with a winding
@@ -167,20 +152,23 @@ impl IndexedSurface {
         let normal = [0, 1, 2].map(|k| plane_from_mesh.0[2][k] as f32);
         let (mut out, mut all) = (0.0, 0.0);
         let stride = self.blocks.len().div_ceil(WINDING_SAMPLE_BLOCKS);
-        for (place, [a, b, c]) in self.blocks.iter().enumerate().step_by(stride) {
-            let facing = facing(normal, a, b, c);
-            // The last block repeats its last triangle.
-            let count = self.triangle_count - place * LANES;
-            for facing in facing.into_iter().take(count).map(f64::from) {
-                all += facing.abs();
-                out += facing.max(0.0);
+        dispatch!({
+            for (place, [a, b, c]) in self.blocks.iter().enumerate().step_by(stride) {
+                let facing = facing(normal, a, b, c);
+                // The last block repeats its last triangle.
+                let count = self.triangle_count - place * LANES;
+                for facing in facing.into_iter().take(count).map(f64::from) {
+                    all += facing.abs();
+                    out += facing.max(0.0);
+                }
             }
-        }
+        });
         (all > 0.0).then(|| out / all)
     }
 }
 
 /// Returns twice each triangle's signed area, projected along the normal. Triangles facing away have a negative area.
+#[inline(always)]
 fn facing(
     [x, y, z]: [f32; 3],
     a: &[LaneArray; 3],
