@@ -28,17 +28,22 @@ pub fn gaussian_blur_transposed(transposed: Grid<f32>, sigma: f64) -> Grid<f32> 
     let rounded = |pass: u32| (half * f64::from(pass)).round() as usize;
     let radii = [0, 1, 2].map(|pass| rounded(pass + 1) - rounded(pass));
     // Columns are summed in parallel lanes.
-    box_blur_columns(box_blur_columns(transposed, radii).transposed(), radii)
+    let memory = vec![0.0; transposed.data().len()];
+    let [rows, memory] = box_blur_columns(transposed, memory, radii);
+    let columns = rows.transposed_in(memory.into_vec());
+    let [blurred, _] = box_blur_columns(columns, rows.into_vec(), radii);
+    blurred
 }
 
-/// Applies box filters down the columns, one after another.
-fn box_blur_columns(mut values: Grid<f32>, radii: [usize; 3]) -> Grid<f32> {
-    let mut means = Grid::new(values.width(), values.height(), 0.0);
+/// Applies box filters down the columns, one after another. `memory` holds as many values. Returns the result, and a grid
+/// whose memory is free.
+fn box_blur_columns(mut values: Grid<f32>, memory: Vec<f32>, radii: [usize; 3]) -> [Grid<f32>; 2] {
+    let mut means = Grid::of(values.width(), values.height(), memory);
     for radius in radii.into_iter().filter(|radius| *radius > 0) {
         box_blur_all_columns(&values, radius, &mut means);
         std::mem::swap(&mut values, &mut means);
     }
-    values
+    [values, means]
 }
 
 /// Columns summed in parallel: many where possible, few for the rest.
@@ -115,7 +120,8 @@ mod tests {
             radius in 1_usize..30,
         ) {
             let grid = Grid::from_fn(width, height, |x, y| ((x * 7 + y * 13) % 17) as f32);
-            let means = box_blur_columns(grid.clone(), [0, radius, 0]);
+            let memory = vec![0.0; width * height];
+            let [means, _] = box_blur_columns(grid.clone(), memory, [0, radius, 0]);
             for y in 0..height {
                 for x in 0..width {
                     let rows = y.saturating_sub(radius)..(y + radius + 1).min(height);

@@ -39,7 +39,8 @@ fn transpose_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width
 }
 
 impl<T: Copy> Grid<T> {
-    const fn of(width: usize, height: usize, data: Vec<T>) -> Self {
+    /// Creates a grid from `width * height` values.
+    pub(super) const fn of(width: usize, height: usize, data: Vec<T>) -> Self {
         Self {
             width,
             height,
@@ -96,8 +97,13 @@ impl<T: Copy> Grid<T> {
     /// Returns the transposed grid.
     #[must_use]
     pub fn transposed(&self) -> Self {
+        self.transposed_in(self.data.clone())
+    }
+
+    /// Returns the transposed grid in memory that holds as many values.
+    pub(super) fn transposed_in(&self, memory: Vec<T>) -> Self {
         let (width, height) = (self.width, self.height);
-        let mut data = self.data.clone();
+        let mut data = memory;
         for top in (0..height).step_by(TILE) {
             poll();
             let rows = &self.data[top * width..];
@@ -154,6 +160,11 @@ impl<T: Copy> Grid<T> {
     /// Returns all values in row-major order.
     pub fn data(&self) -> &[T] {
         &self.data
+    }
+
+    /// Returns the memory of the values.
+    pub(super) fn into_vec(self) -> Vec<T> {
+        self.data
     }
 
     /// Returns all values for modification.
