@@ -13,19 +13,20 @@ pub(super) const FFT_SIZE: usize = 32;
 ///
 /// The surface is stored reversed: the value for shift s is at index -s, modulo the size.
 pub(super) fn best_shift(surface: &[Complex32], part: usize, max_shift_px: i64) -> ([f64; 2], f32) {
-    let mut best = ([0.0; 2], f32::NEG_INFINITY);
+    // The size is a power of two, so wrapped numbers have the right remainder.
+    let place = |shift: i64| shift.wrapping_neg() as usize % FFT_SIZE;
+    let value_of = |value: &Complex32| if part == 0 { value.re } else { value.im };
+    let mut best = ([0; 2], f32::NEG_INFINITY);
     for dy in -max_shift_px..=max_shift_px {
-        let from = (-dy).rem_euclid(FFT_SIZE as i64) as usize * FFT_SIZE;
-        let row = &surface[from..from + FFT_SIZE];
+        let row = &surface[place(dy) * FFT_SIZE..][..FFT_SIZE];
         for dx in -max_shift_px..=max_shift_px {
-            let value = row[(-dx).rem_euclid(FFT_SIZE as i64) as usize];
-            let value = if part == 0 { value.re } else { value.im };
+            let value = value_of(&row[place(dx)]);
             if value > best.1 {
-                best = ([dx as f64, dy as f64], value);
+                best = ([dx, dy], value);
             }
         }
     }
-    best
+    (best.0.map(|shift| shift as f64), best.1)
 }
 
 /// Two-dimensional FFTs of a square, with reusable buffers.

@@ -41,7 +41,7 @@ pub(super) struct Correspondences {
 /// Buffers that are reused between steps.
 #[derive(Default)]
 pub(super) struct Workspace {
-    /// The last block is padded with zeros.
+    /// The last block with correspondences is padded with zeros. Blocks after it are of earlier steps.
     blocks: Vec<Correspondences>,
     count: usize,
     /// Sum of products of corresponding values.
@@ -52,8 +52,8 @@ pub(super) struct Workspace {
 impl Workspace {
     /// Makes room for `most` correspondences and one that is discarded.
     pub(super) fn reset(&mut self, most: usize) {
-        self.blocks
-            .resize(most / LANES + 1, Correspondences::default());
+        let blocks = self.blocks.len().max(most / LANES + 1);
+        self.blocks.resize(blocks, Correspondences::default());
         self.count = 0;
     }
 
@@ -69,12 +69,12 @@ impl Workspace {
         self.count += usize::from(moving[3] >= 0.5);
     }
 
-    /// Truncates the buffer to the appended correspondences. `explained` is the sum of `fixed value * moving value`.
+    /// Pads the last block. `explained` is the sum of `fixed value * moving value`.
     pub(super) fn finish(&mut self, explained: f64) {
         self.explained = explained;
-        self.blocks.truncate(self.count.div_ceil(LANES));
-        let filled = (self.count + LANES - 1) % LANES + 1;
-        if let Some(last) = self.blocks.last_mut() {
+        let filled = self.count % LANES;
+        if filled > 0 {
+            let last = &mut self.blocks[self.count / LANES];
             for lane in filled..LANES {
                 last.fixed[lane] = 0.0;
                 last.moving[lane] = [0.0; 4];
@@ -82,10 +82,15 @@ impl Workspace {
         }
     }
 
+    /// Returns the appended correspondences.
+    fn filled_blocks(&self) -> &[Correspondences] {
+        &self.blocks[..self.count.div_ceil(LANES)]
+    }
+
     /// Fits `fixed = gain * moving + offset` by least squares. Returns the gain, at least 0.05, and the offset.
     fn gain_and_offset(&self) -> (f32, f32) {
         let totals = sum_blocks::<4>(
-            &self.blocks,
+            self.filled_blocks(),
             #[inline(always)]
             |sums, block, _| {
                 for k in 0..LANES {
@@ -106,7 +111,7 @@ impl Workspace {
     /// Returns the median of the absolute residuals.
     fn median_residual(&mut self, gain: f32, offset: f32) -> f32 {
         self.residual_sizes.clear();
-        for block in &self.blocks {
+        for block in &self.blocks[..self.count.div_ceil(LANES)] {
             let residual = |k: usize| block.fixed[k] - gain * block.moving[k][0] - offset;
             let residual_sizes: [f32; LANES] = std::array::from_fn(|k| residual(k).abs());
             self.residual_sizes.extend(residual_sizes);
@@ -135,7 +140,7 @@ impl NormalEquations {
         };
         let (count, fit) = (workspace.count, [gain, offset, cutoff]);
         let totals = sum_blocks(
-            &workspace.blocks,
+            workspace.filled_blocks(),
             #[inline(always)]
             |sums, block, place| {
                 let filled = LANES.min(count - place * LANES);

@@ -14,6 +14,7 @@ pub(super) struct PlacedLevel<'a> {
 
 impl PlacedLevel<'_> {
     /// Returns where a pixel of the fixed level lies in the moving level, or `None` if that place is not valid.
+    #[inline]
     pub(super) fn cell(&self, x: usize, y: usize) -> Option<BilinearCell> {
         let there = self.moving_from_fixed.apply([x as f64, y as f64]);
         let size = [self.valid.width(), self.valid.height()];
@@ -50,13 +51,16 @@ impl PoseOverlap {
         fixed_valid: &Grid<f32>,
         placed: &PlacedLevel<'_>,
     ) -> Self {
-        let (mut both, mut ink, mut relief) = (0.0, 0.0, 0.0);
-        for (x, y, cell) in placed.common_pixels(fixed_valid) {
+        // A fold over the nested iterators takes less time than a loop.
+        let common = placed.common_pixels(fixed_valid);
+        let [both, ink, relief] = common.fold([0.0; 3], |[both, ink, relief], (x, y, cell)| {
             let (a, b) = (fixed.amount.at(x, y), cell.value(&placed.moving.amount));
-            both += f64::from(a.min(b));
-            ink += f64::from(a);
-            relief += f64::from(b);
-        }
+            [
+                both + f64::from(a.min(b)),
+                ink + f64::from(a),
+                relief + f64::from(b),
+            ]
+        });
         let share = |of: f64| if of > 0.0 { both / of } else { 0.0 };
         Self {
             moving_covered: share(relief),

@@ -76,16 +76,17 @@ impl ImagePyramid {
 
     /// Returns `present` with each known pixel's amount replaced.
     fn mapped(&self, amount: impl Fn(f32) -> f32) -> Grid<f32> {
-        dispatch!(self.present.zip_map(
-            &self.known,
-            #[inline(always)]
-            |present, known| {
-                let is_known = known > 0.0;
-                let share = if is_known { known } else { 1.0 };
-                let replaced = share * amount(present / share);
-                if is_known { replaced } else { 0.0 }
-            },
-        ))
+        let mut mapped = self.present.clone();
+        let pairs = mapped.data_mut().iter_mut().zip(self.known.data());
+        dispatch!({
+            for (present, known) in pairs {
+                let is_known = *known > 0.0;
+                let share = if is_known { *known } else { 1.0 };
+                let replaced = share * amount(*present / share);
+                *present = if is_known { replaced } else { 0.0 };
+            }
+        });
+        mapped
     }
 
     /// Returns the image without plateaus wider than `2 radius + 1` working pixels. Returns `None` if the plateaus hold less

@@ -40,7 +40,7 @@ impl<'a> Refiner<'a> {
         Self::with_samples(Rc::new(FixedSamples::new(fixed)), fixed, moving)
     }
 
-    /// Prepares several moving levels against one fixed level.
+    /// Prepares several moving levels of the same place and size against one fixed level.
     pub(crate) fn for_levels(fixed: &'a PyramidLevel, moving: &'a [PyramidLevel]) -> Vec<Self> {
         let samples = Rc::new(FixedSamples::new(fixed));
         let with = |moving| Self::with_samples(Rc::clone(&samples), fixed, moving);
@@ -115,19 +115,32 @@ impl<'a> Refiner<'a> {
 
     /// Scores a pose without changing it.
     pub(crate) fn evaluate(&self, pose: &PoseCandidate) -> PoseCandidate {
-        let score = |from_fixed: Affine2| {
-            let product = self.product(
-                &from_fixed,
-                #[inline(always)]
-                |[u, v], _, _| self.sample_value(u, v),
-            );
-            self.normalize_score(product, &from_fixed)
+        let [score] = Self::scores(std::array::from_ref(self), pose);
+        PoseCandidate { score, ..*pose }
+    }
+
+    /// Scores a pose with each refiner of [`Self::for_levels`]. All find a pixel at the same place in their moving level.
+    pub(crate) fn scores<const N: usize>(refiners: &[Self; N], pose: &PoseCandidate) -> [f64; N] {
+        let Some(first) = refiners.first() else {
+            return [0.0; N];
         };
-        let from_fixed = self.moving_from_fixed(&pose.fixed_from_moving);
-        PoseCandidate {
-            score: from_fixed.map_or(0.0, score),
-            ..*pose
-        }
+        let Some(from_fixed) = first.moving_from_fixed(&pose.fixed_from_moving) else {
+            return [0.0; N];
+        };
+        let products = first.products(
+            &from_fixed,
+            #[inline(always)]
+            |place, _, _| {
+                let mut values = [0.0; N];
+                if let Some(cell) = BilinearCell::at_single(first.size, place) {
+                    for (value, refiner) in values.iter_mut().zip(refiners) {
+                        *value = cell.value(&refiner.moving.value);
+                    }
+                }
+                values
+            },
+        );
+        std::array::from_fn(|k| refiners[k].normalize_score(products[k], &from_fixed))
     }
 
     /// Computes how much of each level is covered by the other at a pose.
@@ -216,45 +229,50 @@ impl<'a> Refiner<'a> {
     /// Collects the correspondence of each sampled fixed pixel.
     fn gather_correspondences(&self, from_fixed: &Affine2, workspace: &mut Workspace) {
         workspace.reset(self.samples.places.len());
-        let product = self.product(
+        let [product] = self.products(
             from_fixed,
             #[inline(always)]
             |[u, v], place, value| {
-                self.sample_cell(u, v).map_or(0.0, |cell| {
+                [self.sample_cell(u, v).map_or(0.0, |cell| {
                     workspace.push(value, cell, place);
                     cell[0]
-                })
+                })]
             },
         );
         workspace.finish(product);
     }
 
-    /// Sums `fixed value * moving_value(...)` over the sampled pixels. The arguments of `moving_value` are the position
-    /// in the moving level, the position in the fixed level, and the fixed value.
+    /// Sums `fixed value * moving value` over the sampled pixels, for each of the values that `moving_values` returns. Its
+    /// arguments are the position in the moving level, the position in the fixed level, and the fixed value.
     #[inline(always)]
-    fn product(
+    fn products<const N: usize>(
         &self,
         from_fixed: &Affine2,
-        mut moving_value: impl FnMut([f32; 2], [f32; 2], f32) -> f32,
-    ) -> f64 {
+        mut moving_values: impl FnMut([f32; 2], [f32; 2], f32) -> [f32; N],
+    ) -> [f64; N] {
         let FixedSamples { places, values, .. } = &*self.samples;
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
         let runs = places
             .chunks(PIXELS_PER_SUM)
             .zip(values.chunks(PIXELS_PER_SUM));
-        let mut product = 0.0_f64;
+        let mut products = [0.0_f64; N];
         dispatch!({
             for (places, values) in runs {
-                let mut part = 0.0_f32;
+                let mut parts = [0.0_f32; N];
                 for ([x, y], value) in places.iter().zip(values) {
                     let u = a[0] * x + a[1] * y + a[2];
                     let v = b[0] * x + b[1] * y + b[2];
-                    part += moving_value([u, v], [*x, *y], *value) * value;
+                    let moving = moving_values([u, v], [*x, *y], *value);
+                    for k in 0..N {
+                        parts[k] += moving[k] * value;
+                    }
                 }
-                product += f64::from(part);
+                for k in 0..N {
+                    products[k] += f64::from(parts[k]);
+                }
             }
         });
-        product
+        products
     }
 
     /// Interpolates value, gradient and weight of the moving level. Returns `None` outside the level.
@@ -268,13 +286,6 @@ impl<'a> Refiner<'a> {
         );
         let (top, bottom) = (lerp(above[0], above[1], fx), lerp(below[0], below[1], fx));
         Some(lerp(top, bottom, fy))
-    }
-
-    /// Interpolates the value alone; 0 outside.
-    #[inline(always)]
-    fn sample_value(&self, u: f32, v: f32) -> f32 {
-        let cell = BilinearCell::at_single(self.size, [u, v]);
-        cell.map_or(0.0, |cell| cell.value(&self.moving.value))
     }
 
     /// Converts a sum of products over the sampled pixels to a correlation, using the energies of both levels.
@@ -349,12 +360,29 @@ fn cells(level: &PyramidLevel) -> Vec<[f32; 4]> {
     for y in 0..height {
         let [above, row, below] =
             [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| level.value.row(y));
-        let sides = (0..width).map(|x| {
+        let weights = level.weight.row(y);
+        let cell = |x: usize| {
             let slope_x = (row[(x + 1).min(width - 1)] - row[x.saturating_sub(1)]) * 0.5;
             let slope_y = (below[x] - above[x]) * 0.5;
-            [row[x], slope_x, slope_y, level.weight.at(x, y)]
-        });
-        cells.extend(sides);
+            [row[x], slope_x, slope_y, weights[x]]
+        };
+        cells.push(cell(0));
+        let columns = above.iter().zip(below).zip(weights).skip(1);
+        cells.extend(
+            row.windows(3)
+                .zip(columns)
+                .map(|(near, ((above, below), weight))| {
+                    [
+                        near[1],
+                        (near[2] - near[0]) * 0.5,
+                        (below - above) * 0.5,
+                        *weight,
+                    ]
+                }),
+        );
+        if width > 1 {
+            cells.push(cell(width - 1));
+        }
     }
     cells
 }

@@ -49,8 +49,7 @@ impl<'a> SoftThresholds<'a> {
 
     /// Finds the threshold that fits best at a pose.
     pub(super) fn best_at<'b>(&'b self, pose: &PoseCandidate) -> Option<BestThreshold<'a, 'b>> {
-        let score = |strokes: &Refiner| strokes.evaluate(pose).score;
-        let scores: Vec<f64> = self.refiners.iter().map(score).collect();
+        let scores = Refiner::scores(self.refiners.first_chunk::<NEAR>()?, pose);
         let best = highest(&scores);
         let at = summit(&scores);
         let cut = |k: usize| self.cuts[k.min(self.cuts.len() - 1)];
