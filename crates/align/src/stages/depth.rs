@@ -7,7 +7,7 @@ use super::zbuffer::{IndexedSurface, LARGEST_OVERLAP, NO_HIT, Viewport};
 use mocban_core::domain::cancel::poll;
 use mocban_core::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use mocban_core::raster::{DepthMap, Grid};
-use mocban_core::simd::{max_f32, min_f32};
+use mocban_core::simd::{dispatch, max_f32, min_f32};
 
 /// Raised by every change of the code that may change results.
 pub const REVISION: u32 = 5;
@@ -134,14 +134,16 @@ pub fn depth(
     }
     if let Some(curvature) = &fit.curvature {
         let rows = heights.data_mut().chunks_exact_mut(view.width);
-        for (y, row) in rows.enumerate() {
-            poll();
-            // Conversions from 32-bit integers to floats are vectorized.
-            for (x, height) in (0_i32..).zip(row) {
-                let [u, v] = plane_from_px.apply([f64::from(x), y as f64]);
-                *height -= curvature.height(u, v) as f32;
+        dispatch!({
+            for (y, row) in rows.enumerate() {
+                poll();
+                // Conversions from 32-bit integers to floats are vectorized.
+                for (x, height) in (0_i32..).zip(row) {
+                    let [u, v] = plane_from_px.apply([f64::from(x), y as f64]);
+                    *height -= curvature.height(u, v) as f32;
+                }
             }
-        }
+        });
     }
     let (levels, height_min, height_per_level) =
         quantize(&heights).ok_or(DepthError::NothingSeen)?;
@@ -182,12 +184,20 @@ fn longest_px(
 fn quantize(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
     let [low, high] = range(heights)?.map(f64::from);
     let step = ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE));
-    let levels = heights.map(|z| {
-        let steps = ((f64::from(*z) - low) / step).clamp(0.0, 65_534.0);
-        // Rounds half up. A call of `round` would take longer than the rest of the loop.
-        let whole = steps as i32;
-        let level = 1 + whole + i32::from(steps - f64::from(whole) >= 0.5);
-        if *z == NO_HIT { 0 } else { level as u16 }
+    let width = heights.width();
+    let mut levels = Grid::new(width, heights.height(), 0);
+    let rows = levels.data_mut().chunks_exact_mut(width);
+    dispatch!({
+        for (levels, heights) in rows.zip(heights.data().chunks_exact(width)) {
+            poll();
+            for (level, z) in levels.iter_mut().zip(heights) {
+                let steps = ((f64::from(*z) - low) / step).clamp(0.0, 65_534.0);
+                // Rounds half up. A call of `round` would take longer than the rest of the loop.
+                let whole = steps as i32;
+                let nearest = 1 + whole + i32::from(steps - f64::from(whole) >= 0.5);
+                *level = if *z == NO_HIT { 0 } else { nearest as u16 };
+            }
+        }
     });
     Some((levels, low, step))
 }

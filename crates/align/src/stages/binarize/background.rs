@@ -58,31 +58,32 @@ pub(super) fn extreme(
     pick: impl Fn(f32, f32) -> f32,
 ) -> Grid<f32> {
     // Transposes the result, so that two calls cover both axes.
-    let along_rows = |cells: &Grid<f32>| {
-        let rows = (0..cells.height()).flat_map(|y| doubled(cells.row(y), reach, &pick));
-        let extremes = Grid::from_vec(cells.width(), cells.height(), rows.collect());
-        extremes.expect("one value for each cell").transposed()
-    };
-    along_rows(&along_rows(cells))
+    let down_columns = |cells: &Grid<f32>| doubled(cells, reach, &pick).transposed();
+    down_columns(&down_columns(cells))
 }
 
-/// Returns the extreme value within `reach` cells on either side of each cell, from windows that double in width.
-fn doubled(row: &[f32], reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Vec<f32> {
-    let (len, window) = (row.len(), 2 * reach + 1);
-    // Padded by `reach` cells, so that the window that starts at index k is centred on cell k.
-    let mut spans = vec![EMPTY; reach];
-    spans.extend_from_slice(row);
-    spans.resize(len + 2 * reach, EMPTY);
-    let mut width = 1;
-    while width < window {
-        let step = width.min(window - width);
-        for k in 0..spans.len() - step {
-            spans[k] = pick(spans[k], spans[k + step]);
+/// Returns the extreme value within `reach` cells above and below each cell, from windows that double in height. Whole rows
+/// are combined, which is vectorized.
+fn doubled(cells: &Grid<f32>, reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Grid<f32> {
+    let (width, height, window) = (cells.width(), cells.height(), 2 * reach + 1);
+    // Padded by `reach` rows, so that the window that starts at row k is centred on row k.
+    let mut spans = vec![EMPTY; reach * width];
+    spans.extend_from_slice(cells.data());
+    spans.resize((height + 2 * reach) * width, EMPTY);
+    let mut span = 1;
+    while span < window {
+        let step = span.min(window - span);
+        for row in 0..height + 2 * reach - step {
+            let (upper, lower) = spans.split_at_mut((row + step) * width);
+            let upper = &mut upper[row * width..][..width];
+            for (value, other) in upper.iter_mut().zip(&lower[..width]) {
+                *value = pick(*value, *other);
+            }
         }
-        width += step;
+        span += step;
     }
-    spans.truncate(len);
-    spans
+    spans.truncate(height * width);
+    Grid::from_vec(width, height, spans).expect("one value for each cell")
 }
 
 #[cfg(test)]

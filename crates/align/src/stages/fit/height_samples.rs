@@ -50,7 +50,8 @@ impl HeightSamples {
         let size = [heights.width(), heights.height()];
         let extent = view.unit_per_px * size[0].max(size[1]) as f64;
         let centre = back.apply(size.map(|side| (side - 1) as f64 / 2.0));
-        let (mut points, mut places) = (Points::default(), Vec::new());
+        let most = size[0] * size[1];
+        let (mut points, mut places) = (Points::with_capacity(most), Vec::with_capacity(most));
         for y in 0..size[1] {
             for (x, z) in heights.row(y).iter().enumerate() {
                 if *z != NO_HIT {
@@ -72,7 +73,7 @@ impl HeightSamples {
         centre: [f64; 2],
         extent: f64,
     ) -> Self {
-        let mut few = Points::default();
+        let mut few = Points::with_capacity(points.len() / 3);
         for (point, place) in points.iter().zip(&places) {
             if (place % size[0]).is_multiple_of(2) && (place / size[0]).is_multiple_of(2) {
                 few.push(point);
@@ -117,7 +118,7 @@ impl HeightSamples {
             other_from_this.apply([self.centre[0] + u, self.centre[1] + v, z])
         };
         let [x, y, _] = at([0.0; 3]);
-        let mut points = Points::default();
+        let mut points = Points::with_capacity(self.points.len());
         for point in self.points.iter() {
             let [u, v, z] = at(point);
             points.push([u - x, v - y, z].map(|length| length / self.extent));

@@ -30,6 +30,14 @@ pub(super) struct Prior {
 }
 
 impl Points {
+    /// Creates an empty list with room for `count` points.
+    pub(super) fn with_capacity(count: usize) -> Self {
+        Self {
+            blocks: Vec::with_capacity(count.div_ceil(LANES)),
+            count: 0,
+        }
+    }
+
     pub(super) fn push(&mut self, point: [f64; 3]) {
         let lane = self.count % LANES;
         if lane == 0 {
