@@ -65,8 +65,8 @@ impl IndexedSurface {
         [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| AffineForm(row.map(|v| v as f32)))
     }
 
-    /// Calls `emit` with the index and the height of every pixel that is tested against a triangle. The height is NaN
-    /// if the pixel's centre is outside that triangle.
+    /// Calls `emit` with the index and the height of each pixel whose centre is inside a triangle. May also call it for
+    /// other pixels that are tested; their height is NaN.
     fn rasterize(&self, plane_from_mesh: &Rigid3, view: &Viewport, emit: impl FnMut(usize, f32)) {
         if self.given_up.get() {
             return;

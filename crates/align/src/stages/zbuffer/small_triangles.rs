@@ -63,10 +63,9 @@ impl SmallTriangles {
             place[k] = index_from_f32(origin[1][k]) as usize * width
                 + index_from_f32(origin[0][k]) as usize;
         }
-        let last = width * height - 1;
         for row in 0..self.max_span[1] {
             for column in 0..self.max_span[0] {
-                let mut heights_hit = [f32::NAN; LANES];
+                let (mut heights, mut hits) = ([0.0; LANES], [0_u32; LANES]);
                 for k in 0..LANES {
                     let (x, y) = (origin[0][k] + column as f32, origin[1][k] + row as f32);
                     let orientation = planes.orientation[k];
@@ -81,17 +80,18 @@ impl SmallTriangles {
                     let side =
                         |from: usize, to: usize| across[from] * down[to] - down[from] * across[to];
                     let least = min_f32(min_f32(side(0, 1), side(1, 2)), side(2, 0));
-                    let z = planes.height(k, x, y);
+                    heights[k] = planes.height(k, x, y);
                     let is_within = (x < width as f32) & (y < height as f32);
-                    heights_hit[k] = if (least >= 0.0) & is_within {
-                        z
-                    } else {
-                        f32::NAN
-                    };
+                    let is_hit = (least >= 0.0) & is_within;
+                    hits[k] = if is_hit { 1 << k } else { 0 };
                 }
                 let on = row * width + column;
-                for k in 0..LANES {
-                    emit((place[k] + on).min(last), heights_hit[k]);
+                // Most steps hit no triangle or one.
+                let mut hits = hits.into_iter().fold(0, |all, lane| all | lane);
+                while hits != 0 {
+                    let k = hits.trailing_zeros() as usize % LANES;
+                    emit(place[k] + on, heights[k]);
+                    hits &= hits - 1;
                 }
             }
         }
