@@ -67,22 +67,24 @@ fn sort(values: &mut [f32]) {
     }
     let mut keys: Vec<u32> = values.iter().map(|v| key(*v)).collect();
     let mut sorted = vec![0; keys.len()];
-    for shift in DIGITS {
-        let digit = |key: u32| (key >> shift) as usize % DIGIT_VALUES;
-        // At first the number of keys with each digit value. Later the index in `sorted` for the next such key.
-        let mut places = [0_u32; DIGIT_VALUES];
-        poll();
-        for key in &keys {
-            places[digit(*key)] += 1;
+    let digit = |key: u32, shift: u32| (key >> shift) as usize % DIGIT_VALUES;
+    // At first the number of keys with each value of a digit. Later the index in `sorted` for the next such key.
+    let mut places = [[0_u32; DIGIT_VALUES]; DIGITS.len()];
+    poll();
+    for key in &keys {
+        for (places, shift) in places.iter_mut().zip(DIGITS) {
+            places[digit(*key, shift)] += 1;
         }
+    }
+    for (places, shift) in places.iter_mut().zip(DIGITS) {
         let mut next = 0;
-        for place in &mut places {
+        for place in places.iter_mut() {
             next += std::mem::replace(place, next);
         }
         for part in keys.chunks(KEYS_PER_POLL) {
             poll();
             for key in part {
-                let place = &mut places[digit(*key)];
+                let place = &mut places[digit(*key, shift)];
                 sorted[*place as usize] = *key;
                 *place += 1;
             }

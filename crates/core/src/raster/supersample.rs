@@ -59,16 +59,21 @@ impl Supersampler {
         cell: impl Fn(&Grid<T>, [f64; 2]) -> ([T; 4], [f64; 2]),
     ) -> [f64; LEVELS] {
         let mut covered = [0.0; LEVELS];
-        self.for_each_sample(x, y, |place| {
-            let (near, within) = cell(values, place);
-            let weights = bilinear_weights(within);
-            for i in 0..4 {
-                let value: f64 = near[i].into();
-                for k in 0..LEVELS {
-                    covered[k] += if value >= least[k] { weights[i] } else { 0.0 };
+        self.for_each_sample(
+            x,
+            y,
+            #[inline(always)]
+            |place| {
+                let (near, within) = cell(values, place);
+                let weights = bilinear_weights(within);
+                for i in 0..4 {
+                    let value: f64 = near[i].into();
+                    for k in 0..LEVELS {
+                        covered[k] += if value >= least[k] { weights[i] } else { 0.0 };
+                    }
                 }
-            }
-        });
+            },
+        );
         covered
     }
 
