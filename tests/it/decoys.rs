@@ -59,7 +59,7 @@ fn pairs_that_do_not_belong_together_are_refused() {
 #[test]
 fn look_alikes_are_pairs_of_different_characters() {
     let pairs = PairGenerator::new(Tier::Upright, 3).with_vertices(Some(2000));
-    for index in [0, 20] {
+    for index in [0, 60] {
         let decoy = decoy_pair(&pairs, Decoy::LookAlike, index).expect("images encode");
         let [carved, printed] = if index == 0 {
             ['申', '甲']
