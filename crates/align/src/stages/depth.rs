@@ -60,6 +60,9 @@ impl DepthParams {
     }
 }
 
+/// Doubles of this magnitude (2^52) have no fraction bits, and their lowest bits are the bits of an integer.
+const INTEGER_BIAS: f64 = 4_503_599_627_370_496.0;
+
 /// Why the depth stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DepthError {
@@ -192,10 +195,11 @@ fn quantize(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
             poll();
             for (level, z) in levels.iter_mut().zip(heights) {
                 let steps = ((f64::from(*z) - low) / step).clamp(0.0, 65_534.0);
-                // Rounds half up. A call of `round` would take longer than the rest of the loop.
-                let whole = steps as i32;
-                let nearest = 1 + whole + i32::from(steps - f64::from(whole) >= 0.5);
-                *level = if *z == NO_HIT { 0 } else { nearest as u16 };
+                // Rounds half up. Calls and casts would not be vectorized.
+                let near = (steps + INTEGER_BIAS) - INTEGER_BIAS;
+                let up = if steps - near >= 0.5 { 1.0 } else { 0.0 };
+                let nearest = (near + up + 1.0 + INTEGER_BIAS).to_bits() as u16;
+                *level = if *z == NO_HIT { 0 } else { nearest };
             }
         }
     });

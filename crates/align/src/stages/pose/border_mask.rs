@@ -146,16 +146,18 @@ fn without_border_strokes(weight: &Grid<f32>, border: &Mask) -> Grid<f32> {
 }
 
 fn without_border_band(weight: &Grid<f32>) -> Grid<f32> {
-    let reach = (BORDER_BAND * weight.width().max(weight.height()) as f64).round() as i64;
-    let around = [(reach, 0), (-reach, 0), (0, reach), (0, -reach)];
-    Grid::from_fn(weight.width(), weight.height(), |x, y| {
-        let (i, j) = (x as i64, y as i64);
-        let is_known = |(dx, dy): &(i64, i64)| weight.get(i + dx, j + dy).is_some_and(|w| w > 0.0);
-        if around.iter().all(is_known) {
-            weight.at(x, y)
-        } else {
-            0.0
-        }
+    let reach = (BORDER_BAND * weight.width().max(weight.height()) as f64).round() as usize;
+    let (width, height) = (weight.width(), weight.height());
+    let is_inner = |at: usize, side: usize| at >= reach && at + reach < side;
+    Grid::from_fn(width, height, |x, y| {
+        let is_known = |x, y| weight.at(x, y) > 0.0;
+        let is_kept = is_inner(x, width)
+            && is_inner(y, height)
+            && is_known(x - reach, y)
+            && is_known(x + reach, y)
+            && is_known(x, y - reach)
+            && is_known(x, y + reach);
+        if is_kept { weight.at(x, y) } else { 0.0 }
     })
 }
 

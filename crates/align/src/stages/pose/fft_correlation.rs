@@ -17,9 +17,11 @@ pub(super) fn best_shift(surface: &[Complex32], part: usize, max_shift_px: i64) 
     let place = |shift: i64| shift.wrapping_neg() as usize % FFT_SIZE;
     let value_of = |value: &Complex32| if part == 0 { value.re } else { value.im };
     let mut best = ([0; 2], f32::NEG_INFINITY);
-    for dy in -max_shift_px..=max_shift_px {
+    // Loops over inclusive ranges take longer.
+    let shifts = || (0..2 * max_shift_px + 1).map(|k| k - max_shift_px);
+    for dy in shifts() {
         let row = &surface[place(dy) * FFT_SIZE..][..FFT_SIZE];
-        for dx in -max_shift_px..=max_shift_px {
+        for dx in shifts() {
             let value = value_of(&row[place(dx)]);
             if value > best.1 {
                 best = ([dx, dy], value);
@@ -100,16 +102,15 @@ impl FftCorrelator {
     /// Mirroring leaves the middle of the square, column `FFT_SIZE / 2`, in place. The result is stored reversed: the
     /// value for shift s is at index -s, modulo the size.
     pub(super) fn correlate(&mut self, target: &[Complex32], mirrored: bool) -> &[Complex32] {
-        for x in 0..FFT_SIZE {
+        let columns = self.product.chunks_exact_mut(FFT_SIZE);
+        for (x, (out, target)) in columns.zip(target.chunks_exact(FFT_SIZE)).enumerate() {
             let from = if mirrored {
                 (FFT_SIZE - x) % FFT_SIZE
             } else {
                 x
             } * FFT_SIZE;
             let column = &self.spectrum[from..from + FFT_SIZE];
-            let places = x * FFT_SIZE..(x + 1) * FFT_SIZE;
-            let out = &mut self.product[places.clone()];
-            for ((out, a), b) in out.iter_mut().zip(column).zip(&target[places]) {
+            for ((out, a), b) in out.iter_mut().zip(column).zip(target) {
                 *out = a * b;
             }
         }

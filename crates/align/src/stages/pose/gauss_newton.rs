@@ -46,7 +46,8 @@ pub(super) struct Workspace {
     count: usize,
     /// Sum of products of corresponding values.
     explained: f64,
-    residual_sizes: Vec<f32>,
+    /// Bits of the absolute residuals, which are ordered like these.
+    residual_sizes: Vec<u32>,
 }
 
 impl Workspace {
@@ -113,11 +114,11 @@ impl Workspace {
         self.residual_sizes.clear();
         for block in &self.blocks[..self.count.div_ceil(LANES)] {
             let residual = |k: usize| block.fixed[k] - gain * block.moving[k][0] - offset;
-            let residual_sizes: [f32; LANES] = std::array::from_fn(|k| residual(k).abs());
+            let residual_sizes: [u32; LANES] = std::array::from_fn(|k| residual(k).abs().to_bits());
             self.residual_sizes.extend(residual_sizes);
         }
         self.residual_sizes.truncate(self.count);
-        median(&mut self.residual_sizes)
+        f32::from_bits(median(&mut self.residual_sizes))
     }
 }
 
@@ -197,12 +198,12 @@ fn sum_blocks<const N: usize>(
     })
 }
 
-fn median(values: &mut [f32]) -> f32 {
+fn median(values: &mut [u32]) -> u32 {
     if values.is_empty() {
-        return 0.0;
+        return 0;
     }
     let k = values.len() / 2;
-    *values.select_nth_unstable_by(k, f32::total_cmp).1
+    *values.select_nth_unstable(k).1
 }
 
 /// Adds a block to the sums of the normal equations and to the sum of the losses.

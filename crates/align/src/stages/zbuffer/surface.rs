@@ -157,7 +157,8 @@ impl IndexedSurface {
                 let facing = facing(normal, a, b, c);
                 // The last block repeats its last triangle.
                 let count = self.triangle_count - place * LANES;
-                for facing in facing.into_iter().take(count).map(f64::from) {
+                for (k, facing) in facing.into_iter().enumerate() {
+                    let facing = f64::from(if k < count { facing } else { 0.0 });
                     all += facing.abs();
                     out += facing.max(0.0);
                 }
