@@ -1,4 +1,4 @@
-//! Pages of the results of pairs, of all or of those that people judged.
+//! Pages of the results of pairs: of all pairs, or only of judged ones.
 
 use std::vec::IntoIter;
 

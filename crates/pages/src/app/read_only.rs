@@ -20,7 +20,7 @@ pub(super) enum ReadOnlyPlace {
 
 impl ReadOnlyPlace {
     /// Finds out whether a project, or the folder of all projects, is such a place. Opens no project. A project in a database
-    /// is looked at once it is open.
+    /// is examined only after it was opened.
     pub(super) async fn find(state: &AppState, project: Option<&str>) -> Option<Self> {
         let folder = &state.options.folder;
         let of_all = || (!platform::may_write(folder)).then_some(Self::Folder);
