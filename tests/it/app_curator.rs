@@ -60,10 +60,10 @@ fn an_open_review_is_shown_in_the_language_that_was_chosen_since() {
 }
 
 #[test]
-fn the_page_of_the_run_leads_to_the_least_certain_results() {
+fn the_page_of_the_run_leads_to_the_least_confident_results() {
     let (_dir, page) = with_project();
     let run = html(&page, "/p/p/");
-    let link = "<a href=\"pairs?sort=confidence\">All results, least certain first</a>";
+    let link = "<a href=\"pairs?sort=confidence\">All results, least confident first</a>";
     assert!(run.contains(link), "{run}");
     html(&page, "/p/p/pairs?sort=confidence");
 }

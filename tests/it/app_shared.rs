@@ -62,6 +62,17 @@ fn two_apps_on_one_project_show_and_change_the_same() {
     let judged = html(&second, &format!("/p/p/{go}"));
     let part = "Only the chosen pairs are judged: <b>2</b>";
     assert!(judged.contains(part), "{judged}");
+    for path in [
+        "/",
+        "/import",
+        "/import?project=new",
+        "/import?project=p",
+        "/p/p/",
+        "/p/p/review",
+    ] {
+        let shown = html(&first, path);
+        assert!(!shown.contains("is read-only"), "{path}: {shown}");
+    }
     // A run that one of them started is that of both.
     import_more(dir.path(), ["late".to_owned()]);
     let run = json!({"which": "all"});

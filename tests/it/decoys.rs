@@ -6,7 +6,7 @@ use mocban::raster;
 use mocban::stages::{AlignedPair, Settings, StageError};
 use rayon::prelude::*;
 
-use crate::decoy::{Decoy, DecoyPair, decoy_pair};
+use crate::decoy::{Decoy, DecoyPair, LOOK_ALIKES, decoy_pair};
 use crate::semi_real::settings;
 
 /// Number of pairs per kind and tier.
@@ -54,6 +54,18 @@ fn pairs_that_do_not_belong_together_are_refused() {
         "aligned without an error: {}",
         accepted.join(", ")
     );
+}
+
+#[test]
+fn no_look_alikes_are_listed_twice() {
+    let mut listed = LOOK_ALIKES.map(|mut pair| {
+        assert_ne!(pair[0], pair[1]);
+        pair.sort_unstable();
+        pair
+    });
+    listed.sort_unstable();
+    let twice = listed.windows(2).find(|pairs| pairs[0] == pairs[1]);
+    assert_eq!(twice, None);
 }
 
 #[test]

@@ -11,8 +11,8 @@ const PLATE_NOISE: f64 = 0.0016;
 /// Depth, as a share of the character's height, below which the vertices of a closed scan belong to its base or walls.
 const BASE_DEPTH: f64 = 0.165;
 
-/// Characters of the demo's font that differ by one stroke or by the length of a stroke.
-const LOOK_ALIKES: [[char; 2]; 60] = [
+/// Similar characters of the demo's font, most of which differ by one stroke or by its length.
+pub(crate) const LOOK_ALIKES: [[char; 2]; 60] = [
     ['申', '甲'],
     ['太', '大'],
     ['土', '士'],

@@ -11,7 +11,7 @@ use csv::StringRecord;
 use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use super::location::now;
 use super::verdict_columns::{COLUMNS, REQUIRED};
-use super::verdict_json::{ArrayPlaces, array_places, array_rows, json_rows};
+use super::verdict_json::{array_rows, json_rows};
 use super::verdict_row::{GivenTime, VerdictRow, at_line};
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
@@ -31,12 +31,12 @@ pub struct VerdictList {
 }
 
 /// How the rows are written.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 enum VerdictLayout {
     /// CSV with this separator.
     Csv(u8),
     JsonLines,
-    JsonArray(ArrayPlaces),
+    JsonArray,
 }
 
 /// Text that clones share.
@@ -57,13 +57,13 @@ impl VerdictList {
     /// and the encoding.
     ///
     /// # Errors
-    /// Returns an error if the bytes are not text, if a quotation mark is never closed, or if an array is damaged.
+    /// Returns an error if the bytes are not text, or if a quotation mark is never closed.
     pub fn new(bytes: Vec<u8>, is_json: bool) -> Result<Self, RefusedLine> {
         let refuse = |error: NotText| RefusedLine::new(1, &error.to_string());
         let (text, layout) = if is_json {
             let text = as_utf8(&bytes).map_err(refuse)?;
             let layout = if is_array(&text) {
-                VerdictLayout::JsonArray(array_places(&text)?)
+                VerdictLayout::JsonArray
             } else {
                 VerdictLayout::JsonLines
             };
@@ -87,7 +87,7 @@ impl VerdictList {
         let text = self.text.clone();
         match &self.layout {
             VerdictLayout::JsonLines => Box::new(json_rows(text)),
-            VerdictLayout::JsonArray(places) => Box::new(array_rows(text, Arc::clone(places))),
+            VerdictLayout::JsonArray => Box::new(array_rows(text)),
             VerdictLayout::Csv(delimiter) => match csv_rows(text, *delimiter) {
                 Ok(rows) => Box::new(rows),
                 Err(refused) => Box::new(std::iter::once(Err(refused))),

@@ -1,8 +1,6 @@
 //! Parses verdicts in JSON: JSON Lines, such as those of an export, with one object on each line, or an array of objects.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
-use std::sync::Arc;
 
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -17,7 +15,7 @@ use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
 use mocban_lists::json_numbers::nan_as_null;
-use mocban_lists::manifest::each_value;
+use mocban_lists::manifest::ArrayCursor;
 
 /// The fields of the log of verdicts, which JSON Lines may have.
 const LOG_FIELDS: [&str; 17] = [
@@ -82,46 +80,51 @@ pub(crate) fn json_rows(
         let line = rest.split(|byte| *byte == b'\n').next()?;
         at += line.len() + 1;
         let is_blank = line.trim_ascii().is_empty();
-        Some((!is_blank).then(|| parsed(line)))
+        Some((!is_blank).then(|| parsed(line, 1)))
     };
     let lines = (1..).zip(std::iter::from_fn(next_line));
     let parsed = lines.filter_map(|(line, parsed)| Some((line, parsed?)));
     parsed.filter_map(|(line, parsed)| json_row(line, parsed).transpose())
 }
 
-/// The line of each value of an array, and its place in the text.
-pub(crate) type ArrayPlaces = Arc<Vec<(usize, Range<usize>)>>;
-
-/// Finds the values of an array of verdicts.
-pub(crate) fn array_places(text: &[u8]) -> Result<ArrayPlaces, RefusedLine> {
-    let mut places = Vec::new();
-    let ended = each_value(text, &mut |line, place| places.push((line, place)));
-    ended.map_err(|refused| RefusedLine::new(refused.line, refused.reason))?;
-    Ok(Arc::new(places))
-}
-
-/// Parses an array. Undone verdicts are ignored.
+/// Parses an array. Undone verdicts are ignored. Problems name the row, because a line may have many rows.
 pub(crate) fn array_rows(
     text: impl AsRef<[u8]> + Send,
-    places: ArrayPlaces,
 ) -> impl Iterator<Item = Result<VerdictRow, RefusedLine>> + Send {
-    (0..places.len()).filter_map(move |index| {
-        let (line, place) = places[index].clone();
-        json_row(line, parsed(&text.as_ref()[place])).transpose()
+    let mut cursor = ArrayCursor::default();
+    let values = (1..).zip(std::iter::from_fn(move || {
+        let next = cursor.next_value(text.as_ref())?;
+        Some(next.map(|(line, place)| (line, parsed(&text.as_ref()[place], line))))
+    }));
+    values.filter_map(|(number, value)| {
+        let row = value
+            .map_err(|refused| RefusedLine::new(refused.line, refused.reason))
+            .and_then(|(line, parsed)| {
+                json_row(line, parsed.map_err(|why| format!("row {number}: {why}")))
+            });
+        row.transpose()
     })
 }
 
-/// Parses a row. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons, metrics and times may be as in
+/// Parses a row that begins on the line `first`. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons, metrics and times may be as in
 /// CSV.
 ///
 /// # Errors
 /// Returns a sentence about what was not understood.
-fn parsed(line: &[u8]) -> Result<(VerdictLine, GivenTime), String> {
-    let read = serde_json::from_slice(line).or_else(|error| {
-        let text = std::str::from_utf8(line).ok().and_then(nan_as_null);
+fn parsed(row: &[u8], first: usize) -> Result<(VerdictLine, GivenTime), String> {
+    let read = serde_json::from_slice(row).or_else(|error| {
+        let text = std::str::from_utf8(row).ok().and_then(nan_as_null);
         text.map_or(Err(error), |text| serde_json::from_str(&text))
     });
-    let UniqueKeys(value) = read.map_err(|error| json_error(&error))?;
+    let has_lines = row.contains(&b'\n');
+    let place = |error: &serde_json::Error| {
+        if has_lines {
+            format!("line {}", first + error.line().max(1) - 1)
+        } else {
+            format!("column {}", error.column())
+        }
+    };
+    let UniqueKeys(value) = read.map_err(|error| json_error(&error, &place(&error)))?;
     let Value::Object(mut fields) = value else {
         return Err("each row is a JSON object with pair, verdict and reviewer".to_owned());
     };
@@ -150,7 +153,10 @@ fn parsed(line: &[u8]) -> Result<(VerdictLine, GivenTime), String> {
         fields.insert("at".to_owned(), at);
     }
     let read = serde_json::from_value(Value::Object(fields));
-    Ok((read.map_err(|error| json_error(&error))?, given))
+    Ok((
+        read.map_err(|error| json_error(&error, &place(&error)))?,
+        given,
+    ))
 }
 
 /// Returns the fields under the names of the columns in CSV, whose other names and spellings they may have.
@@ -207,13 +213,13 @@ fn json_row(
     }))
 }
 
-/// Returns the parser's message without its line number, which is always 1 because lines are parsed one by one.
-fn json_error(error: &serde_json::Error) -> String {
+/// Returns the parser's message with the place in the file, instead of that in the row.
+fn json_error(error: &serde_json::Error, place: &str) -> String {
     let message = error.to_string();
     let reason = message.split(" at line ").next().unwrap_or(&message);
     if error.is_data() {
         value_error_text(reason)
     } else {
-        format!("not a JSON object, column {}: {reason}", error.column())
+        format!("not a JSON object, {place}: {reason}")
     }
 }

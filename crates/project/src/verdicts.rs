@@ -165,7 +165,7 @@ pub struct VerdictFileImport {
     pub warnings: Vec<String>,
 }
 
-/// Records the verdicts of a file in CSV or JSON Lines, or of a sheet of a workbook. If a line is refused, no verdict is
+/// Records the verdicts of a file in CSV or JSON, or of a sheet of a workbook. If a line is refused, no verdict is
 /// recorded. A new reviewer whose name is similar to another is refused unless `is_new_allowed`.
 pub async fn import(
     file: &Path,

@@ -88,9 +88,9 @@ WHERE p.imported = (SELECT q.imported FROM pair AS q
     AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
 ORDER BY p.name";
 
-/// Counts the pairs that the newest import of a list or of folders added, up to `?1`. An import adds pairs in one
-/// transaction, so its pairs are next to each other by row id, and no more than `?1` rows are read.
-pub(crate) const LAST_IMPORT_COUNTS: &str = "
+/// Counts the pairs that the newest import of a list or of folders added, up to `?1`. Reads the newer pairs of blocks, and then
+/// at most `?1` pairs: an import adds its pairs in one transaction. On a server, pairs of blocks may lie between them.
+const LAST_IMPORT_COUNTS: &str = "
 WITH newest AS (SELECT q.id, q.imported FROM pair AS q
     WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id) ORDER BY q.id DESC LIMIT 1)
 SELECT p.imported, count(*) AS pairs, count(j.pair) AS jobs FROM (SELECT q.id, q.imported FROM pair AS q

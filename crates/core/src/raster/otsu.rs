@@ -69,7 +69,7 @@ fn sort(values: &mut [f32]) {
     let mut sorted = vec![0; keys.len()];
     let digit = |key: u32, shift: u32| (key >> shift) as usize % DIGIT_VALUES;
     // At first the number of keys with each value of a digit. Later the index in `sorted` for the next such key.
-    let mut places = [[0_u32; DIGIT_VALUES]; DIGITS.len()];
+    let mut places = vec![[0_u32; DIGIT_VALUES]; DIGITS.len()];
     poll();
     for key in &keys {
         for (places, shift) in places.iter_mut().zip(DIGITS) {

@@ -16,54 +16,77 @@ pub fn is_array(list: &[u8]) -> bool {
     list.trim_ascii_start().starts_with(b"[")
 }
 
-/// Calls `each` for every value of an array with the line on which it begins, from 1, and its place in `list`.
-///
-/// # Errors
-/// Returns an error if the array ends early, a comma is missing between two values, or text follows its end.
-pub fn each_value(
-    list: &[u8],
-    each: &mut dyn FnMut(usize, Range<usize>),
-) -> Result<(), NotAnArray> {
-    let mut place = ArrayPlace {
-        list,
-        at: 0,
-        line: 1,
-    };
-    place.skip_blanks();
-    // The opening bracket.
-    place.at += 1;
-    loop {
-        place.skip_blanks();
-        if place.byte()? == b']' {
-            break;
-        }
-        let (line, start) = (place.line, place.at);
-        place.skip_value();
-        each(line, start..place.at);
-        place.skip_blanks();
-        match place.byte()? {
-            b',' => place.at += 1,
-            b']' => break,
-            _ => return Err(place.refused("a comma is missing before this row")),
-        }
-    }
-    place.at += 1;
-    place.skip_blanks();
-    if place.at < list.len() {
-        return Err(place.refused("text follows the end of the list"));
-    }
-    Ok(())
-}
-
-/// A place in the text of an array.
-struct ArrayPlace<'l> {
-    list: &'l [u8],
+/// A place in the text of an array, which goes from value to value. Every call takes the same text.
+#[derive(Debug, Clone)]
+pub struct ArrayCursor {
     at: usize,
     /// Its line, from 1.
     line: usize,
+    progress: ArrayProgress,
 }
 
-impl ArrayPlace<'_> {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ArrayProgress {
+    BeforeArray,
+    BehindValue,
+    Ended,
+}
+
+impl Default for ArrayCursor {
+    fn default() -> Self {
+        Self {
+            at: 0,
+            line: 1,
+            progress: ArrayProgress::BeforeArray,
+        }
+    }
+}
+
+impl ArrayCursor {
+    /// Returns the line on which the next value begins, from 1, and its place in `list`, or `None` behind the last value.
+    ///
+    /// # Errors
+    /// Returns an error, and then nothing more, if the array ends early, a comma is missing between two values, or text
+    /// follows its end.
+    pub fn next_value(&mut self, list: &[u8]) -> Option<Result<(usize, Range<usize>), NotAnArray>> {
+        if self.progress == ArrayProgress::Ended {
+            return None;
+        }
+        let found = self.advance(list);
+        self.progress = match found {
+            Ok(Some(_)) => ArrayProgress::BehindValue,
+            Ok(None) | Err(_) => ArrayProgress::Ended,
+        };
+        found.transpose()
+    }
+
+    fn advance(&mut self, list: &[u8]) -> Result<Option<(usize, Range<usize>)>, NotAnArray> {
+        self.skip_blanks(list);
+        if self.progress == ArrayProgress::BeforeArray {
+            // The opening bracket.
+            self.at += 1;
+        } else {
+            match self.byte(list)? {
+                b',' => self.at += 1,
+                b']' => {}
+                _ => return Err(self.refused("a comma is missing before this row")),
+            }
+        }
+        self.skip_blanks(list);
+        if self.byte(list)? == b']' {
+            self.at += 1;
+            self.skip_blanks(list);
+            return if self.at < list.len() {
+                Err(self.refused("text follows the end of the list"))
+            } else {
+                Ok(None)
+            };
+        }
+        let (line, start) = (self.line, self.at);
+        self.skip_value(list);
+        Ok(Some((line, start..self.at)))
+    }
+
     fn refused(&self, reason: &'static str) -> NotAnArray {
         NotAnArray {
             line: self.line,
@@ -71,28 +94,28 @@ impl ArrayPlace<'_> {
         }
     }
 
-    fn byte(&self) -> Result<u8, NotAnArray> {
-        let byte = self.list.get(self.at).copied();
+    fn byte(&self, list: &[u8]) -> Result<u8, NotAnArray> {
+        let byte = list.get(self.at).copied();
         byte.ok_or_else(|| self.refused("the list ends early; save or copy it again"))
     }
 
-    fn go_to(&mut self, at: usize) {
-        let passed = &self.list[self.at..at];
+    fn go_to(&mut self, list: &[u8], at: usize) {
+        let passed = &list[self.at..at];
         self.line += passed.split(|byte| *byte == b'\n').count() - 1;
         self.at = at;
     }
 
-    fn skip_blanks(&mut self) {
-        let rest = self.list[self.at..].iter();
+    fn skip_blanks(&mut self, list: &[u8]) {
+        let rest = list[self.at..].iter();
         let blanks = rest.take_while(|byte| byte.is_ascii_whitespace()).count();
-        self.go_to(self.at + blanks);
+        self.go_to(list, self.at + blanks);
     }
 
     /// Goes to the end of a value: behind the bracket that closes it, or before a comma, bracket or blank.
-    fn skip_value(&mut self) {
+    fn skip_value(&mut self, list: &[u8]) {
         let (mut depth, mut in_text, mut is_escaped) = (0_usize, false, false);
-        let mut end = self.list.len();
-        for (at, byte) in self.list.iter().enumerate().skip(self.at) {
+        let mut end = list.len();
+        for (at, byte) in list.iter().enumerate().skip(self.at) {
             if in_text {
                 in_text = *byte != b'"' || is_escaped;
                 is_escaped = *byte == b'\\' && !is_escaped;
@@ -115,21 +138,24 @@ impl ArrayPlace<'_> {
                 break;
             }
         }
-        self.go_to(end);
+        self.go_to(list, end);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::ops::Range;
-
-    use super::{NotAnArray, each_value};
+    use super::{ArrayCursor, NotAnArray};
 
     fn values(list: &str) -> (Vec<(usize, String)>, Option<NotAnArray>) {
-        let mut found = Vec::new();
-        let mut each = |line, place: Range<usize>| found.push((line, list[place].to_owned()));
-        let outcome = each_value(list.as_bytes(), &mut each);
-        (found, outcome.err())
+        let (mut cursor, mut found) = (ArrayCursor::default(), Vec::new());
+        while let Some(next) = cursor.next_value(list.as_bytes()) {
+            match next {
+                Ok((line, place)) => found.push((line, list[place].to_owned())),
+                Err(refused) => return (found, Some(refused)),
+            }
+        }
+        assert!(cursor.next_value(list.as_bytes()).is_none());
+        (found, None)
     }
 
     #[test]

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, at_line, of_list};
-use super::json_array::{each_value, is_array};
+use super::json_array::{ArrayCursor, is_array};
 use super::row::{COLUMNS, ManifestRow, ReadRows};
 use super::text::{as_utf8, trimmed};
 use crate::columns::HeaderColumns;
@@ -53,9 +53,15 @@ pub fn read_jsonl(
         rows.push(line, draft);
     };
     if is_array(bytes) {
-        let ended = each_value(bytes, &mut |line, place| push(line, &bytes[place]));
-        if let Err(refused) = ended {
-            rows.add_problem(at_line(refused.line, refused.reason));
+        let mut cursor = ArrayCursor::default();
+        while let Some(next) = cursor.next_value(bytes) {
+            match next {
+                Ok((line, place)) => push(line, &bytes[place]),
+                Err(refused) => {
+                    rows.add_problem(at_line(refused.line, refused.reason));
+                    break;
+                }
+            }
         }
         return rows.finish();
     }

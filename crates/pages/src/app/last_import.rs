@@ -38,34 +38,31 @@ pub(super) async fn part(
 }
 
 fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
-    let (change, text, button) = if added.jobs > 0 {
+    // Then the earlier pairs of the import were not counted.
+    let is_cut = added.pairs > MAX_COUNTED;
+    let has_jobs = added.jobs > 0;
+    let (text, number) = if has_jobs {
         (
-            "retire",
             visit.t(
                 "Pairs added by the newest import that added pairs",
                 "Số cặp được thêm trong lần nhập gần nhất có thêm cặp",
             ),
-            visit.t("Undo this import", "Hoàn tác lần nhập này"),
+            added.jobs,
         )
     } else {
         (
-            "restore",
             visit.t(
                 "Pairs of the newest import that added pairs, which are in no count",
                 "Số cặp của lần nhập gần nhất có thêm cặp, hiện không được tính",
             ),
-            visit.t("Bring them back", "Đưa trở lại"),
+            added.pairs,
         )
     };
-    let number = if added.jobs > 0 {
-        added.jobs
-    } else {
-        added.pairs
-    };
+    let number = number.min(MAX_COUNTED);
     html! {
         h2 { (visit.t("Newest import that added pairs", "Lần nhập gần nhất có thêm cặp")) }
         p { (text) " (" (visit.time(added.imported)) "): "
-            b { @if number > MAX_COUNTED { (visit.t("more than", "hơn")) " " (grouped(MAX_COUNTED)) } @else { (grouped(number)) } } ". "
+            b { @if is_cut { (visit.t("at least", "ít nhất")) " " } (grouped(number)) } ". "
             span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
         }
         // The part stands on the page of imports, so the address is relative to that page.
@@ -74,7 +71,10 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
             "inline",
             &html! {
                 input type="hidden" name="at" value=(added.imported);
-                button name="change" value=(change) { (button) }
+                @if has_jobs || is_cut {
+                    button name="change" value="retire" { (visit.t("Undo this import", "Hoàn tác lần nhập này")) }
+                }
+                @if !has_jobs { button name="change" value="restore" { (visit.t("Bring them back", "Đưa trở lại")) } }
             },
         ))
     }
@@ -143,17 +143,25 @@ mod tests {
     #[test]
     fn a_large_import_is_not_counted_to_its_end() {
         let visit = Visit::in_language(Language::Vietnamese);
-        let shown = |pairs| {
-            let jobs = pairs;
+        let more = MAX_COUNTED + 1;
+        for (pairs, jobs, number, buttons) in [
+            (MAX_COUNTED, MAX_COUNTED, "<b>10\u{202f}000</b>", "retire"),
+            (more, more, "<b>ít nhất 10\u{202f}000</b>", "retire"),
+            (more, 9_901, "<b>ít nhất 9\u{202f}901</b>", "retire"),
+            (more, 0, "<b>ít nhất 10\u{202f}000</b>", "retire restore"),
+            (3, 0, "<b>3</b>", "restore"),
+        ] {
             let imported = 1;
             let counts = LastImport {
                 imported,
                 pairs,
                 jobs,
             };
-            undo_part(&visit, "p", counts).into_string()
-        };
-        assert!(shown(MAX_COUNTED).contains("<b>10\u{202f}000</b>"));
-        assert!(shown(MAX_COUNTED + 1).contains("<b>hơn 10\u{202f}000</b>"));
+            let shown = undo_part(&visit, "p", counts).into_string();
+            assert!(shown.contains(number), "{shown}");
+            let offered = ["retire", "restore"].into_iter();
+            let offered = offered.filter(|change| shown.contains(&format!("value=\"{change}\"")));
+            assert_eq!(offered.collect::<Vec<_>>().join(" "), buttons, "{shown}");
+        }
     }
 }

@@ -1,9 +1,10 @@
 //! The projects of a folder.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::failure::{AppFailure, AppResult};
+use crate::local_server::WorkThread;
 use crate::on_thread::on_thread;
 use mocban_catalog::Catalog;
 use mocban_project::location::Location;
@@ -30,6 +31,10 @@ pub(super) struct OpenProject {
     pub(super) dir: PathBuf,
     pub(super) project: Project,
     pub(super) catalog: Catalog,
+    /// Whether this user may store verdicts in the catalog.
+    pub(super) may_store: bool,
+    /// Reads results for reports; started by the first one.
+    reports: OnceLock<WorkThread>,
     /// Identity of the catalog's file, which changes if the project is made anew.
     file: Option<platform::FileId>,
 }
@@ -111,15 +116,28 @@ impl OpenProject {
     pub(super) async fn open(found: FoundProject) -> AppResult<Arc<Self>> {
         let file = catalog_file(&found.dir);
         let dir = found.dir.clone();
-        let opened = on_thread(async move || Location::new(dir).open_read_only().await).await;
-        let (project, catalog) = opened.map_err(|error| AppFailure::of(error, &found.dir))?;
+        let open = async move || {
+            let (project, catalog) = Location::new(dir).open_read_only().await?;
+            let rights = catalog.review_rights().await?;
+            Ok((project, catalog, rights))
+        };
+        let opened = on_thread(open).await;
+        let (project, catalog, rights) =
+            opened.map_err(|error| AppFailure::of(error, &found.dir))?;
         Ok(Arc::new(Self {
             key: found.key,
             dir: found.dir,
             project,
             catalog,
+            may_store: rights.may_store(),
+            reports: OnceLock::new(),
             file,
         }))
+    }
+
+    /// Returns the thread that reads results for reports. A project whose server does not answer stops no other one.
+    pub(super) fn reports(&self) -> &WorkThread {
+        self.reports.get_or_init(WorkThread::default)
     }
 }
 

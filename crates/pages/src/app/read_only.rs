@@ -1,6 +1,6 @@
 //! Places in which nothing can be stored, so that pages say it before anybody types.
 
-use std::path::{Component, Path};
+use axum::http::StatusCode;
 
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -19,35 +19,27 @@ pub(super) enum ReadOnlyPlace {
 }
 
 impl ReadOnlyPlace {
-    /// Finds out whether a project, or the folder of all projects, is such a place. Opens no project. A project in a database
-    /// is examined only after it was opened.
+    /// Finds out whether a project, or the folder of all projects, is such a place. `None` also for a project that cannot be
+    /// opened, of which its page says why.
     pub(super) async fn find(state: &AppState, project: Option<&str>) -> Option<Self> {
-        let folder = &state.options.folder;
-        let of_all = || (!platform::may_write(folder)).then_some(Self::Folder);
         let Some(key) = project else {
-            return of_all();
+            return Self::of_folder(state);
         };
-        let of_folder = folder.join(CATALOG_FILE);
-        let below = Path::new(key);
-        let is_below = below
-            .components()
-            .all(|part| matches!(part, Component::Normal(_)));
-        let catalog = if of_folder.is_file() || !is_below {
-            of_folder
-        } else {
-            folder.join(below).join(CATALOG_FILE)
-        };
-        if catalog.is_file() {
-            let dir = catalog.parent().unwrap_or(folder);
-            let may_write = platform::may_write(&catalog) && platform::may_write(dir);
-            return (!may_write).then_some(Self::Project);
-        }
-        let Some(open) = state.known(key) else {
+        match state.open(key).await {
+            Ok(open) if open.catalog.is_shared() => (!open.may_store).then_some(Self::Database),
+            Ok(open) => {
+                let catalog = open.dir.join(CATALOG_FILE);
+                let may_write = platform::may_write(&catalog) && platform::may_write(&open.dir);
+                (!may_write).then_some(Self::Project)
+            }
             // An import may make a project of this name.
-            return of_all();
-        };
-        let rights = open.catalog.review_rights().await.ok()?;
-        (!rights.may_store()).then_some(Self::Database)
+            Err(failure) if failure.status() == StatusCode::NOT_FOUND => Self::of_folder(state),
+            Err(_) => None,
+        }
+    }
+
+    fn of_folder(state: &AppState) -> Option<Self> {
+        (!platform::may_write(&state.options.folder)).then_some(Self::Folder)
     }
 
     /// Says what cannot be done, and what to do.

@@ -67,7 +67,7 @@ pub(super) async fn numbers(
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
     let location = open.location();
-    let found = read_in_turn(&state.reports, async move || read(&location).await).await?;
+    let found = read_in_turn(open.reports(), async move || read(&location).await).await?;
     let found = found.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(Html(numbers_part(&visit, &found).into_string()))
 }
@@ -176,7 +176,7 @@ pub(super) async fn download(
     };
     let location = open.location();
     let render = async move || report(options, None, &location, &()).await;
-    let rendered = read_in_turn(&state.reports, render).await?;
+    let rendered = read_in_turn(open.reports(), render).await?;
     let rendered = rendered.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(attachment(&file, kind, rendered.text.into_bytes()))
 }

@@ -402,7 +402,7 @@ fn latest(visit: &Visit, run: &RunState) -> Markup {
                 (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! {}))
             } @else {
                 div.gallery { @for pair in &run.latest { (pair_card(visit, "", pair, ThresholdMetric::DEFAULT, &PageQuery::default())) } }
-                p.row { a href="pairs?sort=confidence" { (visit.t("All results, least certain first", "Mọi kết quả, kém chắc chắn nhất trước")) } }
+                p.row { a href="pairs?sort=confidence" { (visit.t("All results, least confident first", "Mọi kết quả, độ tin cậy thấp trước")) } }
             }
         }
     }

@@ -62,8 +62,6 @@ pub(super) struct AppState {
     pub(super) uploads: Uploads,
     /// Draws pictures.
     pub(super) work: WorkThread,
-    /// Reads results for reports.
-    pub(super) reports: WorkThread,
 }
 
 impl AppState {
@@ -84,7 +82,6 @@ impl AppState {
             zip_sizes: ZipSizes::default(),
             plans: PlanCache::default(),
             work: WorkThread::default(),
-            reports: WorkThread::default(),
         }
     }
 
@@ -105,7 +102,8 @@ impl AppState {
 
     /// Returns an open project by its name. Only projects of the folder have names, so no address leads elsewhere.
     pub(super) async fn open(&self, key: &str) -> AppResult<Arc<OpenProject>> {
-        if let Some(open) = self.known(key) {
+        let known = self.lock_projects().get(key).cloned();
+        if let Some(open) = known.filter(|open| open.is_current()) {
             return Ok(open);
         }
         let folder = self.options.folder.clone();
@@ -122,12 +120,6 @@ impl AppState {
         let kept = kept.cloned().unwrap_or(open);
         projects.insert(key.to_owned(), Arc::clone(&kept));
         Ok(kept)
-    }
-
-    /// Returns a project that is open.
-    pub(super) fn known(&self, key: &str) -> Option<Arc<OpenProject>> {
-        let known = self.lock_projects().get(key).cloned();
-        known.filter(|open| open.is_current())
     }
 
     fn lock_projects(&self) -> MutexGuard<'_, BTreeMap<String, Arc<OpenProject>>> {

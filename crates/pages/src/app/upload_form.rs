@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use super::components::grouped;
 use super::home::free_space;
+use super::read_only::ReadOnlyPlace;
 use super::received_files::{ARCHIVE, importable_extensions};
 use super::upload_sentence::{MAX_FILES, RESERVE_BYTES};
 use super::uploads::Uploads;
@@ -18,6 +19,9 @@ pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Ma
     let free = uploads.folder().parent().and_then(platform::free_bytes);
     html! {
         h2 { (visit.t("Files from this browser", "Tệp từ trình duyệt này")) }
+        @if visit.read_only != Some(ReadOnlyPlace::Folder) && !uploads.may_write() {
+            p.notice.warn { (ReadOnlyPlace::Folder.sentence().text(visit.language)) }
+        }
         @if let Some(problem) = uploads.problem() {
             p #upload-last.notice.bad role="status" { (visit.t("The last upload did not end well: ", "Lần gửi trước không thành công: ")) (problem.text(visit.language)) }
         }

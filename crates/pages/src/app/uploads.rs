@@ -15,6 +15,7 @@ use super::upload_sentence::{
     too_many_uploads,
 };
 use mocban_store::NewFolder;
+use mocban_system::platform;
 
 /// Folder of uploads in the folder of the app.
 pub(super) const FOLDER: &str = "uploads";
@@ -51,6 +52,12 @@ impl Uploads {
     /// Returns the folder in which the folders of uploads are.
     pub(super) fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// Returns whether files can be added to the folder, or the folder to that of the app.
+    pub(super) fn may_write(&self) -> bool {
+        let made = self.folder.ancestors().find(|folder| folder.is_dir());
+        made.is_none_or(platform::may_write)
     }
 
     /// Begins an upload, or resumes an interrupted one of the same files. Removes uploads that ended or were abandoned. Returns

@@ -146,13 +146,23 @@ fn an_array_has_the_rows_of_json_lines() {
     assert_eq!(listed(&rows), listed(&lines));
     assert_eq!(rows.iter().map(|row| row.line).collect::<Vec<_>>(), [2, 3]);
     for (list, expected) in [
-        ("[{}]", "line 1: pair is missing"),
+        ("[{}]", "line 1: row 1: pair is missing"),
         (
             "[\n1]",
-            "line 2: each row is a JSON object with pair, verdict and reviewer",
+            "line 2: row 1: each row is a JSON object with pair, verdict and reviewer",
         ),
-        ("[{}\n{}]", "line 2: a comma is missing before this row"),
-        ("[{}", "line 1: the list ends early; save or copy it again"),
+        (
+            &format!("[{one}\n{other}]"),
+            "line 2: a comma is missing before this row",
+        ),
+        (
+            &format!("[{one}"),
+            "line 1: the list ends early; save or copy it again",
+        ),
+        (
+            &format!("[{one},\n{{\n\"pair\" 1}}]"),
+            "line 2: row 2: not a JSON object, line 3: expected `:`",
+        ),
     ] {
         let refused = parse_jsonl(list.as_bytes()).expect_err(list);
         assert_eq!(refused.to_string(), expected, "{list}");

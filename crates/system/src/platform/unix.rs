@@ -81,9 +81,10 @@ pub fn file_system_magic(_folder: &Path) -> Option<u64> {
     None
 }
 
-/// Returns whether this user may write to a file, or add files to a folder, on a disk that can be written to.
+/// Returns whether this process may write to a file, or add files to a folder, on a disk that can be written to.
 pub fn may_write(path: &Path) -> bool {
-    rustix::fs::access(path, rustix::fs::Access::WRITE_OK).is_ok()
+    use rustix::fs::{Access, AtFlags, CWD, accessat};
+    accessat(CWD, path, Access::WRITE_OK, AtFlags::EACCESS).is_ok()
 }
 
 /// Returns whether the disk of a folder has no room for another file or for more bytes.

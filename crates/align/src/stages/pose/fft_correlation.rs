@@ -18,7 +18,8 @@ pub(super) fn best_shift(surface: &[Complex32], part: usize, max_shift_px: i64) 
     let value_of = |value: &Complex32| if part == 0 { value.re } else { value.im };
     let mut best = ([0; 2], f32::NEG_INFINITY);
     // Loops over inclusive ranges take longer.
-    let shifts = || (0..2 * max_shift_px + 1).map(|k| k - max_shift_px);
+    let count = 2 * max_shift_px + 1;
+    let shifts = || (0..count).map(|k| k - max_shift_px);
     for dy in shifts() {
         let row = &surface[place(dy) * FFT_SIZE..][..FFT_SIZE];
         for dx in shifts() {

@@ -59,7 +59,7 @@ pub(super) fn refine(
     let mut poses = CompetingPoses::compare(&few, search)?;
     let cuts = cuts_near(poses.best.cut);
     let closer = images.at(CLOSER);
-    let strokes = closer.strokes(cuts);
+    let strokes = closer.strokes(&cuts);
     poses.sharpen(&SoftThresholds::new(cuts, &closer.ink, &strokes))?;
     let (refined, spread) = images.refine_fully(&few, &poses.best)?;
     let masks_from_depth = search.expected.unwrap_or(refined);
@@ -104,7 +104,7 @@ impl CompetingPoses {
     /// Refines the first few upright poses and the best mirrored pose, and selects the best pose and its competitors.
     fn compare(images: &ScaledImages, search: &PoseSearch) -> Option<Self> {
         let strokes = images.strokes(&FEW_CUTS);
-        let thresholds = SoftThresholds::new(&FEW_CUTS, &images.ink, &strokes);
+        let thresholds = SoftThresholds::new(FEW_CUTS, &images.ink, &strokes);
         let starts = search.poses.iter().take(TRIED).chain(&search.mirrored);
         let tried: Option<Vec<RefinedPose>> = starts
             .map(|start| refined_twice(&thresholds, start))

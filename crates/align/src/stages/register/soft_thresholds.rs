@@ -12,17 +12,17 @@ const NEAR: usize = 3;
 pub(super) const FEW_CUTS: [f64; NEAR] = [0.08, 0.2, 0.4];
 
 /// Returns the thresholds of `CUTS` that are nearest to `cut`.
-pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
+pub(super) fn cuts_near(cut: f64) -> [f64; NEAR] {
     let cut = cut.max(f64::MIN_POSITIVE);
     let far = |at: usize| (CUTS[at + NEAR / 2] / cut).ln().abs();
     let nearest = |a: &usize, b: &usize| far(*a).total_cmp(&far(*b));
     let first = (0..=CUTS.len() - NEAR).min_by(nearest).unwrap_or(0);
-    &CUTS[first..first + NEAR]
+    std::array::from_fn(|k| CUTS[first + k])
 }
 
 /// One refiner for each threshold, the shallowest first. It aligns the strokes at the threshold with the print's ink.
 pub(super) struct SoftThresholds<'a> {
-    cuts: &'a [f64],
+    cuts: [f64; NEAR],
     refiners: Vec<Refiner<'a>>,
 }
 
@@ -40,7 +40,11 @@ pub(super) struct BestThreshold<'a, 'b> {
 
 impl<'a> SoftThresholds<'a> {
     /// Prepares one level of strokes for each threshold.
-    pub(super) fn new(cuts: &'a [f64], ink: &'a PyramidLevel, strokes: &'a [PyramidLevel]) -> Self {
+    pub(super) fn new(
+        cuts: [f64; NEAR],
+        ink: &'a PyramidLevel,
+        strokes: &'a [PyramidLevel],
+    ) -> Self {
         Self {
             cuts,
             refiners: Refiner::for_levels(ink, strokes),
@@ -101,9 +105,9 @@ mod tests {
 
     #[test]
     fn thresholds_near_one_lie_around_it() {
-        assert_eq!(cuts_near(0.01), &CUTS[..3]);
-        assert_eq!(cuts_near(0.2), &CUTS[1..4]);
-        assert_eq!(cuts_near(0.4), &CUTS[2..]);
+        assert_eq!(cuts_near(0.01), CUTS[..3]);
+        assert_eq!(cuts_near(0.2), CUTS[1..4]);
+        assert_eq!(cuts_near(0.4), CUTS[2..]);
     }
 
     #[test]
