@@ -314,4 +314,6 @@ fn csv_error(error: &csv::Error, text: &ListText) -> RefusedLine {
 }
 
 #[cfg(test)]
+mod array_tests;
+#[cfg(test)]
 mod tests;

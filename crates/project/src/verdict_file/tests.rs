@@ -128,48 +128,6 @@ fn json_of_python_has_no_values_for_missing_ones() {
 }
 
 #[test]
-fn an_array_has_the_rows_of_json_lines() {
-    let one = r#"{"pair":"a","verdict":"pass","reviewer":"lan","note":"[x], {"}"#;
-    let other = r#"{"pair":2,"verdict":"fail","reviewer":"minh","at":1795234203000}"#;
-    let undone = r#"{"pair":"c","verdict":"pass","reviewer":"lan","undone_at":1795234203000}"#;
-    let lines = parse_jsonl(format!("{one}\n{undone}\n{other}\n").as_bytes()).expect("valid");
-    let array = format!(
-        "\u{feff}\n[{one},{undone},\n {}]\n",
-        other.replace(',', ",\n")
-    );
-    let rows = parse_jsonl(array.as_bytes()).expect("valid");
-    let listed = |rows: &[super::VerdictRow]| {
-        let rows = rows.iter();
-        rows.map(|row| format!("{:?}", row.listed))
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(listed(&rows), listed(&lines));
-    assert_eq!(rows.iter().map(|row| row.line).collect::<Vec<_>>(), [2, 3]);
-    for (list, expected) in [
-        ("[{}]", "line 1: row 1: pair is missing"),
-        (
-            "[\n1]",
-            "line 2: row 1: each row is a JSON object with pair, verdict and reviewer",
-        ),
-        (
-            &format!("[{one}\n{other}]"),
-            "line 2: a comma is missing before this row",
-        ),
-        (
-            &format!("[{one}"),
-            "line 1: the list ends early; save or copy it again",
-        ),
-        (
-            &format!("[{one},\n{{\n\"pair\" 1}}]"),
-            "line 2: row 2: not a JSON object, line 3: expected `:`",
-        ),
-    ] {
-        let refused = parse_jsonl(list.as_bytes()).expect_err(list);
-        assert_eq!(refused.to_string(), expected, "{list}");
-    }
-}
-
-#[test]
 fn times_are_parsed_and_other_texts_refused() {
     let rows =
         parse_csv(b"pair,verdict,reviewer,at\n1,pass,lan,2026-11-21 04:10:03\n1,pass,lan,\n");
