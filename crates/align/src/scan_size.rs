@@ -158,7 +158,7 @@ fn longest_side<T: Copy + Into<f64>>(vertices: &[[T; 3]]) -> f64 {
             let vertex = vertex.map(Into::into);
             let is_inside = is_in_box(&bulk, &vertex);
             for ([low, high], value) in bounds.iter_mut().zip(vertex) {
-                // Plain comparisons take less time than `min` and `max`.
+                // Ignores NaN: comparisons with it are false.
                 *low = if is_inside && value < *low {
                     value
                 } else {

@@ -77,21 +77,25 @@ mod tests {
     use crate::local_server::WorkThread;
     use mocban_project::ProjectResult;
 
+    /// Drops a request once its work has started.
+    async fn leave(request: impl Future + Unpin, start: oneshot::Receiver<()>) {
+        tokio::select! {
+            biased;
+            _ = request => unreachable!("the work waits"),
+            begun = start => begun.expect("it starts"),
+        }
+    }
+
     #[tokio::test]
     async fn reading_ends_when_its_caller_leaves() {
         let (started, start) = oneshot::channel();
         let (ended, end) = oneshot::channel::<()>();
-        let mut request = Box::pin(read_on_thread(async move || {
+        let request = Box::pin(read_on_thread(async move || {
             let _ended = ended;
             started.send(()).expect("a receiver");
             std::future::pending::<ProjectResult<()>>().await
         }));
-        tokio::select! {
-            biased;
-            _ = &mut request => unreachable!("the work has no end"),
-            begun = start => begun.expect("it starts"),
-        }
-        drop(request);
+        leave(request, start).await;
         assert!(end.await.is_err(), "the work was dropped");
     }
 
@@ -100,18 +104,13 @@ mod tests {
         let (started, start) = oneshot::channel();
         let (proceed, go) = oneshot::channel::<()>();
         let (ended, end) = oneshot::channel();
-        let mut request = Box::pin(on_thread(async move || {
+        let request = Box::pin(on_thread(async move || {
             started.send(()).expect("a receiver");
             go.await.expect("it proceeds");
             ended.send(()).expect("a receiver");
             Ok(())
         }));
-        tokio::select! {
-            biased;
-            _ = &mut request => unreachable!("it waits"),
-            begun = start => begun.expect("it starts"),
-        }
-        drop(request);
+        leave(request, start).await;
         proceed.send(()).expect("a receiver");
         end.await.expect("the change was made");
     }
@@ -126,16 +125,11 @@ mod tests {
     async fn reading_in_turn_ends_when_its_caller_leaves_and_the_next_follows() {
         let thread = WorkThread::default();
         let (started, start) = oneshot::channel();
-        let mut request = Box::pin(read_in_turn(&thread, async move || {
+        let request = Box::pin(read_in_turn(&thread, async move || {
             started.send(()).expect("a receiver");
             std::future::pending::<ProjectResult<()>>().await
         }));
-        tokio::select! {
-            biased;
-            _ = &mut request => unreachable!("the work has no end"),
-            begun = start => begun.expect("it starts"),
-        }
-        drop(request);
+        leave(request, start).await;
         let next = read_in_turn(&thread, async || Ok(7)).await;
         assert_eq!(next.expect("the thread is there").ok(), Some(7));
     }

@@ -85,10 +85,10 @@ impl VerdictList {
     /// Parses the rows.
     pub fn rows(&self) -> VerdictRows {
         let text = self.text.clone();
-        match &self.layout {
+        match self.layout {
             VerdictLayout::JsonLines => Box::new(json_rows(text)),
             VerdictLayout::JsonArray => Box::new(array_rows(text)),
-            VerdictLayout::Csv(delimiter) => match csv_rows(text, *delimiter) {
+            VerdictLayout::Csv(delimiter) => match csv_rows(text, delimiter) {
                 Ok(rows) => Box::new(rows),
                 Err(refused) => Box::new(std::iter::once(Err(refused))),
             },

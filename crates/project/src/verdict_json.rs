@@ -15,7 +15,7 @@ use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
 use mocban_lists::json_numbers::nan_as_null;
-use mocban_lists::manifest::ArrayCursor;
+use mocban_lists::manifest::{ArrayCursor, place_in_row};
 
 /// The fields of the log of verdicts, which JSON Lines may have.
 const LOG_FIELDS: [&str; 17] = [
@@ -106,8 +106,8 @@ pub(crate) fn array_rows(
     })
 }
 
-/// Parses a row that begins on the line `first`. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons, metrics and times may be as in
-/// CSV.
+/// Parses a row that begins on the line `first`. If it is not JSON, tries again with `NaN` as no value. Verdicts, reasons,
+/// metrics and times may be as in CSV.
 ///
 /// # Errors
 /// Returns a sentence about what was not understood.
@@ -116,15 +116,8 @@ fn parsed(row: &[u8], first: usize) -> Result<(VerdictLine, GivenTime), String> 
         let text = std::str::from_utf8(row).ok().and_then(nan_as_null);
         text.map_or(Err(error), |text| serde_json::from_str(&text))
     });
-    let has_lines = row.contains(&b'\n');
-    let place = |error: &serde_json::Error| {
-        if has_lines {
-            format!("line {}", first + error.line().max(1) - 1)
-        } else {
-            format!("column {}", error.column())
-        }
-    };
-    let UniqueKeys(value) = read.map_err(|error| json_error(&error, &place(&error)))?;
+    let explained = |error: serde_json::Error| json_error(&error, first, row);
+    let UniqueKeys(value) = read.map_err(explained)?;
     let Value::Object(mut fields) = value else {
         return Err("each row is a JSON object with pair, verdict and reviewer".to_owned());
     };
@@ -153,10 +146,7 @@ fn parsed(row: &[u8], first: usize) -> Result<(VerdictLine, GivenTime), String> 
         fields.insert("at".to_owned(), at);
     }
     let read = serde_json::from_value(Value::Object(fields));
-    Ok((
-        read.map_err(|error| json_error(&error, &place(&error)))?,
-        given,
-    ))
+    Ok((read.map_err(explained)?, given))
 }
 
 /// Returns the fields under the names of the columns in CSV, whose other names and spellings they may have.
@@ -214,12 +204,13 @@ fn json_row(
 }
 
 /// Returns the parser's message with the place in the file, instead of that in the row.
-fn json_error(error: &serde_json::Error, place: &str) -> String {
+fn json_error(error: &serde_json::Error, first: usize, row: &[u8]) -> String {
     let message = error.to_string();
     let reason = message.split(" at line ").next().unwrap_or(&message);
     if error.is_data() {
         value_error_text(reason)
     } else {
+        let place = place_in_row(error, first, row);
         format!("not a JSON object, {place}: {reason}")
     }
 }

@@ -195,7 +195,7 @@ fn quantize(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
             poll();
             for (level, z) in levels.iter_mut().zip(heights) {
                 let steps = ((f64::from(*z) - low) / step).clamp(0.0, 65_534.0);
-                // Rounds half up. Calls and casts would not be vectorized.
+                // Rounds half up, with additions alone.
                 let near = (steps + INTEGER_BIAS) - INTEGER_BIAS;
                 let up = if steps - near >= 0.5 { 1.0 } else { 0.0 };
                 let nearest = (near + up + 1.0 + INTEGER_BIAS).to_bits() as u16;

@@ -32,6 +32,20 @@ pub(super) struct Statements {
     pub(super) is_chained: bool,
 }
 
+/// Returns the beginning of a statement that selects rows with their checksums.
+macro_rules! checked {
+    ($key:literal, $columns:literal, $pair:literal) => {
+        concat!(
+            "SELECT t.",
+            $key,
+            ", c.value, c.previous, (SELECT p.name FROM pair AS p WHERE p.id = ",
+            $pair,
+            "), ",
+            $columns
+        )
+    };
+}
+
 /// Builds the statements of a table from its name, its key column, the columns that a checksum covers, an SQL
 /// expression for the id of a row's pair, and whether its checksums are chained.
 ///
@@ -52,12 +66,7 @@ macro_rules! statements {
                 " = CAST(wanted.atom AS bigint) ORDER BY 1"
             ),
             page: concat!(
-                "SELECT t.",
-                $key,
-                ", c.value, c.previous, (SELECT p.name FROM pair AS p WHERE p.id = ",
-                $pair,
-                "), ",
-                $columns,
+                checked!($key, $columns, $pair),
                 " FROM ",
                 $table,
                 " AS t LEFT JOIN checksum AS c ON c.record = ?1 AND c.row = t.",
@@ -67,12 +76,7 @@ macro_rules! statements {
                 " > ?2 ORDER BY 1 LIMIT ?3"
             ),
             some: concat!(
-                "SELECT t.",
-                $key,
-                ", c.value, c.previous, (SELECT p.name FROM pair AS p WHERE p.id = ",
-                $pair,
-                "), ",
-                $columns,
+                checked!($key, $columns, $pair),
                 " FROM json_each(?2) AS wanted CROSS JOIN ",
                 $table,
                 " AS t ON t.",

@@ -78,7 +78,7 @@ pub fn bulk_box<T: Copy + Into<f64>>(points: &[[T; 3]]) -> Bounds<3> {
     [0, 1].map(|end| along.map(|limits| limits[end]))
 }
 
-/// Returns every n-th of `count` values, with n so that a few thousand are left.
+/// Returns every n-th of `count` values, with n so that at most 4,000 are left.
 pub fn samples<T>(count: usize, value: impl Fn(usize) -> T) -> Vec<T> {
     let stride = count.div_ceil(SAMPLES).max(1);
     (0..count).step_by(stride).map(value).collect()

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-/// Why a text is not an array, and where.
+/// What is wrong with the text of an array, and where.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NotAnArray {
+pub struct DamagedArray {
     /// The line, counted from 1.
     pub line: usize,
     /// What was seen there.
@@ -48,7 +48,10 @@ impl ArrayCursor {
     /// # Errors
     /// Returns an error, and then nothing more, if the array ends early, a comma is missing between two values, or text
     /// follows its end.
-    pub fn next_value(&mut self, list: &[u8]) -> Option<Result<(usize, Range<usize>), NotAnArray>> {
+    pub fn next_value(
+        &mut self,
+        list: &[u8],
+    ) -> Option<Result<(usize, Range<usize>), DamagedArray>> {
         if self.progress == ArrayProgress::Ended {
             return None;
         }
@@ -60,7 +63,7 @@ impl ArrayCursor {
         found.transpose()
     }
 
-    fn advance(&mut self, list: &[u8]) -> Result<Option<(usize, Range<usize>)>, NotAnArray> {
+    fn advance(&mut self, list: &[u8]) -> Result<Option<(usize, Range<usize>)>, DamagedArray> {
         self.skip_blanks(list);
         if self.progress == ArrayProgress::BeforeArray {
             // The opening bracket.
@@ -87,14 +90,14 @@ impl ArrayCursor {
         Ok(Some((line, start..self.at)))
     }
 
-    fn refused(&self, reason: &'static str) -> NotAnArray {
-        NotAnArray {
+    fn refused(&self, reason: &'static str) -> DamagedArray {
+        DamagedArray {
             line: self.line,
             reason,
         }
     }
 
-    fn byte(&self, list: &[u8]) -> Result<u8, NotAnArray> {
+    fn byte(&self, list: &[u8]) -> Result<u8, DamagedArray> {
         let byte = list.get(self.at).copied();
         byte.ok_or_else(|| self.refused("the list ends early; save or copy it again"))
     }
@@ -142,11 +145,21 @@ impl ArrayCursor {
     }
 }
 
+/// Returns where the parser stopped in a row that begins on the line `first` of a file: the line of the file if the row has
+/// several lines, else the column of the row, both from 1.
+pub fn place_in_row(error: &serde_json::Error, first: usize, row: &[u8]) -> String {
+    if row.contains(&b'\n') {
+        format!("line {}", first + error.line().max(1) - 1)
+    } else {
+        format!("column {}", error.column())
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{ArrayCursor, NotAnArray};
+    use super::{ArrayCursor, DamagedArray};
 
-    fn values(list: &str) -> (Vec<(usize, String)>, Option<NotAnArray>) {
+    fn values(list: &str) -> (Vec<(usize, String)>, Option<DamagedArray>) {
         let (mut cursor, mut found) = (ArrayCursor::default(), Vec::new());
         while let Some(next) = cursor.next_value(list.as_bytes()) {
             match next {
@@ -182,7 +195,7 @@ mod tests {
             ("[{}]\n{}", 2, "text follows the end of the list"),
             ("[", 1, early),
         ] {
-            let expected = NotAnArray { line, reason };
+            let expected = DamagedArray { line, reason };
             assert_eq!(values(list).1, Some(expected), "{list}");
         }
         // The parser refuses what is no object.

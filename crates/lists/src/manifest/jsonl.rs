@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, at_line, of_list};
-use super::json_array::{ArrayCursor, is_array};
+use super::json_array::{ArrayCursor, is_array, place_in_row};
 use super::row::{COLUMNS, ManifestRow, ReadRows};
 use super::text::{as_utf8, trimmed};
 use crate::columns::HeaderColumns;
@@ -192,14 +192,14 @@ fn wrong_json(error: &serde_json::Error, first: usize, text: &str) -> String {
         return reason.to_owned();
     }
     let reason = value_error_text(reason);
-    if text.contains('\n') {
-        let line = first + error.line().max(1) - 1;
-        return format!("not a JSON object, line {line}: {reason}");
+    // The parser's column is that of one of the lines.
+    if !text.contains('\n')
+        && let Some(number) = unknown_number(text, error.column())
+    {
+        return format!("{number} is not a number of JSON; write null or leave it out");
     }
-    match unknown_number(text, error.column()) {
-        Some(number) => format!("{number} is not a number of JSON; write null or leave it out"),
-        None => format!("not a JSON object, column {}: {reason}", error.column()),
-    }
+    let place = place_in_row(error, first, text.as_bytes());
+    format!("not a JSON object, {place}: {reason}")
 }
 
 #[cfg(test)]

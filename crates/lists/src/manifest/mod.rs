@@ -25,7 +25,7 @@ pub use folders::{
     FolderPairs, ListedFolder, MESH_EXTENSIONS, PRINT_EXTENSIONS, PairingChanges,
     is_named_like_input, is_named_like_mesh, is_named_like_print, pair_folders,
 };
-pub use json_array::{ArrayCursor, NotAnArray, is_array};
+pub use json_array::{ArrayCursor, DamagedArray, is_array, place_in_row};
 pub use jsonl::{parse_jsonl, read_jsonl};
 pub use later_header::later_header;
 pub use list_head::{ListHead, read_head};

@@ -9,9 +9,7 @@ use super::failure::{AppFailure, AppResult};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use crate::on_thread::read_on_thread;
-use crate::review::{
-    CheckRates, Language, PictureWork, QueueOptions, ReviewOptions, ReviewPages, key_map,
-};
+use crate::review::{CheckRates, PictureWork, QueueOptions, ReviewOptions, ReviewPages, key_map};
 use mocban_catalog::{Catalog, CatalogError, MetricRecord};
 use mocban_core::domain::{JobStatus, PairName, ReviewOrder, ThresholdMetric};
 use mocban_project::block_status::BlockStatus;
@@ -29,7 +27,6 @@ const PAGE_PAIRS: usize = 256;
 /// Where a reviewer judges: in this app, or as a guest with an invitation.
 #[derive(Debug)]
 pub(super) struct ReviewPlace {
-    pub(super) language: Option<Language>,
     /// The command line that names the project.
     pub(super) command: Option<String>,
     /// Returns the sentence that explains an error of the catalog.
@@ -44,7 +41,6 @@ impl ReviewPlace {
     /// Returns the place of a guest, whose page has the language of the browser and names no file and no command.
     pub(super) fn of_guest(work: Arc<PictureWork>) -> Self {
         Self {
-            language: None,
             command: None,
             explain: |_error, _dir| {
                 "the project cannot be read now: tell the person who invited you, and keep this page open".to_owned()
@@ -155,7 +151,8 @@ async fn review_pages(
     let options = ReviewOptions {
         command: place.command,
         project_page: place.project_page,
-        language: place.language,
+        // The app adds the chosen language to the address of the page; a guest has that of the browser.
+        language: None,
         keys,
         min_view_ms: MIN_VIEW_MS,
         opens_guide: true,

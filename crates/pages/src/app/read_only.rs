@@ -19,8 +19,8 @@ pub(super) enum ReadOnlyPlace {
 }
 
 impl ReadOnlyPlace {
-    /// Finds out whether a project, or the folder of all projects, is such a place. `None` also for a project that cannot be
-    /// opened, of which its page says why.
+    /// Finds out whether a project, or the folder of all projects, is such a place. Also returns `None` if the project cannot
+    /// be opened: then its page says why.
     pub(super) async fn find(state: &AppState, project: Option<&str>) -> Option<Self> {
         let Some(key) = project else {
             return Self::of_folder(state);

@@ -214,9 +214,13 @@ pub(super) async fn pages(
     pass_on(router, access, in_chosen_language(&state, request)).await
 }
 
-/// Asks for the page of a review in the language that the user has chosen since it was opened.
+/// Asks for the page of a review in the language that the user has chosen, unless the address names one.
 fn in_chosen_language(state: &AppState, mut request: Request) -> Request {
-    let is_page = path_below(&request).is_empty() && request.uri().query().is_none();
+    let names_one = request
+        .uri()
+        .query()
+        .is_some_and(|query| query.starts_with("lang="));
+    let is_page = path_below(&request).is_empty() && !names_one;
     if let Some(language) = state.language().filter(|_| is_page) {
         let address = format!("{}?lang={}", request.uri().path(), language.name());
         if let Ok(address) = address.parse() {
@@ -239,7 +243,6 @@ async fn review(
     }
     // Two requests at once may both open it; both get the same pages.
     let of_app = ReviewPlace {
-        language: state.language(),
         command: Some(format!(
             "mocban -C {}",
             shell_quoted(&open.dir.to_string_lossy())

@@ -62,8 +62,8 @@ pub(super) fn extreme(
     down_columns(&down_columns(cells))
 }
 
-/// Returns the extreme value within `reach` cells above and below each cell, from windows that double in height. Whole rows
-/// are combined, which is vectorized.
+/// Returns the extreme value within `reach` cells above and below each cell, from windows that double in height. Combines
+/// whole rows.
 fn doubled(cells: &Grid<f32>, reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Grid<f32> {
     let (width, height, window) = (cells.width(), cells.height(), 2 * reach + 1);
     // Padded by `reach` rows, so that the window that starts at row k is centred on row k.

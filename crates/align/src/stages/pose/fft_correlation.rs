@@ -17,7 +17,6 @@ pub(super) fn best_shift(surface: &[Complex32], part: usize, max_shift_px: i64) 
     let place = |shift: i64| shift.wrapping_neg() as usize % FFT_SIZE;
     let value_of = |value: &Complex32| if part == 0 { value.re } else { value.im };
     let mut best = ([0; 2], f32::NEG_INFINITY);
-    // Loops over inclusive ranges take longer.
     let count = 2 * max_shift_px + 1;
     let shifts = || (0..count).map(|k| k - max_shift_px);
     for dy in shifts() {

@@ -51,7 +51,7 @@ impl PoseOverlap {
         fixed_valid: &Grid<f32>,
         placed: &PlacedLevel<'_>,
     ) -> Self {
-        // A fold over the nested iterators takes less time than a loop.
+        // A `for` loop would ask the outer of the nested iterators in each step.
         let common = placed.common_pixels(fixed_valid);
         let [both, ink, relief] = common.fold([0.0; 3], |[both, ink, relief], (x, y, cell)| {
             let (a, b) = (fixed.amount.at(x, y), cell.value(&placed.moving.amount));

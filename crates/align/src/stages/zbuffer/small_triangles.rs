@@ -86,7 +86,7 @@ impl SmallTriangles {
                     hits[k] = if is_hit { 1 << k } else { 0 };
                 }
                 let on = row * width + column;
-                // Most steps hit no triangle or one.
+                // Visits only the lanes that hit.
                 let mut hits = hits.into_iter().fold(0, |all, lane| all | lane);
                 while hits != 0 {
                     let k = hits.trailing_zeros() as usize % LANES;
