@@ -14,6 +14,11 @@
 //! `MOCBAN_TIME_SCALE=N` divides intervals of heartbeats, leases, recovery and reconnection by N, `MOCBAN_STORE_TIME_SCALE=N`
 //! the time limits of an object store, and `MOCBAN_COMMIT_TIME_SCALE=N` the longest wait of a commit.
 //!
+//! `MOCBAN_LIMIT_FACTOR=N` multiplies by N the time limits of requests to the local server, of their confirmation, of silent
+//! uploads, and of statements on a database server; `MOCBAN_CONNECT_FACTOR=N` those of connections to a database server;
+//! `MOCBAN_SHUTDOWN_FACTOR=N` the time that the local server waits for responses when it ends. With long limits, a test shows
+//! at any speed that nothing waits for them.
+//!
 //! Only builds with debug assertions read these variables.
 
 use std::fmt::Display;
@@ -62,7 +67,7 @@ pub fn hit(stage: impl Display, point: Point, name: Option<&dyn Display>) {
 #[cfg(not(debug_assertions))]
 pub fn hit(_stage: impl Display, _point: Point, _name: Option<&dyn Display>) {}
 
-/// Returns the divisor of time limits that a variable of the environment sets for tests, or 1.
+/// Returns the divisor or factor of time limits that a variable of the environment sets for tests, or 1.
 pub fn time_scale(variable: &str) -> u32 {
     let scale = cfg!(debug_assertions)
         .then(|| std::env::var(variable).ok()?.parse().ok())

@@ -10,6 +10,7 @@ use crate::db::error_kind::{CatalogErrorKind, connection_error};
 use crate::db::open::SCHEMA_VERSION;
 use crate::db::postgres_address::PostgresAddress;
 use crate::db::query::limited;
+use mocban_system::failpoint;
 use mocban_system::platform::timeout_active;
 
 /// Oldest supported major version of the server.
@@ -90,7 +91,7 @@ impl PostgresAddress {
         let settings = self.settings(READ_ONLY);
         let pool = PgPoolOptions::new()
             .max_connections(READERS)
-            .acquire_timeout(CONNECT_TIMEOUT)
+            .acquire_timeout(connect_timeout())
             .after_connect(move |conn, _| {
                 let settings = settings.clone();
                 Box::pin(async move { run_settings(conn, settings).await })
@@ -107,7 +108,7 @@ impl PostgresAddress {
         let mut conn = self.connect_unconfigured().await?;
         let mut other = self.connect_unconfigured().await?;
         // A pooler without a free connection to the server answers late.
-        let is_kept = timeout_active(CONNECT_TIMEOUT, keep_processes(&mut conn, &mut other))
+        let is_kept = timeout_active(connect_timeout(), keep_processes(&mut conn, &mut other))
             .await
             .unwrap_or_else(|| Err(timed_out()))
             .map_err(|error| self.not_connected(&error))?;
@@ -138,7 +139,7 @@ impl PostgresAddress {
     /// Sets the settings of every connection, and these.
     async fn configure(&self, conn: &mut PgConnection, settings: &str) -> Result<()> {
         let configuring = run_settings(conn, self.settings(settings));
-        let configured = timeout_active(CONNECT_TIMEOUT, configuring).await;
+        let configured = timeout_active(connect_timeout(), configuring).await;
         configured
             .unwrap_or_else(|| Err(timed_out()))
             .map_err(|error| self.not_connected(&error))
@@ -146,7 +147,7 @@ impl PostgresAddress {
 
     /// Opens a connection with the settings of the server.
     async fn connect_unconfigured(&self) -> Result<PgConnection> {
-        let connected = timeout_active(CONNECT_TIMEOUT, self.options.connect()).await;
+        let connected = timeout_active(connect_timeout(), self.options.connect()).await;
         let conn = connected
             .unwrap_or_else(|| Err(timed_out()))
             .map_err(|error| self.not_connected(&error))?;
@@ -228,6 +229,11 @@ impl PostgresAddress {
         sqlx::raw_sql(CREATE).execute(conn).await?;
         Ok(true)
     }
+}
+
+/// Returns the longest time for one connection attempt, which tests can change.
+fn connect_timeout() -> Duration {
+    CONNECT_TIMEOUT * failpoint::time_scale("MOCBAN_CONNECT_FACTOR")
 }
 
 /// Returns the error of a connection attempt that took too long.

@@ -13,6 +13,7 @@ use crate::db::dialect::Sql;
 use crate::db::error::{CatalogError, Result};
 use crate::db::row::{FromRow, Row};
 use crate::db::value::{Argument, FromValue};
+use mocban_system::failpoint;
 use mocban_system::platform::timeout_active;
 
 /// Longest time for one statement on a server. Without a limit, a statement on a connection that broke silently would
@@ -192,8 +193,9 @@ where
 pub(crate) async fn limited<T>(
     statement: impl Future<Output = sqlx::Result<T>>,
 ) -> sqlx::Result<T> {
-    let limited = timeout_active(STATEMENT_LIMIT, statement).await;
-    limited.unwrap_or_else(|| Err(no_reply(STATEMENT_LIMIT)))
+    let longest = STATEMENT_LIMIT * failpoint::time_scale("MOCBAN_LIMIT_FACTOR");
+    let limited = timeout_active(longest, statement).await;
+    limited.unwrap_or_else(|| Err(no_reply(longest)))
 }
 
 /// Returns the error of a server that did not reply for so long.

@@ -17,6 +17,7 @@ use super::sentence::Sentence;
 use super::upload_sentence::{busy, cut, cut_with_rest, ended, incomplete, storing, taken_over};
 use crate::local_server::WorkFailed;
 use mocban_core::domain::cancel::{CancelGuard, CancelToken};
+use mocban_system::failpoint::time_scale;
 
 /// A browser that has sent nothing for this long between two files is closed.
 const MAX_IDLE: Duration = Duration::from_secs(30);
@@ -116,7 +117,7 @@ impl FileUpload {
             UploadState::Storing => now,
             UploadState::Paused(..) | UploadState::Ended(_) => return None,
         };
-        if now.duration_since(last) <= MAX_SILENT {
+        if now.duration_since(last) <= MAX_SILENT * time_scale("MOCBAN_LIMIT_FACTOR") {
             return Some(UploadActivity::Arriving);
         }
         (self.arrived.load(Ordering::Relaxed) > 0).then_some(UploadActivity::Silent)

@@ -18,6 +18,7 @@ use tokio::net::TcpStream;
 use tokio::sync::{Notify, watch};
 use tokio::time::Instant;
 
+use mocban_system::failpoint::time_scale;
 use mocban_system::platform;
 
 /// Maximum number of bytes of a request header, and of a response that waits for a slow client.
@@ -44,11 +45,12 @@ pub struct ConnectionLimits {
 impl ConnectionLimits {
     /// Returns the limits for this process. At most a quarter of its file descriptors are used for connections.
     pub fn system() -> Self {
+        let factor = time_scale("MOCBAN_LIMIT_FACTOR");
         Self {
             connections: (platform::max_open_files() / 4).clamp(4, 128) as usize,
-            header: Duration::from_secs(15),
-            response: Duration::from_mins(1),
-            shutdown: Duration::from_secs(2),
+            header: Duration::from_secs(15) * factor,
+            response: Duration::from_mins(1) * factor,
+            shutdown: Duration::from_secs(2) * time_scale("MOCBAN_SHUTDOWN_FACTOR"),
             shutdown_header: Duration::from_millis(300),
             keep_alive: true,
         }

@@ -16,6 +16,7 @@ use axum::response::{Html, IntoResponse as _, Response};
 use super::access_control::AccessControl;
 use super::page_frame::closed_page;
 use super::session::{ICON, SESSION_SCRIPT, SESSION_STYLE, START};
+use mocban_system::failpoint::time_scale;
 
 /// Maximum size of a request body of a guest in bytes. A verdict with a note of ordinary length is far smaller.
 const GUEST_BODY_LIMIT: usize = 16 * 1024;
@@ -210,7 +211,8 @@ async fn with_whole_body(
     too_large: Rejection,
 ) -> Result<Request, Rejection> {
     let (head, body) = request.into_parts();
-    match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, limit)).await {
+    let longest = BODY_TIMEOUT * time_scale("MOCBAN_LIMIT_FACTOR");
+    match tokio::time::timeout(longest, to_bytes(body, limit)).await {
         Ok(Ok(body)) => Ok(Request::from_parts(head, body.into())),
         // Also returned if the client closed the connection, but then nobody reads it.
         Ok(Err(_)) => Err(too_large),

@@ -14,7 +14,7 @@ const MAX_EVENTS: usize = 1000;
 
 /// Returns the maximum time until the catalog confirms a request.
 pub(super) fn confirmation_limit() -> Duration {
-    CONFIRMATION / time_scale("MOCBAN_TIME_SCALE")
+    CONFIRMATION * time_scale("MOCBAN_LIMIT_FACTOR") / time_scale("MOCBAN_TIME_SCALE")
 }
 
 /// Why a request was not confirmed.
