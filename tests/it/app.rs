@@ -1,12 +1,12 @@
 //! `mocban app` by raw requests: its guard, its addresses, its actions and its pages without a browser.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
 use crate::cli::{binary, mocban};
 use crate::page::{Page, Reply, read_project, send};
+use crate::waiting::wait_until;
 
 /// Starts the app on a folder and opens a session.
 pub(crate) fn open_app(folder: &Path) -> Page {
@@ -302,7 +302,6 @@ fn a_kill_during_an_import_leaves_nothing_half_done() {
     held.env("MOCBAN_HOLD_AT", "import:computed:5");
     held.env("MOCBAN_HOLD_FILE", &hold);
     let mut page = Page::of(&mut held).entered();
-    let deadline = Instant::now() + Duration::from_mins(1);
     std::thread::scope(|scope| {
         let site = &page;
         let (body, csrf) = (chosen.to_string(), token(site));
@@ -313,10 +312,7 @@ fn a_kill_during_an_import_leaves_nothing_half_done() {
             let path = format!("{}/actions/import", site.session);
             send(site.address(), "POST", &path, &headers, body.as_bytes()).is_err()
         });
-        while !hold.exists() {
-            assert!(Instant::now() < deadline, "the import is not held");
-            crate::waiting::pause();
-        }
+        wait_until("the import is held", || hold.exists());
         rustix::process::kill_process(site.pid(), rustix::process::Signal::KILL).expect("killed");
         assert!(request.join().expect("no panic"), "there is no reply");
     });

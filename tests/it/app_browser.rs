@@ -7,6 +7,7 @@ use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
 use crate::review_browser::{judge, saved};
+use crate::waiting::wait_until;
 
 /// Opens the app in a tab and returns the address of its home page.
 pub(crate) fn enter<'b>(browser: &'b Browser, page: &Page, size: [u32; 2]) -> (Tab<'b>, String) {
@@ -219,11 +220,7 @@ fn a_run_survives_the_app_and_is_stopped_from_the_next_one() {
     tab.wait(&on_page("/p/p/"));
     tab.eval("document.querySelector('[name=jobs]').value = '1', document.querySelector('#start').click(), null");
     tab.wait("document.querySelector('#stop')");
-    let deadline = std::time::Instant::now() + std::time::Duration::from_mins(1);
-    while !hold.exists() {
-        assert!(std::time::Instant::now() < deadline, "the run is not held");
-        crate::waiting::pause();
-    }
+    wait_until("the run is held", || hold.exists());
     page.kill();
     let status = || {
         let status = mocban(&dir.path().join("p"), &["status", "--json"]);

@@ -1,6 +1,6 @@
 //! What the app says to people without a terminal: in both languages, and with buttons instead of commands.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde_json::json;
 
@@ -8,12 +8,12 @@ use crate::app::{act, app, open_app, text, with_project};
 use crate::block_view::finished_block;
 use crate::check::sql;
 use crate::page::{Page, read_project};
-use crate::waiting::pause;
+use crate::waiting::{LONGEST, pause, wait_until};
 use mocban::store::Project;
 
 /// Reads a page again until a text is on it.
 fn wait_for(page: &Page, path: &str, part: &str) -> String {
-    let deadline = Instant::now() + Duration::from_mins(1);
+    let deadline = Instant::now() + LONGEST;
     loop {
         let html = text(&page.get(path));
         if html.contains(part) {
@@ -196,11 +196,7 @@ fn a_run_that_fails_later_says_why_on_its_page() {
         |_| {},
     );
     assert_eq!(reply.status, 200, "{}", text(&reply));
-    let deadline = Instant::now() + Duration::from_mins(1);
-    while !hold.exists() {
-        assert!(Instant::now() < deadline, "the run is not held");
-        pause();
-    }
+    wait_until("the run is held", || hold.exists());
     // The run has begun, so its start has succeeded.
     let running = wait_for(&page, "/p/p/", "id=\"stop\"");
     assert!(!running.contains("failed-run"), "{running}");

@@ -1,7 +1,6 @@
 //! Files that a person chooses in a browser, through to stored pairs, and what the page of imports looks like meanwhile.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use crate::accessible::{axe, no_violation};
 use crate::app::app;
@@ -9,6 +8,7 @@ use crate::app_browser::{enter, looks_right};
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
+use crate::waiting::wait_until;
 
 /// The page of imports can take files.
 const READY: &str = "document.getElementById('upload')?.dataset.ready";
@@ -131,11 +131,7 @@ fn an_upload_shows_its_progress_and_is_cancelled() {
     tab.wait(READY);
     look(&tab, axe.as_deref(), "import_empty");
     tab.choose_files("#upload-files", &files);
-    let deadline = Instant::now() + Duration::from_mins(1);
-    while !hold.exists() {
-        assert!(Instant::now() < deadline, "the upload is not held");
-        crate::waiting::pause();
-    }
+    wait_until("the upload is held", || hold.exists());
     tab.wait("document.querySelector('#upload-done').textContent.startsWith('1 / 3 files')");
     tab.wait("document.querySelector('#upload progress').value >= 400000");
     look(&tab, axe.as_deref(), "import_sending");
@@ -151,10 +147,7 @@ fn an_upload_shows_its_progress_and_is_cancelled() {
             .expect("a folder")
             .count()
     };
-    while left() > 0 {
-        assert!(Instant::now() < deadline, "files are left");
-        crate::waiting::pause();
-    }
+    wait_until("no files are left", || left() == 0);
     tab.eval("document.querySelector('#upload-files').value = '', null");
     let other = source.path().join("notes.doc");
     std::fs::write(&other, "x").expect("written");

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 #[cfg(target_os = "linux")]
 use mocban::workbook::test_helpers::archive;
@@ -14,7 +14,7 @@ use crate::cli::mocban;
 #[cfg(target_os = "linux")]
 use crate::fault::{ENOSPC, Fault};
 use crate::page::{Page, Reply, send};
-use crate::waiting::pause;
+use crate::waiting::{LONGEST, pause, wait_until};
 
 /// An empty folder with the app on it.
 pub(crate) fn empty_app() -> (tempfile::TempDir, Page) {
@@ -93,7 +93,7 @@ pub(crate) fn stored(dir: &Path) -> Vec<String> {
 
 /// Waits until the files are these.
 fn wait_for(dir: &Path, expected: &[&str]) {
-    let deadline = Instant::now() + Duration::from_mins(1);
+    let deadline = Instant::now() + LONGEST;
     while stored(dir) != expected {
         assert!(Instant::now() < deadline, "{:?}", stored(dir));
         pause();
@@ -304,20 +304,17 @@ fn a_connection_that_is_cut_leaves_nothing_and_the_next_upload_starts_again() {
     let mut stream = TcpStream::connect(page.address()).expect("a connection");
     let head = format!("{}\r\n\r\nsolid", lines.join("\r\n"));
     stream.write_all(head.as_bytes()).expect("sent");
-    let deadline = Instant::now() + Duration::from_mins(1);
-    while page.get(&format!("/uploads/{upload}")).json()["bytes"] != 5 {
-        assert!(Instant::now() < deadline, "the file does not arrive");
-        pause();
-    }
+    wait_until("the file arrives", || {
+        page.get(&format!("/uploads/{upload}")).json()["bytes"] == 5
+    });
     let second = refusal(&put(&page, &upload, "2.stl", b"x"));
     assert!(second.contains("is still arriving"), "{second}");
     drop(stream);
     wait_for(dir.path(), &[]);
     // The files are removed before the upload is known to have failed.
-    while page.get(&format!("/uploads/{upload}")).status != 422 {
-        assert!(Instant::now() < deadline, "the upload does not end");
-        pause();
-    }
+    wait_until("the upload ends", || {
+        page.get(&format!("/uploads/{upload}")).status == 422
+    });
     let refused = refusal(&put(&page, &upload, "1.stl", b"solid"));
     assert!(refused.contains("the connection was cut"), "{refused}");
     assert!(text(&page.get("/import")).contains("the connection was cut"));

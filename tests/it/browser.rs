@@ -6,9 +6,12 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::time::Instant;
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};
+
+use crate::waiting::{LONGEST, pause};
 
 /// Names of the executable, the one that starts fastest first.
 const NAMES: [&str; 5] = [
@@ -18,8 +21,6 @@ const NAMES: [&str; 5] = [
     "google-chrome",
     "chrome",
 ];
-/// Maximum time until a condition holds.
-const TIMEOUT_MS: u32 = 60_000;
 
 /// The key Shift in events.
 pub(crate) const SHIFT: u8 = 8;
@@ -282,22 +283,30 @@ impl Tab<'_> {
         self.call("DOM.setFileInputFiles", &params);
     }
 
-    /// Waits until an expression is true, also across navigation.
+    /// Waits until an expression is true, also across navigation. An expression that fails is not true yet: what it asks for
+    /// may be missing while the page loads.
     #[track_caller]
     pub(crate) fn wait(&self, condition: &str) {
         let poll = format!(
             "new Promise((done) => {{
-                const end = Date.now() + {TIMEOUT_MS};
+                const end = Date.now() + {};
                 const poll = () => {{
-                    const found = Boolean({condition});
+                    let found = false;
+                    try {{
+                        found = Boolean({condition});
+                    }} catch (error) {{
+                        if (Date.now() > end) done(String(error));
+                    }}
                     if (found || Date.now() > end) done(found);
                     else setTimeout(poll, 20);
                 }};
                 poll();
-            }})"
+            }})",
+            LONGEST.as_millis()
         );
         let params = json!({ "expression": poll, "awaitPromise": true, "returnByValue": true });
-        for _ in 0..200 {
+        let deadline = Instant::now() + LONGEST;
+        while Instant::now() < deadline {
             let response = self
                 .browser
                 .request(Some(&self.session), "Runtime.evaluate", &params);
@@ -314,6 +323,8 @@ impl Tab<'_> {
                 );
                 return;
             }
+            // The next page needs the processor, too.
+            pause();
         }
         unreachable!("no page stays: {condition}");
     }

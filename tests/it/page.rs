@@ -3,7 +3,7 @@
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use mocban::store::Project;
 use serde_json::{Value, json};
@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use crate::cli::{binary, call};
 use crate::made_once::copy_of;
 use crate::resume::{project, run};
+use crate::waiting::{LONGEST, pause};
 
 /// Number of pairs of the shared project, with up to four results each.
 const PAIRS: &str = "15";
@@ -132,13 +133,13 @@ impl Page {
 
     /// Waits for the server to end and returns its exit code. Fails if the server does not end.
     pub(crate) fn exit_code(&mut self) -> Option<i32> {
-        let deadline = Instant::now() + Duration::from_secs(30);
+        let deadline = Instant::now() + LONGEST;
         loop {
             if let Some(ended) = self.child.try_wait().expect("its state") {
                 return ended.code();
             }
             assert!(Instant::now() < deadline, "the server does not end");
-            crate::waiting::pause();
+            pause();
         }
     }
 
@@ -293,7 +294,7 @@ pub(crate) fn send(
         lines.push(format!("content-length: {}", body.len()));
     }
     let mut stream = TcpStream::connect(to)?;
-    stream.set_read_timeout(Some(Duration::from_mins(1)))?;
+    stream.set_read_timeout(Some(LONGEST))?;
     stream.write_all(format!("{}\r\n\r\n", lines.join("\r\n")).as_bytes())?;
     // A server that rejects the headers may close before the body is sent.
     let _ = stream.write_all(body);

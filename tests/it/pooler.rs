@@ -4,7 +4,6 @@ use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
 
 use sqlx::postgres::PgConnectOptions;
 use sqlx::{ConnectOptions as _, Row as _};
@@ -12,6 +11,7 @@ use sqlx::{ConnectOptions as _, Row as _};
 use crate::cli::{Call, binary, call, empty, mocban};
 use crate::postgres_server::{Server, other_user};
 use crate::resume::{copy_folder, project};
+use crate::waiting::wait_until;
 
 /// A running pooler, which ends with this value.
 struct Pooler {
@@ -37,11 +37,9 @@ impl Pooler {
         command.args(words).arg(&settings);
         let command = command.stdout(Stdio::null()).stderr(Stdio::null());
         let process = command.spawn().expect("the pooler starts");
-        let deadline = Instant::now() + Duration::from_mins(1);
-        while UnixStream::connect(folder.join(".s.PGSQL.6432")).is_err() {
-            assert!(Instant::now() < deadline, "the pooler did not start");
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        wait_until("the pooler starts", || {
+            UnixStream::connect(folder.join(".s.PGSQL.6432")).is_ok()
+        });
         let url = server.url().replace("localhost/", "localhost:6432/");
         Self { process, url }
     }

@@ -1,7 +1,6 @@
 //! Manual alignments are stored, exported and scored like results. Items with a duplicate hide them until answered.
 
 use std::process::Stdio;
-use std::time::{Duration, Instant};
 
 use mocban::catalog::StoredAlignment;
 use mocban::store::Project;
@@ -11,6 +10,7 @@ use crate::cli::mocban;
 use crate::page::{NO_CHECKS, Page, answer, open_review};
 use crate::resume::run;
 use crate::review_page::ask;
+use crate::waiting::wait_until;
 
 fn alignments(project: &Project) -> Vec<StoredAlignment> {
     ask(project, async |catalog| {
@@ -188,11 +188,7 @@ impl HeldRun {
             .env("MOCBAN_HOLD_FILE", &file);
         let command = command.stdout(Stdio::null()).stderr(Stdio::null());
         let process = command.spawn().expect("the binary starts");
-        let deadline = Instant::now() + Duration::from_mins(2);
-        while !file.exists() {
-            assert!(Instant::now() < deadline, "the point was not reached");
-            crate::waiting::pause();
-        }
+        wait_until("the point is reached", || file.exists());
         Self { process, file }
     }
 

@@ -3,6 +3,14 @@
 use std::process::Child;
 use std::time::{Duration, Instant};
 
+/// Longest wait for what other processes, servers and browsers do. It only ends a test that would wait without end, so it is
+/// longer than a busy machine needs.
+pub(crate) const LONGEST: Duration = Duration::from_mins(10);
+
+/// Variable with which a command waits for hours for requests, for their confirmation and for statements on a server. A test
+/// shows then, at any speed, that something else does not wait for them.
+pub(crate) const PATIENT: (&str, &str) = ("MOCBAN_LIMIT_FACTOR", "1000");
+
 /// Pauses between two looks at what another process brings about. Without a pause, a test that waits takes a core from
 /// the processes that it waits for.
 ///
@@ -14,8 +22,13 @@ pub(crate) fn pause() {
 /// Waits until a process brings about what a condition looks for. It must not end before.
 #[track_caller]
 pub(crate) fn until(child: &mut Child, condition: impl Fn() -> bool) {
-    while !condition() {
-        assert_eq!(child.try_wait().expect("a child"), None, "it ended");
+    loop {
+        // Asked for first, because the last act of the process may be what is waited for.
+        let ended = child.try_wait().expect("a child");
+        if condition() {
+            return;
+        }
+        assert_eq!(ended, None, "it ended");
         pause();
     }
 }
@@ -23,7 +36,7 @@ pub(crate) fn until(child: &mut Child, condition: impl Fn() -> bool) {
 /// Waits until something is so.
 #[track_caller]
 pub(crate) fn wait_until(what: &str, is_so: impl Fn() -> bool) {
-    let deadline = Instant::now() + Duration::from_mins(1);
+    let deadline = Instant::now() + LONGEST;
     while !is_so() {
         assert!(Instant::now() < deadline, "never: {what}");
         pause();
