@@ -112,6 +112,7 @@ mod old_snapshots;
 mod one_pair;
 #[cfg(unix)]
 mod outputs;
+mod own_port;
 mod page;
 mod parsers;
 mod place_owner;

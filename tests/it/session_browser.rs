@@ -5,6 +5,7 @@ use std::net::TcpListener;
 use std::sync::mpsc;
 
 use crate::browser::{Browser, Tab};
+use crate::own_port::own_port;
 use crate::page::{Page, read_project};
 use crate::review_browser::{PLAIN, enter};
 
@@ -96,11 +97,12 @@ fn a_session_that_has_ended_is_explained_and_followed_by_the_next() {
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let mut page = Page::start(&project, "lan", &PLAIN);
+    let port = own_port().to_string();
+    let on_port = [&PLAIN[..], &["--port", &port]].concat();
+    let mut page = Page::start(&project, "lan", &on_port);
     let tab = enter(&browser, &page, [1024, 768]);
     page.kill();
-    let port = page.address().port().to_string();
-    let next = Page::start(&project, "lan", &[&PLAIN[..], &["--port", &port]].concat());
+    let next = Page::start(&project, "lan", &on_port);
     tab.reload();
     tab.wait("document.querySelector('[lang=vi] h1')?.textContent.startsWith('Trang này')");
     let _other = enter(&browser, &next, [1024, 768]);

@@ -27,6 +27,7 @@ start() {
     server=$!
     until "$2/pg_isready" -q -h "$1" -U mocban -d postgres; do
         kill -0 $server 2>/dev/null || exit 1
+        sleep 0.02
     done
     echo ready
 }

@@ -36,15 +36,15 @@ impl S3Server {
             SKIPPED.call_once(|| drop(std::io::stderr().write_all(text.as_bytes())));
             return None;
         };
-        // Another process may take a free port before the server does.
+        // Another process may use a port.
         (0..5).find_map(|_| Self::try_start(&program))
     }
 
     fn try_start(program: &Path) -> Option<Self> {
         let dir = tempfile::tempdir().expect("a temporary directory");
-        let [master, volume, filer, port] = free_ports();
+        let [master, volume, filer, port] = own_ports();
         // Without these arguments, each part also listens on its port + 10000, which may be in use.
-        let [grpc_master, grpc_volume, grpc_filer, grpc_s3] = free_ports();
+        let [grpc_master, grpc_volume, grpc_filer, grpc_s3] = own_ports();
         let process = Command::new(program)
             .args([
                 "server",
@@ -88,7 +88,7 @@ impl S3Server {
             _dir: dir,
         };
         // An object with a body is stored when all parts of the server have found each other.
-        let deadline = std::time::Instant::now() + Duration::from_mins(1);
+        let deadline = std::time::Instant::now() + Duration::from_mins(5);
         while std::time::Instant::now() < deadline {
             if server.process.try_wait().expect("its state").is_some() {
                 return None;
@@ -191,17 +191,14 @@ fn program() -> Option<PathBuf> {
         .find(|file| file.is_file())
 }
 
-fn free_ports() -> [u16; 4] {
-    let listeners = [0; 4].map(|_| TcpListener::bind(("127.0.0.1", 0)).expect("a port"));
-    listeners.map(|listener| listener.local_addr().expect("an address").port())
+fn own_ports() -> [u16; 4] {
+    [(); 4].map(|()| crate::own_port::own_port())
 }
 
 /// Sends a request. Returns the status of the reply.
 fn request(port: u16, method: &str, path: &str, body: &str) -> Option<u16> {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).ok()?;
-    stream
-        .set_read_timeout(Some(Duration::from_secs(20)))
-        .ok()?;
+    stream.set_read_timeout(Some(Duration::from_mins(2))).ok()?;
     let length = body.len();
     let request = format!(
         "{method} {path} HTTP/1.1\r\nHost: s3\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
