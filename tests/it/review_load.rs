@@ -3,15 +3,29 @@
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
 
+use mocban::store::Project;
 use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit};
 
 use crate::cli::{call, mocban};
 use crate::memory::enlarge;
-use crate::page::{NO_CHECKS, Page, answer, open_review};
+use crate::page::{NO_CHECKS, Page, answer, open_review, read_project, review};
 use crate::resume::{pairs, project, run};
 use crate::test_size::trials;
+use crate::waiting::{LONGEST, PATIENT};
+
+/// Makes the server wait for ten minutes for its last responses.
+const UNHURRIED: (&str, &str) = ("MOCBAN_SHUTDOWN_FACTOR", "300");
+
+/// Opens the page of the reviewer `lan` on a copy of the shared project, on a server with other time limits.
+fn open_with(limits: &[(&str, &str)]) -> (tempfile::TempDir, Project, Page) {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let mut command = review(&project, "lan");
+    command.args(NO_CHECKS).envs(limits.iter().copied());
+    let page = Page::of(&mut command).with_session();
+    (dir, project, page)
+}
 
 /// Sets the maximum number of open files of a process.
 fn limit_files(pid: Pid, files: u64) {
@@ -22,9 +36,10 @@ fn limit_files(pid: Pid, files: u64) {
     prlimit(Some(pid), Resource::Nofile, limit).expect("a lower limit");
 }
 
+/// Requests are served although the connections stay open for hours.
 #[test]
 fn half_open_and_slow_connections_do_not_delay_other_requests() {
-    let (_dir, _project, page) = open_review(&NO_CHECKS);
+    let (_dir, _project, page) = open_with(&[PATIENT]);
     limit_files(page.pid(), 256);
     let mut open = Vec::new();
     for i in 0..400 {
@@ -37,10 +52,7 @@ fn half_open_and_slow_connections_do_not_delay_other_requests() {
             for stream in &mut open {
                 let _ = stream.write_all(b"a");
             }
-            let start = Instant::now();
-            assert_eq!(page.get("/api/queue").status, 200);
-            let took = start.elapsed();
-            assert!(took < Duration::from_secs(1), "{i} connections: {took:?}");
+            assert_eq!(page.get("/api/queue").status, 200, "{i} connections");
         }
     }
 }
@@ -73,9 +85,10 @@ fn interrupt(page: &Page) {
     }
 }
 
+/// The server waits for the answer, but not for the headers of other connections.
 #[test]
 fn a_signal_ends_the_server_despite_open_connections_and_stores_answers_in_flight() {
-    let (_dir, project, mut page) = open_review(&NO_CHECKS);
+    let (_dir, project, mut page) = open_with(&[PATIENT, UNHURRIED]);
     let body = answer("e1", &page.queue()[0], "pass").to_string();
     let mut open = Vec::new();
     for sent in ["", "GET / HTTP/1.1\r\n"] {
@@ -84,32 +97,25 @@ fn a_signal_ends_the_server_despite_open_connections_and_stores_answers_in_fligh
         open.push(stream);
     }
     let mut stream = begun_answer(&page, &body);
-    let limit = Some(Duration::from_secs(30));
-    stream.set_read_timeout(limit).expect("a limit");
-    let start = Instant::now();
+    stream.set_read_timeout(Some(LONGEST)).expect("a limit");
     interrupt(&page);
     stream.write_all(body.as_bytes()).expect("sent");
     let mut reply = String::new();
     let read = stream.read_to_string(&mut reply);
     assert!(reply.starts_with("HTTP/1.1 200"), "{read:?} {reply}");
     assert_eq!(page.exit_code(), Some(0));
-    let took = start.elapsed();
-    assert!(took < Duration::from_secs(2), "{took:?}");
     let log = mocban(project.dir(), &["verdict", "log"]).expect(0);
     assert!(log.out.contains("pass"), "{}", log.out);
 }
 
 #[test]
 fn a_signal_ends_the_server_although_a_request_never_ends() {
-    let (_dir, project, mut page) = open_review(&NO_CHECKS);
+    let (_dir, project, mut page) = open_with(&[PATIENT]);
     let body = answer("e1", &page.queue()[0], "pass").to_string();
     let mut stream = begun_answer(&page, &body);
     stream.write_all(&body.as_bytes()[..9]).expect("sent");
-    let start = Instant::now();
     interrupt(&page);
     assert_eq!(page.exit_code(), Some(0));
-    let took = start.elapsed();
-    assert!(took < Duration::from_secs(4), "{took:?}");
     let mut reply = Vec::new();
     let ended = stream.read_to_end(&mut reply);
     let is_reset = ended.is_err_and(|error| error.kind() == ErrorKind::ConnectionReset);

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
 
 use rustix::process::{Signal, kill_process};
 use serde_json::{Value, json};
@@ -11,20 +10,23 @@ use serde_json::{Value, json};
 use crate::browser::Browser;
 use crate::cli::mocban;
 use crate::lab::Lab;
+use crate::own_port::own_port;
 use crate::page::{Page, answer, read_project, review};
 use crate::review_browser::{PLAIN, current_verdicts, enter, judge, ready, saved, shown};
 use crate::review_load::begun_answer;
 use crate::silent_server::Suspended;
+use crate::waiting::PATIENT;
 
-/// Starts a page on a server, and sends an answer after the server no longer replies. Calls `then` while the answer waits.
-fn with_waiting_answer(scale: &str, then: impl FnOnce(&mut Page, TcpStream)) {
+/// Starts a page on a server with other time limits, and sends an answer after the server no longer replies. Calls `then`
+/// while the answer waits.
+fn with_waiting_answer(limits: (&str, &str), then: impl FnOnce(&mut Page, TcpStream)) {
     let Some(lab) = Lab::new("2") else {
         return;
     };
     lab.call("mocban", "run").expect(0);
     let words = "--json review --no-open --reviewer lan --attention-checks 0 --duplicates 0";
     let mut command = lab.command("mocban", words);
-    let mut page = Page::of(command.env("MOCBAN_TIME_SCALE", scale)).with_session();
+    let mut page = Page::of(command.envs([limits])).with_session();
     let body = answer("e1", &page.queue()[0], "pass").to_string();
     let _suspended = Suspended::of_lab(&lab);
     let mut stream = begun_answer(&page, &body);
@@ -40,17 +42,15 @@ fn reply(stream: TcpStream) -> String {
     String::from_utf8(bytes).expect("UTF-8")
 }
 
+/// The answer and its statements would be waited for for hours.
 #[test]
 fn a_signal_ends_a_review_whose_server_does_not_reply() {
     for signals in [1, 2] {
-        with_waiting_answer("1", |page, stream| {
-            let start = Instant::now();
+        with_waiting_answer(PATIENT, |page, stream| {
             for _ in 0..signals {
                 kill_process(page.pid(), Signal::INT).expect("sent");
             }
-            assert_eq!(page.exit_code(), Some(0));
-            let took = start.elapsed();
-            assert!(took < Duration::from_secs(6), "{signals}: {took:?}");
+            assert_eq!(page.exit_code(), Some(0), "{signals}");
             assert!(!reply(stream).starts_with("HTTP/1.1 200"));
         });
     }
@@ -58,7 +58,7 @@ fn a_signal_ends_a_review_whose_server_does_not_reply() {
 
 #[test]
 fn an_answer_is_given_up_if_the_server_does_not_reply() {
-    with_waiting_answer("20", |_, stream| {
+    with_waiting_answer(("MOCBAN_TIME_SCALE", "20"), |_, stream| {
         let reply = reply(stream);
         assert!(reply.starts_with("HTTP/1.1 503"), "{reply}");
         assert!(reply.contains("has not confirmed this in time"), "{reply}");
@@ -73,7 +73,8 @@ fn an_answer_without_a_reply_is_sent_again() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let mut command = review(&project, "lan");
-    let page = Page::of(command.args(PLAIN).env("MOCBAN_TIME_SCALE", "20"));
+    // The page gives a request up after 3 s, in which a busy machine stores an answer.
+    let page = Page::of(command.args(PLAIN).env("MOCBAN_TIME_SCALE", "5"));
     let tab = enter(&browser, &page, [1024, 768]);
     tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
     // The server accepts connections, but does not reply.
@@ -97,8 +98,9 @@ fn at_most_three_answers_wait_for_a_lost_server() {
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let mut page = Page::start(&project, "lan", &PLAIN);
-    let port = page.address().port().to_string();
+    let port = own_port().to_string();
+    let on_port = [&PLAIN[..], &["--port", &port]].concat();
+    let mut page = Page::start(&project, "lan", &on_port);
     let tab = enter(&browser, &page, [1024, 768]);
     judge(&tab, "KeyP");
     saved(&tab);
@@ -116,9 +118,7 @@ fn at_most_three_answers_wait_for_a_lost_server() {
     tab.key("KeyP");
     tab.wait("document.getElementById('alert').textContent.startsWith('3 answers are not saved')");
     assert_eq!(shown(&tab), blocked);
-    let mut again = PLAIN.to_vec();
-    again.extend(["--port", &port]);
-    let next = Page::start(&project, "lan", &again);
+    let next = Page::start(&project, "lan", &on_port);
     let _other = enter(&browser, &next, [1024, 768]);
     saved(&tab);
     assert_eq!(current_verdicts(&project, "lan").len(), 4);
@@ -132,9 +132,10 @@ fn the_end_says_how_many_answers_are_not_saved() {
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let few = [&PLAIN[..], &["--metric", "density", "--sample", "3"]].concat();
+    let port = own_port().to_string();
+    let few = ["--metric", "density", "--sample", "3", "--port", &port];
+    let few = [&PLAIN[..], &few].concat();
     let mut page = Page::start(&project, "lan", &few);
-    let port = page.address().port().to_string();
     let tab = enter(&browser, &page, [1024, 768]);
     judge(&tab, "KeyP");
     saved(&tab);
@@ -150,7 +151,7 @@ fn the_end_says_how_many_answers_are_not_saved() {
     };
     head("All images are reviewed, but 2 not saved yet");
     tab.before_scripts(LOG_FETCHES);
-    let next = Page::start(&project, "lan", &[&few[..], &["--port", &port]].concat());
+    let next = Page::start(&project, "lan", &few);
     let _other = enter(&browser, &next, [1024, 768]);
     head("All images are reviewed. Thank you.");
     assert_eq!(current_verdicts(&project, "lan").len(), 3);

@@ -12,9 +12,10 @@ use crate::cli::{Call, binary, call, empty, mocban};
 use crate::page;
 use crate::postgres_server::Server;
 use crate::resume::{project, run};
+use crate::waiting::wait_until;
 
-/// Heartbeats once in 0.5 s. Leases last 2.5 s: if they ended on a slow machine, stages would run again.
-const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "20");
+/// Heartbeats once in 2 s. Leases last 10 s: if they ended on a slow machine, stages would run again.
+const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "5");
 
 /// A worker that serves its metrics and is held in the fit of its second pair.
 struct HeldWorker {
@@ -46,7 +47,7 @@ impl HeldWorker {
             _stderr: stderr,
             hold,
         };
-        until("the hold", || worker.hold.exists());
+        wait_until("the hold", || worker.hold.exists());
         worker
     }
 
@@ -88,15 +89,6 @@ impl Drop for HeldWorker {
     }
 }
 
-/// Waits until other processes bring a condition about.
-fn until(what: &str, condition: impl Fn() -> bool) {
-    let deadline = std::time::Instant::now() + std::time::Duration::from_mins(2);
-    while !condition() {
-        assert!(std::time::Instant::now() < deadline, "timeout: {what}");
-        crate::waiting::pause();
-    }
-}
-
 /// Returns the workers of the only host, which are sorted by their registration.
 fn workers(status: &Value) -> Vec<Value> {
     let hosts = status["hosts"].as_array().expect("hosts");
@@ -135,7 +127,7 @@ fn two_workers_are_shown_while_they_run_stop_and_end() {
     let start = |name: &str| HeldWorker::start(&mut shared(&["worker"]), dir.path().join(name));
     let (mut first, mut second) = (start("first"), start("second"));
     for worker in [&first, &second] {
-        until("the first pair", || {
+        wait_until("the first pair", || {
             worker.metric("mocban_pairs_done_total") == 1.0
         });
         assert_eq!(worker.metric("mocban_pairs_failed_total"), 0.0);
@@ -156,7 +148,7 @@ fn two_workers_are_shown_while_they_run_stop_and_end() {
             assert!(!rebound.body.starts_with(b"mocban") && rebound.body.len() < 200);
         }
     }
-    until("the heartbeats", || hosts()["total"]["done"] == 2);
+    wait_until("the heartbeats", || hosts()["total"]["done"] == 2);
     let shown = hosts();
     assert_eq!(states(&shown), ["alive", "alive"]);
     for (worker, child) in workers(&shown).iter().zip([&first, &second]) {
@@ -166,7 +158,7 @@ fn two_workers_are_shown_while_they_run_stop_and_end() {
         assert!(worker["leased"].as_u64() >= Some(1));
     }
     first.send(Signal::TERM);
-    until("the stop", || states(&hosts()) == ["stopping", "alive"]);
+    wait_until("the stop", || states(&hosts()) == ["stopping", "alive"]);
     assert_eq!(first.release(), Some(130));
     assert_eq!(states(&hosts()), ["ended", "alive"]);
     assert_eq!(second.release(), Some(0));
