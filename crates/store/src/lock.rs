@@ -17,8 +17,9 @@ use mocban_system::platform::unlock;
 /// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";
 
-/// Attempts to get the exclusive lock. [`RunLock::is_held`] of another process may hold the lock for a moment.
-const ATTEMPTS: u32 = 20;
+/// Attempts to get the exclusive lock. [`RunLock::is_held`] of another process may hold the lock for a moment, which a busy
+/// machine makes longer. Without the exclusive lock, a run would wait for the leases of dead workers to end.
+const ATTEMPTS: u32 = 200;
 const RETRY_AFTER: Duration = Duration::from_millis(5);
 
 /// The right to work on a project. It ends when the value is dropped or the process dies.
