@@ -308,7 +308,7 @@ mod tests {
         let hangs = |number: usize| number < THREADS + 2;
         let item = |number| Item(number, hangs(number).then(|| Arc::clone(&gate)));
         let items: Vec<_> = (0..40).map(item).collect();
-        let limits = limits(Duration::from_secs(2), &Stop::new());
+        let limits = limits(Duration::from_secs(5), &Stop::new());
         let read = read_each(items, &limits).await;
         let wanted = (0..40).map(|number| (!hangs(number)).then_some(number));
         assert_eq!(read, wanted.collect::<Vec<_>>());

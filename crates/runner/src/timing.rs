@@ -30,7 +30,21 @@ impl Timing {
 
     /// Returns the intervals of this build. With debug assertions, `MOCBAN_TIME_SCALE=N` divides them by N for tests.
     pub(super) fn of_this_build() -> Self {
-        Self::DEFAULT.divided_by(failpoint::time_scale("MOCBAN_TIME_SCALE"))
+        let timing = Self::DEFAULT.divided_by(failpoint::time_scale("MOCBAN_TIME_SCALE"));
+        if cfg!(test) {
+            timing.with_rare_heartbeats()
+        } else {
+            timing
+        }
+    }
+
+    /// Returns intervals with which a run in a unit test sends no heartbeat after its first, at any speed.
+    fn with_rare_heartbeats(self) -> Self {
+        Self {
+            heartbeat_every: self.heartbeat_every * 100,
+            lease: self.lease * 100,
+            ..self
+        }
     }
 
     fn divided_by(self, scale: u32) -> Self {

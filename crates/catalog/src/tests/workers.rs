@@ -176,7 +176,7 @@ async fn others_see_whether_a_worker_is_connected() {
                 tokio::task::yield_now().await;
             }
         };
-        tokio::time::timeout(Duration::from_mins(1), gone)
+        tokio::time::timeout(Duration::from_mins(10), gone)
             .await
             .expect("the server releases the lock");
         world
