@@ -112,7 +112,12 @@ fn another_tab_takes_over_an_upload_of_which_nothing_arrives() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let source = tempfile::tempdir().expect("a temporary directory");
     let files = files(source.path());
-    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    // An upload is silent after 15 s instead of 5 s, in which a busy machine sends something.
+    let mut command = app(dir.path());
+    command
+        .args(["--lang", "en"])
+        .env("MOCBAN_LIMIT_FACTOR", "3");
+    let page = Page::of(&mut command);
     let (first, home) = enter(&browser, &page, [1366, 660]);
     open_import(&first, &home);
     send_slowly(&first, &files);

@@ -326,13 +326,15 @@ fn use_page(dir: &Path, tab: &Tab<'_>) {
     tab.key("KeyT");
     tab.key("KeyT");
     tab.wait("mocbanCorrection.face.image.complete && mocbanCorrection.face.turns === 2");
+    // A sentence of another length changes the size of the pictures, which their positions follow in the next frame.
+    tab.eval("window.nextFrame = () => new Promise((done) => requestAnimationFrame(() => setTimeout(done))), null");
     let place = |part: &str, at: &Value| -> [f64; 2] {
         let found = tab.eval(&format!(
-            "(() => {{
+            "nextFrame().then(nextFrame).then(() => {{
                 const {{ camera, canvas }} = mocbanCorrection.{part}, {{ left, top }} = canvas.getBoundingClientRect();
                 [x, y] = mocbanCorrection.{part}.shown({at});
                 return [left + camera.x + (x + 0.5) * camera.zoom, top + camera.y + (y + 0.5) * camera.zoom];
-            }})()"
+            }})"
         ));
         [0, 1].map(|k: usize| found[k].as_f64().expect("a number"))
     };

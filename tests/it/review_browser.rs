@@ -76,6 +76,26 @@ pub(crate) fn judge(tab: &Tab<'_>, key: &str) {
     tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
 }
 
+/// Records what the page announces, because it removes some announcements after seconds.
+pub(crate) fn record_announcements(tab: &Tab<'_>) {
+    tab.eval(
+        "(() => {
+            window.announced = [];
+            const live = document.getElementById('live');
+            const record = () => window.announced.push(live.textContent);
+            new MutationObserver(record).observe(live, { childList: true, characterData: true, subtree: true });
+        })()",
+    );
+}
+
+/// Waits for an announcement with a text, and for its end.
+pub(crate) fn announced_for_some_time(tab: &Tab<'_>, text: &str) {
+    tab.wait(&format!(
+        "window.announced.some((said) => said.includes('{text}'))"
+    ));
+    tab.wait("document.getElementById('live').textContent === ''");
+}
+
 pub(crate) fn saved(tab: &Tab<'_>) {
     tab.wait("document.getElementById('saved').textContent.includes('✓')");
 }
@@ -275,8 +295,8 @@ fn typing_a_note_with_verdict_keys_stores_no_verdict() {
     let slow = [&NO_CHECKS[..], &["--no-guide", "--min-view-ms", "60000"]].concat();
     let page = Page::start(&project, "minh", &slow);
     let tab = enter(&browser, &page, [1024, 768]);
+    record_announcements(&tab);
     tab.key("KeyP");
-    tab.wait("document.getElementById('live').textContent === 'Please look at the image first'");
-    tab.wait("document.getElementById('live').textContent === ''");
+    announced_for_some_time(&tab, "Please look at the image first");
     assert!(current_verdicts(&project, "minh").is_empty());
 }

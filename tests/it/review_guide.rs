@@ -4,7 +4,10 @@ use serde_json::{Value, json};
 
 use crate::browser::{Browser, Tab};
 use crate::page::{Page, open_review, read_project};
-use crate::review_browser::{PLAIN, accepts_an_answer, enter, judge, on_a_page_of};
+use crate::review_browser::{
+    PLAIN, accepts_an_answer, announced_for_some_time, enter, judge, on_a_page_of,
+    record_announcements,
+};
 
 /// Position and size of the large image.
 fn picture(tab: &Tab<'_>) -> Value {
@@ -89,6 +92,7 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
         );
         tab.eval("document.activeElement.click()");
         tab.wait("!document.querySelector('#guide[open]')");
+        record_announcements(tab);
         // The fourth answer is wrong.
         let keys = ["KeyP", "Numpad1", "KeyF", "KeyF", "Digit3", "KeyP"];
         for (i, key) in keys.into_iter().enumerate() {
@@ -105,9 +109,8 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
             }
             tab.key(["Enter", "NumpadEnter"][i % 2]);
         }
-        tab.wait("document.getElementById('live').textContent.includes('5 of 6')");
         tab.wait("document.getElementById('practice').hidden");
-        tab.wait("document.getElementById('live').textContent === ''");
+        announced_for_some_time(tab, "5 of 6");
         assert_eq!(
             tab.eval("document.getElementById('bar').value"),
             0,
