@@ -33,7 +33,7 @@ def program() -> str:
 
 def mocban_command(*arguments: object, check: bool = True) -> subprocess.CompletedProcess[str]:
     command = [program(), *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=600)
     assert not check or done.returncode == 0, (command, done.stdout, done.stderr)
     return done
 

@@ -36,7 +36,7 @@ def folder(pair: DemoPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> P
 def run(folder: Path, script: str, *arguments: str) -> str:
     environment = os.environ | {"PYTHONIOENCODING": "utf-8", "PYTHONPATH": os.pathsep.join(sys.path), "MPLBACKEND": "agg"}
     command = [sys.executable, EXAMPLES / script, *arguments]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, timeout=180, encoding="utf-8")
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, timeout=600, encoding="utf-8")
     assert done.returncode == 0 or "install matplotlib" in done.stderr, done.stderr
     return done.stdout
 

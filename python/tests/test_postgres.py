@@ -28,17 +28,17 @@ def address() -> Iterator[str]:
     data, programs = folder / "data", versions[-1]
 
     def call(*command: object) -> None:
-        done = subprocess.run([*as_user, *map(str, command)], capture_output=True, text=True, timeout=60, cwd="/tmp")
+        done = subprocess.run([*as_user, *map(str, command)], capture_output=True, text=True, timeout=600, cwd="/tmp")
         assert done.returncode == 0, (command, done.stdout, done.stderr)
 
     try:
         call(programs / "initdb", "-D", data, "-U", "mocban", "-A", "trust", "--no-sync", "--locale=C", "-E", "UTF8")
         options = f"-c listen_addresses='' -c unix_socket_directories='{folder}' -c fsync=off"
-        call(programs / "pg_ctl", "-D", data, "-w", "-l", folder / "log", "-o", options, "start")
+        call(programs / "pg_ctl", "-D", data, "-w", "-t", 600, "-l", folder / "log", "-o", options, "start")
         try:
             yield f"postgresql://mocban@localhost/postgres?host={folder}"
         finally:
-            call(programs / "pg_ctl", "-D", data, "-m", "immediate", "stop")
+            call(programs / "pg_ctl", "-D", data, "-t", 600, "-m", "immediate", "stop")
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

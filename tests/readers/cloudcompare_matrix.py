@@ -22,7 +22,7 @@ for line, folder in list(scans(export))[:2]:
         command = [*tools, "-SILENT", "-AUTO_SAVE", "OFF", "-M_EXPORT_FMT", "PLY", "-O", original]
         command += ["-APPLY_TRANS", folder / "matrix.txt", "-SAVE_MESHES", "FILE", moved]
         environment = os.environ | {"XDG_RUNTIME_DIR": scratch, "HOME": scratch}
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=environment)
         check(moved.exists(), f"{name}: CloudCompare wrote nothing: {' '.join(done.stdout[-300:].split())}")
         found = trimesh.load(moved, process=False).vertices
     distance = cKDTree(positions(vertex_table(folder / "scan.ply"))).query(found)[0].max()

@@ -30,7 +30,7 @@ def numbers(folder, x, y):
         macro = Path(scratch) / "check.ijm"
         macro.write_text(MACRO.format(folder=folder.resolve(), x=x, y=y))
         command = [*tools, f"-Duser.home={scratch}", "-jar", JAR, "-batch", macro]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=os.environ | {"HOME": scratch})
+        done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=os.environ | {"HOME": scratch})
     found = {row.split(" ")[0]: row.split(" ")[1:] for row in done.stdout.splitlines() if row}
     check({"heights", "stack", "strokes"} <= found.keys(), f"ImageJ prints {' '.join((done.stdout + done.stderr).split())}")
     return found
