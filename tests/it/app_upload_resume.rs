@@ -7,7 +7,7 @@ use std::path::Path;
 use mocban::workbook::test_helpers::archive;
 use serde_json::{Value, json};
 
-use crate::app::{act, text};
+use crate::app::{act, app, text};
 use crate::app_uploads::{begin, empty_app, end, file_path, headers, put, refusal, stored};
 use crate::page::{Page, Reply, send};
 use crate::waiting::wait_until;
@@ -130,7 +130,13 @@ fn an_archive_that_was_unpacked_is_not_sent_again() {
 
 #[test]
 fn another_page_takes_over_an_upload_of_which_nothing_arrives() {
-    let (dir, page) = empty_app();
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    // An upload is silent after 15 s instead of 5 s, in which a busy machine answers the next requests.
+    let mut command = app(dir.path());
+    command
+        .args(["--lang", "en"])
+        .env("MOCBAN_LIMIT_FACTOR", "3");
+    let page = Page::of(&mut command).entered();
     let (first, _) = begun_with(&page, "quét", 2);
     put_modified(&page, &first, "1.stl", b"solid 1", 5);
     let stream = begin_file(&page, &first, "2.stl");

@@ -9,6 +9,7 @@ use mocban::store::Project;
 use crate::check::{at, done, exported, sql};
 use crate::cli::mocban;
 use crate::resume::{copy_folder, pairs_done, project, run};
+use crate::waiting::until;
 
 pub(crate) fn files(dir: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(dir).expect("a folder");
@@ -31,19 +32,19 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
     let file = dir.path().join("b.sqlite");
     let backup = ["backup", file.to_str().expect("UTF-8")];
 
+    // The run waits at its last pair until the backup is there.
+    let hold = dir.path().join("hold");
     let mut child = run(&original, &["-j", "1"])
+        .env("MOCBAN_HOLD_AT", "fit:computed:8")
+        .env("MOCBAN_HOLD_FILE", &hold)
         .stderr(Stdio::null())
         .spawn()
         .expect("the binary starts");
     // `fit` writes no files, `depth` does.
-    while pairs_done(&original, Stage::Depth) == 0 {
-        crate::waiting::pause();
-    }
+    until(&mut child, || pairs_done(&original, Stage::Depth) > 0);
     at(&original, &backup).expect(0);
-    assert!(
-        child.try_wait().expect("a child").is_none(),
-        "the run ended before the backup"
-    );
+    until(&mut child, || hold.exists());
+    std::fs::remove_file(&hold).expect("released");
     assert!(child.wait().expect("a child").success());
     let expected = exported(&original, "expected");
 

@@ -9,6 +9,7 @@ use crate::cli::{Call, binary, call, empty, mocban};
 use crate::page::Page;
 use crate::postgres_server::Server;
 use crate::resume::project;
+use crate::waiting::PATIENT;
 
 /// The code of PostgreSQL for a missing right, also by row-level security.
 pub(crate) const NOT_PERMITTED: &str = "42501";
@@ -129,7 +130,8 @@ impl Lab {
     /// Opens the review page of a user of the database.
     pub(crate) fn review(&self, user: &str, options: &str) -> Page {
         let words = format!("--json review --no-open --reviewer {user} {options}");
-        Page::of(&mut self.command(user, &words)).with_session()
+        // Many pages at the same time may need long for a request.
+        Page::of(self.command(user, &words).envs([PATIENT])).with_session()
     }
 }
 

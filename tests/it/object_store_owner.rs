@@ -5,6 +5,7 @@ use std::process::Command;
 
 use crate::cli::{call, mocban};
 use crate::object_store::Remote;
+use crate::own_port::own_port;
 use crate::resume::copy_folder;
 
 /// A backup restored beside the original, and a copied folder, name the same bucket.
@@ -152,11 +153,8 @@ fn settings_of_the_store_that_are_wrong_are_explained() {
         2,
         "no keys: set AWS_ACCESS_KEY_ID",
     );
-    // A port that was just free, so nobody listens there.
-    let listener = std::net::TcpListener::bind(("127.0.0.1", 0)).expect("a port");
-    let away = listener.local_addr().expect("an address").port();
-    drop(listener);
-    let away = &mut remote.command(away, "cache", &["run"]);
+    // Nobody listens at this port.
+    let away = &mut remote.command(own_port(), "cache", &["run"]);
     refused(away, 1, "the object store does not answer properly");
     let list = "id,mesh,print\nnew,scans:meshes/none.obj,scans:prints/none.png\n";
     std::fs::write(remote.path().join("more.csv"), list).expect("written");

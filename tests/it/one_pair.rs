@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use serde_json::Value;
 
 use crate::cli::{binary, mocban};
+use crate::waiting::until;
 
 fn lines(file: &Path) -> Vec<Value> {
     std::fs::read_to_string(file)
@@ -150,8 +151,11 @@ fn paper_preset_has_only_its_three_metrics() {
 fn first_signal_drains_and_the_next_run_continues() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     mocban(dir.path(), &["demo", "demo", "--pairs", "2", "--no-run"]).expect(0);
+    let hold = dir.path().join("hold");
     let mut child = binary()
         .current_dir(dir.path())
+        .env("MOCBAN_HOLD_AT", "fit:computed")
+        .env("MOCBAN_HOLD_FILE", &hold)
         .args([
             "-C",
             "demo",
@@ -169,9 +173,13 @@ fn first_signal_drains_and_the_next_run_continues() {
     let stderr = child.stderr.take().expect("it is piped");
     let mut events = BufReader::new(stderr).lines().map_while(Result::ok);
     assert!(events.any(|line| line.contains("stage_started")));
+    // The stage does not end before the signal arrives.
+    until(&mut child, || hold.exists());
     let pid = child.id().to_string();
     let sent = Command::new("kill").args(["-TERM", &pid]).status();
     assert!(sent.expect("kill is there").success());
+    assert!(events.any(|line| line.contains("stopping")));
+    std::fs::remove_file(&hold).expect("released");
     let rest: Vec<String> = events.collect();
     let output = child.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(130), "{rest:?}");

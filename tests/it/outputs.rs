@@ -8,6 +8,7 @@ use crate::browser::Browser;
 use crate::check::{at, done};
 use crate::cli::{binary, empty, mocban};
 use crate::page::Page;
+use crate::waiting::PATIENT;
 
 #[test]
 fn every_command_makes_the_folder_of_its_output() {
@@ -214,7 +215,8 @@ fn bash_completes(dir: &Path, words: &str) -> String {
     bash.args(["-c", &script])
         .arg(program)
         .current_dir(dir)
-        .env("LC_ALL", "C.UTF-8");
+        .env("LC_ALL", "C.UTF-8")
+        .envs([PATIENT]);
     let output = bash.output().expect("bash starts");
     assert!(
         output.stderr.is_empty(),

@@ -13,6 +13,7 @@ use crate::cli::{binary, mocban};
 use crate::resume::copy;
 use crate::test_size::trials;
 use crate::uninterrupted::files;
+use crate::waiting::until;
 
 /// Calls of one command that start at the same time.
 const AT_ONCE: usize = 3;
@@ -178,15 +179,16 @@ fn what_a_killed_export_left_is_removed_by_the_next() {
     let export = ["export", "-o", "../out"];
     at(&project, &export).expect(0);
     let (before, expected) = (files(&dir.path().join("out")), names(dir.path()));
+    let held = tempfile::tempdir().expect("a temporary directory");
+    let hold = held.path().join("hold");
     let mut child = command(&project, &export)
+        .env("MOCBAN_HOLD_AT", "export:written")
+        .env("MOCBAN_HOLD_FILE", &hold)
         .spawn()
         .expect("the binary starts");
     let staging = format!(".out.{}-0.mocban-partial", child.id());
-    let lock = dir.path().join(&staging).join("lock");
-    while !lock.exists() {
-        assert_eq!(child.try_wait().expect("a child"), None);
-        std::thread::yield_now();
-    }
+    until(&mut child, || hold.exists());
+    assert!(dir.path().join(&staging).join("lock").exists());
     child.kill().expect("killed");
     child.wait().expect("a child");
     assert!(names(dir.path()).contains(&staging));

@@ -14,6 +14,7 @@ use mocban_project::files;
 use mocban_project::location::Location;
 use mocban_project::own_files::refuse_project_file;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
+use mocban_system::failpoint::time_scale;
 
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
@@ -81,6 +82,7 @@ async fn names(command: &Command, words: &[String]) -> Option<Vec<String>> {
     location.catalog = request.catalog;
     location.config = request.config;
     let names = names_with_prefix(&location, &request.prefix, request.is_block, MAX_NAMES);
-    let names = tokio::time::timeout(MAX_WAIT, names).await;
+    let longest = MAX_WAIT * time_scale("MOCBAN_LIMIT_FACTOR");
+    let names = tokio::time::timeout(longest, names).await;
     names.ok()?.ok().filter(|names| !names.is_empty())
 }
