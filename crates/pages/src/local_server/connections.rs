@@ -254,8 +254,9 @@ mod tests {
 
     #[tokio::test]
     async fn a_late_header_and_an_idle_connection_end_the_connection() {
+        // Longer than a busy machine needs between the start of a connection and its first bytes.
         let server = TestServer::start(ConnectionLimits {
-            header: Duration::from_millis(20),
+            header: Duration::from_secs(1),
             ..limits()
         })
         .await;
@@ -268,8 +269,9 @@ mod tests {
 
     #[tokio::test]
     async fn a_connection_without_a_further_request_ends() {
+        // Longer than a busy machine needs between the start of a connection and its request.
         let server = TestServer::start(ConnectionLimits {
-            response: Duration::from_millis(20),
+            response: Duration::from_secs(1),
             ..limits()
         })
         .await;
@@ -277,7 +279,7 @@ mod tests {
         // A request may take longer than this limit.
         let slow = server.get("/wait").await;
         server.begun.notified().await;
-        tokio::time::sleep(Duration::from_millis(60)).await;
+        tokio::time::sleep(Duration::from_secs(2)).await;
         server.permits.add_permits(1);
         assert!(rest(slow).await.ends_with("waited"));
     }
