@@ -270,8 +270,7 @@ fn chosen_pairs_are_computed_again_unless_a_run_is_in_progress() {
         html.contains("Pairs that are computed again: <b>1</b>"),
         "{html}"
     );
-    wait_until("the run has ended", || {
-        // Asked in this order, because the run may begin between the two questions.
+    wait_until("the run has begun, and then ended", || {
         attempts("upright-0002") > before[0] && status(dir.path())["running"] == false
     });
     let now = ["upright-0002", "upright-0003"].map(attempts);

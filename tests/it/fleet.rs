@@ -20,6 +20,15 @@ use crate::waiting::{pause, until};
 /// Shortens leases to five seconds.
 pub(crate) const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "10");
 
+/// Lets the server note when a heartbeat comes, and when a worker is found dead.
+const NOTE_WORKERS: &str = "
+    CREATE TABLE public.noted (worker bigint, died boolean, at timestamptz DEFAULT clock_timestamp());
+    CREATE FUNCTION public.note() RETURNS trigger LANGUAGE plpgsql AS
+        'BEGIN INSERT INTO public.noted VALUES (new.id, new.died > old.died); RETURN null; END';
+    CREATE TRIGGER note AFTER UPDATE ON mocban.worker FOR EACH ROW EXECUTE FUNCTION public.note();";
+/// Ends that, because `check` names a trigger of another program.
+const NOTE_NO_MORE: &str = "DROP TRIGGER note ON mocban.worker";
+
 /// A project in a file that has been run and exported, and the same pairs in PostgreSQL, not run yet.
 pub(crate) struct Fleet {
     dir: tempfile::TempDir,
@@ -248,13 +257,7 @@ fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
     };
     fleet.shared(&["plan"]).expect(0);
     // A later heartbeat or stage would hide that a worker was marked, or a pair blamed.
-    fleet.sql(
-        "CREATE TABLE public.taken (worker bigint);
-        CREATE FUNCTION public.note() RETURNS trigger LANGUAGE plpgsql AS
-            'BEGIN INSERT INTO public.taken VALUES (new.id); RETURN null; END';
-        CREATE TRIGGER note AFTER UPDATE ON mocban.worker FOR EACH ROW WHEN (new.died > old.died)
-            EXECUTE FUNCTION public.note();",
-    );
+    fleet.sql(NOTE_WORKERS);
     let mut workers = [(); 3].map(|()| fleet.worker_with(&[LEASES]));
     fleet.wait_for_work(&mut workers);
     fleet.server.stop_at_once();
@@ -264,11 +267,10 @@ fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
     for worker in workers {
         fleet.assert_success(worker);
     }
-    let count = "SELECT count(*) FROM public.taken";
+    let count = "SELECT count(*) FROM public.noted WHERE died";
     let taken: i64 = fleet.on_server(async |conn| sqlx::query_scalar(count).fetch_one(conn).await);
     assert_eq!(taken, 0, "living workers were taken for dead");
-    // `check` names a trigger of another program.
-    fleet.sql("DROP TRIGGER note ON mocban.worker");
+    fleet.sql(NOTE_NO_MORE);
     fleet.assert_same();
 }
 
@@ -350,13 +352,8 @@ fn pairs_of_a_killed_worker_are_taken_before_their_leases_end() {
         WHERE dead.died AND NOT alive.died";
     let Some(fleet) = Fleet::new("4") else { return };
     fleet.shared(&["plan"]).expect(0);
-    // What the workers compute takes any time, so the server notes when a heartbeat comes and when a worker is dead.
-    fleet.sql(
-        "CREATE TABLE public.noted (worker bigint, died boolean, at timestamptz DEFAULT clock_timestamp());
-        CREATE FUNCTION public.note() RETURNS trigger LANGUAGE plpgsql AS
-            'BEGIN INSERT INTO public.noted VALUES (new.id, new.died > old.died); RETURN null; END';
-        CREATE TRIGGER note AFTER UPDATE ON mocban.worker FOR EACH ROW EXECUTE FUNCTION public.note();",
-    );
+    // What the workers compute may take any time.
+    fleet.sql(NOTE_WORKERS);
     let held = fleet.path().join("held");
     let file = held.to_str().expect("UTF-8");
     let hold = [
@@ -372,12 +369,10 @@ fn pairs_of_a_killed_worker_are_taken_before_their_leases_end() {
     victim.kill().expect("killed");
     victim.wait().expect("an exit code");
     assert!(other.wait().expect("an exit code").success());
-    let taken_after: Option<i64> =
+    let after: Option<i64> =
         fleet.on_server(async |conn| sqlx::query_scalar(TAKEN_AFTER).fetch_one(conn).await);
-    let is_early = taken_after.is_some_and(|after| after < LEASE_MS);
-    assert!(is_early, "{taken_after:?} ms");
-    // `check` names a trigger of another program.
-    fleet.sql("DROP TRIGGER note ON mocban.worker");
+    assert!(after.is_some_and(|ms| ms < LEASE_MS), "{after:?}");
+    fleet.sql(NOTE_NO_MORE);
     fleet.assert_same();
 }
 
