@@ -15,7 +15,7 @@ use crate::postgres_server::Server;
 use crate::resume::{copy_folder, project};
 use crate::test_size::size_from_env;
 use crate::uninterrupted::files;
-use crate::waiting::{pause, until};
+use crate::waiting::{PATIENT_CONNECT, pause, until};
 
 /// Shortens leases to five seconds.
 pub(crate) const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "10");
@@ -58,7 +58,7 @@ impl Fleet {
     /// Calls a command on the shared project.
     pub(crate) fn shared(&self, args: &[&str]) -> Call {
         let mut command = binary();
-        command.current_dir(self.path());
+        command.current_dir(self.path()).envs([PATIENT_CONNECT]);
         command.args(["-C", "shared", "--catalog", self.server.url()]);
         call(command.args(args))
     }

@@ -9,7 +9,7 @@ use crate::cli::{Call, binary, call, empty, mocban};
 use crate::page::Page;
 use crate::postgres_server::Server;
 use crate::resume::project;
-use crate::waiting::PATIENT;
+use crate::waiting::{PATIENT, PATIENT_CONNECT};
 
 /// The code of PostgreSQL for a missing right, also by row-level security.
 pub(crate) const NOT_PERMITTED: &str = "42501";
@@ -77,7 +77,7 @@ impl Lab {
 
     /// Calls a command on the project as a user of the database.
     pub(crate) fn call(&self, user: &str, words: &str) -> Call {
-        call(&mut self.command(user, words))
+        call(self.command(user, words).envs([PATIENT_CONNECT]))
     }
 
     /// Asserts that a command is refused in one sentence with a text, and with exit code 2.

@@ -10,10 +10,9 @@ use crate::cli::{binary, call, empty};
 use crate::own_port::own_port;
 use crate::postgres_server::Server;
 use crate::resume::project;
+use crate::waiting::PATIENT_CONNECT;
 
-/// Variable with which a command waits for minutes for a connection.
-const PATIENT_CONNECT: (&str, &str) = ("MOCBAN_CONNECT_FACTOR", "60");
-/// Longer than a busy machine needs, and shorter than the wait for a connection.
+/// Longer than a busy machine needs, and shorter than the wait for a connection with [`PATIENT_CONNECT`].
 const AT_ONCE: Duration = Duration::from_secs(300);
 
 /// Creates an authority, a key, a certificate that the key signed itself, and certificates that the authority signed: a

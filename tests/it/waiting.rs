@@ -11,6 +11,9 @@ pub(crate) const LONGEST: Duration = Duration::from_mins(10);
 /// shows then, at any speed, that something else does not wait for them.
 pub(crate) const PATIENT: (&str, &str) = ("MOCBAN_LIMIT_FACTOR", "1000");
 
+/// Variable with which a command waits for minutes for a connection to a database server.
+pub(crate) const PATIENT_CONNECT: (&str, &str) = ("MOCBAN_CONNECT_FACTOR", "60");
+
 /// Pauses between two looks at what another process brings about. Without a pause, a test that waits takes a core from
 /// the processes that it waits for.
 ///
