@@ -110,7 +110,7 @@ fn axe_finds_nothing_in_a_report() {
         let tab = browser.tab(size[0], size[1]);
         tab.dark(dark);
         tab.open(&format!("file://{}", file.display()));
-        tab.wait("document.querySelector('figure.item')");
+        tab.wait("document.querySelector('figure.item') && document.readyState === 'complete'");
         no_violation(&tab, &axe, &format!("{size:?}"));
     }
 }

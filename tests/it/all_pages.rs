@@ -34,6 +34,7 @@ fn visit(browser: &Browser, axe: Option<&String>, what: &str, address: &str, sho
     let tab = browser.tab(1280, 900);
     tab.open(address);
     tab.wait(shown);
+    tab.wait("document.readyState === 'complete'");
     check(browser, &tab, axe, what);
 }
 

@@ -303,6 +303,9 @@ fn a_curator_invites_and_a_colleague_judges_in_a_browser() {
     guest.screenshot("app_guest");
     guest.key("Escape");
     guest.wait("!document.querySelector('dialog[open]')");
+    // An image must be shown for some time before an answer is accepted.
+    guest.eval("window.since = Date.now(), null");
+    guest.wait("Date.now() - window.since > 400");
     judge(&guest, "KeyP");
     saved(&guest);
     // The page in the background does not follow by itself.

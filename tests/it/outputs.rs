@@ -280,7 +280,10 @@ fn the_documentation_folds_and_searches() {
     let page = dir.path().join("docs/tutorial/first-hour.html");
     tab.open(&format!("file://{}", page.display()));
     let contents = "getComputedStyle(document.getElementById('contents')).display";
-    tab.wait(&format!("{contents} === 'none'"));
+    // The button works once the script of the page has run.
+    tab.wait(&format!(
+        "document.readyState === 'complete' && {contents} === 'none'"
+    ));
     tab.screenshot("docs-phone");
     tab.eval("document.getElementById('contents-button').click(), null");
     tab.wait(&format!("{contents} !== 'none'"));
@@ -297,11 +300,11 @@ fn the_documentation_folds_and_searches() {
         "{found}"
     );
     tab.eval("document.querySelector('.translation a').click(), null");
-    tab.wait("document.documentElement.lang === 'vi' && document.querySelector('main h1')");
+    tab.wait("document.documentElement.lang === 'vi' && document.readyState === 'complete'");
     for page in ["ung-dung", "python", "thuat-ngu"] {
         tab.eval("document.querySelector('a[rel=next]').click(), null");
         tab.wait(&format!(
-            "location.pathname.endsWith('{page}.html') && document.querySelector('main h1')"
+            "location.pathname.endsWith('{page}.html') && document.readyState === 'complete'"
         ));
     }
 }
