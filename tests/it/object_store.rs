@@ -79,8 +79,8 @@ impl Remote {
         let mut command = binary();
         command.current_dir(self.path());
         command.env("XDG_CACHE_HOME", self.path().join(cache));
-        // A busy machine would store the stages of a pair in several packs.
-        command.env("MOCBAN_PACK_FACTOR", "300");
+        // A busy machine would store the stages of a pair in several packs, and ask for inputs again.
+        command.env("MOCBAN_STORE_FACTOR", "300");
         S3Server::configure(&mut command, port);
         command.args(["-C", project]);
         command

@@ -110,7 +110,7 @@ async fn write_pack(
     first: ComputedStage,
     stages: &mut mpsc::UnboundedReceiver<ComputedStage>,
 ) -> Result<(Vec<StageCheckpoint>, Option<Unwritten>), RunError> {
-    let deadline = Instant::now() + PACK_WAIT * failpoint::time_scale("MOCBAN_PACK_FACTOR");
+    let deadline = Instant::now() + PACK_WAIT * failpoint::time_scale("MOCBAN_STORE_FACTOR");
     let (mut batch, mut files) = (vec![first.0], first.1);
     let mut counts = vec![files.len()];
     while let Ok(Some((stage, more))) = timeout_at(deadline, stages.recv()).await {

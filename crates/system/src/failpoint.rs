@@ -17,8 +17,9 @@
 //! `MOCBAN_LIMIT_FACTOR=N` multiplies by N the time limits of requests to the local server, of their confirmation, of silent
 //! uploads, of statements on a database server, and of names for a shell; `MOCBAN_CONNECT_FACTOR=N` those of connections to a
 //! database server; `MOCBAN_SHUTDOWN_FACTOR=N` the time that the local server waits for responses when it ends;
-//! `MOCBAN_PACK_FACTOR=N` the time that a pack waits for the next stages of its pair. With long limits, a test shows at any
-//! speed that nothing waits for them, or that nothing is lost.
+//! `MOCBAN_STORE_FACTOR=N` the time that a pack waits for the next stages of its pair, and the time for which the local copy
+//! of an object counts as current. With long limits, a test shows at any speed that nothing waits for them, or counts what is
+//! done within them.
 //!
 //! Only builds with debug assertions read these variables.
 

@@ -17,10 +17,16 @@ use super::bucket_error::BucketError;
 use super::cache_files;
 use crate::create_folders::create_folders;
 use mocban_core::domain::ContentHash;
+use mocban_system::failpoint::time_scale;
 use mocban_system::platform::rename;
 
 /// The store is not asked again whether an object has changed within this time.
 const FRESH: Duration = Duration::from_mins(1);
+
+/// Returns whether a copy that was confirmed at this time counts as current.
+fn is_fresh(confirmed: Instant) -> bool {
+    confirmed.elapsed() < FRESH * time_scale("MOCBAN_STORE_FACTOR")
+}
 
 /// A folder of copies.
 #[derive(Debug)]
@@ -234,13 +240,13 @@ impl ObjectCache {
     fn is_confirmed(&self, address: &str) -> bool {
         let state = self.lock();
         let confirmed = state.confirmed.get(address);
-        confirmed.is_some_and(|at| at.elapsed() < FRESH)
+        confirmed.is_some_and(|at| is_fresh(*at))
     }
 
     fn confirm(&self, address: String) {
         let mut state = self.lock();
         if state.confirmed.len() > 10_000 {
-            state.confirmed.retain(|_, at| at.elapsed() < FRESH);
+            state.confirmed.retain(|_, at| is_fresh(*at));
         }
         state.confirmed.insert(address, Instant::now());
     }
