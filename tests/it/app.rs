@@ -62,6 +62,7 @@ fn every_page_is_shown_and_links_only_to_this_server() {
     for path in [
         "/",
         "/import",
+        "/restore",
         "/p/p/",
         "/p/p/pairs",
         "/p/p/pairs?view=table&sort=confidence&state=aligned",

@@ -108,6 +108,7 @@ fn every_page_is_accessible_in_both_themes_and_logs_no_error() {
         ("report", "p/p/report"),
         ("export", "p/p/export"),
         ("import", "import"),
+        ("restore", "restore"),
         ("settings", "p/p/settings?key=run.workers&value=3"),
         ("health", "p/p/health"),
         ("missing", "p/nowhere/"),

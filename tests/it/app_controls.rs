@@ -16,7 +16,7 @@ const SMALLEST: u32 = 44;
 pub(crate) const SHOWN: &str = "document.body?.dataset.ready && !document.querySelector('#choice:not([data-ready])') && [...document.querySelectorAll('[data-load]')].every((part) => part.dataset.loaded)";
 
 /// Pages of the app.
-pub(crate) const PAGES: [&str; 16] = [
+pub(crate) const PAGES: [&str; 17] = [
     "",
     "p/p/",
     "p/p/pairs",
@@ -30,6 +30,7 @@ pub(crate) const PAGES: [&str; 16] = [
     "p/p/report",
     "p/p/export",
     "import",
+    "restore",
     "p/p/settings?key=run.workers&value=3",
     "p/p/health",
     "p/nowhere/",

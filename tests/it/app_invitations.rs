@@ -74,7 +74,14 @@ fn a_guest_judges_under_the_name_of_the_invitation_and_does_nothing_else() {
     let log = mocban(&dir.path().join("p"), &["verdict", "log", "--json"]).expect(0);
     assert!(log.out.contains("Lan Anh"), "{}", log.out);
 
-    for path in ["/p/p/", "/p/p/review", "/import", "/p/p/backup.sqlite"] {
+    for path in [
+        "/p/p/",
+        "/p/p/review",
+        "/import",
+        "/restore",
+        "/restore/content",
+        "/p/p/backup.sqlite",
+    ] {
         assert_eq!(guest.get(path).status, 404, "{path}");
         let own_path = Site {
             cookie: guest.cookie.clone(),
@@ -86,7 +93,7 @@ fn a_guest_judges_under_the_name_of_the_invitation_and_does_nothing_else() {
             "{path} with a guest's cookie"
         );
     }
-    for path in ["/p/p/actions/retire", "/actions/demo"] {
+    for path in ["/p/p/actions/retire", "/actions/demo", "/actions/restore"] {
         let reply = guest.post(path, &json!({"pair": "upright-0000"}));
         assert_eq!(reply.expect("a reply").status, 404, "{path}");
     }

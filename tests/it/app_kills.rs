@@ -14,7 +14,7 @@ use crate::page::{Page, read_project, send};
 use crate::waiting::wait_until;
 
 /// How long the interrupted call takes, in milliseconds: until the app is killed.
-const UNTIL_KILLED: u32 = 600_000;
+pub(crate) const UNTIL_KILLED: u32 = 600_000;
 /// The log of the catalog, to which a transaction is written.
 const LOG: &str = "p/catalog.sqlite-wal";
 
@@ -151,14 +151,14 @@ const ACTIONS: [KilledAction; 10] = [
 ];
 
 /// An app that waits at a system call, with the notes of its faults.
-struct HeldApp {
-    page: Page,
+pub(crate) struct HeldApp {
+    pub(crate) page: Page,
     notes: tempfile::TempDir,
 }
 
 impl HeldApp {
     /// Starts an app that `held` holds at its `nth` call.
-    fn start(root: &Path, held: Fault, nth: usize) -> Self {
+    pub(crate) fn start(root: &Path, held: Fault, nth: usize) -> Self {
         let notes = tempfile::tempdir().expect("a temporary directory");
         let mut command = app(root);
         held.inject(nth, root, notes.path(), &mut command);
@@ -167,7 +167,7 @@ impl HeldApp {
     }
 
     /// Sends an action to an address below the session, and kills the app at the call.
-    fn kill_in(mut self, action: &str, token: String, body: &Value) {
+    pub(crate) fn kill_in(mut self, action: &str, token: String, body: &Value) {
         let mut headers = self.page.headers();
         headers.retain(|(name, _)| *name != "x-csrf-token");
         headers.push(("x-csrf-token", token));

@@ -5,9 +5,10 @@ use crate::review_load::peak_mib;
 use crate::test_size::trials;
 
 /// Pages, parts of pages, pictures and data, each for every client in every trial.
-const PATHS: [&str; 24] = [
+const PATHS: [&str; 25] = [
     "/",
     "/import",
+    "/restore",
     "/p/p/",
     "/p/p/pairs",
     "/p/p/pairs?view=table&compare=density",

@@ -39,6 +39,7 @@ fn no_page_names_a_command_or_an_option() {
         "/p/p/export",
         "/p/p/health",
         "/import",
+        "/restore",
         "/p/nowhere/",
     ] {
         for language in ["en", "vi"] {

@@ -109,6 +109,7 @@ fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
     for (path, what) in [
         ("/", "This folder is read-only"),
         ("/import", "This folder is read-only"),
+        ("/restore", "This folder is read-only"),
         ("/import?project=new", "This folder is read-only"),
         ("/import?project=p", "This project is read-only"),
         ("/p/p/", "This project is read-only"),

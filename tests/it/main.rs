@@ -20,6 +20,8 @@ mod app_kills;
 #[cfg(target_os = "linux")]
 mod app_load;
 mod app_phone;
+#[cfg(target_os = "linux")]
+mod app_restore;
 mod app_resume_browser;
 mod app_sentences;
 #[cfg(unix)]

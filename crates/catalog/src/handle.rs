@@ -66,6 +66,21 @@ impl Catalog {
         })
     }
 
+    /// Opens a backup read-only, as a file that nobody writes to. Makes no other file beside it.
+    ///
+    /// # Errors
+    /// Returns an error if the file does not exist or is not a catalog, or if a database operation fails.
+    pub async fn open_backup(path: &Path) -> Result<Self> {
+        Ok(Self {
+            readers: ReaderPool::Sqlite(open::immutable_pool(path).await?),
+            inbox: None,
+            delay: CommitDelay::new(),
+            retry_wait: Arc::default(),
+            left_out: Arc::default(),
+            path: path.into(),
+        })
+    }
+
     /// Opens an existing file. If `allow_empty` is set, the file may have no bytes.
     pub(crate) async fn with_writer(
         path: &Path,

@@ -63,14 +63,20 @@ pub async fn backup(
 pub async fn count_rows(dir: &Path) -> ProjectResult<(u64, u64)> {
     let count = async {
         let catalog = Catalog::open_read_only(&dir.join(CATALOG_FILE)).await?;
-        let verdicts = catalog.verdict_log(None).await?.len() as u64;
-        let pairs = catalog.counters().await?.values().sum();
+        let counted = rows_of(&catalog).await?;
         catalog.close().await;
-        Ok((pairs, verdicts))
+        Ok(counted)
     };
     count
         .await
         .map_err(|error: ProjectError| ProjectError::unexpected(error.text(dir)))
+}
+
+/// Returns the numbers of pairs and verdicts in a catalog.
+pub(crate) async fn rows_of(catalog: &Catalog) -> ProjectResult<(u64, u64)> {
+    let verdicts = catalog.verdict_log(None).await?.len() as u64;
+    let pairs = catalog.counters().await?.values().sum();
+    Ok((pairs, verdicts))
 }
 
 /// Refuses a target that exists and is not a backup.

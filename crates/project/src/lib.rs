@@ -11,7 +11,8 @@
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`change_setting`]: changes a setting, after saying what that costs
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
-//! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
+//! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database;
+//!   [`backup_content`]: what such a file holds
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`], [`generated_folder`]: what may be replaced
 //! - [`events`]: what a function reports while it works
@@ -28,6 +29,7 @@
 
 pub mod align;
 pub mod backup;
+pub mod backup_content;
 mod block_files;
 pub mod block_status;
 pub mod change_setting;

@@ -1,5 +1,7 @@
 //! Makes a project of a backup.
 
+use std::ffi::OsStr;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -83,6 +85,29 @@ pub async fn restore(
         let _ = std::fs::remove_dir(dir);
     }
     restored
+}
+
+/// Returns whether a folder may become a project that is restored: it does not exist, is empty, or has only what an
+/// interrupted restore left.
+pub fn is_free(dir: &Path) -> ProjectResult<bool> {
+    let failed = || format!("cannot read {}", dir.display());
+    let entries = match std::fs::read_dir(dir) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(true),
+        Err(error) if error.kind() == ErrorKind::NotADirectory => return Ok(false),
+        entries => entries.with_context(failed)?,
+    };
+    for entry in entries {
+        if !is_left_over(&entry.with_context(failed)?.file_name()) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Returns whether an interrupted restore leaves an entry with this name: settings, or what is written beside the catalog.
+fn is_left_over(name: &OsStr) -> bool {
+    let beside = format!(".{CATALOG_FILE}.");
+    name == SETTINGS_FILE || name.as_encoded_bytes().starts_with(beside.as_bytes())
 }
 
 /// Creates the project. The catalog comes last: a directory without a catalog is no project.
@@ -197,7 +222,7 @@ fn check_inputs(inputs: &Path) -> ProjectResult<()> {
 }
 
 /// Refuses a file that is not a backup.
-fn check_backup(backup: &Path) -> ProjectResult<()> {
+pub(crate) fn check_backup(backup: &Path) -> ProjectResult<()> {
     let shown = backup.display();
     let failed = || format!("cannot read {shown}");
     let refuse = |text: String| Err(Refusal::Usage(text).into());
@@ -238,4 +263,23 @@ fn is_project_already(project: &Project) -> ProjectError {
         "{shown} is a project already; name another directory"
     ))
     .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_free;
+
+    #[test]
+    fn only_a_folder_without_files_of_others_becomes_a_project() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let new = dir.path().join("new");
+        assert!(is_free(&new).expect("looked up"), "there is none");
+        let left = new.join(".catalog.sqlite.12-0.mocban-partial");
+        std::fs::create_dir_all(left).expect("a folder");
+        std::fs::write(new.join("mocban.toml"), "").expect("written");
+        assert!(is_free(&new).expect("listed"), "of an interrupted restore");
+        std::fs::write(new.join("scan.stl"), "").expect("written");
+        assert!(!is_free(&new).expect("listed"));
+        assert!(!is_free(&new.join("scan.stl")).expect("a file"));
+    }
 }

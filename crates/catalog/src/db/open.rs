@@ -130,6 +130,18 @@ async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identit
     }
 }
 
+/// Opens read connections to a file that nobody writes to, such as a backup.
+pub(crate) async fn immutable_pool(path: &Path) -> Result<SqlitePool> {
+    check_file(path, false)?;
+    let opened = pool(options(path).read_only(true).immutable(true)).await;
+    let (pool, found) = opened.map_err(|error| unreadable(path, error))?;
+    match found {
+        Identity::Current => Ok(pool),
+        Identity::Uninitialized => Err(CatalogError::Empty(path.to_owned())),
+        Identity::Other(number) => Err(wrong_identity(path, number)),
+    }
+}
+
 async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
     let pool = SqlitePoolOptions::new()
         .max_connections(READERS)

@@ -62,7 +62,7 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let mut task = state.tasks.state(TaskKind::Export, &open);
+    let mut task = state.tasks.state(TaskKind::Export, &open.key);
     if task.is_none() {
         let dir = open.dir.clone();
         let recovered = spawn_blocking(move || recover_exports(&dir)).await;
@@ -71,7 +71,7 @@ pub(super) async fn page(
                 "the program ended before the last export was done, so an earlier one is kept: press Export again",
                 "chương trình dừng trước khi xuất xong nên bản xuất trước được giữ lại: hãy bấm Xuất lại",
             );
-            task = Some(state.tasks.note_failure(TaskKind::Export, &open, why));
+            task = Some(state.tasks.note_failure(TaskKind::Export, &open.key, why));
         }
     }
     let folders = exported(&open.dir);

@@ -8,7 +8,7 @@ use super::projects::is_project;
 use super::sentence::Sentence;
 use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
-use mocban_store::Project;
+use mocban_store::{CATALOG_FILE, Project};
 
 /// Most entries of all folders that are counted for one page.
 const COUNTED: usize = 20_000;
@@ -16,6 +16,8 @@ const COUNTED: usize = 20_000;
 const SHOWN: usize = 500;
 /// Extensions of lists.
 pub(super) const LISTS: [&str; 4] = ["csv", "xlsx", "jsonl", "tsv"];
+/// Extensions of files that may be backups.
+const BACKUP_EXTENSIONS: [&str; 5] = ["sqlite", "sqlite3", "db", "backup", "bak"];
 /// Folders in which other disks appear.
 const DISKS: [&str; 4] = ["/media", "/mnt", "/run/media", "/Volumes"];
 
@@ -29,6 +31,7 @@ pub(super) struct FileCounts {
     pub(super) meshes: u64,
     pub(super) prints: u64,
     pub(super) lists: u64,
+    pub(super) backups: u64,
     /// Whether there were too many entries to count all.
     pub(super) is_partial: bool,
 }
@@ -42,6 +45,8 @@ pub(super) struct PickedFolder {
     pub(super) counts: FileCounts,
     pub(super) folders: Vec<(String, FileCounts)>,
     pub(super) lists: Vec<String>,
+    /// Files that are named like backups.
+    pub(super) backups: Vec<String>,
 }
 
 impl PickerRoots {
@@ -117,7 +122,7 @@ impl PickerRoots {
             ))
         };
         let mut budget = COUNTED;
-        let (mut folders, mut lists) = (Vec::new(), Vec::new());
+        let (mut folders, mut lists, mut backups) = (Vec::new(), Vec::new(), Vec::new());
         let mut counts = FileCounts::default();
         for entry in std::fs::read_dir(&path).map_err(failed)?.flatten() {
             let Ok(name) = entry.file_name().into_string() else {
@@ -139,16 +144,20 @@ impl PickerRoots {
             counts.add(&entry);
             if is_list(&entry) && lists.len() < SHOWN {
                 lists.push(name);
+            } else if is_named_like_backup(&entry) && backups.len() < SHOWN {
+                backups.push(name);
             }
         }
         for (_, below) in &folders {
             counts.meshes += below.meshes;
             counts.prints += below.prints;
             counts.lists += below.lists;
+            counts.backups += below.backups;
             counts.is_partial |= below.is_partial;
         }
         folders.sort_by(|(a, _), (b, _)| a.cmp(b));
         lists.sort();
+        backups.sort();
         let parent = path.parent().filter(|parent| self.has(parent));
         Ok(PickedFolder {
             parent: parent.map(Path::to_owned),
@@ -156,6 +165,7 @@ impl PickerRoots {
             counts,
             folders,
             lists,
+            backups,
         })
     }
 }
@@ -194,15 +204,25 @@ impl FileCounts {
             self.prints += 1;
         } else if is_list(file) {
             self.lists += 1;
+        } else if is_named_like_backup(file) {
+            self.backups += 1;
         }
     }
 }
 
 /// Returns whether a folder in another one has results of a project, or is an export.
-fn holds_results(parent: &Path, folder: &Path) -> bool {
+pub(super) fn holds_results(parent: &Path, folder: &Path) -> bool {
     let is_named_so =
         folder == exports_dir(parent) || folder == Project::at(parent).artifacts_dir();
     is_named_so && is_project(parent) || folder.join(EXPORT_MANIFEST).exists()
+}
+
+/// Returns whether a file may be a backup by its name. The catalog of a project is none.
+pub(super) fn is_named_like_backup(file: &Path) -> bool {
+    let extension = file.extension().and_then(|extension| extension.to_str());
+    let is_known =
+        |extension: &str| BACKUP_EXTENSIONS.contains(&extension.to_ascii_lowercase().as_str());
+    extension.is_some_and(is_known) && file.file_name().is_some_and(|name| name != CATALOG_FILE)
 }
 
 fn is_list(file: &Path) -> bool {
@@ -212,7 +232,8 @@ fn is_list(file: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{EXPORT_MANIFEST, FileCounts, PickerRoots};
+    use super::{EXPORT_MANIFEST, FileCounts, PickerRoots, is_named_like_backup};
+    use std::path::Path;
 
     #[test]
     fn a_folder_is_counted_and_nothing_outside_the_roots_is_read() {
@@ -234,6 +255,7 @@ mod tests {
             "3.png",
             "pairs.csv",
             "x.txt",
+            "blocks.sqlite",
             ".hidden/4.stl",
             "p/catalog.sqlite",
             "p/artifacts/00/5.png",
@@ -265,6 +287,7 @@ mod tests {
             }
         );
         assert_eq!(read.lists, ["pairs.csv"]);
+        assert_eq!((read.counts.backups, read.backups.len()), (1, 1));
         assert_eq!(read.parent, None);
         for path in [
             "../secret",
@@ -281,8 +304,10 @@ mod tests {
             assert_eq!(roots.read(&root).expect("a folder").folders.len(), 2);
         }
         roots
-            .allowed(std::path::Path::new("/etc/passwd"))
+            .allowed(Path::new("/etc/passwd"))
             .expect_err("outside");
+        assert!(is_named_like_backup(Path::new("x/OLD.DB")));
+        assert!(!is_named_like_backup(Path::new("x/catalog.sqlite")));
         assert!(PickerRoots::of(["/".into()]).all().is_empty());
     }
 }

@@ -16,6 +16,7 @@ use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::home::free_space;
 use super::number_text::file_size;
+use super::restore_page::restore_address;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
@@ -44,8 +45,8 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let checked = state.tasks.state(TaskKind::Check, &open);
-    let mut stored = state.tasks.state(TaskKind::Backup, &open);
+    let checked = state.tasks.state(TaskKind::Check, &open.key);
+    let mut stored = state.tasks.state(TaskKind::Backup, &open.key);
     let file = open.dir.join(BACKUP);
     if stored.is_none() {
         let file = file.clone();
@@ -55,7 +56,7 @@ pub(super) async fn page(
                 "the program ended before the last backup was done, so an earlier one is kept: press Back up now again",
                 "chương trình dừng trước khi sao lưu xong nên bản trước được giữ lại: hãy bấm Sao lưu ngay lần nữa",
             );
-            stored = Some(state.tasks.note_failure(TaskKind::Backup, &open, why));
+            stored = Some(state.tasks.note_failure(TaskKind::Backup, &open.key, why));
         }
     }
     let meta = std::fs::metadata(&file).ok();
@@ -80,6 +81,7 @@ pub(super) async fn page(
                 @if let Some(meta) = meta {
                     p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (visit.file_size(meta.len())) } " "
                         @if meta.len() <= DOWNLOAD_BYTES { a.button href="backup.sqlite" download { (visit.t("Save a copy", "Lưu một bản")) } }
+                        " " a.button href={ (visit.root) (restore_address(&shown)) } { (visit.t("Restore as a new project", "Khôi phục thành dự án mới")) }
                     }
                 }
             }

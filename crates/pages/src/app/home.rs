@@ -59,11 +59,13 @@ pub(super) async fn page(
             (empty(visit.t("There is no project in this folder yet.", "Chưa có dự án nào trong thư mục này."), &html! {
                 p { a.button.primary href="import" { (visit.t("Import scans and prints", "Nhập bản quét và bản in")) } }
                 (demo_form(&visit))
+                p { (restore_link(&visit)) }
             }))
         } @else {
             div.cards { @for project in &projects { (card(&visit, project)) } }
             @if !is_project(&state.options.folder) { div.row {
                 a.button href="import" { (visit.t("Import into a new project", "Nhập vào dự án mới")) }
+                (restore_link(&visit))
                 @if projects.iter().all(|project| project.key != "mocban-demo") { (demo_form(&visit)) }
             } }
         }
@@ -113,6 +115,10 @@ pub(super) fn free_space(visit: &Visit, bytes: u64) -> String {
         Language::English => format!("{size} free on this disk"),
         Language::Vietnamese => format!("đĩa còn trống {size}"),
     }
+}
+
+fn restore_link(visit: &Visit) -> Markup {
+    html! { a.button href="restore" { (visit.t("Restore a backup", "Khôi phục bản sao lưu")) } }
 }
 
 fn demo_form(visit: &Visit) -> Markup {

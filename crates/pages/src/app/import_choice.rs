@@ -9,9 +9,9 @@ use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
 use super::plan_cache::{KEPT_PAIRS, PlanCache};
-use super::projects::{find, is_project};
+use super::project_name::new_project_dir;
+use super::projects::find;
 use super::sentence::Sentence;
-use super::uploads::FOLDER as UPLOADS;
 use mocban_core::domain::{BlockName, LengthUnit};
 use mocban_lists::manifest::{
     BlockRow, ChosenColumns, ListHead, PairingChanges, is_named_like_mesh, is_named_like_print,
@@ -25,8 +25,6 @@ use mocban_project::import_plan::{ImportPlan, plan_import};
 use mocban_project::location::Location;
 use mocban_project::pair_choices::PairChoices;
 
-/// Longest name of a new project, characters.
-pub(super) const NAME_CHARS: usize = 60;
 /// Number of pairs that are shown at once before an import.
 pub(super) const SHOWN_PAIRS: u64 = 20;
 /// Rows of a list that are shown to choose its columns.
@@ -212,37 +210,7 @@ impl ImportChoice {
         if let Some(found) = found.into_iter().find(|found| found.key == self.project) {
             return Ok(found.dir);
         }
-        if is_project(folder) {
-            return Err(AppFailure::refused(Sentence::new(
-                "the folder of the app is a project itself: start the app in the folder above it for a new one",
-                "thư mục của ứng dụng đã là một dự án: hãy mở ứng dụng ở thư mục bên trên để tạo dự án mới",
-            )));
-        }
-        let name = self.project.trim();
-        if name.eq_ignore_ascii_case(UPLOADS) {
-            return Err(AppFailure::refused(Sentence::new(
-                format!(
-                    "{name:?} is the folder of files from browsers: give the project another name"
-                ),
-                format!(
-                    "{name:?} là thư mục của các tệp từ trình duyệt: hãy đặt tên khác cho dự án"
-                ),
-            )));
-        }
-        let is_plain = !name.starts_with('.') && !name.contains(['/', '\\', ':']);
-        let is_short = name.chars().count() <= NAME_CHARS && !name.is_empty();
-        if is_plain && is_short && !name.contains(char::is_control) {
-            return Ok(folder.join(name));
-        }
-        let name = &self.project;
-        Err(AppFailure::refused(Sentence::new(
-            format!(
-                "{name:?} cannot be the name of a project: give a name of at most {NAME_CHARS} characters without / and :"
-            ),
-            format!(
-                "{name:?} không thể là tên dự án: hãy đặt tên tối đa {NAME_CHARS} ký tự, không có / và :"
-            ),
-        )))
+        new_project_dir(&self.project, folder)
     }
 
     /// Returns what an import would store; `None` if not enough is chosen. Pairs are shown from the position `from`, or from

@@ -195,7 +195,8 @@ fn picker(visit: &Visit, picked: &PickedFolder) -> Markup {
     }
 }
 
-fn counts_text(visit: &Visit, counts: &FileCounts) -> String {
+/// Says how many files a folder has.
+pub(super) fn counts_text(visit: &Visit, counts: &FileCounts) -> String {
     let parts = [
         (counts.meshes, visit.t("scans", "bản quét")),
         (counts.prints, visit.t("images", "hình ảnh")),
@@ -213,7 +214,8 @@ fn counts_text(visit: &Visit, counts: &FileCounts) -> String {
     format!("{}{more}", parts.join(", "))
 }
 
-fn root_links(visit: &Visit, roots: &PickerRoots) -> Markup {
+/// Returns links to the folders in which files are chosen.
+pub(super) fn root_links(visit: &Visit, roots: &PickerRoots) -> Markup {
     html! {
         p.muted.row { (visit.t("Start at", "Bắt đầu từ")) ":"
             @for root in roots.all() {

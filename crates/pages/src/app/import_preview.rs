@@ -5,7 +5,8 @@ use std::path::Path;
 use maud::{Markup, html};
 
 use super::components::{action_form, choice, grouped};
-use super::import_choice::{ImportChoice, NAME_CHARS, Planned, SHOWN_PAIRS};
+use super::import_choice::{ImportChoice, Planned, SHOWN_PAIRS};
+use super::project_name::NAME_CHARS;
 use super::sentence::{Sentence, without_commands};
 use super::visit::Visit;
 use crate::messages;

@@ -9,8 +9,8 @@ use super::state::{AppOptions, AppState};
 use super::{
     assets, block_page, blocks_page, chosen_pairs, export_page, export_zip, failure_page,
     health_page, home, import_page, invitation_cards, last_import, pair_page, pairs_page, pictures,
-    report_page, review_agreement, review_page, run_actions, run_page, settings_page,
-    upload_actions,
+    report_page, restore_action, restore_content, restore_page, review_agreement, review_page,
+    run_actions, run_page, settings_page, upload_actions,
 };
 
 /// Returns the routes of the app, for a server.
@@ -36,6 +36,9 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route(&format!("{block}/"), get(block_page::page))
         .route("/p/{project}/review", get(review_page::page))
         .route("/p/{project}/review/agreement", get(review_agreement::part))
+        .route("/restore", get(restore_page::page))
+        .route("/restore/content", get(restore_content::part))
+        .route("/actions/restore", post(restore_action::start))
         .route("/import", get(import_page::page))
         .route("/actions/import", post(import_page::import))
         .route("/actions/upload", post(upload_actions::begin))

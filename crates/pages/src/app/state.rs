@@ -50,7 +50,7 @@ pub(super) struct AppState {
     pub(super) invitations: Invitations,
     /// The blocks that are open, each with its picture and heights.
     pub(super) blocks: OpenPages,
-    /// Exports, checks and backups.
+    /// Exports, checks, backups, and what is restored.
     pub(super) tasks: AppTasks,
     /// Why runs that the app started failed.
     pub(super) failed_runs: FailedRuns,

@@ -7,8 +7,8 @@ use super::failure::{AppFailure, AppResult};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use crate::on_thread::on_thread;
-use mocban_project::ProjectResult;
 use mocban_project::location::Location;
+use mocban_project::{ProjectError, ProjectResult};
 
 /// A kind of long work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -16,6 +16,7 @@ pub(super) enum TaskKind {
     Export,
     Check,
     Backup,
+    Restore,
 }
 
 /// Lines that say what was done, each in English and Vietnamese.
@@ -55,7 +56,26 @@ impl AppTasks {
     where
         F: Future<Output = ProjectResult<FinishedTask>>,
     {
-        let id = (open.key.clone(), kind);
+        let (location, dir) = (open.location(), open.dir.clone());
+        let explain = move |error: &ProjectError| Sentence::of_error(error, &dir);
+        self.start_named(kind, &open.key, explain, move || work(location))
+    }
+
+    /// Starts a task for a project that need not exist yet, by its name. `explain` says why it failed.
+    ///
+    /// # Errors
+    /// Refuses a second task of a kind.
+    pub(super) fn start_named<F>(
+        &self,
+        kind: TaskKind,
+        name: &str,
+        explain: impl FnOnce(&ProjectError) -> Sentence + Send + 'static,
+        work: impl FnOnce() -> F + Send + 'static,
+    ) -> AppResult<()>
+    where
+        F: Future<Output = ProjectResult<FinishedTask>>,
+    {
+        let id = (name.to_owned(), kind);
         {
             let mut tasks = self.lock();
             if matches!(tasks.get(&id), Some(TaskState::Running)) {
@@ -66,13 +86,11 @@ impl AppTasks {
             }
             tasks.insert(id.clone(), TaskState::Running);
         }
-        let (tasks, dir) = (Self(Arc::clone(&self.0)), open.dir.clone());
-        let location = open.location();
+        let tasks = Self(Arc::clone(&self.0));
         tokio::spawn(async move {
-            let done = on_thread(move || work(location)).await;
-            let state = match done {
+            let state = match on_thread(work).await {
                 Ok(done) => TaskState::Done(done),
-                Err(error) => TaskState::Failed(Sentence::of_error(&error, &dir)),
+                Err(error) => TaskState::Failed(explain(&error)),
             };
             tasks.lock().insert(id, state);
         });
@@ -80,20 +98,15 @@ impl AppTasks {
     }
 
     /// Notes why a task of an earlier process failed, unless another one was started since. Returns the state of the task.
-    pub(super) fn note_failure(
-        &self,
-        kind: TaskKind,
-        open: &OpenProject,
-        why: Sentence,
-    ) -> TaskState {
+    pub(super) fn note_failure(&self, kind: TaskKind, name: &str, why: Sentence) -> TaskState {
         let mut tasks = self.lock();
-        let state = tasks.entry((open.key.clone(), kind));
+        let state = tasks.entry((name.to_owned(), kind));
         state.or_insert(TaskState::Failed(why)).clone()
     }
 
-    /// Returns the state of the last task of a kind.
-    pub(super) fn state(&self, kind: TaskKind, open: &OpenProject) -> Option<TaskState> {
-        self.lock().get(&(open.key.clone(), kind)).cloned()
+    /// Returns the state of the last task of a kind for the project with a name.
+    pub(super) fn state(&self, kind: TaskKind, name: &str) -> Option<TaskState> {
+        self.lock().get(&(name.to_owned(), kind)).cloned()
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<(String, TaskKind), TaskState>> {

@@ -1,0 +1,154 @@
+//! What a backup holds, before a project is made of it, with the form that does it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::response::Html;
+use maud::{Markup, html};
+
+use super::backup_files::BACKUPS;
+use super::components::{action_form, grouped};
+use super::failure::{AppFailure, AppResult};
+use super::folder_picker::PickerRoots;
+use super::home::free_space;
+use super::project_name::{NAME_CHARS, new_project_dir};
+use super::restore_action::{check_backup_file, check_room, restore_sentence};
+use super::restore_page::chosen_path;
+use super::sentence::Sentence;
+use super::state::AppState;
+use super::visit::Visit;
+use crate::on_thread::read_on_thread;
+use mocban_core::domain::one_line;
+use mocban_project::backup_content::{BackupContent, backup_content};
+use mocban_project::{ProjectError, ProjectResult};
+use mocban_system::platform;
+
+/// Most names that are tried for a new project.
+const MAX_NAMES: u32 = 100;
+
+/// Responds with the content of the backup that the address names.
+pub(super) async fn part(
+    State(state): State<Arc<AppState>>,
+    visit: Visit,
+) -> AppResult<Html<String>> {
+    let folder = state.options.folder.clone();
+    let given = visit.query.get("backup").unwrap_or_default().to_owned();
+    let read =
+        read_on_thread(async move || Ok::<_, ProjectError>(read(&folder, &given).await)).await;
+    let part = match read? {
+        Ok((content, name)) => content_part(&visit, &state.options.folder, &content, &name),
+        Err(failure) => html! { p.notice.bad role="alert" { (failure.text(visit.language)) } },
+    };
+    Ok(Html(part.into_string()))
+}
+
+/// Reads a backup. Returns its content, and a name for the new project.
+async fn read(folder: &Path, given: &str) -> AppResult<(BackupContent, String)> {
+    let backup = chosen_path(&PickerRoots::new(folder), given)?;
+    check_backup_file(&backup)?;
+    let name = free_name(folder, &backup);
+    let content: ProjectResult<BackupContent> = backup_content(&backup, &folder.join(&name)).await;
+    let content = content
+        .map_err(|error| AppFailure::refused(restore_sentence(&error, &backup, folder, &name)))?;
+    Ok((content, name))
+}
+
+/// Returns the name of a project that does not exist: that of the backup or of its project, or a similar one.
+fn free_name(folder: &Path, backup: &Path) -> String {
+    let parent = backup.parent().filter(|parent| parent.ends_with(BACKUPS));
+    let of_project = parent.and_then(Path::parent).and_then(Path::file_name);
+    let stem = of_project.or(backup.file_stem()).unwrap_or_default();
+    let stem: String = stem
+        .to_string_lossy()
+        .chars()
+        .take(NAME_CHARS - 4)
+        .collect();
+    let is_plain = new_project_dir(&stem, folder).is_ok();
+    let stem = if is_plain { stem.trim() } else { "restored" };
+    let others = (2..MAX_NAMES).map(|number| format!("{stem} {number}"));
+    let mut names = std::iter::once(stem.to_owned()).chain(others);
+    let free = names.find(|name| !folder.join(name).exists());
+    free.unwrap_or_default()
+}
+
+fn content_part(visit: &Visit, folder: &Path, content: &BackupContent, name: &str) -> Markup {
+    let room = check_room(folder, content.bytes);
+    let inputs = visit.query.get("inputs");
+    html! {
+        h2 { (visit.t("What is in the backup", "Bản sao lưu có gì")) }
+        dl {
+            dt { (visit.t("Pairs", "Các cặp")) } dd { b { (grouped(content.pairs)) } }
+            @if content.blocks > 0 { dt { (visit.t("Blocks", "Các ván")) } dd { (grouped(content.blocks)) } }
+            dt { (visit.t("Verdicts", "Đánh giá")) } dd { (grouped(content.verdicts)) }
+            @if let Some(time) = content.written { dt { (visit.t("Written", "Thời điểm ghi")) } dd { (visit.time(time)) } }
+            @if let Some(time) = content.last_activity { dt { (visit.t("Last result", "Kết quả mới nhất")) } dd { (visit.time(time)) } }
+            dt { (visit.t("Size", "Dung lượng")) }
+            dd { (visit.file_size(content.bytes)) @if let Some(free) = platform::free_bytes(folder) { " · " (free_space(visit, free)) } }
+            dt { (visit.t("Scans and prints", "Bản quét và bản in")) } dd { (inputs_text(visit, content, inputs)) }
+        }
+        @match &room {
+            Err(why) => p.notice.bad role="alert" { (why.text(visit.language)) },
+            Ok(()) => (action_form("actions/restore", "fields", &html! {
+                input type="hidden" name="backup" value=(visit.query.get("backup").unwrap_or_default());
+                @if let Some(inputs) = inputs { input type="hidden" name="inputs" value=(inputs); }
+                label { span { (visit.t("Name of the new project", "Tên dự án mới")) }
+                    input #restore-name name="name" value=(name) required maxlength=(NAME_CHARS);
+                }
+                button.primary #restore { (visit.t("Restore", "Khôi phục")) }
+            })),
+        }
+    }
+}
+
+/// Says where scans and prints will be read, because a backup has none.
+fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> String {
+    let said = match (inputs, &content.missing) {
+        (Some(inputs), _) => {
+            let inputs = one_line(inputs);
+            Sentence::new(
+                format!(
+                    "Not in a backup. Files that are not at their old places are looked for in {inputs}."
+                ),
+                format!(
+                    "Không có trong bản sao lưu. Các tệp không còn ở chỗ cũ sẽ được tìm trong {inputs}."
+                ),
+            )
+        }
+        (None, None) => Sentence::new(
+            "Not in a backup. They are read from their old places, where all files that were looked at are.",
+            "Không có trong bản sao lưu. Chúng được đọc từ chỗ cũ, nơi có mọi tệp đã xem thử.",
+        ),
+        (None, Some(found)) => {
+            let [missing, looked_at] = [found.missing, found.looked_at].map(|n| grouped(n as u64));
+            let first = one_line(&found.first);
+            Sentence::new(
+                format!(
+                    "Not in a backup, and {missing} of {looked_at} files that were looked at are not at their old places, first {first}. Choose their folder below."
+                ),
+                format!(
+                    "Không có trong bản sao lưu, và {missing} trên {looked_at} tệp đã xem thử không còn ở chỗ cũ, tệp đầu tiên là {first}. Hãy chọn thư mục của chúng ở bên dưới."
+                ),
+            )
+        }
+    };
+    said.text(visit.language).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::free_name;
+    use std::path::Path;
+
+    #[test]
+    fn a_new_project_is_named_like_the_one_that_was_backed_up() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let name = |backup: &str| free_name(dir.path(), Path::new(backup));
+        assert_eq!(name("/x/ván 04/backups/backup.sqlite"), "ván 04");
+        assert_eq!(name("/x/old blocks.sqlite"), "old blocks");
+        std::fs::create_dir(dir.path().join("ván 04")).expect("a folder");
+        assert_eq!(name("/x/ván 04/backups/backup.sqlite"), "ván 04 2");
+        assert_eq!(name("/x/uploads.sqlite"), "restored");
+        assert_eq!(name("/x/a:b.sqlite"), "restored");
+    }
+}

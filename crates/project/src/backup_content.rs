@@ -1,0 +1,66 @@
+//! What a backup holds, before a project is made of it.
+
+use std::path::Path;
+use std::time::UNIX_EPOCH;
+
+use crate::backup::rows_of;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
+use crate::missing_inputs::{self, MissingInputs};
+use crate::restore::check_backup;
+use mocban_catalog::Catalog;
+use mocban_core::domain::UnixMillis;
+use mocban_store::Project;
+
+/// What a backup holds. Scans, prints and artifacts are in no backup.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BackupContent {
+    /// Its length.
+    pub bytes: u64,
+    /// When its file was last written.
+    pub written: Option<UnixMillis>,
+    /// When the last attempt at a stage ended.
+    pub last_activity: Option<UnixMillis>,
+    /// Number of pairs.
+    pub pairs: u64,
+    /// Number of whole blocks.
+    pub blocks: u64,
+    /// Number of verdicts.
+    pub verdicts: u64,
+    /// Scans and prints that a project in the new folder would not find.
+    pub missing: Option<MissingInputs>,
+}
+
+/// Reads what a backup holds for a project in the folder `dir`, which need not exist. Writes nothing.
+///
+/// # Errors
+/// Returns an error if the file is not a backup, or is damaged where it is read.
+pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupContent> {
+    check_backup(backup)?;
+    let meta = std::fs::metadata(backup);
+    let meta = meta.with_context(|| format!("cannot read {}", backup.display()))?;
+    let catalog = Catalog::open_backup(backup).await?;
+    let read = async {
+        let (pairs, verdicts) = rows_of(&catalog).await?;
+        let blocks = catalog.known_blocks().await?.len() as u64;
+        let last_activity = catalog.last_activity().await?;
+        let missing = missing_inputs::missing(&Project::at(dir), &catalog, pairs).await?;
+        Ok::<_, ProjectError>(BackupContent {
+            bytes: meta.len(),
+            written: written(&meta),
+            last_activity,
+            pairs,
+            blocks,
+            verdicts,
+            missing,
+        })
+    };
+    let content = read.await;
+    catalog.close().await;
+    content
+}
+
+/// Returns when a file was last written, if the file system knows.
+pub fn written(meta: &std::fs::Metadata) -> Option<UnixMillis> {
+    let since = meta.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+    UnixMillis::try_from(since.as_millis()).ok()
+}
