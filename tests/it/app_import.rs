@@ -11,7 +11,7 @@ use crate::cli::mocban;
 use crate::page::{Page, Reply};
 
 /// Copies inputs of the shared project to other names.
-fn copy_inputs(dir: &Path, files: &[(&str, &str)]) {
+pub(crate) fn copy_inputs(dir: &Path, files: &[(&str, &str)]) {
     for (from, to) in files {
         let (from, to) = (dir.join("p/data").join(from), dir.join(to));
         std::fs::create_dir_all(to.parent().expect("a folder")).expect("created");
@@ -21,7 +21,7 @@ fn copy_inputs(dir: &Path, files: &[(&str, &str)]) {
 }
 
 /// Opens the page of imports for two folders.
-fn folders(page: &Page, dir: &Path, query: &str) -> String {
+pub(crate) fn folders(page: &Page, dir: &Path, query: &str) -> String {
     let folder = |name: &str| encode(dir.join(name).to_str().expect("UTF-8"));
     let [meshes, prints] = [folder("x/scans"), folder("x/prints")];
     let address = format!("/import?project=new&meshes={meshes}&prints={prints}{query}");

@@ -14,6 +14,7 @@ mod app_controls;
 mod app_curator;
 mod app_export_zip;
 mod app_import;
+mod app_import_files;
 mod app_invitations;
 #[cfg(target_os = "linux")]
 mod app_kills;

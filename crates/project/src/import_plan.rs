@@ -8,7 +8,7 @@ use crate::import_pairs::{PairSource, listing};
 use crate::location::Location;
 use crate::missing_files::MissingFiles;
 use crate::pair_choices::PairChoices;
-use mocban_core::domain::{ContentHash, PairName};
+use mocban_core::domain::{ContentHash, LengthUnit, PairName};
 use mocban_store::Project;
 
 /// A pair that would be imported.
@@ -24,6 +24,8 @@ pub struct PlannedPair {
     pub character: Option<String>,
     /// Its block, if the list names it.
     pub block: Option<String>,
+    /// The unit of its scan, if it is given.
+    pub unit: Option<LengthUnit>,
     /// Messages about its files that do not exist.
     pub missing: Vec<String>,
 }
@@ -76,6 +78,7 @@ pub fn plan_import(
                 print: row.print,
                 character: row.character,
                 block: row.block,
+                unit: row.unit,
                 missing: lines,
             });
         }

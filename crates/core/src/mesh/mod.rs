@@ -4,6 +4,7 @@ mod arrays;
 mod clustering;
 mod decimal;
 mod error;
+mod extent;
 mod format;
 mod missing;
 mod obj;
@@ -22,13 +23,14 @@ mod xyz;
 
 pub use arrays::{MeshArrayError, PositionSlice};
 pub use error::{MeshError, MeshLimits, MeshReadError};
+pub use extent::MeshExtent;
 pub use missing::MeshRead;
 pub use triangle_mesh::{Mesh, Vertices};
 pub use triangle_stream::{
     STL_HEAD, Triangle, TriangleStream, binary_stl_triangles, pass_over_binary_stl,
 };
 
-use std::io::Read;
+use std::io::{Read, Seek};
 
 use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
@@ -127,6 +129,29 @@ pub fn read_from(
     }
     let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
     Ok(read_bytes(&bytes, name, limits)?)
+}
+
+/// Describes the size of a mesh by its file of `len` bytes. Of a long file, reads only parts.
+///
+/// # Errors
+/// Returns an error if [`read_from`] would return one for a short file; for a long file, if its header shows one, or the
+/// source fails.
+pub fn extent(
+    file: &mut (impl Read + Seek),
+    len: u64,
+    name: &str,
+    limits: &MeshLimits,
+) -> Result<MeshExtent, MeshReadError> {
+    limits.check_bytes(len)?;
+    if len > extent::WHOLE_BYTES {
+        return extent::sampled(file, len, name, limits);
+    }
+    let mut bytes = Vec::new();
+    file.by_ref()
+        .take(extent::WHOLE_BYTES)
+        .read_to_end(&mut bytes)?;
+    let mesh = read(&bytes, name, limits)?;
+    Ok(MeshExtent::of_all(mesh.vertices.iter(), &bytes))
 }
 
 #[cfg(test)]

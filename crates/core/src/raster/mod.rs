@@ -21,7 +21,7 @@ mod warp_rgb;
 
 pub use decode::{
     DecodeError, ImageLimits, PrintImage, PrintSamples, SampleSlice, decode, header_pixel_count,
-    stated_dpi,
+    header_size, stated_dpi,
 };
 pub use depth_map::DepthMap;
 pub use encode::{

@@ -156,7 +156,7 @@ pub(super) fn scan_file(visit: &Visit, path: &str, unit: Option<LengthUnit>) -> 
 }
 
 /// Returns the name of a unit. In Vietnamese, `in` means to print.
-fn unit_name(visit: &Visit, unit: LengthUnit) -> &'static str {
+pub(super) fn unit_name(visit: &Visit, unit: LengthUnit) -> &'static str {
     match unit {
         LengthUnit::In => visit.t("in", "inch"),
         _ => unit.name(),

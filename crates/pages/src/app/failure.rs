@@ -99,6 +99,14 @@ impl AppFailure {
         self.status
     }
 
+    /// Returns what failed, as a part of something else.
+    pub(super) fn into_sentence(self) -> Sentence {
+        let texts = Language::ALL.map(|language| self.text(language).to_owned());
+        let [english, vietnamese] = texts;
+        self.sentence
+            .unwrap_or_else(|| Sentence::new(english, vietnamese))
+    }
+
     /// Returns what failed.
     pub(super) fn text(&self, language: Language) -> &str {
         match (&self.sentence, language) {

@@ -6,6 +6,7 @@ use maud::{Markup, html};
 
 use super::components::{action_form, choice, grouped};
 use super::import_choice::{ImportChoice, Planned, SHOWN_PAIRS};
+use super::import_files::files_part;
 use super::project_name::NAME_CHARS;
 use super::sentence::{Sentence, without_commands};
 use super::visit::Visit;
@@ -40,8 +41,17 @@ pub(super) fn plan_part(
                 },
                 Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
             }
+            @if has_files(planned) { (files_part(visit)) }
             (import_form(visit, chosen, planned))
         }
+    }
+}
+
+/// Returns whether there are files to look at.
+fn has_files(planned: &Planned) -> bool {
+    match planned {
+        Planned::Pairs(plan, _) => plan.pairs > 0,
+        Planned::Blocks(rows, _) => !rows.is_empty(),
     }
 }
 

@@ -29,6 +29,8 @@ mod health_page;
 mod home;
 mod import_choice;
 mod import_columns;
+mod import_files;
+mod import_heads;
 mod import_page;
 mod import_partners;
 mod import_preview;

@@ -79,7 +79,7 @@ pub(super) enum PlyType {
 
 impl PlyType {
     /// Returns the bytes of the shortest value in a binary body.
-    const fn min_size(self) -> usize {
+    pub(super) const fn min_size(self) -> usize {
         match self {
             Self::Scalar(scalar) => scalar.size(),
             Self::List { count, .. } => count.size(),

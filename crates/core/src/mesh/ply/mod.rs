@@ -3,6 +3,9 @@
 mod body;
 mod header;
 mod source;
+mod vertex_rows;
+
+pub(super) use vertex_rows::VertexRows;
 
 use body::PlyBody;
 use header::{PlyEncoding, PlyHeader};

@@ -2,6 +2,7 @@
 
 mod colour_profile;
 mod error;
+mod header_size;
 mod jpeg;
 mod limits;
 mod orientation;
@@ -23,6 +24,7 @@ use print_image::colours_on_white;
 use tags::TagFileWindow;
 
 pub use error::DecodeError;
+pub use header_size::header_size;
 pub use limits::ImageLimits;
 pub use print_image::PrintImage;
 pub use resolution::stated_dpi;

@@ -73,6 +73,12 @@ pub(super) fn pixel_count(file: &dyn TagSource) -> Option<u64> {
     Some(pages::pixel_count(&print.page))
 }
 
+/// Returns width and height of the print of a TIFF file, or `None` if its tags cannot be read.
+pub(super) fn size(file: &dyn TagSource) -> Option<[u32; 2]> {
+    let print = pages::find_print_page(file).ok()?;
+    pages::size(&print.page)
+}
+
 fn pixels(layout: &TiffLayout<'_>, file: &[u8]) -> Result<Grid<[u16; 3]>, DecodeError> {
     let [across, down] = layout.chunk_counts();
     let mut out = Grid::new(layout.width, layout.height, [0; 3]);

@@ -1,0 +1,163 @@
+//! What the page of imports says of the files before anything is stored: their sizes, their unit, and which cannot be used.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::app::{act, text, with_project};
+use crate::app_import::{copy_inputs, folders};
+use crate::app_uploads::encode;
+use crate::page::Page;
+
+/// Returns the query of an import of two folders.
+fn query(dir: &Path, more: &str) -> String {
+    let folder = |name: &str| encode(dir.join(name).to_str().expect("UTF-8"));
+    let [meshes, prints] = [folder("x/scans"), folder("x/prints")];
+    format!("?project=new&meshes={meshes}&prints={prints}{more}")
+}
+
+fn files(page: &Page, query: &str) -> String {
+    let reply = page.get(&format!("/import/files{query}"));
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    text(&reply)
+}
+
+/// Returns all files that cannot be used, and the number of pairs.
+fn problems(page: &Page, query: &str) -> (Vec<String>, Value) {
+    let (mut found, mut after) = (Vec::new(), json!(0));
+    loop {
+        let reply = page
+            .get(&format!("/import/problems{query}&after={after}"))
+            .json();
+        let more = reply["problems"].as_array().expect("a list").iter();
+        found.extend(more.map(|line| line.as_str().expect("a text").to_owned()));
+        if reply["next"].is_null() {
+            return (found, reply["looked_at"].clone());
+        }
+        assert!(
+            reply["next"].as_u64() > after.as_u64(),
+            "it goes on: {reply}"
+        );
+        after = reply["next"].clone();
+    }
+}
+
+#[test]
+fn sizes_and_the_unit_are_shown_before_the_import() {
+    let (dir, page) = with_project();
+    let dir = dir.path();
+    copy_inputs(
+        dir,
+        &[
+            ("meshes/upright-0000.ply", "x/scans/1.ply"),
+            ("prints/upright-0000.jpg", "x/prints/1.jpg"),
+        ],
+    );
+    let shown = folders(&page, dir, "");
+    for part in [
+        "data-load=\"./import/files?",
+        "data-address=\"./import/problems?",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    let english = files(&page, &query(dir, ""));
+    for part in [
+        " px</td>",
+        " mm</td>",
+        "probably mm",
+        "id=\"use-unit\"",
+        "unit=mm",
+    ] {
+        assert!(english.contains(part), "{part}: {english}");
+    }
+    let chosen = files(&page, &query(dir, "&unit=mm"));
+    assert!(chosen.contains("mm, as chosen"), "{chosen}");
+    assert!(!chosen.contains("use-unit"), "{chosen}");
+    let wrong = files(&page, &query(dir, "&unit=m"));
+    assert!(wrong.contains("m, as chosen; rather mm"), "{wrong}");
+    let vietnamese = files(&page, &query(dir, "&language=vi"));
+    assert!(vietnamese.contains("có lẽ là mm"), "{vietnamese}");
+    page.get("/?language=en");
+    assert!(!dir.join("new").exists(), "nothing is stored");
+}
+
+#[test]
+fn files_that_cannot_be_used_are_named_before_the_import() {
+    let (dir, page) = with_project();
+    let dir = dir.path();
+    let inputs = ["empty", "cut", "lfs", "text", "whole"].map(|name| {
+        let to = [
+            format!("x/scans/{name}.ply"),
+            format!("x/prints/{name}.jpg"),
+        ];
+        let from = ["meshes/upright-0000.ply", "prints/upright-0000.jpg"];
+        for (from, to) in from.into_iter().zip(&to) {
+            copy_inputs(dir, &[(from, to.as_str())]);
+        }
+        to.map(|path| dir.join(path))
+    });
+    let [[empty, _], [cut, cut_print], [lfs, _], [_, no_print], _] = inputs;
+    let write = |path: &Path, bytes: &[u8]| std::fs::write(path, bytes).expect("written");
+    write(&empty, b"");
+    for path in [&cut, &cut_print] {
+        let bytes = std::fs::read(path).expect("a file");
+        write(path, &bytes[..bytes.len() / 2]);
+    }
+    write(
+        &lfs,
+        b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n",
+    );
+    write(&no_print, b"notes");
+    let (found, pairs) = problems(&page, &query(dir, ""));
+    assert_eq!((found.len(), pairs), (5, json!(5)), "{found:#?}");
+    for (name, part) in [
+        ("empty: ", "the file is empty"),
+        ("cut: ", "truncated"),
+        ("lfs: ", "Git LFS"),
+        ("text: ", "the file is text"),
+    ] {
+        let is_named = |line: &String| line.starts_with(name) && line.contains(part);
+        assert!(found.iter().any(is_named), "{name}{part}: {found:#?}");
+    }
+    let table = files(&page, &query(dir, ""));
+    assert_eq!(table.matches("class=\"bad\"").count(), 5, "{table}");
+    page.get("/?language=vi");
+    let (found, _) = problems(&page, &query(dir, ""));
+    assert!(
+        found.iter().any(|line| line.contains("tệp rỗng")),
+        "{found:#?}"
+    );
+    page.get("/?language=en");
+}
+
+#[test]
+fn files_outside_the_folders_of_the_user_are_not_opened() {
+    let (dir, page) = with_project();
+    let list = dir.path().join("list.csv");
+    std::fs::write(&list, "id,mesh,print\na,/etc/passwd,/etc/hosts\n").expect("written");
+    let list = encode(list.to_str().expect("UTF-8"));
+    let (found, _) = problems(&page, &format!("?project=new&list={list}"));
+    assert_eq!(found.len(), 2, "{found:#?}");
+    for line in &found {
+        assert!(line.contains("outside your folders and disks"), "{line}");
+    }
+}
+
+#[test]
+fn all_pairs_of_a_large_folder_are_looked_at_in_steps() {
+    let (dir, page) = with_project();
+    let dir = dir.path();
+    for number in 0..1005 {
+        for (folder, ending) in [("scans", "stl"), ("prints", "png")] {
+            let file = dir.join(format!("x/{folder}/{number}.{ending}"));
+            std::fs::create_dir_all(file.parent().expect("a folder")).expect("created");
+            std::fs::write(file, "").expect("written");
+        }
+    }
+    let (found, pairs) = problems(&page, &query(dir, ""));
+    assert_eq!((found.len(), pairs), (2010, json!(1005)));
+    let last = files(&page, &query(dir, "&from=1000"));
+    assert_eq!(last.matches("<th scope=\"row\">").count(), 5, "{last}");
+    let nothing = act(&page, "/import/files", &json!({}), |_| {});
+    assert_eq!(nothing.status, 405, "it only reads");
+}
