@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use mocban::raster::{ImageLimits, decode};
 use serde_json::{Value, json};
 
-use crate::app::{act, text, with_project};
+use crate::app::{open_app, text, with_project};
 use crate::app_import::{copy_inputs, folders};
 use crate::app_uploads::encode;
 use crate::page::Page;
+use crate::small_block::{demo_block, few_labels};
 
 /// Returns the query of an import of two folders.
 fn query(dir: &Path, more: &str) -> String {
@@ -158,6 +160,67 @@ fn all_pairs_of_a_large_folder_are_looked_at_in_steps() {
     assert_eq!((found.len(), pairs), (2010, json!(1005)));
     let last = files(&page, &query(dir, "&from=1000"));
     assert_eq!(last.matches("<th scope=\"row\">").count(), 5, "{last}");
-    let nothing = act(&page, "/import/files", &json!({}), |_| {});
-    assert_eq!(nothing.status, 405, "it only reads");
+}
+
+#[test]
+fn a_block_is_shown_with_its_page_labels_and_scan_before_the_import() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let root = dir.path();
+    demo_block(root);
+    few_labels(root, &root.join("few.json"));
+    let rows = "block,mesh,page,labels\n\
+        b1,d/data/block.ply,d/data/page.jpg,few.json\n\
+        b2,d/data/block.ply,d/data/page.jpg,d/data/block.ply\n";
+    std::fs::write(root.join("blocks.csv"), rows).expect("written");
+    let page = open_app(root);
+    let list = encode(root.join("blocks.csv").to_str().expect("UTF-8"));
+    let query = format!("?project=new&list={list}");
+    let shown = files(&page, &query);
+    for part in [
+        "Labels: <b>6</b> characters (VIA 2)",
+        " mm</td>",
+        "import/picture/page?",
+        "import/picture/scan?",
+        "loading=\"lazy\"",
+        "class=\"bad\"",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    let picture =
+        |kind: &str, place: u32| page.get(&format!("/import/picture/{kind}{query}&place={place}"));
+    let drawn = |kind: &str, place: u32| {
+        let reply = picture(kind, place);
+        assert_eq!(reply.status, 200, "{kind}: {}", text(&reply));
+        assert_eq!(reply.header("content-type"), Some("image/jpeg"), "{kind}");
+        let image = decode(&reply.body, &ImageLimits::SUGGESTED).expect("a picture");
+        let longest = image.rgb.width().max(image.rgb.height());
+        assert!((500..=560).contains(&longest), "{kind}: {longest} pixels");
+        image.rgb
+    };
+    let is_vermillion = |colour: &[u16; 3]| {
+        let [red, green, blue] = colour.map(|value| value >> 8);
+        red > 160 && (40..150).contains(&green) && blue < 90
+    };
+    let marked = |place: u32| {
+        let image = drawn("page", place);
+        image
+            .data()
+            .iter()
+            .filter(|colour| is_vermillion(colour))
+            .count()
+    };
+    assert!(marked(0) > 100, "the boxes of the labels");
+    assert!(marked(1) < marked(0) / 4, "a mesh is no labels");
+    let scan = drawn("scan", 0);
+    let first = scan.data()[scan.data().len() / 2];
+    assert!(
+        scan.data().iter().any(|colour| *colour != first),
+        "a relief"
+    );
+    for (kind, place) in [("page", 2), ("scan", 9), ("other", 0)] {
+        assert_eq!(picture(kind, place).status, 404, "{kind} {place}");
+    }
+    let nothing = page.get("/import/picture/page?project=new");
+    assert_eq!(nothing.status, 404);
+    assert!(!root.join("new").exists(), "nothing is stored");
 }

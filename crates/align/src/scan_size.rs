@@ -68,7 +68,7 @@ pub fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
 pub const TYPICAL_BLOCK_MM: f64 = 320.0;
 
 /// Typical longer side of a character, mm.
-const TYPICAL_CHARACTER_MM: f64 = 12.0;
+pub const TYPICAL_CHARACTER_MM: f64 = 12.0;
 
 /// Longer sides of characters that do not contradict the unit, mm.
 const POSSIBLE_CHARACTER_MM: std::ops::RangeInclusive<f64> = 2.5..=40.0;

@@ -8,6 +8,7 @@
 //! - `block_lines.rs`, `block_grid.rs` and `page_labels.rs` write whole blocks, their maps and their boxes
 //! - `pictures` and `contact_sheet.rs` draw overlays and sheets; `block_view` draws any part of a page, of its relief, or of
 //!   both
+//! - `import_pictures.rs` draws a page with its labels and a scan before a block is imported
 //! - `zip_folder.rs` writes an export as one ZIP archive, in the order of `zip_listing.rs`
 //! - `scan_view` encodes a scan in the frame of its print for the viewer, on pages of a server and in files
 //!
@@ -32,6 +33,7 @@ mod format;
 mod format_writer;
 mod formats;
 mod gallery_selection;
+pub mod import_pictures;
 mod manifest;
 mod mesh;
 mod options;

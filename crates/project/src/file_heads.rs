@@ -1,17 +1,22 @@
 //! What files say of themselves before an import stores anything: sizes of scans and images, or why they cannot be used.
 
 use std::io::BufReader;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
+use mocban_align::scan_size::{TYPICAL_BLOCK_MM, TYPICAL_CHARACTER_MM, nearest_unit};
 use mocban_core::domain::LengthUnit;
 use mocban_core::mesh::{self, MeshExtent, MeshLimits};
-use mocban_core::raster::{ImageLimits, header_size};
-use mocban_store::open_regular;
+use mocban_core::raster::{ImageLimits, PrintImage, decode, header_size};
+use mocban_lists::labels::{self, Labels, MAX_BYTES, PageFile};
+use mocban_store::{open_regular, read_up_to};
 
-/// Shortest and longest usual side of the scan of one character, mm.
-const CHARACTER_MM: [f64; 2] = [8.0, 150.0];
-/// Shortest and longest usual side of the scan of a whole block, mm.
-const BLOCK_MM: [f64; 2] = [100.0, 1500.0];
+/// Usual longest sides of the scan of one character, with the wood around it, mm.
+const USUAL_CHARACTER_MM: RangeInclusive<f64> = 4.0..=200.0;
+/// Usual longest sides of the scan of a whole block, mm.
+const USUAL_BLOCK_MM: RangeInclusive<f64> = 80.0..=1500.0;
+/// Most vertices that are kept for a picture of a scan.
+const MAX_POINTS: usize = 1 << 21;
 
 /// What a scan shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,18 +52,20 @@ pub struct ScanUnit {
 impl ScanKind {
     /// Returns the unit of a scan: the given one, that of its file, or the one in which its longest side is usual.
     pub fn unit(self, extent: &MeshExtent, given: Option<LengthUnit>) -> Option<ScanUnit> {
-        let usual_mm = match self {
-            Self::Character => CHARACTER_MM,
-            Self::Block => BLOCK_MM,
+        let (typical_mm, usual_mm) = match self {
+            Self::Character => (TYPICAL_CHARACTER_MM, USUAL_CHARACTER_MM),
+            Self::Block => (TYPICAL_BLOCK_MM, USUAL_BLOCK_MM),
         };
-        let longest = extent.longest();
-        let guess = longest.and_then(|longest| LengthUnit::likely(longest, usual_mm));
+        let longest = extent.longest().filter(|longest| *longest > 0.0);
+        let is_usual = |unit: &LengthUnit| {
+            longest.is_none_or(|longest| usual_mm.contains(&(longest * unit.mm())))
+        };
+        let guess = longest.map(|longest| nearest_unit(longest, typical_mm));
+        let guess = guess.filter(is_usual);
         let of_file = extent.unit.map(|unit| (unit, UnitOrigin::File));
         let known = given.map(|unit| (unit, UnitOrigin::Given)).or(of_file);
         let (unit, origin) = known.or(guess.map(|unit| (unit, UnitOrigin::Guess)))?;
-        let is_usual = longest
-            .is_none_or(|longest| (usual_mm[0]..=usual_mm[1]).contains(&(longest * unit.mm())));
-        let likelier = guess.filter(|_| !is_usual);
+        let likelier = guess.filter(|_| !is_usual(&unit));
         Some(ScanUnit {
             unit,
             origin,
@@ -84,6 +91,62 @@ pub fn scan_extent(path: &Path, limits: &MeshLimits) -> Result<MeshExtent, Strin
 pub fn image_size(path: &Path, limits: &ImageLimits) -> Result<[u32; 2], String> {
     let (file, meta) = open_regular(path).map_err(|error| error.to_string())?;
     header_size(BufReader::new(file), meta.len(), limits).map_err(|error| error.to_string())
+}
+
+/// Returns vertices of a scan: all of a short file, and some of a long one, spread over the file.
+///
+/// # Errors
+/// Returns the reason if the file cannot be used.
+pub fn scan_points(path: &Path, limits: &MeshLimits) -> Result<Vec<[f32; 3]>, String> {
+    let (mut file, meta) = open_regular(path).map_err(|error| error.to_string())?;
+    let (name, mut points) = (path.to_string_lossy(), Vec::new());
+    let mut add = |point: [f64; 3]| {
+        if points.len() < MAX_POINTS {
+            points.push(point.map(|value| value as f32));
+        }
+    };
+    let read = mesh::visit_some_vertices(&mut file, meta.len(), &name, limits, &mut add);
+    read.map_err(|error| error.to_string())?;
+    Ok(points)
+}
+
+/// Reads the image of a page.
+///
+/// # Errors
+/// Returns the reason if the file cannot be used.
+pub fn page_image(path: &Path, limits: &ImageLimits) -> Result<PrintImage, String> {
+    let (file, _) = open_regular(path).map_err(|error| error.to_string())?;
+    let bytes = read_up_to(file, limits.max_bytes).map_err(|error| error.to_string())?;
+    decode(&bytes, limits).map_err(|error| error.to_string())
+}
+
+/// Reads the boxes that labels have for a page of a size in pixels. A page that is stored turned may have both sizes.
+///
+/// # Errors
+/// Returns the reason if the file cannot be used, or has no boxes for the page.
+pub fn page_labels(file: &Path, page: &Path, size: [u32; 2]) -> Result<Labels, String> {
+    let (opened, _) = open_regular(file).map_err(|error| error.to_string())?;
+    let bytes = read_up_to(opened, MAX_BYTES as u64).map_err(|error| error.to_string())?;
+    let bytes_of_page = std::fs::metadata(page).map_or(0, |meta| meta.len());
+    let shown = |path: &Path| {
+        path.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let (file, page) = (shown(file), shown(page));
+    let of = |[width, height]: [u32; 2]| {
+        let page = PageFile {
+            name: &page,
+            bytes: bytes_of_page,
+            width,
+            height,
+        };
+        labels::read(&bytes, &file, &page)
+    };
+    let [width, height] = size;
+    let read = of(size).or_else(|error| of([height, width]).map_err(|_turned| error));
+    read.map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

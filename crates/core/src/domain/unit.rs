@@ -41,22 +41,4 @@ impl LengthUnit {
             Self::In => 25.4,
         }
     }
-
-    /// Returns the unit in which a length is usual, or `None` if it is in none. `usual_mm` are the shortest and the longest
-    /// usual length. If several units fit, mm is preferred, then m, as scanners and programs for photogrammetry write.
-    ///
-    /// ```
-    /// use mocban_core::domain::LengthUnit;
-    ///
-    /// assert_eq!(LengthUnit::likely(42.0, [8.0, 150.0]), Some(LengthUnit::Mm));
-    /// assert_eq!(LengthUnit::likely(0.042, [8.0, 150.0]), Some(LengthUnit::M));
-    /// assert_eq!(LengthUnit::likely(4.2, [8.0, 150.0]), Some(LengthUnit::Cm));
-    /// assert_eq!(LengthUnit::likely(5000.0, [8.0, 150.0]), None);
-    /// ```
-    pub fn likely(length: f64, usual_mm: [f64; 2]) -> Option<Self> {
-        let [low, high] = usual_mm;
-        let is_usual = |unit: &Self| (low..=high).contains(&(length * unit.mm()));
-        let preferred = [Self::Mm, Self::M, Self::Cm, Self::In];
-        preferred.into_iter().find(is_usual)
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use super::error::{MeshError, MeshLimits, MeshReadError};
+use super::error::{MeshLimits, MeshReadError};
 use super::format::DetectedFormat;
 use super::missing::is_finite;
 use super::ply::VertexRows;
@@ -10,20 +10,36 @@ use super::robust_bounds::Bounds;
 use super::triangle_stream::binary_stl_triangles;
 use super::{stl, text, xyz};
 use crate::domain::LengthUnit;
+use crate::domain::cancel::poll;
 use crate::page_vec::fill;
 
 /// Files of at most this length are read as a whole.
 pub(super) const WHOLE_BYTES: u64 = 4 << 20;
 /// Bytes at the beginning of a longer file that show its format. They hold the longest header of a PLY file.
 const HEAD_BYTES: u64 = (1 << 20) + (1 << 12);
-/// Places of a longer file from which vertices are read.
-const PARTS: u64 = 64;
-/// Bytes of a text, or about those of rows, that are read at each place.
-const PART_BYTES: u64 = 16 << 10;
+/// Places of a longer file for its size.
+const FEW: PartSpread = PartSpread {
+    parts: 64,
+    bytes: 16 << 10,
+};
+/// Places of a longer file for a picture.
+pub(super) const MANY: PartSpread = PartSpread {
+    parts: 1024,
+    bytes: 4 << 10,
+};
 /// Bytes at the beginning of a file in which it may name its unit.
 const UNIT_BYTES: usize = 4096;
 /// Beginnings of lines that may name the unit.
 const COMMENTS: [&[u8]; 5] = [b"#", b"//", b"comment", b"obj_info", b"solid"];
+
+/// Places of a file, evenly spread, from which vertices are read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PartSpread {
+    /// Number of places.
+    parts: u64,
+    /// Bytes of a text, or about those of rows, that are read at each place.
+    bytes: u64,
+}
 
 /// What parts of its file say about a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,40 +82,66 @@ pub(super) fn sampled(
     name: &str,
     limits: &MeshLimits,
 ) -> Result<MeshExtent, MeshReadError> {
-    let mut head = Vec::new();
-    file.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
     let mut seen = GrowingBox::default();
-    if let Some(count) = binary_stl_triangles(&head, len, name)? {
-        limits.check_triangles(u64::from(count))?;
-        let facets = [stl::HEADER as u64, len];
-        each_part(file, facets, stl::FACET as u64, |part| {
-            let (facets, _) = part.as_chunks::<{ stl::FACET }>();
-            let corners = facets.iter().flat_map(stl::corners);
-            corners.for_each(|corner| seen.add(corner.map(f64::from)));
-        })?;
-    } else {
-        match DetectedFormat::of(&head, name)? {
-            DetectedFormat::Ply => ply_parts(file, &head, len, limits, &mut seen)?,
-            DetectedFormat::Obj => each_line(file, [0, len], |line| {
-                seen.add_words(line, b"v");
-            })?,
-            DetectedFormat::StlAscii => each_line(file, [0, len], |line| {
-                seen.add_words(line, b"vertex");
-            })?,
-            DetectedFormat::Xyz => each_part(file, [0, len], 1, |part| {
-                let points = xyz::read(whole_lines(part), limits);
-                let points = points.map(|mesh| mesh.vertices).unwrap_or_default();
-                points.iter().for_each(|point| seen.add(point));
-            })?,
-            // Its length is not the one that its header implies.
-            DetectedFormat::StlBinary => {}
-        }
-    }
+    let unit = each_position(file, (len, name), limits, FEW, &mut |position| {
+        seen.add(position);
+    })?;
     Ok(MeshExtent {
         sides: seen.sides(),
         is_exact: false,
-        unit: stated_unit(&head),
+        unit,
     })
+}
+
+/// Visits vertices at some places of a file with a length and a name. Returns the unit that the file names.
+pub(super) fn each_position(
+    file: &mut (impl Read + Seek),
+    (len, name): (u64, &str),
+    limits: &MeshLimits,
+    spread: PartSpread,
+    visit: &mut dyn FnMut([f64; 3]),
+) -> Result<Option<LengthUnit>, MeshReadError> {
+    let mut head = Vec::new();
+    file.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
+    let unit = stated_unit(&head);
+    if let Some(count) = binary_stl_triangles(&head, len, name)? {
+        limits.check_triangles(u64::from(count))?;
+        let facets = [stl::HEADER as u64, len];
+        each_part(file, facets, stl::FACET as u64, spread, |part| {
+            let (facets, _) = part.as_chunks::<{ stl::FACET }>();
+            let corners = facets.iter().flat_map(stl::corners);
+            corners.for_each(|corner| visit(corner.map(f64::from)));
+        })?;
+        return Ok(unit);
+    }
+    let of_keyword = |line: &[u8], keyword: &[u8]| {
+        let mut words = text::words(line);
+        let word = words.next()?;
+        let is_vertex = word.eq_ignore_ascii_case(keyword);
+        is_vertex.then(|| text::position(words).ok()).flatten()
+    };
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&head);
+    match DetectedFormat::of(text, name)? {
+        // The mark shifts the offsets of rows.
+        DetectedFormat::Ply if text.len() < head.len() => {}
+        DetectedFormat::Ply => ply_parts(file, &head, len, limits, spread, visit)?,
+        DetectedFormat::Obj => each_line(file, [0, len], spread, |line| {
+            of_keyword(line, b"v").into_iter().for_each(&mut *visit);
+        })?,
+        DetectedFormat::StlAscii => each_line(file, [0, len], spread, |line| {
+            of_keyword(line, b"vertex")
+                .into_iter()
+                .for_each(&mut *visit);
+        })?,
+        DetectedFormat::Xyz => each_part(file, [0, len], 1, spread, |part| {
+            let points = xyz::read(whole_lines(part), limits);
+            let points = points.map(|mesh| mesh.vertices).unwrap_or_default();
+            points.iter().for_each(&mut *visit);
+        })?,
+        // Its length is not the one that its header implies.
+        DetectedFormat::StlBinary => {}
+    }
+    Ok(unit)
 }
 
 fn ply_parts(
@@ -107,20 +149,19 @@ fn ply_parts(
     head: &[u8],
     len: u64,
     limits: &MeshLimits,
-    seen: &mut GrowingBox,
+    spread: PartSpread,
+    visit: &mut dyn FnMut([f64; 3]),
 ) -> Result<(), MeshReadError> {
     let Some(rows) = VertexRows::of(head, len)? else {
         return Ok(());
     };
     limits.check_vertices(rows.rows)?;
     let mut add = |row: &[u8]| {
-        if let Some(position) = rows.position(row) {
-            seen.add(position);
-        }
+        rows.position(row).into_iter().for_each(&mut *visit);
     };
     if let Some(size) = rows.size {
         let end = rows.start + size * rows.rows;
-        each_part(file, [rows.start, end], size, |part| {
+        each_part(file, [rows.start, end], size, spread, |part| {
             part.chunks_exact(size as usize).for_each(&mut add);
         })?;
         return Ok(());
@@ -130,7 +171,7 @@ fn ply_parts(
     let lines = first.iter().filter(|byte| **byte == b'\n').count().max(1);
     let about = rows.rows.saturating_mul((first.len() / lines) as u64);
     let end = rows.start.saturating_add(about / 10 * 9).min(len);
-    each_line(file, [rows.start, end], add)?;
+    each_line(file, [rows.start, end], spread, add)?;
     Ok(())
 }
 
@@ -139,13 +180,16 @@ fn each_part(
     file: &mut (impl Read + Seek),
     [start, end]: [u64; 2],
     row: u64,
+    spread: PartSpread,
     mut visit: impl FnMut(&[u8]),
 ) -> io::Result<()> {
     let rows = end.saturating_sub(start) / row;
-    let most = (PART_BYTES / row).max(1).min(rows);
+    let most = (spread.bytes / row).max(1).min(rows);
     let mut bytes = vec![0; (most * row) as usize];
-    for part in 0..PARTS {
-        let first = ((rows - most) as f64 * part as f64 / (PARTS - 1) as f64) as u64;
+    for part in 0..spread.parts {
+        poll();
+        let share = part as f64 / (spread.parts - 1) as f64;
+        let first = ((rows - most) as f64 * share) as u64;
         file.seek(SeekFrom::Start(start + first * row))?;
         let have = fill(file, &mut bytes)?;
         visit(&bytes[..have]);
@@ -157,9 +201,10 @@ fn each_part(
 fn each_line(
     file: &mut (impl Read + Seek),
     range: [u64; 2],
+    spread: PartSpread,
     mut visit: impl FnMut(&[u8]),
 ) -> io::Result<()> {
-    each_part(file, range, 1, |part| {
+    each_part(file, range, 1, spread, |part| {
         let lines = whole_lines(part).split(|byte| *byte == b'\n');
         lines.for_each(|line| visit(line.trim_ascii()));
     })
@@ -211,17 +256,6 @@ impl GrowingBox {
         for axis in 0..3 {
             low[axis] = low[axis].min(position[axis]);
             high[axis] = high[axis].max(position[axis]);
-        }
-    }
-
-    /// Adds the position of a line that begins with a keyword.
-    fn add_words(&mut self, line: &[u8], keyword: &[u8]) {
-        let mut words = text::words(line);
-        let is_vertex = words
-            .next()
-            .is_some_and(|word| word.eq_ignore_ascii_case(keyword));
-        if is_vertex && let Ok(position) = text::position(words) {
-            self.add(position);
         }
     }
 

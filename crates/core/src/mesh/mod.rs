@@ -146,12 +146,37 @@ pub fn extent(
     if len > extent::WHOLE_BYTES {
         return extent::sampled(file, len, name, limits);
     }
-    let mut bytes = Vec::new();
-    file.by_ref()
-        .take(extent::WHOLE_BYTES)
-        .read_to_end(&mut bytes)?;
+    let bytes = short_file(file)?;
     let mesh = read(&bytes, name, limits)?;
     Ok(MeshExtent::of_all(mesh.vertices.iter(), &bytes))
+}
+
+/// Visits vertices of a mesh by its file of `len` bytes: all of a short file, and some of a long one, spread over the file.
+///
+/// # Errors
+/// Returns an error like [`extent`].
+pub fn visit_some_vertices(
+    file: &mut (impl Read + Seek),
+    len: u64,
+    name: &str,
+    limits: &MeshLimits,
+    visit: &mut dyn FnMut([f64; 3]),
+) -> Result<(), MeshReadError> {
+    limits.check_bytes(len)?;
+    if len > extent::WHOLE_BYTES {
+        extent::each_position(file, (len, name), limits, extent::MANY, visit)?;
+    } else {
+        let mesh = read(&short_file(file)?, name, limits)?;
+        mesh.vertices.iter().for_each(visit);
+    }
+    Ok(())
+}
+
+/// Reads a file of at most `WHOLE_BYTES`.
+fn short_file(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    file.take(extent::WHOLE_BYTES).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -40,6 +40,19 @@ pub(crate) struct PictureLegend {
     pub entries: Vec<LegendEntry>,
 }
 
+/// Draws boxes, given by their edges in pixels, without names.
+pub(crate) fn mark_edges(picture: &mut Rgb, boxes: &[[f64; 4]], colour: [u8; 3]) {
+    for bounds in boxes {
+        let one = MarkedBox {
+            bounds: *bounds,
+            names: Vec::new(),
+            outline: colour,
+            tag: colour,
+        };
+        outline(picture, &one);
+    }
+}
+
 /// Draws boxes and their names. Outlines are drawn first, so that none hides a name.
 pub(crate) fn mark(picture: &mut Rgb, boxes: &[MarkedBox]) {
     for one in boxes {

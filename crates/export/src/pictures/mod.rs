@@ -7,7 +7,9 @@ mod paint;
 mod relief;
 mod sheet_layout;
 
-pub(super) use marked_page::{LegendEntry, MarkedBox, PictureLegend, mark, with_legend};
+pub(super) use marked_page::{
+    LegendEntry, MarkedBox, PictureLegend, mark, mark_edges, with_legend,
+};
 pub use overlay::PrintView;
 pub use paint::Rgb;
 pub(super) use paint::{BLUE, ORANGE, VERMILLION, resized};

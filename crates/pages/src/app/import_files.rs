@@ -1,6 +1,7 @@
 //! The parts of the page of imports that say what the files say of themselves: sizes, units, and what cannot be used.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Json;
 use axum::extract::State;
@@ -12,6 +13,7 @@ use super::components::{grouped, unit_name};
 use super::failure::AppResult;
 use super::import_choice::{ImportChoice, SHOWN_PAIRS};
 use super::import_heads::{FileHeads, LookedAtFiles, PlannedFiles, look};
+use super::import_pictures::pictures_part;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
@@ -21,6 +23,10 @@ use mocban_project::file_heads::{ScanKind, ScanUnit, UnitOrigin};
 
 /// Most pairs whose files are looked at for one request of the script.
 const MOST: usize = 400;
+/// How long files are looked at for one request of the script; the file that is read then is finished.
+const STEP_TIME: Duration = Duration::from_millis(500);
+/// How long the files of the shown pairs may take.
+const SHOWN_TIME: Duration = Duration::from_mins(1);
 
 /// Returns the places of the page that are filled from its files: a table, and the files that cannot be used.
 pub(super) fn files_part(visit: &Visit) -> Markup {
@@ -49,10 +55,12 @@ pub(super) async fn part(
     let chosen = ImportChoice::of(&visit.query);
     let from: u64 = visit.query.parsed("from").unwrap_or_default();
     let has_list = !chosen.list.is_empty();
-    let LookedAtFiles { heads, .. } = look(&state, chosen, from, SHOWN_PAIRS as usize).await?;
+    let LookedAtFiles { heads, .. } =
+        look(&state, chosen, from, SHOWN_PAIRS as usize, SHOWN_TIME).await?;
     let units: Vec<Option<ScanUnit>> = heads.iter().map(unit).collect();
     let part = html! {
         @if !heads.is_empty() { (table(&visit, &heads, &units)) }
+        (pictures_part(&visit, &heads, from))
         @if let Some(guess) = common_guess(&units).filter(|_| !has_list) { (guess_part(&visit, guess)) }
     };
     Ok(Html(part.into_string()))
@@ -65,7 +73,7 @@ pub(super) async fn problems(
 ) -> AppResult<Json<Value>> {
     let chosen = ImportChoice::of(&visit.query);
     let after: u64 = visit.query.parsed("after").unwrap_or_default();
-    let LookedAtFiles { heads, total } = look(&state, chosen, after, MOST).await?;
+    let LookedAtFiles { heads, total } = look(&state, chosen, after, MOST, STEP_TIME).await?;
     let next = after + heads.len() as u64;
     let problems: Vec<String> = heads
         .iter()

@@ -14,13 +14,11 @@ use crate::on_thread::read_on_thread;
 use mocban_core::InputLimits;
 use mocban_core::domain::LengthUnit;
 use mocban_core::mesh::MeshExtent;
+use mocban_lists::labels::LabelFormat;
 use mocban_project::ProjectError;
-use mocban_project::file_heads::{ScanKind, image_size, scan_extent};
+use mocban_project::file_heads::{ScanKind, image_size, page_labels, scan_extent};
 use mocban_project::input_paths::find_on_disk;
 use mocban_project::location::Location;
-
-/// How long files are looked at for one request; the file that is read then is finished.
-const LOOK_TIME: Duration = Duration::from_millis(500);
 
 /// The files of a pair or of a whole block that would be imported.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,6 +39,8 @@ pub(super) struct FileHeads {
     pub(super) scan: Result<MeshExtent, Sentence>,
     /// Width and height in pixels.
     pub(super) print: Result<[u32; 2], Sentence>,
+    /// The number of boxes of the labels, and their format. `None` without labels, or if the page cannot be used.
+    pub(super) labels: Option<Result<(u64, LabelFormat), Sentence>>,
 }
 
 /// Some files of an import.
@@ -52,21 +52,24 @@ pub(super) struct PlannedPart {
 }
 
 impl ImportChoice {
-    /// Returns pairs or blocks that would be imported, from a position on. `None` if nothing would be.
-    pub(super) fn planned_files(
+    /// Returns up to `most` pairs or blocks that would be imported, from a position on. `None` if nothing would be.
+    fn planned_files(
         &self,
         state: &AppState,
         roots: &PickerRoots,
-        from: u64,
+        start: u64,
+        most: usize,
     ) -> Option<PlannedPart> {
-        let from = from / SHOWN_PAIRS * SHOWN_PAIRS;
+        // A page of the preview starts with whole groups.
+        let from = start / SHOWN_PAIRS * SHOWN_PAIRS;
+        let known = (start - from) as usize;
         let preview = self.preview(&state.options.folder, roots, from, &state.plans)?;
         let of_form = self.unit.parse::<LengthUnit>().ok();
         // Past the end, the preview has the last ones.
         let is_there = preview.from == from;
         let (files, total) = match preview.planned.ok()? {
             Planned::Pairs(plan, at) => {
-                let shown = plan.shown.iter().skip(at);
+                let shown = plan.shown.iter().skip(at + known).take(most);
                 let files = shown.map(|pair| PlannedFiles {
                     name: pair.name.to_string(),
                     kind: ScanKind::Character,
@@ -84,7 +87,7 @@ impl ImportChoice {
             Planned::Blocks(rows, _) => {
                 let total = rows.len() as u64;
                 let folder = Path::new(&self.list).parent().unwrap_or(Path::new(""));
-                let rows = rows.into_iter().skip(from as usize);
+                let rows = rows.into_iter().skip(start as usize).take(most);
                 let files = rows.map(|row| PlannedFiles {
                     name: row.name.to_string(),
                     kind: ScanKind::Block,
@@ -102,8 +105,20 @@ impl ImportChoice {
         })
     }
 
+    /// Returns the block at a place of those that would be imported.
+    pub(super) fn planned_block(
+        &self,
+        state: &AppState,
+        roots: &PickerRoots,
+        place: u64,
+    ) -> Option<PlannedFiles> {
+        let part = self.planned_files(state, roots, place, 1)?;
+        let found = part.files.into_iter().next()?;
+        (found.kind == ScanKind::Block).then_some(found)
+    }
+
     /// Returns the limits that the files of this import will have.
-    fn limits(&self, folder: &Path) -> InputLimits {
+    pub(super) fn limits(&self, folder: &Path) -> InputLimits {
         let dir = self.dir(folder).unwrap_or_else(|_| folder.join("new"));
         let settings = Location::new(dir).settings();
         settings.map_or(InputLimits::SUGGESTED, |settings| settings.config.limits)
@@ -117,25 +132,24 @@ pub(super) struct LookedAtFiles {
     pub(super) total: u64,
 }
 
-/// Looks at the files of up to `most` pairs or blocks from a position on; at fewer if that takes long, but at least at one.
-/// Ends when the caller leaves.
+/// Looks at the files of up to `most` pairs or blocks from a position on. If that takes longer than `time`, looks at fewer, but
+/// at least at those of one. Ends when the caller leaves.
 pub(super) async fn look(
     state: &Arc<AppState>,
     chosen: ImportChoice,
     from: u64,
     most: usize,
+    time: Duration,
 ) -> AppResult<LookedAtFiles> {
     let state = Arc::clone(state);
     let work = async move || {
         let roots = PickerRoots::new(&state.options.folder);
         let limits = chosen.limits(&state.options.folder);
-        let planned = chosen.planned_files(&state, &roots, from);
+        let planned = chosen.planned_files(&state, &roots, from, most);
         let (files, total) = planned.map_or((Vec::new(), 0), |part| (part.files, part.total));
-        // A page starts with whole groups, so some of the first ones may have been looked at before.
-        let known = (from % SHOWN_PAIRS) as usize;
-        let until = Instant::now() + LOOK_TIME;
+        let until = Instant::now() + time;
         let mut heads = Vec::new();
-        for files in files.into_iter().skip(known).take(most) {
+        for files in files {
             if !heads.is_empty() && Instant::now() >= until {
                 break;
             }
@@ -156,11 +170,27 @@ impl PlannedFiles {
         let print = allowed(roots, &self.print).and_then(|path| {
             image_size(&path, &limits.image).map_err(|why| Sentence::of_program(&why))
         });
+        let labels = self.labels.as_deref().zip(print.as_ref().ok());
+        let labels = labels.map(|(labels, size)| self.label_count(labels, *size, roots));
         FileHeads {
             scan,
             print,
+            labels,
             files: self,
         }
+    }
+
+    /// Returns the number of boxes that labels have for the page.
+    fn label_count(
+        &self,
+        labels: &Path,
+        size: [u32; 2],
+        roots: &PickerRoots,
+    ) -> Result<(u64, LabelFormat), Sentence> {
+        let labels = allowed(roots, labels)?;
+        let found = page_labels(&labels, &self.print, size);
+        let found = found.map_err(|why| Sentence::of_program(&why))?;
+        Ok((found.boxes.len() as u64, found.format))
     }
 }
 

@@ -33,6 +33,7 @@ mod import_files;
 mod import_heads;
 mod import_page;
 mod import_partners;
+mod import_pictures;
 mod import_preview;
 mod invitation_cards;
 mod invitations;

@@ -8,8 +8,8 @@ use axum::{Router, middleware};
 use super::state::{AppOptions, AppState};
 use super::{
     assets, block_page, blocks_page, chosen_pairs, export_page, export_zip, failure_page,
-    health_page, home, import_files, import_page, invitation_cards, last_import, pair_page,
-    pairs_page, pictures, report_page, restore_action, restore_content, restore_page,
+    health_page, home, import_files, import_page, import_pictures, invitation_cards, last_import,
+    pair_page, pairs_page, pictures, report_page, restore_action, restore_content, restore_page,
     review_agreement, review_page, run_actions, run_page, settings_page, upload_actions,
 };
 
@@ -41,6 +41,7 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/actions/restore", post(restore_action::start))
         .route("/import", get(import_page::page))
         .route("/import/files", get(import_files::part))
+        .route("/import/picture/{picture}", get(import_pictures::draw))
         .route("/import/problems", get(import_files::problems))
         .route("/actions/import", post(import_page::import))
         .route("/actions/upload", post(upload_actions::begin))

@@ -62,6 +62,8 @@ pub(super) struct AppState {
     pub(super) uploads: Uploads,
     /// Draws pictures.
     pub(super) work: WorkThread,
+    /// Draws pictures of files that are not imported yet, whose disk may be slow.
+    pub(super) import_work: WorkThread,
 }
 
 impl AppState {
@@ -82,6 +84,7 @@ impl AppState {
             zip_sizes: ZipSizes::default(),
             plans: PlanCache::default(),
             work: WorkThread::default(),
+            import_work: WorkThread::default(),
         }
     }
 
