@@ -106,7 +106,10 @@ fn a_backup_is_shown_and_becomes_a_project() {
     let go = reply.json()["go"].to_string();
     assert!(go.contains("name=again"), "{go}");
     let done = ended(&page, "again");
-    for part in ["15 pairs and 1 verdicts were restored", "href=\"p/again/\""] {
+    for part in [
+        "15 pairs and 1 verdicts were restored",
+        "href=\"./p/again/\"",
+    ] {
         assert!(done.contains(part), "{part}: {done}");
     }
     assert_eq!(page.get("/p/again/").status, 200);
@@ -251,7 +254,7 @@ fn a_killed_restore_leaves_no_project_and_is_done_by_the_next_app() {
         app.kill_in("/actions/restore", token, &form);
         assert!(!root.join("again/catalog.sqlite").exists(), "no project");
         let next = open_app(&root);
-        assert!(!text(&next.get("/")).contains("href=\"p/again/\""));
+        assert!(!text(&next.get("/")).contains("href=\"./p/again/\""));
         let said = state(&next, "again");
         assert!(
             said.contains("ended before the project was restored"),

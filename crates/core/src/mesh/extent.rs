@@ -169,7 +169,7 @@ fn ply_parts(
     // Faces follow, whose lines also begin with numbers. A row is about as long as the first ones.
     let first = head.get(rows.start as usize..).unwrap_or_default();
     let lines = first.iter().filter(|byte| **byte == b'\n').count().max(1);
-    let about = rows.rows.saturating_mul((first.len() / lines) as u64);
+    let about = rows.rows.saturating_mul(first.len() as u64) / lines as u64;
     let end = rows.start.saturating_add(about / 10 * 9).min(len);
     each_line(file, [rows.start, end], spread, add)?;
     Ok(())
@@ -301,7 +301,7 @@ mod tests {
                 let found = found.expect("a mesh");
                 assert_eq!(found.is_exact, len <= WHOLE_BYTES, "{name}");
                 let sides = found.sides.expect("vertices");
-                let usual = [[34.0, 40.01], [25.5, 30.01], [1.5, 4.01]];
+                let usual = [[34.0, 40.01], [24.0, 30.01], [1.5, 4.01]];
                 for (side, [low, high]) in sides.into_iter().zip(usual) {
                     assert!((low..=high).contains(&side), "{name}: {sides:?}");
                 }

@@ -34,7 +34,7 @@ use mocban_system::platform;
 /// The fields of the form that restores a backup.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct RestoreBody {
+pub(super) struct RestoreBackupBody {
     #[serde(default)]
     backup: String,
     /// Name of the new project.
@@ -48,7 +48,7 @@ pub(super) struct RestoreBody {
 /// Starts to restore a backup.
 pub(super) async fn start(
     State(state): State<Arc<AppState>>,
-    ActionBody(body): ActionBody<RestoreBody>,
+    ActionBody(body): ActionBody<RestoreBackupBody>,
 ) -> AppResult<Json<Value>> {
     let folder = state.options.folder.clone();
     let name = body.name.trim().to_owned();
@@ -77,7 +77,7 @@ pub(super) async fn start(
 ///
 /// # Errors
 /// Refuses a file that is no backup, a name that is taken, and a disk without room.
-fn request(folder: &Path, name: &str, body: &RestoreBody) -> AppResult<RestoreRequest> {
+fn request(folder: &Path, name: &str, body: &RestoreBackupBody) -> AppResult<RestoreRequest> {
     let roots = PickerRoots::new(folder);
     let backup = chosen_path(&roots, &body.backup)?;
     check_backup_file(&backup)?;
@@ -253,7 +253,7 @@ fn finished(
 
 #[cfg(test)]
 mod tests {
-    use super::{RestoreBody, check_room, request};
+    use super::{RestoreBackupBody, check_room, request};
     use crate::review::Language;
 
     #[test]
@@ -284,7 +284,7 @@ mod tests {
             "/etc/passwd".to_owned(),
         ] {
             let (name, inputs) = ("new".to_owned(), String::new());
-            let body = RestoreBody {
+            let body = RestoreBackupBody {
                 backup,
                 name,
                 inputs,
