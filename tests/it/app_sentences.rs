@@ -7,6 +7,7 @@ use serde_json::json;
 use crate::app::{act, app, open_app, text, with_project};
 use crate::block_view::finished_block;
 use crate::check::sql;
+use crate::cli::mocban;
 use crate::page::{Page, read_project};
 use crate::waiting::{LONGEST, pause, wait_until};
 use mocban::store::Project;
@@ -136,6 +137,28 @@ fn damage_is_mended_by_a_button() {
         |_| {},
     );
     wait_for(&page, "/p/p/health", "files were checked. All are sound.");
+}
+
+#[test]
+fn lost_files_of_results_are_computed_again_after_a_button() {
+    let (dir, page) = with_project();
+    let project = dir.path().join("p");
+    std::fs::remove_dir_all(project.join("artifacts")).expect("removed");
+    let start = |what: &str| {
+        let reply = act(&page, "/p/p/actions/check", &json!({"what": what}), |_| {});
+        assert_eq!(reply.status, 200, "{}", text(&reply));
+    };
+    start("repair");
+    let found = wait_for(&page, "/p/p/health", "Most files of results are missing");
+    assert!(found.contains("id=\"compute-lost\""), "{found}");
+    let vietnamese = text(&page.get("/p/p/health?language=vi"));
+    assert!(vietnamese.contains("bấm nút cuối"), "{vietnamese}");
+    page.get("/?language=en");
+    start("lost");
+    let mended = wait_for(&page, "/p/p/health", "All damage was mended. Press Align");
+    assert!(!mended.contains("compute-lost"), "{mended}");
+    mocban(&project, &["run", "-q"]).expect(0);
+    mocban(&project, &["check"]).expect(0);
 }
 
 #[test]

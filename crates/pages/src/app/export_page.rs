@@ -276,6 +276,7 @@ async fn run(
     }
     Ok(FinishedTask {
         is_warning: is_empty || summary.kept_earlier || !summary.unreadable.is_empty(),
+        lacks_most_files: false,
         lines,
     })
 }

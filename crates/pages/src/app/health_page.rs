@@ -20,7 +20,7 @@ use super::restore_page::restore_address;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
-use super::tasks::{FinishedTask, TaskKind};
+use super::tasks::{FinishedTask, TaskKind, TaskState};
 use super::visit::Visit;
 use crate::review::Language;
 use mocban_core::domain::one_line;
@@ -47,6 +47,7 @@ pub(super) async fn page(
     let open = state.open(&key).await?;
     let checked = state.tasks.state(TaskKind::Check, &open.key);
     let mut stored = state.tasks.state(TaskKind::Backup, &open.key);
+    let lacks_most_files = matches!(&checked, Some(TaskState::Done(done)) if done.lacks_most_files);
     let file = open.dir.join(BACKUP);
     if stored.is_none() {
         let file = file.clone();
@@ -70,6 +71,9 @@ pub(super) async fn page(
                 (action_form("actions/check", "inline", &html! {
                     button.primary #check name="what" value="check" { (visit.t("Check now", "Kiểm tra ngay")) }
                     button #repair name="what" value="repair" data-confirm=(visit.t("Mend what can be mended? Damaged results are computed again by the next run.", "Sửa những gì sửa được? Kết quả bị hỏng sẽ được tính lại trong lần chạy sau.")) { (visit.t("Repair", "Sửa chữa")) }
+                    @if lacks_most_files {
+                        button #compute-lost name="what" value="lost" data-confirm=(visit.t("Are these files lost? The next run computes them again, which takes as long as at first.", "Các tệp này đã mất? Lần chạy sau sẽ tính lại chúng, lâu như lần đầu.")) { (visit.t("They are lost: compute them again", "Chúng đã mất: tính lại")) }
+                    }
                 }))
                 (task_part(&visit, checked.as_ref()))
             }
@@ -98,8 +102,13 @@ pub(super) async fn start_check(
     ActionBody(body): ActionBody<CheckBody>,
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
-    let repair = body.what == "repair";
-    let work = move |location| check_lines(location, repair);
+    let accept_missing = body.what == "lost";
+    let options = CheckOptions {
+        repair: accept_missing || body.what == "repair",
+        accept_missing,
+        ..CheckOptions::default()
+    };
+    let work = move |location| check_lines(location, options);
     state.tasks.start(TaskKind::Check, &open, work)?;
     Ok(Json(json!({ "reload": true })))
 }
@@ -108,16 +117,13 @@ pub(super) async fn start_check(
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CheckBody {
-    /// `check` or `repair`.
+    /// `check`, `repair`, or `lost` to repair although most files of results are missing.
     #[serde(default)]
     what: String,
 }
 
-async fn check_lines(location: Location, repair: bool) -> ProjectResult<FinishedTask> {
-    let options = CheckOptions {
-        repair,
-        ..CheckOptions::default()
-    };
+async fn check_lines(location: Location, options: CheckOptions) -> ProjectResult<FinishedTask> {
+    let repair = options.repair;
     let summary = check(options, &location, &()).await?;
     let [pairs, files] = [summary.pairs, summary.files].map(grouped);
     let [english, vietnamese] = conclusion(&summary, repair);
@@ -159,6 +165,7 @@ async fn check_lines(location: Location, repair: bool) -> ProjectResult<Finished
     Ok(FinishedTask {
         lines,
         is_warning: summary.left() > 0,
+        lacks_most_files: summary.left() > 0 && summary.lacks_most_files(),
     })
 }
 
@@ -186,8 +193,8 @@ fn conclusion(summary: &CheckSummary, repair: bool) -> [&'static str; 2] {
             "Mọi hư hỏng đã được sửa. Hãy bấm Căn chỉnh ở trang Căn chỉnh để tính lại kết quả bị thiếu. Các hư hỏng là:",
         ],
         _ if summary.lacks_most_files() => [
-            "Most files of results are missing. Connect their disk and check again. The damage is:",
-            "Thiếu hầu hết các tệp kết quả. Hãy nối lại ổ đĩa chứa chúng rồi kiểm tra lại. Các hư hỏng là:",
+            "Most files of results are missing. Connect their disk and check again, or press the last button if they are lost. The damage is:",
+            "Thiếu hầu hết các tệp kết quả. Hãy nối lại ổ đĩa chứa chúng rồi kiểm tra lại, hoặc bấm nút cuối nếu chúng đã mất. Các hư hỏng là:",
         ],
         _ if repair && needs_backup => [
             "Some damage cannot be mended: put your last backup in place of the catalog. The damage was:",
@@ -253,6 +260,7 @@ async fn backup_lines(location: Location) -> ProjectResult<FinishedTask> {
             format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({vietnamese})."),
         ]],
         is_warning: false,
+        lacks_most_files: false,
     })
 }
 

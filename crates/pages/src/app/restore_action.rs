@@ -247,6 +247,7 @@ fn finished(
     }
     FinishedTask {
         is_warning: missing.is_some() || failure.is_some(),
+        lacks_most_files: false,
         lines,
     }
 }

@@ -28,6 +28,8 @@ pub(super) struct FinishedTask {
     pub(super) lines: TaskLines,
     /// Whether the lines say that something is wrong.
     pub(super) is_warning: bool,
+    /// Whether most files of results are missing, which a button then computes again.
+    pub(super) lacks_most_files: bool,
 }
 
 /// What became of a task.
