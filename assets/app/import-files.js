@@ -1,4 +1,4 @@
-// Looks at all files of an import while its page is shown, and lists those that cannot be used.
+// Looks at all files of an import while its page is shown, and lists the ones that cannot be used.
 
 const part = document.getElementById("file-problems");
 const [count, unusable, list] = ["looked-at", "unusable", "unusable-files"].map((id) => document.getElementById(id));

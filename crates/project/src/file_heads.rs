@@ -38,7 +38,7 @@ pub enum UnitOrigin {
     Guess,
 }
 
-/// The unit of a scan, as far as it is known before an import.
+/// The unit of a scan, known or guessed before an import.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ScanUnit {
     /// The unit.

@@ -105,7 +105,7 @@ impl ImportChoice {
         })
     }
 
-    /// Returns the block at a place of those that would be imported.
+    /// Returns the block at a place in the list that would be imported.
     pub(super) fn planned_block(
         &self,
         state: &AppState,
