@@ -9,9 +9,12 @@ use super::limits::ImageLimits;
 use super::tags::TagFileWindow;
 use super::tiff;
 use crate::domain::FileKind;
+use crate::page_vec::fill;
 
 /// Bytes at the end of a file in which the mark of its end is searched. Some programs write metadata behind it.
 const TAIL_BYTES: u64 = 1 << 16;
+/// Most segments of a JPEG before its frame header.
+const MAX_SEGMENTS: usize = 1000;
 
 /// Returns width and height of a stored image in pixels, by its header. `len` is the length of the file in bytes.
 ///
@@ -35,7 +38,8 @@ pub fn header_size(
     };
     let size = match kind {
         FileKind::Tiff => tiff::size(&TagFileWindow::new(&mut file)),
-        FileKind::Png | FileKind::Jpeg => dimensions(&mut file),
+        FileKind::Jpeg => jpeg_size(&mut file).or_else(|| dimensions(&mut file)),
+        FileKind::Png => dimensions(&mut file),
         other => return Err(DecodeError::NotAnImage(other)),
     };
     let [width, height] = size.ok_or(DecodeError::Truncated(kind))?;
@@ -47,7 +51,34 @@ pub fn header_size(
     }
 }
 
+/// Reads the frame header of a JPEG, which a general reader finds only in the whole file. `None` if a segment before it is
+/// not where its length says.
+fn jpeg_size(file: &mut (impl BufRead + Seek)) -> Option<[u32; 2]> {
+    let mut at = 2;
+    for _ in 0..MAX_SEGMENTS {
+        let mut head = [0; 9];
+        file.seek(SeekFrom::Start(at)).ok()?;
+        if fill(file, &mut head).ok()? < head.len() {
+            return None;
+        }
+        let number = |at: usize| u16::from_be_bytes([head[at], head[at + 1]]);
+        match (head[0], head[1]) {
+            (0xff, 0xff) => at += 1,
+            (0xff, 0x01 | 0xd0..=0xd8) => at += 2,
+            (0xff, 0xc0..=0xc3 | 0xc5..=0xc7 | 0xc9..=0xcb | 0xcd..=0xcf) => {
+                return Some([number(7), number(5)].map(u32::from));
+            }
+            // The end, or a scan before the frame.
+            (0xff, 0x00 | 0xd9 | 0xda) => return None,
+            (0xff, _) => at += 2 + u64::from(number(2)),
+            _ => return None,
+        }
+    }
+    None
+}
+
 fn dimensions(file: &mut (impl BufRead + Seek)) -> Option<[u32; 2]> {
+    file.rewind().ok()?;
     let reader = ImageReader::new(file).with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;
     Some([width, height])
