@@ -15,6 +15,7 @@ use crate::queue::checkpoint;
 use crate::queue::claim;
 use crate::queue::fail;
 use crate::queue::pair_job::PairJob;
+use crate::records::pair_lookups;
 use crate::records::pair_results;
 use crate::records::pair_work;
 use crate::records::result_pages;
@@ -214,6 +215,27 @@ async fn lists_of_pairs_read_part_of_an_index_in_its_order() {
         assert!(!sorts, "{name}: {plan:?}");
     }
     assert_only(&plan(listed_names::NAMES).await, &["VIRTUAL TABLE"]);
+}
+
+#[tokio::test]
+async fn the_least_confident_results_are_those_of_the_newest_attempts() {
+    let lines = plan(pair_lookups::LEAST_CONFIDENT).await;
+    // The newest attempts, which the statement limits.
+    assert_only(&lines, &["SCAN a"]);
+    for part in [
+        "SEARCH attempt USING INTEGER PRIMARY KEY (rowid>?)",
+        "SEARCH j USING INTEGER PRIMARY KEY",
+        "SEARCH m USING INDEX sqlite_autoindex_metric_result_1 (pair=? AND metric=?)",
+    ] {
+        assert!(
+            lines.iter().any(|line| line.starts_with(part)),
+            "{part}: {lines:?}"
+        );
+    }
+    assert!(
+        !lines.iter().any(|line| line == "SCAN attempt"),
+        "{lines:?}"
+    );
 }
 
 #[tokio::test]

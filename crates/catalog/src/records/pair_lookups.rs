@@ -3,16 +3,29 @@
 use crate::db::query::{query_as, query_scalar};
 use crate::records::model::PairResults;
 use crate::{Catalog, Result};
-use mocban_core::domain::{PairName, UnixMillis};
+use mocban_core::domain::{PairName, ThresholdMetric, UnixMillis};
 
 /// How many attempts are searched for the latest results.
 const RECENT_ATTEMPTS: usize = 2000;
+
+/// How many attempts are searched for the least confident results: those of 2000 pairs of four stages.
+const SORTED_ATTEMPTS: usize = 8000;
 
 /// Completed pairs whose last stage was stored most recently, the newest first.
 const RECENT: &str = "
 SELECT a.pair FROM attempt AS a CROSS JOIN job AS j ON j.pair = a.pair
 WHERE a.stage = 3 AND a.class IS NULL AND j.status = 3 AND a.id > (SELECT coalesce(max(id), 0) - ?1 FROM attempt)
 ORDER BY a.id DESC LIMIT ?2";
+
+/// Completed pairs whose last stage was stored since a time, least confident first. A confidence is looked up for each pair,
+/// whatever the statistics of PostgreSQL say of larger parts of the tables. Without a confidence, a result comes last.
+pub(crate) const LEAST_CONFIDENT: &str = "
+SELECT DISTINCT a.pair, coalesce(
+        (SELECT m.confidence FROM metric_result AS m WHERE m.pair = a.pair AND m.metric = ?3), 2.0) AS confidence
+FROM (SELECT pair, stage, class, at FROM attempt
+    WHERE id > (SELECT coalesce(max(id), 0) - ?1 FROM attempt) ORDER BY id DESC LIMIT ?1) AS a
+WHERE a.stage = 3 AND a.class IS NULL AND a.at >= ?2 AND (SELECT j.status FROM job AS j WHERE j.pair = a.pair) = 3
+ORDER BY confidence, a.pair LIMIT ?4";
 
 const LAST_ATTEMPT: &str = "SELECT at FROM attempt ORDER BY id DESC LIMIT 1";
 
@@ -37,6 +50,26 @@ impl Catalog {
             }
         }
         self.results_of(&mut conn, &distinct).await
+    }
+
+    /// Returns the completed pairs whose last stage was stored since a time, the least confident by a metric first. No index has
+    /// results by time and confidence, so only the newest 8000 attempts are searched: a run that stores more in this
+    /// time has only its last 2000 results, or fewer after failures, here.
+    pub async fn least_confident_results(
+        &self,
+        since: UnixMillis,
+        metric: ThresholdMetric,
+        limit: usize,
+    ) -> Result<Vec<PairResults>> {
+        let mut conn = self.snapshot().await?;
+        let query = query_as(LEAST_CONFIDENT)
+            .bind(SORTED_ATTEMPTS as i64)
+            .bind(since)
+            .bind(metric.name())
+            .bind(limit as i64);
+        let found: Vec<(i64, f64)> = query.fetch_all(&mut conn).await?;
+        let ids: Vec<i64> = found.into_iter().map(|(id, _)| id).collect();
+        self.results_of(&mut conn, &ids).await
     }
 
     /// Returns when the last attempt at a stage ended.

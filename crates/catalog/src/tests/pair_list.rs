@@ -238,6 +238,31 @@ async fn the_latest_results_come_first() {
 }
 
 #[tokio::test]
+async fn the_least_confident_results_since_a_time_come_first() {
+    let world = world(14, 11).await;
+    let least = async |since, metric| {
+        let found = world.catalog.least_confident_results(since, metric, 3);
+        let found = found.await.expect("pairs");
+        let names = found.iter().map(|pair| pair.attributes.name.to_string());
+        names.collect::<Vec<_>>()
+    };
+    // All results were stored at 100.
+    for metric in [ThresholdMetric::Ensemble, ThresholdMetric::Density] {
+        assert_eq!(least(100, metric).await, ["p005", "p004", "p006"]);
+    }
+    assert!(least(101, ThresholdMetric::Ensemble).await.is_empty());
+    let retired = world.catalog.retire_pairs(&[name("p005")], 9).await;
+    retired.expect("retired");
+    let left = least(100, ThresholdMetric::Ensemble).await;
+    assert_eq!(left, ["p004", "p006", "p003"]);
+    let (current, all) = (fingerprints([1; 4]), RerunPolicy::All(Stage::Fit));
+    let requeued = world.catalog.requeue_stale(&current, None, all);
+    requeued.await.expect("requeued");
+    let left = least(100, ThresholdMetric::Ensemble).await;
+    assert!(left.is_empty(), "their results are computed again");
+}
+
+#[tokio::test]
 async fn pairs_whose_metrics_differ_are_found() {
     let world = world(14, 11).await;
     let filter = PairFilter {

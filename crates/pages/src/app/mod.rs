@@ -38,6 +38,7 @@ mod import_preview;
 mod invitation_cards;
 mod invitations;
 mod last_import;
+mod latest_results;
 mod number_text;
 mod open_pages;
 mod opened_review;

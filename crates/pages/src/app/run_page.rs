@@ -6,12 +6,11 @@ use axum::extract::{Path, State};
 use axum::response::Html;
 use maud::{Markup, html};
 
-use super::address::PageQuery;
 use super::child_run;
-use super::components::{NavSection, action_form, empty, figure, frame, grouped, stored_message};
+use super::components::{NavSection, action_form, figure, frame, grouped, stored_message};
 use super::failure::AppResult;
 use super::home::free_space;
-use super::pairs_page::pair_card;
+use super::latest_results::{LatestResults, latest_results};
 use super::projects::OpenProject;
 use super::run_blocks::{
     blocks_text, failed_block_list, failed_blocks, other_blocks_text, outdated_blocks,
@@ -32,8 +31,6 @@ use mocban_project::{ProjectError, ProjectResult};
 use mocban_runner::{fingerprints, is_running};
 use mocban_system::platform;
 
-/// Number of the latest results that are shown.
-const LATEST: usize = 12;
 /// Number of failed pairs that are shown as examples of each class.
 const EXAMPLES: usize = 3;
 /// Most pairs that failed or have other files with which the page asks what the next run would do: each is inspected.
@@ -44,7 +41,7 @@ struct RunState {
     counts: StatusCounts,
     is_running: bool,
     workers: Vec<WorkerRecord>,
-    latest: Vec<PairResults>,
+    latest: LatestResults,
     failures: Vec<(FailureClass, u64, Vec<PairResults>)>,
     blocks: BlockStatus,
     /// Number of finished or failed blocks that the next run would align again. 0 during a run.
@@ -105,7 +102,7 @@ impl RunState {
             counts,
             is_running: running,
             workers: workers.unwrap_or_default(),
-            latest: catalog.recent_results(LATEST).await?,
+            latest: LatestResults::read(catalog, now()).await?,
             failures,
             blocks,
             outdated_blocks,
@@ -203,7 +200,7 @@ pub(super) async fn page(
             (progress(&visit, &run))
             (controls(&visit, &run))
             (disk(&visit, &open))
-            (latest(&visit, &run))
+            (latest_results(&visit, &run.latest))
             (failed_block_list(&visit, &run.blocks))
             (failures(&visit, &run))
         }
@@ -392,20 +389,6 @@ fn to_align(visit: &Visit, blocks: u64, pairs: u64) -> String {
 fn disk(visit: &Visit, open: &OpenProject) -> Markup {
     let free = platform::free_bytes(&open.dir);
     html! { @if let Some(free) = free { p.muted { (free_space(visit, free)) } } }
-}
-
-fn latest(visit: &Visit, run: &RunState) -> Markup {
-    html! {
-        section {
-            h2 { (visit.t("Latest results", "Kết quả mới nhất")) }
-            @if run.latest.is_empty() {
-                (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! {}))
-            } @else {
-                div.gallery { @for pair in &run.latest { (pair_card(visit, "", pair, ThresholdMetric::DEFAULT, &PageQuery::default())) } }
-                p.row { a href="pairs?sort=confidence" { (visit.t("All results, least confident first", "Mọi kết quả, độ tin cậy thấp trước")) } }
-            }
-        }
-    }
 }
 
 fn failures(visit: &Visit, run: &RunState) -> Markup {

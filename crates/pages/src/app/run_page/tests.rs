@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{RunState, controls, figures, progress};
+use crate::app::latest_results::LatestResults;
 use crate::app::run_blocks::{blocks_text, failed_block_list};
 use crate::app::visit::Visit;
 use crate::review::Language;
@@ -67,7 +68,7 @@ fn running(blocks: Vec<BlockState>) -> RunState {
             leased: 1,
             metrics: Some(metrics),
         }],
-        latest: Vec::new(),
+        latest: LatestResults::default(),
         failures: Vec::new(),
         blocks: BlockStatus(blocks),
         outdated_blocks: 0,
