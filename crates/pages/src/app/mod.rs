@@ -42,6 +42,7 @@ mod latest_results;
 mod number_text;
 mod open_pages;
 mod opened_review;
+mod pair_filter_form;
 mod pair_history;
 mod pair_numbers;
 mod pair_page;
