@@ -67,6 +67,7 @@ fn files_of_a_project_are_never_an_output() {
         "run.lock",
         "run.members",
         "empty-import.txt",
+        "saved-views.json",
         "artifacts/x.html",
         "artifacts",
     ] {

@@ -9,6 +9,9 @@ use crate::files::is_backup;
 use mocban_catalog::Catalog;
 use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};
 
+/// File of the lists of pairs that were saved in the app, in the project folder.
+pub const VIEWS_FILE: &str = "saved-views.json";
+
 /// Refuses to write over a catalog, a backup, or another file that a project needs, or into its folder of results.
 pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     let is_copy = || is_backup(path).unwrap_or(false).then_some("is a backup");
@@ -30,7 +33,14 @@ pub(crate) fn project_role(path: &Path) -> Option<&'static str> {
     let rest = name.strip_prefix(CATALOG_FILE);
     let is_catalog = rest.is_some_and(|rest| ["", "-wal", "-shm", "-journal"].contains(&rest));
     let is_known = is_catalog
-        || [SETTINGS_FILE, EMPTY_IMPORT_FILE, "run.lock", "run.members"].contains(&&*name);
+        || [
+            SETTINGS_FILE,
+            EMPTY_IMPORT_FILE,
+            VIEWS_FILE,
+            "run.lock",
+            "run.members",
+        ]
+        .contains(&&*name);
     // The parent of a bare file name is empty.
     let folder = Path::new(".").join(real.parent().unwrap_or(&real));
     if is_known && is_project(&folder) {

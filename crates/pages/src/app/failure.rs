@@ -36,6 +36,15 @@ impl AppFailure {
         }
     }
 
+    /// There is no such page any more, for a reason.
+    pub(super) const fn missing(sentence: Sentence) -> Self {
+        Self {
+            status: StatusCode::NOT_FOUND,
+            sentence: Some(sentence),
+            retired: Vec::new(),
+        }
+    }
+
     /// A request that cannot be done as asked.
     pub(super) const fn refused(sentence: Sentence) -> Self {
         Self {

@@ -22,6 +22,21 @@ pub(super) const RETIRED: &str = "retired";
 /// Differences of IoU that a list can ask for.
 pub(super) const DIFFERENCES: [&str; 4] = ["0.01", "0.03", "0.1", "0.3"];
 
+/// Names of the values of an address that choose a list and how it is shown.
+const LIST_VALUES: [&str; 11] = [
+    "state",
+    "class",
+    "confidence",
+    "verdict",
+    "block",
+    "character",
+    "sort",
+    "metric",
+    "compare",
+    "differs",
+    "view",
+];
+
 /// Number of cards on a page, and of rows.
 const PAGE_SIZES: [usize; 2] = [48, 100];
 
@@ -85,6 +100,24 @@ impl PairQuery {
             is_retired: state == Some(RETIRED),
             after: query.get("after").and_then(cursor),
         }
+    }
+
+    /// Returns the address of the same list from its beginning, without values that change nothing. It is empty for the list of
+    /// all pairs.
+    pub(super) fn plain(query: &PageQuery) -> PageQuery {
+        let values = LIST_VALUES.map(|name| (name, query.get(name).unwrap_or_default()));
+        let mut plain = PageQuery::default();
+        for (name, value) in values {
+            plain = plain.with(name, value);
+        }
+        let list = Self::of(&plain);
+        for name in LIST_VALUES {
+            let without = plain.with(name, "");
+            if Self::of(&without) == list {
+                plain = without;
+            }
+        }
+        plain
     }
 
     /// Returns the query of the page of a pair, which shows the same metrics.
@@ -170,6 +203,29 @@ mod tests {
             "compare=x",
         ] {
             assert_eq!(of(bad), plain, "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_plain_address_has_only_what_chooses_the_list() {
+        let plain = |text| PairQuery::plain(&PageQuery::parse(text)).text();
+        for (address, expected) in [
+            ("", ""),
+            ("after=0.5,7&done=retire&at=1&state=x&sort=imported", ""),
+            ("metric=ensemble&view=gallery&compare=ensemble", ""),
+            (
+                "view=table&sort=iou&state=aligned&metric=relief",
+                "?state=aligned&sort=iou&metric=relief&view=table",
+            ),
+            ("class=io&sort=iou", "?class=io"),
+            (
+                "compare=density&differs=0.1",
+                "?compare=density&differs=0.1",
+            ),
+            ("differs=0.2&block=b+03", "?block=b%2003"),
+        ] {
+            assert_eq!(plain(address), expected, "{address}");
+            assert_eq!(plain(expected.trim_start_matches('?')), expected);
         }
     }
 }

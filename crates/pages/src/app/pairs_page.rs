@@ -16,6 +16,7 @@ use super::pair_query::{PairQuery, cursor_text};
 use super::projects::OpenProject;
 use super::retired_pairs::retired_list;
 use super::state::AppState;
+use super::view_bar::view_bar;
 use super::visit::Visit;
 use mocban_catalog::{PairListPage, PairResults};
 use mocban_core::domain::{MetricOutcome, PairName, ThresholdMetric, Verdict, one_line, sanitize};
@@ -47,12 +48,14 @@ pub(super) async fn page(
     let title = visit.t("Pairs", "Các cặp");
     let blocks = open.catalog.first_listed_blocks(SUGGESTED_BLOCKS).await?;
     let retired = open.catalog.retired_count().await?;
+    let saved = view_bar(&visit, &open).await;
     if query.is_retired {
         let list = retired_list(&visit, &open, &query).await?;
         let body = html! {
             (done)
             (jump_form(&visit))
             (filter_form(&visit, &blocks, retired))
+            (saved)
             (list)
         };
         return Ok(frame(&visit, title, Some(&key), NavSection::Pairs, &body).into_response());
@@ -74,6 +77,7 @@ pub(super) async fn page(
         (done)
         (jump_form(&visit))
         (filter_form(&visit, &blocks, retired))
+        (saved)
         (views(&visit, &query))
         @if query.lacks_compared {
             p.notice role="alert" { (metric_is_lacking().text(visit.language)) }

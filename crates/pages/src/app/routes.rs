@@ -10,7 +10,7 @@ use super::{
     assets, block_page, blocks_page, chosen_pairs, export_page, export_zip, failure_page,
     health_page, home, import_files, import_page, import_pictures, invitation_cards, last_import,
     pair_page, pairs_page, pictures, report_page, restore_action, restore_content, restore_page,
-    review_agreement, review_page, run_actions, run_page, settings_page, upload_actions,
+    review_agreement, review_page, run_actions, run_page, settings_page, upload_actions, view_bar,
 };
 
 /// Returns the routes of the app, for a server.
@@ -78,6 +78,8 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/p/{project}/backup.sqlite", get(health_page::download))
         .route("/p/{project}/actions/run", post(run_actions::run))
         .route("/p/{project}/pairs/listed", get(chosen_pairs::listed))
+        .route("/p/{project}/pairs/view/{name}", get(view_bar::view))
+        .route("/p/{project}/actions/view", post(view_bar::change))
         .route("/p/{project}/actions/chosen", post(chosen_pairs::change))
         .route("/p/{project}/actions/restore", post(chosen_pairs::restore))
         .route("/p/{project}/actions/stop", post(run_actions::stop))
