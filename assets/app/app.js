@@ -102,6 +102,11 @@ async function refresh(mustReload) {
   offline.hidden = response?.ok === true;
   if (!response?.ok) return;
   const page = new DOMParser().parseFromString(await response.text(), "text/html");
+  // The language was changed on another page.
+  if (page.documentElement.lang !== document.documentElement.lang) {
+    if (!document.activeElement?.matches("input:not([readonly]), select, textarea")) location.reload();
+    return;
+  }
   const fresh = page.querySelector("[data-live]");
   if (!fresh || fresh.innerHTML === part.dataset.html) return;
   part.dataset.html = fresh.innerHTML;

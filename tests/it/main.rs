@@ -18,6 +18,7 @@ mod app_import_files;
 mod app_invitations;
 #[cfg(target_os = "linux")]
 mod app_kills;
+mod app_language;
 mod app_lists;
 #[cfg(target_os = "linux")]
 mod app_load;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::Extension;
 use axum::extract::{Path, Request, State};
-use axum::response::{Html, Response};
+use axum::response::{Html, IntoResponse as _, Response};
 use maud::{Markup, html};
 
 use super::address::encoded;
@@ -13,14 +13,13 @@ use super::components::{
     NavSection, action_form, frame, grouped, scan_file, score, stored_message,
 };
 use super::failure::{AppFailure, AppResult};
-use super::pass_on::{pass_on, path_below};
+use super::pass_on::{in_chosen_language, pass_on, path_below};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
 use crate::on_thread::read_on_thread;
-use crate::review::Language;
 use crate::view::{BlockPoints, open_block};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{
@@ -68,30 +67,32 @@ pub(super) async fn pages(
     let [key, block, ..] = parts.as_slice() else {
         return Err(AppFailure::not_found());
     };
+    let request = match in_chosen_language(&state, request, &["", "correct"]) {
+        Ok(request) => request,
+        Err(plain) => return Ok(plain.into_response()),
+    };
     let open = state.open(key).await?;
-    // Pages keep the language in which they were opened.
-    let language = state.language().map_or("", Language::name);
-    let id = [open.key.as_str(), block, language].map(str::to_owned);
+    let id = [open.key.as_str(), block, ""].map(str::to_owned);
     if path_below(&request).is_empty() {
         state.blocks.close(&id);
     }
     let router = if let Some(router) = state.blocks.get(&id, &open) {
         router
     } else {
-        let opened = opened(&state, &open, block).await?;
+        let opened = opened(&open, block).await?;
         state.blocks.keep(id, &open, opened)
     };
     pass_on(router, access, request).await
 }
 
 /// Reads a block and returns its pages.
-async fn opened(state: &AppState, open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router> {
+async fn opened(open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router> {
     let name = block.parse::<BlockName>().ok();
     let name = name.ok_or_else(AppFailure::not_found)?;
     if open.catalog.block(&name).await?.is_none() {
         return Err(AppFailure::not_found());
     }
-    let (open, language) = (Arc::clone(open), state.language());
+    let open = Arc::clone(open);
     let location = open.location();
     let own = Arc::clone(&open);
     let read = read_on_thread(async move || {
@@ -104,7 +105,8 @@ async fn opened(state: &AppState, open: &Arc<OpenProject>, block: &str) -> AppRe
             None,
             limits,
             store,
-            language,
+            // The app adds the chosen language to the address of each page.
+            None,
         )
         .await
     });

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::extract::{Path, Request, State};
 use axum::http::Method;
-use axum::response::{Html, Response};
+use axum::response::{Html, IntoResponse as _, Response};
 use axum::{Extension, Json};
 use maud::{Markup, html};
 use serde::Deserialize;
@@ -18,7 +18,7 @@ use super::components::{NavSection, action_form, choice, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::invitation_cards::{invitation_list, invite};
 use super::opened_review::{ReviewPlace, open_review};
-use super::pass_on::{pass_on, path_below};
+use super::pass_on::{in_chosen_language, pass_on};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -204,6 +204,10 @@ pub(super) async fn pages(
     let [key, reviewer, choice, ..] = parts.as_slice() else {
         return Err(AppFailure::not_found());
     };
+    let request = match in_chosen_language(&state, request, &[""]) {
+        Ok(request) => request,
+        Err(plain) => return Ok(plain.into_response()),
+    };
     let open = state.open(key).await?;
     let router = match review(&state, &open, reviewer, choice).await {
         Ok(router) => router,
@@ -211,23 +215,7 @@ pub(super) async fn pages(
         Err(failure) if request.method() == Method::POST => return Err(failure.for_later()),
         Err(failure) => return Err(failure),
     };
-    pass_on(router, access, in_chosen_language(&state, request)).await
-}
-
-/// Asks for the page of a review in the language that the user has chosen, unless the address names one.
-fn in_chosen_language(state: &AppState, mut request: Request) -> Request {
-    let names_one = request
-        .uri()
-        .query()
-        .is_some_and(|query| query.starts_with("lang="));
-    let is_page = path_below(&request).is_empty() && !names_one;
-    if let Some(language) = state.language().filter(|_| is_page) {
-        let address = format!("{}?lang={}", request.uri().path(), language.name());
-        if let Ok(address) = address.parse() {
-            *request.uri_mut() = address;
-        }
-    }
-    request
+    pass_on(router, access, request).await
 }
 
 /// Returns the pages of a reviewer, which are opened if they are not.

@@ -31,6 +31,11 @@ impl Language {
         })
     }
 
+    /// Returns the language that the query of an address asks for, such as `lang=vi`.
+    pub(crate) fn asked_for(query: Option<&str>) -> Option<Self> {
+        query?.strip_prefix("lang=")?.parse().ok()
+    }
+
     /// Returns the other language.
     #[must_use]
     pub(crate) const fn other(self) -> Self {
@@ -93,6 +98,19 @@ mod tests {
             ("", None),
         ] {
             assert_eq!(Language::accepted(header), language, "{header}");
+        }
+    }
+
+    #[test]
+    fn an_address_asks_for_a_language() {
+        for (query, language) in [
+            (Some("lang=vi"), Some(Language::Vietnamese)),
+            (Some("lang=en"), Some(Language::English)),
+            (Some("lang=x"), None),
+            (Some("language=vi"), None),
+            (None, None),
+        ] {
+            assert_eq!(Language::asked_for(query), language, "{query:?}");
         }
     }
 

@@ -57,9 +57,8 @@ async fn index(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
 ) -> Html<String> {
-    let query = query.as_deref();
-    let requested = query.and_then(|query| query.strip_prefix("lang=")?.parse().ok());
-    let language = requested.unwrap_or_else(|| language(&state, &headers));
+    let asked = Language::asked_for(query.as_deref());
+    let language = asked.unwrap_or_else(|| language(&state, &headers));
     let options = &state.options;
     Html(page::review(&options.queue, options.project_page, language).into_string())
 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use axum::Router;
 use axum::body::Bytes;
-use axum::extract::{Path, State};
+use axum::extract::{Path, RawQuery, State};
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse as _, Redirect, Response};
 use axum::routing::get;
@@ -63,8 +63,8 @@ struct ShownBlock {
     overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
 }
 
-/// Returns the routes of the page of a block, and of its correction. Without `view`, only the correction is shown. Without a
-/// language, the browser decides.
+/// Returns the routes of the page of a block, and of its correction. Without `view`, only the correction is shown. A language in
+/// the address of a page, as in `?lang=vi`, is preferred to `language`; without both, the browser decides.
 pub(super) fn block_page(
     block: &BlockName,
     view: Option<BlockView>,
@@ -127,12 +127,9 @@ impl ShownBlock {
     }
 }
 
-async fn index(State(shown): State<Arc<ShownBlock>>) -> Html<String> {
-    Html(page::block(
-        shown.view.name.as_str(),
-        shown.language,
-        shown.back,
-    ))
+async fn index(State(shown): State<Arc<ShownBlock>>, RawQuery(query): RawQuery) -> Html<String> {
+    let language = Language::asked_for(query.as_deref()).or(shown.language);
+    Html(page::block(shown.view.name.as_str(), language, shown.back))
 }
 
 async fn asset(Path(name): Path<String>) -> Response {

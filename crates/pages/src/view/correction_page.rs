@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::body::Bytes;
 use axum::extract::rejection::JsonRejection;
-use axum::extract::{Path, State};
+use axum::extract::{Path, RawQuery, State};
 use axum::http::StatusCode;
 use axum::response::{Html, IntoResponse as _, Response};
 use axum::routing::{get, post};
@@ -146,9 +146,10 @@ impl CorrectionState {
     }
 }
 
-async fn index(State(state): CorrectionPage) -> Html<String> {
+async fn index(State(state): CorrectionPage, RawQuery(query): RawQuery) -> Html<String> {
     let (block, back) = (state.block.as_str(), state.store.back());
-    Html(page::correction(block, state.language, back))
+    let language = Language::asked_for(query.as_deref()).or(state.language);
+    Html(page::correction(block, language, back))
 }
 
 async fn block_json(

@@ -21,8 +21,8 @@ pub struct OpenedBlock {
     pub refused: Option<String>,
 }
 
-/// Reads a block with the results of a metric, or of the default one, and returns its pages. Without a language, the browser
-/// decides.
+/// Reads a block with the results of a metric, or of the default one, and returns its pages. A language in the address of a page,
+/// as in `?lang=vi`, is preferred to `language`; without both, the browser decides.
 ///
 /// # Errors
 /// Returns an error if the block is not aligned and was not refused, or if the catalog or a file cannot be read.

@@ -1,0 +1,75 @@
+//! The language of open reviews, blocks and pages that move follows the one that was chosen last, on whatever page.
+
+use serde_json::json;
+
+use crate::app::{act, app, open_app, text, with_project};
+use crate::app_browser::enter;
+use crate::block_view::finished_block;
+use crate::browser::Browser;
+use crate::page::{Page, read_project};
+
+#[track_caller]
+fn has_language(page: &Page, path: &str, language: &str) {
+    let reply = page.get(path);
+    assert_eq!(reply.status, 200, "{path}: {}", text(&reply));
+    let html = text(&reply);
+    let tag = format!("<html lang=\"{language}\"");
+    assert!(html.contains(&tag), "{path} {language}: {html}");
+}
+
+#[test]
+fn a_language_chosen_in_a_review_is_that_of_all_pages_until_another_is_chosen() {
+    let (_dir, page) = with_project();
+    let form = json!({"reviewer": "lan", "metric": "density", "sample": "", "order": "random"});
+    let reply = act(&page, "/p/p/actions/review", &form, |_| {}).json();
+    let address = format!("/p/p/{}", reply["go"].as_str().expect("a page"));
+    for [in_review, elsewhere] in [["vi", "en"], ["en", "vi"]] {
+        let chosen = page.get(&format!("{address}?lang={in_review}"));
+        assert_eq!(chosen.status, 303);
+        assert_eq!(chosen.header("location"), Some("./"));
+        has_language(&page, &address, in_review);
+        has_language(&page, "/p/p/pairs", in_review);
+        has_language(&page, &format!("/p/p/?language={elsewhere}"), elsewhere);
+        has_language(&page, &address, elsewhere);
+    }
+}
+
+#[test]
+fn an_open_block_follows_the_language_that_was_chosen_since() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    finished_block(dir.path());
+    let page = open_app(dir.path());
+    let view = "/p/p/block/b1/view/";
+    for language in ["vi", "en", "vi"] {
+        has_language(&page, &format!("/p/p/?language={language}"), language);
+        for path in [view.to_owned(), format!("{view}correct")] {
+            has_language(&page, &path, language);
+            let html = text(&page.get(&path));
+            let given = format!("name=\"page-language\" content=\"{language}\"");
+            assert!(html.contains(&given), "{path} {language}: {html}");
+        }
+        assert_eq!(page.get(&format!("{view}block.json")).status, 200);
+    }
+    let chosen = page.get(&format!("{view}correct?lang=en"));
+    assert_eq!(chosen.header("location"), Some("correct"));
+    has_language(&page, view, "en");
+}
+
+#[test]
+fn a_page_that_moves_is_read_again_in_the_language_chosen_in_another_tab() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1280, 800]);
+    tab.open(&format!("{home}p/p/"));
+    let in_language = |language| {
+        format!("document.body?.dataset.ready && document.documentElement.lang === '{language}'")
+    };
+    tab.wait(&in_language("en"));
+    // As another tab does.
+    tab.eval(&format!("fetch('{home}?language=vi'), null"));
+    tab.wait(&in_language("vi"));
+}
