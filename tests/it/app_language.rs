@@ -43,10 +43,12 @@ fn an_open_block_follows_the_language_that_was_chosen_since() {
     for language in ["vi", "en", "vi"] {
         has_language(&page, &format!("/p/p/?language={language}"), language);
         for path in [view.to_owned(), format!("{view}correct")] {
-            has_language(&page, &path, language);
             let html = text(&page.get(&path));
+            let tag = format!("<html lang=\"{language}\"");
             let given = format!("name=\"page-language\" content=\"{language}\"");
-            assert!(html.contains(&given), "{path} {language}: {html}");
+            for part in [tag, given] {
+                assert!(html.contains(&part), "{path}: {part}: {html}");
+            }
         }
         assert_eq!(page.get(&format!("{view}block.json")).status, 200);
     }
