@@ -124,6 +124,10 @@ if (live) {
   setTimeout(next, interval);
 }
 
+document.addEventListener("click", (event) => {
+  if (event.target.closest("[data-print]")) window.print();
+});
+
 /** Loads the parts of a page that take long. */
 for (const part of document.querySelectorAll("[data-load]")) {
   const response = await fetch(part.dataset.load, PAGE).catch(() => null);
@@ -134,6 +138,7 @@ for (const part of document.querySelectorAll("[data-load]")) {
   part.replaceChildren(...shown.childNodes);
   part.dataset.loaded = "true";
 }
+for (const button of document.querySelectorAll("[data-print]")) button.disabled = false;
 
 // The language was chosen with this address; a later one may be chosen on another page. What was done is said once, except
 // for retired pairs, whose number is read anew.

@@ -24,6 +24,7 @@ mod app_lists;
 mod app_load;
 mod app_phone;
 #[cfg(target_os = "linux")]
+mod app_print;
 mod app_restore;
 mod app_resume_browser;
 mod app_sentences;

@@ -14,6 +14,8 @@ use super::run_blocks::failed_blocks_part;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::read_in_turn;
+use mocban_core::domain::one_line;
+use mocban_project::location::now;
 use mocban_project::report::{ReportOptions, read, report};
 use mocban_report::{MetricRow, Report, ReportFormat};
 use mocban_results::IntervalMethod;
@@ -45,12 +47,15 @@ pub(super) async fn page(
 ) -> AppResult<Html<String>> {
     state.open(&key).await?;
     let body = html! {
-        p.row {
+        p.row.not-on-paper {
             (visit.t("Save as", "Lưu thành")) ": "
             @for (_, extension, _, name) in DOWNLOADS {
                 a.button href={ "report/file/report." (extension) } download { (name) }
             }
+            // The numbers of the page are loaded first.
+            button #print type="button" data-print disabled { (visit.t("Print or save as PDF", "In hoặc lưu thành PDF")) }
         }
+        p.on-paper { (one_line(&key)) " · " (visit.time(now())) }
         div #numbers data-load="report/numbers" aria-live="polite" {
             div.notice { p { (visit.t("Reading the results…", "Đang đọc kết quả…")) } progress aria-label=(visit.t("Reading", "Đang đọc")) {} }
         }

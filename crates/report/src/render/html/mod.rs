@@ -73,6 +73,7 @@ fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
                     }
                 }
                 footer {
+                    p.hint { "Print this page to save it as PDF. Word opens the file, too, without its plots and pictures." }
                     p { "Made by mocban " (report.provenance.version) "." }
                 }
             }
@@ -204,6 +205,22 @@ mod tests {
         }
         for outside in ["url(", "@import", "http://", "https://"] {
             assert!(!text.contains(outside), "{outside}");
+        }
+    }
+
+    #[test]
+    fn tables_have_only_parts_that_word_processors_know() {
+        let known = ["caption", "thead", "tbody", "tr", "th", "td", "span"];
+        let text = page(&report(), &Gallery::default(), &Cover::default());
+        let tables: Vec<&str> = text.split("<table>").skip(1).collect();
+        assert!(tables.len() > 5);
+        for table in tables {
+            let table = table.split("</table>").next().expect("its end");
+            for tag in table.split('<').skip(1) {
+                let name = tag.trim_start_matches('/');
+                let end = name.find([' ', '>']).unwrap_or(name.len());
+                assert!(known.contains(&&name[..end]), "{tag}");
+            }
         }
     }
 
