@@ -22,6 +22,7 @@ mod app_language;
 mod app_lists;
 #[cfg(target_os = "linux")]
 mod app_load;
+mod app_paper;
 mod app_phone;
 #[cfg(target_os = "linux")]
 mod app_print;

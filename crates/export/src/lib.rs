@@ -68,7 +68,7 @@ pub use format::ExportFormat;
 pub use gallery_selection::{GallerySelection, draw_gallery};
 pub use manifest::{MANIFEST as EXPORT_MANIFEST, PairCounts};
 pub use options::{ExportOptions, ResultFilter, UnusedOption};
-pub use pair_pictures::PictureError;
+pub use pair_pictures::{PictureError, read_mesh};
 pub use record::{
     ManualAlignmentFields, MetricFields, PairFields, PairRecord, RecordStatus, ReviewerFields,
     SplitName,

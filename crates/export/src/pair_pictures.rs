@@ -281,7 +281,10 @@ impl<'a> PairPictures<'a> {
 }
 
 /// Reads the mesh file of a pair, and checks that it is the one that was aligned, if it was.
-pub(super) fn read_mesh(
+///
+/// # Errors
+/// Returns an error if the mesh cannot be read, or has changed.
+pub fn read_mesh(
     project: &Project,
     pair: &PairResults,
     limits: &MeshLimits,

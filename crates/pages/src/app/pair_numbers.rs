@@ -121,41 +121,68 @@ impl PairNumber {
     }
 }
 
-/// Returns the table of numbers. With another result, it has a column for each and one for the difference.
+/// Returns the numbers of a result and its verdicts. With another result, there is a column for each and one for the difference.
 pub(super) fn numbers(
     visit: &Visit,
     record: &MetricRecord,
     other: Option<&MetricRecord>,
 ) -> Markup {
-    let outcome = &record.outcome;
     let title = visit.t("Numbers", "Các con số");
     html! {
         section #numbers {
             h2 { (title) }
-            div.scroll tabindex="0" role="region" aria-label=(title) {
-                table.meanings {
-                    @if let Some(other) = other {
-                        thead { tr {
-                            th scope="col" { (visit.t("Number", "Con số")) }
-                            @for record in [record, other] { th.number scope="col" { (visit.metric(record.outcome.metric)) } }
-                            th.number scope="col" { (visit.t("Difference", "Chênh lệch")) }
-                            th scope="col" { (visit.t("Meaning", "Ý nghĩa")) }
-                        } }
-                    }
-                    tbody { @for number in &NUMBERS {
-                        tr {
-                            th scope="row" { (number.name[visit.index()]) }
-                            td.number { (number.text(visit, outcome)) }
-                            @if let Some(other) = other {
-                                td.number { (number.text(visit, &other.outcome)) }
-                                td.number { (number.difference(visit, outcome, &other.outcome)) }
-                            }
-                            td.muted { (number.meaning[visit.index()]) }
-                        }
-                    } }
+            @match other {
+                None => (table(visit, title, &record.outcome, None)),
+                Some(other) => {
+                    @let outcomes = [&record.outcome, &other.outcome];
+                    (compared_numbers(visit, title, outcomes, outcomes.map(|outcome| visit.metric(outcome.metric))))
                 }
             }
             @for record in [Some(record), other].into_iter().flatten() { (verdicts(visit, record, other.is_some())) }
+        }
+    }
+}
+
+/// Returns the table of the numbers of two results with their titles, and their differences. `label` names the table.
+pub(super) fn compared_numbers(
+    visit: &Visit,
+    label: &str,
+    [outcome, other]: [&MetricOutcome; 2],
+    titles: [&str; 2],
+) -> Markup {
+    table(visit, label, outcome, Some((other, titles)))
+}
+
+/// Returns the table of the numbers of a result, or of two with their titles.
+fn table(
+    visit: &Visit,
+    label: &str,
+    outcome: &MetricOutcome,
+    other: Option<(&MetricOutcome, [&str; 2])>,
+) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(label) {
+            table.meanings {
+                @if let Some((_, titles)) = other {
+                    thead { tr {
+                        th scope="col" { (visit.t("Number", "Con số")) }
+                        @for title in titles { th.number scope="col" { (title) } }
+                        th.number scope="col" { (visit.t("Difference", "Chênh lệch")) }
+                        th scope="col" { (visit.t("Meaning", "Ý nghĩa")) }
+                    } }
+                }
+                tbody { @for number in &NUMBERS {
+                    tr {
+                        th scope="row" { (number.name[visit.index()]) }
+                        td.number { (number.text(visit, outcome)) }
+                        @if let Some((other, _)) = other {
+                            td.number { (number.text(visit, other)) }
+                            td.number { (number.difference(visit, outcome, other)) }
+                        }
+                        td.muted { (number.meaning[visit.index()]) }
+                    }
+                } }
+            }
         }
     }
 }

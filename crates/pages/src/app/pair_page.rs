@@ -11,6 +11,7 @@ use super::components::{NavSection, action_form, frame, scan_file, stored_messag
 use super::failure::AppResult;
 use super::pair_history::{history, verdict_line};
 use super::pair_numbers::numbers;
+use super::paper_method::{PAPER, is_comparable};
 use super::retired_pairs::retired_band;
 use super::state::AppState;
 use super::visit::Visit;
@@ -72,12 +73,15 @@ pub(super) async fn page(
     let compared = visit.query.parsed::<ThresholdMetric>("compare");
     let compared = compared.filter(|other| Some(*other) != shown);
     let other = compared.and_then(|other| overview.detail.results.metric(other));
+    let with_paper =
+        visit.query.get("compare") == Some(PAPER) && is_comparable(&overview.detail.results);
     let body = html! {
         (neighbour_links(&visit, &neighbours))
         (state_line(&visit, &overview))
         @if let Some(record) = record {
             @let (metric, other_metric) = (record.outcome.metric, other.map(|other| other.outcome.metric));
             (metric_links(&visit, &overview.detail, metric, other_metric))
+            @if with_paper { (paper_part(&visit, metric)) }
             (pictures(&visit, &LAYERS, Some(metric), other_metric))
             (numbers(&visit, record, other))
         } @else {
@@ -161,6 +165,8 @@ fn metric_links(
 ) -> Markup {
     let metrics = detail.results.metrics.iter();
     let metrics: Vec<_> = metrics.map(|record| record.outcome.metric).collect();
+    let has_paper = is_comparable(&detail.results);
+    let with_paper = has_paper && visit.query.get("compare") == Some(PAPER);
     let link = |name: &str, value: &str, is_shown: bool, text: &str| {
         html! {
             a href={ "./" (visit.query.with(name, value).text()) } aria-current=[is_shown.then_some("true")] { (text) } " "
@@ -174,10 +180,23 @@ fn metric_links(
         @if metrics.len() > 1 {
             p.views #compare {
                 (visit.t("Compare with", "So sánh với")) ": "
-                (link("compare", "", other.is_none(), visit.t("none", "không")))
+                (link("compare", "", other.is_none() && !with_paper, visit.t("none", "không")))
                 @for metric in metrics.iter().filter(|metric| **metric != shown) {
                     (link("compare", metric.name(), Some(*metric) == other, visit.metric(*metric)))
                 }
+                @if has_paper { (link("compare", PAPER, with_paper, visit.t("The paper's method", "Phương pháp của bài báo"))) }
+            }
+        }
+    }
+}
+
+/// Returns the part that compares the result with that of the paper's method, which a script asks for, because it takes a while.
+fn paper_part(visit: &Visit, metric: ThresholdMetric) -> Markup {
+    html! {
+        section #paper data-load={ "paper-method?metric=" (metric) } aria-live="polite" {
+            div.notice {
+                p { (visit.t("Aligning the pair by the paper's method…", "Đang căn chỉnh cặp này theo phương pháp của bài báo…")) }
+                progress aria-label=(visit.t("Aligning", "Đang căn chỉnh")) {}
             }
         }
     }

@@ -7,13 +7,14 @@ use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use maud::html;
 
+use super::encoded_picture::{Encoded, JPEG, PICTURE_SIDE, jpeg};
 use super::failure::{AppFailure, AppResult};
 use super::projects::OpenProject;
 use super::state::AppState;
 use mocban_catalog::PairResults;
 use mocban_core::InputLimits;
 use mocban_core::domain::{Affine2, PairName, ThresholdMetric, enum_names};
-use mocban_core::raster::{Grid, Mask, jpeg_rgb8, png_mask};
+use mocban_core::raster::{Mask, png_mask};
 use mocban_export::pictures::PrintView;
 use mocban_export::scan_view::{ScanView, scan_alone};
 use mocban_export::{PictureError, SourcePrint};
@@ -21,11 +22,6 @@ use mocban_results::pair_artifacts::PairArtifacts;
 
 /// Longer side of a picture on a card, pixels.
 const THUMB_SIDE: usize = 180;
-/// Longer side of a picture on the page of a pair, pixels.
-const PICTURE_SIDE: usize = 640;
-const JPEG: &str = "image/jpeg";
-/// JPEG quality of pictures.
-const QUALITY: u8 = 85;
 
 /// A picture of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,9 +43,6 @@ pub(super) enum PairPicture {
 enum_names! { pub PairPicture, "a picture":
     Thumb = "thumb", Print = "print", Relief = "relief", PrintMask = "print_mask", DepthMask = "depth_mask", Overlay = "overlay",
 }
-
-/// An encoded picture with its content type.
-type Encoded = (&'static str, Vec<u8>);
 
 /// Responds with a picture of the result of a metric. `name` is that of the picture and of the metric: `overlay-relief`.
 pub(super) async fn picture(
@@ -177,10 +170,6 @@ fn centred(from: [usize; 2], to: [usize; 2]) -> Affine2 {
     let scale = (to[0] / from[0]).min(to[1] / from[1]);
     let shift = [0, 1].map(|axis| (to[axis] - 1.0 - scale * (from[axis] - 1.0)) / 2.0);
     Affine2::scale_shift(scale, shift)
-}
-
-fn jpeg(picture: &Grid<[u8; 3]>) -> Encoded {
-    (JPEG, jpeg_rgb8(picture, QUALITY))
 }
 
 fn mask(mask: &Mask) -> Encoded {

@@ -9,8 +9,9 @@ use super::state::{AppOptions, AppState};
 use super::{
     assets, block_page, blocks_page, chosen_pairs, export_page, export_zip, failure_page,
     health_page, home, import_files, import_page, import_pictures, invitation_cards, last_import,
-    pair_page, pairs_page, pictures, report_page, restore_action, restore_content, restore_page,
-    review_agreement, review_page, run_actions, run_page, settings_page, upload_actions, view_bar,
+    pair_page, pairs_page, paper_page, pictures, report_page, restore_action, restore_content,
+    restore_page, review_agreement, review_page, run_actions, run_page, settings_page,
+    upload_actions, view_bar,
 };
 
 /// Returns the routes of the app, for a server.
@@ -26,6 +27,11 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/p/{project}/pairs", get(pairs_page::page))
         .route(&format!("{pair}/"), get(pair_page::page))
         .route(&format!("{pair}/picture/{{name}}"), get(pictures::picture))
+        .route(&format!("{pair}/paper-method"), get(paper_page::part))
+        .route(
+            &format!("{pair}/paper-method/{{name}}"),
+            get(paper_page::picture),
+        )
         .route(&format!("{pair}/3d/"), get(pair_page::scan_view))
         .route(&format!("{pair}/3d/scan"), get(pictures::scan))
         .route(

@@ -10,6 +10,7 @@ use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
 use super::invitations::Invitations;
 use super::open_pages::OpenPages;
+use super::paper_method::PaperMethod;
 use super::plan_cache::PlanCache;
 use super::projects::{OpenProject, find};
 use super::tasks::AppTasks;
@@ -55,6 +56,8 @@ pub(super) struct AppState {
     /// Why runs that the app started failed.
     pub(super) failed_runs: FailedRuns,
     pub(super) thumbs: ThumbCache,
+    /// Pairs aligned by the method of the paper.
+    pub(super) paper: PaperMethod,
     pub(super) zip_sizes: ZipSizes,
     /// What the last import would store.
     pub(super) plans: PlanCache,
@@ -81,6 +84,7 @@ impl AppState {
             tasks: AppTasks::default(),
             failed_runs: FailedRuns::default(),
             thumbs: ThumbCache::default(),
+            paper: PaperMethod::default(),
             zip_sizes: ZipSizes::default(),
             plans: PlanCache::default(),
             work: WorkThread::default(),
