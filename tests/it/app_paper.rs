@@ -69,7 +69,7 @@ fn a_pair_that_the_paper_s_method_aligned_is_not_compared_with_it() {
     let pair = "/p/p/pair/upright-0001/";
     let shown = html(&page, &format!("{pair}?compare=paper"));
     assert!(!shown.contains("paper-method"), "{shown}");
-    assert!(!shown.contains("compare=paper\">"), "{shown}");
+    assert!(!shown.contains("The paper's method"), "{shown}");
     let refused = page.get(&format!("{pair}paper-method"));
     assert_eq!(refused.status, 422);
     let why = text(&refused);
