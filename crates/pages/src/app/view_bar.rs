@@ -129,13 +129,13 @@ fn bar(visit: &Visit, views: &[SavedView], may_save: bool) -> Markup {
             }
         }
         @if may_save && shown.is_empty() && is_savable {
-            details #save-view {
+            details #save-view.not-on-paper {
                 summary { (visit.t("Save this list as a view", "Lưu danh sách này")) }
                 (save_form(visit, &list))
             }
         }
         @if may_save && !shown.is_empty() {
-            details #change-view {
+            details #change-view.not-on-paper {
                 summary { (visit.t("Rename or delete this view", "Đổi tên hoặc xóa danh sách đã lưu này")) }
                 @for view in shown { (change_forms(visit, view)) }
             }
