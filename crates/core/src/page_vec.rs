@@ -146,6 +146,7 @@ pub fn fill(source: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
 }
 
 /// Returns pages as elements; the remainder at their end is unused.
+#[inline]
 fn as_elements<T: Pod>(pages: &mut PageBuffer) -> &mut [T] {
     let whole = pages.len() - pages.len() % size_of::<T>();
     bytemuck::cast_slice_mut(&mut pages[..whole])
@@ -154,6 +155,7 @@ fn as_elements<T: Pod>(pages: &mut PageBuffer) -> &mut [T] {
 impl<T: Pod> Deref for PageVec<T> {
     type Target = [T];
 
+    #[inline]
     fn deref(&self) -> &[T] {
         match &self.0 {
             Storage::Heap(vec) => vec,
@@ -163,6 +165,7 @@ impl<T: Pod> Deref for PageVec<T> {
 }
 
 impl<T: Pod> DerefMut for PageVec<T> {
+    #[inline]
     fn deref_mut(&mut self) -> &mut [T] {
         match &mut self.0 {
             Storage::Heap(vec) => vec,

@@ -179,8 +179,12 @@ impl MeshLimits {
 
     /// Checks a number of vertices against the limit. More vertices than a 32-bit index can address are never allowed.
     pub(super) fn check_vertices(&self, count: u64) -> Result<(), MeshError> {
-        let limit = self.max_vertices.min(u64::from(u32::MAX));
-        check_count("vertices", count, limit)
+        check_count("vertices", count, self.most_vertices())
+    }
+
+    /// Returns the most vertices that the settings allow and that have an index.
+    fn most_vertices(&self) -> u64 {
+        self.max_vertices.min(u64::from(u32::MAX))
     }
 
     pub(super) fn check_triangles(&self, count: u64) -> Result<(), MeshError> {
@@ -189,8 +193,7 @@ impl MeshLimits {
 
     /// Returns whether a mesh of this size is within the limits.
     pub(super) fn allow(&self, vertices: usize, triangles: usize) -> bool {
-        self.check_vertices(vertices as u64).is_ok()
-            && self.check_triangles(triangles as u64).is_ok()
+        vertices as u64 <= self.most_vertices() && triangles as u64 <= self.max_triangles
     }
 }
 

@@ -71,7 +71,7 @@ impl PositionCheck {
             missing_vertices,
             incomplete_faces,
         };
-        if self.is_finite && self.origins < 2 {
+        if self.is_finite && (self.origins < 2 || !has_unused_origin(&mesh)) {
             let losses = losses(0);
             return Ok(MeshRead { mesh, losses });
         }
@@ -165,6 +165,17 @@ fn has_adjacent_zeros<T: CoordinateValue>(values: &[T]) -> bool {
     let zero = T::default();
     let pairs = values.iter().zip(values.iter().skip(1));
     pairs.fold(false, |found, (a, b)| found | ((*a == zero) & (*b == zero)))
+}
+
+/// Returns whether a vertex that no face uses is at the origin.
+fn has_unused_origin(mesh: &Mesh) -> bool {
+    let mut is_used = vec![false; mesh.vertices.len()];
+    for part in polled(mesh.triangles.chunks(256)) {
+        for corner in part.as_flattened() {
+            is_used[*corner as usize] = true;
+        }
+    }
+    polled(mesh.vertices.iter().zip(is_used)).any(|(vertex, is_used)| !is_used && is_origin(vertex))
 }
 
 /// Returns whether no coordinate is NaN or infinite.

@@ -20,9 +20,9 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
     let lines = std::iter::from_fn(move || {
         let rest = unread?;
         let end = if is_classic_mac {
-            rest.iter().position(|byte| matches!(byte, b'\n' | b'\r'))
+            memchr::memchr2(b'\n', b'\r', rest)
         } else {
-            rest.iter().position(|byte| *byte == b'\n')
+            memchr::memchr(b'\n', rest)
         };
         let line = &rest[..end.unwrap_or(rest.len())];
         unread = end.map(|end| &rest[end + 1..]);
@@ -88,14 +88,9 @@ pub(super) fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
-/// Bytes of a sign, a point and the digits that [`decimal::parse`] reads.
-const SHORT_NUMBER: usize = 18;
-
 /// Parses a coordinate. NaN and infinity stand for one that is missing.
 pub(super) fn number(word: &[u8]) -> Option<f64> {
-    if word.len() <= SHORT_NUMBER
-        && let Some((value, [])) = decimal::parse(word)
-    {
+    if let Some((value, [])) = decimal::parse(word) {
         return Some(value);
     }
     parse(word).or_else(|| {

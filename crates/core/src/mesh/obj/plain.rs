@@ -7,7 +7,7 @@ use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
 
-/// Digits of an index that is parsed without a check for overflow.
+/// Most digits of an index, so that it fits 64 bits.
 const MAX_INDEX_DIGITS: usize = 18;
 /// Estimates of the bytes that a file needs per vertex and per triangle. They are high, so that too little memory is
 /// reserved rather than too much.
@@ -68,7 +68,7 @@ struct PlainReader<'a> {
     incomplete_faces: u64,
 }
 
-impl PlainReader<'_> {
+impl<'a> PlainReader<'a> {
     /// Keeps the vertices that faces use, in the order of their first use, or all vertices if there are no faces.
     fn into_mesh(mut self, limits: &MeshLimits) -> Result<(Mesh, u64), MeshError> {
         limits.check_vertices(self.vertices.len() as u64)?;
@@ -91,23 +91,14 @@ impl PlainReader<'_> {
     /// Reads a line; returns `None` if it is another than [`read`] lists.
     #[inline]
     fn line(&mut self, limits: &MeshLimits) -> Option<()> {
-        self.skip_space();
-        match self.rest {
-            [b'v', space, rest @ ..] if is_space(*space) => {
-                self.rest = rest;
-                self.vertex()?;
-            }
-            [b'f', space, rest @ ..] if is_space(*space) => {
-                self.rest = rest;
-                self.face(limits)?;
-            }
+        let mut text = Cursor(self.rest);
+        text.skip_space();
+        self.rest = text.0;
+        match text.0 {
+            [b'v', space, rest @ ..] if is_space(*space) => self.vertex(Cursor(rest))?,
+            [b'f', space, rest @ ..] if is_space(*space) => self.face(Cursor(rest), limits)?,
             rest => {
-                let len = rest.iter().position(u8::is_ascii_whitespace);
-                let keyword = &rest[..len.unwrap_or(rest.len())];
-                if !matches!(
-                    keyword,
-                    [] | [b'#', ..] | b"vn" | b"vt" | b"g" | b"o" | b"s" | b"usemtl" | b"mtllib"
-                ) {
+                if !is_ignored(rest) {
                     return None;
                 }
             }
@@ -117,30 +108,25 @@ impl PlainReader<'_> {
     }
 
     fn next_line(&mut self) {
-        let len = self.rest.iter().position(|byte| *byte == b'\n');
-        let len = len.map_or(self.rest.len(), |len| len + 1);
+        let end = match self.rest {
+            [b'\n', ..] => Some(0),
+            rest => memchr::memchr(b'\n', rest),
+        };
+        let len = end.map_or(self.rest.len(), |end| end + 1);
         self.rest = &self.rest[len..];
         self.line += 1;
     }
 
-    fn skip_space(&mut self) {
-        while let [byte, rest @ ..] = self.rest
-            && is_space(*byte)
-        {
-            self.rest = rest;
-        }
-    }
-
     /// Parses three numbers, and skips a weight of 1 or the three or four words of a colour.
-    fn vertex(&mut self) -> Option<()> {
+    fn vertex(&mut self, mut text: Cursor<'a>) -> Option<()> {
         let mut position = [0.0; 3];
         for value in &mut position {
-            self.skip_space();
-            *value = self.number()?;
+            text.skip_space();
+            *value = text.number()?;
         }
         self.vertices.push(position);
         let (mut words, mut len, mut was_space) = (0, 0, true);
-        for byte in self.rest {
+        for byte in text.0 {
             match byte {
                 b'\n' | b'#' => break,
                 byte if is_space(*byte) => was_space = true,
@@ -148,7 +134,7 @@ impl PlainReader<'_> {
             }
             len += 1;
         }
-        let (rest, end) = self.rest.split_at(len);
+        let (rest, end) = text.0.split_at(len);
         self.rest = end;
         let is_plain = match words {
             1 => text::parse(rest.trim_ascii()) == Some(1.0),
@@ -158,39 +144,19 @@ impl PlainReader<'_> {
         is_plain.then_some(())
     }
 
-    /// Parses a number up to the end of its word.
-    fn number(&mut self) -> Option<f64> {
-        if let Some((value, rest)) = decimal::parse(self.rest)
-            && rest.first().is_none_or(u8::is_ascii_whitespace)
-        {
-            self.rest = rest;
-            return Some(value);
-        }
-        // A comment may follow at once, but `1.#IND` has none.
-        let number_before = |is_end: fn(&u8) -> bool| {
-            let len = self.rest.iter().position(is_end).unwrap_or(self.rest.len());
-            let (word, rest) = self.rest.split_at(len);
-            text::number(word).map(|number| (number, rest))
-        };
-        let found = number_before(u8::is_ascii_whitespace);
-        let (value, rest) = found.or_else(|| number_before(|byte| is_end_of_word(*byte)))?;
-        self.rest = rest;
-        Some(value)
-    }
-
     /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner. Polygons with
     /// fewer than three corners are only counted. Stops at the first triangle that exceeds the limits.
-    fn face(&mut self, limits: &MeshLimits) -> Option<()> {
+    fn face(&mut self, mut text: Cursor<'a>, limits: &MeshLimits) -> Option<()> {
         let before = self.triangles.len();
         let (mut first, mut last, mut highest) = (0, 0, 0);
         for count in polled(0..) {
-            self.skip_space();
-            let is_end = matches!(self.rest, [] | [b'\n' | b'#', ..]);
+            text.skip_space();
+            let is_end = matches!(text.0, [] | [b'\n' | b'#', ..]);
             if is_end || self.triangles.len() as u64 > limits.max_triangles {
                 self.incomplete_faces += u64::from(count < 3);
                 break;
             }
-            let corner = self.corner()?;
+            let corner = text.corner(self.vertices.len())?;
             match count {
                 0 => first = corner,
                 1 => {}
@@ -202,47 +168,98 @@ impl PlainReader<'_> {
         if self.triangles.len() > before && highest > self.last_used.0 {
             self.last_used = (highest, self.line);
         }
+        self.rest = text.0;
         Some(())
+    }
+}
+
+/// The unread part of a line and what follows it.
+struct Cursor<'a>(&'a [u8]);
+
+impl Cursor<'_> {
+    #[inline]
+    fn skip_space(&mut self) {
+        while let [byte, rest @ ..] = self.0
+            && is_space(*byte)
+        {
+            self.0 = rest;
+        }
+    }
+
+    /// Parses a number up to the end of its word.
+    fn number(&mut self) -> Option<f64> {
+        if let Some((value, rest)) = decimal::parse(self.0)
+            && rest.first().is_none_or(u8::is_ascii_whitespace)
+        {
+            self.0 = rest;
+            return Some(value);
+        }
+        // A comment may follow at once, but `1.#IND` has none.
+        let number_before = |is_end: fn(&u8) -> bool| {
+            let len = self.0.iter().position(is_end).unwrap_or(self.0.len());
+            let (word, rest) = self.0.split_at(len);
+            text::number(word).map(|number| (number, rest))
+        };
+        let found = number_before(u8::is_ascii_whitespace);
+        let (value, rest) = found.or_else(|| number_before(|byte| is_end_of_word(*byte)))?;
+        self.0 = rest;
+        Some(value)
     }
 
     /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn` and returns the vertex's index, from 0. A negative index counts back from
-    /// the last vertex so far. An index that no vertex can have is returned as the highest.
-    fn corner(&mut self) -> Option<u32> {
+    /// the last of the vertices so far. An index that no vertex can have is returned as the highest.
+    fn corner(&mut self, vertices: usize) -> Option<u32> {
         let index = self.index()?;
         let mut parts = 1;
-        while let [b'/', rest @ ..] = self.rest {
-            self.rest = rest;
+        while let [b'/', rest @ ..] = self.0 {
+            self.0 = rest;
             parts += 1;
             if let Some(b'-' | b'+' | b'0'..=b'9') = rest.first() {
                 self.index().filter(|_| parts <= 3)?;
             }
         }
         let place = if index < 0 {
-            self.vertices.len() as i64 + index
+            vertices as i64 + index
         } else {
             index - 1
         };
         let place = u32::try_from(place).unwrap_or(u32::MAX);
-        self.rest
+        self.0
             .first()
             .is_none_or(|byte| is_end_of_word(*byte))
             .then_some(place)
     }
 
-    /// Parses an integer.
+    /// Parses an integer of at most [`MAX_INDEX_DIGITS`] digits.
+    #[inline]
     fn index(&mut self) -> Option<i64> {
-        let word = self.rest;
-        let sign = usize::from(matches!(word.first(), Some(b'-' | b'+')));
+        let is_negative = self.0.first() == Some(&b'-');
+        let sign = usize::from(is_negative || self.0.first() == Some(&b'+'));
         let mut index = 0;
-        let digits = decimal::read_digits(&word[sign..], &mut index);
-        self.rest = &word[sign + digits..];
-        match digits {
-            0 => None,
-            1..=MAX_INDEX_DIGITS if word[0] == b'-' => Some(-(index as i64)),
-            1..=MAX_INDEX_DIGITS => Some(index as i64),
-            _ => text::parse(&word[..sign + digits]),
-        }
+        let digits = decimal::read_digits(&self.0[sign..], &mut index);
+        self.0 = &self.0[sign + digits..];
+        let index = if is_negative {
+            -(index as i64)
+        } else {
+            index as i64
+        };
+        (1..=MAX_INDEX_DIGITS).contains(&digits).then_some(index)
     }
+}
+
+/// Returns whether a line that a text begins with has no geometry.
+fn is_ignored(text: &[u8]) -> bool {
+    if let [b'v', b'n' | b't', space, ..] = text
+        && space.is_ascii_whitespace()
+    {
+        return true;
+    }
+    let len = text.iter().position(u8::is_ascii_whitespace);
+    let keyword = &text[..len.unwrap_or(text.len())];
+    matches!(
+        keyword,
+        [] | [b'#', ..] | b"vn" | b"vt" | b"g" | b"o" | b"s" | b"usemtl" | b"mtllib"
+    )
 }
 
 /// White space within a line.

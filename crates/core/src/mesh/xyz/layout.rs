@@ -138,7 +138,7 @@ impl PointLayout {
     }
 }
 
-/// Parses three short numbers with simple separators, as in almost every line. Returns `None` for all other lines.
+/// Parses three numbers with simple separators, as in almost every line. Returns `None` for all other lines.
 #[inline]
 fn plain_position(line: &[u8]) -> Option<[f64; 3]> {
     let mut position = [0.0; 3];
