@@ -13,7 +13,7 @@ use crate::resume::project;
 use crate::waiting::PATIENT_CONNECT;
 
 /// Longer than a busy machine needs, and shorter than the wait for a connection with [`PATIENT_CONNECT`].
-const AT_ONCE: Duration = Duration::from_secs(300);
+const AT_ONCE: Duration = Duration::from_mins(5);
 
 /// Creates an authority, a key, a certificate that the key signed itself, and certificates that the authority signed: a
 /// valid one, an expired one and one for another host.

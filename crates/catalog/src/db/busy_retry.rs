@@ -210,12 +210,12 @@ mod tests {
             CPU_CS.fetch_add(cpu_cs, Ordering::SeqCst);
             retry.may_wait(waited)
         };
-        let mut now = LOOK_EVERY;
+        let (mut now, mut idle_from) = (LOOK_EVERY, LOOK_EVERY);
         while now < 10 * LONGEST_WAIT {
             assert!(waits_until(now, 100), "{now:?}");
+            idle_from = now;
             now += LOOK_EVERY;
         }
-        let idle_from = now - LOOK_EVERY;
         while now < idle_from + LONGEST_WAIT {
             assert!(waits_until(now, 0), "{now:?}");
             now += LOOK_EVERY;

@@ -168,7 +168,7 @@ fn ply_parts(
     }
     // Faces follow, whose lines also begin with numbers. A row is about as long as the first ones.
     let first = head.get(rows.start as usize..).unwrap_or_default();
-    let lines = first.iter().filter(|byte| **byte == b'\n').count().max(1);
+    let lines = memchr::memchr_iter(b'\n', first).count().max(1);
     let about = rows.rows.saturating_mul(first.len() as u64) / lines as u64;
     let end = rows.start.saturating_add(about / 10 * 9).min(len);
     each_line(file, [rows.start, end], spread, add)?;

@@ -208,7 +208,7 @@ fn picker(visit: &Visit, picked: &PickedFolder) -> Markup {
 fn held(visit: &Visit, counts: &FileCounts) -> String {
     let backups = visit.t("backups", "bản sao lưu");
     let backups = (counts.backups > 0).then(|| format!("{} {backups}", grouped(counts.backups)));
-    let others = Some(held(visit, counts)).filter(|text| !text.is_empty());
+    let others = Some(counts_text(visit, counts)).filter(|text| !text.is_empty());
     let parts: Vec<String> = backups.into_iter().chain(others).collect();
     parts.join(", ")
 }
