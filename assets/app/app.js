@@ -79,10 +79,11 @@ function withFocus(part, change) {
 
 /** Keeps the pictures that are shown, so that they do not flicker. */
 function update(part, fresh) {
-  const shown = new Map([...part.querySelectorAll("img")].map((image) => [image.getAttribute("src"), image]));
+  // Two lists may show the same picture.
+  const shown = [...part.querySelectorAll("img")];
   for (const image of fresh.querySelectorAll("img")) {
-    const known = shown.get(image.getAttribute("src"));
-    if (known) image.replaceWith(known);
+    const at = shown.findIndex((known) => known.getAttribute("src") === image.getAttribute("src"));
+    if (at >= 0) image.replaceWith(shown.splice(at, 1)[0]);
   }
   withFocus(part, () => part.replaceChildren(...fresh.childNodes));
 }
@@ -129,7 +130,7 @@ document.addEventListener("click", (event) => {
 });
 
 /** Loads the parts of a page that take long. */
-for (const part of document.querySelectorAll("[data-load]")) {
+const loads = [...document.querySelectorAll("[data-load]")].map(async (part) => {
   const response = await fetch(part.dataset.load, PAGE).catch(() => null);
   if (!response) offline.hidden = false;
   const text = await response?.text();
@@ -137,7 +138,8 @@ for (const part of document.querySelectorAll("[data-load]")) {
   const shown = response?.ok ? page.body : page.querySelector("main") ?? page.body;
   part.replaceChildren(...shown.childNodes);
   part.dataset.loaded = "true";
-}
+});
+await Promise.all(loads);
 for (const button of document.querySelectorAll("[data-print]")) button.disabled = false;
 
 // The language was chosen with this address; a later one may be chosen on another page. What was done is said once, except

@@ -103,7 +103,8 @@ fn files_that_cannot_be_used_are_named_before_the_import() {
     write(&empty, b"");
     for path in [&cut, &cut_print] {
         let bytes = std::fs::read(path).expect("a file");
-        write(path, &bytes[..bytes.len() / 2]);
+        // A mesh of this length is read as a whole.
+        write(path, &bytes[..bytes.len() / 4]);
     }
     write(
         &lfs,

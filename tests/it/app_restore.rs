@@ -107,13 +107,13 @@ fn a_backup_is_shown_and_becomes_a_project() {
     assert!(go.contains("name=again"), "{go}");
     let done = ended(&page, "again");
     for part in [
-        "15 pairs and 1 verdicts were restored",
+        "15 pairs and 4 verdicts were restored",
         "href=\"./p/again/\"",
     ] {
         assert!(done.contains(part), "{part}: {done}");
     }
     assert_eq!(page.get("/p/again/").status, 200);
-    assert_eq!(counts(&root.join("again")), (json!(15), 1));
+    assert_eq!(counts(&root.join("again")), (json!(15), 4));
     // Only the depth maps and masks are computed again.
     mocban(&root.join("again"), &["run", "-q"]).expect(0);
     mocban(&root.join("again"), &["check"]).expect(0);
@@ -214,7 +214,7 @@ fn restores_run_at_once_and_one_name_is_taken_once() {
     for (page, name) in [(&page, "one"), (&page, "two"), (&second, "three")] {
         let html = ended(page, name);
         assert!(html.contains("data-task=\"done\""), "{name}: {html}");
-        assert_eq!(counts(&root.join(name)), (json!(15), 1));
+        assert_eq!(counts(&root.join(name)), (json!(15), 4));
     }
 }
 
@@ -263,8 +263,8 @@ fn a_killed_restore_leaves_no_project_and_is_done_by_the_next_app() {
         let reply = start(&next, &form);
         assert_eq!(reply.status, 200, "{}", text(&reply));
         let done = ended(&next, "again");
-        assert!(done.contains("15 pairs and 1 verdicts"), "{done}");
-        assert_eq!(counts(&root.join("again")), (json!(15), 1));
+        assert!(done.contains("15 pairs and 4 verdicts"), "{done}");
+        assert_eq!(counts(&root.join("again")), (json!(15), 4));
         let hidden = std::fs::read_dir(root.join("again"))
             .expect("a folder")
             .flatten();

@@ -49,7 +49,8 @@ pub(super) fn parse(text: &[u8]) -> Option<(f64, &[u8])> {
     Some((if is_negative { -value } else { value }, rest))
 }
 
-/// Parses the exponent that a text begins with, and returns it with the rest of the text. A large one is only that.
+/// Parses the exponent that a text begins with, and returns it with the rest of the text. An exponent of ten or more digits
+/// is returned as the largest integer, whatever its sign: no power of ten in the table has it.
 fn parse_exponent(text: &[u8]) -> Option<(i64, &[u8])> {
     let sign = usize::from(matches!(text.first(), Some(b'-' | b'+')));
     let mut value = 0;
@@ -66,8 +67,8 @@ fn parse_exponent(text: &[u8]) -> Option<(i64, &[u8])> {
 /// Parses the text before `rest`, which is a later part of it, by the standard library.
 #[cold]
 fn parse_slowly<'a>(text: &[u8], rest: &'a [u8]) -> Option<(f64, &'a [u8])> {
-    let number = &text[..text.len() - rest.len()];
-    Some((super::text::parse(number)?, rest))
+    let number = std::str::from_utf8(&text[..text.len() - rest.len()]);
+    Some((number.ok()?.parse().ok()?, rest))
 }
 
 /// Reads decimal digits, appends them to `number` and returns their count. On overflow, `number` wraps around.
@@ -103,7 +104,8 @@ fn read_many_digits(text: &[u8], number: &mut u64) -> usize {
 fn eight_digits(text: [u8; 8]) -> Option<u64> {
     let word = u64::from_le_bytes(text);
     let digits = word.wrapping_sub(0x3030_3030_3030_3030);
-    // A byte above 9 has one of its four upper bits, or gets one from 6 more; a byte below 0 wraps around.
+    // A byte that is no digit has one of its four upper bits, or gets one if 6 is added: above '9' it is at least 10, and
+    // below '0' the subtraction wraps around.
     let others = digits | digits.wrapping_add(0x0606_0606_0606_0606);
     if others & 0xf0f0_f0f0_f0f0_f0f0 != 0 {
         return None;

@@ -72,6 +72,7 @@ pub(super) async fn pages(
         Err(plain) => return Ok(plain.into_response()),
     };
     let open = state.open(key).await?;
+    // Only reviews have a third part.
     let id = [open.key.as_str(), block, ""].map(str::to_owned);
     if path_below(&request).is_empty() {
         state.blocks.close(&id);

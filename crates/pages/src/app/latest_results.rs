@@ -21,7 +21,7 @@ const HOUR_MS: UnixMillis = 3_600_000;
 pub(super) struct LatestResults {
     /// The newest first.
     newest: Vec<PairResults>,
-    /// Those of the last hour, least confident first.
+    /// The least confident results of the last hour, in order of confidence.
     worst: Vec<PairResults>,
 }
 

@@ -1,8 +1,10 @@
 //! A pair aligned by the method of the paper, beside its stored result. It is computed when a page asks for it, and not stored.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use axum::body::Bytes;
+use tokio::time::timeout;
 
 use super::encoded_picture::{PICTURE_SIDE, jpeg};
 use super::failure::{AppFailure, AppResult};
@@ -82,7 +84,10 @@ impl PaperMethod {
         let computed = self
             .work
             .call(move || compute(&own, &pair, &stages, &limits));
-        let computed = computed.await?;
+        let longest = Duration::from_secs(settings.config.run.stage_timeout_s);
+        // The work ends when nobody waits for it any more.
+        let computed = timeout(longest, computed).await;
+        let computed = computed.map_err(|_| AppFailure::refused(too_long(longest)))??;
         let computed = computed.map_err(|error| AppFailure::of(error, &open.dir))?;
         let computed = Arc::new(computed);
         let mut kept = self.lock();
@@ -131,6 +136,18 @@ fn compute(
     Ok(Ok(PaperAlignment {
         metrics: drawn.collect(),
     }))
+}
+
+fn too_long(longest: Duration) -> Sentence {
+    let seconds = longest.as_secs();
+    Sentence::new(
+        format!(
+            "the paper's method was stopped after {seconds} s, the longest time of a stage; a longer one is chosen on the page Settings"
+        ),
+        format!(
+            "phương pháp của bài báo đã bị dừng sau {seconds} giây, thời gian dài nhất của một bước; có thể chọn thời gian dài hơn ở trang Thiết lập"
+        ),
+    )
 }
 
 fn not_comparable() -> Sentence {

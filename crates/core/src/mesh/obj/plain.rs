@@ -91,12 +91,12 @@ impl<'a> PlainReader<'a> {
     /// Reads a line; returns `None` if it is another than [`read`] lists.
     #[inline]
     fn line(&mut self, limits: &MeshLimits) -> Option<()> {
-        let mut text = Cursor(self.rest);
+        let mut text = TextCursor(self.rest);
         text.skip_space();
         self.rest = text.0;
         match text.0 {
-            [b'v', space, rest @ ..] if is_space(*space) => self.vertex(Cursor(rest))?,
-            [b'f', space, rest @ ..] if is_space(*space) => self.face(Cursor(rest), limits)?,
+            [b'v', space, rest @ ..] if is_space(*space) => self.vertex(TextCursor(rest))?,
+            [b'f', space, rest @ ..] if is_space(*space) => self.face(TextCursor(rest), limits)?,
             rest => {
                 if !is_ignored(rest) {
                     return None;
@@ -118,7 +118,7 @@ impl<'a> PlainReader<'a> {
     }
 
     /// Parses three numbers, and skips a weight of 1 or the three or four words of a colour.
-    fn vertex(&mut self, mut text: Cursor<'a>) -> Option<()> {
+    fn vertex(&mut self, mut text: TextCursor<'a>) -> Option<()> {
         let mut position = [0.0; 3];
         for value in &mut position {
             text.skip_space();
@@ -146,7 +146,7 @@ impl<'a> PlainReader<'a> {
 
     /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner. Polygons with
     /// fewer than three corners are only counted. Stops at the first triangle that exceeds the limits.
-    fn face(&mut self, mut text: Cursor<'a>, limits: &MeshLimits) -> Option<()> {
+    fn face(&mut self, mut text: TextCursor<'a>, limits: &MeshLimits) -> Option<()> {
         let before = self.triangles.len();
         let (mut first, mut last, mut highest) = (0, 0, 0);
         for count in polled(0..) {
@@ -174,9 +174,9 @@ impl<'a> PlainReader<'a> {
 }
 
 /// The unread part of a line and what follows it.
-struct Cursor<'a>(&'a [u8]);
+struct TextCursor<'a>(&'a [u8]);
 
-impl Cursor<'_> {
+impl TextCursor<'_> {
     #[inline]
     fn skip_space(&mut self) {
         while let [byte, rest @ ..] = self.0
