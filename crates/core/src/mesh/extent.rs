@@ -7,8 +7,10 @@ use super::format::DetectedFormat;
 use super::missing::is_finite;
 use super::ply::VertexRows;
 use super::robust_bounds::Bounds;
+use super::stated_unit::stated_unit;
 use super::triangle_stream::binary_stl_triangles;
-use super::{stl, text, xyz};
+use super::xyz::SampledPoints;
+use super::{stl, text};
 use crate::domain::LengthUnit;
 use crate::domain::cancel::poll;
 use crate::page_vec::fill;
@@ -27,10 +29,6 @@ pub(super) const MANY: PartSpread = PartSpread {
     parts: 1024,
     bytes: 4 << 10,
 };
-/// Bytes at the beginning of a file in which it may name its unit.
-const UNIT_BYTES: usize = 4096;
-/// Beginnings of lines that may name the unit.
-const COMMENTS: [&[u8]; 5] = [b"#", b"//", b"comment", b"obj_info", b"solid"];
 
 /// Places of a file, evenly spread, from which vertices are read.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +91,8 @@ pub(super) fn sampled(
     })
 }
 
-/// Visits vertices at some places of a file with a length and a name. Returns the unit that the file names.
+/// Visits vertices at some places of a file with a length and a name. Returns the unit that the file names. Visits none if
+/// their places are not known, and leaves out repeated vertices at the origin, which have no position, except in an STL.
 pub(super) fn each_position(
     file: &mut (impl Read + Seek),
     (len, name): (u64, &str),
@@ -114,68 +113,100 @@ pub(super) fn each_position(
         })?;
         return Ok(unit);
     }
-    let of_keyword = |line: &[u8], keyword: &[u8]| {
-        let mut words = text::words(line);
-        let word = words.next()?;
-        let is_vertex = word.eq_ignore_ascii_case(keyword);
-        is_vertex.then(|| text::position(words).ok()).flatten()
-    };
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&head);
+    let lines = TextLines {
+        start: (head.len() - text.len()) as u64,
+        end: len,
+        line_end: if text::is_classic_mac(text) {
+            b'\r'
+        } else {
+            b'\n'
+        },
+    };
+    let mut origins = 0_u64;
+    let mut visit_other = |position: [f64; 3]| {
+        if position == [0.0; 3] {
+            origins += 1;
+        } else {
+            visit(position);
+        }
+    };
     match DetectedFormat::of(text, name)? {
-        // The mark shifts the offsets of rows.
-        DetectedFormat::Ply if text.len() < head.len() => {}
-        DetectedFormat::Ply => ply_parts(file, &head, len, limits, spread, visit)?,
-        DetectedFormat::Obj => each_line(file, [0, len], spread, |line| {
-            of_keyword(line, b"v").into_iter().for_each(&mut *visit);
+        DetectedFormat::Ply => {
+            ply_parts(file, text, lines, limits, spread, &mut visit_other)?;
+        }
+        DetectedFormat::Obj => lines.visit(file, spread, |line| {
+            let position = after_keyword(line, b"v");
+            position.into_iter().for_each(&mut visit_other);
         })?,
-        DetectedFormat::StlAscii => each_line(file, [0, len], spread, |line| {
-            of_keyword(line, b"vertex")
-                .into_iter()
-                .for_each(&mut *visit);
-        })?,
-        DetectedFormat::Xyz => each_part(file, [0, len], 1, spread, |part| {
-            let points = xyz::read(whole_lines(part), limits);
-            let points = points.map(|mesh| mesh.vertices).unwrap_or_default();
-            points.iter().for_each(&mut *visit);
-        })?,
+        DetectedFormat::StlAscii => {
+            lines.visit(file, spread, |line| {
+                let position = after_keyword(line, b"vertex");
+                position.into_iter().for_each(&mut *visit);
+            })?;
+            return Ok(unit);
+        }
+        DetectedFormat::Xyz => {
+            let points = SampledPoints::of(whole_lines(text, lines.line_end, true))?;
+            lines.visit(file, spread, |line| {
+                points.position(line).into_iter().for_each(&mut visit_other);
+            })?;
+        }
         // Its length is not the one that its header implies.
         DetectedFormat::StlBinary => {}
+    }
+    if origins == 1 {
+        visit([0.0; 3]);
     }
     Ok(unit)
 }
 
+/// Returns the position that follows a keyword at the beginning of a line.
+fn after_keyword(line: &[u8], keyword: &[u8]) -> Option<[f64; 3]> {
+    let mut words = text::words(line);
+    let is_vertex = words.next()?.eq_ignore_ascii_case(keyword);
+    is_vertex.then(|| text::position(words).ok()).flatten()
+}
+
+/// Visits vertices of a PLY file, which begins with `head`. `lines` is all of the file behind a byte order mark.
 fn ply_parts(
     file: &mut (impl Read + Seek),
     head: &[u8],
-    len: u64,
+    lines: TextLines,
     limits: &MeshLimits,
     spread: PartSpread,
     visit: &mut dyn FnMut([f64; 3]),
 ) -> Result<(), MeshReadError> {
-    let Some(rows) = VertexRows::of(head, len)? else {
+    let Some(rows) = VertexRows::of(head, lines.end - lines.start)? else {
         return Ok(());
     };
     limits.check_vertices(rows.rows)?;
     let mut add = |row: &[u8]| {
         rows.position(row).into_iter().for_each(&mut *visit);
     };
+    let start = lines.start + rows.start;
     if let Some(size) = rows.size {
-        let end = rows.start + size * rows.rows;
-        each_part(file, [rows.start, end], size, spread, |part| {
+        let end = start + size * rows.rows;
+        each_part(file, [start, end], size, spread, |part| {
             part.chunks_exact(size as usize).for_each(&mut add);
         })?;
         return Ok(());
     }
-    // Faces follow, whose lines also begin with numbers. A row is about as long as the first ones.
+    // A row is about as long as the first ones. Other elements follow.
     let first = head.get(rows.start as usize..).unwrap_or_default();
-    let lines = memchr::memchr_iter(b'\n', first).count().max(1);
-    let about = rows.rows.saturating_mul(first.len() as u64) / lines as u64;
-    let end = rows.start.saturating_add(about / 10 * 9).min(len);
-    each_line(file, [rows.start, end], spread, add)?;
+    let count = memchr::memchr_iter(lines.line_end, first).count().max(1);
+    let about = rows.rows.saturating_mul(first.len() as u64) / count as u64;
+    let end = start.saturating_add(about / 10 * 9).min(lines.end);
+    let rows = TextLines {
+        start,
+        end,
+        ..lines
+    };
+    rows.visit(file, spread, add)?;
     Ok(())
 }
 
-/// Visits parts of the rows between two offsets.
+/// Visits parts of the rows between two offsets. The first part begins at the first one.
 fn each_part(
     file: &mut (impl Read + Seek),
     [start, end]: [u64; 2],
@@ -197,50 +228,45 @@ fn each_part(
     Ok(())
 }
 
-/// Visits lines between two offsets.
-fn each_line(
-    file: &mut (impl Read + Seek),
-    range: [u64; 2],
-    spread: PartSpread,
-    mut visit: impl FnMut(&[u8]),
-) -> io::Result<()> {
-    each_part(file, range, 1, spread, |part| {
-        let lines = whole_lines(part).split(|byte| *byte == b'\n');
-        lines.for_each(|line| visit(line.trim_ascii()));
-    })
+/// Lines between two offsets of a file.
+#[derive(Debug, Clone, Copy)]
+struct TextLines {
+    /// Offset of the first line.
+    start: u64,
+    end: u64,
+    /// Byte that ends a line.
+    line_end: u8,
 }
 
-/// Returns the lines of a part of a text that it has from their beginning to their end.
-fn whole_lines(part: &[u8]) -> &[u8] {
-    let mut ends = (0..part.len()).filter(|at| part[*at] == b'\n');
-    match (ends.next(), ends.next_back()) {
-        (Some(first), Some(last)) => &part[first + 1..last],
-        _ => &[],
+impl TextLines {
+    /// Visits lines at some places.
+    fn visit(
+        self,
+        file: &mut (impl Read + Seek),
+        spread: PartSpread,
+        mut visit: impl FnMut(&[u8]),
+    ) -> io::Result<()> {
+        let mut is_first = true;
+        each_part(file, [self.start, self.end], 1, spread, |part| {
+            let lines = whole_lines(part, self.line_end, std::mem::take(&mut is_first));
+            let lines = lines.split(|byte| *byte == self.line_end);
+            lines.for_each(|line| visit(line.trim_ascii()));
+        })
     }
 }
 
-/// Returns the unit that a comment at the beginning of a file names.
-fn stated_unit(head: &[u8]) -> Option<LengthUnit> {
-    let head = &head[..head.len().min(UNIT_BYTES)];
-    let mut lines = text::lines(head).map(|(_, line)| line);
-    lines.find_map(|line| {
-        let is_comment = COMMENTS.iter().any(|start| line.starts_with(start));
-        is_comment.then(|| unit_of(line)).flatten()
-    })
-}
-
-/// Returns the unit that follows the word `unit` or `units` of a line.
-fn unit_of(line: &[u8]) -> Option<LengthUnit> {
-    let line = String::from_utf8_lossy(line).to_ascii_lowercase();
-    let (_, rest) = line.split_once("unit")?;
-    let mut words = rest.split(|c: char| !c.is_ascii_alphabetic());
-    match words.find(|word| !["", "s", "is", "are", "in"].contains(word))? {
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(LengthUnit::Mm),
-        "cm" | "centimeter" | "centimeters" | "centimetre" | "centimetres" => Some(LengthUnit::Cm),
-        "m" | "meter" | "meters" | "metre" | "metres" => Some(LengthUnit::M),
-        "inch" | "inches" => Some(LengthUnit::In),
-        _ => None,
-    }
+/// Returns the lines of a part of a text that it has from their beginning to their end. Whether its first byte begins a line
+/// is given.
+fn whole_lines(part: &[u8], line_end: u8, begins_line: bool) -> &[u8] {
+    let first = if begins_line {
+        Some(0)
+    } else {
+        memchr::memchr(line_end, part).map(|end| end + 1)
+    };
+    let last = memchr::memrchr(line_end, part);
+    let range = first.zip(last).filter(|(first, last)| first <= last);
+    let lines = range.map(|(first, last)| &part[first..last]);
+    lines.unwrap_or_default()
 }
 
 /// The box around the positions that were seen.
@@ -266,72 +292,4 @@ impl GrowingBox {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::io::Cursor;
-
-    use super::{WHOLE_BYTES, unit_of};
-    use crate::domain::LengthUnit;
-    use crate::mesh::write::MeshFormat;
-    use crate::mesh::{Mesh, MeshLimits, extent};
-
-    /// A wavy sheet of 40 by 30 by at most 4.
-    fn sheet(side: usize) -> Mesh {
-        let at = |k: usize| {
-            let [x, y] = [k % side, k / side].map(|at| at as f64 / (side - 1) as f64);
-            [40.0 * x, 30.0 * y, (9.0 * x).sin() + (7.0 * y).cos()]
-        };
-        let vertices: Vec<[f64; 3]> = (0..side * side).map(at).collect();
-        let corner = |k: usize| [k, k + 1, k + side].map(|at| at as u32);
-        let triangles = (0..side * side - side - 1).map(corner).collect::<Vec<_>>();
-        Mesh {
-            vertices: vertices.into(),
-            triangles: triangles.into(),
-        }
-    }
-
-    #[test]
-    fn the_size_of_long_and_short_files_is_found_in_every_format() {
-        for side in [20, 420] {
-            let mesh = sheet(side);
-            for format in MeshFormat::ALL {
-                let bytes = format.encode(&mesh);
-                let (len, name) = (bytes.len() as u64, format!("a.{}", format.extension()));
-                let limits = &MeshLimits::SUGGESTED;
-                let found = extent(&mut Cursor::new(&bytes), len, &name, limits);
-                let found = found.expect("a mesh");
-                assert_eq!(found.is_exact, len <= WHOLE_BYTES, "{name}");
-                let sides = found.sides.expect("vertices");
-                let usual = [[34.0, 40.01], [24.0, 30.01], [1.5, 4.01]];
-                for (side, [low, high]) in sides.into_iter().zip(usual) {
-                    assert!((low..=high).contains(&side), "{name}: {sides:?}");
-                }
-                assert_eq!(found.longest(), Some(sides[0]), "{name}");
-                // A binary file that is cut shows it by its header.
-                let cut = &bytes[..bytes.len() / 3];
-                let found = extent(&mut Cursor::new(cut), cut.len() as u64, &name, limits);
-                let is_text = bytes.is_ascii();
-                assert!(found.is_err() || is_text, "{name} cut");
-            }
-        }
-    }
-
-    #[test]
-    fn a_unit_is_read_in_a_comment() {
-        for (line, unit) in [
-            ("# units: mm", Some(LengthUnit::Mm)),
-            ("comment Unit = Meters", Some(LengthUnit::M)),
-            ("# all units are in inches", Some(LengthUnit::In)),
-            ("solid plate UNITS=cm", Some(LengthUnit::Cm)),
-            ("# unit vectors", None),
-            ("# mm", None),
-        ] {
-            assert_eq!(unit_of(line.as_bytes()), unit, "{line}");
-        }
-        let xyz = b"# units: m\n0 0 0\n0.04 0.03 0\n0 0.01 0\n";
-        let limits = &MeshLimits::SUGGESTED;
-        let found = extent(&mut Cursor::new(xyz), xyz.len() as u64, "a.xyz", limits);
-        let found = found.expect("points");
-        assert_eq!(found.unit, Some(LengthUnit::M));
-        assert_eq!(found.sides, Some([0.04, 0.03, 0.0]));
-    }
-}
+mod tests;

@@ -10,6 +10,7 @@ mod missing;
 mod obj;
 mod ply;
 pub mod robust_bounds;
+mod stated_unit;
 mod stl;
 mod text;
 mod triangle_mesh;

@@ -49,6 +49,34 @@ fn points(
     Ok(points)
 }
 
+/// The columns of a long file, of which only some lines are read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SampledPoints(PointLayout);
+
+impl SampledPoints {
+    /// Determines the columns by whole lines at the beginning of a file.
+    ///
+    /// # Errors
+    /// Returns an error if the title has more columns than the first point.
+    pub(super) fn of(head: &[u8]) -> Result<Self, MeshError> {
+        let layout = PointLayout::of(head)?;
+        let numbered = layout.numbered().filter(|_| {
+            let lines = text::lines(head).filter(|(line, _)| *line >= layout.first_point);
+            let points: Vec<_> = lines
+                .filter_map(|(_, line)| layout.position(line).ok())
+                .collect();
+            are_numbers(&points)
+        });
+        Ok(Self(numbered.unwrap_or(layout)))
+    }
+
+    /// Returns the position in a line. `None` if it has none, such as a title.
+    pub(super) fn position(&self, line: &[u8]) -> Option<[f64; 3]> {
+        let is_point = !is_comment(line);
+        is_point.then(|| self.0.position(line).ok()).flatten()
+    }
+}
+
 /// Returns whether the first coordinates are whole and increasing numbers, as no scan has them.
 fn are_numbers(points: &[[f64; 3]]) -> bool {
     let is_number = |pair: &[[f64; 3]]| pair[0][0] < pair[1][0] && pair[1][0].fract() == 0.0;

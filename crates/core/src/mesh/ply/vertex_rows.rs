@@ -14,6 +14,8 @@ pub(in crate::mesh) struct VertexRows {
     /// Bytes of a row; `None` in text.
     pub(in crate::mesh) size: Option<u64>,
     encoding: PlyEncoding,
+    /// Number of properties, which is that of the words of a row in text.
+    properties: usize,
     /// Columns of x, y and z: offsets in bytes, or in text the numbers of words before them.
     columns: [(usize, PlyScalar); 3],
 }
@@ -40,6 +42,7 @@ impl VertexRows {
                     rows: element.rows,
                     size: (!is_text && size > 0).then_some(size),
                     encoding,
+                    properties: element.properties.len(),
                     columns: [x, y, z],
                 };
                 return rows.within(len).map(Some);
@@ -67,16 +70,24 @@ impl VertexRows {
         }
     }
 
-    /// Returns the position in a row, without line end in text. `None` if it is not three numbers.
+    /// Returns the position in a row, without line end in text. `None` if it is not three numbers, or if a line of text may be
+    /// that of a face.
     pub(in crate::mesh) fn position(&self, row: &[u8]) -> Option<[f64; 3]> {
         let mut out = [0.0; 3];
+        if self.encoding == PlyEncoding::Ascii {
+            let words: Vec<&[u8]> = text::words(row).take(self.properties + 1).collect();
+            // A face begins with the number of the words that follow.
+            let is_face = || text::parse(words[0]) == Some(words.len() - 1);
+            if words.len() != self.properties || is_face() {
+                return None;
+            }
+            for (value, (at, _)) in out.iter_mut().zip(self.columns) {
+                *value = text::number(words.get(at)?)?;
+            }
+            return Some(out);
+        }
         for (value, (at, scalar)) in out.iter_mut().zip(self.columns) {
-            *value = match self.encoding {
-                PlyEncoding::Ascii => text::number(text::words(row).nth(at)?)?,
-                PlyEncoding::LittleEndian | PlyEncoding::BigEndian => {
-                    number(scalar, row.get(at..)?, self.encoding)?
-                }
-            };
+            *value = number(scalar, row.get(at..)?, self.encoding)?;
         }
         Some(out)
     }
@@ -93,26 +104,21 @@ fn column(element: &PlyElement, name: &str, is_text: bool) -> Option<(usize, Ply
     Some((if is_text { at } else { bytes }, scalar))
 }
 
-/// Returns the float at the beginning of some bytes. Coordinates that are whole numbers are not read.
+/// Returns the number at the beginning of some bytes.
 fn number(scalar: PlyScalar, bytes: &[u8], encoding: PlyEncoding) -> Option<f64> {
-    let is_big_endian = encoding == PlyEncoding::BigEndian;
-    match scalar {
-        PlyScalar::F32 => {
-            let bytes = *bytes.first_chunk()?;
-            Some(f64::from(if is_big_endian {
-                f32::from_be_bytes(bytes)
-            } else {
-                f32::from_le_bytes(bytes)
-            }))
-        }
-        PlyScalar::F64 => {
-            let bytes = *bytes.first_chunk()?;
-            Some(if is_big_endian {
-                f64::from_be_bytes(bytes)
-            } else {
-                f64::from_le_bytes(bytes)
-            })
-        }
-        _ => None,
+    let mut field = [0; 8];
+    let used = &mut field[..scalar.size()];
+    used.copy_from_slice(bytes.get(..used.len())?);
+    if encoding == PlyEncoding::BigEndian {
+        used.reverse();
     }
+    let bits = u64::from_le_bytes(field);
+    Some(match scalar {
+        PlyScalar::I8 => f64::from(bits as i8),
+        PlyScalar::I16 => f64::from(bits as i16),
+        PlyScalar::I32 => f64::from(bits as i32),
+        PlyScalar::U8 | PlyScalar::U16 | PlyScalar::U32 => bits as f64,
+        PlyScalar::F32 => f64::from(f32::from_bits(bits as u32)),
+        PlyScalar::F64 => f64::from_bits(bits),
+    })
 }
