@@ -3,6 +3,7 @@
 use super::fax::FaxCoding;
 use super::photometric::{AlphaSample, Photometric};
 use super::tag_numbers::{common, number, refuse, values};
+use crate::domain::cancel::polled;
 use crate::raster::decode::error::DecodeError;
 use crate::raster::decode::limits::ImageLimits;
 use crate::raster::decode::tags::{TagDirectory, TagValues};
@@ -149,6 +150,16 @@ impl<'b> TiffLayout<'b> {
     pub(super) const fn chunk_counts(&self) -> [usize; 2] {
         let [width, height] = self.chunk;
         [self.width.div_ceil(width), self.height.div_ceil(height)]
+    }
+
+    /// Returns where the strip or tile that is stored last ends, if its place can be read.
+    pub(super) fn end(&self) -> Option<u64> {
+        let [across, down] = self.chunk_counts();
+        let places = polled(0..across * down * self.planes);
+        let places = places.map(|at| self.offsets.get(at).map(|offset| (offset, at)));
+        let (offset, at) = places.max().flatten()?;
+        let bytes = self.byte_counts.and_then(|counts| counts.get(at));
+        Some(offset.saturating_add(bytes.unwrap_or(1)))
     }
 
     /// Checks the memory for all strips or tiles, which may be larger than the image.

@@ -73,10 +73,23 @@ pub(super) fn pixel_count(file: &dyn TagSource) -> Option<u64> {
     Some(pages::pixel_count(&print.page))
 }
 
-/// Returns width and height of the print of a TIFF file, or `None` if its tags cannot be read.
-pub(super) fn size(file: &dyn TagSource) -> Option<[u32; 2]> {
-    let print = pages::find_print_page(file).ok()?;
-    pages::size(&print.page)
+/// Returns width and height of the stored print of a TIFF file of `len` bytes, and its EXIF orientation, by its tags.
+///
+/// # Errors
+/// Returns an error if there is no single print, or if it is too large, stored in a way that is not read, or if a strip or tile
+/// ends behind the end of the file.
+pub(super) fn stored_size(
+    file: &dyn TagSource,
+    len: u64,
+    limits: &ImageLimits,
+) -> Result<([u32; 2], Option<u64>), DecodeError> {
+    let print = pages::find_print_page(file)?;
+    let layout = TiffLayout::read(&print.page, limits)?;
+    if layout.end().is_none_or(|end| end > len) {
+        return Err(DecodeError::Truncated(FileKind::Tiff));
+    }
+    let size = [layout.width, layout.height].map(|side| side as u32);
+    Ok((size, print.inherited(ORIENTATION)))
 }
 
 fn pixels(layout: &TiffLayout<'_>, file: &[u8]) -> Result<Grid<[u16; 3]>, DecodeError> {

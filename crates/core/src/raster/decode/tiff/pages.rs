@@ -57,12 +57,6 @@ pub(super) fn pixel_count(page: &TagDirectory<'_>) -> u64 {
     width.saturating_mul(height)
 }
 
-/// Returns width and height of a page.
-pub(super) fn size(page: &TagDirectory<'_>) -> Option<[u32; 2]> {
-    let side = |tag| page.number(tag).and_then(|side| u32::try_from(side).ok());
-    Some([side(WIDTH)?, side(HEIGHT)?])
-}
-
 /// The pages that are found so far.
 #[derive(Default)]
 struct FoundPages<'b> {
