@@ -2,7 +2,7 @@
 
 use crate::pictures::{Rgb, VERMILLION, mark_edges, resized, shaded};
 use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
-use mocban_core::raster::{Grid, PrintImage};
+use mocban_core::raster::{Grid, PrintImage, reduce};
 
 /// Highest level of a height.
 const LEVELS: f64 = 65_000.0;
@@ -16,7 +16,17 @@ pub fn page_with_boxes(page: &PrintImage, boxes: &[[f64; 4]], longest: usize) ->
     let size = [page.rgb.width().max(1), page.rgb.height().max(1)];
     let scale = (longest as f64 / size[0].max(size[1]) as f64).min(1.0);
     let [width, height] = size.map(|side| ((side as f64 * scale).round() as usize).max(1));
-    let mut picture = resized(&page.to_rgb8(), width, height);
+    // Fewer pixels are converted if those of a large page are reduced before.
+    let times = (0.5 / scale).floor() as u32;
+    let mut picture = if times > 1 {
+        resized(
+            &PrintImage::from(reduce(&page.rgb, times)).to_rgb8(),
+            width,
+            height,
+        )
+    } else {
+        resized(&page.to_rgb8(), width, height)
+    };
     // Edges are between pixels, whose centres have whole coordinates.
     let edges = |bounds: &[f64; 4]| bounds.map(|edge| (edge + 0.5) * scale);
     let boxes: Vec<[f64; 4]> = boxes.iter().map(edges).collect();
@@ -103,6 +113,9 @@ mod tests {
         assert_eq!((picture.width(), picture.height()), (200, 100));
         assert_eq!(picture.at(50, 25), VERMILLION);
         assert_eq!(picture.at(75, 50), [255; 3], "inside");
+        let small = page_with_boxes(&page, &[[99.5, 49.5, 199.5, 149.5]], 50);
+        assert_eq!((small.width(), small.height()), (50, 25));
+        assert_eq!(small.at(13, 10), VERMILLION);
         let whole = page_with_boxes(&page, &[], 1000);
         assert_eq!((whole.width(), whole.height()), (400, 200), "never larger");
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use mocban_align::scan_size::{TYPICAL_BLOCK_MM, TYPICAL_CHARACTER_MM, nearest_unit};
 use mocban_core::domain::LengthUnit;
 use mocban_core::mesh::{self, MeshExtent, MeshLimits};
-use mocban_core::raster::{ImageLimits, PrintImage, decode, header_size};
+use mocban_core::raster::{DecodeError, ImageLimits, PrintImage, decode, header_size};
 use mocban_lists::labels::{self, Labels, MAX_BYTES, PageFile};
 use mocban_store::{open_regular, read_up_to};
 
@@ -84,25 +84,37 @@ pub fn scan_extent(path: &Path, limits: &MeshLimits) -> Result<MeshExtent, Strin
     mesh::extent(&mut file, meta.len(), &name, limits).map_err(|error| error.to_string())
 }
 
-/// Returns width and height of an image in pixels, by the header of its file.
+/// Returns width and height of an upright image in pixels, by the header of its file. Decodes a file that may be cut.
 ///
 /// # Errors
 /// Returns the reason if the file cannot be used.
 pub fn image_size(path: &Path, limits: &ImageLimits) -> Result<[u32; 2], String> {
     let (file, meta) = open_regular(path).map_err(|error| error.to_string())?;
-    header_size(BufReader::new(file), meta.len(), limits).map_err(|error| error.to_string())
+    match header_size(BufReader::new(file), meta.len(), limits) {
+        // Some programs leave out the end of a file behind the last pixel.
+        Err(DecodeError::Truncated(_)) => {
+            let image = page_image(path, limits)?;
+            Ok([image.rgb.width(), image.rgb.height()].map(|side| side as u32))
+        }
+        size => size.map_err(|error| error.to_string()),
+    }
 }
 
-/// Returns vertices of a scan: all of a short file, and some of a long one, spread over the file.
+/// Returns vertices of a scan for a picture, relative to one of them: all of a short file, and some of a long one, spread over
+/// the file. Leaves out vertices without a position, and those at the origin.
 ///
 /// # Errors
 /// Returns the reason if the file cannot be used.
 pub fn scan_points(path: &Path, limits: &MeshLimits) -> Result<Vec<[f32; 3]>, String> {
     let (mut file, meta) = open_regular(path).map_err(|error| error.to_string())?;
     let (name, mut points) = (path.to_string_lossy(), Vec::new());
+    let mut first = None;
     let mut add = |point: [f64; 3]| {
-        if points.len() < MAX_POINTS {
-            points.push(point.map(|value| value as f32));
+        let is_position = point != [0.0; 3] && point.iter().all(|value| value.is_finite());
+        if is_position && points.len() < MAX_POINTS {
+            // Coordinates of maps are too large for 32 bits.
+            let origin = *first.get_or_insert(point);
+            points.push([0, 1, 2].map(|axis| (point[axis] - origin[axis]) as f32));
         }
     };
     let read = mesh::visit_some_vertices(&mut file, meta.len(), &name, limits, &mut add);
@@ -120,41 +132,33 @@ pub fn page_image(path: &Path, limits: &ImageLimits) -> Result<PrintImage, Strin
     decode(&bytes, limits).map_err(|error| error.to_string())
 }
 
-/// Reads the boxes that labels have for a page of a size in pixels. A page that is stored turned may have both sizes.
+/// Reads the boxes that labels have for a page, by the name that a list gives it, and its upright size in pixels.
 ///
 /// # Errors
 /// Returns the reason if the file cannot be used, or has no boxes for the page.
-pub fn page_labels(file: &Path, page: &Path, size: [u32; 2]) -> Result<Labels, String> {
+pub fn page_labels(file: &Path, page: &Path, [width, height]: [u32; 2]) -> Result<Labels, String> {
     let (opened, _) = open_regular(file).map_err(|error| error.to_string())?;
-    let bytes = read_up_to(opened, MAX_BYTES as u64).map_err(|error| error.to_string())?;
-    let bytes_of_page = std::fs::metadata(page).map_or(0, |meta| meta.len());
-    let shown = |path: &Path| {
-        path.file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
+    let content = read_up_to(opened, MAX_BYTES as u64).map_err(|error| error.to_string())?;
+    let bytes = std::fs::metadata(page).map_or(0, |meta| meta.len());
+    let [file, name] = [file, page].map(|path| {
+        let name = path.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    });
+    let page = PageFile {
+        name: &name,
+        bytes,
+        width,
+        height,
     };
-    let (file, page) = (shown(file), shown(page));
-    let of = |[width, height]: [u32; 2]| {
-        let page = PageFile {
-            name: &page,
-            bytes: bytes_of_page,
-            width,
-            height,
-        };
-        labels::read(&bytes, &file, &page)
-    };
-    let [width, height] = size;
-    let read = of(size).or_else(|error| of([height, width]).map_err(|_turned| error));
-    read.map_err(|error| error.to_string())
+    labels::read(&content, &file, &page).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ScanKind, UnitOrigin, image_size, scan_extent};
+    use super::{ScanKind, UnitOrigin, image_size, scan_extent, scan_points};
     use mocban_core::domain::LengthUnit;
     use mocban_core::mesh::{MeshExtent, MeshLimits};
-    use mocban_core::raster::ImageLimits;
+    use mocban_core::raster::{Grid, ImageLimits, jpeg_rgb8};
 
     fn of_length(longest: f64) -> MeshExtent {
         MeshExtent {
@@ -211,5 +215,30 @@ mod tests {
         assert!(reason(&cut)[0].contains("truncated"));
         let none = scan_extent(&dir.path().join("none"), &MeshLimits::SUGGESTED);
         assert!(none.expect_err("none").contains("not there"));
+    }
+
+    #[test]
+    fn an_image_without_the_mark_of_its_end_is_used_if_all_pixels_are_there() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("1.jpg");
+        let size = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).expect("written");
+            image_size(&path, &ImageLimits::SUGGESTED)
+        };
+        let picture = Grid::from_fn(120, 80, |x, y| [x as u8, y as u8, 50]);
+        let whole = jpeg_rgb8(&picture, 85);
+        assert_eq!(size(&whole[..whole.len() - 2]), Ok([120, 80]));
+        let cut = size(&whole[..whole.len() / 2]).expect_err("cut");
+        assert!(cut.contains("truncated"), "{cut}");
+    }
+
+    #[test]
+    fn points_far_from_the_origin_keep_their_distances() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("map.xyz");
+        let text = "0 0 0\n0 0 0\n500000.25 2300000.5 7\n500000.5 2300000.625 8\n";
+        std::fs::write(&path, text).expect("written");
+        let points = scan_points(&path, &MeshLimits::SUGGESTED).expect("points");
+        assert_eq!(points, [[0.0; 3], [0.25, 0.125, 1.0]]);
     }
 }
