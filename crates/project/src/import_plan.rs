@@ -8,6 +8,7 @@ use crate::import_pairs::{PairSource, listing};
 use crate::location::Location;
 use crate::missing_files::MissingFiles;
 use crate::pair_choices::PairChoices;
+use mocban_core::domain::cancel::poll;
 use mocban_core::domain::{ContentHash, LengthUnit, PairName};
 use mocban_store::Project;
 
@@ -52,7 +53,7 @@ pub struct ImportPlan {
 }
 
 /// Reads a list or folders and looks at the files, as an import into a project does before it stores the pairs. Folders
-/// may have no pair. `shown` has the positions of the pairs that are returned.
+/// may have no pair. `shown` has the positions of the pairs that are returned. Looking at the files polls for a cancellation.
 ///
 /// # Errors
 /// Returns an error if an import would refuse the list or the folders.
@@ -68,6 +69,7 @@ pub fn plan_import(
     let (mut pairs, mut planned) = (0, Vec::new());
     let mut missing = MissingFiles::default();
     let hash = listing.rows(&project, |row, lines| {
+        poll();
         for line in &lines {
             missing.add(line.clone());
         }

@@ -1,4 +1,4 @@
-//! Size and encoding of the pictures of a pair.
+//! Size and encoding of the pictures of a pair, and of files before an import.
 
 use mocban_core::raster::{Grid, jpeg_rgb8};
 

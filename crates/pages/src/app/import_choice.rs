@@ -213,6 +213,35 @@ impl ImportChoice {
         new_project_dir(&self.project, folder)
     }
 
+    /// Returns the folder of the project, or a new one if its name is not valid.
+    pub(super) fn dir_or_new(&self, folder: &Path) -> PathBuf {
+        self.dir(folder).unwrap_or_else(|_| folder.join("new"))
+    }
+
+    /// Returns what decides about a plan that begins at a position, beside the files.
+    fn plan_key(&self, dir: &Path, start: u64) -> String {
+        let source = [
+            &self.list,
+            &self.meshes,
+            &self.prints,
+            &self.matches,
+            &self.whole_block,
+        ];
+        format!("{:?}", (dir, start, source, self.columns()))
+    }
+
+    /// Returns the plan that a preview has kept for these choices, and the place of a position in it.
+    pub(super) fn kept_plan(
+        &self,
+        folder: &Path,
+        from: u64,
+        plans: &PlanCache,
+    ) -> Option<(Arc<ImportPlan>, usize)> {
+        let start = kept_start(from);
+        let plan = plans.kept(&self.plan_key(&self.dir_or_new(folder), start))?;
+        Some((plan, (from - start) as usize))
+    }
+
     /// Returns what an import would store; `None` if not enough is chosen. Pairs are shown from the position `from`, or from
     /// the last page if there are fewer.
     pub(super) fn preview(
@@ -234,11 +263,10 @@ impl ImportChoice {
                     let table = bytes.as_ref().filter(|bytes| !is_jsonl(file, bytes));
                     head = table.and_then(|bytes| read_head(bytes, &choices.columns, SHOWN_ROWS));
                 }
-                let dir = self.dir(folder).unwrap_or_else(|_| folder.join("new"));
-                let is_kept = from < KEPT_PAIRS;
-                let start = if is_kept { 0 } else { from };
+                let dir = self.dir_or_new(folder);
+                let start = kept_start(from);
                 let shown = start..start.saturating_add(KEPT_PAIRS);
-                let key = format!("{} {start} {}", dir.display(), self.matches);
+                let key = self.plan_key(&dir, start);
                 let location = Location::new(dir);
                 let plan = plans.plan(source, &key, |source| {
                     plan_import(source, &choices, &location, &shown)
@@ -260,6 +288,11 @@ impl ImportChoice {
             from,
         })
     }
+}
+
+/// Returns the position of the first pair of the plan that is kept for a position.
+const fn kept_start(from: u64) -> u64 {
+    if from < KEPT_PAIRS { 0 } else { from }
 }
 
 /// Returns the blocks of a source, as their list has them.

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::components::{grouped, unit_name};
 use super::failure::AppResult;
 use super::import_choice::{ImportChoice, SHOWN_PAIRS};
-use super::import_heads::{FileHeads, LookedAtFiles, PlannedFiles, look};
+use super::import_heads::{FileHeads, LookedAtFiles, PlannedFiles, UnreadFile, look};
 use super::import_pictures::pictures_part;
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -25,8 +25,8 @@ use mocban_project::file_heads::{ScanKind, ScanUnit, UnitOrigin};
 const MOST: usize = 400;
 /// How long files are looked at for one request of the script; the file that is read then is finished.
 const STEP_TIME: Duration = Duration::from_millis(500);
-/// How long the files of the shown pairs may take.
-const SHOWN_TIME: Duration = Duration::from_mins(1);
+/// How long files of the shown pairs are looked at; the file that is read then is finished.
+const SHOWN_TIME: Duration = Duration::from_secs(3);
 
 /// Returns the places of the page that are filled from its files: a table, and the files that cannot be used.
 pub(super) fn files_part(visit: &Visit) -> Markup {
@@ -38,10 +38,13 @@ pub(super) fn files_part(visit: &Visit) -> Markup {
         }
         div #file-problems data-address={ (visit.root) "import/problems" (query) } {
             p.muted role="status" {
-                (visit.t("Pairs whose files were looked at", "Số cặp đã xem tệp")) ": " span #looked-at { "0" }
+                (visit.t("Pairs whose files were looked at", "Số cặp đã kiểm tra tệp")) ": " span #looked-at { "0" }
                 " · " (visit.t("files that cannot be used", "tệp không dùng được")) ": " b #unusable { "0" }
             }
             ul #unusable-files {}
+            p #more-unusable hidden { (visit.t("More files that cannot be used", "Số tệp không dùng được khác")) ": " b {} }
+            p #other-pairs hidden { (visit.t("The files of the other pairs are checked by the run.", "Tệp của các cặp khác được kiểm tra khi căn chỉnh.")) }
+            p.notice.warn #stopped-looking hidden role="alert" { (visit.t("Stopped before all files were looked at: reload the page to start again.", "Đã dừng trước khi kiểm tra hết các tệp: hãy tải lại trang để làm lại.")) }
         }
         script type="module" src={ (visit.root) "assets/import-files.js" } {}
     }
@@ -55,13 +58,16 @@ pub(super) async fn part(
     let chosen = ImportChoice::of(&visit.query);
     let from: u64 = visit.query.parsed("from").unwrap_or_default();
     let has_list = !chosen.list.is_empty();
-    let LookedAtFiles { heads, .. } =
+    let LookedAtFiles { heads, asked, .. } =
         look(&state, chosen, from, SHOWN_PAIRS as usize, SHOWN_TIME).await?;
     let units: Vec<Option<ScanUnit>> = heads.iter().map(unit).collect();
     let part = html! {
         @if !heads.is_empty() { (table(&visit, &heads, &units)) }
+        @if heads.len() < asked {
+            p.muted { (visit.t("Reading takes long, so the table has only the first of the shown pairs.", "Việc đọc mất nhiều thời gian nên bảng chỉ có các cặp đầu tiên được hiện.")) }
+        }
         (pictures_part(&visit, &heads, from))
-        @if let Some(guess) = common_guess(&units).filter(|_| !has_list) { (guess_part(&visit, guess)) }
+        @if let Some(unit) = common_unit(&units).filter(|_| !has_list) { (unit_part(&visit, unit, &units)) }
     };
     Ok(Html(part.into_string()))
 }
@@ -73,30 +79,34 @@ pub(super) async fn problems(
 ) -> AppResult<Json<Value>> {
     let chosen = ImportChoice::of(&visit.query);
     let after: u64 = visit.query.parsed("after").unwrap_or_default();
-    let LookedAtFiles { heads, total } = look(&state, chosen, after, MOST, STEP_TIME).await?;
+    let LookedAtFiles {
+        heads, most, total, ..
+    } = look(&state, chosen, after, MOST, STEP_TIME).await?;
     let next = after + heads.len() as u64;
     let problems: Vec<String> = heads
         .iter()
-        .flat_map(refused)
+        .flat_map(unusable)
         .map(|(files, why)| {
             let why = why.text(visit.language);
             one_line(&format!("{}: {why}", files.name)).into_owned()
         })
         .collect();
-    let is_over = heads.is_empty() || next >= total;
+    let is_over = heads.is_empty() || next >= most;
     Ok(Json(json!({
         "problems": problems,
-        "looked_at": next.min(total),
+        "looked_at": next.min(most),
+        "total": total,
         "next": (!is_over).then_some(next),
     })))
 }
 
 /// Returns why files of a pair cannot be used.
-fn refused(heads: &FileHeads) -> impl Iterator<Item = (&PlannedFiles, &Sentence)> {
+fn unusable(heads: &FileHeads) -> impl Iterator<Item = (&PlannedFiles, &Sentence)> {
     let whys = [heads.scan.as_ref().err(), heads.print.as_ref().err()];
-    whys.into_iter()
-        .flatten()
-        .map(move |why| (&heads.files, why))
+    whys.into_iter().flatten().filter_map(move |why| match why {
+        UnreadFile::Unusable(why) => Some((&heads.files, why)),
+        UnreadFile::Outside => None,
+    })
 }
 
 fn unit(heads: &FileHeads) -> Option<ScanUnit> {
@@ -104,19 +114,22 @@ fn unit(heads: &FileHeads) -> Option<ScanUnit> {
     heads.files.kind.unit(extent, heads.files.unit)
 }
 
-/// Returns the unit that is guessed for all scans, if it is the same one.
-fn common_guess(units: &[Option<ScanUnit>]) -> Option<LengthUnit> {
+/// Returns the unit that all scans have that are known, if none is given.
+fn common_unit(units: &[Option<ScanUnit>]) -> Option<LengthUnit> {
     let mut known = units.iter().flatten();
     let first = known.next()?;
-    let is_same = |unit: &ScanUnit| unit.origin == UnitOrigin::Guess && unit.unit == first.unit;
+    let is_same = |unit: &ScanUnit| unit.origin != UnitOrigin::Given && unit.unit == first.unit;
     (is_same(first) && known.all(is_same)).then_some(first.unit)
 }
 
-fn guess_part(visit: &Visit, unit: LengthUnit) -> Markup {
+/// Offers a unit for all pairs of the import, with the number of scans that show it.
+fn unit_part(visit: &Visit, unit: LengthUnit, units: &[Option<ScanUnit>]) -> Markup {
     let query = visit.query.with("unit", unit.name()).text();
+    let [known, shown] = [units.iter().flatten().count(), units.len()].map(|n| grouped(n as u64));
     html! {
         p.row {
-            span { (visit.t("The scans are probably in", "Bản quét có lẽ có đơn vị")) " " b { (unit_name(visit, unit)) } "." }
+            span { (visit.t("The scans are probably in", "Đơn vị của bản quét có lẽ là")) " " b { (unit_name(visit, unit)) } ": "
+                (known) " / " (shown) " " (visit.t("of the scans shown here. The button sets it for all pairs.", "bản quét ở đây. Nút này đặt đơn vị cho mọi cặp.")) }
             a.button #use-unit href={ "import" (query) } { (visit.t("Use this unit", "Dùng đơn vị này")) }
         }
     }
@@ -145,24 +158,32 @@ fn table(visit: &Visit, heads: &[FileHeads], units: &[Option<ScanUnit>]) -> Mark
                         td.muted { (why_unit(visit, one.files.kind, extent, *unit)) }
                     },
                     Err(why) => {
-                        td.bad { (one_line(why.text(visit.language))) }
+                        (unread(visit, why))
                         td {}
                     },
                 }
                 @match &one.print {
                     Ok([width, height]) => td { (grouped(u64::from(*width))) " × " (grouped(u64::from(*height))) " px" },
-                    Err(why) => td.bad { (one_line(why.text(visit.language))) },
+                    Err(why) => (unread(visit, why)),
                 }
             } } }
         } }
     }
 }
 
+/// Returns a cell that says why nothing is known of a file.
+fn unread(visit: &Visit, why: &UnreadFile) -> Markup {
+    let sentence = why.sentence();
+    let said = one_line(sentence.text(visit.language));
+    let is_bad = matches!(why, UnreadFile::Unusable(_));
+    html! { td.bad[is_bad].muted[!is_bad] { (said) } }
+}
+
 /// Returns the lengths of a scan along its axes in mm, or in its own unit if that is not known.
 fn size(visit: &Visit, extent: &MeshExtent, unit: Option<ScanUnit>) -> String {
     let Some(sides) = extent.sides else {
         return visit
-            .t("no position found", "không tìm thấy vị trí nào")
+            .t("not known before the run", "chưa biết trước khi căn chỉnh")
             .to_owned();
     };
     let mm = unit.map(|unit| unit.unit.mm());
@@ -211,14 +232,20 @@ fn why_unit(visit: &Visit, kind: ScanKind, extent: &MeshExtent, unit: Option<Sca
     let name = unit_name(visit, unit);
     let said = match origin {
         UnitOrigin::Given => format!("{name}, {}", visit.t("as chosen", "như đã chọn")),
-        UnitOrigin::File => format!("{name}, {}", visit.t("as the file says", "theo tệp")),
+        UnitOrigin::File => format!(
+            "{name}, {}",
+            visit.t(
+                "as the file says; not used unless it is chosen",
+                "theo tệp; chỉ được dùng nếu bạn chọn",
+            )
+        ),
         UnitOrigin::Guess => format!("{} {name}: {usual}", visit.t("probably", "có lẽ là")),
     };
     match likelier {
         None => said,
         Some(other) => format!(
             "{said}; {} {}: {usual}",
-            visit.t("rather", "đúng hơn có lẽ là"),
+            visit.t("rather", "nhiều khả năng là"),
             unit_name(visit, other)
         ),
     }
@@ -226,7 +253,7 @@ fn why_unit(visit: &Visit, kind: ScanKind, extent: &MeshExtent, unit: Option<Sca
 
 #[cfg(test)]
 mod tests {
-    use super::{common_guess, size, why_unit};
+    use super::{common_unit, size, why_unit};
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_core::domain::LengthUnit;
@@ -260,8 +287,20 @@ mod tests {
             ..SCAN
         };
         assert_eq!(size(&vietnamese, &parts, None), "khoảng 42,0 × 30,0 × 4,25");
-        assert_eq!(common_guess(&[guess, None]), Some(LengthUnit::Mm));
-        assert_eq!(common_guess(&[guess, wrong]), None);
-        assert_eq!(common_guess(&[None]), None);
+        assert_eq!(common_unit(&[guess, None]), Some(LengthUnit::Mm));
+        assert_eq!(common_unit(&[guess, wrong]), None);
+        assert_eq!(common_unit(&[None]), None);
+        let named = MeshExtent {
+            unit: Some(LengthUnit::Cm),
+            ..SCAN
+        };
+        let named = kind.unit(&named, None);
+        assert_eq!(common_unit(&[named, named]), Some(LengthUnit::Cm));
+        assert_eq!(common_unit(&[named, guess]), None);
+        let said = why_unit(&english, kind, &SCAN, named);
+        assert!(
+            said.starts_with("cm, as the file says; not used unless it is chosen"),
+            "{said}"
+        );
     }
 }

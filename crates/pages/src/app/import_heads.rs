@@ -4,21 +4,25 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::failure::{AppFailure, AppResult};
+use tokio::task::spawn_blocking;
+
+use super::failure::AppResult;
 use super::folder_picker::PickerRoots;
 use super::import_choice::{ImportChoice, Planned, SHOWN_PAIRS};
 use super::plan_cache::KEPT_PAIRS;
 use super::sentence::Sentence;
 use super::state::AppState;
-use crate::on_thread::read_on_thread;
 use mocban_core::InputLimits;
 use mocban_core::domain::LengthUnit;
+use mocban_core::domain::cancel::{CancelGuard, CancelToken, poll};
 use mocban_core::mesh::MeshExtent;
-use mocban_lists::labels::LabelFormat;
+use mocban_lists::labels::{LabelFormat, Labels};
 use mocban_project::ProjectError;
+use mocban_project::error::TaskStopped;
 use mocban_project::file_heads::{ScanKind, image_size, page_labels, scan_extent};
 use mocban_project::input_paths::find_on_disk;
 use mocban_project::location::Location;
+use mocban_store::Project;
 
 /// The files of a pair or of a whole block that would be imported.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,11 +40,38 @@ pub(super) struct PlannedFiles {
 #[derive(Debug)]
 pub(super) struct FileHeads {
     pub(super) files: PlannedFiles,
-    pub(super) scan: Result<MeshExtent, Sentence>,
+    pub(super) scan: Result<MeshExtent, UnreadFile>,
     /// Width and height in pixels.
-    pub(super) print: Result<[u32; 2], Sentence>,
+    pub(super) print: Result<[u32; 2], UnreadFile>,
     /// The number of boxes of the labels, and their format. `None` without labels, or if the page cannot be used.
-    pub(super) labels: Option<Result<(u64, LabelFormat), Sentence>>,
+    pub(super) labels: Option<Result<(u64, LabelFormat), UnreadFile>>,
+}
+
+/// Why nothing is known of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum UnreadFile {
+    /// It cannot be used.
+    Unusable(Sentence),
+    /// It is outside the folders of the user and of the app, where only an import and a run look.
+    Outside,
+}
+
+impl UnreadFile {
+    /// Makes a reason of a message of the program.
+    pub(super) fn of_program(why: &str) -> Self {
+        Self::Unusable(Sentence::of_program(why))
+    }
+
+    /// Returns the reason.
+    pub(super) fn sentence(&self) -> Sentence {
+        match self {
+            Self::Unusable(why) => why.clone(),
+            Self::Outside => Sentence::new(
+                "not looked at: it is outside your folders and disks",
+                "không kiểm tra: tệp nằm ngoài các thư mục và ổ đĩa của bạn",
+            ),
+        }
+    }
 }
 
 /// Some files of an import.
@@ -48,6 +79,8 @@ pub(super) struct FileHeads {
 pub(super) struct PlannedPart {
     pub(super) files: Vec<PlannedFiles>,
     /// Number of pairs or blocks whose files can be looked at.
+    pub(super) most: u64,
+    /// Number of all pairs or blocks.
     pub(super) total: u64,
 }
 
@@ -56,18 +89,25 @@ impl ImportChoice {
     fn planned_files(
         &self,
         state: &AppState,
-        roots: &PickerRoots,
+        places: &FilePlaces,
         start: u64,
         most: usize,
     ) -> Option<PlannedPart> {
         // A page of the preview starts with whole groups.
         let from = start / SHOWN_PAIRS * SHOWN_PAIRS;
         let known = (start - from) as usize;
-        let preview = self.preview(&state.options.folder, roots, from, &state.plans)?;
+        let folder = &state.options.folder;
+        // Past the end, a preview has the last ones.
+        let mut is_there = true;
+        let planned = if let Some((plan, at)) = self.kept_plan(folder, from, &state.plans) {
+            Planned::Pairs(plan, at)
+        } else {
+            let preview = self.preview(folder, &places.roots, from, &state.plans)?;
+            is_there = preview.from == from;
+            preview.planned.ok()?
+        };
         let of_form = self.unit.parse::<LengthUnit>().ok();
-        // Past the end, the preview has the last ones.
-        let is_there = preview.from == from;
-        let (files, total) = match preview.planned.ok()? {
+        let (mut files, total): (Vec<_>, u64) = match planned {
             Planned::Pairs(plan, at) => {
                 let shown = plan.shown.iter().skip(at + known).take(most);
                 let files = shown.map(|pair| PlannedFiles {
@@ -82,7 +122,7 @@ impl ImportChoice {
                         pair.unit
                     },
                 });
-                (files.collect::<Vec<_>>(), plan.pairs.min(KEPT_PAIRS))
+                (files.collect(), plan.pairs)
             }
             Planned::Blocks(rows, _) => {
                 let total = rows.len() as u64;
@@ -91,44 +131,105 @@ impl ImportChoice {
                 let files = rows.map(|row| PlannedFiles {
                     name: row.name.to_string(),
                     kind: ScanKind::Block,
-                    scan: on_disk(folder, &row.mesh),
-                    print: on_disk(folder, &row.page),
-                    labels: row.labels.map(|labels| on_disk(folder, &labels)),
+                    scan: places.on_disk(folder, row.mesh),
+                    print: places.on_disk(folder, row.page),
+                    labels: row.labels.map(|labels| places.on_disk(folder, labels)),
                     unit: row.unit,
                 });
                 (files.collect(), total)
             }
         };
-        Some(PlannedPart {
-            files: if is_there { files } else { Vec::new() },
-            total,
-        })
+        if !is_there {
+            files.clear();
+        }
+        let most = total.min(KEPT_PAIRS);
+        Some(PlannedPart { files, most, total })
     }
 
     /// Returns the block at a place in the list that would be imported.
     pub(super) fn planned_block(
         &self,
         state: &AppState,
-        roots: &PickerRoots,
+        places: &FilePlaces,
         place: u64,
     ) -> Option<PlannedFiles> {
-        let part = self.planned_files(state, roots, place, 1)?;
+        let part = self.planned_files(state, places, place, 1)?;
         let found = part.files.into_iter().next()?;
         (found.kind == ScanKind::Block).then_some(found)
     }
 
     /// Returns the limits that the files of this import will have.
     pub(super) fn limits(&self, folder: &Path) -> InputLimits {
-        let dir = self.dir(folder).unwrap_or_else(|_| folder.join("new"));
-        let settings = Location::new(dir).settings();
+        let settings = Location::new(self.dir_or_new(folder)).settings();
         settings.map_or(InputLimits::SUGGESTED, |settings| settings.config.limits)
     }
 }
 
-/// What was looked at for a request.
+/// Where the files of an import are, and which of them may be opened.
 #[derive(Debug)]
+pub(super) struct FilePlaces {
+    roots: PickerRoots,
+    /// The project of the import, which need not exist. Its settings may name folders and object stores.
+    project: Project,
+}
+
+impl FilePlaces {
+    pub(super) fn new(chosen: &ImportChoice, folder: &Path) -> Self {
+        let location = Location::new(chosen.dir_or_new(folder));
+        let storage = location
+            .data_locations()
+            .ok()
+            .and_then(|(storage, _)| storage);
+        Self {
+            roots: PickerRoots::new(folder),
+            project: Project::at(&location.dir).with_storage(storage),
+        }
+    }
+
+    /// Returns the stored path of a file below a folder or an object store of the settings.
+    fn below_root<'p>(&self, path: &'p Path) -> Option<&'p str> {
+        path.to_str()
+            .filter(|path| self.project.is_below_root(path))
+    }
+
+    /// Returns the path of a file of a list of blocks, whose name may be written differently.
+    fn on_disk(&self, folder: &Path, file: PathBuf) -> PathBuf {
+        if self.below_root(&file).is_some() {
+            return file;
+        }
+        let mut path = folder.join(file);
+        // If this cannot be found out, opening the file says why.
+        let _ = find_on_disk(&mut path);
+        path
+    }
+
+    /// Returns the path of a file that may be looked at.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such file in the folders of the user and of the app.
+    pub(super) fn allowed(&self, path: &Path) -> Result<PathBuf, UnreadFile> {
+        if let Some(stored) = self.below_root(path) {
+            let found = self.roots.allowed(&self.project.input_path(stored));
+            return found.map_err(|_outside| UnreadFile::Outside);
+        }
+        self.roots
+            .allowed(path)
+            .map_err(|why| match path.try_exists() {
+                Ok(true) => UnreadFile::Outside,
+                Ok(false) | Err(_) => UnreadFile::Unusable(why.into_sentence()),
+            })
+    }
+}
+
+/// What was looked at for a request.
+#[derive(Debug, Default)]
 pub(super) struct LookedAtFiles {
     pub(super) heads: Vec<FileHeads>,
+    /// Number of pairs or blocks that the request asked for.
+    pub(super) asked: usize,
+    /// Number of pairs or blocks whose files can be looked at.
+    pub(super) most: u64,
+    /// Number of all pairs or blocks.
     pub(super) total: u64,
 }
 
@@ -142,36 +243,61 @@ pub(super) async fn look(
     time: Duration,
 ) -> AppResult<LookedAtFiles> {
     let state = Arc::clone(state);
-    let work = async move || {
-        let roots = PickerRoots::new(&state.options.folder);
-        let limits = chosen.limits(&state.options.folder);
-        let planned = chosen.planned_files(&state, &roots, from, most);
-        let (files, total) = planned.map_or((Vec::new(), 0), |part| (part.files, part.total));
-        let until = Instant::now() + time;
-        let mut heads = Vec::new();
-        for files in files {
-            if !heads.is_empty() && Instant::now() >= until {
-                break;
-            }
-            heads.push(files.look(&roots, &limits));
-            // The caller may have left.
-            tokio::task::yield_now().await;
-        }
-        Ok::<_, ProjectError>(LookedAtFiles { heads, total })
+    let token = CancelToken::default();
+    let _leaves = CancelGuard(token.clone());
+    let work = move || {
+        token
+            .run(|| looked_at(&state, &chosen, (from, most), time))
+            .ok()
     };
-    Ok(read_on_thread(work).await?)
+    let done = spawn_blocking(work).await;
+    // It is cancelled only if the caller has left.
+    let done = done.map_err(|error| ProjectError::from(TaskStopped(error)))?;
+    Ok(done.unwrap_or_default())
+}
+
+fn looked_at(
+    state: &AppState,
+    chosen: &ImportChoice,
+    (from, most): (u64, usize),
+    time: Duration,
+) -> LookedAtFiles {
+    let folder = &state.options.folder;
+    let places = FilePlaces::new(chosen, folder);
+    let limits = chosen.limits(folder);
+    let Some(part) = chosen.planned_files(state, &places, from, most) else {
+        return LookedAtFiles::default();
+    };
+    let asked = part.files.len();
+    let until = Instant::now() + time;
+    let mut heads = Vec::new();
+    for files in part.files {
+        poll();
+        if !heads.is_empty() && Instant::now() >= until {
+            break;
+        }
+        heads.push(files.look(&places, &limits));
+    }
+    LookedAtFiles {
+        heads,
+        asked,
+        most: part.most,
+        total: part.total,
+    }
 }
 
 impl PlannedFiles {
-    fn look(self, roots: &PickerRoots, limits: &InputLimits) -> FileHeads {
-        let scan = allowed(roots, &self.scan).and_then(|path| {
-            scan_extent(&path, &limits.mesh).map_err(|why| Sentence::of_program(&why))
-        });
-        let print = allowed(roots, &self.print).and_then(|path| {
-            image_size(&path, &limits.image).map_err(|why| Sentence::of_program(&why))
-        });
+    fn look(self, places: &FilePlaces, limits: &InputLimits) -> FileHeads {
+        let unusable = |why: String| UnreadFile::of_program(&why);
+        let scan = places.allowed(&self.scan);
+        let scan = scan.and_then(|path| scan_extent(&path, &limits.mesh).map_err(unusable));
+        let print = places.allowed(&self.print);
+        let print = print.and_then(|path| image_size(&path, &limits.image).map_err(unusable));
         let labels = self.labels.as_deref().zip(print.as_ref().ok());
-        let labels = labels.map(|(labels, size)| self.label_count(labels, *size, roots));
+        let labels = labels.map(|(labels, size)| {
+            let found = self.boxes(labels, *size, places);
+            found.map(|found| (found.boxes.len() as u64, found.format))
+        });
         FileHeads {
             scan,
             print,
@@ -180,33 +306,14 @@ impl PlannedFiles {
         }
     }
 
-    /// Returns the number of boxes that labels have for the page.
-    fn label_count(
+    /// Returns the boxes that labels have for the page, which they know by its name in the list.
+    pub(super) fn boxes(
         &self,
         labels: &Path,
         size: [u32; 2],
-        roots: &PickerRoots,
-    ) -> Result<(u64, LabelFormat), Sentence> {
-        let labels = allowed(roots, labels)?;
-        let found = page_labels(&labels, &self.print, size);
-        let found = found.map_err(|why| Sentence::of_program(&why))?;
-        Ok((found.boxes.len() as u64, found.format))
+        places: &FilePlaces,
+    ) -> Result<Labels, UnreadFile> {
+        let labels = places.allowed(labels)?;
+        page_labels(&labels, &self.print, size).map_err(|why| UnreadFile::of_program(&why))
     }
-}
-
-/// Returns the path of a file of a list of blocks, whose name may be written differently.
-fn on_disk(folder: &Path, file: &Path) -> PathBuf {
-    let mut path = folder.join(file);
-    // If this cannot be found out, opening the file says why.
-    let _ = find_on_disk(&mut path);
-    path
-}
-
-/// Returns the path of a file that may be looked at.
-///
-/// # Errors
-/// Returns the reason if there is no such file in the folders of the user and of the app.
-pub(super) fn allowed(roots: &PickerRoots, path: &Path) -> Result<PathBuf, Sentence> {
-    let found = roots.allowed(path);
-    found.map_err(AppFailure::into_sentence)
 }

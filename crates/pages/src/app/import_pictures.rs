@@ -1,32 +1,31 @@
 //! Pictures of the files of whole blocks before they are imported: the page with the boxes of its labels, and the scan.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
 
+use axum::body::Bytes;
 use axum::extract::{Path as AddressPath, State};
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use maud::{Markup, html};
 
 use super::components::grouped;
+use super::encoded_picture::{JPEG, jpeg};
 use super::failure::{AppFailure, AppResult};
-use super::folder_picker::PickerRoots;
 use super::import_choice::ImportChoice;
-use super::import_heads::{FileHeads, allowed};
-use super::sentence::Sentence;
+use super::import_heads::{FileHeads, FilePlaces, PlannedFiles, UnreadFile};
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::InputLimits;
 use mocban_core::domain::{enum_names, one_line};
-use mocban_core::raster::jpeg_rgb8;
 use mocban_export::import_pictures::{page_with_boxes, points_from_above};
+use mocban_export::pictures::Rgb;
 use mocban_lists::labels::LabelBox;
-use mocban_project::file_heads::{ScanKind, page_image, page_labels, scan_points};
+use mocban_project::file_heads::{ScanKind, page_image, scan_points};
 
 /// Longer side of a picture, pixels.
 const SIDE: usize = 560;
-/// JPEG quality of pictures.
-const QUALITY: u8 = 85;
 
 /// A picture of a file of a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,10 +50,15 @@ pub(super) fn pictures_part(visit: &Visit, heads: &[FileHeads], from: u64) -> Ma
             p { (labels_text(visit, one)) }
             div.row {
                 @if one.print.is_ok() { (picture(visit, ImportPicture::Page, place, &one.files.name)) }
-                @if one.scan.is_ok() { (picture(visit, ImportPicture::Scan, place, &one.files.name)) }
+                @if has_positions(one) { (picture(visit, ImportPicture::Scan, place, &one.files.name)) }
             }
         } }
     }
+}
+
+/// Returns whether positions of a scan are known, so that there is a picture of it.
+fn has_positions(one: &FileHeads) -> bool {
+    one.scan.as_ref().is_ok_and(|scan| scan.sides.is_some())
 }
 
 fn picture(visit: &Visit, picture: ImportPicture, place: u64, name: &str) -> Markup {
@@ -80,7 +84,7 @@ fn labels_text(visit: &Visit, one: &FileHeads) -> Markup {
                 (visit.t("Labels", "Nhãn")) ": " b { (grouped(*count)) } " "
                 (visit.t("characters", "chữ")) " (" (format.name()) ")"
             },
-            Some(Err(why)) => span.bad { (one_line(why.text(visit.language))) },
+            Some(Err(why)) => span.bad { (one_line(why.sentence().text(visit.language))) },
             None if one.files.labels.is_none() => (visit.t("No labels: a run looks for the characters on the page.", "Không có nhãn: lần chạy sẽ tìm các chữ trên trang in.")),
             None => {},
         }
@@ -102,51 +106,79 @@ pub(super) async fn draw(
         let state = Arc::clone(&state);
         move || drawn(&state, &chosen, picture, place)
     };
-    let jpeg = state.import_work.call(work).await??;
-    Ok(([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response())
+    let picture = state.import_work.call(work).await??;
+    Ok(([(header::CONTENT_TYPE, JPEG)], picture).into_response())
 }
 
+/// Returns a picture as JPEG: the one that was drawn last, if its files are the same.
 fn drawn(
     state: &AppState,
     chosen: &ImportChoice,
     picture: ImportPicture,
     place: u64,
-) -> AppResult<Vec<u8>> {
+) -> AppResult<Bytes> {
     let folder = &state.options.folder;
-    let roots = PickerRoots::new(folder);
-    let files = chosen.planned_block(state, &roots, place);
+    let places = FilePlaces::new(chosen, folder);
+    let files = chosen.planned_block(state, &places, place);
     let files = files.ok_or_else(AppFailure::not_found)?;
-    let limits = chosen.limits(folder);
-    let refused = |why: String| AppFailure::refused(Sentence::of_program(&why));
-    let path = |path: &Path| allowed(&roots, path).map_err(AppFailure::refused);
-    let drawn = match picture {
-        ImportPicture::Page => {
-            let page = path(&files.print)?;
-            let labels = files.labels.as_deref().map(path).transpose()?;
-            draw_page(&page, labels.as_deref(), &limits)
-        }
-        ImportPicture::Scan => {
-            let points = scan_points(&path(&files.scan)?, &limits.mesh);
-            points.and_then(|points| {
-                let picture = points_from_above(&points, SIDE);
-                picture.ok_or_else(|| "the mesh has no vertices".to_owned())
-            })
-        }
+    let used: Vec<&Path> = match picture {
+        ImportPicture::Page => std::iter::once(&files.print)
+            .chain(&files.labels)
+            .map(PathBuf::as_path)
+            .collect(),
+        ImportPicture::Scan => vec![files.scan.as_path()],
     };
-    Ok(jpeg_rgb8(&drawn.map_err(refused)?, QUALITY))
+    let key = versions(&used).map(|used| format!("import {} {used:?}", picture.name()));
+    if let Some(kept) = key.as_deref().and_then(|key| state.thumbs.get(key)) {
+        return Ok(kept);
+    }
+    let limits = chosen.limits(folder);
+    let drawn = match picture {
+        ImportPicture::Page => draw_page(&files, &places, &limits),
+        ImportPicture::Scan => draw_scan(&files, &places, &limits),
+    };
+    let drawn = drawn.map_err(|why| AppFailure::refused(why.sentence()))?;
+    let (_, bytes) = jpeg(&drawn);
+    let bytes = Bytes::from(bytes);
+    if let Some(key) = key {
+        state.thumbs.add(key, bytes.clone());
+    }
+    Ok(bytes)
+}
+
+/// Returns paths, each with length and time of its file. `None` if one is not known.
+fn versions<'p>(paths: &[&'p Path]) -> Option<Vec<(&'p Path, u64, SystemTime)>> {
+    let version = |path: &&'p Path| {
+        let meta = std::fs::metadata(path).ok()?;
+        Some((*path, meta.len(), meta.modified().ok()?))
+    };
+    paths.iter().map(version).collect()
 }
 
 /// Draws a page. Labels that cannot be used are left out; the page of imports says why.
 fn draw_page(
-    page: &Path,
-    labels: Option<&Path>,
+    files: &PlannedFiles,
+    places: &FilePlaces,
     limits: &InputLimits,
-) -> Result<mocban_export::pictures::Rgb, String> {
-    let image = page_image(page, &limits.image)?;
+) -> Result<Rgb, UnreadFile> {
+    let page = page_image(&places.allowed(&files.print)?, &limits.image);
+    let image = page.map_err(|why| UnreadFile::of_program(&why))?;
     let size = [image.rgb.width() as u32, image.rgb.height() as u32];
-    let found = labels.and_then(|labels| page_labels(labels, page, size).ok());
+    let labels = files.labels.as_deref();
+    let found = labels.and_then(|labels| files.boxes(labels, size, places).ok());
     let boxes = found.map_or_else(Vec::new, |found| {
         found.boxes.iter().map(LabelBox::bounds).collect()
     });
     Ok(page_with_boxes(&image, &boxes, SIDE))
+}
+
+fn draw_scan(
+    files: &PlannedFiles,
+    places: &FilePlaces,
+    limits: &InputLimits,
+) -> Result<Rgb, UnreadFile> {
+    let points = scan_points(&places.allowed(&files.scan)?, &limits.mesh);
+    let points = points.map_err(|why| UnreadFile::of_program(&why))?;
+    let picture = points_from_above(&points, SIDE);
+    picture.ok_or_else(|| UnreadFile::of_program("the mesh has no vertices"))
 }

@@ -1,7 +1,8 @@
-//! The plan of the folders that were looked at last: it is kept while their files and the choices stay.
+//! The plans of pairs that were made last: each is kept while its files and the choices stay.
 
+use std::collections::VecDeque;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use mocban_core::domain::ContentHash;
 use mocban_project::ProjectResult;
@@ -11,14 +12,18 @@ use mocban_project::import_plan::ImportPlan;
 
 /// Number of pairs that are kept with a plan.
 pub(super) const KEPT_PAIRS: u64 = 10_000;
+/// Number of plans that are kept.
+const KEPT_PLANS: usize = 4;
 
-/// The last plan.
+/// The last plans, the newest first.
 #[derive(Debug, Default)]
-pub(super) struct PlanCache(Mutex<Option<KeptPlan>>);
+pub(super) struct PlanCache(Mutex<VecDeque<KeptPlan>>);
 
 #[derive(Debug)]
 struct KeptPlan {
-    key: ContentHash,
+    choices: String,
+    /// Hash of the names of all files, if the source is two folders.
+    names: Option<ContentHash>,
     plan: Arc<ImportPlan>,
 }
 
@@ -33,27 +38,49 @@ impl PlanCache {
         choices: &str,
         plan: impl FnOnce(PairSource) -> ProjectResult<ImportPlan>,
     ) -> ProjectResult<Arc<ImportPlan>> {
-        let key = match &source {
-            PairSource::List { .. } => None,
-            PairSource::Folders { meshes, prints, .. } => Some(key([meshes, prints], choices)?),
+        let names = match &source {
+            PairSource::List { .. } => Ok(None),
+            PairSource::Folders { meshes, prints, .. } => names_hash([meshes, prints]).map(Some),
         };
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kept) = kept.as_ref().filter(|kept| Some(kept.key) == key) {
-            return Ok(Arc::clone(&kept.plan));
+        if let Ok(Some(names)) = &names
+            && let Some(same) =
+                self.find(|kept| kept.choices == choices && kept.names == Some(*names))
+        {
+            return Ok(same);
         }
-        *kept = None;
+        self.lock().retain(|kept| kept.choices != choices);
+        let names = names?;
         let plan = Arc::new(plan(source)?);
-        *kept = key.map(|key| KeptPlan {
-            key,
+        let mut all = self.lock();
+        all.truncate(KEPT_PLANS - 1);
+        all.push_front(KeptPlan {
+            choices: choices.to_owned(),
+            names,
             plan: Arc::clone(&plan),
         });
         Ok(plan)
     }
+
+    /// Returns the last plan for choices, without a look at the files. The page of these choices has it made again.
+    pub(super) fn kept(&self, choices: &str) -> Option<Arc<ImportPlan>> {
+        self.find(|kept| kept.choices == choices)
+    }
+
+    fn find(&self, is_wanted: impl Fn(&KeptPlan) -> bool) -> Option<Arc<ImportPlan>> {
+        let all = self.lock();
+        let found = all.iter().find(|kept| is_wanted(kept));
+        found.map(|kept| Arc::clone(&kept.plan))
+    }
+
+    /// Locks the plans. No plan is made meanwhile.
+    fn lock(&self) -> MutexGuard<'_, VecDeque<KeptPlan>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
-/// Returns a hash of the names of all files in two folders, and of the choices.
-fn key(folders: [&Path; 2], choices: &str) -> ProjectResult<ContentHash> {
-    let mut names = choices.as_bytes().to_vec();
+/// Returns a hash of the names of all files in two folders.
+fn names_hash(folders: [&Path; 2]) -> ProjectResult<ContentHash> {
+    let mut names = Vec::new();
     for folder in folders {
         for file in list_below(folder)? {
             names.push(0);
@@ -99,6 +126,15 @@ mod tests {
         assert_eq!([look("a"), look("a")], [(2, 2), (2, 2)]);
         assert_eq!([look("b"), look("b")], [(2, 3), (2, 3)]);
         std::fs::remove_file(dir.path().join("1.stl")).expect("removed");
+        let pairs = |choices: &str| cache.kept(choices).map(|plan| plan.pairs);
+        assert_eq!(pairs("b"), Some(2), "without a look at the files");
         assert_eq!(look("b"), (1, 4));
+        for choices in ["c", "d", "e"] {
+            look(choices);
+        }
+        assert_eq!(
+            [pairs("a"), pairs("b"), pairs("e")],
+            [None, Some(1), Some(1)]
+        );
     }
 }
