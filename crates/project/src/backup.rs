@@ -74,7 +74,7 @@ pub async fn count_rows(dir: &Path) -> ProjectResult<(u64, u64)> {
 
 /// Returns the numbers of pairs and verdicts in a catalog.
 pub(crate) async fn rows_of(catalog: &Catalog) -> ProjectResult<(u64, u64)> {
-    let verdicts = catalog.verdict_log(None).await?.len() as u64;
+    let verdicts = catalog.count_verdicts().await?;
     let pairs = catalog.counters().await?.values().sum();
     Ok((pairs, verdicts))
 }

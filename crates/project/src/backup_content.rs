@@ -5,7 +5,7 @@ use std::time::UNIX_EPOCH;
 
 use crate::backup::rows_of;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
-use crate::missing_inputs::{self, MissingInputs};
+use crate::missing_inputs::{self, InputInspection};
 use crate::restore::check_backup;
 use mocban_catalog::Catalog;
 use mocban_core::domain::UnixMillis;
@@ -26,8 +26,8 @@ pub struct BackupContent {
     pub blocks: u64,
     /// Number of verdicts.
     pub verdicts: u64,
-    /// Scans and prints that a project in the new folder would not find.
-    pub missing: Option<MissingInputs>,
+    /// Scans and prints that a project in the new folder would not find, among a few.
+    pub inputs: InputInspection,
 }
 
 /// Reads what a backup holds for a project in the folder `dir`, which need not exist. Writes nothing.
@@ -41,9 +41,9 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
     let catalog = Catalog::open_backup(backup).await?;
     let read = async {
         let (pairs, verdicts) = rows_of(&catalog).await?;
-        let blocks = catalog.known_blocks().await?.len() as u64;
+        let blocks = catalog.count_blocks().await?;
         let last_activity = catalog.last_activity().await?;
-        let missing = missing_inputs::missing(&Project::at(dir), &catalog, pairs).await?;
+        let inputs = missing_inputs::inspect(&Project::at(dir), &catalog, pairs).await?;
         Ok::<_, ProjectError>(BackupContent {
             bytes: meta.len(),
             written: written(&meta),
@@ -51,7 +51,7 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
             pairs,
             blocks,
             verdicts,
-            missing,
+            inputs,
         })
     };
     let content = read.await;

@@ -73,6 +73,8 @@ impl std::fmt::Display for ChangedInputs {
 /// Missing and changed files among the sampled inputs.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct InputInspection {
+    /// Number of files that were inspected. 0 if none was read before, the disk hangs, or inputs may be in an object store.
+    pub looked_at: usize,
     /// Files that are missing.
     pub missing: Option<MissingInputs>,
     /// Files that were changed.
@@ -154,6 +156,7 @@ fn among(project: &Project, files: &[(String, String)], until: Instant) -> Input
     }
     let shown = |path: &str| project.input(path).path().display().to_string();
     InputInspection {
+        looked_at,
         missing: missing.first().map(|first| MissingInputs {
             missing: missing.len(),
             looked_at,
@@ -192,14 +195,20 @@ mod tests {
         });
         let later = Instant::now() + Duration::from_hours(1);
         let none = InputInspection::default();
-        assert_eq!(among(&project, &files, later), none);
+        let sound = InputInspection {
+            looked_at: 3,
+            ..none.clone()
+        };
+        assert_eq!(among(&project, &files, later), sound);
         // Another file with the same size, as in a copy of the folder.
         std::fs::write(dir.path().join("new.stl"), "y").expect("written");
         std::fs::rename(dir.path().join("new.stl"), dir.path().join("a.stl")).expect("moved");
-        assert_eq!(among(&project, &files, later), none);
+        assert_eq!(among(&project, &files, later), sound);
         std::fs::write(dir.path().join("b.stl"), "longer").expect("written");
         std::fs::remove_file(dir.path().join("c.stl")).expect("removed");
-        let InputInspection { missing, changed } = among(&project, &files, later);
+        let InputInspection {
+            missing, changed, ..
+        } = among(&project, &files, later);
         let (missing, changed) = (missing.expect("one"), changed.expect("one"));
         assert_eq!((missing.missing, missing.looked_at), (1, 3));
         assert!(missing.first.ends_with("c.stl"), "{missing}");

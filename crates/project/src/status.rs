@@ -80,6 +80,7 @@ impl ProjectStatus {
         let inspection = InputInspection {
             missing: self.missing_inputs.clone(),
             changed: self.changed_inputs.clone(),
+            ..InputInspection::default()
         };
         (inspection, self.same_contents.clone())
     }

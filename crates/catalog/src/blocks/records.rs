@@ -7,7 +7,7 @@ use crate::blocks::model::{BlockAttributes, BlockInputVersions};
 use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::conn::Conn;
 use crate::db::left_out::is_counted;
-use crate::db::query::query_as;
+use crate::db::query::{query_as, query_scalar};
 use crate::db::row::{FromRow, Row, from_row};
 use crate::db::value::Json;
 use crate::records::model::{AttemptRecord, StoredFailure, stored_failure};
@@ -210,6 +210,13 @@ impl Catalog {
     pub async fn known_blocks(&self) -> Result<Vec<KnownBlock>> {
         let mut conn = self.read_conn().await?;
         query_as(BLOCKS).fetch_all(&mut conn).await
+    }
+
+    /// Returns the number of blocks.
+    pub async fn count_blocks(&self) -> Result<u64> {
+        let mut conn = self.read_conn().await?;
+        let query = query_scalar("SELECT count(*) FROM block");
+        query.fetch_one(&mut conn).await
     }
 
     /// Returns every block with the results of its stages, for a check.

@@ -131,6 +131,12 @@ WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) AND v.id > coal
 ORDER BY v.id LIMIT coalesce(?4, 9223372036854775807)"
 );
 
+/// Counts the verdicts of the log, without those of `?1`.
+const COUNT: &str = concat!(
+    "SELECT count(*) FROM verdict AS v WHERE ",
+    is_counted!("v.id", "?1")
+);
+
 const UNDO: &str = "
 INSERT INTO verdict_undo (act, reviewer, at) SELECT id, reviewer, ?2 FROM review_act WHERE id = ?1";
 
@@ -187,6 +193,14 @@ impl Catalog {
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         log(&mut conn, pair, &self.left_out).await
+    }
+
+    /// Returns the number of lines of the verdict log.
+    pub async fn count_verdicts(&self) -> Result<u64> {
+        let mut conn = self.read_conn().await?;
+        let left_out = self.left_out.of(ChecksummedTable::Verdict);
+        let query = query_scalar(COUNT).bind(left_out);
+        query.fetch_one(&mut conn).await
     }
 
     /// Returns up to `limit` lines of the verdict log with ids above `after`, oldest first.

@@ -56,6 +56,8 @@ async fn the_newest_verdict_of_each_reviewer_counts() {
         world.catalog.verdict_log(None).await.expect("a log").len(),
         3 * METRICS
     );
+    let count = world.catalog.count_verdicts().await.expect("a count");
+    assert_eq!(count, 3 * METRICS as u64);
 }
 
 #[tokio::test]

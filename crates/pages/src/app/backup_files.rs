@@ -31,10 +31,10 @@ pub(super) struct FoundBackup {
 pub(super) fn backups_below(folder: &Path) -> Vec<FoundBackup> {
     let (mut found, mut budget) = (Vec::new(), MAX_ENTRIES);
     let mut open = VecDeque::from([(folder.to_owned(), MAX_DEPTH)]);
-    while let Some((folder, depth)) = open.pop_front() {
+    'folders: while let Some((folder, depth)) = open.pop_front() {
         for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
             if budget == 0 || found.len() >= MAX_BACKUPS {
-                break;
+                break 'folders;
             }
             budget -= 1;
             let (name, path) = (entry.file_name(), entry.path());

@@ -16,6 +16,7 @@ use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::home::free_space;
 use super::number_text::file_size;
+use super::projects::is_project;
 use super::restore_page::restore_address;
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -72,7 +73,7 @@ pub(super) async fn page(
                     button.primary #check name="what" value="check" { (visit.t("Check now", "Kiểm tra ngay")) }
                     button #repair name="what" value="repair" data-confirm=(visit.t("Mend what can be mended? Damaged results are computed again by the next run.", "Sửa những gì sửa được? Kết quả bị hỏng sẽ được tính lại trong lần chạy sau.")) { (visit.t("Repair", "Sửa chữa")) }
                     @if lacks_most_files {
-                        button #compute-lost name="what" value="lost" data-confirm=(visit.t("Are these files lost? The next run computes them again, which takes as long as at first.", "Các tệp này đã mất? Lần chạy sau sẽ tính lại chúng, lâu như lần đầu.")) { (visit.t("They are lost: compute them again", "Chúng đã mất: tính lại")) }
+                        button #compute-lost name="what" value="lost" data-confirm=(visit.t("Are these files lost? The next run computes them again, which takes as long as at first. If scans or prints are lost too, the numbers and pictures of their pairs are gone.", "Các tệp này đã mất? Lần chạy sau sẽ tính lại chúng, lâu như lần đầu. Nếu bản quét hoặc bản in cũng đã mất thì số đo và hình ảnh của các cặp đó không còn nữa.")) { (visit.t("They are lost: compute them again", "Chúng đã mất: tính lại")) }
                     }
                 }))
                 (task_part(&visit, checked.as_ref()))
@@ -85,7 +86,9 @@ pub(super) async fn page(
                 @if let Some(meta) = meta {
                     p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (visit.file_size(meta.len())) } " "
                         @if meta.len() <= DOWNLOAD_BYTES { a.button href="backup.sqlite" download { (visit.t("Save a copy", "Lưu một bản")) } }
-                        " " a.button href={ (visit.root) (restore_address(&shown)) } { (visit.t("Restore as a new project", "Khôi phục thành dự án mới")) }
+                        @if !is_project(&state.options.folder) {
+                            " " a.button href={ (visit.root) (restore_address(&shown)) } { (visit.t("Restore as a new project", "Khôi phục thành dự án mới")) }
+                        }
                     }
                 }
             }
@@ -193,8 +196,8 @@ fn conclusion(summary: &CheckSummary, repair: bool) -> [&'static str; 2] {
             "Mọi hư hỏng đã được sửa. Hãy bấm Căn chỉnh ở trang Căn chỉnh để tính lại kết quả bị thiếu. Các hư hỏng là:",
         ],
         _ if summary.lacks_most_files() => [
-            "Most files of results are missing. Connect their disk and check again, or press the last button if they are lost. The damage is:",
-            "Thiếu hầu hết các tệp kết quả. Hãy nối lại ổ đĩa chứa chúng rồi kiểm tra lại, hoặc bấm nút cuối nếu chúng đã mất. Các hư hỏng là:",
+            "Most files of results are missing. Connect their disk and check again, or press They are lost: compute them again. The damage is:",
+            "Thiếu hầu hết các tệp kết quả. Hãy nối lại ổ đĩa chứa chúng rồi kiểm tra lại, hoặc bấm Chúng đã mất: tính lại. Các hư hỏng là:",
         ],
         _ if repair && needs_backup => [
             "Some damage cannot be mended: put your last backup in place of the catalog. The damage was:",

@@ -103,7 +103,8 @@ fn content_part(visit: &Visit, folder: &Path, content: &BackupContent, name: &st
 
 /// Says where scans and prints will be read, because a backup has none.
 fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> String {
-    let said = match (inputs, &content.missing) {
+    let found = &content.inputs;
+    let said = match (inputs, &found.missing) {
         (Some(inputs), _) => {
             let inputs = one_line(inputs);
             Sentence::new(
@@ -115,10 +116,21 @@ fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> 
                 ),
             )
         }
-        (None, None) => Sentence::new(
-            "Not in a backup. They are read from their old places, where all files that were looked at are.",
-            "Không có trong bản sao lưu. Chúng được đọc từ chỗ cũ, nơi có mọi tệp đã xem thử.",
+        (None, None) if found.looked_at == 0 => Sentence::new(
+            "Not in a backup. They are read from their old places. It is not known whether they are there: none was looked at.",
+            "Không có trong bản sao lưu. Chúng được đọc từ chỗ cũ. Không rõ chúng có còn ở đó không: chưa kiểm tra tệp nào.",
         ),
+        (None, None) => {
+            let looked_at = grouped(found.looked_at as u64);
+            Sentence::new(
+                format!(
+                    "Not in a backup. They are read from their old places. {looked_at} files were looked at, and all are there."
+                ),
+                format!(
+                    "Không có trong bản sao lưu. Chúng được đọc từ chỗ cũ. Đã kiểm tra {looked_at} tệp và tất cả đều có."
+                ),
+            )
+        }
         (None, Some(found)) => {
             let [missing, looked_at] = [found.missing, found.looked_at].map(|n| grouped(n as u64));
             let first = one_line(&found.first);
@@ -127,7 +139,7 @@ fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> 
                     "Not in a backup, and {missing} of {looked_at} files that were looked at are not at their old places, first {first}. Choose their folder below."
                 ),
                 format!(
-                    "Không có trong bản sao lưu, và {missing} trên {looked_at} tệp đã xem thử không còn ở chỗ cũ, tệp đầu tiên là {first}. Hãy chọn thư mục của chúng ở bên dưới."
+                    "Không có trong bản sao lưu, và {missing} trên {looked_at} tệp đã kiểm tra không còn ở chỗ cũ, tệp đầu tiên là {first}. Hãy chọn thư mục của chúng ở bên dưới."
                 ),
             )
         }

@@ -33,10 +33,13 @@ pub(super) async fn page(
 ) -> AppResult<Html<String>> {
     let title = visit.t("Restore a backup", "Khôi phục bản sao lưu");
     let show = |body: &Markup| frame(&visit, title, None, NavSection::None, body);
-    if let Some(name) = visit.query.get("name")
-        && let Some(task) = last_task(&state, name).await
-    {
-        return Ok(show(&progress_part(&visit, name, &task)));
+    if let Some(name) = visit.query.get("name") {
+        if let Some(task) = last_task(&state, name).await {
+            return Ok(show(&progress_part(&visit, name, &task)));
+        }
+        if new_project_dir(name, &state.options.folder).is_ok_and(|dir| is_project(&dir)) {
+            return Ok(show(&existing_part(&visit, name)));
+        }
     }
     let folder = state.options.folder.clone();
     let path = visit.query.get("path").map(PathBuf::from);
@@ -124,6 +127,22 @@ fn progress_part(visit: &Visit, name: &str, task: &TaskState) -> Markup {
     }
 }
 
+/// Says that there is a project, which an earlier process may have restored without the repair that follows.
+fn existing_part(visit: &Visit, name: &str) -> Markup {
+    html! {
+        p { (visit.t("Project", "Dự án")) ": " b { (one_line(name)) } }
+        p.notice { (visit.t(
+            "The project is there. If the program ended during its restore, files of results may be missing: press Check now on the page Health, which then offers to compute them again.",
+            "Đã có dự án này. Nếu chương trình dừng trong khi khôi phục thì có thể thiếu tệp kết quả: hãy bấm Kiểm tra ngay ở trang Tình trạng, ở đó có nút để tính lại chúng.",
+        )) }
+        p.row {
+            a.button.primary #restored href=(visit.project_page(name, "")) { (visit.t("Open the project", "Mở dự án")) }
+            a.button href=(visit.project_page(name, "health")) { (visit.t("Health", "Tình trạng")) }
+            a.button href=(visit.here) { (visit.t("Restore another backup", "Khôi phục bản sao lưu khác")) }
+        }
+    }
+}
+
 /// Says what is chosen.
 fn chosen_part(visit: &Visit) -> Markup {
     let rows = [
@@ -196,7 +215,7 @@ fn picker(visit: &Visit, picked: &PickedFolder) -> Markup {
             @for name in &picked.backups {
                 tr {
                     th scope="row" { (one_line(name)) }
-                    td.muted { (visit.t("backup", "bản sao lưu")) }
+                    td.muted { (visit.t("possible backup", "có thể là bản sao lưu")) }
                     td { (choose(visit, "backup", &picked.path.join(name), visit.t("Use this backup", "Dùng bản này"))) }
                 }
             }
@@ -206,7 +225,7 @@ fn picker(visit: &Visit, picked: &PickedFolder) -> Markup {
 
 /// Says what is in a folder.
 fn held(visit: &Visit, counts: &FileCounts) -> String {
-    let backups = visit.t("backups", "bản sao lưu");
+    let backups = visit.t("possible backups", "tệp có thể là bản sao lưu");
     let backups = (counts.backups > 0).then(|| format!("{} {backups}", grouped(counts.backups)));
     let others = Some(counts_text(visit, counts)).filter(|text| !text.is_empty());
     let parts: Vec<String> = backups.into_iter().chain(others).collect();
