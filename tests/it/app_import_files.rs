@@ -139,11 +139,12 @@ fn files_outside_the_folders_of_the_user_are_not_opened() {
     let list = dir.path().join("list.csv");
     std::fs::write(&list, "id,mesh,print\na,/etc/passwd,/etc/hosts\n").expect("written");
     let list = encode(list.to_str().expect("UTF-8"));
-    let (found, _) = problems(&page, &format!("?project=new&list={list}"));
-    assert_eq!(found.len(), 2, "{found:#?}");
-    for line in &found {
-        assert!(line.contains("outside your folders and disks"), "{line}");
-    }
+    let query = format!("?project=new&list={list}");
+    let (found, pairs) = problems(&page, &query);
+    assert_eq!((found, pairs), (Vec::new(), json!(1)), "no faults");
+    let table = files(&page, &query);
+    let said = "not looked at: it is outside your folders and disks";
+    assert_eq!(table.matches(said).count(), 2, "{table}");
 }
 
 #[test]
@@ -161,6 +162,55 @@ fn all_pairs_of_a_large_folder_are_looked_at_in_steps() {
     assert_eq!((found.len(), pairs), (2010, json!(1005)));
     let last = files(&page, &query(dir, "&from=1000"));
     assert_eq!(last.matches("<th scope=\"row\">").count(), 5, "{last}");
+}
+
+#[test]
+fn all_rows_of_a_long_list_are_looked_at_in_steps() {
+    let (dir, page) = with_project();
+    let dir = dir.path();
+    std::fs::create_dir(dir.join("x")).expect("a folder");
+    let rows: String = (0..1005)
+        .map(|number| format!("{number},x/{number}.stl,x/{number}.png\n"))
+        .collect();
+    std::fs::write(dir.join("list.csv"), format!("id,mesh,print\n{rows}")).expect("written");
+    for number in 0..1005 {
+        for ending in ["stl", "png"] {
+            std::fs::write(dir.join(format!("x/{number}.{ending}")), "").expect("written");
+        }
+    }
+    let list = encode(dir.join("list.csv").to_str().expect("UTF-8"));
+    let query = format!("?project=new&list={list}");
+    page.get(&format!("/import{query}"));
+    let (found, pairs) = problems(&page, &query);
+    assert_eq!((found.len(), pairs), (2010, json!(1005)));
+    let last = files(&page, &format!("{query}&from=1000"));
+    assert_eq!(last.matches("<th scope=\"row\">").count(), 5, "{last}");
+}
+
+#[test]
+fn a_unit_that_all_files_name_is_offered_and_said_to_be_unused() {
+    let (dir, page) = with_project();
+    let dir = dir.path();
+    for (name, bytes) in [
+        (
+            "x/scans/1.xyz",
+            &b"# units: m\n0 0 0\n0.04 0.03 0\n0 0.01 0\n"[..],
+        ),
+        ("x/prints/1.png", &b""[..]),
+    ] {
+        let file = dir.join(name);
+        std::fs::create_dir_all(file.parent().expect("a folder")).expect("created");
+        std::fs::write(file, bytes).expect("written");
+    }
+    let shown = files(&page, &query(dir, ""));
+    for part in [
+        "m, as the file says; not used unless it is chosen",
+        "id=\"use-unit\"",
+        "unit=m",
+        "1 / 1 of the scans shown here",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
 }
 
 #[test]

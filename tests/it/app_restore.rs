@@ -113,6 +113,11 @@ fn a_backup_is_shown_and_becomes_a_project() {
         assert!(done.contains(part), "{part}: {done}");
     }
     assert_eq!(page.get("/p/again/").status, 200);
+    // An app that was started later does not know how the restore ended.
+    let later = state(&open_app(&root), "again");
+    for part in ["The project is there", "href=\"./p/again/health\""] {
+        assert!(later.contains(part), "{part}: {later}");
+    }
     assert_eq!(counts(&root.join("again")), (json!(15), 4));
     // Only the depth maps and masks are computed again.
     mocban(&root.join("again"), &["run", "-q"]).expect(0);

@@ -152,7 +152,7 @@ fn lost_files_of_results_are_computed_again_after_a_button() {
     let found = wait_for(&page, "/p/p/health", "Most files of results are missing");
     assert!(found.contains("id=\"compute-lost\""), "{found}");
     let vietnamese = text(&page.get("/p/p/health?language=vi"));
-    assert!(vietnamese.contains("bấm nút cuối"), "{vietnamese}");
+    assert!(vietnamese.contains("bấm Chúng đã mất"), "{vietnamese}");
     page.get("/?language=en");
     start("lost");
     let mended = wait_for(&page, "/p/p/health", "All damage was mended. Press Align");

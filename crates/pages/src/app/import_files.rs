@@ -175,8 +175,12 @@ fn table(visit: &Visit, heads: &[FileHeads], units: &[Option<ScanUnit>]) -> Mark
 fn unread(visit: &Visit, why: &UnreadFile) -> Markup {
     let sentence = why.sentence();
     let said = one_line(sentence.text(visit.language));
-    let is_bad = matches!(why, UnreadFile::Unusable(_));
-    html! { td.bad[is_bad].muted[!is_bad] { (said) } }
+    html! {
+        @match why {
+            UnreadFile::Unusable(_) => td.bad { (said) },
+            UnreadFile::Outside => td.muted { (said) },
+        }
+    }
 }
 
 /// Returns the lengths of a scan along its axes in mm, or in its own unit if that is not known.
