@@ -84,7 +84,7 @@ fn labels_text(visit: &Visit, one: &FileHeads) -> Markup {
                 (visit.t("Labels", "Nhãn")) ": " b { (grouped(*count)) } " "
                 (visit.t("characters", "chữ")) " (" (format.name()) ")"
             },
-            Some(Err(why)) => span.bad { (one_line(why.sentence().text(visit.language))) },
+            Some(Err(why)) => span.bad[matches!(why, UnreadFile::Unusable(_))] { (one_line(why.sentence().text(visit.language))) },
             None if one.files.labels.is_none() => (visit.t("No labels: a run looks for the characters on the page.", "Không có nhãn: lần chạy sẽ tìm các chữ trên trang in.")),
             None => {},
         }

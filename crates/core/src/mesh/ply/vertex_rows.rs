@@ -77,7 +77,7 @@ impl VertexRows {
         if self.encoding == PlyEncoding::Ascii {
             let words: Vec<&[u8]> = text::words(row).take(self.properties + 1).collect();
             // A face begins with the number of the words that follow.
-            let is_face = || text::parse(words[0]) == Some(words.len() - 1);
+            let is_face = || text::parse::<usize>(words[0]) == Some(words.len() - 1);
             if words.len() != self.properties || is_face() {
                 return None;
             }
