@@ -169,10 +169,10 @@ fn all_rows_of_a_long_list_are_looked_at_in_steps() {
     let (dir, page) = with_project();
     let dir = dir.path();
     std::fs::create_dir(dir.join("x")).expect("a folder");
-    let rows: String = (0..1005)
-        .map(|number| format!("{number},x/{number}.stl,x/{number}.png\n"))
-        .collect();
-    std::fs::write(dir.join("list.csv"), format!("id,mesh,print\n{rows}")).expect("written");
+    let row = |number: u32| format!("{number},x/{number}.stl,x/{number}.png\n");
+    let rows: Vec<String> = (0..1005).map(row).collect();
+    let list = format!("id,mesh,print\n{}", rows.concat());
+    std::fs::write(dir.join("list.csv"), list).expect("written");
     for number in 0..1005 {
         for ending in ["stl", "png"] {
             std::fs::write(dir.join(format!("x/{number}.{ending}")), "").expect("written");
