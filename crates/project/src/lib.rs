@@ -4,7 +4,7 @@
 //! - [`align`]: one scan with one print, without a project
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
 //! - [`import_plan`]: what an import of pairs would store; [`pair_choices`]: what a person changes in it;
-//!   [`file_heads`]: what the files say of themselves
+//!   [`file_headers`]: what the files say of themselves
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
 //! - [`retire`]: takes pairs out of every count, and brings them back
 //! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
@@ -45,7 +45,7 @@ pub mod events;
 pub mod exit;
 pub mod export;
 pub mod failures;
-pub mod file_heads;
+pub mod file_headers;
 pub mod files;
 pub mod generated_folder;
 pub mod hosts;

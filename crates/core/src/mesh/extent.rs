@@ -20,19 +20,19 @@ pub(super) const WHOLE_BYTES: u64 = 4 << 20;
 /// Bytes at the beginning of a longer file that show its format. They hold the longest header of a PLY file.
 const HEAD_BYTES: u64 = (1 << 20) + (1 << 12);
 /// Places of a longer file for its size.
-const FEW: PartSpread = PartSpread {
+const FOR_SIZE: SampleSpread = SampleSpread {
     parts: 64,
     bytes: 16 << 10,
 };
-/// Places of a longer file for a picture.
-pub(super) const MANY: PartSpread = PartSpread {
+/// Places of a longer file for a picture of it.
+pub(super) const FOR_PICTURE: SampleSpread = SampleSpread {
     parts: 1024,
     bytes: 4 << 10,
 };
 
 /// Places of a file, evenly spread, from which vertices are read.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PartSpread {
+pub(super) struct SampleSpread {
     /// Number of places.
     parts: u64,
     /// Bytes of a text, or about those of rows, that are read at each place.
@@ -81,7 +81,7 @@ pub(super) fn sampled(
     limits: &MeshLimits,
 ) -> Result<MeshExtent, MeshReadError> {
     let mut seen = GrowingBox::default();
-    let unit = each_position(file, (len, name), limits, FEW, &mut |position| {
+    let unit = each_position(file, (len, name), limits, FOR_SIZE, &mut |position| {
         seen.add(position);
     })?;
     Ok(MeshExtent {
@@ -97,7 +97,7 @@ pub(super) fn each_position(
     file: &mut (impl Read + Seek),
     (len, name): (u64, &str),
     limits: &MeshLimits,
-    spread: PartSpread,
+    spread: SampleSpread,
     visit: &mut dyn FnMut([f64; 3]),
 ) -> Result<Option<LengthUnit>, MeshReadError> {
     let mut head = Vec::new();
@@ -174,7 +174,7 @@ fn ply_parts(
     head: &[u8],
     lines: TextLines,
     limits: &MeshLimits,
-    spread: PartSpread,
+    spread: SampleSpread,
     visit: &mut dyn FnMut([f64; 3]),
 ) -> Result<(), MeshReadError> {
     let Some(rows) = VertexRows::of(head, lines.end - lines.start)? else {
@@ -211,7 +211,7 @@ fn each_part(
     file: &mut (impl Read + Seek),
     [start, end]: [u64; 2],
     row: u64,
-    spread: PartSpread,
+    spread: SampleSpread,
     mut visit: impl FnMut(&[u8]),
 ) -> io::Result<()> {
     let rows = end.saturating_sub(start) / row;
@@ -243,7 +243,7 @@ impl TextLines {
     fn visit(
         self,
         file: &mut (impl Read + Seek),
-        spread: PartSpread,
+        spread: SampleSpread,
         mut visit: impl FnMut(&[u8]),
     ) -> io::Result<()> {
         let mut is_first = true;

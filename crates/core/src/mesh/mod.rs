@@ -165,7 +165,7 @@ pub fn visit_some_vertices(
 ) -> Result<(), MeshReadError> {
     limits.check_bytes(len)?;
     if len > extent::WHOLE_BYTES {
-        extent::each_position(file, (len, name), limits, extent::MANY, visit)?;
+        extent::each_position(file, (len, name), limits, extent::FOR_PICTURE, visit)?;
     } else {
         let mesh = read(&short_file(file)?, name, limits)?;
         mesh.vertices.iter().for_each(visit);

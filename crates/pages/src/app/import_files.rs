@@ -12,14 +12,14 @@ use serde_json::{Value, json};
 use super::components::{grouped, unit_name};
 use super::failure::AppResult;
 use super::import_choice::{ImportChoice, SHOWN_PAIRS};
-use super::import_heads::{FileHeads, LookedAtFiles, PlannedFiles, UnreadFile, look};
+use super::import_headers::{FileHeaders, InspectedFiles, PlannedFiles, UnreadFile, inspect};
 use super::import_pictures::pictures_part;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::domain::{LengthUnit, one_line};
 use mocban_core::mesh::MeshExtent;
-use mocban_project::file_heads::{ScanKind, ScanUnit, UnitOrigin};
+use mocban_project::file_headers::{ScanKind, ScanUnit, UnitOrigin};
 
 /// Most pairs whose files are looked at for one request of the script.
 const MOST: usize = 400;
@@ -58,15 +58,15 @@ pub(super) async fn part(
     let chosen = ImportChoice::of(&visit.query);
     let from: u64 = visit.query.parsed("from").unwrap_or_default();
     let has_list = !chosen.list.is_empty();
-    let LookedAtFiles { heads, asked, .. } =
-        look(&state, chosen, from, SHOWN_PAIRS as usize, SHOWN_TIME).await?;
-    let units: Vec<Option<ScanUnit>> = heads.iter().map(unit).collect();
+    let InspectedFiles { headers, asked, .. } =
+        inspect(&state, chosen, from, SHOWN_PAIRS as usize, SHOWN_TIME).await?;
+    let units: Vec<Option<ScanUnit>> = headers.iter().map(unit).collect();
     let part = html! {
-        @if !heads.is_empty() { (table(&visit, &heads, &units)) }
-        @if heads.len() < asked {
+        @if !headers.is_empty() { (table(&visit, &headers, &units)) }
+        @if headers.len() < asked {
             p.muted { (visit.t("Reading takes long, so the table has only the first of the shown pairs.", "Việc đọc mất nhiều thời gian nên bảng chỉ có các cặp đầu tiên được hiện.")) }
         }
-        (pictures_part(&visit, &heads, from))
+        (pictures_part(&visit, &headers, from))
         @if let Some(unit) = common_unit(&units).filter(|_| !has_list) { (unit_part(&visit, unit, &units)) }
     };
     Ok(Html(part.into_string()))
@@ -79,11 +79,14 @@ pub(super) async fn problems(
 ) -> AppResult<Json<Value>> {
     let chosen = ImportChoice::of(&visit.query);
     let after: u64 = visit.query.parsed("after").unwrap_or_default();
-    let LookedAtFiles {
-        heads, most, total, ..
-    } = look(&state, chosen, after, MOST, STEP_TIME).await?;
-    let next = after + heads.len() as u64;
-    let problems: Vec<String> = heads
+    let InspectedFiles {
+        headers,
+        most,
+        total,
+        ..
+    } = inspect(&state, chosen, after, MOST, STEP_TIME).await?;
+    let next = after + headers.len() as u64;
+    let problems: Vec<String> = headers
         .iter()
         .flat_map(unusable)
         .map(|(files, why)| {
@@ -91,7 +94,7 @@ pub(super) async fn problems(
             one_line(&format!("{}: {why}", files.name)).into_owned()
         })
         .collect();
-    let is_over = heads.is_empty() || next >= most;
+    let is_over = headers.is_empty() || next >= most;
     Ok(Json(json!({
         "problems": problems,
         "looked_at": next.min(most),
@@ -101,17 +104,17 @@ pub(super) async fn problems(
 }
 
 /// Returns why files of a pair cannot be used.
-fn unusable(heads: &FileHeads) -> impl Iterator<Item = (&PlannedFiles, &Sentence)> {
-    let whys = [heads.scan.as_ref().err(), heads.print.as_ref().err()];
+fn unusable(headers: &FileHeaders) -> impl Iterator<Item = (&PlannedFiles, &Sentence)> {
+    let whys = [headers.scan.as_ref().err(), headers.print.as_ref().err()];
     whys.into_iter().flatten().filter_map(move |why| match why {
-        UnreadFile::Unusable(why) => Some((&heads.files, why)),
+        UnreadFile::Unusable(why) => Some((&headers.files, why)),
         UnreadFile::Outside => None,
     })
 }
 
-fn unit(heads: &FileHeads) -> Option<ScanUnit> {
-    let extent = heads.scan.as_ref().ok()?;
-    heads.files.kind.unit(extent, heads.files.unit)
+fn unit(headers: &FileHeaders) -> Option<ScanUnit> {
+    let extent = headers.scan.as_ref().ok()?;
+    headers.files.kind.unit(extent, headers.files.unit)
 }
 
 /// Returns the unit that all scans have that are known, if none is given.
@@ -135,9 +138,9 @@ fn unit_part(visit: &Visit, unit: LengthUnit, units: &[Option<ScanUnit>]) -> Mar
     }
 }
 
-fn table(visit: &Visit, heads: &[FileHeads], units: &[Option<ScanUnit>]) -> Markup {
+fn table(visit: &Visit, headers: &[FileHeaders], units: &[Option<ScanUnit>]) -> Markup {
     let label = visit.t("Sizes of the files", "Kích thước của các tệp");
-    let is_block = heads.iter().any(|one| one.files.kind == ScanKind::Block);
+    let is_block = headers.iter().any(|one| one.files.kind == ScanKind::Block);
     let print = if is_block {
         visit.t("Page", "Trang in")
     } else {
@@ -150,7 +153,7 @@ fn table(visit: &Visit, heads: &[FileHeads], units: &[Option<ScanUnit>]) -> Mark
                     th scope="col" { (title) }
                 }
             } }
-            tbody { @for (one, unit) in heads.iter().zip(units) { tr {
+            tbody { @for (one, unit) in headers.iter().zip(units) { tr {
                 th scope="row" { (one_line(&one.files.name)) }
                 @match &one.scan {
                     Ok(extent) => {
@@ -262,7 +265,7 @@ mod tests {
     use crate::review::Language;
     use mocban_core::domain::LengthUnit;
     use mocban_core::mesh::MeshExtent;
-    use mocban_project::file_heads::ScanKind;
+    use mocban_project::file_headers::ScanKind;
 
     const SCAN: MeshExtent = MeshExtent {
         sides: Some([42.0, 30.0, 4.25]),

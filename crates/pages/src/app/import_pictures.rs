@@ -14,7 +14,7 @@ use super::components::grouped;
 use super::encoded_picture::{JPEG, jpeg};
 use super::failure::{AppFailure, AppResult};
 use super::import_choice::ImportChoice;
-use super::import_heads::{FileHeads, FilePlaces, PlannedFiles, UnreadFile};
+use super::import_headers::{FileHeaders, FilePlaces, PlannedFiles, UnreadFile};
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::InputLimits;
@@ -22,7 +22,7 @@ use mocban_core::domain::{enum_names, one_line};
 use mocban_export::import_pictures::{page_with_boxes, points_from_above};
 use mocban_export::pictures::Rgb;
 use mocban_lists::labels::LabelBox;
-use mocban_project::file_heads::{ScanKind, page_image, scan_points};
+use mocban_project::file_headers::{ScanKind, page_image, scan_points};
 
 /// Longer side of a picture, pixels.
 const SIDE: usize = 560;
@@ -41,8 +41,8 @@ enum_names! { pub ImportPicture, "a picture of an import":
 }
 
 /// Returns the pictures of blocks, which the browser loads when they are in sight.
-pub(super) fn pictures_part(visit: &Visit, heads: &[FileHeads], from: u64) -> Markup {
-    let blocks = (from..).zip(heads);
+pub(super) fn pictures_part(visit: &Visit, headers: &[FileHeaders], from: u64) -> Markup {
+    let blocks = (from..).zip(headers);
     let blocks = blocks.filter(|(_, one)| one.files.kind == ScanKind::Block);
     html! {
         @for (place, one) in blocks { section.card.block-files {
@@ -57,7 +57,7 @@ pub(super) fn pictures_part(visit: &Visit, heads: &[FileHeads], from: u64) -> Ma
 }
 
 /// Returns whether positions of a scan are known, so that there is a picture of it.
-fn has_positions(one: &FileHeads) -> bool {
+fn has_positions(one: &FileHeaders) -> bool {
     one.scan.as_ref().is_ok_and(|scan| scan.sides.is_some())
 }
 
@@ -77,7 +77,7 @@ fn picture(visit: &Visit, picture: ImportPicture, place: u64, name: &str) -> Mar
 }
 
 /// Says how many characters the labels of a page have, or why they cannot be used.
-fn labels_text(visit: &Visit, one: &FileHeads) -> Markup {
+fn labels_text(visit: &Visit, one: &FileHeaders) -> Markup {
     html! {
         @match &one.labels {
             Some(Ok((count, format))) => {

@@ -31,7 +31,7 @@ mod home;
 mod import_choice;
 mod import_columns;
 mod import_files;
-mod import_heads;
+mod import_headers;
 mod import_page;
 mod import_partners;
 mod import_pictures;

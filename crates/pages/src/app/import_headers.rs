@@ -1,4 +1,4 @@
-//! Looks at the files of an import before anything is stored: what each says of itself, or why it cannot be used.
+//! Inspects the files of an import before anything is stored: what each says of itself, or why it cannot be used.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use mocban_core::mesh::MeshExtent;
 use mocban_lists::labels::{LabelFormat, Labels};
 use mocban_project::ProjectError;
 use mocban_project::error::TaskStopped;
-use mocban_project::file_heads::{ScanKind, image_size, page_labels, scan_extent};
+use mocban_project::file_headers::{ScanKind, image_size, page_labels, scan_extent};
 use mocban_project::input_paths::find_on_disk;
 use mocban_project::location::Location;
 use mocban_store::Project;
@@ -38,7 +38,7 @@ pub(super) struct PlannedFiles {
 
 /// What the files of a pair or of a block say of themselves.
 #[derive(Debug)]
-pub(super) struct FileHeads {
+pub(super) struct FileHeaders {
     pub(super) files: PlannedFiles,
     pub(super) scan: Result<MeshExtent, UnreadFile>,
     /// Width and height in pixels.
@@ -221,10 +221,10 @@ impl FilePlaces {
     }
 }
 
-/// What was looked at for a request.
+/// What was inspected for a request.
 #[derive(Debug, Default)]
-pub(super) struct LookedAtFiles {
-    pub(super) heads: Vec<FileHeads>,
+pub(super) struct InspectedFiles {
+    pub(super) headers: Vec<FileHeaders>,
     /// Number of pairs or blocks that the request asked for.
     pub(super) asked: usize,
     /// Number of pairs or blocks whose files can be looked at.
@@ -233,21 +233,21 @@ pub(super) struct LookedAtFiles {
     pub(super) total: u64,
 }
 
-/// Looks at the files of up to `most` pairs or blocks from a position on. If that takes longer than `time`, looks at fewer, but
+/// Inspects the files of up to `most` pairs or blocks from a position on. If that takes longer than `time`, inspects fewer, but
 /// at least at those of one. Ends when the caller leaves.
-pub(super) async fn look(
+pub(super) async fn inspect(
     state: &Arc<AppState>,
     chosen: ImportChoice,
     from: u64,
     most: usize,
     time: Duration,
-) -> AppResult<LookedAtFiles> {
+) -> AppResult<InspectedFiles> {
     let state = Arc::clone(state);
     let token = CancelToken::default();
     let _leaves = CancelGuard(token.clone());
     let work = move || {
         token
-            .run(|| looked_at(&state, &chosen, (from, most), time))
+            .run(|| inspected(&state, &chosen, (from, most), time))
             .ok()
     };
     let done = spawn_blocking(work).await;
@@ -256,30 +256,30 @@ pub(super) async fn look(
     Ok(done.unwrap_or_default())
 }
 
-fn looked_at(
+fn inspected(
     state: &AppState,
     chosen: &ImportChoice,
     (from, most): (u64, usize),
     time: Duration,
-) -> LookedAtFiles {
+) -> InspectedFiles {
     let folder = &state.options.folder;
     let places = FilePlaces::new(chosen, folder);
     let limits = chosen.limits(folder);
     let Some(part) = chosen.planned_files(state, &places, from, most) else {
-        return LookedAtFiles::default();
+        return InspectedFiles::default();
     };
     let asked = part.files.len();
     let until = Instant::now() + time;
-    let mut heads = Vec::new();
+    let mut headers = Vec::new();
     for files in part.files {
         poll();
-        if !heads.is_empty() && Instant::now() >= until {
+        if !headers.is_empty() && Instant::now() >= until {
             break;
         }
-        heads.push(files.look(&places, &limits));
+        headers.push(files.inspect(&places, &limits));
     }
-    LookedAtFiles {
-        heads,
+    InspectedFiles {
+        headers,
         asked,
         most: part.most,
         total: part.total,
@@ -287,7 +287,7 @@ fn looked_at(
 }
 
 impl PlannedFiles {
-    fn look(self, places: &FilePlaces, limits: &InputLimits) -> FileHeads {
+    fn inspect(self, places: &FilePlaces, limits: &InputLimits) -> FileHeaders {
         let unusable = |why: String| UnreadFile::of_program(&why);
         let scan = places.allowed(&self.scan);
         let scan = scan.and_then(|path| scan_extent(&path, &limits.mesh).map_err(unusable));
@@ -298,7 +298,7 @@ impl PlannedFiles {
             let found = self.boxes(labels, *size, places);
             found.map(|found| (found.boxes.len() as u64, found.format))
         });
-        FileHeads {
+        FileHeaders {
             scan,
             print,
             labels,
