@@ -155,7 +155,7 @@ pub fn page_labels(file: &Path, page: &Path, [width, height]: [u32; 2]) -> Resul
 
 #[cfg(test)]
 mod tests {
-    use super::{ScanKind, UnitOrigin, image_size, scan_extent, scan_points};
+    use super::{ScanKind, UnitOrigin, image_size, page_labels, scan_extent, scan_points};
     use mocban_core::domain::LengthUnit;
     use mocban_core::mesh::{MeshExtent, MeshLimits};
     use mocban_core::raster::{Grid, ImageLimits, jpeg_rgb8};
@@ -240,5 +240,20 @@ mod tests {
         std::fs::write(&path, text).expect("written");
         let points = scan_points(&path, &MeshLimits::SUGGESTED).expect("points");
         assert_eq!(points, [[0.0; 3], [0.25, 0.125, 1.0]]);
+    }
+
+    #[test]
+    fn labels_are_read_for_the_upright_page_by_its_name_in_a_list() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let labels = dir.path().join("labels.json");
+        let text = r#"{"images":[{"id":1,"width":80,"height":120,"file_name":"p.jpg"}],"categories":[{"id":1,"name":"x"}],
+            "annotations":[{"id":1,"image_id":1,"category_id":1,"bbox":[10,10,30,30],"segmentation":[],"area":900,"iscrowd":0}]}"#;
+        std::fs::write(&labels, text).expect("written");
+        let count = |size| {
+            let found = page_labels(&labels, &dir.path().join("p.jpg"), size);
+            found.map(|found| found.boxes.len())
+        };
+        assert_eq!(count([80, 120]), Ok(1));
+        count([120, 80]).expect_err("turned");
     }
 }
