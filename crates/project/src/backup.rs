@@ -1,14 +1,17 @@
-//! Copies catalog, verdicts and settings to one file. The copy is consistent even during a run.
+//! Copies catalog, verdicts and settings to one file, and scans and prints to a folder beside it. The copy is consistent even
+//! during a run.
 
 use std::fs::Metadata;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use crate::error::{ProjectError, ProjectResult, WithContext as _};
+use crate::backup_inputs::{InputSaver, SavedInputs};
+use crate::error::{ProjectError, ProjectResult, TaskStopped, WithContext as _};
 
 use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
+use crate::input_list::inputs_folder;
 use crate::location::Location;
 use crate::own_files::project_role;
 use mocban_catalog::Catalog;
@@ -18,7 +21,7 @@ use mocban_store::{
 use mocban_system::platform::stat;
 
 /// What a backup holds.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Backup {
     /// Its length.
     pub bytes: u64,
@@ -26,15 +29,22 @@ pub struct Backup {
     pub pairs: u64,
     /// Number of verdicts.
     pub verdicts: u64,
+    /// Scans and prints beside it, if they were asked for.
+    pub inputs: Option<SavedInputs>,
 }
 
-/// Writes a backup of a project. An existing backup is replaced only when the new one is complete.
+/// Writes a backup of a project, and if asked for its scans and prints to a folder beside it. An existing backup is replaced
+/// only when the new one is complete. Scans and prints are copied after that, so that a disk that fails costs no backup.
+///
+/// # Errors
+/// Refuses a place that something else has, and a disk without room for scans and prints, before anything is written.
 pub async fn backup(
     file: &Path,
+    with_inputs: bool,
     location: &Location,
     listener: &dyn Listener,
 ) -> ProjectResult<Backup> {
-    let _work = LongWork::begin(listener, "copying the catalog");
+    let work = LongWork::begin(listener, "copying the catalog");
     let (project, catalog) = location.open_read_only().await?;
     let shown = file.display();
     let failed = || format!("cannot write the backup {shown}");
@@ -48,14 +58,37 @@ pub async fn backup(
     copied.with_context(failed)?;
     catalog.close().await;
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
+    let saver = if with_inputs {
+        let saver = InputSaver::plan(&copy, &project, inputs_folder(file)).await?;
+        let copier = saver.begin()?;
+        Some((saver, copier))
+    } else {
+        None
+    };
     // Somebody may have created the file in the meantime.
     check_target(file, &project)?;
     rename_into_place(&copy, file).with_context(failed)?;
     let bytes = std::fs::metadata(file).with_context(failed)?.len();
+    // A folder that a kill leaves from here on is that of the scans and prints.
+    drop(staging);
+    drop(work);
+    let inputs = match saver {
+        None => None,
+        Some((saver, copier)) => {
+            let _work = LongWork::begin(listener, "copying the scans and prints");
+            let save = move || saver.save(&copier);
+            let saved = tokio::task::spawn_blocking(save).await;
+            let saved = saved.map_err(TaskStopped)?;
+            Some(saved.with_context(|| {
+                format!("the backup {shown} is complete, but not its scans and prints")
+            })?)
+        }
+    };
     Ok(Backup {
         bytes,
         pairs,
         verdicts,
+        inputs,
     })
 }
 

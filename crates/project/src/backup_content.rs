@@ -5,13 +5,14 @@ use std::time::UNIX_EPOCH;
 
 use crate::backup::rows_of;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
+use crate::input_list::{InputCopies, copies_beside};
 use crate::missing_inputs::{self, InputInspection};
 use crate::restore::check_backup;
 use mocban_catalog::Catalog;
 use mocban_core::domain::UnixMillis;
 use mocban_store::Project;
 
-/// What a backup holds. Scans, prints and artifacts are in no backup.
+/// What a backup holds. Scans and prints may be beside it; artifacts are in no backup.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BackupContent {
     /// Its length.
@@ -26,7 +27,9 @@ pub struct BackupContent {
     pub blocks: u64,
     /// Number of verdicts.
     pub verdicts: u64,
-    /// Scans and prints that a project in the new folder would not find, among a few.
+    /// Scans and prints beside it, which a restore copies.
+    pub copies: Option<InputCopies>,
+    /// Without copies, scans and prints that a project in the new folder would not find, among a few.
     pub inputs: InputInspection,
 }
 
@@ -38,12 +41,16 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
     check_backup(backup)?;
     let meta = std::fs::metadata(backup);
     let meta = meta.with_context(|| format!("cannot read {}", backup.display()))?;
+    let copies = copies_beside(backup)?;
     let catalog = Catalog::open_backup(backup).await?;
     let read = async {
         let (pairs, verdicts) = rows_of(&catalog).await?;
         let blocks = catalog.count_blocks().await?;
         let last_activity = catalog.last_activity().await?;
-        let inputs = missing_inputs::inspect(&Project::at(dir), &catalog, pairs).await?;
+        let inputs = match copies {
+            Some(_) => InputInspection::default(),
+            None => missing_inputs::inspect(&Project::at(dir), &catalog, pairs).await?,
+        };
         Ok::<_, ProjectError>(BackupContent {
             bytes: meta.len(),
             written: written(&meta),
@@ -51,6 +58,7 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
             pairs,
             blocks,
             verdicts,
+            copies,
             inputs,
         })
     };

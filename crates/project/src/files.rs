@@ -6,6 +6,7 @@ use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
+use super::input_list::is_inputs_folder;
 use super::input_paths::in_existing_form;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use mocban_core::domain::{ErrorCode, FileKind, pointer_of, sanitize};
@@ -220,8 +221,8 @@ pub fn or_elsewhere(written: ProjectResult<()>, named: Option<&Path>) -> Project
     }
 }
 
-/// Lists the files of a directory and of the folders in it. Leaves out hidden folders, links to folders, exports, and
-/// the folder of results of a project.
+/// Lists the files of a directory and of the folders in it. Leaves out hidden folders, links to folders, exports, scans and
+/// prints of backups, and the folder of results of a project.
 pub fn list_below(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
     let (mut files, mut folders) = (Vec::new(), vec![dir.to_owned()]);
     while let Some(folder) = folders.pop() {
@@ -233,7 +234,7 @@ pub fn list_below(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
         };
         let results = Project::at(&folder).artifacts_dir();
         let is_project = folder.join(CATALOG_FILE).exists();
-        if folder != dir && folder.join(EXPORT_MANIFEST).exists() {
+        if folder != dir && (folder.join(EXPORT_MANIFEST).exists() || is_inputs_folder(&folder)) {
             continue;
         }
         for entry in std::fs::read_dir(&folder).map_err(refuse)? {

@@ -13,7 +13,7 @@
 //! - [`change_setting`]: changes a setting, after saying what that costs
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database;
-//!   [`backup_content`]: what such a file holds
+//!   [`backup_content`]: what such a file holds; [`backup_inputs`], [`input_list`]: scans and prints beside it
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`], [`generated_folder`]: what may be replaced
 //! - [`events`]: what a function reports while it works
@@ -31,8 +31,10 @@
 pub mod align;
 pub mod backup;
 pub mod backup_content;
+pub mod backup_inputs;
 mod block_files;
 pub mod block_status;
+pub mod byte_size;
 pub mod change_setting;
 pub mod check;
 pub mod closing;
@@ -52,6 +54,9 @@ pub mod hosts;
 pub mod import_blocks;
 pub mod import_pairs;
 pub mod import_plan;
+mod input_copy;
+pub mod input_list;
+mod input_names;
 pub mod input_paths;
 pub mod location;
 pub mod manifest_file;
@@ -64,6 +69,7 @@ pub mod pair_table;
 mod repeated_files;
 pub mod report;
 pub mod restore;
+mod restore_inputs;
 pub mod retire;
 pub mod retry;
 pub mod reviewers;
@@ -81,6 +87,7 @@ mod verdict_json;
 pub mod verdict_row;
 pub mod verdict_words;
 pub mod verdicts;
+mod wanted_inputs;
 pub mod worker_totals;
 
 pub use error::{ProjectError, ProjectResult};

@@ -3,20 +3,21 @@
 use std::ffi::OsStr;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
 
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use crate::backup::count_rows;
-use crate::events::{Listener, LongWork};
+use crate::backup_inputs::{check_room, free_beside};
+use crate::events::{Listener, LongWork, warn};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
+use crate::input_list::{InputCopies, has_list, inputs_folder};
 use crate::location::Location;
 use crate::missing_inputs::{self, MissingInputs};
 use crate::new_project::check_new_folder;
-use mocban_catalog::{Catalog, RetrySelection};
+use crate::restore_inputs::{ListedCopies, ProjectCopies, finder_in, locate_inputs};
+use mocban_catalog::Catalog;
 use mocban_config::{LocalSettings, make_local};
-use mocban_core::domain::FailureClass;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, place_new_file, write_synced,
 };
@@ -28,7 +29,8 @@ pub struct RestoreRequest {
     pub backup: PathBuf,
     /// The project folder to create; it may hold meshes and prints already.
     pub dir: PathBuf,
-    /// A folder where meshes and prints are looked for that are no longer at their old places.
+    /// A folder where meshes and prints are looked for that are no longer at their old places. `None` to copy those beside
+    /// the backup into the project, if there are any.
     pub inputs: Option<PathBuf>,
 }
 
@@ -41,9 +43,13 @@ pub struct Restored {
     pub verdicts: u64,
     /// Settings of the backup, made local.
     pub settings: Option<LocalSettings>,
-    /// Paths of meshes and prints that `--inputs` did not find.
+    /// Scans and prints that are now in the project, and the folder beside the backup that they were copied from.
+    pub copied: Option<InputCopies>,
+    /// The folder of the project that they were copied to; `None` if the project had all of them.
+    pub copied_to: Option<PathBuf>,
+    /// Paths of meshes and prints that neither `--inputs` nor the folder beside the backup has.
     pub missing: Vec<String>,
-    /// Without `--inputs`, files that are not at their old places.
+    /// Without such a folder, files that are not at their old places.
     pub not_in_place: Option<MissingInputs>,
 }
 
@@ -70,9 +76,18 @@ pub async fn restore(
     check_directory(&Project::at(dir))?;
     check_new_folder(dir)?;
     location.at(dir).require_local("the restored project")?;
+    let copies = match inputs {
+        Some(_) => None,
+        None => ListedCopies::beside(backup)?,
+    };
+    match &copies {
+        Some(copies) => check_room(copies.bytes(), free_beside(dir), dir)?,
+        None => warn_about_unlisted(backup, inputs.as_deref(), listener),
+    }
+    let is_copied = copies.is_some();
     let existed = dir.exists();
-    let mut restored = restore_into(backup, dir, inputs.as_deref()).await;
-    if let (Ok(restored), None) = (&mut restored, inputs) {
+    let mut restored = restore_into(backup, dir, inputs.as_deref(), copies).await;
+    if let (Ok(restored), None, false) = (&mut restored, inputs, is_copied) {
         // The project is there already, so what cannot be looked up is no error.
         if let Ok((project, catalog)) = location.at(dir).open_read_only().await {
             let missing = missing_inputs::missing(&project, &catalog, restored.pairs).await;
@@ -97,21 +112,43 @@ pub fn is_free(dir: &Path) -> ProjectResult<bool> {
         entries => entries.with_context(failed)?,
     };
     for entry in entries {
-        if !is_left_over(&entry.with_context(failed)?.file_name()) {
+        let entry = entry.with_context(failed)?;
+        if !is_left_over(&entry.file_name()) && !has_list(&entry.path()) {
             return Ok(false);
         }
     }
     Ok(true)
 }
 
-/// Returns whether an interrupted restore leaves an entry with this name: settings, or what is written beside the catalog.
+/// Returns whether an interrupted restore leaves an entry with this name: settings, or what is written beside the catalog or
+/// a folder of copies.
 fn is_left_over(name: &OsStr) -> bool {
     let beside = format!(".{CATALOG_FILE}.");
-    name == SETTINGS_FILE || name.as_encoded_bytes().starts_with(beside.as_bytes())
+    let name_bytes = name.as_encoded_bytes();
+    let is_new_folder =
+        name_bytes.starts_with(b".new.") && name_bytes.ends_with(b".mocban-partial");
+    name == SETTINGS_FILE || name_bytes.starts_with(beside.as_bytes()) || is_new_folder
+}
+
+/// Warns about a folder beside the backup whose files are not used, because nothing says which files they are.
+fn warn_about_unlisted(backup: &Path, inputs: Option<&Path>, listener: &dyn Listener) {
+    let folder = inputs_folder(backup);
+    if inputs.is_none() && folder.is_dir() {
+        let shown = folder.display();
+        let text = format!(
+            "{shown} has no list of scans and prints, so it is not used; `backup --with-inputs` completes it, or name it with --inputs"
+        );
+        warn(listener, text);
+    }
 }
 
 /// Creates the project. The catalog comes last: a directory without a catalog is no project.
-async fn restore_into(backup: &Path, dir: &Path, inputs: Option<&Path>) -> ProjectResult<Restored> {
+async fn restore_into(
+    backup: &Path,
+    dir: &Path,
+    inputs: Option<&Path>,
+    copies: Option<ListedCopies>,
+) -> ProjectResult<Restored> {
     let failed = || format!("cannot restore {} to {}", backup.display(), dir.display());
     let project = Project::create(dir).with_context(failed)?;
     let catalog = project.catalog_path();
@@ -121,19 +158,49 @@ async fn restore_into(backup: &Path, dir: &Path, inputs: Option<&Path>) -> Proje
     let settings = Catalog::restore_backup(backup, &new)
         .await
         .with_context(failed)?;
-    let missing = match inputs {
-        None => Vec::new(),
-        Some(inputs) => {
-            let located = locate_inputs(&project, &new, inputs).await;
-            located.map_err(|error| ProjectError::unexpected(error.text(staging.path())))?
-        }
+    let copied = match copies {
+        None => None,
+        Some(copies) => Some(copies.copy_to(&project, &new).await.with_context(failed)?),
     };
+    let placed = place_project(
+        &project,
+        &staging,
+        inputs,
+        copied.as_ref(),
+        settings,
+        &failed,
+    );
+    let placed = placed.await;
+    if placed.is_err()
+        && let Some(copied) = &copied
+    {
+        copied.remove();
+    }
+    placed
+}
+
+/// Gives a project the catalog in a staging folder, after its inputs were located. `failed` says what failed.
+async fn place_project(
+    project: &Project,
+    staging: &StagingFolder,
+    inputs: Option<&Path>,
+    copied: Option<&ProjectCopies>,
+    settings: Option<Vec<u8>>,
+    failed: &dyn Fn() -> String,
+) -> ProjectResult<Restored> {
+    let (catalog, new) = (project.catalog_path(), staging.path().join(CATALOG_FILE));
+    let located = match (copied, inputs) {
+        (Some(copied), _) => locate_inputs(&new, copied.finder(project)).await,
+        (None, Some(inputs)) => locate_inputs(&new, finder_in(project, inputs)?).await,
+        (None, None) => Ok(Vec::new()),
+    };
+    let missing = located.map_err(|error| ProjectError::unexpected(error.text(staging.path())))?;
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
-    check_directory(&project)?;
+    check_directory(project)?;
     let settings = settings.as_deref().map(make_local);
     let wrote_settings = match &settings {
         Some(settings) => {
-            write_settings(&project, &settings.text, staging.path()).with_context(failed)?
+            write_settings(project, &settings.text, staging.path()).with_context(failed)?
         }
         None => false,
     };
@@ -142,52 +209,17 @@ async fn restore_into(backup: &Path, dir: &Path, inputs: Option<&Path>) -> Proje
         if wrote_settings {
             let _ = std::fs::remove_file(project.settings_path());
         }
-        return Err(is_project_already(&project));
+        return Err(is_project_already(project));
     }
     Ok(Restored {
         pairs,
         verdicts,
         settings,
+        copied: copied.map(|copied| copied.copies.clone()),
+        copied_to: copied.and_then(ProjectCopies::place).map(Path::to_owned),
         missing,
         not_in_place: None,
     })
-}
-
-/// Changes the paths of meshes and prints that exist below `inputs` and not at their old places. Returns the paths of
-/// missing meshes and prints. A file that cannot be looked up is an error, because it may not be missing.
-async fn locate_inputs(project: &Project, new: &Path, inputs: &Path) -> ProjectResult<Vec<String>> {
-    let catalog = Catalog::open(new).await?;
-    let (project, inputs) = (project.clone(), inputs.to_owned());
-    let unreadable = Arc::new(OnceLock::new());
-    let first_unreadable = Arc::clone(&unreadable);
-    let replaced = catalog.replace_input_paths(move |stored| {
-        if project.input(stored).exists() {
-            return Some(stored.to_owned());
-        }
-        project.find_input(stored, &inputs).unwrap_or_else(|error| {
-            let _ = first_unreadable.set(error);
-            None
-        })
-    });
-    let missing = replaced.await;
-    if missing.is_ok() {
-        // What failed because a file was not there runs again with the file at its new place.
-        let unread = FailureClass::Io;
-        let (pairs, blocks) = (RetrySelection::Class(unread), RetrySelection::Class(unread));
-        catalog.retry_pairs_and_blocks(&pairs, &blocks).await?;
-    }
-    catalog.close().await;
-    if let Some(error) = unreadable.get() {
-        let text = format!("cannot look for a mesh or print: {error}");
-        return Err(ProjectError::unexpected(text));
-    }
-    // Changes that are still in the write-ahead log would be lost when the file is renamed.
-    let log = metadata(&new.with_file_name(format!("{CATALOG_FILE}-wal")))?;
-    if log.is_some_and(|log| log.len() > 0) {
-        let text = "the disk is full or reported an error";
-        return Err(ProjectError::unexpected(text));
-    }
-    Ok(missing?)
 }
 
 /// Writes the settings file of a project. An equal file may exist: a restore that was killed has written it. Returns
@@ -277,6 +309,10 @@ mod tests {
         let left = new.join(".catalog.sqlite.12-0.mocban-partial");
         std::fs::create_dir_all(left).expect("a folder");
         std::fs::write(new.join("mocban.toml"), "").expect("written");
+        std::fs::create_dir(new.join(".new.12-0.mocban-partial")).expect("a folder");
+        std::fs::create_dir(new.join("inputs")).expect("a folder");
+        assert!(!is_free(&new).expect("listed"), "a folder of somebody");
+        std::fs::write(new.join("inputs/mocban-inputs.json"), "").expect("written");
         assert!(is_free(&new).expect("listed"), "of an interrupted restore");
         std::fs::write(new.join("scan.stl"), "").expect("written");
         assert!(!is_free(&new).expect("listed"));

@@ -52,6 +52,14 @@ impl Input {
         &self.path
     }
 
+    /// Returns whether it is in an object store.
+    pub const fn is_remote(&self) -> bool {
+        match &self.place {
+            InputLocation::File | InputLocation::SharedFile => false,
+            InputLocation::Object(_) | InputLocation::Artifact(..) => true,
+        }
+    }
+
     /// Returns its length in bytes, or 0 if it cannot be read.
     pub fn size(&self) -> u64 {
         match &self.place {
@@ -190,6 +198,7 @@ mod tests {
         bucket.put("a/1.obj", b"v 0 0 0");
         let input = project.input("scans:a/1.obj");
         assert!(input.exists() && !project.input("scans:a/2.obj").exists());
+        assert!(input.is_remote() && !project.input("a/1.obj").is_remote());
         assert_eq!(input.size(), 7);
         let read = read_input(&input, 100, "x").expect("read");
         assert_eq!(&read.bytes[..], b"v 0 0 0");

@@ -1,6 +1,6 @@
 //! `restore`: makes a project of a backup.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -8,7 +8,8 @@ use serde_json::json;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use crate::cli::output::terminal::Terminal;
-use mocban_project::restore::{self, RestoreRequest};
+use mocban_project::byte_size::byte_size;
+use mocban_project::restore::{self, RestoreRequest, Restored};
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_store::SETTINGS_FILE;
 
@@ -19,7 +20,8 @@ pub(crate) struct RestoreArgs {
     pub(crate) backup: PathBuf,
     /// The project directory to create; it may hold meshes and prints already
     pub(crate) dir: PathBuf,
-    /// A directory where meshes and prints are looked for that are no longer at their old places
+    /// A directory where meshes and prints are looked for that are no longer at their old places. Without it, those beside
+    /// the backup (BACKUP.inputs) are copied into the project
     #[arg(long, value_name = "DIR")]
     pub(crate) inputs: Option<PathBuf>,
 }
@@ -34,27 +36,25 @@ pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResu
     let restored = restore::restore(&request, &context.location, &terminal).await?;
     let RestoreRequest { dir, inputs, .. } = request;
     let (pairs, verdicts) = (restored.pairs, restored.verdicts);
+    let copied = restored.copied.as_ref();
     context.print_json(&json!({
         "schema": 1, "project": dir, "pairs": pairs, "verdicts": verdicts,
         "settings": restored.settings.is_some(), "inputs_missing": restored.missing.len(),
+        "inputs_copied": copied.map(|copied| copied.files),
         "settings_removed": restored.settings.as_ref().map_or(&[][..], |settings| &settings.removed),
     }))?;
-    let places = match &inputs {
-        None => "their old places".to_owned(),
-        Some(inputs) => format!("their old places or in {}", inputs.display()),
-    };
+    let (pairs, verdicts) = (count(pairs, "pair"), count(verdicts, "verdict"));
+    let shown = dir.display();
+    let inputs_text = inputs_text(&restored, inputs.as_deref());
     context.info(&format!(
-        "{} and {} restored to {}; a backup has no scans, prints, depth maps and masks: put scans and prints at {places}, \
-         and the next two commands compute the rest again",
-        count(pairs, "pair"),
-        count(verdicts, "verdict"),
-        dir.display(),
+        "{pairs} and {verdicts} restored to {shown}; {inputs_text}"
     ));
-    if let (Some(first), Some(inputs)) = (restored.missing.first(), &inputs) {
+    if let Some(first) = restored.missing.first() {
+        let missing = count(restored.missing.len() as u64, "path");
+        let folder = inputs.as_deref().or(copied.map(|copied| &*copied.folder));
+        let folder = folder.map_or_else(String::new, |folder| folder.display().to_string());
         context.warn(&format!(
-            "{} neither at the old place nor in {}, first {first}; put meshes and prints there before `check --repair --accept-missing`",
-            count(restored.missing.len() as u64, "path"),
-            inputs.display()
+            "{missing} neither at the old place nor in {folder}, first {first}; put meshes and prints there before `check --repair --accept-missing`"
         ));
     }
     if let Some(missing) = &restored.not_in_place {
@@ -75,4 +75,30 @@ pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResu
     context.next("check --repair --accept-missing");
     context.next("run");
     Ok(ExitCode::Done)
+}
+
+/// Says where scans and prints are, or have to be put.
+fn inputs_text(restored: &Restored, inputs: Option<&Path>) -> String {
+    match (&restored.copied, &restored.copied_to) {
+        (Some(copied), Some(place)) => format!(
+            "{} of scans and prints, {}, copied from {} to {}, so the project does not need that folder; the next two commands compute depth maps and masks again",
+            count(copied.files, "file"),
+            byte_size(copied.bytes),
+            copied.folder.display(),
+            place.display()
+        ),
+        (Some(copied), None) => format!(
+            "nothing was copied from {}; the next two commands compute depth maps and masks again",
+            copied.folder.display()
+        ),
+        (None, _) => {
+            let places = match inputs {
+                None => "their old places".to_owned(),
+                Some(inputs) => format!("their old places or in {}", inputs.display()),
+            };
+            format!(
+                "a backup has no scans, prints, depth maps and masks: put scans and prints at {places}, and the next two commands compute the rest again"
+            )
+        }
+    }
 }

@@ -8,6 +8,7 @@ use super::projects::is_project;
 use super::sentence::Sentence;
 use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
+use mocban_project::input_list::is_inputs_folder;
 use mocban_store::{CATALOG_FILE, Project};
 
 /// Most entries of all folders that are counted for one page.
@@ -210,11 +211,13 @@ impl FileCounts {
     }
 }
 
-/// Returns whether a folder in another one has results of a project, or is an export.
+/// Returns whether a folder in another one has results of a project, is an export, or has the scans and prints of a backup.
 pub(super) fn holds_results(parent: &Path, folder: &Path) -> bool {
     let is_named_so =
         folder == exports_dir(parent) || folder == Project::at(parent).artifacts_dir();
-    is_named_so && is_project(parent) || folder.join(EXPORT_MANIFEST).exists()
+    is_named_so && is_project(parent)
+        || folder.join(EXPORT_MANIFEST).exists()
+        || is_inputs_folder(folder)
 }
 
 /// Returns whether a file may be a backup by its name. The catalog of a project is none.

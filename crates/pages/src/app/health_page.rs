@@ -1,21 +1,21 @@
 //! The health of a project: whether files and rows are sound, and a backup.
 
+use std::path::Path as FilePath;
 use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::response::{Html, Response};
+use axum::response::Html;
 use maud::html;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
 
 use super::action_body::ActionBody;
-use super::attachment::attachment;
+use super::backup_card::{self, BACKUP, DOWNLOAD_BYTES};
 use super::components::{NavSection, action_form, frame, grouped};
-use super::failure::{AppFailure, AppResult};
+use super::failure::AppResult;
 use super::home::free_space;
-use super::number_text::file_size;
 use super::projects::is_project;
 use super::restore_page::restore_address;
 use super::sentence::Sentence;
@@ -23,20 +23,15 @@ use super::state::AppState;
 use super::task_part::task_part;
 use super::tasks::{FinishedTask, TaskKind, TaskState};
 use super::visit::Visit;
-use crate::review::Language;
 use mocban_core::domain::one_line;
 use mocban_project::ProjectResult;
-use mocban_project::backup::backup;
 use mocban_project::check::check;
+use mocban_project::input_list::unfinished_copies;
 use mocban_project::location::Location;
 use mocban_runner::check::{CheckOptions, CheckSummary, Kind};
 use mocban_store::StagingFolder;
 use mocban_system::platform;
 
-/// Path of the backup in a project.
-const BACKUP: &str = "backups/backup.sqlite";
-/// Largest backup that is offered for download, bytes.
-const DOWNLOAD_BYTES: u64 = 256 << 20;
 /// Most findings of each kind that are shown.
 const SHOWN: usize = 3;
 
@@ -52,12 +47,8 @@ pub(super) async fn page(
     let file = open.dir.join(BACKUP);
     if stored.is_none() {
         let file = file.clone();
-        let removed = spawn_blocking(move || StagingFolder::remove_stale(&file)).await;
-        if removed.unwrap_or(0) > 0 {
-            let why = Sentence::new(
-                "the program ended before the last backup was done, so an earlier one is kept: press Back up now again",
-                "chương trình dừng trước khi sao lưu xong nên bản trước được giữ lại: hãy bấm Sao lưu ngay lần nữa",
-            );
+        let why = spawn_blocking(move || interrupted(&file)).await;
+        if let Some(why) = why.ok().flatten() {
             stored = Some(state.tasks.note_failure(TaskKind::Backup, &open.key, why));
         }
     }
@@ -78,24 +69,43 @@ pub(super) async fn page(
                 }))
                 (task_part(&visit, checked.as_ref()))
             }
-            section.card {
-                h2 { (visit.t("Backup", "Sao lưu")) }
-                p { (visit.t("One file with pairs, results, verdicts and settings, also during a run. Scans, prints and pictures are not in it. Copy it to another disk.", "Một tệp gồm các cặp, kết quả, đánh giá và thiết lập, kể cả khi đang chạy. Không gồm bản quét, bản in và hình ảnh. Hãy chép sang ổ đĩa khác.")) }
-                (action_form("actions/backup", "inline", &html! { button #backup { (visit.t("Back up now", "Sao lưu ngay")) } }))
-                (task_part(&visit, stored.as_ref()))
-                @if let Some(meta) = meta {
-                    p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (visit.file_size(meta.len())) } " "
-                        @if meta.len() <= DOWNLOAD_BYTES { a.button href="backup.sqlite" download { (visit.t("Save a copy", "Lưu một bản")) } }
-                        @if !is_project(&state.options.folder) {
-                            " " a.button href={ (visit.root) (restore_address(&shown)) } { (visit.t("Restore as a new project", "Khôi phục thành dự án mới")) }
+            @if stored.is_some() || meta.is_some() {
+                section.card {
+                    h2 { (visit.t("Last backup", "Bản sao lưu gần nhất")) }
+                    (task_part(&visit, stored.as_ref()))
+                    @if let Some(meta) = meta {
+                        p { code { (one_line(&shown.to_string_lossy())) } " " span.muted { (visit.file_size(meta.len())) } " "
+                            @if meta.len() <= DOWNLOAD_BYTES { a.button href="backup.sqlite" download { (visit.t("Save a copy", "Lưu một bản")) } }
+                            @if !is_project(&state.options.folder) {
+                                " " a.button href={ (visit.root) (restore_address(&shown)) } { (visit.t("Restore as a new project", "Khôi phục thành dự án mới")) }
+                            }
                         }
                     }
                 }
             }
         }
+        // Outside of the part that is renewed, so that the choice and the size stay.
+        (backup_card::card(&visit))
     };
     let title = visit.t("Health", "Tình trạng");
     Ok(frame(&visit, title, Some(&key), NavSection::Health, &body))
+}
+
+/// Removes what an interrupted backup left, and says that it was interrupted.
+fn interrupted(file: &FilePath) -> Option<Sentence> {
+    let was_copying = unfinished_copies(file) > 0;
+    if StagingFolder::remove_stale(file) > 0 {
+        return Some(Sentence::new(
+            "the program ended before the last backup was done, so an earlier one is kept: press Back up now again",
+            "chương trình dừng trước khi sao lưu xong nên bản trước được giữ lại: hãy bấm Sao lưu ngay lần nữa",
+        ));
+    }
+    was_copying.then(|| {
+        Sentence::new(
+            "the program ended before all scans and prints were copied: press Back up now again, and it goes on with the others",
+            "chương trình dừng trước khi chép xong bản quét và bản in: hãy bấm Sao lưu ngay lần nữa để chép tiếp",
+        )
+    })
 }
 
 /// Starts a check.
@@ -240,46 +250,4 @@ const fn vietnamese_heading(kind: Kind) -> &'static str {
         Kind::FileChanged => "tệp bị đổi",
         Kind::FileUnreadable => "tệp không đọc được",
     }
-}
-
-/// Starts a backup.
-pub(super) async fn start_backup(
-    State(state): State<Arc<AppState>>,
-    Path(key): Path<String>,
-) -> AppResult<Json<Value>> {
-    let open = state.open(&key).await?;
-    state.tasks.start(TaskKind::Backup, &open, backup_lines)?;
-    Ok(Json(json!({ "reload": true })))
-}
-
-async fn backup_lines(location: Location) -> ProjectResult<FinishedTask> {
-    let stored = backup(&location.dir.join(BACKUP), &location, &()).await?;
-    let [pairs, verdicts] = [stored.pairs, stored.verdicts].map(grouped);
-    let [english, vietnamese] =
-        [Language::English, Language::Vietnamese].map(|language| file_size(language, stored.bytes));
-    Ok(FinishedTask {
-        lines: vec![[
-            format!("{pairs} pairs and {verdicts} verdicts are in the backup ({english})."),
-            format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({vietnamese})."),
-        ]],
-        is_warning: false,
-        lacks_most_files: false,
-    })
-}
-
-/// Responds with the backup.
-pub(super) async fn download(
-    State(state): State<Arc<AppState>>,
-    Path(key): Path<String>,
-) -> AppResult<Response> {
-    let open = state.open(&key).await?;
-    let file = open.dir.join(BACKUP);
-    let read = move || {
-        let length = std::fs::metadata(&file).ok()?.len();
-        (length <= DOWNLOAD_BYTES).then(|| std::fs::read(&file).ok())?
-    };
-    let read = tokio::task::spawn_blocking(read).await.ok().flatten();
-    let bytes = read.ok_or_else(AppFailure::not_found)?;
-    let name = format!("{}.sqlite", key.replace('/', "-"));
-    Ok(attachment(&name, "application/vnd.sqlite3", bytes))
 }

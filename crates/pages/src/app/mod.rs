@@ -8,6 +8,7 @@ mod action_body;
 mod address;
 mod assets;
 mod attachment;
+mod backup_card;
 mod backup_files;
 mod block_page;
 mod blocks_page;

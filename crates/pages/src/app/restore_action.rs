@@ -25,6 +25,7 @@ use mocban_core::domain::{ErrorCode, one_line};
 use mocban_project::check::check;
 use mocban_project::error::TaskStopped;
 use mocban_project::files::is_backup;
+use mocban_project::input_list::copies_beside;
 use mocban_project::location::Location;
 use mocban_project::restore::{RestoreRequest, Restored, is_free, restore};
 use mocban_project::{ProjectError, ProjectResult};
@@ -89,12 +90,20 @@ fn request(folder: &Path, name: &str, body: &RestoreBackupBody) -> AppResult<Res
             format!("đã có thư mục {name:?}: hãy đặt tên khác cho dự án mới"),
         )));
     }
+    let inputs = inputs.transpose()?;
     let bytes = std::fs::metadata(&backup).map_or(0, |meta| meta.len());
-    check_room(folder, bytes).map_err(AppFailure::refused)?;
+    let copies = match inputs {
+        Some(_) => None,
+        None => copies_beside(&backup).map_err(|error| {
+            AppFailure::refused(restore_sentence(&error, &backup, folder, name))
+        })?,
+    };
+    let copied = copies.map_or(0, |copies| copies.bytes);
+    check_room(folder, bytes, copied).map_err(AppFailure::refused)?;
     Ok(RestoreRequest {
         backup,
         dir,
-        inputs: inputs.transpose()?,
+        inputs,
     })
 }
 
@@ -114,13 +123,13 @@ pub(super) fn check_backup_file(backup: &Path) -> AppResult<()> {
     )))
 }
 
-/// Refuses a backup for which the disk has no room.
+/// Refuses a backup for which the disk has no room. `copied` is the length of the scans and prints that are copied.
 ///
 /// # Errors
 /// Returns the reason.
-pub(super) fn check_room(folder: &Path, bytes: u64) -> Result<(), Sentence> {
+pub(super) fn check_room(folder: &Path, bytes: u64, copied: u64) -> Result<(), Sentence> {
     // Paths of files are changed in a copy, whose log may become as long as it.
-    let needed = bytes.saturating_mul(2);
+    let needed = bytes.saturating_mul(2).saturating_add(copied);
     let free = match platform::free_bytes(folder) {
         Some(free) if free < needed => free,
         _ => return Ok(()),
@@ -218,6 +227,17 @@ fn finished(
             "Đã khôi phục {pairs} cặp và {verdicts} đánh giá. Bản sao lưu không có bản đồ độ sâu và mặt nạ: hãy bấm Căn chỉnh ở trang Căn chỉnh để tính lại."
         ),
     ]];
+    if let Some(copied) = &restored.copied
+        && copied.files > 0
+    {
+        let files = grouped(copied.files);
+        let [english, vietnamese] = [Language::English, Language::Vietnamese]
+            .map(|language| file_size(language, copied.bytes));
+        lines.push([
+            format!("{files} scans and prints ({english}) were copied into the project, which does not need the folder beside the backup."),
+            format!("Đã chép {files} bản quét và bản in ({vietnamese}) vào dự án nên dự án không cần thư mục bên cạnh bản sao lưu."),
+        ]);
+    }
     let missing = match (&restored.not_in_place, restored.missing.first()) {
         (Some(found), _) => Some((found.missing as u64, found.first.as_str())),
         (None, Some(first)) => Some((restored.missing.len() as u64, first.as_str())),
@@ -260,9 +280,12 @@ mod tests {
     #[test]
     fn a_backup_that_does_not_fit_the_disk_is_refused_in_both_languages() {
         let dir = tempfile::tempdir().expect("a temporary directory");
-        check_room(dir.path(), 0).expect("room for nothing");
-        if cfg!(unix) {
-            let why = check_room(dir.path(), u64::MAX / 2).expect_err("no disk is so large");
+        check_room(dir.path(), 0, 0).expect("room for nothing");
+        for (bytes, copied) in [(u64::MAX / 2, 0), (0, u64::MAX)] {
+            if !cfg!(unix) {
+                continue;
+            }
+            let why = check_room(dir.path(), bytes, copied).expect_err("no disk is so large");
             assert!(
                 why.text(Language::English).contains("the disk has"),
                 "{why:?}"

@@ -73,8 +73,11 @@ fn free_name(folder: &Path, backup: &Path) -> String {
 }
 
 fn content_part(visit: &Visit, folder: &Path, content: &BackupContent, name: &str) -> Markup {
-    let room = check_room(folder, content.bytes);
     let inputs = visit.query.get("inputs");
+    // A folder that was chosen is used instead of that beside the backup.
+    let copies = content.copies.as_ref().filter(|_| inputs.is_none());
+    let copied = copies.map_or(0, |copies| copies.bytes);
+    let room = check_room(folder, content.bytes, copied);
     html! {
         h2 { (visit.t("What is in the backup", "Bản sao lưu có gì")) }
         dl {
@@ -101,8 +104,19 @@ fn content_part(visit: &Visit, folder: &Path, content: &BackupContent, name: &st
     }
 }
 
-/// Says where scans and prints will be read, because a backup has none.
+/// Says where scans and prints will be read: copied from beside the backup, or at their places.
 fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> String {
+    let copies = content.copies.as_ref().filter(|_| inputs.is_none());
+    if let Some(copies) = copies {
+        let (files, size) = (grouped(copies.files), visit.file_size(copies.bytes));
+        let said = Sentence::new(
+            format!(
+                "Beside the backup: {files} files, {size}. They are copied into the new project."
+            ),
+            format!("Ở bên cạnh bản sao lưu: {files} tệp, {size}. Chúng được chép vào dự án mới."),
+        );
+        return said.text(visit.language).to_owned();
+    }
     let found = &content.inputs;
     let said = match (inputs, &found.missing) {
         (Some(inputs), _) => {

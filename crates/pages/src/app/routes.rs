@@ -7,11 +7,11 @@ use axum::{Router, middleware};
 
 use super::state::{AppOptions, AppState};
 use super::{
-    assets, block_page, blocks_page, chosen_pairs, export_page, export_zip, failure_page,
-    health_page, home, import_files, import_page, import_pictures, invitation_cards, last_import,
-    pair_page, pairs_page, paper_page, pictures, report_page, restore_action, restore_content,
-    restore_page, review_agreement, review_page, run_actions, run_page, settings_page,
-    upload_actions, view_bar,
+    assets, backup_card, block_page, blocks_page, chosen_pairs, export_page, export_zip,
+    failure_page, health_page, home, import_files, import_page, import_pictures, invitation_cards,
+    last_import, pair_page, pairs_page, paper_page, pictures, report_page, restore_action,
+    restore_content, restore_page, review_agreement, review_page, run_actions, run_page,
+    settings_page, upload_actions, view_bar,
 };
 
 /// Returns the routes of the app, for a server.
@@ -77,11 +77,9 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/p/{project}/actions/setting", post(settings_page::store))
         .route("/p/{project}/health", get(health_page::page))
         .route("/p/{project}/actions/check", post(health_page::start_check))
-        .route(
-            "/p/{project}/actions/backup",
-            post(health_page::start_backup),
-        )
-        .route("/p/{project}/backup.sqlite", get(health_page::download))
+        .route("/p/{project}/actions/backup", post(backup_card::start))
+        .route("/p/{project}/backup.sqlite", get(backup_card::download))
+        .route("/p/{project}/health/inputs", get(backup_card::size_part))
         .route("/p/{project}/actions/run", post(run_actions::run))
         .route("/p/{project}/pairs/listed", get(chosen_pairs::listed))
         .route("/p/{project}/pairs/view/{name}", get(view_bar::view))
