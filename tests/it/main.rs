@@ -6,6 +6,7 @@ mod align_command;
 mod alignment_editor;
 mod all_pages;
 mod app;
+mod app_backup;
 mod app_blocks;
 mod app_browser;
 mod app_choice;
@@ -38,6 +39,7 @@ mod app_uploads;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;
+mod backup_inputs;
 mod bit_flips;
 mod block_correction;
 mod block_demo;

@@ -161,10 +161,11 @@ pub(crate) fn is_of_list(name: &OsStr) -> bool {
     name == INPUT_LIST || name.as_encoded_bytes().starts_with(beside.as_bytes())
 }
 
-/// Returns whether a path stays below its folder.
+/// Returns whether a path stays below its folder, and is not that of the list.
 fn is_below(name: &str) -> bool {
     let mut parts = Path::new(name).components();
-    !name.is_empty() && parts.all(|part| matches!(part, Component::Normal(_)))
+    let is_plain = parts.all(|part| matches!(part, Component::Normal(_)));
+    is_plain && !name.is_empty() && !is_of_list(OsStr::new(name))
 }
 
 #[cfg(test)]
@@ -219,6 +220,7 @@ mod tests {
             written(&InputList::new(vec![copy("../1.stl")])),
             written(&InputList::new(vec![copy("/etc/passwd")])),
             written(&InputList::new(vec![copy("")])),
+            written(&InputList::new(vec![copy(INPUT_LIST)])),
             written(&InputList::new(vec![copy("1.stl"), copy("1.stl")])),
         ] {
             std::fs::write(dir.path().join(INPUT_LIST), &text).expect("written");

@@ -130,13 +130,13 @@ fn is_left_over(name: &OsStr) -> bool {
     name == SETTINGS_FILE || name_bytes.starts_with(beside.as_bytes()) || is_new_folder
 }
 
-/// Warns about a folder beside the backup whose files are not used, because nothing says which files they are.
+/// Warns about a folder beside the backup that is not used, because nothing says which inputs its files are.
 fn warn_about_unlisted(backup: &Path, inputs: Option<&Path>, listener: &dyn Listener) {
     let folder = inputs_folder(backup);
     if inputs.is_none() && folder.is_dir() {
         let shown = folder.display();
         let text = format!(
-            "{shown} has no list of scans and prints, so it is not used; `backup --with-inputs` completes it, or name it with --inputs"
+            "{shown} lists no scans and prints, so it is not used; `backup --with-inputs` completes it, or name it with --inputs"
         );
         warn(listener, text);
     }

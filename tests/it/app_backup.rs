@@ -1,0 +1,59 @@
+//! The backup of the app with the scans and prints, and the project that is restored from it.
+
+use serde_json::json;
+
+use crate::app::{act, text, with_project};
+use crate::app_uploads::encode;
+use crate::waiting::wait_until;
+
+#[test]
+fn scans_and_prints_are_saved_beside_the_backup_and_restored() {
+    let (dir, page) = with_project();
+    let root = dir.path().canonicalize().expect("a path");
+    let health = text(&page.get("/p/p/health"));
+    for part in ["id=\"with-inputs\"", "data-load=\"health/inputs\""] {
+        assert!(health.contains(part), "{part}: {health}");
+    }
+    let backup = root.join("p/backups/backup.sqlite");
+    let shown = encode(backup.to_str().expect("UTF-8"));
+    let content = || text(&page.get(&format!("/restore/content?backup={shown}")));
+    for (language, part) in [("vi", "đĩa còn trống"), ("en", "are free")] {
+        page.get(&format!("/?language={language}"));
+        let size = text(&page.get("/p/p/health/inputs"));
+        assert!(size.contains(part), "{size}");
+    }
+    let done = |part: &str| {
+        let is_done = || text(&page.get("/p/p/health")).contains("data-task=\"done\"");
+        wait_until("the backup is done", is_done);
+        let html = text(&page.get("/p/p/health"));
+        assert!(html.contains(part), "{part}: {html}");
+    };
+    let reply = act(&page, "/p/p/actions/backup", &json!({}), |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    done("15 pairs and 0 verdicts are in the backup");
+    assert!(content().contains("Not in a backup"), "{}", content());
+    let form = json!({"inputs": "yes"});
+    let reply = act(&page, "/p/p/actions/backup", &form, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    wait_until("scans and prints are saved", || {
+        root.join("p/backups/backup.sqlite.inputs/data").is_dir()
+            && text(&page.get("/p/p/health")).contains("of them were copied now")
+    });
+    assert!(content().contains("Beside the backup"), "{}", content());
+
+    let form = json!({"backup": backup.to_str().expect("UTF-8"), "name": "again"});
+    let reply = act(&page, "/actions/restore", &form, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    let state = || text(&page.get("/restore?name=again"));
+    wait_until("the restore is over", || {
+        ["done", "failed"]
+            .iter()
+            .any(|end| state().contains(&format!("data-task=\"{end}\"")))
+    });
+    assert!(
+        state().contains("were copied into the project"),
+        "{}",
+        state()
+    );
+    assert!(root.join("again/inputs/data/meshes").is_dir());
+}
