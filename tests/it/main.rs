@@ -39,6 +39,7 @@ mod app_uploads;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;
+#[cfg(target_os = "linux")]
 mod backup_inputs;
 mod bit_flips;
 mod block_correction;
