@@ -13,6 +13,7 @@ use crate::backup::files as names;
 use crate::check::{at, done};
 use crate::cli::{Call, binary, call, mocban};
 use crate::fault::{ENOSPC, Fault};
+use crate::lab::Lab;
 use crate::uninterrupted::files;
 use crate::waiting::until;
 
@@ -284,4 +285,16 @@ fn the_folder_beside_a_backup_can_be_used_without_copies() {
     let restored = Project::open(&root.join("q")).expect("a project");
     at(&restored, &["check", "--repair", "--accept-missing"]).expect(0);
     at(&restored, &["run"]).expect(0);
+}
+
+#[test]
+fn a_catalog_on_a_server_is_saved_with_its_scans_and_prints() {
+    let Some(lab) = Lab::with_roles("2") else {
+        return;
+    };
+    let told = lab.call("guest", "--json backup b.sqlite --with-inputs");
+    let saved = &told.expect(0).json()["inputs"];
+    assert!(saved["copied"].as_u64() > Some(1), "{saved}");
+    assert_eq!(saved["left_out"], 0);
+    assert_eq!(restore(lab.path())["inputs_copied"], saved["files"]);
 }

@@ -27,6 +27,8 @@ mod app_paper;
 mod app_phone;
 #[cfg(target_os = "linux")]
 mod app_print;
+#[cfg(unix)]
+mod app_read_only;
 mod app_restore;
 mod app_resume_browser;
 mod app_sentences;

@@ -7,6 +7,10 @@ use crate::{Catalog, CatalogError, Result};
 
 /// Rights of the user of the database.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a right of its own, with a name"
+)]
 pub struct ReviewRights {
     /// Name of the user. Empty if the catalog is a file.
     user: String,
@@ -18,18 +22,22 @@ pub struct ReviewRights {
     reviews: bool,
     /// Whether the user may use only the own name as the reviewer.
     is_limited_to_own: bool,
+    /// Whether the server takes no changes of this user, such as a standby.
+    is_read_only: bool,
 }
 
-from_row! { ReviewRights { user: "user_name", quoted, adds_verdicts, reviews, is_limited_to_own } }
+from_row! { ReviewRights { user: "user_name", quoted, adds_verdicts, reviews, is_limited_to_own, is_read_only } }
 
-/// The policies that limit reviewers to their own names do not apply to workers: see `migrations/roles/postgres.sql`.
+/// The connection itself is read-only, so the value is asked for with which the session began. The policies that limit reviewers to their own names do not apply to workers: see `migrations/roles/postgres.sql`.
 const RIGHTS: &str = "
 SELECT CAST(session_user AS text) AS user_name, quote_ident(session_user) AS quoted,
     has_any_column_privilege('verdict', 'INSERT') AS adds_verdicts,
     (SELECT bool_and(has_any_column_privilege(name, 'INSERT')) FROM unnest(ARRAY['review_act', 'verdict', 'verdict_undo', 'attention_check_answer',
         'attention_check_undo', 'manual_alignment', 'manual_alignment_undo', 'checksum']) AS name) AS reviews,
     row_security_active('verdict') AND NOT EXISTS (
-        SELECT 1 FROM pg_roles WHERE rolname = 'mocban_worker' AND pg_has_role(oid, 'USAGE')) AS is_limited_to_own";
+        SELECT 1 FROM pg_roles WHERE rolname = 'mocban_worker' AND pg_has_role(oid, 'USAGE')) AS is_limited_to_own,
+    pg_is_in_recovery() OR EXISTS (
+        SELECT 1 FROM pg_settings WHERE name = 'default_transaction_read_only' AND reset_val = 'on') AS is_read_only";
 
 impl Catalog {
     /// Returns what the user of the database may store as a reviewer. In a file, everybody may store everything.
@@ -49,6 +57,7 @@ impl ReviewRights {
         adds_verdicts: true,
         reviews: true,
         is_limited_to_own: false,
+        is_read_only: false,
     };
 
     /// Returns the only reviewer whose verdicts the user may store or undo, or `None` for any reviewer.
@@ -58,7 +67,7 @@ impl ReviewRights {
 
     /// Returns whether the user may store verdicts. Whoever may change anything in a catalog may.
     pub const fn may_store(&self) -> bool {
-        self.adds_verdicts
+        self.adds_verdicts && !self.is_read_only
     }
 
     /// Checks that the user may append verdicts of a reviewer.

@@ -14,7 +14,7 @@ pub(super) enum ReadOnlyPlace {
     Folder,
     /// The folder of a project, or its catalog.
     Project,
-    /// The database of a project, for this user.
+    /// The database of a project, for this user or for everybody, such as a standby.
     Database,
 }
 
