@@ -14,15 +14,15 @@ fn pages_say_that_the_database_can_only_be_read() {
         return;
     };
     // A server that takes no changes, as a standby.
-    lab.add_user("copy", "worker");
+    lab.add_user("mirror", "worker");
     lab.sql(
         "mocban",
-        "ALTER ROLE copy SET default_transaction_read_only = on",
+        "ALTER ROLE mirror SET default_transaction_read_only = on",
     )
     .expect("set");
     for (user, is_read_only) in [
         ("guest", true),
-        ("copy", true),
+        ("mirror", true),
         ("lan", false),
         ("grid", false),
     ] {

@@ -28,7 +28,8 @@ pub struct ReviewRights {
 
 from_row! { ReviewRights { user: "user_name", quoted, adds_verdicts, reviews, is_limited_to_own, is_read_only } }
 
-/// The connection itself is read-only, so the value is asked for with which the session began. The policies that limit reviewers to their own names do not apply to workers: see `migrations/roles/postgres.sql`.
+/// The policies that limit reviewers to their own names do not apply to workers: see `migrations/roles/postgres.sql`. Read
+/// connections are set to read-only, so `reset_val` is compared, the value with which the session began.
 const RIGHTS: &str = "
 SELECT CAST(session_user AS text) AS user_name, quote_ident(session_user) AS quoted,
     has_any_column_privilege('verdict', 'INSERT') AS adds_verdicts,
