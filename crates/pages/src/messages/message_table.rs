@@ -410,6 +410,14 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "choose points on the same strokes of both images",
         "hãy chọn các điểm trên cùng các nét của hai hình",
     ),
+    (
+        "the scans and prints need {} in {}, and the disk has {}",
+        "bản quét và bản in cần {0} trong {1}, đĩa còn {2}",
+    ),
+    (
+        "make room, or name another disk",
+        "hãy giải phóng dung lượng",
+    ),
     // The correction of a block.
     (
         "the points of this block were changed since this page was opened: reload the page to see them",
