@@ -267,6 +267,17 @@ fn a_damaged_copy_is_not_restored() {
     let restored = restore(&root);
     assert_eq!(restored["inputs_copied"], 2);
     assert_eq!(restored["inputs_missing"], 2);
+    // So is a damaged list, until the next backup.
+    std::fs::write(root.join("b.sqlite.inputs/mocban-inputs.json"), "{").expect("written");
+    let refused = mocban(&root, &["restore", "b.sqlite", "again"]).expect(2);
+    assert!(
+        refused.err.contains("make the backup again"),
+        "{}",
+        refused.err
+    );
+    assert!(!root.join("again").exists());
+    std::fs::remove_dir_all(root.join("q")).expect("removed");
+    assert_completed(&root);
 }
 
 /// With `--inputs`, files stay where they are.

@@ -147,8 +147,9 @@ impl InputSaver {
         check_inputs_outside(project, &folder, &inputs)?;
         let size = size_of(project, &folder, &inputs);
         check_room(size.to_copy, free_beside(&folder), &folder)?;
-        let earlier = InputList::read(&folder)?.map(|list| list.files);
-        let earlier = earlier.into_iter().flatten();
+        // Without a list that can be read, copies are still compared with the inputs.
+        let earlier = InputList::read(&folder).ok().flatten();
+        let earlier = earlier.map_or_else(Vec::new, |list| list.files).into_iter();
         Ok(Self {
             project: project.clone(),
             earlier: earlier.map(|copy| (copy.stored.clone(), copy)).collect(),

@@ -81,7 +81,10 @@ impl InputList {
             read => read.with_context(failed)?,
         };
         let refuse = |reason: &str| {
-            let text = format!("{} {reason}; make the backup again", path.display());
+            let text = format!(
+                "{} {reason}; make the backup again, or name a folder with --inputs",
+                path.display()
+            );
             Err(Refusal::Usage(text).into())
         };
         let list: Self = match serde_json::from_slice(&bytes) {
