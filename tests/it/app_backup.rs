@@ -2,8 +2,12 @@
 
 use serde_json::json;
 
-use crate::app::{act, text, with_project};
+use crate::app::{act, open_app, text, token, with_project};
+use crate::app_kills::{HeldApp, UNTIL_KILLED};
 use crate::app_uploads::encode;
+use crate::backup::files as names;
+use crate::fault::Fault;
+use crate::page::read_project;
 use crate::waiting::wait_until;
 
 #[test]
@@ -56,4 +60,28 @@ fn scans_and_prints_are_saved_beside_the_backup_and_restored() {
         state()
     );
     assert!(root.join("again/inputs/data/meshes").is_dir());
+}
+
+#[test]
+fn a_killed_copy_of_scans_and_prints_goes_on_with_the_next_click() {
+    const STAGED: &str = "p/backups/backup.sqlite.inputs/.mocban-inputs.json.*/new";
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let root = dir.path().canonicalize().expect("a path");
+    let app = HeldApp::start(&root, Fault::slow("write", STAGED, UNTIL_KILLED), 3);
+    let (form, token) = (json!({"inputs": "yes"}), token(&app.page));
+    app.kill_in("/p/p/actions/backup", token, &form);
+    assert!(root.join("p/backups/backup.sqlite").is_file());
+    let next = open_app(&root);
+    let health = || text(&next.get("/p/p/health"));
+    let said = health();
+    let part = "ended before all scans and prints were copied";
+    assert!(said.contains(part), "{said}");
+    let reply = act(&next, "/p/p/actions/backup", &form, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    wait_until("the others are copied", || {
+        health().contains("of them were copied now")
+    });
+    let copies = names(&root.join("p/backups/backup.sqlite.inputs"));
+    assert_eq!(copies, ["data", "mocban-inputs.json"]);
 }

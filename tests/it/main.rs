@@ -6,6 +6,7 @@ mod align_command;
 mod alignment_editor;
 mod all_pages;
 mod app;
+#[cfg(target_os = "linux")]
 mod app_backup;
 mod app_blocks;
 mod app_browser;
