@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import logging
 import os
@@ -531,6 +532,14 @@ def plain_metric(name: str) -> str:
     return plain if plain in METRICS else name
 
 
+def unknown_metric(name: object, known: Iterable[str]) -> InputError:
+    """Return the error of a metric that is not one of the known ones, with a similar one."""
+    names = tuple(known)
+    similar = difflib.get_close_matches(str(name).lower(), names, 1)
+    hint = f"; did you mean {similar[0]!r}?" if similar else ""
+    return InputError(f"there is no metric {name!r}, only {', '.join(names)}{hint}", "usage")
+
+
 def metric_names(metrics: Iterable[str], chosen: Settings) -> tuple[str, ...]:
     """Return the names of metrics, all of which the method gives."""
     names = tuple(map(plain_metric, (metrics,) if isinstance(metrics, str) else metrics))
@@ -539,5 +548,5 @@ def metric_names(metrics: Iterable[str], chosen: Settings) -> tuple[str, ...]:
     known = METRICS if chosen["pipeline.method"] == "default" else METRICS[:-1]
     for name in names:
         if name not in known:
-            raise InputError(f"there is no metric {name!r}, only {', '.join(known)}", "usage")
+            raise unknown_metric(name, known)
     return names

@@ -439,7 +439,7 @@ def mesh_of(
 ) -> Mesh:
     """Return a mesh, or read its file."""
     if isinstance(mesh, Mesh):
-        if unit is not None and unit != mesh.unit:
+        if unit is not None and unit.strip().lower() != mesh.unit:
             text = f"the unit is {unit}, but that of the mesh is {mesh.unit or 'not known'}; give it to the mesh"
             raise UnitError(text, "unknown_unit")
         return mesh

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from . import _native as _rust
-from ._alignment import METRICS, Alignment, plain_metric
+from ._alignment import METRICS, Alignment, plain_metric, unknown_metric
 from ._blocks import BlockAlignment
 from ._errors import Cancelled, InputError, ReadOnlyProject
 from ._frozen import Frozen
@@ -97,7 +97,7 @@ class Pair(Frozen):
         results = self.alignment.results
         metric = self.alignment._first if metric is None else metric
         if metric is None or metric not in results:
-            raise InputError(f"there is no metric {metric!r}, only {', '.join(results)}", "usage")
+            raise unknown_metric(metric, results)
         return results[metric].aligned_mask()
 
     def overlay(self, metric: str | None = None) -> NDArray[np.uint8]:
@@ -232,7 +232,7 @@ class Project:
             raise ImportError("Project.pairs needs pyarrow: pip install 'mocban[arrow]'") from None
         metric = None if metric is None else plain_metric(metric)
         if metric is not None and metric not in METRICS:
-            raise InputError(f"there is no metric {metric!r}, only {', '.join(METRICS)}", "usage")
+            raise unknown_metric(metric, METRICS)
         if where is not None and not isinstance(where, pyarrow.compute.Expression):
             text = "where is no expression of pyarrow; give one such as pyarrow.compute.field('iou') > 0.9"
             raise InputError(text, "usage")

@@ -89,8 +89,8 @@ def test_wrong_files_are_named(block: Path, demo: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
     with pytest.raises(mocban.UnitError):
         project.import_block(files["mesh"], files["page"], unit="inch")
-    with pytest.raises(mocban.InputError):
-        project.import_block(files["mesh"], files["page"], side="left")
+    with pytest.raises(mocban.InputError, match="Left"):
+        project.import_block(files["mesh"], files["page"], side="Left")
     other = tmp_path / "other"
     other.mkdir()
     (other / "notes.txt").touch()

@@ -93,7 +93,8 @@ def test_units_are_checked(pair: DemoPair) -> None:
     with pytest.raises(mocban.UnitError, match="inch") as error:
         mocban.Mesh(CORNERS, unit="inch")
     assert error.value.code == "unknown_unit"
-    mesh = mocban.read_mesh(pair.mesh, unit="m")
+    assert mocban.Mesh(CORNERS, unit="MM").unit == "mm"
+    mesh = mocban.read_mesh(pair.mesh, unit="M")
     assert "m long" in mesh.warnings[0]
     with pytest.raises(mocban.UnitError, match="perhaps mm") as error:
         mocban.align(mesh, pair.print)

@@ -3,6 +3,7 @@
 
 use std::str::FromStr;
 
+use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict};
 use mocban_lists::columns::plain_name;
 
@@ -36,29 +37,29 @@ const REASONS: [(Reason, &[&str]); 6] = [
 /// Parses a verdict.
 ///
 /// # Errors
-/// Returns a sentence with the names of the verdicts.
+/// Returns a sentence with the names of the verdicts, and a similar one.
 pub fn verdict(text: &str) -> Result<Verdict, String> {
-    word(text, &VERDICTS)
+    word(text, &VERDICTS, &Verdict::ALL.map(Verdict::name))
 }
 
 /// Parses a reason of a failure.
 ///
 /// # Errors
-/// Returns a sentence with the names of the reasons.
+/// Returns a sentence with the names of the reasons, and a similar one.
 pub fn reason(text: &str) -> Result<Reason, String> {
-    word(text, &REASONS)
+    word(text, &REASONS, &Reason::ALL.map(Reason::name))
 }
 
 /// Parses a metric.
 ///
 /// # Errors
-/// Returns a sentence with the names of the metrics.
+/// Returns a sentence with the names of the metrics, and a similar one.
 pub fn metric(text: &str) -> Result<ThresholdMetric, String> {
-    word(text, &[])
+    word(text, &[], &ThresholdMetric::ALL.map(ThresholdMetric::name))
 }
 
-/// Parses a name in any case and with blanks, or one of some other words.
-fn word<T>(text: &str, others: &[(T, &[&str])]) -> Result<T, String>
+/// Parses one of these names, in any case and with blanks, or one of some other words.
+fn word<T>(text: &str, others: &[(T, &[&str])], names: &[&str]) -> Result<T, String>
 where
     T: FromStr<Err: std::fmt::Display> + Copy,
 {
@@ -71,7 +72,7 @@ where
     // The error shows the text as written.
     parsed
         .or_else(|_: T::Err| text.parse())
-        .map_err(|error: T::Err| error.to_string())
+        .map_err(|error: T::Err| format!("{error}{}", hint(&plain, names.iter().copied())))
 }
 
 #[cfg(test)]
@@ -114,6 +115,15 @@ mod tests {
         assert_eq!(
             metric("IOU").expect_err("unknown"),
             "\"IOU\" is not a metric (nl_ssim, density, ensemble, relief)"
+        );
+        assert_eq!(
+            metric("Releif").expect_err("misspelt"),
+            "\"Releif\" is not a metric (nl_ssim, density, ensemble, relief); did you mean \"relief\"?"
+        );
+        let refused = reason("Stroke lost").expect_err("misspelt");
+        assert!(
+            refused.ends_with("; did you mean \"strokes_lost\"?"),
+            "{refused}"
         );
     }
 }

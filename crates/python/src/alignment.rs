@@ -16,6 +16,7 @@ use crate::settings::NativeSettings;
 use crate::state;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
 use mocban_core::domain::MetricOutcome;
+use mocban_core::domain::spelling::hint;
 use mocban_core::raster::{Mask, compact_rgb8, warp_mask};
 use mocban_export::pictures::{PrintView, Rgb};
 use mocban_project::align::{self, AlignFailure};
@@ -39,7 +40,11 @@ impl NativeAlignment {
         metrics
             .find(|(_, found)| Some(found.metric) == wanted)
             .ok_or_else(|| {
-                let text = format!("there is no result of the metric {metric}");
+                let known = self.pair.metrics().iter();
+                let known: Vec<&str> = known.map(|found| found.metric.name()).collect();
+                let (names, hint) = (known.join(", "), hint(metric, known.iter().copied()));
+                let text =
+                    format!("there is no result of the metric {metric}, only of {names}{hint}");
                 wrong_argument(py, &text)
             })
     }

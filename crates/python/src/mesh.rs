@@ -25,9 +25,15 @@ pub(crate) struct NativeMesh {
     wrong_unit: OnceLock<Option<String>>,
 }
 
-/// Parses the name of a unit.
+/// Parses one of a few names, in any case. The error shows the name as given.
+pub(crate) fn any_case<T: std::str::FromStr>(name: &str) -> Result<T, T::Err> {
+    let plain = name.trim().to_lowercase();
+    plain.parse().or_else(|_: T::Err| name.parse())
+}
+
+/// Parses the name of a unit, in any case.
 pub(crate) fn unit(py: Python<'_>, name: Option<&str>) -> PyResult<Option<LengthUnit>> {
-    let parsed = name.map(str::parse).transpose();
+    let parsed = name.map(any_case).transpose();
     parsed.map_err(|text: String| raise(py, "UnitError", "unknown_unit", &text, None))
 }
 

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::alignment::NativeAlignment;
 use crate::compute::{EventSender, compute_with_events};
 use crate::failure::{project_failure, raise, wrong_argument};
-use crate::mesh::unit as mesh_unit;
+use crate::mesh::{any_case, unit as mesh_unit};
 use crate::{log, stored_block, stored_pair};
 use mocban_catalog::{NewVerdict, ReviewContext};
 use mocban_core::domain::cancel::CancelToken;
@@ -56,13 +56,12 @@ impl Listener for Hearing {
     }
 }
 
-/// Parses an argument, such as the name of a format.
+/// Parses an argument, such as the name of a format, in any case.
 fn parsed<T: std::str::FromStr>(py: Python<'_>, name: &str) -> PyResult<T>
 where
     T::Err: std::fmt::Display,
 {
-    name.parse()
-        .map_err(|error: T::Err| wrong_argument(py, &error.to_string()))
+    any_case(name).map_err(|error: T::Err| wrong_argument(py, &error.to_string()))
 }
 
 /// Parses the name of a metric, in any case.

@@ -235,7 +235,8 @@ fn side(cell: &str) -> Result<BlockSide, String> {
     match plain_form(cell).as_str() {
         "truoc" | "mat truoc" => Ok(BlockSide::Front),
         "sau" | "mat sau" => Ok(BlockSide::Back),
-        plain => plain.parse(),
+        // The error shows the text as written.
+        plain => plain.parse().or_else(|_: String| cell.parse()),
     }
 }
 
@@ -323,8 +324,8 @@ mod tests {
                 "line 3: block \"b1\" differs from that on line 2 only in upper and lower case",
             ),
             (
-                "block,mesh,page,side\nb,m,p,top\n",
-                "is not a side (front, back)",
+                "block,mesh,page,side\nb,m,p,Top\n",
+                "\"Top\" is not a side (front, back)",
             ),
             ("block,mesh,page\na/b,m,p\n", "an id has no slashes"),
             ("block,mesh,page\n", "the list contains no blocks"),

@@ -47,3 +47,18 @@ fn an_array_has_the_rows_of_json_lines() {
         assert_eq!(refused.to_string(), expected, "{list}");
     }
 }
+
+#[test]
+fn words_of_an_array_may_be_capitals() {
+    let plain = r#"[{"pair":"a","verdict":"fail","reviewer":"lan","metric":"relief","reason":"strokes_lost"}]"#;
+    let capitals = r#"[{"pair":"a","verdict":"FAIL","reviewer":"lan","metric":"Relief","reason":"Strokes Lost"}]"#;
+    let rows = parse_json(plain.as_bytes()).expect("valid");
+    assert_eq!(parse_json(capitals.as_bytes()).expect("valid"), rows);
+    let misspelt = plain.replace("relief", "Releif");
+    assert_eq!(
+        parse_json(misspelt.as_bytes())
+            .expect_err("misspelt")
+            .to_string(),
+        "line 1: row 1: \"Releif\" is not a metric (nl_ssim, density, ensemble, relief); did you mean \"relief\"?"
+    );
+}
