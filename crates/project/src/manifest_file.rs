@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form, is_windows_path};
-use super::missing_files::{IS_FOLDER, LINE_BREAK_HINT, WINDOWS_HINT, has_line_break};
+use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form};
+use super::missing_files::{IS_FOLDER, MAX_PATH_CHARS, missing_hint};
 use super::repeated_files::RepeatedFiles;
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
@@ -287,9 +287,6 @@ fn renamed(read: &ReadRows) -> Option<String> {
 /// Longest name of a column in a message, in characters.
 const MAX_NAME_CHARS: usize = 60;
 
-/// Longest path in a message, in characters.
-const MAX_PATH_CHARS: usize = 300;
-
 /// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
 /// row with a label and a number; returns `None` if it exists.
 pub fn locate_file(
@@ -314,15 +311,7 @@ pub fn locate_file(
         Ok(false) if has_scheme(path, "://") => {
             "is a web address; download the file and write the path of the copy".to_owned()
         }
-        Ok(false) if has_line_break(path) => format!("does not exist{LINE_BREAK_HINT}"),
-        Ok(false) if is_windows_path(path) => format!("does not exist{WINDOWS_HINT}"),
-        Ok(false) => {
-            let similar = searches
-                .find(path)
-                .map(|path| sanitize(&path, MAX_PATH_CHARS));
-            let hint = similar.map(|path| format!("; there is {path}"));
-            format!("does not exist{}", hint.unwrap_or_default())
-        }
+        Ok(false) => format!("does not exist{}", missing_hint(path, searches)),
         Err(error) => format!("cannot be read: {error}"),
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
@@ -415,8 +404,7 @@ mod tests {
             "{missing:?}"
         );
         std::fs::create_dir(dir.path().join("d.stl")).expect("a folder");
-        let list =
-            "id,mesh,print\na,d.stl,https://museum.vn/1.png\nb,file:///d/1.stl,\"a\nb.png\"\n";
+        let list = "id,mesh,print\na,d.stl,https://museum.vn/1.png\nb,file:///d/1.stl,\"a\nb.png\"\nc,a\t.stl,c.csv\n";
         std::fs::write(&file, list).expect("written");
         let mut odd = Vec::new();
         let listing = from_file(&file).expect("valid");
@@ -426,10 +414,11 @@ mod tests {
             "https://museum.vn/1.png of a is a web address; download the file and write the path of the copy",
             "file:///d/1.stl of b does not exist; write its path without file://",
             "b.png of b does not exist; its path has a line break: write the cell on one line",
+            " of c does not exist; its path has a tab: remove it",
         ]) {
             assert!(line.ends_with(end), "{line}");
         }
-        assert_eq!(odd.len(), 4, "{odd:?}");
+        assert_eq!(odd.len(), 6, "{odd:?}");
         let refused = from_file(dir.path()).expect_err("a directory");
         assert!(refused.to_string().contains("--meshes"), "{refused}");
     }

@@ -4,23 +4,46 @@ use std::path::Path;
 
 use super::exit::Refusal;
 use super::files::listed;
+use super::input_paths::{SimilarFiles, is_windows_path};
+use mocban_core::domain::sanitize;
 
 /// Maximum number of missing files that `--json` lists.
 const MAX_MISSING: usize = 1000;
+
+/// Longest path in a message, in characters.
+pub(crate) const MAX_PATH_CHARS: usize = 300;
 
 /// Ends the message of a missing file whose path is one of Windows.
 pub const WINDOWS_HINT: &str =
     "; it is a path of a Windows computer: write paths relative to the list";
 
 /// Ends the message of a missing file whose path is on several lines.
-pub(crate) const LINE_BREAK_HINT: &str = "; its path has a line break: write the cell on one line";
+const LINE_BREAK_HINT: &str = "; its path has a line break: write the cell on one line";
+
+/// Ends the message of a missing file whose path has a tab.
+const TAB_HINT: &str = "; its path has a tab: remove it";
 
 /// Ends the message of a path that leads to a folder.
 pub const IS_FOLDER: &str = "is a folder, not a file";
 
-/// Returns whether a path is on several lines. A file may have such a name.
-pub(crate) fn has_line_break(path: &Path) -> bool {
-    path.to_string_lossy().contains(['\n', '\r'])
+/// Returns what may be wrong with the path of a missing file, or nothing.
+pub(crate) fn missing_hint(path: &Path, searches: &mut SimilarFiles) -> String {
+    let windows = || is_windows_path(path).then_some(WINDOWS_HINT);
+    if let Some(hint) = blank_hint(path).or_else(windows) {
+        return hint.to_owned();
+    }
+    let similar = searches.find(path);
+    let similar = similar.map(|path| format!("; there is {}", sanitize(&path, MAX_PATH_CHARS)));
+    similar.unwrap_or_default()
+}
+
+/// Returns what to do about a missing file whose path has a line break or a tab, or nothing. A file may have such a name.
+fn blank_hint(path: &Path) -> Option<&'static str> {
+    let path = path.to_string_lossy();
+    if path.contains(['\n', '\r']) {
+        return Some(LINE_BREAK_HINT);
+    }
+    path.contains('\t').then_some(TAB_HINT)
 }
 
 /// Files of a list that do not exist.
@@ -36,7 +59,7 @@ impl MissingFiles {
     /// Adds the message of a file. Only the first hint of each kind is kept.
     pub fn add(&mut self, mut line: String) {
         self.count += 1;
-        for hint in [WINDOWS_HINT, LINE_BREAK_HINT] {
+        for hint in [WINDOWS_HINT, LINE_BREAK_HINT, TAB_HINT] {
             if let Some(end) = line.strip_suffix(hint).map(str::len)
                 && self.lines.iter().any(|line| line.ends_with(hint))
             {

@@ -8,6 +8,7 @@ use serde_json::Value;
 use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{PairName, UniqueKeys};
+use mocban_lists::manifest::trimmed;
 use mocban_results::ground_truth::TruthRecord;
 
 /// Longest line in bytes. The values of a line take about ten times as much memory.
@@ -31,7 +32,7 @@ pub struct TruthRow {
     pub line: usize,
     /// The pair.
     pub name: PairName,
-    /// The object as given.
+    /// The object as given, without blanks at the ends of the id.
     pub value: Value,
     /// Its mask of stroke tops, relative to the working directory.
     pub tops_mask: Option<PathBuf>,
@@ -62,8 +63,11 @@ pub fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
                 "each line is a JSON object with {fields}; tables are not read"
             )));
         }
-        let UniqueKeys(value) =
+        let UniqueKeys(mut value) =
             serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
+        if let Some(Value::String(id)) = value.get_mut("id") {
+            *id = trimmed(id).to_owned();
+        }
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
         if let Some(first) = lines.insert(record.id.clone(), line) {
             let name = record.id;
@@ -171,6 +175,21 @@ mod tests {
                 "{refused}"
             );
         }
+    }
+
+    #[test]
+    fn an_id_may_end_in_blanks_but_is_on_one_line() {
+        let with = |id: &str| read(&LINE.replace("\"a\"", id));
+        let rows = with("\" a\\t\\n\"").expect("blanks at the ends");
+        assert_eq!(rows[0].name.as_str(), "a");
+        assert_eq!(rows[0].value["id"], "a");
+        let refused = with("\"a\\nb\"").expect_err("two lines");
+        assert!(
+            refused.contains(
+                "line 1: truth is not of the form of truth.jsonl: id \"a b\" has a line break"
+            ),
+            "{refused}"
+        );
     }
 
     #[test]

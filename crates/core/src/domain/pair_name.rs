@@ -49,6 +49,9 @@ pub enum PairNameError {
     /// The id has several lines.
     #[error("id \"{shown}\" has a line break; write it on one line", shown = sanitize(.0, 48))]
     LineBreak(String),
+    /// The id has a tab between other characters.
+    #[error("id \"{shown}\" has a tab; remove it", shown = sanitize(.0, 48))]
+    Tab(String),
     /// The id begins with a dot.
     #[error("id \"{shown}\" begins with a dot", shown = sanitize(.0, 48))]
     LeadingDot(String),
@@ -80,10 +83,12 @@ impl PairName {
         }
         let is_bad = |c: &char| matches!(c, '/' | '\\') || is_hidden(*c);
         if let Some(bad) = text.chars().find(is_bad) {
-            if matches!(bad, '\n' | '\r') {
-                return Err(PairNameError::LineBreak(text.to_owned()));
-            }
-            return Err(PairNameError::Character(text.to_owned(), bad));
+            let text = text.to_owned();
+            return Err(match bad {
+                '\n' | '\r' => PairNameError::LineBreak(text),
+                '\t' => PairNameError::Tab(text),
+                bad => PairNameError::Character(text, bad),
+            });
         }
         if text.starts_with('.') {
             return Err(PairNameError::LeadingDot(text.to_owned()));
@@ -245,7 +250,8 @@ mod tests {
         assert_eq!(PairName::new(""), Err(PairNameError::Empty));
         assert_eq!(PairName::new("a/b"), character("a/b", '/'));
         assert_eq!(PairName::new("a\\b"), character("a\\b", '\\'));
-        assert_eq!(PairName::new("a\tb"), character("a\tb", '\t'));
+        let tab = PairName::new("a\tb").expect_err("a tab");
+        assert_eq!(tab.to_string(), "id \"a b\" has a tab; remove it");
         for text in ["a\nb", "a\r\nb"] {
             let refused = PairName::new(text).expect_err("two lines");
             assert_eq!(refused, PairNameError::LineBreak(text.into()));

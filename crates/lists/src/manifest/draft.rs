@@ -7,7 +7,7 @@ use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
 use mocban_core::domain::spelling::plain_form;
-use mocban_core::domain::{PairName, PairNameError};
+use mocban_core::domain::{PairName, PairNameError, sanitize};
 
 /// The cells of one row by lower-case column name, and its other columns.
 #[derive(Debug, Default)]
@@ -120,6 +120,14 @@ fn complete(
         }
     }
     check_lengths(&draft, reasons);
+    if let Some(block) = draft.cells.get("block")
+        && block.contains(['\n', '\r'])
+    {
+        let block = sanitize(block, MAX_BLOCK_CHARS);
+        reasons.push(format!(
+            "block {block:?} has a line break; write it on one line"
+        ));
+    }
     if is_swapped(&draft.cells) {
         reasons.push("mesh names an image and print names a mesh; swap the two".to_owned());
     }
@@ -179,6 +187,8 @@ fn check_lengths(draft: &DraftRow, reasons: &mut Vec<String>) {
 pub(super) const MAX_ROW_BYTES: usize = 1 << 20;
 /// Longest path in bytes; the system accepts no longer one.
 pub(super) const MAX_PATH_BYTES: usize = 4096;
+/// Longest name of a block in a message, in characters.
+const MAX_BLOCK_CHARS: usize = 48;
 /// Longest other cell in bytes.
 const MAX_CELL_BYTES: usize = 1 << 16;
 

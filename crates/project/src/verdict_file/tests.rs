@@ -415,3 +415,26 @@ fn invalid_json_line_is_reported_by_number() {
         );
     }
 }
+
+#[test]
+fn blanks_at_the_ends_of_an_id_are_left_out_and_a_line_break_within_is_named() {
+    let csv = |id: &str| format!("pair,verdict,reviewer\n\"{id}\",pass,lan\n").into_bytes();
+    let json = |id: &str| {
+        let row = serde_json::json!({"pair": id, "verdict": "pass", "reviewer": "lan"});
+        row.to_string().into_bytes()
+    };
+    for rows in [
+        parse_csv(&csv("\n1\t")),
+        parse_jsonl(&json("\n1\t\u{feff}")),
+    ] {
+        assert_eq!(rows.expect("valid")[0].listed.verdict.pair.as_str(), "1");
+    }
+    let why = "id \"1 a\" has a line break; write it on one line";
+    for (refused, line) in [
+        (parse_csv(&csv("1\na")), 2),
+        (parse_jsonl(&json("1\na")), 1),
+    ] {
+        let text = refused.expect_err("two lines").to_string();
+        assert_eq!(text, format!("line {line}: {why}"));
+    }
+}

@@ -331,3 +331,53 @@ fn names_of_columns_that_are_not_utf8_are_one_problem() {
     );
     assert_eq!(refused.lines().count(), 1, "{refused}");
 }
+
+#[test]
+fn ids_and_blocks_on_several_lines_are_refused_with_their_row() {
+    for (id, block, expected) in [
+        (
+            "a\nb",
+            "1",
+            "id \"a b\" has a line break; write it on one line",
+        ),
+        (
+            "a\r\nb",
+            "1",
+            "id \"a  b\" has a line break; write it on one line",
+        ),
+        ("a\tb", "1", "id \"a b\" has a tab; remove it"),
+        (
+            "a",
+            "b\n1",
+            "block \"b 1\" has a line break; write it on one line",
+        ),
+    ] {
+        let csv = format!("id,mesh,print,block\n0,m,p,\n\"{id}\",m,p,\"{block}\"\n");
+        assert_eq!(refusal(&csv), format!("line 3: {expected}"));
+        let [first, second] = [("0", ""), (id, block)].map(
+            |(id, block)| serde_json::json!({"id": id, "mesh": "m", "print": "p", "block": block}),
+        );
+        for list in [
+            format!("{first}\n{second}"),
+            format!("[{first},\n{second}]"),
+        ] {
+            let refused = super::super::parse_jsonl(list.as_bytes()).expect_err("two lines");
+            assert_eq!(refused.to_string(), format!("line 2: {expected}"));
+        }
+    }
+    for list in [
+        "id,mesh,print,block\n\"\na\t\",m,p,\"b\r\n\"\n",
+        "{\"id\":\"\\na\\t\",\"mesh\":\"m\",\"print\":\"p\",\"block\":\"b\\r\\n\"}",
+    ] {
+        let parse = if list.starts_with('{') {
+            super::super::parse_jsonl
+        } else {
+            super::parse_csv
+        };
+        let rows = parse(list.as_bytes()).expect("blanks only at the ends");
+        assert_eq!(
+            (rows[0].name.as_str(), rows[0].block.as_deref()),
+            ("a", Some("b"))
+        );
+    }
+}

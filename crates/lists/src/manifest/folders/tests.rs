@@ -181,7 +181,7 @@ fn stems_that_are_not_valid_ids_are_reported_by_file() {
     );
     assert_eq!(
         error.expect_err("a tab").to_string(),
-        "x y.stl: id \"x y\" holds '\\t'; an id has no slashes, control or invisible characters"
+        "x y.stl: id \"x y\" has a tab; remove it"
     );
     // There is no pair either, but the reason is the id.
     let only = pair_folders(&files(&["x\ty.stl"]), &files(&["x\ty.png"]));
