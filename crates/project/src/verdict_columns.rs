@@ -34,6 +34,9 @@ pub(crate) const COLUMNS: KnownColumns = KnownColumns {
         ("ghi_chu", "note"),
         ("thoi_gian", "at"),
         ("ngay", "at"),
+        ("goc_lech", "angle_read_deg"),
+        ("goc_xoay", "angle_read_deg"),
+        ("goc", "angle_read_deg"),
     ],
 };
 

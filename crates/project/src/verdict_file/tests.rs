@@ -106,7 +106,7 @@ fn a_list_may_have_the_angles_that_reviewers_read() {
     let angles: Vec<Option<f64>> = angles.collect();
     assert_eq!(angles, [Some(-4.5), Some(12.25), None]);
     assert_eq!(
-        error("pair,verdict,reviewer,angle_read_deg\n1,fail,lan,left\n"),
+        error("pair,verdict,reviewer,Góc lệch\n1,fail,lan,left\n"),
         "line 2: angle_read_deg is \"left\", not a number of degrees such as -4.5"
     );
     for wrong in ["900", "NaN"] {
