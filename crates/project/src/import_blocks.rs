@@ -17,7 +17,9 @@ use crate::new_project::import_with;
 use crate::repeated_files::RepeatedFiles;
 use mocban_catalog::{BlockAttributes, BlockImportSummary, SameFiles};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
-use mocban_lists::manifest::{BlockRow, is_block_list, is_named_like_mesh, parse_blocks};
+use mocban_lists::manifest::{
+    BlockRow, ReadBlocks, is_block_list, is_named_like_mesh, read_blocks,
+};
 use mocban_store::Project;
 
 /// What an import of blocks changed.
@@ -196,7 +198,8 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
             });
         }
     };
-    let mut rows = parse_blocks(bytes).map_err(|problems| refuse(file, &problems))?;
+    let read = read_blocks(bytes).map_err(|problems| refuse(file, &problems))?;
+    let ReadBlocks { mut rows, unread } = read;
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut repeated = RepeatedFiles::default();
     for row in &mut rows {
@@ -209,9 +212,9 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
     Ok(BlockListing {
         rows,
         label: format!("{}: line", file.display()),
-        warnings: repeated
-            .warning("blocks with the same scan and page")
+        warnings: unread
             .into_iter()
+            .chain(repeated.warning("blocks with the same scan and page"))
             .collect(),
     })
 }

@@ -34,6 +34,15 @@ pub struct BlockRow {
     pub side: Option<BlockSide>,
 }
 
+/// What a list of blocks has.
+#[derive(Debug, Default)]
+pub struct ReadBlocks {
+    /// The blocks.
+    pub rows: Vec<BlockRow>,
+    /// A warning about columns that are not read.
+    pub unread: Option<String>,
+}
+
 /// Returns whether a list is one of blocks, by its header: it has the column `page`, or the column `block` with `labels`
 /// or `side`, and not the columns of a list of pairs.
 pub fn is_block_list(bytes: &[u8]) -> bool {
@@ -71,6 +80,14 @@ fn reader<'t>(text: &'t CsvText<'_>) -> ::csv::Reader<&'t [u8]> {
 /// Returns an error if the list cannot be decoded, contains no blocks, or has an invalid header or row. The error names
 /// the lines of invalid rows.
 pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
+    read_blocks(bytes).map(|read| read.rows)
+}
+
+/// Parses a list of blocks like [`parse_blocks`], and returns a warning about other columns, too.
+///
+/// # Errors
+/// Returns an error like [`parse_blocks`].
+pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
     let text = CsvText::new(bytes).map_err(|error| of_list(&error.to_string()))?;
     let bytes = &*text.bytes;
     check_quotes(bytes, text.delimiter).map_err(|error| at_line(error.line, &error.to_string()))?;
@@ -83,8 +100,8 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
         hint = encoding_hint(bytes);
         problems.add(of_list(&format!("the list is not UTF-8{hint}")));
     }
-    let mut header: Option<Vec<&'static str>> = None;
-    let (mut rows, mut ids) = (Vec::new(), RowIds::default());
+    let mut header: Option<Vec<Option<&'static str>>> = None;
+    let (mut read, mut ids) = (ReadBlocks::default(), RowIds::default());
     loop {
         let start = reader.position().clone();
         let is_read = match reader.read_byte_record(&mut record) {
@@ -100,7 +117,8 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
         }
         let line = lines.at(Some(record.position().unwrap_or(&start)));
         let Some(columns) = &header else {
-            header = Some(columns_of(line, &record, &hint)?);
+            let (columns, unread) = columns_of(line, &record, &hint)?;
+            (header, read.unread) = (Some(columns), unread);
             continue;
         };
         if record.iter().all(<[u8]>::is_empty) {
@@ -112,23 +130,26 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
             if let Some(first) = ids.insert(name, line) {
                 reasons.push(first.reason("block", name.as_str()));
             }
-            rows.push(row);
+            read.rows.push(row);
         }
         problems.extend(reasons.iter().map(|reason| at_line(line, reason)));
     }
-    if problems == ManifestError::default() && rows.is_empty() {
+    if problems == ManifestError::default() && read.rows.is_empty() {
         return Err(of_list("the list contains no blocks").into());
     }
     problems.check(false)?;
-    Ok(rows)
+    Ok(read)
 }
+
+/// The columns of a header, each with its name if it is known, and a warning about the others.
+type HeaderOfBlocks = (Vec<Option<&'static str>>, Option<String>);
 
 /// Returns the columns of a header.
 fn columns_of(
     line: usize,
     record: &::csv::ByteRecord,
     encoding_hint: &str,
-) -> Result<Vec<&'static str>, ManifestError> {
+) -> Result<HeaderOfBlocks, ManifestError> {
     let names = column_names(line, record, encoding_hint)?;
     let columns = COLUMNS
         .assign(&names)
@@ -138,47 +159,47 @@ fn columns_of(
     let required = COLUMNS.names[..REQUIRED].iter();
     let missing = required.filter(|name| !columns.contains(&Some(**name)));
     problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
-    // A misspelt name is also unknown; say it once.
     problems.check(false)?;
-    let unknown = names.iter().zip(&columns);
-    let unknown = unknown.filter_map(|(name, known)| known.is_none().then_some(*name));
-    let unknown: Vec<&str> = unknown.collect();
-    if !unknown.is_empty() {
-        return Err(at_line(line, &unknown_columns(&unknown)).into());
-    }
-    Ok(columns.into_iter().flatten().collect())
+    let unread = unread_columns(&names, &columns);
+    Ok((columns, unread))
 }
 
-/// Returns a sentence about unknown columns, with a hint for the first that resembles an optional one.
-fn unknown_columns(unknown: &[&str]) -> String {
+/// Returns a sentence about columns that are not read, with a hint for the first that resembles an optional one which is
+/// missing. Columns without a name are left out.
+fn unread_columns(names: &[&str], columns: &[Option<&'static str>]) -> Option<String> {
     const MAX_NAMES: usize = 3;
     const MAX_NAME_CHARS: usize = 40;
-    let quoted = |name: &&str| format!("{:?}", sanitize(name, MAX_NAME_CHARS));
-    let shown: Vec<String> = unknown.iter().map(quoted).collect();
-    let hint = |name: &&str| {
-        let found = name.to_lowercase();
-        let mut optional = COLUMNS.names[REQUIRED..].iter();
-        let column = optional.find(|column| similar_column(&found, column))?;
-        Some(format!(
-            "; rename {} to {column:?} if it is meant",
-            quoted(name)
-        ))
-    };
-    let hint = unknown.iter().find_map(hint).unwrap_or_default();
-    let (columns, are) = match unknown {
+    let quoted = |name: &str| format!("{:?}", sanitize(name, MAX_NAME_CHARS));
+    let unread = names.iter().zip(columns);
+    let unread = unread.filter(|(name, known)| known.is_none() && !name.is_empty());
+    let unread: Vec<&str> = unread.map(|(name, _)| *name).collect();
+    let (what, are) = match unread.as_slice() {
+        [] => return None,
         [_] => ("column", "is"),
         _ => ("columns", "are"),
     };
+    let hint = |name: &&str| {
+        let found = name.to_lowercase();
+        let mut missing = COLUMNS.names[REQUIRED..].iter();
+        let column = missing
+            .find(|column| similar_column(&found, column) && !columns.contains(&Some(**column)))?;
+        let name = quoted(name);
+        Some(format!(
+            "; rename {name} to {column:?} if it is meant, and import again"
+        ))
+    };
+    let hint = unread.iter().find_map(hint).unwrap_or_default();
+    let shown: Vec<String> = unread.iter().map(|name| quoted(name)).collect();
     let (shown, known) = (first_names(&shown, MAX_NAMES), COLUMNS.names.join(", "));
-    format!(
-        "{columns} {shown} {are} unknown{hint}; a list of blocks has: {known}; remove other columns, which are kept only of pairs"
-    )
+    Some(format!(
+        "{what} {shown} {are} ignored{hint}; a list of blocks has: {known}"
+    ))
 }
 
 /// Returns a row, or records why it is not valid.
 fn row(
     line: usize,
-    columns: &[&'static str],
+    columns: &[Option<&'static str>],
     record: &::csv::ByteRecord,
     reasons: &mut Vec<String>,
 ) -> Option<BlockRow> {
@@ -188,7 +209,8 @@ fn row(
         return None;
     }
     let mut cells = BTreeMap::new();
-    for (column, cell) in columns.iter().zip(record) {
+    let known = columns.iter().zip(record);
+    for (column, cell) in known.filter_map(|(column, cell)| Some((column.as_ref()?, cell))) {
         let Ok(cell) = std::str::from_utf8(cell) else {
             reasons.push(format!("the cell of column {column:?} is not UTF-8"));
             return None;
@@ -242,7 +264,7 @@ fn side(cell: &str) -> Result<BlockSide, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{is_block_list, parse_blocks};
+    use super::{is_block_list, parse_blocks, read_blocks};
     use mocban_core::domain::{BlockSide, LengthUnit};
 
     fn refusal(text: &str) -> String {
@@ -301,18 +323,6 @@ mod tests {
                 "block,mesh,pages,labels\nb,m,p,l\n",
                 "rename \"pages\" to \"page\" if it is meant",
             ),
-            (
-                "block,mesh,page,lables\nb,m,p,l\n",
-                "column \"lables\" is unknown; rename \"lables\" to \"labels\" if it is meant; a list of blocks has: ",
-            ),
-            (
-                "block,mesh,page,color\nb,m,p,l\n",
-                "; remove other columns, which are kept only of pairs",
-            ),
-            (
-                "block,mesh,page,color,year\nb,m,p,l,1\n",
-                "line 1: columns \"color\", \"year\" are unknown; a list of blocks has: block, mesh, page, labels, unit, side; ",
-            ),
             ("block,mesh,page\nb,m\n", "line 2: the row has 2 cells"),
             ("block,mesh,page\nb,,p\n", "line 2: mesh is empty"),
             (
@@ -333,5 +343,31 @@ mod tests {
             let found = refusal(text);
             assert!(found.contains(expected), "{text:?}: {found}");
         }
+    }
+
+    #[test]
+    fn other_columns_are_named_and_not_read() {
+        let known = "; a list of blocks has: block, mesh, page, labels, unit, side";
+        for (columns, cells, expected) in [
+            ("color", "x", "column \"color\" is ignored"),
+            (
+                "color,year,,folio,note",
+                "x,1,,2,y",
+                "columns \"color\", \"year\", \"folio\" and 1 more are ignored",
+            ),
+            (
+                "color,lables",
+                "x,l.json",
+                "columns \"color\", \"lables\" are ignored; rename \"lables\" to \"labels\" if it is meant, and import again",
+            ),
+            ("unit,units", "mm,mm", "column \"units\" is ignored"),
+        ] {
+            let list = format!("{columns},block,mesh,page\n{cells},b,m,p\n");
+            let read = read_blocks(list.as_bytes()).expect("valid");
+            assert_eq!(read.unread, Some(format!("{expected}{known}")));
+            assert_eq!(read.rows[0].page.to_str(), Some("p"));
+        }
+        let list = "block,mesh,page,,\nb,m,p,,\n";
+        assert_eq!(read_blocks(list.as_bytes()).expect("valid").unread, None);
     }
 }

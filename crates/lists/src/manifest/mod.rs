@@ -18,7 +18,7 @@ mod row;
 mod text;
 
 pub use self::csv::{parse_csv, read_csv, read_csv_as};
-pub use block_list::{BlockRow, is_block_list, parse_blocks};
+pub use block_list::{BlockRow, ReadBlocks, is_block_list, parse_blocks, read_blocks};
 pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;
 pub use folders::{

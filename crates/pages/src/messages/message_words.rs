@@ -256,8 +256,8 @@ mod tests {
                 "a.csv: dòng 2: không có bản quét a b của 1; đường dẫn có ngắt dòng: hãy viết ô đó trên một dòng",
             ),
             (
-                "line 1: columns \"x\", \"y\" are unknown",
-                "line 1: không rõ các cột \"x\", \"y\"",
+                "columns \"x\", \"y\" are ignored",
+                "các cột \"x\", \"y\" không được đọc",
             ),
         ] {
             assert_eq!(vietnamese(english).as_deref(), Some(expected));
