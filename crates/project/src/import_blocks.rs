@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::block_files;
+use crate::block_scale;
 use crate::empty_import;
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork};
@@ -148,6 +149,9 @@ pub async fn import_blocks(
     if missing.count == 0 {
         block_files::check(&listing.rows, &listing.label, &project)?;
     }
+    let limits = location.settings()?.config.limits;
+    let doubts = block_scale::doubts(&listing.rows, &listing.label, &project, &limits);
+    listing.warnings.extend(doubts);
     let rows = listing.rows.iter().map(|row| stored_row(row, &project));
     let rows: Vec<BlockAttributes> = rows.collect::<Result<_, _>>()?;
     let summary = import_with(&project, url.as_deref(), async |catalog| {

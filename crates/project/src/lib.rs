@@ -33,6 +33,7 @@ pub mod backup;
 pub mod backup_content;
 pub mod backup_inputs;
 mod block_files;
+mod block_scale;
 pub mod block_status;
 pub mod byte_size;
 pub mod change_setting;

@@ -20,8 +20,8 @@ mod warp_mask;
 mod warp_rgb;
 
 pub use decode::{
-    DecodeError, ImageLimits, PrintImage, PrintSamples, SampleSlice, decode, header_pixel_count,
-    header_size, stated_dpi,
+    DecodeError, ImageLimits, PrintImage, PrintSamples, SampleSlice, decode, file_dpi,
+    header_pixel_count, header_size, stated_dpi,
 };
 pub use depth_map::DepthMap;
 pub use encode::{

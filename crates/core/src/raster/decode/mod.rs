@@ -27,7 +27,7 @@ pub use error::DecodeError;
 pub use header_size::header_size;
 pub use limits::ImageLimits;
 pub use print_image::PrintImage;
-pub use resolution::stated_dpi;
+pub use resolution::{file_dpi, stated_dpi};
 pub use samples::{PrintSamples, SampleSlice};
 
 /// Decodes a grey, RGB or palette image of a print. Transparent pixels are composited on white.

@@ -1,6 +1,10 @@
 //! The resolution that an image file states.
 
-use super::tags::{TagValues, TaggedFile};
+use std::io::{BufRead, Read as _, Seek};
+
+use image::metadata::Orientation;
+
+use super::tags::{TagFileWindow, TagSource, TagValues, TaggedFile};
 use super::{jpeg, orientation, tiff};
 use crate::domain::FileKind;
 
@@ -11,11 +15,16 @@ const INCH: f64 = 2.0;
 const CENTIMETRE: f64 = 3.0;
 const CM_PER_INCH: f64 = 2.54;
 const METRES_PER_INCH: f64 = 0.0254;
+/// Bytes at the beginning of a PNG or JPEG file in which its resolution is searched.
+const HEAD_BYTES: u64 = 1 << 20;
+
+/// The resolution of the stored pixels, and how they are turned.
+type StoredDpi = (Option<[f64; 2]>, Orientation);
 
 /// Returns how many pixels per inch the upright image has, from left to right and from top to bottom, if the file says so:
 /// in the `pHYs` chunk of a PNG, the JFIF header of a JPEG, the tags of a TIFF, or EXIF. Numbers without a unit do not count.
 pub fn stated_dpi(bytes: &[u8]) -> Option<[f64; 2]> {
-    let (stored, orientation) = match FileKind::of(bytes) {
+    upright_dpi(match FileKind::of(bytes) {
         FileKind::Png => {
             let physical = orientation::png_chunk(bytes, *b"pHYs").and_then(of_phys);
             let exif = || of_exif(orientation::png_chunk(bytes, *b"eXIf")?);
@@ -26,15 +35,32 @@ pub fn stated_dpi(bytes: &[u8]) -> Option<[f64; 2]> {
             let stored = jfif.and_then(of_jfif).or_else(|| of_exif(exif?));
             (stored, orientation::of_exif(exif))
         }
-        FileKind::Tiff => {
-            let (stored, turned) = tiff::with_print_tags(&bytes, |print| {
-                let tag = |tag| print.inherited_values(tag);
-                (of_tags(tag), print.inherited(tiff::ORIENTATION))
-            })?;
-            (stored, orientation::of_tag(turned))
-        }
+        FileKind::Tiff => of_tiff(&bytes)?,
         _ => return None,
-    };
+    })
+}
+
+/// Returns the same as [`stated_dpi`] for a file, of which little is read. What a PNG file states behind its pixels is not
+/// found.
+pub fn file_dpi(mut file: impl BufRead + Seek) -> Option<[f64; 2]> {
+    if FileKind::of(file.fill_buf().ok()?) == FileKind::Tiff {
+        return upright_dpi(of_tiff(&TagFileWindow::new(file))?);
+    }
+    let mut head = Vec::new();
+    file.take(HEAD_BYTES).read_to_end(&mut head).ok()?;
+    stated_dpi(&head)
+}
+
+fn of_tiff(file: &dyn TagSource) -> Option<StoredDpi> {
+    let (stored, turned) = tiff::with_print_tags(file, |print| {
+        let tag = |tag| print.inherited_values(tag);
+        (of_tags(tag), print.inherited(tiff::ORIENTATION))
+    })?;
+    Some((stored, orientation::of_tag(turned)))
+}
+
+/// Returns the resolution of the upright image, if it is one.
+fn upright_dpi((stored, orientation): StoredDpi) -> Option<[f64; 2]> {
     let [x, y] = stored.filter(|dpi| dpi.iter().all(|dpi| dpi.is_finite() && *dpi > 0.0))?;
     Some(if orientation::swaps_sides(orientation) {
         [y, x]
@@ -92,7 +118,9 @@ fn of_tags<'b>(values: impl Fn(u64) -> Option<TagValues<'b>>) -> Option<[f64; 2]
 
 #[cfg(test)]
 mod tests {
-    use super::stated_dpi;
+    use std::io::Cursor;
+
+    use super::{file_dpi, stated_dpi};
 
     /// Returns a block of tags in the byte order of Intel: a resolution of `x` and `y` tenths, a unit and an orientation.
     fn tags(x: u32, y: u32, unit: Option<u16>, orientation: u16) -> Vec<u8> {
@@ -176,6 +204,7 @@ mod tests {
             (tags(1000, 2000, Some(3), 1), [254.0, 508.0]),
         ] {
             let found = stated_dpi(&file).expect("a resolution");
+            assert_eq!(file_dpi(Cursor::new(&file)), Some(found));
             for (found, expected) in found.into_iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-9, "{found} {expected}");
             }
@@ -197,6 +226,7 @@ mod tests {
                 png(&[(b"eXIf", &block)]),
             ] {
                 assert_eq!(stated_dpi(&file), Some(expected), "{orientation}");
+                assert_eq!(file_dpi(Cursor::new(&file)), Some(expected));
             }
         }
     }
@@ -217,6 +247,7 @@ mod tests {
             Vec::new(),
         ] {
             assert_eq!(stated_dpi(&file), None, "{file:?}");
+            assert_eq!(file_dpi(Cursor::new(&file)), None, "{file:?}");
         }
     }
 }
