@@ -1,5 +1,6 @@
 //! Notes in the folder of a project when an import added no pair. The catalog has a time only of imports that added pairs,
-//! so without the note, the undo of the newest import would undo an earlier one.
+//! so without the note, the undo of the newest import would undo an earlier one. Folders that share a catalog have a note
+//! each: an empty import there does not keep people here from the undo of theirs.
 
 use std::path::PathBuf;
 
@@ -44,6 +45,9 @@ mod tests {
             assert_eq!(note(&project, at), None);
             assert_eq!(noted(&project), Some(at));
         }
+        let other = tempfile::tempdir().expect("a temporary directory");
+        let other = Project::at(other.path());
+        assert_eq!(noted(&other), None, "notes are of their folder");
         std::fs::write(dir.path().join(EMPTY_IMPORT_FILE), "x").expect("written");
         assert_eq!(noted(&project), None);
         let gone = Project::at(&dir.path().join("gone"));
