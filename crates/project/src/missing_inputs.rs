@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use crate::error::ProjectResult;
-use mocban_catalog::{Catalog, InputVersion, PairSelection};
+use mocban_catalog::{Catalog, InputVersion, KnownBlock, PairSelection};
 use mocban_core::domain::{ArtifactRef, PairId, one_line};
 use mocban_store::{InputError, Project, stat_input};
 
@@ -123,9 +123,8 @@ pub async fn inspect(
         add(known.print_path, known.print);
     }
     let blocks = catalog.known_blocks().await?.into_iter().take(MAX_BLOCKS);
-    for block in blocks {
-        add(block.attributes.mesh_path, block.inputs.mesh);
-        add(block.attributes.page_path, block.inputs.page);
+    for (path, read) in blocks.flat_map(block_files) {
+        add(path, read);
     }
     // The files of pairs that were cut from a block are artifacts.
     files.retain(|(path, _)| ArtifactRef::at_path(path).is_none());
@@ -134,6 +133,19 @@ pub async fn inspect(
     let inspection = tokio::task::spawn_blocking(move || among(&project, &files, until));
     let inspected = tokio::time::timeout(MAX_TIME, inspection).await;
     Ok(inspected.ok().and_then(Result::ok).unwrap_or_default())
+}
+
+/// Returns the paths of the files of a block, each with its version when it was read.
+fn block_files(block: KnownBlock) -> Vec<(String, Option<InputVersion>)> {
+    let KnownBlock {
+        attributes, inputs, ..
+    } = block;
+    let mut files = vec![
+        (attributes.mesh_path, inputs.mesh),
+        (attributes.page_path, inputs.page),
+    ];
+    files.extend(attributes.labels_path.map(|path| (path, inputs.labels)));
+    files
 }
 
 /// Inspects files until a time, each with what was stored about it when it was read.
@@ -179,8 +191,41 @@ fn size(stat: &str) -> &str {
 mod tests {
     use std::time::{Duration, Instant};
 
-    use super::{InputInspection, among};
+    use super::{InputInspection, among, block_files};
+    use mocban_catalog::{BlockAttributes, BlockInputVersions, InputVersion, KnownBlock};
+    use mocban_core::domain::{BlockId, BlockName, ContentHash};
     use mocban_store::{Project, stat_input};
+
+    #[test]
+    fn the_labels_of_a_block_are_inspected_like_its_scan_and_page() {
+        let read = |stat: &str| {
+            Some(InputVersion {
+                hash: ContentHash::of(b""),
+                stat: stat.to_owned(),
+            })
+        };
+        let block = KnownBlock {
+            block: BlockId(1),
+            attributes: BlockAttributes {
+                name: BlockName::new("b").expect("an id"),
+                mesh_path: "b.stl".to_owned(),
+                page_path: "b.png".to_owned(),
+                labels_path: Some("b.json".to_owned()),
+                unit: None,
+                side: None,
+            },
+            inputs: BlockInputVersions {
+                mesh: read("1"),
+                page: None,
+                labels: read("2"),
+            },
+        };
+        let expected = [("b.stl", read("1")), ("b.png", None), ("b.json", read("2"))];
+        assert_eq!(
+            block_files(block),
+            expected.map(|(path, read)| (path.to_owned(), read))
+        );
+    }
 
     #[test]
     fn changed_and_missing_files_are_counted_and_copies_are_not() {
