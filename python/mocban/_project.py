@@ -367,9 +367,7 @@ class Project:
         outcome = json.loads(
             project.import_pairs(os.fspath(file), rows_json, allow_missing, allow_changed_files, replace)
         )
-        for warning in outcome.pop("warnings"):
-            _LOG.warning("%s", warning)
-        return outcome
+        return _without_warnings(outcome)
 
     def import_block(
         self,
@@ -406,7 +404,8 @@ class Project:
             If a file is not there. Nothing is imported.
         """
         boxes = None if labels is None else os.fspath(labels)
-        return json.loads(self._writable().import_block(os.fspath(mesh), os.fspath(page), boxes, id, unit, side))
+        files = (os.fspath(mesh), os.fspath(page), boxes)
+        return _without_warnings(json.loads(self._writable().import_block(*files, id, unit, side)))
 
     def run(
         self,
@@ -491,6 +490,13 @@ class Project:
         if not chosen:
             raise InputError("formats is empty; give one such as 'csv'", "usage")
         return json.loads(self._native.export(os.fspath(dir), chosen, list(metrics or ()), only, False))
+
+
+def _without_warnings(outcome: dict[str, Any]) -> dict[str, Any]:
+    """Log the warnings of an import, and return the rest of its outcome."""
+    for warning in outcome.pop("warnings"):
+        _LOG.warning("%s", warning)
+    return outcome
 
 
 def _records(rows: Any) -> Iterable[Mapping[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 import pickle
 from pathlib import Path
 
@@ -74,6 +75,15 @@ def test_a_character_keeps_the_temporary_project(block: Path) -> None:
     labels = block / "labels.json"
     first = mocban.align_block(block / "block.ply", block / "page.jpg", labels=labels).characters[0]
     assert first.alignment.status == "aligned"
+
+
+def test_warnings_of_an_import_are_logged(block: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    project = mocban.Project.create(tmp_path / "new")
+    with caplog.at_level(logging.WARNING, logger="mocban"):
+        first = project.import_block(block / "block.ply", block / "page.jpg", id="a")
+        assert first == {"added": 1, "changed": [], "unchanged": 0} and not caplog.records
+        project.import_block(block / "block.ply", block / "page.jpg", id="b")
+    assert "blocks with the same scan and page as one of the project: 1, first b, as a" in caplog.text
 
 
 def test_wrong_files_are_named(block: Path, demo: Path, tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ pub(crate) async fn import(
         "added": summary.added,
         "changed": changed.collect::<Vec<_>>(),
         "unchanged": summary.unchanged,
+        "warnings": outcome.warnings,
     });
     Ok(counts.to_string())
 }
