@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::block_columns::{COLUMNS, REQUIRED};
 use super::column_names::{missing_column, similar_column};
 use super::csv::column_names;
-use super::draft::MAX_PATH_BYTES;
+use super::draft::{MAX_PATH_BYTES, parse_unit};
 use super::error::{ManifestError, at_line, of_list};
 use super::row::RowIds;
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
@@ -234,8 +234,7 @@ fn row(
     }
     let name = cells.get("block").copied().unwrap_or_default();
     let name = BlockName::new(name).map_err(|error| error.to_string());
-    let unit = cells.get("unit").map(|cell| cell.to_ascii_lowercase());
-    let unit = unit.map(|cell| cell.parse::<LengthUnit>()).transpose();
+    let unit = cells.get("unit").map(|cell| parse_unit(cell)).transpose();
     let side = cells.get("side").map(|cell| side(cell)).transpose();
     let mut record = |reason: Option<&String>| reasons.extend(reason.cloned());
     record(name.as_ref().err());
@@ -336,6 +335,10 @@ mod tests {
             (
                 "block,mesh,page,side\nb,m,p,Top\n",
                 "\"Top\" is not a side (front, back)",
+            ),
+            (
+                "block,mesh,page,unit\nb,m,p,Inch\n",
+                "\"Inch\" is not a unit (mm, cm, m, in)",
             ),
             ("block,mesh,page\na/b,m,p\n", "an id has no slashes"),
             ("block,mesh,page\n", "the list contains no blocks"),
