@@ -7,7 +7,7 @@ use std::path::Path;
 use mocban_align::scan_size::{TYPICAL_BLOCK_MM, TYPICAL_CHARACTER_MM, nearest_unit};
 use mocban_core::domain::LengthUnit;
 use mocban_core::mesh::{self, MeshExtent, MeshLimits};
-use mocban_core::raster::{DecodeError, ImageLimits, PrintImage, decode, header_size};
+use mocban_core::raster::{DecodeError, ImageLimits, PrintImage, decode, file_dpi, header_size};
 use mocban_lists::labels::{self, Labels, MAX_BYTES, PageFile};
 use mocban_store::{open_regular, read_up_to};
 
@@ -15,6 +15,11 @@ use mocban_store::{open_regular, read_up_to};
 const USUAL_CHARACTER_MM: RangeInclusive<f64> = 4.0..=200.0;
 /// Usual longest sides of the scan of a whole block, mm.
 const USUAL_BLOCK_MM: RangeInclusive<f64> = 80.0..=1500.0;
+/// Largest factor between the sizes of a block and its page, which has margins and shows no handles.
+const MAX_RATIO: f64 = 1.5;
+/// Lower resolutions are not measured: cameras and screens state 72 and 96 for any image.
+const MIN_DPI: f64 = 100.0;
+const MM_PER_INCH: f64 = 25.4;
 /// Most vertices that are kept for a picture of a scan.
 const MAX_POINTS: usize = 1 << 21;
 
@@ -100,6 +105,27 @@ pub fn image_size(path: &Path, limits: &ImageLimits) -> Result<[u32; 2], String>
     }
 }
 
+/// Returns the length of the longer side of a page, mm, if its file can be used and states a resolution that may be measured.
+pub fn page_length_mm(path: &Path, limits: &ImageLimits) -> Option<f64> {
+    let (file, _) = open_regular(path).ok()?;
+    let [x, y] = file_dpi(BufReader::new(file))?;
+    // They are equal nearly always, so it does not matter whether the image is stored turned.
+    let dpi = x.min(y);
+    let [width, height] = image_size(path, limits).ok()?;
+    (dpi >= MIN_DPI).then(|| f64::from(width.max(height)) / dpi * MM_PER_INCH)
+}
+
+/// Returns the unit in which a scan of a block is as long as its page, if it is not so in `unit`. `length` is in units of the
+/// mesh. `None` also if no unit fits, because cameras state resolutions that say nothing of the page.
+pub fn unit_of_page(length: f64, unit: LengthUnit, page_mm: f64) -> Option<LengthUnit> {
+    let fits = |unit: LengthUnit| {
+        let ratio = length * unit.mm() / page_mm;
+        (1.0 / MAX_RATIO..=MAX_RATIO).contains(&ratio)
+    };
+    let likely = nearest_unit(length, page_mm);
+    (!fits(unit) && fits(likely)).then_some(likely)
+}
+
 /// Returns vertices of a scan for a picture, relative to one of them: all of a short file, and some of a long one, spread over
 /// the file. Leaves out vertices without a position, and those at the origin.
 ///
@@ -155,7 +181,7 @@ pub fn page_labels(file: &Path, page: &Path, [width, height]: [u32; 2]) -> Resul
 
 #[cfg(test)]
 mod tests {
-    use super::{ScanKind, UnitOrigin, image_size, page_labels, scan_extent, scan_points};
+    use super::{ScanKind, UnitOrigin, image_size, scan_extent, scan_points, unit_of_page};
     use mocban_core::domain::LengthUnit;
     use mocban_core::mesh::{MeshExtent, MeshLimits};
     use mocban_core::raster::{Grid, ImageLimits, jpeg_rgb8};
@@ -189,6 +215,28 @@ mod tests {
         };
         let found = character.unit(&named, None).expect("a unit");
         assert_eq!((found.unit, found.origin), (m, UnitOrigin::File));
+    }
+
+    #[test]
+    fn a_unit_of_the_page_is_another_one_that_fits() {
+        let (mm, cm) = (LengthUnit::Mm, LengthUnit::Cm);
+        for (length, unit, expected) in [
+            (33.0, mm, Some(cm)),
+            (13.0, cm, Some(LengthUnit::In)),
+            (0.33, cm, Some(LengthUnit::M)),
+            (330.0, mm, None),
+            (460.0, mm, None),
+            // The lengths differ in every unit.
+            (200.0, mm, None),
+            (5.0, cm, None),
+            (0.0, mm, None),
+        ] {
+            assert_eq!(
+                unit_of_page(length, unit, 330.0),
+                expected,
+                "{length} {unit}"
+            );
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::domain::{LengthUnit, one_line};
 use mocban_core::mesh::MeshExtent;
-use mocban_project::file_headers::{ScanKind, ScanUnit, UnitOrigin};
+use mocban_project::file_headers::{ScanKind, ScanUnit, UnitOrigin, unit_of_page};
 
 /// Most pairs whose files are looked at for one request of the script.
 const MOST: usize = 400;
@@ -158,7 +158,12 @@ fn table(visit: &Visit, headers: &[FileHeaders], units: &[Option<ScanUnit>]) -> 
                 @match &one.scan {
                     Ok(extent) => {
                         td { (size(visit, extent, *unit)) }
-                        td.muted { (why_unit(visit, one.files.kind, extent, *unit)) }
+                        td.muted {
+                            (why_unit(visit, one.files.kind, extent, *unit))
+                            @if let Some(other) = other_unit(one, *unit) {
+                                "; " (visit.t("as long as its page in", "dài bằng trang in nếu đơn vị là")) " " (unit_name(visit, other))
+                            }
+                        }
                     },
                     Err(why) => {
                         (unread(visit, why))
@@ -166,7 +171,10 @@ fn table(visit: &Visit, headers: &[FileHeaders], units: &[Option<ScanUnit>]) -> 
                     },
                 }
                 @match &one.print {
-                    Ok([width, height]) => td { (grouped(u64::from(*width))) " × " (grouped(u64::from(*height))) " px" },
+                    Ok([width, height]) => td {
+                        (grouped(u64::from(*width))) " × " (grouped(u64::from(*height))) " px"
+                        @if let Some(mm) = one.page_mm { " · " (visit.decimal(mm, 0)) " mm" }
+                    },
                     Err(why) => (unread(visit, why)),
                 }
             } } }
@@ -206,6 +214,12 @@ fn size(visit: &Visit, extent: &MeshExtent, unit: Option<ScanUnit>) -> String {
     };
     let name = if mm.is_some() { " mm" } else { "" };
     format!("{about}{}{name}", lengths.join(" × "))
+}
+
+/// Returns the unit in which the scan of a block is as long as its page, if it is another one.
+fn other_unit(heads: &FileHeaders, unit: Option<ScanUnit>) -> Option<LengthUnit> {
+    let length = heads.scan.as_ref().ok()?.longest()?;
+    unit_of_page(length, unit?.unit, heads.page_mm?)
 }
 
 /// Says where a unit comes from, and why it may be another one.
@@ -260,7 +274,10 @@ fn why_unit(visit: &Visit, kind: ScanKind, extent: &MeshExtent, unit: Option<Sca
 
 #[cfg(test)]
 mod tests {
-    use super::{common_unit, size, why_unit};
+    use std::path::PathBuf;
+
+    use super::{common_unit, size, table, unit, why_unit};
+    use crate::app::import_headers::{FileHeaders, PlannedFiles};
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_core::domain::LengthUnit;
@@ -309,5 +326,36 @@ mod tests {
             said.starts_with("cm, as the file says; not used unless it is chosen"),
             "{said}"
         );
+    }
+
+    /// Returns a block in a unit whose page is 400 mm long.
+    fn block(unit: LengthUnit) -> FileHeaders {
+        FileHeaders {
+            files: PlannedFiles {
+                name: "b".to_owned(),
+                kind: ScanKind::Block,
+                scan: PathBuf::new(),
+                print: PathBuf::new(),
+                labels: None,
+                unit: Some(unit),
+            },
+            scan: Ok(SCAN),
+            print: Ok([4000, 2000]),
+            page_mm: Some(400.0),
+            labels: None,
+        }
+    }
+
+    #[test]
+    fn a_block_whose_page_has_another_length_has_its_likelier_unit() {
+        let visit = Visit::in_language(Language::English);
+        let [doubted, fitting] = [LengthUnit::Mm, LengthUnit::Cm].map(|given| {
+            let heads = block(given);
+            let units = [unit(&heads)];
+            table(&visit, &[heads], &units).into_string()
+        });
+        assert!(doubted.contains(" px · 400 mm"), "{doubted}");
+        assert!(doubted.contains("; as long as its page in cm"), "{doubted}");
+        assert!(!fitting.contains("as long as its page"), "{fitting}");
     }
 }

@@ -19,7 +19,9 @@ use mocban_core::mesh::MeshExtent;
 use mocban_lists::labels::{LabelFormat, Labels};
 use mocban_project::ProjectError;
 use mocban_project::error::TaskStopped;
-use mocban_project::file_headers::{ScanKind, image_size, page_labels, scan_extent};
+use mocban_project::file_headers::{
+    ScanKind, image_size, page_labels, page_length_mm, scan_extent,
+};
 use mocban_project::input_paths::find_on_disk;
 use mocban_project::location::Location;
 use mocban_store::Project;
@@ -43,6 +45,8 @@ pub(super) struct FileHeaders {
     pub(super) scan: Result<MeshExtent, UnreadFile>,
     /// Width and height in pixels.
     pub(super) print: Result<[u32; 2], UnreadFile>,
+    /// Length of the longer side of the page of a block in mm, if its file says so.
+    pub(super) page_mm: Option<f64>,
     /// The number of boxes of the labels, and their format. `None` without labels, or if the page cannot be used.
     pub(super) labels: Option<Result<(u64, LabelFormat), UnreadFile>>,
 }
@@ -293,6 +297,9 @@ impl PlannedFiles {
         let scan = scan.and_then(|path| scan_extent(&path, &limits.mesh).map_err(unusable));
         let print = places.allowed(&self.print);
         let print = print.and_then(|path| image_size(&path, &limits.image).map_err(unusable));
+        let is_page = self.kind == ScanKind::Block && print.is_ok();
+        let page = is_page.then(|| places.allowed(&self.print).ok()).flatten();
+        let page_mm = page.and_then(|path| page_length_mm(&path, &limits.image));
         let labels = self.labels.as_deref().zip(print.as_ref().ok());
         let labels = labels.map(|(labels, size)| {
             let found = self.boxes(labels, *size, places);
@@ -301,6 +308,7 @@ impl PlannedFiles {
         FileHeaders {
             scan,
             print,
+            page_mm,
             labels,
             files: self,
         }
