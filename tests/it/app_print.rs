@@ -71,7 +71,7 @@ fn the_html_report_is_printed_without_its_navigation() {
     mocban(project.dir(), &report).expect(0);
     let tab = browser.tab(800, 1000);
     tab.open(&format!("file://{}", file.display()));
-    tab.wait("document.querySelector('figure.item')");
+    tab.wait("document.readyState === 'complete' && document.querySelector('figure.item')");
     as_printed(&tab);
     is_for_paper(
         &tab,

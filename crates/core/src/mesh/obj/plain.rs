@@ -239,7 +239,7 @@ impl TextCursor<'_> {
         let digits = decimal::read_digits(&self.0[sign..], &mut index);
         self.0 = &self.0[sign + digits..];
         let index = if is_negative {
-            -(index as i64)
+            (index as i64).wrapping_neg()
         } else {
             index as i64
         };
