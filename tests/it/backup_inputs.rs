@@ -68,7 +68,7 @@ fn with_outside_pairs(root: &Path) -> Project {
             std::fs::copy(project.dir().join(from), &to).expect("copied");
             to.display().to_string()
         });
-        list += &format!("{id},{mesh},{print}\n");
+        list.extend([id, ",", &mesh, ",", &print, "\n"]);
     }
     let file = root.join("more.csv");
     std::fs::write(&file, list).expect("written");

@@ -181,7 +181,9 @@ pub fn page_labels(file: &Path, page: &Path, [width, height]: [u32; 2]) -> Resul
 
 #[cfg(test)]
 mod tests {
-    use super::{ScanKind, UnitOrigin, image_size, scan_extent, scan_points, unit_of_page};
+    use super::{
+        ScanKind, UnitOrigin, image_size, page_labels, scan_extent, scan_points, unit_of_page,
+    };
     use mocban_core::domain::LengthUnit;
     use mocban_core::mesh::{MeshExtent, MeshLimits};
     use mocban_core::raster::{Grid, ImageLimits, jpeg_rgb8};

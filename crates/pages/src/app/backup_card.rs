@@ -95,11 +95,12 @@ fn size_sentence(size: &InputsSize, free: Option<u64>) -> Sentence {
         }
         if size.remote > 0 {
             let remote = grouped(size.remote);
-            text += &if is_english {
-                format!("; without {remote} files of an object store")
+            let [before, after] = if is_english {
+                ["; without ", " files of an object store"]
             } else {
-                format!("; không gồm {remote} tệp ở kho đối tượng")
+                ["; không gồm ", " tệp ở kho đối tượng"]
             };
+            text.extend([before, &remote, after]);
         }
         text
     });

@@ -87,7 +87,7 @@ impl PaperMethod {
         let longest = Duration::from_secs(settings.config.run.stage_timeout_s);
         // The work ends when nobody waits for it any more.
         let computed = timeout(longest, computed).await;
-        let computed = computed.map_err(|_| AppFailure::refused(too_long(longest)))??;
+        let computed = computed.map_err(|_elapsed| AppFailure::refused(too_long(longest)))??;
         let computed = computed.map_err(|error| AppFailure::of(error, &open.dir))?;
         let computed = Arc::new(computed);
         let mut kept = self.lock();

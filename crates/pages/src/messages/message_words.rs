@@ -1,7 +1,13 @@
 //! Frequent messages of the program in Vietnamese. They are stored or refuse something in English, so they are recognised
 //! by their wording.
 
+use super::block_messages::BLOCK_MESSAGES;
 use super::message_table::{KINDS, MESSAGES};
+
+/// Returns the messages with their Vietnamese texts. An earlier one is preferred.
+fn all_messages() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
+    MESSAGES.iter().chain(BLOCK_MESSAGES)
+}
 
 /// Returns a message of the program in Vietnamese if its beginning is known. Parts that are not known stay as they are.
 pub(crate) fn vietnamese(text: &str) -> Option<String> {
@@ -35,7 +41,7 @@ fn clause(text: &str) -> Option<String> {
         if before.contains("; ") {
             return None;
         }
-        let found = MESSAGES.iter().find_map(|(english, vietnamese)| {
+        let found = all_messages().find_map(|(english, vietnamese)| {
             let parts = parts_of(message, english)?;
             let is_clean = parts.iter().all(|part| !part.contains("; "));
             // The first part of these may begin behind a colon, but not before it.
@@ -123,7 +129,7 @@ fn part_text(part: &str) -> String {
 mod tests {
     use std::path::Path;
 
-    use super::{MESSAGES, vietnamese};
+    use super::{all_messages, vietnamese};
 
     #[test]
     fn frequent_messages_are_translated_with_their_parts() {
@@ -293,7 +299,7 @@ mod tests {
     #[test]
     fn the_program_still_says_what_is_translated() {
         let sources = sources();
-        for (english, vietnamese) in MESSAGES {
+        for (english, vietnamese) in all_messages() {
             let pieces = english.split("{}").map(str::trim);
             let longest = pieces.max_by_key(|piece| piece.len()).expect("a piece");
             assert!(sources.contains(longest), "{english:?}: {longest:?}");

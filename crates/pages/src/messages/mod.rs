@@ -1,5 +1,6 @@
 //! Messages of the program in Vietnamese, for all pages.
 
+mod block_messages;
 mod message_table;
 mod message_words;
 

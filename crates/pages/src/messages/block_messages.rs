@@ -1,0 +1,84 @@
+//! The frequent messages of the program on blocks with their Vietnamese texts.
+
+/// Messages like those on pairs.
+pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
+    (
+        "the page does not belong to this block: at the best position found, {} % of the places agree",
+        "trang in không thuộc ván này: ở vị trí tốt nhất tìm được, {0} % số chỗ khớp nhau",
+    ),
+    (
+        "on the right page nearly all do",
+        "với trang in đúng, hầu hết các chỗ đều khớp",
+    ),
+    (
+        "the scan was taken to be {} x {} mm",
+        "bản quét được coi là có cỡ {0} x {1} mm",
+    ),
+    (
+        "check the file names and the unit",
+        "hãy kiểm tra tên tệp và đơn vị",
+    ),
+    (
+        "characters of about {} mm, but most have 6 to 30 mm",
+        "các chữ khoảng {0} mm, trong khi đa số có 6 đến 30 mm",
+    ),
+    ("is the unit {}?", "đơn vị có phải là {0} không?"),
+    ("check the unit", "hãy kiểm tra đơn vị"),
+    (
+        "the scan shows no carved face: {}",
+        "bản quét không có mặt khắc: {0}",
+    ),
+    (
+        "{} control points are too few: choose at least {}",
+        "{0} điểm là quá ít: hãy chọn ít nhất {1} điểm",
+    ),
+    (
+        "the control points lie within {} mm of each other: choose points that are at least {} mm apart, best near the corners of the text",
+        "các điểm chỉ cách nhau {0} mm: hãy chọn các điểm cách nhau ít nhất {1} mm, tốt nhất gần các góc của phần chữ",
+    ),
+    (
+        "the control points contradict each other: no common position is nearer than {} mm to all of them",
+        "các điểm mâu thuẫn với nhau: không có vị trí chung nào gần tất cả các điểm hơn {0} mm",
+    ),
+    (
+        "choose them again on the same strokes of both images, or add a fourth one",
+        "hãy chọn lại trên cùng các nét của hai hình, hoặc thêm điểm thứ tư",
+    ),
+    (
+        "control point {} contradicts the others, which put it {} mm away: choose it again on the same stroke of both images",
+        "điểm {0} mâu thuẫn với các điểm khác, vốn cho vị trí cách đó {1} mm: hãy chọn lại điểm đó trên cùng một nét của hai hình",
+    ),
+    (
+        "relief and ink do not agree at the control points: {} % of the places agree",
+        "mặt khắc và mực không khớp tại các điểm: {0} % số chỗ khớp nhau",
+    ),
+    (
+        "choose points on the same strokes of both images",
+        "hãy chọn các điểm trên cùng các nét của hai hình",
+    ),
+    (
+        "the scans and prints need {} in {}, and the disk has {}",
+        "bản quét và bản in cần {0} trong {1}, đĩa còn {2}",
+    ),
+    (
+        "make room, or name another disk",
+        "hãy giải phóng dung lượng",
+    ),
+    // The correction of a block.
+    (
+        "the points of this block were changed since this page was opened: reload the page to see them",
+        "các điểm của ván này đã được thay đổi sau khi mở trang: hãy tải lại trang để xem",
+    ),
+    (
+        "{} was replaced since this page was opened: reload the page, and choose the points again",
+        "{0} đã được thay sau khi mở trang: hãy tải lại trang rồi chọn lại các điểm",
+    ),
+    (
+        "the page was opened again, or other points were tried: try these again before saving them",
+        "trang đã được mở lại, hoặc các điểm khác đã được thử: hãy thử lại các điểm này trước khi lưu",
+    ),
+    (
+        "is this the scan of a whole block?",
+        "đây có phải bản quét của cả ván không?",
+    ),
+];
