@@ -138,7 +138,7 @@ def test_chosen_metrics_alone_are_kept(pair: DemoPair) -> None:
     with pytest.raises(mocban.Error, match="no metric 'Releif'.*; did you mean 'relief'"):
         mocban.align(pair.mesh, pair.print, metrics=["Releif"])
     for wrong in (lambda: found.overlay("nope"), lambda: found.overlay("")):
-        with pytest.raises(mocban.InputError, match="no result of the metric .*only of density") as error:
+        with pytest.raises(mocban.InputError, match="no result of the metric .*only of .*density") as error:
             wrong()
         assert error.value.code == "usage"
     paper = mocban.align(pair.mesh, pair.print, settings=mocban.settings("paper"))

@@ -292,7 +292,7 @@ fn the_folder_beside_a_backup_can_be_used_without_copies() {
     let args = ["restore", "b.sqlite", "q", "--inputs", "b.sqlite.inputs"];
     let told = mocban(&root, &[&args[..], &["--json"]].concat()).expect(0);
     assert_eq!(told.json()["inputs_missing"], 0);
-    assert_eq!(names(&root.join("q")), ["catalog.sqlite"]);
+    assert_eq!(names(&root.join("q")), ["catalog.sqlite", "mocban.toml"]);
     let restored = Project::open(&root.join("q")).expect("a project");
     at(&restored, &["check", "--repair", "--accept-missing"]).expect(0);
     at(&restored, &["run"]).expect(0);
