@@ -43,9 +43,12 @@ fn hostile_project(dir: &Path) {
     project(dir, "p", "2");
     let dir = dir.join("p");
     let data = dir.join("data");
+    // A line break within the name of a block is refused.
+    let one_line = HOSTILE.replace('\n', " ");
+    let block = format!("{PLAIN}{one_line}");
     let row = json!({
         "id": "x1", "mesh": format!("{HOSTILE}.obj"), "print": format!("{HOSTILE}.png"),
-        "character": HOSTILE, "block": format!("{PLAIN}{HOSTILE}"), "place": HOSTILE,
+        "character": HOSTILE, "block": block, "place": HOSTILE,
     });
     std::fs::write(data.join("more.jsonl"), format!("{row}\n")).expect("written");
     for colour in ["never", "always"] {
@@ -67,7 +70,6 @@ fn hostile_project(dir: &Path) {
     assert_visible(
         &call(run(&project, &["--color", "always"]).args(["--progress", "plain"])).expect(3),
     );
-    let note = HOSTILE.replace('\n', " ");
     for color in ["never", "always"] {
         let set = [
             "verdict",
@@ -77,7 +79,7 @@ fn hostile_project(dir: &Path) {
             "--reviewer",
             PLAIN,
             "--note",
-            &note,
+            &one_line,
         ];
         assert_visible(&mocban(&dir, &[&set[..], &["--color", color]].concat()).expect(0));
     }
