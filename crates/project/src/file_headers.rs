@@ -110,9 +110,10 @@ pub fn page_length_mm(path: &Path, limits: &ImageLimits) -> Option<f64> {
     let (file, _) = open_regular(path).ok()?;
     let [x, y] = file_dpi(BufReader::new(file))?;
     // They are equal nearly always, so it does not matter whether the image is stored turned.
-    let dpi = x.min(y);
+    let dpi = Some(x.min(y)).filter(|dpi| *dpi >= MIN_DPI)?;
+    // Decodes an image whose file may be cut.
     let [width, height] = image_size(path, limits).ok()?;
-    (dpi >= MIN_DPI).then(|| f64::from(width.max(height)) / dpi * MM_PER_INCH)
+    Some(f64::from(width.max(height)) / dpi * MM_PER_INCH)
 }
 
 /// Returns the unit in which a scan of a block is as long as its page, if it is not so in `unit`. `length` is in units of the
