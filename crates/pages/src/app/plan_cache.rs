@@ -52,6 +52,8 @@ impl PlanCache {
         let names = names?;
         let plan = Arc::new(plan(source)?);
         let mut all = self.lock();
+        // Another request may have made the same plan meanwhile.
+        all.retain(|kept| kept.choices != choices);
         all.truncate(KEPT_PLANS - 1);
         all.push_front(KeptPlan {
             choices: choices.to_owned(),
@@ -136,5 +138,34 @@ mod tests {
             [pairs("a"), pairs("b"), pairs("e")],
             [None, Some(1), Some(1)]
         );
+    }
+
+    #[test]
+    fn a_plan_that_two_requests_make_is_kept_once() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        for name in ["1.stl", "1.png"] {
+            std::fs::write(dir.path().join(name), "x").expect("written");
+        }
+        let source = || PairSource::Folders {
+            meshes: dir.path().to_owned(),
+            prints: dir.path().to_owned(),
+            unit: None,
+        };
+        let made = |source| {
+            let location = Location::new(dir.path().join("project"));
+            plan_import(source, &PairChoices::default(), &location, &(0..9))
+        };
+        let cache = PlanCache::default();
+        for choices in ["b", "c", "d"] {
+            cache.plan(source(), choices, made).expect("a plan");
+        }
+        let twice = cache.plan(source(), "a", |asked| {
+            cache.plan(source(), "a", made).expect("a plan");
+            made(asked)
+        });
+        twice.expect("a plan");
+        for choices in ["a", "b", "c", "d"] {
+            assert!(cache.kept(choices).is_some(), "{choices}");
+        }
     }
 }
