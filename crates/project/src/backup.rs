@@ -59,14 +59,14 @@ pub async fn backup(
     catalog.close().await;
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
     let saver = if with_inputs {
-        let saver = InputSaver::plan(&copy, &project, inputs_folder(file)).await?;
-        let copier = saver.begin()?;
-        Some((saver, copier))
+        Some(InputSaver::plan(&copy, &project, inputs_folder(file)).await?)
     } else {
         None
     };
     // Somebody may have created the file in the meantime.
     check_target(file, &project)?;
+    let begin = |saver: InputSaver| saver.begin().map(|copier| (saver, copier));
+    let saver = saver.map(begin).transpose()?;
     rename_into_place(&copy, file).with_context(failed)?;
     let bytes = std::fs::metadata(file).with_context(failed)?.len();
     // A folder that a kill leaves from here on is that of the scans and prints.

@@ -125,9 +125,10 @@ impl InputList {
 
 /// Returns the folder of the scans and prints of a backup, which need not exist.
 pub fn inputs_folder(backup: &Path) -> PathBuf {
-    let mut folder = backup.as_os_str().to_owned();
-    folder.push(ENDING);
-    folder.into()
+    // A path may end with a slash.
+    let mut name = backup.file_name().unwrap_or_default().to_owned();
+    name.push(ENDING);
+    backup.with_file_name(name)
 }
 
 /// Returns the copies of scans and prints beside a backup, or `None` if there are none.
