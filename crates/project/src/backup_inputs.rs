@@ -1,19 +1,20 @@
 //! Copies the scans and prints of a project to a folder beside its backup.
 
-use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
 use crate::byte_size::byte_size;
 use crate::error::{ProjectResult, TaskStopped, WithContext as _};
 use crate::exit::Refusal;
-use crate::input_copy::{CopyOutcome, InputCopier};
+use crate::growing_list::{GrowingList, earlier_copies};
+use crate::input_copy::{CopyOutcome, InputCopier, link_below};
 use crate::input_list::{CopiedInput, INPUT_LIST, InputCopies, InputList, has_list, is_of_list};
-use crate::input_names::InputNames;
 use crate::location::Location;
-use crate::wanted_inputs::{WantedInput, wanted_inputs};
+use crate::named_inputs::{NamedInput, named_inputs};
+use crate::wanted_inputs::{first_wanted_inputs, wanted_inputs};
 use mocban_catalog::Catalog;
 use mocban_core::domain::ContentHash;
 use mocban_store::{Input, InputError, Project};
@@ -21,6 +22,14 @@ use mocban_system::platform;
 
 /// Most inputs that are named because they are not in a backup.
 const MAX_NAMED: usize = 1_000;
+/// Most pairs whose files are measured for a page.
+const SIZED_PAIRS: usize = 10_000;
+/// Longest time for it.
+const SIZING_TIME: Duration = Duration::from_secs(2);
+/// Number of files after which the time is compared.
+const SIZED_AT_A_TIME: usize = 64;
+/// Longest list that is read for it, in bytes.
+const SIZED_LIST_BYTES: u64 = 16 << 20;
 
 /// Scans and prints that were saved beside a backup.
 #[derive(Debug, Clone)]
@@ -56,6 +65,8 @@ pub enum LeftOutReason {
     Changed,
     /// It cannot be read.
     Unreadable,
+    /// The folder can have no copy of its name or length.
+    Unwritable,
 }
 
 /// What a backup with scans and prints needs.
@@ -69,13 +80,8 @@ pub struct InputsSize {
     pub to_copy: u64,
     /// Number of inputs in an object store, which are never copied.
     pub remote: u64,
-}
-
-/// An input with the name of its copy.
-#[derive(Debug)]
-struct NamedInput {
-    wanted: WantedInput,
-    name: String,
+    /// Whether there may be more, because measuring all would take long.
+    pub is_partial: bool,
 }
 
 /// Scans and prints that will be saved.
@@ -84,35 +90,45 @@ pub(crate) struct InputSaver {
     project: Project,
     folder: PathBuf,
     inputs: Vec<NamedInput>,
-    /// Earlier copies by stored path.
-    earlier: HashMap<String, CopiedInput>,
+    list: GrowingList,
 }
 
-/// Returns how much a project needs for a backup with scans and prints in a folder, which need not exist.
+/// Returns how much a project needs for a backup with scans and prints in a folder, which need not exist. Counts only the first
+/// files of a large project.
 pub async fn inputs_size(folder: &Path, location: &Location) -> ProjectResult<InputsSize> {
     let (project, catalog) = location.open_read_only().await?;
-    let inputs = named_inputs(&catalog).await;
+    let wanted = first_wanted_inputs(&catalog, SIZED_PAIRS).await;
     catalog.close().await;
-    let (folder, inputs) = (folder.to_owned(), inputs?);
-    let measure = move || size_of(&project, &folder, &inputs);
+    let (folder, (wanted, is_cut)) = (folder.to_owned(), wanted?);
+    let measure = move || {
+        let until = Instant::now() + SIZING_TIME;
+        let list = std::fs::metadata(folder.join(INPUT_LIST));
+        let is_short = list.is_ok_and(|list| list.is_file() && list.len() <= SIZED_LIST_BYTES);
+        // The names are nearly always the same without the list.
+        let earlier = is_short.then(|| earlier_copies(&folder).unwrap_or_default());
+        let inputs = named_inputs(wanted, &earlier.unwrap_or_default());
+        let mut size = size_of(&project, &folder, &inputs, Some(until));
+        size.is_partial |= is_cut;
+        size
+    };
     let size = tokio::task::spawn_blocking(measure).await;
     Ok(size.map_err(TaskStopped)?)
 }
 
-/// Returns the inputs of a catalog with the names of their copies.
-async fn named_inputs(catalog: &Catalog) -> ProjectResult<Vec<NamedInput>> {
-    let mut names = InputNames::without(INPUT_LIST);
-    let named = wanted_inputs(catalog).await?.into_iter();
-    let named = named.map(|wanted| NamedInput {
-        name: names.next(&wanted.stored),
-        wanted,
-    });
-    Ok(named.collect())
-}
-
-fn size_of(project: &Project, folder: &Path, inputs: &[NamedInput]) -> InputsSize {
+/// Measures inputs. Counts only the first ones if that takes longer than `until`.
+fn size_of(
+    project: &Project,
+    folder: &Path,
+    inputs: &[NamedInput],
+    until: Option<Instant>,
+) -> InputsSize {
     let mut size = InputsSize::default();
-    for NamedInput { wanted, name } in inputs {
+    for (index, NamedInput { wanted, name }) in inputs.iter().enumerate() {
+        let is_due = index % SIZED_AT_A_TIME == SIZED_AT_A_TIME - 1;
+        if is_due && until.is_some_and(|until| Instant::now() >= until) {
+            size.is_partial = true;
+            break;
+        }
         let input = project.input(&wanted.stored);
         if input.is_remote() {
             size.remote += 1;
@@ -133,26 +149,26 @@ impl InputSaver {
     /// Plans to save the inputs of a backup that is written at `copy`. Checks what can refuse it, and writes nothing.
     ///
     /// # Errors
-    /// Refuses a folder of somebody else, one with inputs of the project, and a disk without room.
+    /// Refuses a folder of somebody else, one with inputs of the project, with links or with a list that cannot be read, and
+    /// a disk without room.
     pub(crate) async fn plan(
         copy: &Path,
         project: &Project,
         folder: PathBuf,
     ) -> ProjectResult<Self> {
         check_folder(&folder)?;
+        let earlier = earlier_copies(&folder)?;
         let catalog = Catalog::open_backup(copy).await?;
-        let inputs = named_inputs(&catalog).await;
+        let wanted = wanted_inputs(&catalog).await;
         catalog.close().await;
-        let inputs = inputs?;
+        let inputs = named_inputs(wanted?, &earlier);
         check_inputs_outside(project, &folder, &inputs)?;
-        let size = size_of(project, &folder, &inputs);
+        check_no_links(&folder, &inputs)?;
+        let size = size_of(project, &folder, &inputs, None);
         check_room(size.to_copy, free_beside(&folder), &folder)?;
-        // Without a list that can be read, copies are still compared with the inputs.
-        let earlier = InputList::read(&folder).ok().flatten();
-        let earlier = earlier.map_or_else(Vec::new, |list| list.files).into_iter();
         Ok(Self {
             project: project.clone(),
-            earlier: earlier.map(|copy| (copy.stored.clone(), copy)).collect(),
+            list: GrowingList::new(&folder, earlier, inputs.len()),
             folder,
             inputs,
         })
@@ -163,7 +179,7 @@ impl InputSaver {
     pub(crate) fn begin(&self) -> ProjectResult<InputCopier> {
         let failed = || format!("cannot write {}", self.folder.display());
         let copier = InputCopier::begin(&self.folder, INPUT_LIST).with_context(failed)?;
-        if self.earlier.is_empty() {
+        if self.list.is_new() {
             InputList::new(Vec::new()).write(&self.folder)?;
         }
         Ok(copier)
@@ -181,27 +197,18 @@ impl InputSaver {
             first_left_out: Vec::new(),
             remote: 0,
         };
-        let mut listed: Vec<CopiedInput> = Vec::new();
         let inputs = std::mem::take(&mut self.inputs);
         let copied: ProjectResult<()> = inputs.iter().try_for_each(|input| {
-            let earlier = self.earlier.remove(&input.wanted.stored);
-            listed.extend(self.save_one(copier, input, earlier.as_ref(), &mut saved)?);
-            Ok(())
+            let copy = self.save_one(copier, input, &mut saved)?;
+            self.list.add(&input.wanted.stored, copy)
         });
         let copied = copied.and_then(|()| {
             // The names of new folders have to survive a power cut, too.
             let synced = platform::sync_tree(&self.folder);
             synced.with_context(|| format!("cannot write {}", self.folder.display()))
         });
-        if copied.is_err() {
-            // Copies of inputs that were not reached are still there.
-            let names: HashSet<String> = listed.iter().map(|copy| copy.name.clone()).collect();
-            let others = self.earlier.drain().map(|(_, copy)| copy);
-            listed.extend(others.filter(|copy| !names.contains(&copy.name)));
-        }
-        let list = InputList::new(listed);
-        let written = list.write(&self.folder);
-        copied.and(written)?;
+        let finished = self.list.finish(copied.is_ok());
+        let list = copied.and(finished)?;
         saved.copies = list.copies(&self.folder);
         Ok(saved)
     }
@@ -211,7 +218,6 @@ impl InputSaver {
         &self,
         copier: &InputCopier,
         NamedInput { wanted, name }: &NamedInput,
-        earlier: Option<&CopiedInput>,
         saved: &mut SavedInputs,
     ) -> ProjectResult<Option<CopiedInput>> {
         let input = self.project.input(&wanted.stored);
@@ -228,6 +234,7 @@ impl InputSaver {
             }))
         };
         let there = copier.hash_of(name);
+        let earlier = self.list.earlier(&wanted.stored);
         let is_earlier = |hash: ContentHash| earlier.is_some_and(|copy| copy.hash == hash);
         // A copy that is worth keeping if the input is lost.
         let good =
@@ -244,7 +251,10 @@ impl InputSaver {
                 saved.copied += u64::from(!was_there);
                 return entry(bytes, hash);
             }
-            CopyOutcome::Other => Some(LeftOutReason::Changed),
+            CopyOutcome::Other | CopyOutcome::Unread(InputError::Changed(_)) => {
+                Some(LeftOutReason::Changed)
+            }
+            CopyOutcome::Unwritable => Some(LeftOutReason::Unwritable),
             CopyOutcome::Unread(_) if good.is_some() => None,
             CopyOutcome::Unread(InputError::NotThere(_)) => Some(LeftOutReason::Missing),
             CopyOutcome::Unread(_) => Some(LeftOutReason::Unreadable),
@@ -325,6 +335,23 @@ fn check_inputs_outside(
     Ok(())
 }
 
+/// Refuses links at the places of copies and of their list: a copy must not be a name of the file itself, and nothing is
+/// written outside the folder.
+fn check_no_links(folder: &Path, inputs: &[NamedInput]) -> ProjectResult<()> {
+    let names = inputs.iter().map(|input| input.name.as_str());
+    let mut links = std::iter::once(INPUT_LIST).chain(names);
+    match links.find_map(|name| link_below(folder, name)) {
+        None => Ok(()),
+        Some(link) => {
+            let link = link.display();
+            let text = format!(
+                "{link} is a link, and a backup needs a copy there; remove the link, or name another file for the backup"
+            );
+            Err(Refusal::Usage(text).into())
+        }
+    }
+}
+
 /// Refuses to copy more than the disk has room for.
 pub(crate) fn check_room(needed: u64, free: Option<u64>, folder: &Path) -> ProjectResult<()> {
     match free {
@@ -345,7 +372,15 @@ mod tests {
     use std::path::Path;
 
     use super::{check_folder, check_room};
-    use crate::input_list::InputList;
+    use crate::input_list::{InputList, inputs_folder};
+
+    #[test]
+    fn the_folder_is_beside_a_backup_whose_name_ends_with_a_slash() {
+        let folder = inputs_folder(Path::new("a/b.sqlite/"));
+        assert_eq!(folder, Path::new("a/b.sqlite.inputs"));
+        let folder = inputs_folder(Path::new("b.sqlite"));
+        assert_eq!(folder, Path::new("b.sqlite.inputs"));
+    }
 
     #[test]
     fn a_disk_without_room_is_refused_before_anything_is_written() {

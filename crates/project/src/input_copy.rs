@@ -39,6 +39,8 @@ pub(crate) enum CopyOutcome {
     Other,
     /// The input cannot be read.
     Unread(InputError),
+    /// The folder can have no file of this name or length. Other inputs may be copied.
+    Unwritable,
 }
 
 /// Why no copy was written.
@@ -62,7 +64,7 @@ impl InputCopier {
     /// has this name already.
     ///
     /// # Errors
-    /// Returns an error if the copy cannot be written.
+    /// Returns an error if the disk is full or fails, so that no other copy can be written either.
     pub(crate) fn copy(
         &self,
         input: &Input,
@@ -85,6 +87,9 @@ impl InputCopier {
                 Ok(_) => {}
             }
         }
+        if link_below(&self.folder, name).is_some() {
+            return Ok(CopyOutcome::Unwritable);
+        }
         let staged = self.staging.path().join(NEW);
         // What an earlier input has left.
         let _ = std::fs::remove_file(&staged);
@@ -97,6 +102,9 @@ impl InputCopier {
         };
         let (hash, bytes) = match copied(input, &staged) {
             Err(CopyFailure::Source(error)) => return Ok(CopyOutcome::Unread(error)),
+            Err(CopyFailure::Target(error)) if is_of_one_file(&error) => {
+                return Ok(CopyOutcome::Unwritable);
+            }
             Err(CopyFailure::Target(error)) => {
                 return Err(ProjectError::from(error).context(failed()));
             }
@@ -105,10 +113,11 @@ impl InputCopier {
         if !may_be(hash) {
             return Ok(CopyOutcome::Other);
         }
-        if let Some(parent) = target.parent() {
-            create_folders(parent).with_context(failed)?;
+        let placed = target.parent().map_or(Ok(()), create_folders);
+        match placed.and_then(|()| rename_into_place(&staged, &target)) {
+            Err(error) if is_of_one_file(&error) => return Ok(CopyOutcome::Unwritable),
+            placed => placed.with_context(failed)?,
         }
-        rename_into_place(&staged, &target).with_context(failed)?;
         Ok(CopyOutcome::There {
             bytes,
             hash,
@@ -123,10 +132,38 @@ impl InputCopier {
         Ok(std::fs::metadata(&path).with_context(failed)?.len())
     }
 
-    /// Returns the hash of the copy that is there already.
+    /// Returns the hash of the copy that is there already. A link is no copy.
     pub(crate) fn hash_of(&self, name: &str) -> Option<ContentHash> {
-        file_hash(&self.folder.join(name))
+        match link_below(&self.folder, name) {
+            None => file_hash(&self.folder.join(name)),
+            Some(_) => None,
+        }
     }
+}
+
+/// Returns the first link on the way from a folder to a path below it.
+pub(crate) fn link_below(folder: &Path, name: &str) -> Option<PathBuf> {
+    let mut path = folder.to_owned();
+    Path::new(name).components().find_map(|part| {
+        path.push(part);
+        let meta = std::fs::symlink_metadata(&path).ok()?;
+        meta.is_symlink().then(|| path.clone())
+    })
+}
+
+/// Returns whether an error is about the name, the place or the length of one file, and not about the disk.
+fn is_of_one_file(error: &std::io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::AlreadyExists
+            | ErrorKind::DirectoryNotEmpty
+            | ErrorKind::FileTooLarge
+            | ErrorKind::InvalidFilename
+            | ErrorKind::InvalidInput
+            | ErrorKind::IsADirectory
+            | ErrorKind::NotADirectory
+            | ErrorKind::PermissionDenied
+    )
 }
 
 /// Returns the hash of a file, or `None` if it cannot be read.
@@ -158,6 +195,8 @@ fn copied(input: &Input, to: &Path) -> Result<(ContentHash, u64), CopyFailure> {
 
 #[cfg(test)]
 mod tests {
+    #[cfg(unix)]
+    use super::link_below;
     use super::{CopyOutcome, InputCopier};
     use mocban_core::domain::ContentHash;
     use mocban_store::Input;
@@ -201,14 +240,46 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_copied_over_a_folder() {
+    fn a_folder_in_the_way_of_a_copy_stays_and_other_copies_are_written() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let scan = dir.path().join("1.stl");
         std::fs::write(&scan, "scan").expect("written");
         std::fs::create_dir_all(dir.path().join("copies/1.stl/mine")).expect("a folder");
         let copier = InputCopier::begin(&dir.path().join("copies"), "list").expect("a folder");
-        let refused = copier.copy(&Input::file(&scan), "1.stl", None, |_| true);
-        let text = refused.expect_err("a folder is there").to_string();
-        assert!(text.starts_with("cannot copy"), "{text}");
+        let copy = |name: &str| {
+            let copied = copier.copy(&Input::file(&scan), name, None, |_| true);
+            copied.expect("the disk works")
+        };
+        let long = "x".repeat(300);
+        let below = format!("{long}/1.stl");
+        for name in ["1.stl", long.as_str(), below.as_str()] {
+            assert!(matches!(copy(name), CopyOutcome::Unwritable), "{name}");
+        }
+        assert!(dir.path().join("copies/1.stl/mine").is_dir());
+        assert!(matches!(copy("2.stl"), CopyOutcome::There { .. }));
+        assert!(matches!(copy("2.stl/3.stl"), CopyOutcome::Unwritable));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_read_or_written_through_a_link() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let scan = dir.path().join("1.stl");
+        std::fs::write(&scan, "scan").expect("written");
+        let (elsewhere, folder) = (dir.path().join("elsewhere"), dir.path().join("copies"));
+        std::fs::create_dir(&elsewhere).expect("a folder");
+        let copier = InputCopier::begin(&folder, "list").expect("a folder");
+        for (to, link) in [(&scan, "1.stl"), (&elsewhere, "a")] {
+            std::os::unix::fs::symlink(to, folder.join(link)).expect("a link");
+        }
+        for name in ["1.stl", "a/1.stl"] {
+            assert_eq!(copier.hash_of(name), None, "{name}");
+            let copied = copier.copy(&Input::file(&scan), name, None, |_| true);
+            let copied = copied.expect("the disk works");
+            assert!(matches!(copied, CopyOutcome::Unwritable), "{name}");
+        }
+        assert_eq!(link_below(&folder, "a/1.stl"), Some(folder.join("a")));
+        let written = std::fs::read_dir(&elsewhere).expect("a folder").count();
+        assert_eq!(written, 0, "nothing is written elsewhere");
     }
 }

@@ -53,6 +53,30 @@ impl InputNames {
         joined(&parent, &name)
     }
 
+    /// Keeps the name that an input has in an earlier list. New copies in its folders get other names.
+    pub(crate) fn reserve(&mut self, stored: &str, name: &str) {
+        let normal = |path: &str| {
+            let parts = Path::new(path).components();
+            let parts = parts.filter_map(|part| match part {
+                Component::Normal(part) => part.to_str().map(str::to_owned),
+                _ => None,
+            });
+            parts.collect::<Vec<String>>()
+        };
+        let (stored, name) = (normal(stored), normal(name));
+        let is_alike = stored.len() == name.len();
+        let mut parent = String::new();
+        for (depth, part) in name.iter().enumerate() {
+            self.taken.insert((parent.clone(), folded(part)));
+            let path = joined(&parent, part);
+            if is_alike && depth + 1 < name.len() {
+                let key = (parent, stored[depth].clone());
+                self.folders.entry(key).or_insert_with(|| path.clone());
+            }
+            parent = path;
+        }
+    }
+
     /// Returns the folder for stored paths with a folder of this name.
     fn folder(&mut self, parent: String, name: &str) -> String {
         let key = (parent, name.to_owned());
@@ -146,6 +170,21 @@ mod tests {
             ("/data/meshes/chữ 1.stl", "data/meshes/chữ 1 (4).stl"),
             ("data", "data (3)"),
             ("List.json", "List (2).json"),
+        ] {
+            assert_eq!(names.next(stored), name, "{stored}");
+        }
+    }
+
+    #[test]
+    fn a_reserved_name_and_its_folders_stay() {
+        let mut names = InputNames::without("list.json");
+        names.reserve("Data/1.stl", "Data (2)/1.stl");
+        names.reserve("/", "file");
+        for (stored, name) in [
+            ("Data/1.stl", "Data (2)/1 (2).stl"),
+            ("Data/2.stl", "Data (2)/2.stl"),
+            ("data/1.stl", "data/1.stl"),
+            ("", "file (2)"),
         ] {
             assert_eq!(names.next(stored), name, "{stored}");
         }

@@ -30,6 +30,15 @@ impl WantedInput {
         self.known.iter().any(|known| known.hash == hash)
     }
 
+    /// Makes an input that no run has read yet.
+    #[cfg(test)]
+    pub(crate) fn unread(stored: &str) -> Self {
+        Self {
+            stored: stored.to_owned(),
+            known: Vec::new(),
+        }
+    }
+
     /// Returns whether no run has read it yet.
     pub(crate) const fn is_unread(&self) -> bool {
         self.known.is_empty()
@@ -47,17 +56,31 @@ impl WantedInput {
 /// Returns the meshes, prints, pages and labels of all pairs and blocks, also of retired ones, in the order of the catalog.
 /// The meshes and prints of pairs that were cut from a block are artifacts.
 pub(crate) async fn wanted_inputs(catalog: &Catalog) -> ProjectResult<Vec<WantedInput>> {
+    let (inputs, _) = first_wanted_inputs(catalog, usize::MAX).await?;
+    Ok(inputs)
+}
+
+/// Returns the inputs of about as many pairs as `most_pairs`, and of all blocks. Also returns whether there may be more.
+pub(crate) async fn first_wanted_inputs(
+    catalog: &Catalog,
+    most_pairs: usize,
+) -> ProjectResult<(Vec<WantedInput>, bool)> {
     let mut wanted = WantedInputs::default();
-    let mut after = None;
+    let (mut after, mut pairs, mut is_cut) = (None, 0, false);
     loop {
         let page = catalog.known_inputs(after, PAGE, None).await?;
         let Some(last) = page.last() else {
             break;
         };
         after = Some(last.pair);
+        pairs += page.len();
         for pair in page {
             wanted.add(pair.mesh_path, pair.mesh);
             wanted.add(pair.print_path, pair.print);
+        }
+        if pairs >= most_pairs {
+            is_cut = true;
+            break;
         }
     }
     for block in catalog.known_blocks().await? {
@@ -68,7 +91,7 @@ pub(crate) async fn wanted_inputs(catalog: &Catalog) -> ProjectResult<Vec<Wanted
             wanted.add(labels, read.labels);
         }
     }
-    Ok(wanted.inputs)
+    Ok((wanted.inputs, is_cut))
 }
 
 #[derive(Default)]

@@ -97,6 +97,9 @@ fn left_out_text(inputs: &SavedInputs) -> String {
             LeftOutReason::Missing => "is missing",
             LeftOutReason::Changed => "has changed since it was read",
             LeftOutReason::Unreadable => "cannot be read",
+            LeftOutReason::Unwritable => {
+                "cannot be written there, because of its name or size or what is in its place"
+            }
         };
         format!("{} {what}", one_line(&input.path))
     });

@@ -73,7 +73,6 @@ pub(super) async fn size_part(
 fn size_sentence(size: &InputsSize, free: Option<u64>) -> Sentence {
     let texts = Language::ALL.map(|language| {
         let is_english = matches!(language, Language::English);
-        let mut parts = vec![file_size(language, size.bytes)];
         let of = |bytes: u64, english: &str, vietnamese: &str| {
             let (bytes, words) = (
                 file_size(language, bytes),
@@ -81,6 +80,11 @@ fn size_sentence(size: &InputsSize, free: Option<u64>) -> Sentence {
             );
             words.replace("{}", &bytes)
         };
+        let mut parts = vec![if size.is_partial {
+            of(size.bytes, "at least {}", "ít nhất {}")
+        } else {
+            file_size(language, size.bytes)
+        }];
         if size.to_copy < size.bytes {
             parts.push(of(size.to_copy, "{} of it new", "trong đó {} mới"));
         }
@@ -177,6 +181,10 @@ fn inputs_lines(saved: &SavedInputs) -> TaskLines {
                     LeftOutReason::Missing => ["missing", "bị thiếu"],
                     LeftOutReason::Changed => ["changed", "đã đổi"],
                     LeftOutReason::Unreadable => ["cannot be read", "không đọc được"],
+                    LeftOutReason::Unwritable => [
+                        "name or size not allowed on this disk",
+                        "ổ đĩa không cho phép tên hoặc kích thước này",
+                    ],
                 };
                 format!("{} ({})", one_line(&input.path), why[index])
             });
@@ -220,6 +228,7 @@ mod tests {
             bytes: 12_300_000_000,
             to_copy: 12_300_000_000,
             remote: 0,
+            is_partial: false,
         };
         let text =
             |size: &InputsSize, free, language| size_sentence(size, free).text(language).to_owned();
@@ -245,5 +254,13 @@ mod tests {
             text(&size, None, Language::Vietnamese),
             "(12,3 GB; trong đó 2,0 GB mới); không gồm 3 tệp ở kho đối tượng"
         );
+        let size = InputsSize {
+            is_partial: true,
+            remote: 0,
+            to_copy: size.bytes,
+            ..size
+        };
+        assert_eq!(text(&size, None, Language::English), "(at least 12.3 GB)");
+        assert_eq!(text(&size, None, Language::Vietnamese), "(ít nhất 12,3 GB)");
     }
 }
