@@ -2,6 +2,7 @@
 //! that is restored from them.
 
 use std::collections::BTreeSet;
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -267,7 +268,7 @@ fn a_damaged_copy_is_not_restored() {
     let restored = restore(&root);
     assert_eq!(restored["inputs_copied"], 2);
     assert_eq!(restored["inputs_missing"], 2);
-    // So is a damaged list, until the next backup.
+    // So is a damaged list.
     std::fs::write(root.join("b.sqlite.inputs/mocban-inputs.json"), "{").expect("written");
     let refused = mocban(&root, &["restore", "b.sqlite", "again"]).expect(2);
     assert!(
@@ -277,6 +278,10 @@ fn a_damaged_copy_is_not_restored() {
     );
     assert!(!root.join("again").exists());
     std::fs::remove_dir_all(root.join("q")).expect("removed");
+    // A backup does not replace it, because it may name the only copies of lost files.
+    let refused = backup(&root).expect(2);
+    assert!(refused.err.contains("rename the folder"), "{}", refused.err);
+    std::fs::remove_dir_all(root.join("b.sqlite.inputs")).expect("removed");
     assert_completed(&root);
 }
 
@@ -308,4 +313,82 @@ fn a_catalog_on_a_server_is_saved_with_its_scans_and_prints() {
     assert!(saved["copied"].as_u64() > Some(1), "{saved}");
     assert_eq!(saved["left_out"], 0);
     assert_eq!(restore(lab.path())["inputs_copied"], saved["files"]);
+}
+
+#[test]
+fn links_in_the_folder_are_refused() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let root = root_of(&dir);
+    done(&root);
+    backup(&root).expect(0);
+    let (copies, elsewhere) = (root.join("b.sqlite.inputs/data"), root.join("elsewhere"));
+    let mesh = copies.join("meshes/upright-0000.ply");
+    std::fs::remove_file(&mesh).expect("removed");
+    symlink(root.join("p/data/meshes/upright-0000.ply"), &mesh).expect("a link");
+    let refused = backup(&root).expect(2);
+    assert!(refused.err.contains("0.ply is a link"), "{}", refused.err);
+    std::fs::remove_file(&mesh).expect("removed");
+    std::fs::rename(&copies, &elsewhere).expect("renamed");
+    symlink(&elsewhere, &copies).expect("a link");
+    let refused = backup(&root).expect(2);
+    assert!(refused.err.contains("data is a link"), "{}", refused.err);
+    assert!(!elsewhere.join("meshes/upright-0000.ply").exists());
+    std::fs::remove_file(&copies).expect("removed");
+    std::fs::remove_dir_all(&elsewhere).expect("removed");
+    assert_completed(&root);
+}
+
+#[test]
+fn a_copy_that_cannot_be_written_costs_no_other() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let root = root_of(&dir);
+    done(&root);
+    let copy = root.join("b.sqlite.inputs/data/meshes/upright-0000.ply");
+    backup(&root).expect(0);
+    std::fs::remove_dir_all(root.join("b.sqlite.inputs/data")).expect("removed");
+    std::fs::create_dir_all(copy.join("mine")).expect("a folder");
+    let told = backup(&root).expect(3);
+    let says = "upright-0000.ply cannot be written there";
+    assert!(told.err.contains(says), "{}", told.err);
+    let saved = &told.json()["inputs"];
+    assert_eq!(
+        (&saved["files"], &saved["left_out"]),
+        (&3.into(), &1.into())
+    );
+    assert_eq!(saved["first_left_out"][0]["reason"], "unwritable");
+    assert!(copy.join("mine").is_dir());
+    std::fs::remove_dir_all(&copy).expect("removed");
+    assert_completed(&root);
+}
+
+#[test]
+fn a_lost_file_with_a_copy_is_in_later_backups() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let root = root_of(&dir);
+    let project = done(&root);
+    backup(&root).expect(0);
+    std::fs::remove_dir_all(project.dir().join("data/meshes")).expect("removed");
+    let saved = &backup(&root).expect(0).json()["inputs"];
+    assert_eq!((&saved["files"], &saved["copied"]), (&4.into(), &0.into()));
+    assert_eq!(restore(&root)["inputs_copied"], DEMO_FILES);
+}
+
+#[test]
+fn a_disk_that_fails_costs_no_earlier_copy() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let (root, notes) = (
+        root_of(&dir),
+        tempfile::tempdir().expect("a temporary directory"),
+    );
+    done(&root);
+    backup(&root).expect(0);
+    let folder = root.join("b.sqlite.inputs");
+    std::fs::write(folder.join("data/meshes/upright-0000.ply"), "damaged").expect("written");
+    let mut failing = command(&root);
+    Fault::once("write", STAGED, ENOSPC).inject(1, &root, notes.path(), &mut failing);
+    call(&mut failing).expect(1);
+    assert!(Fault::injected(notes.path()) > 0);
+    let list = std::fs::read_to_string(folder.join("mocban-inputs.json")).expect("a list");
+    assert_eq!(list.matches("\"stored\"").count() as u64, DEMO_FILES);
+    assert_completed(&root);
 }
