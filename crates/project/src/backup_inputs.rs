@@ -370,9 +370,32 @@ pub(crate) fn check_room(needed: u64, free: Option<u64>, folder: &Path) -> Proje
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+    use std::time::Instant;
 
-    use super::{check_folder, check_room};
+    use super::{SIZED_AT_A_TIME, check_folder, check_room, size_of};
     use crate::input_list::{InputList, inputs_folder};
+    use crate::named_inputs::named_inputs;
+    use crate::wanted_inputs::WantedInput;
+    use mocban_store::Project;
+
+    #[test]
+    fn only_the_first_files_are_measured_if_the_time_is_over() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::at(dir.path());
+        let stored = (0..100).map(|number| format!("{number}.stl"));
+        let wanted = stored.map(|stored| {
+            std::fs::write(dir.path().join(&stored), "scan").expect("written");
+            WantedInput::unread(&stored)
+        });
+        let inputs = named_inputs(wanted.collect(), &[]);
+        let measured = |until| {
+            let size = size_of(&project, &dir.path().join("none"), &inputs, until);
+            (size.files, size.to_copy, size.is_partial)
+        };
+        assert_eq!(measured(None), (100, 400, false));
+        let first = SIZED_AT_A_TIME as u64 - 1;
+        assert_eq!(measured(Some(Instant::now())), (first, first * 4, true));
+    }
 
     #[test]
     fn the_folder_is_beside_a_backup_whose_name_ends_with_a_slash() {
