@@ -7,17 +7,19 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{ProjectResult, WithContext as _};
+use crate::byte_size::byte_size;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::exit::Refusal;
-use mocban_core::domain::ContentHash;
-use mocban_store::{StagingFolder, read_file_or_pipe, write_atomic};
+use crate::input_names::folded;
+use mocban_core::domain::{ContentHash, ErrorCode};
+use mocban_store::{InputError, StagingFolder, open_regular, read_up_to, write_atomic};
 
 /// The list in a folder of copies.
 pub(crate) const INPUT_LIST: &str = "mocban-inputs.json";
 /// What the name of the folder has after that of the backup.
 const ENDING: &str = ".inputs";
-/// Longest list that is read, in bytes.
-const MAX_LIST_BYTES: u64 = 256 << 20;
+/// Longest list that is written and read, in bytes: about five million inputs.
+const MAX_LIST_BYTES: u64 = 1 << 30;
 /// Version of the list.
 const SCHEMA: u32 = 1;
 
@@ -67,24 +69,30 @@ impl InputList {
     /// # Errors
     /// Refuses a list of a later version, a damaged one, and one that leads out of its folder.
     pub(crate) fn read(folder: &Path) -> ProjectResult<Option<Self>> {
+        Self::read_plainly(folder).map_err(|error| {
+            if error.code() != ErrorCode::Usage {
+                return error;
+            }
+            let text = format!(
+                "{error}; make the backup again, or find its files by their paths with --inputs {}",
+                folder.display()
+            );
+            ProjectError::from(Refusal::Usage(text))
+        })
+    }
+
+    /// Reads the list of a folder like [`Self::read`]. The error only says what is wrong with the list.
+    pub(crate) fn read_plainly(folder: &Path) -> ProjectResult<Option<Self>> {
         let path = folder.join(INPUT_LIST);
         let failed = || format!("cannot read {}", path.display());
-        let bytes = match read_file_or_pipe(&path, MAX_LIST_BYTES) {
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::InvalidFilename
-                ) =>
-            {
-                return Ok(None);
-            }
-            read => read.with_context(failed)?,
+        let file = match open_regular(&path) {
+            Err(InputError::NotThere(_)) => return Ok(None),
+            Err(InputError::Io { source, .. }) if is_not_there(source.kind()) => return Ok(None),
+            opened => opened.with_context(failed)?.0,
         };
+        let bytes = read_up_to(file, MAX_LIST_BYTES).with_context(failed)?;
         let refuse = |reason: &str| {
-            let text = format!(
-                "{} {reason}; make the backup again, or name a folder with --inputs",
-                path.display()
-            );
+            let text = format!("{} {reason}", path.display());
             Err(Refusal::Usage(text).into())
         };
         let list: Self = match serde_json::from_slice(&bytes) {
@@ -94,20 +102,40 @@ impl InputList {
         if list.schema != SCHEMA {
             return refuse("was written by another version of this program");
         }
-        let names: HashSet<&str> = list.files.iter().map(|copy| copy.name.as_str()).collect();
-        if names.len() < list.files.len() || !names.into_iter().all(is_below) {
+        let mut names = HashSet::with_capacity(list.files.len());
+        let mut found = list.files.iter().map(|copy| comparable(&copy.name));
+        if !found.all(|name| name.is_some_and(|name| names.insert(name))) {
             return refuse("names a file twice or outside its folder");
         }
         Ok(Some(list))
     }
 
     /// Writes the list to a folder, in place of an earlier one.
+    ///
+    /// # Errors
+    /// Refuses a list that would be too long to be read again.
     pub(crate) fn write(&self, folder: &Path) -> ProjectResult<()> {
         let path = folder.join(INPUT_LIST);
-        let failed = || format!("cannot write {}", path.display());
-        let bytes = serde_json::to_vec(self).map_err(std::io::Error::other);
-        let written = bytes.and_then(|bytes| write_atomic(&path, &bytes));
-        written.with_context(failed)
+        let bytes = self.encoded(&path, MAX_LIST_BYTES)?;
+        let written = write_atomic(&path, &bytes);
+        written.with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    /// Returns the content of the list, of at most `limit` bytes.
+    fn encoded(&self, path: &Path, limit: u64) -> ProjectResult<Vec<u8>> {
+        let bytes = serde_json::to_vec(self).map_err(std::io::Error::other)?;
+        let length = bytes.len() as u64;
+        if length > limit {
+            let text = format!(
+                "{} would name {} files in {}, and lists of at most {} are read; divide the project into smaller ones",
+                path.display(),
+                self.files.len(),
+                byte_size(length),
+                byte_size(limit)
+            );
+            return Err(Refusal::Usage(text).into());
+        }
+        Ok(bytes)
     }
 
     /// Returns how much the folder holds.
@@ -159,17 +187,30 @@ pub(crate) fn has_list(folder: &Path) -> bool {
     folder.join(INPUT_LIST).is_file()
 }
 
-/// Returns whether a name is that of the list, or of what is written beside it.
+/// Returns whether a name is that of the list, or of what is written beside it, also where upper and lower case are the same.
 pub(crate) fn is_of_list(name: &OsStr) -> bool {
-    let beside = format!(".{INPUT_LIST}.");
-    name == INPUT_LIST || name.as_encoded_bytes().starts_with(beside.as_bytes())
+    let name = folded(&name.to_string_lossy());
+    name == INPUT_LIST || name.starts_with(&format!(".{INPUT_LIST}."))
 }
 
-/// Returns whether a path stays below its folder, and is not that of the list.
-fn is_below(name: &str) -> bool {
-    let mut parts = Path::new(name).components();
-    let is_plain = parts.all(|part| matches!(part, Component::Normal(_)));
-    is_plain && !name.is_empty() && !is_of_list(OsStr::new(name))
+/// Returns whether an error says that there is no file with this name.
+pub(crate) fn is_not_there(kind: ErrorKind) -> bool {
+    matches!(
+        kind,
+        ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::InvalidFilename
+    )
+}
+
+/// Returns a path below its folder in the form in which two are the same file on some file system. Returns `None` if it leads
+/// out of the folder, or to the list.
+fn comparable(name: &str) -> Option<String> {
+    let parts = Path::new(name).components().map(|part| match part {
+        Component::Normal(part) => part.to_str().map(folded),
+        _ => None,
+    });
+    let parts = parts.collect::<Option<Vec<String>>>()?;
+    let is_list = is_of_list(OsStr::new(parts.first()?));
+    (!is_list).then(|| parts.join("/"))
 }
 
 #[cfg(test)]
@@ -225,7 +266,16 @@ mod tests {
             written(&InputList::new(vec![copy("/etc/passwd")])),
             written(&InputList::new(vec![copy("")])),
             written(&InputList::new(vec![copy(INPUT_LIST)])),
+            written(&InputList::new(vec![copy("MOCBAN-INPUTS.JSON")])),
+            written(&InputList::new(vec![copy(".mocban-inputs.json.1/new")])),
             written(&InputList::new(vec![copy("1.stl"), copy("1.stl")])),
+            written(&InputList::new(vec![copy("a/1.stl"), copy("a//1.stl")])),
+            written(&InputList::new(vec![copy("a/1.stl"), copy("a/./1.stl")])),
+            written(&InputList::new(vec![copy("a/1.stl"), copy("A/1.STL")])),
+            written(&InputList::new(vec![
+                copy("\u{1eef}.stl"),
+                copy("u\u{31b}\u{303}.stl"),
+            ])),
         ] {
             std::fs::write(dir.path().join(INPUT_LIST), &text).expect("written");
             let refused = InputList::read(dir.path()).expect_err(&text);
@@ -233,10 +283,39 @@ mod tests {
                 refused.to_string().contains("make the backup again"),
                 "{refused}"
             );
+            let plain = InputList::read_plainly(dir.path()).expect_err(&text);
+            assert!(!plain.to_string().contains("--inputs"), "{plain}");
         }
         assert_eq!(
             InputList::read(Path::new("/none")).expect("looked up"),
             None
         );
+    }
+
+    #[test]
+    fn a_list_that_would_be_too_long_to_be_read_is_not_written() {
+        let list = InputList::new(vec![copy("1.stl"), copy("2.stl")]);
+        let path = Path::new("b.inputs/mocban-inputs.json");
+        let bytes = list.encoded(path, 1_000).expect("short enough");
+        let length = bytes.len() as u64;
+        list.encoded(path, length).expect("just short enough");
+        let refused = list.encoded(path, length - 1).expect_err("too long");
+        let text = refused.to_string();
+        assert!(
+            text.contains("would name 2 files") && text.contains("divide the project"),
+            "{text}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_no_list_and_is_not_waited_for() {
+        use rustix::fs::{CWD, FileType, Mode, mknodat};
+
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join(INPUT_LIST);
+        mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("a pipe");
+        let refused = InputList::read(dir.path()).expect_err("a pipe").to_string();
+        assert!(refused.contains("is a pipe"), "{refused}");
     }
 }

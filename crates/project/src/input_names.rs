@@ -25,12 +25,17 @@ pub(crate) struct InputNames {
     folders: HashMap<(String, String), String>,
     /// Names in use, by folder, in lower case.
     taken: HashSet<(String, String)>,
+    /// Beginning of names that are not given in the upper folder, in lower case.
+    hidden: String,
 }
 
 impl InputNames {
-    /// Gives no name yet. No copy is named like the file `reserved`.
+    /// Gives no name yet. No copy is named like the file `reserved`, or like what is written beside it.
     pub(crate) fn without(reserved: &str) -> Self {
-        let mut names = Self::default();
+        let mut names = Self {
+            hidden: folded(&format!(".{reserved}.")),
+            ..Self::default()
+        };
         names.taken.insert((String::new(), folded(reserved)));
         names
     }
@@ -91,7 +96,10 @@ impl InputNames {
 
     /// Returns a name that nothing else has in a folder, and notes it.
     fn unused(&mut self, parent: &str, name: &str, is_file: bool) -> String {
-        let plain = portable(name);
+        let mut plain = portable(name);
+        if parent.is_empty() && folded(&plain).starts_with(&self.hidden) {
+            plain = plain.replacen('.', "_", 1);
+        }
         let mut name = plain.clone();
         let mut number = 1_u64;
         while !self.taken.insert((parent.to_owned(), folded(&name))) {
@@ -111,7 +119,7 @@ fn joined(parent: &str, name: &str) -> String {
 }
 
 /// Returns a name in the form in which file systems without upper and lower case compare it.
-fn folded(name: &str) -> String {
+pub(crate) fn folded(name: &str) -> String {
     let decomposed: String = name.nfd().collect();
     let lower = decomposed.to_uppercase().to_lowercase();
     lower.nfd().collect()
@@ -170,6 +178,10 @@ mod tests {
             ("/data/meshes/chữ 1.stl", "data/meshes/chữ 1 (4).stl"),
             ("data", "data (3)"),
             ("List.json", "List (2).json"),
+            ("list.json/1.stl", "list.json (2)/1.stl"),
+            (".list.json.1-2/new", "_list.json.1-2/new"),
+            (".LIST.json.1", "_LIST.json.1"),
+            ("a/.list.json.1", "a/.list.json.1"),
         ] {
             assert_eq!(names.next(stored), name, "{stored}");
         }
