@@ -57,6 +57,7 @@ pub mod import_blocks;
 pub mod import_pairs;
 pub mod import_plan;
 mod input_copy;
+mod input_finder;
 pub mod input_list;
 mod input_names;
 pub mod input_paths;

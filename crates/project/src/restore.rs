@@ -7,19 +7,21 @@ use std::path::{Path, PathBuf};
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use crate::backup::count_rows;
-use crate::backup_inputs::{check_room, free_beside};
 use crate::events::{Listener, LongWork, warn};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
+use crate::input_finder::finder_in;
 use crate::input_list::{InputCopies, has_list, inputs_folder};
 use crate::location::Location;
 use crate::missing_inputs::{self, MissingInputs};
 use crate::new_project::check_new_folder;
-use crate::restore_inputs::{ListedCopies, ProjectCopies, finder_in, locate_inputs};
+use crate::restore_inputs::{ListedCopies, ProjectCopies, locate_inputs};
 use mocban_catalog::Catalog;
 use mocban_config::{LocalSettings, make_local};
+use mocban_core::domain::ErrorCode;
 use mocban_store::{
-    CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, place_new_file, write_synced,
+    CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StagingFolder, TargetLock,
+    place_new_file, write_synced,
 };
 
 /// A backup to restore.
@@ -47,14 +49,16 @@ pub struct Restored {
     pub copied: Option<InputCopies>,
     /// The folder of the project that they were copied to; `None` if the project had all of them.
     pub copied_to: Option<PathBuf>,
+    /// Number of scans and prints that are read at their old places, because the folder beside the backup has no whole copy.
+    pub elsewhere: u64,
     /// Paths of meshes and prints that neither `--inputs` nor the folder beside the backup has.
     pub missing: Vec<String>,
     /// Without such a folder, files that are not at their old places.
     pub not_in_place: Option<MissingInputs>,
 }
 
-/// Makes a project of a backup. Everything that can refuse it is checked before anything is written. `location` has the
-/// settings of the environment and of flags, which must not lead the new project to a server.
+/// Makes a project of a backup. Everything that can refuse it is checked before more than a hidden copy of the catalog is
+/// written. `location` has the settings of the environment and of flags, which must not lead the new project to a server.
 ///
 /// # Errors
 /// Returns an error if the backup, the folders or the settings are refused, or the disk fails. Then there is no project.
@@ -80,13 +84,12 @@ pub async fn restore(
         Some(_) => None,
         None => ListedCopies::beside(backup)?,
     };
-    match &copies {
-        Some(copies) => check_room(copies.bytes(), free_beside(dir), dir)?,
-        None => warn_about_unlisted(backup, inputs.as_deref(), listener),
+    if copies.is_none() {
+        warn_about_unlisted(backup, inputs.as_deref(), listener);
     }
     let is_copied = copies.is_some();
     let existed = dir.exists();
-    let mut restored = restore_into(backup, dir, inputs.as_deref(), copies).await;
+    let mut restored = restore_into(request, location, copies, listener).await;
     if let (Ok(restored), None, false) = (&mut restored, inputs, is_copied) {
         // The project is there already, so what cannot be looked up is no error.
         if let Ok((project, catalog)) = location.at(dir).open_read_only().await {
@@ -144,11 +147,16 @@ fn warn_about_unlisted(backup: &Path, inputs: Option<&Path>, listener: &dyn List
 
 /// Creates the project. The catalog comes last: a directory without a catalog is no project.
 async fn restore_into(
-    backup: &Path,
-    dir: &Path,
-    inputs: Option<&Path>,
+    request: &RestoreRequest,
+    location: &Location,
     copies: Option<ListedCopies>,
+    listener: &dyn Listener,
 ) -> ProjectResult<Restored> {
+    let RestoreRequest {
+        backup,
+        dir,
+        inputs,
+    } = request;
     let failed = || format!("cannot restore {} to {}", backup.display(), dir.display());
     let project = Project::create(dir).with_context(failed)?;
     let catalog = project.catalog_path();
@@ -158,16 +166,31 @@ async fn restore_into(
     let settings = Catalog::restore_backup(backup, &new)
         .await
         .with_context(failed)?;
+    let settings = settings.as_deref().map(make_local);
+    let text = settings.as_ref().map(|settings| &*settings.text);
+    if let Some(text) = text {
+        check_settings(&project, text).with_context(failed)?;
+    }
+    let storage = storage_of(&project, text, location, staging.path()).with_context(failed)?;
+    let project = project.with_storage(storage);
     let copied = match copies {
         None => None,
-        Some(copies) => Some(copies.copy_to(&project, &new).await.with_context(failed)?),
+        Some(copies) => {
+            let copied = copies.copy_to(&project, &new).await;
+            Some(copied.map_err(|error| match error.code() {
+                // A refusal says all, and is known in other languages.
+                ErrorCode::Usage => error,
+                _ => error.context(failed()),
+            })?)
+        }
     };
     let placed = place_project(
         &project,
         &staging,
-        inputs,
+        inputs.as_deref(),
         copied.as_ref(),
         settings,
+        listener,
         &failed,
     );
     let placed = placed.await;
@@ -185,19 +208,19 @@ async fn place_project(
     staging: &StagingFolder,
     inputs: Option<&Path>,
     copied: Option<&ProjectCopies>,
-    settings: Option<Vec<u8>>,
+    settings: Option<LocalSettings>,
+    listener: &dyn Listener,
     failed: &dyn Fn() -> String,
 ) -> ProjectResult<Restored> {
     let (catalog, new) = (project.catalog_path(), staging.path().join(CATALOG_FILE));
     let located = match (copied, inputs) {
         (Some(copied), _) => locate_inputs(&new, copied.finder(project)).await,
-        (None, Some(inputs)) => locate_inputs(&new, finder_in(project, inputs)?).await,
+        (None, Some(inputs)) => locate_inputs(&new, finder_in(project, inputs, listener)).await,
         (None, None) => Ok(Vec::new()),
     };
     let missing = located.map_err(|error| ProjectError::unexpected(error.text(staging.path())))?;
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
     check_directory(project)?;
-    let settings = settings.as_deref().map(make_local);
     let wrote_settings = match &settings {
         Some(settings) => {
             write_settings(project, &settings.text, staging.path()).with_context(failed)?
@@ -217,9 +240,31 @@ async fn place_project(
         settings,
         copied: copied.map(|copied| copied.copies.clone()),
         copied_to: copied.and_then(ProjectCopies::place).map(Path::to_owned),
+        elsewhere: copied.map_or(0, |copied| copied.elsewhere),
         missing,
         not_in_place: None,
     })
+}
+
+/// Returns the named roots of the settings that the new project will have, if they are valid. Without settings in the backup,
+/// those of its folder hold.
+fn storage_of(
+    project: &Project,
+    settings: Option<&str>,
+    location: &Location,
+    staging: &Path,
+) -> ProjectResult<Option<ProjectStorage>> {
+    let dir = match settings {
+        None => project.dir().to_owned(),
+        Some(text) => {
+            let dir = staging.join("settings");
+            std::fs::create_dir(&dir)?;
+            std::fs::write(dir.join(SETTINGS_FILE), text)?;
+            dir
+        }
+    };
+    let found = location.at(&dir).data_locations().ok();
+    Ok(found.and_then(|(storage, _)| storage))
 }
 
 /// Writes the settings file of a project. An equal file may exist: a restore that was killed has written it. Returns
@@ -231,8 +276,15 @@ fn write_settings(project: &Project, text: &str, staging: &Path) -> ProjectResul
     if place_new_file(&new, &path)? {
         return Ok(true);
     }
-    if files::small(&path)?.is_some_and(|found| found == text.as_bytes()) {
-        return Ok(false);
+    check_settings(project, text)?;
+    Ok(false)
+}
+
+/// Refuses other settings in the project folder than those of the backup.
+fn check_settings(project: &Project, text: &str) -> ProjectResult<()> {
+    let path = project.settings_path();
+    if files::small(&path)?.is_none_or(|found| found == text.as_bytes()) {
+        return Ok(());
     }
     let text = format!(
         "{} exists and differs from the settings that the backup would write there; rename it",
@@ -299,7 +351,7 @@ fn is_project_already(project: &Project) -> ProjectError {
 
 #[cfg(test)]
 mod tests {
-    use super::is_free;
+    use super::{Location, Project, check_settings, is_free, storage_of};
 
     #[test]
     fn only_a_folder_without_files_of_others_becomes_a_project() {
@@ -317,5 +369,41 @@ mod tests {
         std::fs::write(new.join("scan.stl"), "").expect("written");
         assert!(!is_free(&new).expect("listed"));
         assert!(!is_free(&new.join("scan.stl")).expect("a file"));
+    }
+
+    #[test]
+    fn other_settings_are_refused_before_anything_is_copied() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::at(dir.path());
+        check_settings(&project, "[run]\n").expect("there are none");
+        std::fs::write(project.settings_path(), "[run]\n").expect("written");
+        check_settings(&project, "[run]\n").expect("they are equal");
+        let refused = check_settings(&project, "[fit]\n").expect_err("they differ");
+        let text = refused.to_string();
+        assert!(text.contains("exists and differs"), "{text}");
+    }
+
+    #[test]
+    fn the_named_roots_of_the_settings_are_those_of_the_new_project() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::at(&dir.path().join("q"));
+        let location = Location::new(dir.path().join("q"));
+        let root = dir.path().join("scans");
+        for (place, is_root) in [(root.display().to_string(), true), (String::new(), false)] {
+            let staging = tempfile::tempdir().expect("a temporary directory");
+            let text = toml_roots(&place);
+            let storage = storage_of(&project, Some(&text), &location, staging.path());
+            let found = project.clone().with_storage(storage.expect("written"));
+            let is_found = found.input_path("scans:1/a.stl") == root.join("1/a.stl");
+            assert_eq!(is_found, is_root, "{place:?}");
+        }
+        let staging = dir.path().join("none");
+        let none = storage_of(&project, None, &location, &staging);
+        assert!(none.expect("no settings").is_none());
+    }
+
+    /// Returns settings with a root.
+    fn toml_roots(place: &str) -> String {
+        format!("[storage.roots]\nscans = {place:?}\n")
     }
 }

@@ -40,7 +40,7 @@ pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResu
     context.print_json(&json!({
         "schema": 1, "project": dir, "pairs": pairs, "verdicts": verdicts,
         "settings": restored.settings.is_some(), "inputs_missing": restored.missing.len(),
-        "inputs_copied": copied.map(|copied| copied.files),
+        "inputs_copied": copied.map(|copied| copied.files), "inputs_elsewhere": restored.elsewhere,
         "settings_removed": restored.settings.as_ref().map_or(&[][..], |settings| &settings.removed),
     }))?;
     let (pairs, verdicts) = (count(pairs, "pair"), count(verdicts, "verdict"));
@@ -55,6 +55,13 @@ pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResu
         let folder = folder.map_or_else(String::new, |folder| folder.display().to_string());
         context.warn(&format!(
             "{missing} neither at the old place nor in {folder}, first {first}; put meshes and prints there before `check --repair --accept-missing`"
+        ));
+    }
+    if let Some(copied) = copied.filter(|_| restored.elsewhere > 0) {
+        context.warn(&format!(
+            "{} read at the old place, because {} has no whole copy; keep these files there",
+            count(restored.elsewhere, "input"),
+            copied.folder.display()
         ));
     }
     if let Some(missing) = &restored.not_in_place {
@@ -80,13 +87,20 @@ pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResu
 /// Says where scans and prints are, or have to be put.
 fn inputs_text(restored: &Restored, inputs: Option<&Path>) -> String {
     match (&restored.copied, &restored.copied_to) {
-        (Some(copied), Some(place)) => format!(
-            "{} of scans and prints, {}, copied from {} to {}, so the project does not need that folder; the next two commands compute depth maps and masks again",
-            count(copied.files, "file"),
-            byte_size(copied.bytes),
-            copied.folder.display(),
-            place.display()
-        ),
+        (Some(copied), Some(place)) => {
+            let needs = if restored.elsewhere == 0 {
+                ", so the project does not need that folder"
+            } else {
+                ""
+            };
+            format!(
+                "{} of scans and prints, {}, copied from {} to {}{needs}; the next two commands compute depth maps and masks again",
+                count(copied.files, "file"),
+                byte_size(copied.bytes),
+                copied.folder.display(),
+                place.display()
+            )
+        }
         (Some(copied), None) => format!(
             "nothing was copied from {}; the next two commands compute depth maps and masks again",
             copied.folder.display()

@@ -25,7 +25,7 @@ use mocban_core::domain::{ErrorCode, one_line};
 use mocban_project::check::check;
 use mocban_project::error::TaskStopped;
 use mocban_project::files::is_backup;
-use mocban_project::input_list::copies_beside;
+use mocban_project::input_list::{InputCopies, copies_beside};
 use mocban_project::location::Location;
 use mocban_project::restore::{RestoreRequest, Restored, is_free, restore};
 use mocban_project::{ProjectError, ProjectResult};
@@ -98,7 +98,11 @@ fn request(folder: &Path, name: &str, body: &RestoreBackupBody) -> AppResult<Res
             AppFailure::refused(restore_sentence(&error, &backup, folder, name))
         })?,
     };
-    let copied = copies.map_or(0, |copies| copies.bytes);
+    let copied = match copies {
+        // What an interrupted restore has copied there is not copied again. `restore` checks the room for the rest.
+        Some(copies) if !dir.exists() => copies.bytes,
+        _ => 0,
+    };
     check_room(folder, bytes, copied).map_err(AppFailure::refused)?;
     Ok(RestoreRequest {
         backup,
@@ -230,12 +234,13 @@ fn finished(
     if let Some(copied) = &restored.copied
         && copied.files > 0
     {
-        let files = grouped(copied.files);
-        let [english, vietnamese] = [Language::English, Language::Vietnamese]
-            .map(|language| file_size(language, copied.bytes));
+        lines.push(copied_line(copied, restored.elsewhere == 0));
+    }
+    if restored.elsewhere > 0 {
+        let elsewhere = grouped(restored.elsewhere);
         lines.push([
-            format!("{files} scans and prints ({english}) were copied into the project, which does not need the folder beside the backup."),
-            format!("Đã chép {files} bản quét và bản in ({vietnamese}) vào dự án nên dự án không cần thư mục bên cạnh bản sao lưu."),
+            format!("Scans and prints without a whole copy beside the backup: {elsewhere}. They are read at their old places: keep them there."),
+            format!("Số bản quét và bản in không có bản sao nguyên vẹn bên cạnh bản sao lưu: {elsewhere}. Chúng được đọc từ chỗ cũ: hãy giữ chúng ở đó."),
         ]);
     }
     let missing = match (&restored.not_in_place, restored.missing.first()) {
@@ -266,16 +271,56 @@ fn finished(
         );
     }
     FinishedTask {
-        is_warning: missing.is_some() || failure.is_some(),
+        is_warning: missing.is_some() || failure.is_some() || restored.elsewhere > 0,
         lacks_most_files: false,
         lines,
     }
 }
 
+/// Says how much was copied into the project, and whether it needs no other folder.
+fn copied_line(copied: &InputCopies, is_all: bool) -> [String; 2] {
+    let files = grouped(copied.files);
+    let [english, vietnamese] =
+        [Language::English, Language::Vietnamese].map(|language| file_size(language, copied.bytes));
+    let [needs, needs_vi] = if is_all {
+        [
+            ", which does not need the folder beside the backup",
+            " nên dự án không cần thư mục bên cạnh bản sao lưu",
+        ]
+    } else {
+        ["", ""]
+    };
+    [
+        format!("{files} scans and prints ({english}) were copied into the project{needs}."),
+        format!("Đã chép {files} bản quét và bản in ({vietnamese}) vào dự án{needs_vi}."),
+    ]
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{RestoreBackupBody, check_room, request};
+    use std::path::PathBuf;
+
+    use super::{RestoreBackupBody, check_room, copied_line, request};
     use crate::review::Language;
+    use mocban_project::input_list::InputCopies;
+
+    #[test]
+    fn a_project_that_reads_files_elsewhere_is_not_said_to_need_no_folder() {
+        let copied = InputCopies {
+            folder: PathBuf::from("b.sqlite.inputs"),
+            files: 3,
+            bytes: 7_000,
+        };
+        for (is_all, parts) in [
+            (true, ["does not need", "không cần thư mục"]),
+            (false, ["copied into the project.", "vào dự án."]),
+        ] {
+            let line = copied_line(&copied, is_all);
+            for (text, part) in line.iter().zip(parts) {
+                assert!(text.contains(part), "{part}: {text}");
+            }
+        }
+    }
 
     #[test]
     fn a_backup_that_does_not_fit_the_disk_is_refused_in_both_languages() {
