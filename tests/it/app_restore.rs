@@ -204,6 +204,30 @@ fn a_restore_that_cannot_be_done_is_refused_in_both_languages() {
     );
 }
 
+/// The restore would refuse it, so its folder is offered as one of scans and prints.
+#[test]
+fn copies_with_a_damaged_list_are_looked_for_by_their_paths() {
+    let (dir, page) = with_project();
+    let root = dir.path().canonicalize().expect("a path");
+    let backup = backed_up(&root);
+    let folder = root.join("p/backups/backup.sqlite.inputs");
+    std::fs::create_dir(&folder).expect("a folder");
+    std::fs::write(folder.join("mocban-inputs.json"), "{").expect("written");
+    page.get("/?language=en");
+    let html = content(&page, &backup);
+    for part in ["is damaged", "Look for them there", "<b>15</b>"] {
+        assert!(html.contains(part), "{part}: {html}");
+    }
+    assert!(!html.contains("<form"), "{html}");
+    assert_eq!(start(&page, &body(&backup, "again")).status, 422);
+    let mut form = body(&backup, "again");
+    form["inputs"] = json!(folder.to_str().expect("UTF-8"));
+    let reply = start(&page, &form);
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    let done = ended(&page, "again");
+    assert!(done.contains("15 pairs and 4 verdicts"), "{done}");
+}
+
 #[test]
 fn restores_run_at_once_and_one_name_is_taken_once() {
     let (dir, page) = with_project();

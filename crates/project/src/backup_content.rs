@@ -5,7 +5,7 @@ use std::time::UNIX_EPOCH;
 
 use crate::backup::rows_of;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
-use crate::input_list::{InputCopies, copies_beside};
+use crate::input_list::{InputCopies, InputList, inputs_folder};
 use crate::missing_inputs::{self, InputInspection};
 use crate::restore::check_backup;
 use mocban_catalog::Catalog;
@@ -29,6 +29,8 @@ pub struct BackupContent {
     pub verdicts: u64,
     /// Scans and prints beside it, which a restore copies.
     pub copies: Option<InputCopies>,
+    /// What is wrong with their list, if it cannot be read. They are then found by their paths, and not copied.
+    pub list_problem: Option<String>,
     /// Without copies, scans and prints that a project in the new folder would not find, among a few.
     pub inputs: InputInspection,
 }
@@ -41,7 +43,14 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
     check_backup(backup)?;
     let meta = std::fs::metadata(backup);
     let meta = meta.with_context(|| format!("cannot read {}", backup.display()))?;
-    let copies = copies_beside(backup)?;
+    let folder = inputs_folder(backup);
+    let (list, list_problem) = match InputList::read_plainly(&folder) {
+        Ok(list) => (list, None),
+        Err(error) => (None, Some(error.text(dir))),
+    };
+    let copies = list
+        .filter(|list| !list.files.is_empty())
+        .map(|list| list.copies(&folder));
     let catalog = Catalog::open_backup(backup).await?;
     let read = async {
         let (pairs, verdicts) = rows_of(&catalog).await?;
@@ -59,6 +68,7 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
             blocks,
             verdicts,
             copies,
+            list_problem,
             inputs,
         })
     };

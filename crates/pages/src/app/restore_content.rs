@@ -21,6 +21,7 @@ use super::visit::Visit;
 use crate::on_thread::read_on_thread;
 use mocban_core::domain::one_line;
 use mocban_project::backup_content::{BackupContent, backup_content};
+use mocban_project::input_list::inputs_folder;
 use mocban_project::{ProjectError, ProjectResult};
 use mocban_system::platform;
 
@@ -78,6 +79,9 @@ fn content_part(visit: &Visit, folder: &Path, content: &BackupContent, name: &st
     let copies = content.copies.as_ref().filter(|_| inputs.is_none());
     let copied = copies.map_or(0, |copies| copies.bytes);
     let room = check_room(folder, content.bytes, copied);
+    // An interrupted restore may have copied already what the disk has no room for.
+    let may_start = check_room(folder, content.bytes, 0).is_ok();
+    let list_problem = content.list_problem.as_ref().filter(|_| inputs.is_none());
     html! {
         h2 { (visit.t("What is in the backup", "Bản sao lưu có gì")) }
         dl {
@@ -90,17 +94,37 @@ fn content_part(visit: &Visit, folder: &Path, content: &BackupContent, name: &st
             dd { (visit.file_size(content.bytes)) @if let Some(free) = platform::free_bytes(folder) { " · " (free_space(visit, free)) } }
             dt { (visit.t("Scans and prints", "Bản quét và bản in")) } dd { (inputs_text(visit, content, inputs)) }
         }
-        @match &room {
-            Err(why) => p.notice.bad role="alert" { (why.text(visit.language)) },
-            Ok(()) => (action_form("actions/restore", "fields", &html! {
+        @if let Err(why) = &room { p.notice.bad role="alert" { (why.text(visit.language)) } }
+        @if let Some(problem) = list_problem {
+            (list_problem_part(visit, problem))
+        } @else if may_start {
+            (action_form("actions/restore", "fields", &html! {
                 input type="hidden" name="backup" value=(visit.query.get("backup").unwrap_or_default());
                 @if let Some(inputs) = inputs { input type="hidden" name="inputs" value=(inputs); }
                 label { span { (visit.t("Name of the new project", "Tên dự án mới")) }
                     input #restore-name name="name" value=(name) required maxlength=(NAME_CHARS);
                 }
                 button.primary #restore { (visit.t("Restore", "Khôi phục")) }
-            })),
+            }))
         }
+    }
+}
+
+/// Says that the folder beside the backup is not copied, and offers to look for files in it.
+fn list_problem_part(visit: &Visit, problem: &str) -> Markup {
+    let backup = visit.query.get("backup").unwrap_or_default();
+    let folder = inputs_folder(Path::new(backup));
+    let query = visit.query.with("inputs", &folder.to_string_lossy());
+    let why = Sentence::of_program(problem);
+    html! {
+        p.notice.bad role="alert" {
+            (why.text(visit.language)) ". "
+            (visit.t(
+                "So the scans and prints beside the backup cannot be copied. They can be found by their paths and stay where they are.",
+                "Vì vậy không chép được các bản quét và bản in bên cạnh bản sao lưu. Có thể tìm chúng theo đường dẫn và để nguyên chúng tại chỗ.",
+            ))
+        }
+        p.row { a.button href={ "restore" (query.text()) } { (visit.t("Look for them there", "Tìm chúng ở đó")) } }
     }
 }
 
