@@ -192,7 +192,7 @@ impl ListedCopies {
     }
 }
 
-/// A folder of copies in a project, with those that are whole.
+/// A folder of copies in a project, and its whole copies.
 type Placed<'a> = (PathBuf, Vec<&'a CopiedInput>);
 
 /// Returns whether the copy of an input in a folder has the content that its list says.
