@@ -8,6 +8,10 @@ use mocban_core::raster::{Grid, PrintImage, reduce};
 const LEVELS: f64 = 65_000.0;
 /// How often gaps between points are filled from their sides.
 const FILLS: usize = 6;
+/// Side of a cell, pixels, in which the highest point is of the front of a block.
+const CELL: f64 = 16.0;
+/// Distance below it, pixels, from which on points are of the back or the edge. Strokes are less deep.
+const LAYER: f64 = 8.0;
 /// Fewest points of a picture.
 const FEWEST: usize = 16;
 
@@ -66,7 +70,22 @@ pub fn points_from_above(points: &[[f32; 3]], longest: usize) -> Option<Rgb> {
     let (width, height) = (count(across), count(down));
     let mut levels = Grid::new(width, height, 0_u16);
     let per_level = (sides[along] / LEVELS).max(pixel / LEVELS);
+    // The picture of a closed block would otherwise mix its front with its back, because few points are seen.
+    let of_cell = |point: &[f64; 3]| {
+        let [x, y] = [across, down].map(|axis| (point[axis] - low[axis]) / pixel / CELL);
+        (x as usize, y as usize)
+    };
+    let (cells_x, cells_y) = of_cell(&high);
+    let mut highest = Grid::new(cells_x + 1, cells_y + 1, f64::NEG_INFINITY);
     for point in &points {
+        let (x, y) = of_cell(point);
+        highest.set(x, y, highest.at(x, y).max(point[along]));
+    }
+    let is_front = |point: &&[f64; 3]| {
+        let (x, y) = of_cell(point);
+        point[along] > highest.at(x, y) - LAYER * pixel
+    };
+    for point in points.iter().filter(is_front) {
         let at = |axis: usize| point[axis] - low[axis];
         let [x, y] = [across, down].map(|axis| (at(axis) / pixel).floor());
         let level = (at(along) / per_level).round() + 1.0;
@@ -118,6 +137,33 @@ mod tests {
         assert_eq!(small.at(13, 10), VERMILLION);
         let whole = page_with_boxes(&page, &[], 1000);
         assert_eq!((whole.width(), whole.height()), (400, 200), "never larger");
+    }
+
+    #[test]
+    fn the_back_of_a_closed_block_is_not_seen() {
+        // Only every second row of the front and of the back is there, as in samples of a file.
+        let front = |x: u16, y: u16| [f32::from(x), f32::from(y), 30.0];
+        let back = |x: u16, y: u16| [f32::from(x), f32::from(y) + 1.0, 0.0];
+        let rows = || {
+            (0..200)
+                .step_by(2)
+                .flat_map(|y| (0..200).map(move |x| (x, y)))
+        };
+        let open: Vec<_> = rows()
+            .map(|(x, y)| front(x, y))
+            .chain([[100.0, 201.0, 0.0]])
+            .collect();
+        let closed: Vec<_> = open
+            .iter()
+            .copied()
+            .chain(rows().map(|(x, y)| back(x, y)))
+            .collect();
+        let [open, closed] =
+            [open, closed].map(|points| points_from_above(&points, 200).expect("a picture"));
+        let differing = (50..150)
+            .flat_map(|y| (50..150).map(move |x| (x, y)))
+            .filter(|(x, y)| open.at(*x, *y) != closed.at(*x, *y));
+        assert_eq!(differing.count(), 0);
     }
 
     #[test]

@@ -26,8 +26,8 @@ const FOR_SIZE: SampleSpread = SampleSpread {
 };
 /// Places of a longer file for a picture of it.
 pub(super) const FOR_PICTURE: SampleSpread = SampleSpread {
-    parts: 1024,
-    bytes: 4 << 10,
+    parts: 16 << 10,
+    bytes: 256,
 };
 
 /// Places of a file, evenly spread, from which vertices are read.
@@ -219,7 +219,9 @@ fn each_part(
     let mut bytes = vec![0; (most * row) as usize];
     for part in 0..spread.parts {
         poll();
-        let share = part as f64 / (spread.parts - 1) as f64;
+        // Even distances would meet the rows of a grid in stripes. Multiples of the golden ratio spread without a pattern.
+        let shift = (part as f64 * std::f64::consts::GOLDEN_RATIO).fract();
+        let share = (part as f64 + shift) / spread.parts as f64;
         let first = ((rows - most) as f64 * share) as u64;
         file.seek(SeekFrom::Start(start + first * row))?;
         let have = fill(file, &mut bytes)?;
