@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::Instant;
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};
@@ -34,7 +35,7 @@ pub(crate) struct Browser {
 
 struct Pipes {
     to: File,
-    from: BufReader<File>,
+    from: Receiver<Vec<u8>>,
     calls: u64,
     /// Errors of scripts.
     script_errors: Vec<String>,
@@ -80,6 +81,20 @@ fn program() -> Option<PathBuf> {
     places.into_iter().find(|place| place.is_file())
 }
 
+/// Reads the messages of a browser, which each end in a zero, until it ends.
+fn messages(from: File) -> Receiver<Vec<u8>> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        let messages = BufReader::new(from).split(0);
+        for message in messages.map_while(Result::ok) {
+            if sender.send(message).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
 impl Browser {
     /// Starts a browser; `None` if there is none, with a line on stderr.
     #[expect(
@@ -123,7 +138,7 @@ impl Browser {
             .expect("a shell");
         // Opening a pipe blocks until the other end is open. The pipes are therefore opened in the shell's order.
         let to = File::options().write(true).open(to).expect("a pipe");
-        let from = BufReader::new(File::open(from).expect("a pipe"));
+        let from = messages(File::open(from).expect("a pipe"));
         Some(Self {
             child,
             pipes: RefCell::new(Pipes {
@@ -159,12 +174,10 @@ impl Browser {
             .write_all(text.as_bytes())
             .expect("the browser listens");
         loop {
-            let mut bytes = Vec::new();
-            pipes
-                .from
-                .read_until(0, &mut bytes)
-                .expect("the browser speaks");
-            assert_eq!(bytes.pop(), Some(0), "the browser is gone");
+            // Longer than a condition may take that a page waits for.
+            let received = pipes.from.recv_timeout(2 * LONGEST);
+            let bytes =
+                received.unwrap_or_else(|error| unreachable!("{error}: no reply to {call}"));
             let response: Value = serde_json::from_slice(&bytes).expect("JSON");
             pipes.record(&response);
             if response["id"] == id {

@@ -85,7 +85,8 @@ pub(super) fn read_digits(text: &[u8], number: &mut u64) -> usize {
     count
 }
 
-/// Reads decimal digits like [`read_digits`], but eight at once where there are so many.
+/// Reads decimal digits like [`read_digits`], in groups of eight while at least eight follow. For long numbers, this is
+/// faster.
 #[inline]
 fn read_many_digits(text: &[u8], number: &mut u64) -> usize {
     let mut count = 0;
