@@ -76,7 +76,7 @@ fn sizes_and_the_unit_are_shown_before_the_import() {
     assert!(chosen.contains("mm, as chosen"), "{chosen}");
     assert!(!chosen.contains("use-unit"), "{chosen}");
     let wrong = files(&page, &query(dir, "&unit=m"));
-    assert!(wrong.contains("m, as chosen; rather mm"), "{wrong}");
+    assert!(wrong.contains("m, as chosen; more likely mm"), "{wrong}");
     let vietnamese = files(&page, &query(dir, "&language=vi"));
     assert!(vietnamese.contains("có lẽ là mm"), "{vietnamese}");
     page.get("/?language=en");

@@ -27,7 +27,7 @@ fn cards(part: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn the_page_of_the_run_has_the_least_confident_results_of_the_last_hour() {
+fn the_page_of_the_run_has_its_least_confident_results() {
     let (_dir, page) = with_project();
     let run = html(&page, "/p/p/");
     let worst = run.split("id=\"worst\"").nth(1).expect("a gallery");

@@ -37,7 +37,8 @@ pub struct Backup {
 /// only when the new one is complete. Scans and prints are copied after that, so that a disk that fails costs no backup.
 ///
 /// # Errors
-/// Refuses a place that something else has, and a disk without room for scans and prints, before anything is written.
+/// Refuses a place that something else has, and a disk without room for scans and prints, before more than a hidden copy of
+/// the catalog is written.
 pub async fn backup(
     file: &Path,
     with_inputs: bool,

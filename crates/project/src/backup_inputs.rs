@@ -191,7 +191,11 @@ impl InputSaver {
     /// Returns an error if the disk fails. What was copied until then is in the list.
     pub(crate) fn save(mut self, copier: &InputCopier) -> ProjectResult<SavedInputs> {
         let mut saved = SavedInputs {
-            copies: InputList::new(Vec::new()).copies(&self.folder),
+            copies: InputCopies {
+                folder: self.folder.clone(),
+                files: 0,
+                bytes: 0,
+            },
             copied: 0,
             left_out: 0,
             first_left_out: Vec::new(),

@@ -1,6 +1,6 @@
 //! Compares the sizes of scans and pages before blocks are imported, which shows a unit that is wrong but possible.
 
-use crate::file_headers::{ScanKind, page_length_mm, scan_extent, unit_of_page};
+use crate::file_headers::{ScanKind, image_size, page_length_mm, scan_extent, unit_of_page};
 use crate::manifest_file::place_of;
 use mocban_core::InputLimits;
 use mocban_lists::manifest::BlockRow;
@@ -18,7 +18,8 @@ pub(crate) fn doubts(
 ) -> Vec<String> {
     let compared = rows.iter().take(MAX_COMPARED);
     let doubts = compared.filter_map(|row| {
-        let page_mm = page_length_mm(&place_of(&row.page, project), &limits.image)?;
+        let page = place_of(&row.page, project);
+        let page_mm = page_length_mm(&page, || image_size(&page, &limits.image).ok())?;
         let scan = scan_extent(&place_of(&row.mesh, project), &limits.mesh).ok()?;
         let (length, unit) = (scan.longest()?, ScanKind::Block.unit(&scan, row.unit)?.unit);
         let likely = unit_of_page(length, unit, page_mm)?;

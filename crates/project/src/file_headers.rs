@@ -105,14 +105,14 @@ pub fn image_size(path: &Path, limits: &ImageLimits) -> Result<[u32; 2], String>
     }
 }
 
-/// Returns the length of the longer side of a page, mm, if its file can be used and states a resolution that may be measured.
-pub fn page_length_mm(path: &Path, limits: &ImageLimits) -> Option<f64> {
+/// Returns the length of the longer side of a page, mm, if its file states a resolution that may be measured. `size` returns its
+/// width and height in pixels if the file can be used. It is called last, because it may decode the image.
+pub fn page_length_mm(path: &Path, size: impl FnOnce() -> Option<[u32; 2]>) -> Option<f64> {
     let (file, _) = open_regular(path).ok()?;
     let [x, y] = file_dpi(BufReader::new(file))?;
     // They are equal nearly always, so it does not matter whether the image is stored turned.
     let dpi = Some(x.min(y)).filter(|dpi| *dpi >= MIN_DPI)?;
-    // Decodes an image whose file may be cut.
-    let [width, height] = image_size(path, limits).ok()?;
+    let [width, height] = size()?;
     Some(f64::from(width.max(height)) / dpi * MM_PER_INCH)
 }
 

@@ -10,7 +10,7 @@ use mocban_core::domain::ErrorCode;
 
 /// Fewest changes after which the list is written.
 const MIN_CHANGES: usize = 200;
-/// A long list is written only after this part of it has changed.
+/// The list of many inputs is written only after one in this number of them has changed.
 const PART: usize = 50;
 /// Length of new copies after which the list is written.
 const MAX_NEW_BYTES: u64 = 4 << 30;

@@ -176,7 +176,7 @@ pub fn unfinished_copies(backup: &Path) -> usize {
     StagingFolder::remove_stale(&inputs_folder(backup).join(INPUT_LIST))
 }
 
-/// Returns whether a folder holds the scans and prints of a backup, which are no new ones.
+/// Returns whether a folder holds the scans and prints of a backup. An import must not offer them as new files.
 pub fn is_inputs_folder(folder: &Path) -> bool {
     let name = folder.file_name().unwrap_or_default();
     name.as_encoded_bytes().ends_with(ENDING.as_bytes()) && has_list(folder)
@@ -201,8 +201,8 @@ pub(crate) fn is_not_there(kind: ErrorKind) -> bool {
     )
 }
 
-/// Returns a path below its folder in the form in which two are the same file on some file system. Returns `None` if it leads
-/// out of the folder, or to the list.
+/// Returns a path below its folder in a form that is equal for two paths if some file system takes them for one file. Returns
+/// `None` if it leads out of the folder, or to the list.
 fn comparable(name: &str) -> Option<String> {
     let parts = Path::new(name).components().map(|part| match part {
         Component::Normal(part) => part.to_str().map(folded),

@@ -86,7 +86,11 @@ impl ListedCopies {
             place: None,
             is_new: false,
             elsewhere: 0,
-            copies: InputList::new(Vec::new()).copies(&self.folder),
+            copies: InputCopies {
+                folder: self.folder.clone(),
+                files: 0,
+                bytes: 0,
+            },
             paths: HashMap::new(),
         };
         // The copies have to be found wherever the project is moved.

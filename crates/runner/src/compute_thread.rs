@@ -53,9 +53,10 @@ pub(super) enum ComputeEvent {
     Cancelled,
 }
 
-/// Longest time to wait for the end of a cancelled thread. Only a thread that waits for a file takes longer, or one on a busy
-/// machine, for which unit tests wait longer.
-const LONGEST_END: Duration = Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
+/// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer. Unit tests wait longer,
+/// because they also run on busy machines.
+pub(super) const LONGEST_END: Duration =
+    Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
 
 /// The thread that computes the stages of a pair. If this handle is dropped, the computation is cancelled.
 #[derive(Debug)]

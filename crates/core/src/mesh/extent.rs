@@ -35,7 +35,7 @@ pub(super) const FOR_PICTURE: SampleSpread = SampleSpread {
 pub(super) struct SampleSpread {
     /// Number of places.
     parts: u64,
-    /// Bytes of a text, or about those of rows, that are read at each place.
+    /// Bytes that are read at each place; of binary rows, as many whole rows as fit, but at least one.
     bytes: u64,
 }
 
@@ -257,8 +257,8 @@ impl TextLines {
     }
 }
 
-/// Returns the lines of a part of a text that it has from their beginning to their end. Whether its first byte begins a line
-/// is given.
+/// Returns the whole lines in a part of a text, without the last line end. `begins_line` says whether the first byte begins a
+/// line.
 fn whole_lines(part: &[u8], line_end: u8, begins_line: bool) -> &[u8] {
     let first = if begins_line {
         Some(0)

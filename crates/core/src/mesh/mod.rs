@@ -135,8 +135,8 @@ pub fn read_from(
 /// Describes the size of a mesh by its file of `len` bytes. Of a long file, reads only parts.
 ///
 /// # Errors
-/// Returns an error if [`read_from`] would return one for a short file; for a long file, if its header shows one, or the
-/// source fails.
+/// For a short file, returns the errors of [`read_from`]. For a long file, returns an error if its header shows one, or if it
+/// cannot be read.
 pub fn extent(
     file: &mut (impl Read + Seek),
     len: u64,

@@ -161,7 +161,7 @@ fn table(visit: &Visit, headers: &[FileHeaders], units: &[Option<ScanUnit>]) -> 
                         td.muted {
                             (why_unit(visit, one.files.kind, extent, *unit))
                             @if let Some(other) = other_unit(one, *unit) {
-                                "; " (visit.t("as long as its page in", "dài bằng trang in nếu đơn vị là")) " " (unit_name(visit, other))
+                                "; " (visit.t("as long as its page if the unit is", "dài bằng trang in nếu đơn vị là")) " " (unit_name(visit, other))
                             }
                         }
                     },
@@ -266,7 +266,7 @@ fn why_unit(visit: &Visit, kind: ScanKind, extent: &MeshExtent, unit: Option<Sca
         None => said,
         Some(other) => format!(
             "{said}; {} {}: {usual}",
-            visit.t("rather", "nhiều khả năng là"),
+            visit.t("more likely", "nhiều khả năng là"),
             unit_name(visit, other)
         ),
     }
@@ -303,7 +303,7 @@ mod tests {
         );
         assert_eq!(
             why_unit(&english, kind, &SCAN, wrong),
-            "m, as chosen; rather mm: the longest side is then usual for a character"
+            "m, as chosen; more likely mm: the longest side is then usual for a character"
         );
         let vietnamese = Visit::in_language(Language::Vietnamese);
         let parts = MeshExtent {
@@ -355,7 +355,10 @@ mod tests {
             table(&visit, &[heads], &units).into_string()
         });
         assert!(doubted.contains(" px · 400 mm"), "{doubted}");
-        assert!(doubted.contains("; as long as its page in cm"), "{doubted}");
+        assert!(
+            doubted.contains("; as long as its page if the unit is cm"),
+            "{doubted}"
+        );
         assert!(!fitting.contains("as long as its page"), "{fitting}");
     }
 }

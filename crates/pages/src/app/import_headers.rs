@@ -223,6 +223,18 @@ impl FilePlaces {
                 Ok(false) | Err(_) => UnreadFile::Unusable(why.into_sentence()),
             })
     }
+
+    /// Reads a file that may be looked at.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such file in the folders of the user and of the app, or if it cannot be used.
+    pub(super) fn read<T>(
+        &self,
+        path: &Path,
+        read: impl FnOnce(&Path) -> Result<T, String>,
+    ) -> Result<T, UnreadFile> {
+        read(&self.allowed(path)?).map_err(|why| UnreadFile::of_program(&why))
+    }
 }
 
 /// What was inspected for a request.
@@ -237,8 +249,8 @@ pub(super) struct InspectedFiles {
     pub(super) total: u64,
 }
 
-/// Inspects the files of up to `most` pairs or blocks from a position on. If that takes longer than `time`, inspects fewer, but
-/// at least at those of one. Ends when the caller leaves.
+/// Inspects the files of up to `most` pairs or blocks from a position on: of fewer if that takes longer than `time`, but at
+/// least of one. Ends when the caller leaves.
 pub(super) async fn inspect(
     state: &Arc<AppState>,
     chosen: ImportChoice,
@@ -292,14 +304,16 @@ fn inspected(
 
 impl PlannedFiles {
     fn inspect(self, places: &FilePlaces, limits: &InputLimits) -> FileHeaders {
-        let unusable = |why: String| UnreadFile::of_program(&why);
-        let scan = places.allowed(&self.scan);
-        let scan = scan.and_then(|path| scan_extent(&path, &limits.mesh).map_err(unusable));
-        let print = places.allowed(&self.print);
-        let print = print.and_then(|path| image_size(&path, &limits.image).map_err(unusable));
-        let is_page = self.kind == ScanKind::Block && print.is_ok();
-        let page = is_page.then(|| places.allowed(&self.print).ok()).flatten();
-        let page_mm = page.and_then(|path| page_length_mm(&path, &limits.image));
+        let scan = places.read(&self.scan, |path| scan_extent(path, &limits.mesh));
+        let is_page = self.kind == ScanKind::Block;
+        let mut page_mm = None;
+        let print = places.read(&self.print, |path| {
+            let size = image_size(path, &limits.image)?;
+            page_mm = is_page
+                .then(|| page_length_mm(path, || Some(size)))
+                .flatten();
+            Ok(size)
+        });
         let labels = self.labels.as_deref().zip(print.as_ref().ok());
         let labels = labels.map(|(labels, size)| {
             let found = self.boxes(labels, *size, places);
@@ -321,7 +335,6 @@ impl PlannedFiles {
         size: [u32; 2],
         places: &FilePlaces,
     ) -> Result<Labels, UnreadFile> {
-        let labels = places.allowed(labels)?;
-        page_labels(&labels, &self.print, size).map_err(|why| UnreadFile::of_program(&why))
+        places.read(labels, |labels| page_labels(labels, &self.print, size))
     }
 }

@@ -110,7 +110,7 @@ pub(super) async fn draw(
     Ok(([(header::CONTENT_TYPE, JPEG)], picture).into_response())
 }
 
-/// Returns a picture as JPEG: the one that was drawn last, if its files are the same.
+/// Returns a picture as JPEG. It is drawn only if no picture of the same files is kept.
 fn drawn(
     state: &AppState,
     chosen: &ImportChoice,
@@ -161,8 +161,7 @@ fn draw_page(
     places: &FilePlaces,
     limits: &InputLimits,
 ) -> Result<Rgb, UnreadFile> {
-    let page = page_image(&places.allowed(&files.print)?, &limits.image);
-    let image = page.map_err(|why| UnreadFile::of_program(&why))?;
+    let image = places.read(&files.print, |path| page_image(path, &limits.image))?;
     let size = [image.rgb.width() as u32, image.rgb.height() as u32];
     let labels = files.labels.as_deref();
     let found = labels.and_then(|labels| files.boxes(labels, size, places).ok());
@@ -177,8 +176,7 @@ fn draw_scan(
     places: &FilePlaces,
     limits: &InputLimits,
 ) -> Result<Rgb, UnreadFile> {
-    let points = scan_points(&places.allowed(&files.scan)?, &limits.mesh);
-    let points = points.map_err(|why| UnreadFile::of_program(&why))?;
+    let points = places.read(&files.scan, |path| scan_points(path, &limits.mesh))?;
     let picture = points_from_above(&points, SIDE);
     picture.ok_or_else(|| UnreadFile::of_program("the mesh has no vertices"))
 }

@@ -142,10 +142,10 @@ fn too_long(longest: Duration) -> Sentence {
     let seconds = longest.as_secs();
     Sentence::new(
         format!(
-            "the paper's method was stopped after {seconds} s, the longest time of a stage; a longer one is chosen on the page Settings"
+            "the paper's method was stopped after {seconds} s, the longest time of a stage; choose a longer one on the page Settings"
         ),
         format!(
-            "phương pháp của bài báo đã bị dừng sau {seconds} giây, thời gian dài nhất của một bước; có thể chọn thời gian dài hơn ở trang Thiết lập"
+            "phương pháp của bài báo đã bị dừng sau {seconds} giây, thời gian dài nhất của một bước; hãy chọn thời gian dài hơn ở trang Thiết lập"
         ),
     )
 }

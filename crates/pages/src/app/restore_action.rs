@@ -82,7 +82,6 @@ fn request(folder: &Path, name: &str, body: &RestoreBackupBody) -> AppResult<Res
     let roots = PickerRoots::new(folder);
     let backup = chosen_path(&roots, &body.backup)?;
     check_backup_file(&backup)?;
-    let inputs = (!body.inputs.is_empty()).then(|| roots.allowed(Path::new(&body.inputs)));
     let dir = new_project_dir(name, folder)?;
     if is_project(&dir) || !is_free(&dir).map_err(|error| AppFailure::of(error, &dir))? {
         return Err(AppFailure::refused(Sentence::new(
@@ -90,6 +89,7 @@ fn request(folder: &Path, name: &str, body: &RestoreBackupBody) -> AppResult<Res
             format!("đã có thư mục {name:?}: hãy đặt tên khác cho dự án mới"),
         )));
     }
+    let inputs = (!body.inputs.is_empty()).then(|| roots.allowed(Path::new(&body.inputs)));
     let inputs = inputs.transpose()?;
     let bytes = std::fs::metadata(&backup).map_or(0, |meta| meta.len());
     let copies = match inputs {

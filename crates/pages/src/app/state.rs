@@ -51,7 +51,7 @@ pub(super) struct AppState {
     pub(super) invitations: Invitations,
     /// The blocks that are open, each with its picture and heights.
     pub(super) blocks: OpenPages,
-    /// Exports, checks, backups, and what is restored.
+    /// Exports, checks, backups and restores.
     pub(super) tasks: AppTasks,
     /// Why runs that the app started failed.
     pub(super) failed_runs: FailedRuns,
@@ -59,7 +59,7 @@ pub(super) struct AppState {
     /// Pairs aligned by the method of the paper.
     pub(super) paper: PaperMethod,
     pub(super) zip_sizes: ZipSizes,
-    /// What the last import would store.
+    /// What the last imports that were shown would store.
     pub(super) plans: PlanCache,
     /// Files that the browser sends.
     pub(super) uploads: Uploads,

@@ -116,15 +116,17 @@ pub(super) async fn view_bar(visit: &Visit, open: &OpenProject) -> Markup {
 
 fn bar(visit: &Visit, views: &[SavedView], may_save: bool) -> Markup {
     let list = PairQuery::plain(&visit.query);
-    let is_shown = |view: &&SavedView| PairQuery::plain(&view.query()) == list;
-    let shown: Vec<&SavedView> = views.iter().filter(is_shown).collect();
+    let is_shown = |view: &SavedView| PairQuery::plain(&view.query()) == list;
+    let marked: Vec<(&SavedView, bool)> = views.iter().map(|view| (view, is_shown(view))).collect();
+    let shown = marked.iter().filter(|(_, is_shown)| *is_shown);
+    let shown: Vec<&SavedView> = shown.map(|(view, _)| *view).collect();
     let is_savable = list != PageQuery::default() && !PairQuery::of(&list).lacks_compared;
     html! {
         @if !views.is_empty() {
             p.views #saved-views {
                 (visit.t("Saved views", "Danh sách đã lưu")) ": "
-                @for view in views {
-                    a href={ "pairs/view/" (encoded(&view.name)) } aria-current=[is_shown(&view).then_some("true")] { (one_line(&view.name)) } " "
+                @for (view, is_shown) in &marked {
+                    a href={ "pairs/view/" (encoded(&view.name)) } aria-current=[is_shown.then_some("true")] { (one_line(&view.name)) } " "
                 }
             }
         }

@@ -4,7 +4,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use tokio::sync::oneshot;
 
@@ -14,6 +14,7 @@ use super::inputs::{BlockSources, outdated};
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::BlockStageError;
 use crate::blocking::panic_text;
+use crate::compute_thread::LONGEST_END;
 use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::retry::stored;
@@ -226,10 +227,6 @@ async fn compute(
         Err(error) => Err(Interruption::of(error, Some(ms))),
     }
 }
-
-/// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer, or work on a busy machine,
-/// for which unit tests wait longer.
-const LONGEST_END: Duration = Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
 
 /// Runs blocking work on a thread of its own, with a flag that requests a stop. Waits for at most as long as one stage
 /// may take; then, after an immediate stop of the run, and when the leases of `worker` have expired, cancels the work and

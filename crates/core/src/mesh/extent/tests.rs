@@ -68,6 +68,10 @@ fn the_size_of_long_and_short_files_is_found_in_every_format() {
             let whole = found(&bytes, &name).expect("a mesh");
             assert_eq!(whole.is_exact, bytes.len() as u64 <= WHOLE_BYTES, "{name}");
             assert_sheet(whole.sides, &name);
+            if let (true, Some([x, y, _])) = (whole.is_exact, whole.sides) {
+                let is_whole = (x - 40.0).abs() < 1e-3 && (y - 30.0).abs() < 1e-3;
+                assert!(is_whole, "{name}: {x} {y}");
+            }
             assert_eq!(whole.longest(), whole.sides.map(|sides| sides[0]), "{name}");
             // A binary file that is cut shows it by its header. A text has fewer vertices.
             let is_text = bytes.is_ascii();

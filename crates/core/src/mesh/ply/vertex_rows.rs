@@ -1,6 +1,7 @@
 //! Where the vertices of a PLY file are, for reading some of them.
 
 use super::header::{PlyElement, PlyEncoding, PlyHeader, PlyScalar, PlyType};
+use super::source::{BinarySource, NumberSource as _};
 use crate::mesh::error::MeshError;
 use crate::mesh::text;
 
@@ -106,19 +107,9 @@ fn column(element: &PlyElement, name: &str, is_text: bool) -> Option<(usize, Ply
 
 /// Returns the number at the beginning of some bytes.
 fn number(scalar: PlyScalar, bytes: &[u8], encoding: PlyEncoding) -> Option<f64> {
-    let mut field = [0; 8];
-    let used = &mut field[..scalar.size()];
-    used.copy_from_slice(bytes.get(..used.len())?);
-    if encoding == PlyEncoding::BigEndian {
-        used.reverse();
-    }
-    let bits = u64::from_le_bytes(field);
-    Some(match scalar {
-        PlyScalar::I8 => f64::from(bits as i8),
-        PlyScalar::I16 => f64::from(bits as i16),
-        PlyScalar::I32 => f64::from(bits as i32),
-        PlyScalar::U8 | PlyScalar::U16 | PlyScalar::U32 => bits as f64,
-        PlyScalar::F32 => f64::from(f32::from_bits(bits as u32)),
-        PlyScalar::F64 => f64::from_bits(bits),
-    })
+    let number = match encoding {
+        PlyEncoding::BigEndian => BinarySource::<true> { rest: bytes }.next(scalar),
+        _ => BinarySource::<false> { rest: bytes }.next(scalar),
+    };
+    number.ok()
 }

@@ -36,13 +36,7 @@ pub fn header_size(
     len: u64,
     limits: &ImageLimits,
 ) -> Result<[u32; 2], DecodeError> {
-    if len == 0 {
-        return Err(DecodeError::Empty);
-    }
-    if len > limits.max_bytes {
-        let limit = limits.max_bytes;
-        return Err(DecodeError::TooManyBytes { bytes: len, limit });
-    }
+    limits.check_bytes(len)?;
     let kind = match file.fill_buf() {
         Ok(head) => FileKind::of(head),
         Err(error) => return Err(broken(FileKind::Binary, &error.to_string())),
@@ -124,7 +118,9 @@ fn png_size(file: &mut (impl Read + Seek)) -> Option<StoredSize> {
                 };
                 size = Some([width, height].map(u32::from_be_bytes));
             }
-            b"eXIf" if exif.is_none() => exif = Some(block_at(file, at + 8, len)?),
+            b"eXIf" if exif.is_none() => {
+                exif = Some(block_at(file, at + 8, len.min(MAX_EXIF_BYTES))?);
+            }
             b"IEND" => return Some((size?, of_exif(exif.as_deref()))),
             _ => {}
         }
@@ -144,7 +140,7 @@ fn array_at<const N: usize>(file: &mut (impl Read + Seek), at: u64) -> Option<[u
 fn block_at(file: &mut (impl Read + Seek), at: u64, len: u64) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
     file.seek(SeekFrom::Start(at)).ok()?;
-    let mut block = file.by_ref().take(len.min(MAX_EXIF_BYTES));
+    let mut block = file.by_ref().take(len);
     block.read_to_end(&mut bytes).ok()?;
     Some(bytes)
 }

@@ -21,12 +21,11 @@ impl ImageLimits {
         max_pixels: 30_000_000,
     };
 
-    /// Checks the size of a file.
+    /// Checks the size of a file in bytes.
     ///
     /// # Errors
     /// Returns an error if the file is empty or larger than `max_bytes`.
-    pub(super) fn check_bytes(&self, bytes: &[u8]) -> Result<(), DecodeError> {
-        let size = bytes.len() as u64;
+    pub(super) fn check_bytes(&self, size: u64) -> Result<(), DecodeError> {
         if size == 0 {
             return Err(DecodeError::Empty);
         }

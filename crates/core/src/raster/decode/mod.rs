@@ -47,7 +47,7 @@ pub use samples::{PrintSamples, SampleSlice};
 /// # Errors
 /// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
 pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
-    limits.check_bytes(bytes)?;
+    limits.check_bytes(bytes.len() as u64)?;
     let (rgb, orientation, profile, has_16_bits) = match FileKind::of(bytes) {
         FileKind::Tiff => {
             let image = tiff::decode(bytes, limits)?;

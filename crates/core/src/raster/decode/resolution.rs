@@ -40,8 +40,7 @@ pub fn stated_dpi(bytes: &[u8]) -> Option<[f64; 2]> {
     })
 }
 
-/// Returns the same as [`stated_dpi`] for a file, of which little is read. What a PNG file states behind its pixels is not
-/// found.
+/// Returns the resolution like [`stated_dpi`], but reads only the tags of a TIFF file, and only the beginning of any other file.
 pub fn file_dpi(mut file: impl BufRead + Seek) -> Option<[f64; 2]> {
     if FileKind::of(file.fill_buf().ok()?) == FileKind::Tiff {
         return upright_dpi(of_tiff(&TagFileWindow::new(file))?);
