@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mocban_core::domain::spelling::fold_case;
+use mocban_core::domain::spelling::{composed, fold_case};
 use mocban_core::domain::{is_device, is_hidden, sanitize};
-use unicode_normalization::UnicodeNormalization as _;
 
 /// Longest name of a file or folder, in bytes. File systems allow 255.
 const MAX_NAME_BYTES: usize = 200;
@@ -70,7 +69,7 @@ impl RelativePath {
     /// # Errors
     /// Returns an error if the path leads elsewhere, or a file of this name cannot be stored on every system.
     pub fn new(text: &str) -> Result<Self, PathFault> {
-        let text: String = text.nfc().collect();
+        let text = composed(text).into_owned();
         if text.len() > MAX_PATH_BYTES {
             return Err(PathFault::TooLong);
         }

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use mocban_core::domain::NO_BREAK_SPACES;
-use mocban_core::domain::spelling::plain_form;
+use mocban_core::domain::spelling::{composed, plain_form};
 use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
 use unicode_normalization::UnicodeNormalization as _;
 
@@ -57,7 +57,11 @@ fn in_any_form(path: &Path) -> Option<PathBuf> {
             continue;
         };
         let name = name.to_str()?;
-        let forms = [name.to_owned(), name.nfc().collect(), name.nfd().collect()];
+        let forms = [
+            name.to_owned(),
+            composed(name).into_owned(),
+            name.nfd().collect(),
+        ];
         let existing = forms.iter().map(|form| found.join(form));
         found = existing.into_iter().find(|path| path.exists())?;
     }

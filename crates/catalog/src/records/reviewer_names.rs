@@ -4,7 +4,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::json;
-use unicode_normalization::UnicodeNormalization as _;
 
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
@@ -13,6 +12,7 @@ use crate::db::rows::json_array;
 use crate::db::value::Value;
 use crate::{Catalog, Result};
 use mocban_core::domain::is_hidden;
+use mocban_core::domain::spelling::composed;
 
 const NAMES: &str = "
 SELECT reviewer FROM review_act UNION SELECT reviewer FROM attention_check_answer UNION SELECT reviewer FROM manual_alignment";
@@ -26,7 +26,7 @@ const LOGIN: &str = "SELECT CAST(session_user AS text)";
 /// Returns the one spelling of a person's name: with composed letters, and single blanks only between words. macOS and some
 /// keyboards decompose accented letters, which look the same.
 pub fn person_name(name: &str) -> String {
-    let composed: String = name.trim().nfc().collect();
+    let composed = composed(name.trim());
     let is_blank = |c: char| c.is_whitespace() && !is_hidden(c);
     let words = composed.split(is_blank).filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join(" ")

@@ -6,9 +6,8 @@ use std::fmt::Write as _;
 use percent_encoding::percent_decode_str;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use unicode_normalization::UnicodeNormalization as _;
 
-use super::spelling::fold_case;
+use super::spelling::{composed, fold_case};
 use super::{ErrorCode, Explained, is_hidden, sanitize};
 
 /// Characters of an id that a file name on Windows may not have, and the escape character itself. All are ASCII.
@@ -96,10 +95,7 @@ impl PairName {
         if text.trim() != text {
             return Err(PairNameError::OuterSpace(text.to_owned()));
         }
-        let plain = text
-            .nfc()
-            .map(|c| if NO_BREAK_SPACES.contains(&c) { ' ' } else { c });
-        let name = Self(plain.collect());
+        let name = Self(composed(text).replace(NO_BREAK_SPACES, " "));
         let longest = name.0.len().max(name.file_name().len());
         if longest > Self::MAX_BYTES {
             return Err(PairNameError::TooLong(longest));
@@ -168,15 +164,12 @@ impl PairName {
 /// Returns whether a file of this name is a device on Windows.
 pub fn is_device(text: &str) -> bool {
     let stem = text.split('.').next().unwrap_or(text).trim_end();
-    let stem = stem.to_ascii_lowercase();
-    let numbered = || {
-        let mut devices = NUMBERED_DEVICES.into_iter();
-        devices.any(|device| {
-            let number = stem.strip_prefix(device).map(str::as_bytes);
-            matches!(number, Some([b'0'..=b'9']))
-        })
+    let is_in = |devices: &[&str], name: &str| {
+        let mut devices = devices.iter();
+        devices.any(|device| name.eq_ignore_ascii_case(device))
     };
-    DEVICES.contains(&&*stem) || numbered()
+    let unnumbered = stem.strip_suffix(|c: char| c.is_ascii_digit());
+    is_in(&DEVICES, stem) || unnumbered.is_some_and(|name| is_in(&NUMBERED_DEVICES, name))
 }
 
 impl std::str::FromStr for PairName {

@@ -1,12 +1,31 @@
-//! Finds the names that a mistyped name may stand for.
+//! Forms in which names are compared, and the names that a mistyped name may stand for.
 
-use unicode_normalization::UnicodeNormalization as _;
+use std::borrow::Cow;
+
 use unicode_normalization::char::is_combining_mark;
+use unicode_normalization::{IsNormalized, UnicodeNormalization as _, is_nfc_quick};
+
+/// Returns a text in Unicode's composed form (NFC), in which the same name typed on macOS and on Windows is equal.
+pub fn composed(text: &str) -> Cow<'_, str> {
+    // Reading long lists needs the fast paths: almost all ids and paths are ASCII, and most others are composed.
+    if text.is_ascii() || is_nfc_quick(text.chars()) == IsNormalized::Yes {
+        Cow::Borrowed(text)
+    } else {
+        Cow::Owned(text.nfc().collect())
+    }
+}
 
 /// Returns a name as file systems compare it that ignore case, such as those of Windows and macOS.
 pub fn fold_case(name: &str) -> String {
+    if name.is_ascii() {
+        return name.to_ascii_lowercase();
+    }
     // Upper case first: some letters, such as the final sigma, have one upper and several lower forms.
-    name.to_uppercase().to_lowercase().nfc().collect()
+    let folded = name.to_uppercase().to_lowercase();
+    match composed(&folded) {
+        Cow::Borrowed(_) => folded,
+        Cow::Owned(composed) => composed,
+    }
 }
 
 /// Returns a name in lower case, without accents and without zeros before numbers, so that `Khoi-4` is similar to
@@ -84,7 +103,19 @@ fn distance_if_similar(typed: &str, name: &str) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::{hint, nearest, plain_form};
+    use proptest::prelude::{prop_assert_eq, proptest};
+    use unicode_normalization::UnicodeNormalization as _;
+
+    use super::{composed, fold_case, hint, nearest, plain_form};
+
+    proptest! {
+        #[test]
+        fn fast_paths_give_what_the_definitions_give(text in "[A-Za-z0-9 \\u{300}-\\u{36f}ẮữƯĐđİıßΣςKÅ가-각ᄀ-ᇿ天]{0,8}") {
+            let nfc = |text: &str| text.nfc().collect::<String>();
+            prop_assert_eq!(&*composed(&text), nfc(&text));
+            prop_assert_eq!(fold_case(&text), nfc(&text.to_uppercase().to_lowercase()));
+        }
+    }
 
     #[test]
     fn another_letter_alone_is_not_suggested() {

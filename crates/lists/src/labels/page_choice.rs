@@ -1,10 +1,9 @@
 //! Choice of a page in a file about several pages.
 
-use unicode_normalization::UnicodeNormalization as _;
-
 use super::error::LabelsProblem;
 use super::message::quoted;
 use super::model::PageFile;
+use mocban_core::domain::spelling::composed;
 
 /// What a file says about one of its pages.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +18,7 @@ pub(super) struct PageEntry {
 fn comparable(name: &str) -> String {
     let file = name.rsplit(['/', '\\']).next().unwrap_or_default();
     // Lower case can decompose letters, so it comes first.
-    file.to_lowercase().nfc().collect()
+    composed(&file.to_lowercase()).into_owned()
 }
 
 /// Returns whether two paths have the same file name. Folders, case and Unicode form are ignored.

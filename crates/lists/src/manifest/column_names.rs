@@ -1,6 +1,6 @@
 //! Missing columns, and which names are similar.
 
-use unicode_normalization::UnicodeNormalization as _;
+use mocban_core::domain::spelling::composed;
 
 /// Returns whether a name may be a misspelt or abbreviated name of a column: in short names one letter may be wrong,
 /// missing or swapped with the next, in longer names two.
@@ -11,7 +11,7 @@ pub(super) fn similar_column(found: &str, name: &str) -> bool {
         ..=5 => 1,
         _ => 2,
     };
-    let found = found.nfc().collect::<String>().replace(['_', '-'], " ");
+    let found = composed(found).replace(['_', '-'], " ");
     OTHER_NAMES.contains(&(found.as_str(), name))
         || strsim::osa_distance(&found, &name.replace('_', " ")) <= max_wrong
 }

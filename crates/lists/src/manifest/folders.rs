@@ -6,12 +6,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use unicode_normalization::UnicodeNormalization as _;
 
 use super::error::{ManifestError, at_file, of_list};
 use super::row::ManifestRow;
 use mocban_core::domain::PairName;
-use mocban_core::domain::spelling::{fold_case, plain_form};
+use mocban_core::domain::spelling::{composed, fold_case, plain_form};
 
 /// Extensions of meshes.
 pub const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
@@ -333,7 +332,8 @@ impl FolderFile {
     /// Splits a path below a root into its parts, in composed letters: a mesh named on macOS and a print named on Windows
     /// may have different forms of the same letters.
     fn new(path: &Path, root: &Path) -> Option<Self> {
-        let text = |name: &std::ffi::OsStr| -> String { name.to_string_lossy().nfc().collect() };
+        let text =
+            |name: &std::ffi::OsStr| -> String { composed(&name.to_string_lossy()).into_owned() };
         let below = path.strip_prefix(root).unwrap_or(path);
         let folders = below.parent().into_iter().flat_map(Path::components);
         let folders = folders.filter_map(|part| match part {

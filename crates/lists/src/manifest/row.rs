@@ -171,8 +171,8 @@ impl EqualId {
 impl RowIds {
     /// Adds an id; returns the earlier one if an equal id was added before.
     pub(super) fn insert(&mut self, name: &PairName, line: usize) -> Option<EqualId> {
-        let exact = key(name.as_str());
-        match self.0.entry(key(&name.folded())) {
+        let (folded, exact) = keys(name);
+        match self.0.entry(folded) {
             Entry::Occupied(first) => Some(EqualId {
                 line: first.get().line,
                 differs_in_case: first.get().exact != exact,
@@ -187,8 +187,9 @@ impl RowIds {
 
     /// Returns whether the list contains the id.
     pub fn contains(&self, name: &PairName) -> bool {
-        let first = self.0.get(&key(&name.folded()));
-        first.is_some_and(|first| first.exact == key(name.as_str()))
+        let (folded, exact) = keys(name);
+        let first = self.0.get(&folded);
+        first.is_some_and(|first| first.exact == exact)
     }
 
     /// Returns whether the list has no rows.
@@ -205,6 +206,18 @@ impl<'n> FromIterator<&'n PairName> for RowIds {
         }
         ids
     }
+}
+
+/// Returns the hashes of an id in lower case and as written.
+fn keys(name: &PairName) -> ([u8; HASH_BYTES], [u8; HASH_BYTES]) {
+    let folded = name.folded();
+    let key_of_folded = key(&folded);
+    let exact = if folded == name.as_str() {
+        key_of_folded
+    } else {
+        key(name.as_str())
+    };
+    (key_of_folded, exact)
 }
 
 fn key(text: &str) -> [u8; HASH_BYTES] {

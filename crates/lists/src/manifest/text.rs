@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use memchr::memchr_iter;
+
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Why a file is not a list.
@@ -91,10 +93,8 @@ fn without_blanks_before_quotes(list: &[u8], delimiter: u8) -> Option<Vec<u8>> {
     let ends_cell = |byte: &u8| *byte == delimiter || matches!(byte, b'\n' | b'\r');
     let is_blank = |byte: &&u8| matches!(byte, b' ' | b'\t') && **byte != delimiter;
     // Almost no list has any.
-    if !list
-        .windows(2)
-        .any(|two| two[1] == b'"' && matches!(two[0], b' ' | b'\t'))
-    {
+    let is_after_blank = |quote: usize| quote > 0 && matches!(list[quote - 1], b' ' | b'\t');
+    if !memchr_iter(b'"', list).any(is_after_blank) {
         return None;
     }
     let (mut kept, mut copied, mut at) = (Vec::new(), 0, 0);

@@ -24,19 +24,20 @@ pub(in crate::labels) fn read(
     page: &PageFile<'_>,
 ) -> Result<PageRegions, LabelsProblem> {
     let mut columns = FileColumns::default();
-    for (count, row) in (1..).zip(rows(text)) {
-        check_count(count)?;
+    let mut rows = Vec::new();
+    for row in parsed_rows(text) {
+        check_count(rows.len() + 1)?;
         let row = row?;
         columns
             .add(&row)
             .map_err(|reason| malformed(row.line, reason))?;
+        rows.push(row);
     }
     let columns = columns
         .decide()
         .map_err(|(line, reason)| malformed(line, reason))?;
-    let regions = (1..).zip(rows(text)).map(|(number, row)| {
-        let row = row?;
-        let fractions = columns.coordinates(&row);
+    let regions = (1..).zip(&rows).map(|(number, row)| {
+        let fractions = columns.coordinates(row);
         if fractions.len() > 2 * MAX_CORNERS {
             return Err(too_many_corners(row.line));
         }
@@ -64,7 +65,7 @@ fn too_many_corners(line: usize) -> LabelsProblem {
 }
 
 /// Returns the rows of a file. Blank lines are left out.
-fn rows(text: &str) -> impl Iterator<Item = Result<YoloRow, LabelsProblem>> {
+fn parsed_rows(text: &str) -> impl Iterator<Item = Result<YoloRow, LabelsProblem>> {
     let lines = (1..).zip(text.lines());
     let filled = lines.filter(|(_, line)| !line.trim_ascii().is_empty());
     filled.map(|(line, content)| {
