@@ -1,6 +1,7 @@
 //! Fitting of regions to their page: scale, boxes outside, repeated boxes, names.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use super::error::LabelsProblem;
 use super::message::{boxes, for_count, list, quoted};
@@ -24,7 +25,7 @@ const MIN_INSIDE: f64 = 0.5;
 /// Edges are rounded to multiples of this many pixels. Boxes whose rounded edges are equal are the same.
 const SAME_EDGE: f64 = 0.01;
 
-/// A region with an area, and its corners on the page.
+/// A region with an area. Its corners were moved out of it and are on the page.
 struct PlacedRegion {
     region: LabelRegion,
     corners: Corners,
@@ -146,9 +147,12 @@ fn with_area(
 ) -> Vec<PlacedRegion> {
     let mut flat = Vec::new();
     let mut placed = Vec::with_capacity(regions.len());
-    for region in regions {
-        let scaled = |[x, y]: &[f64; 2]| [x * scale[0], y * scale[1]];
-        let corners: Corners = region.corners.iter().flatten().map(scaled).collect();
+    for mut region in regions {
+        let mut corners = region.corners.take().unwrap_or_default();
+        for [x, y] in &mut corners {
+            *x *= scale[0];
+            *y *= scale[1];
+        }
         let [x0, y0, x1, y1] = bounds(&corners);
         if x1 - x0 >= MIN_SIDE && y1 - y0 >= MIN_SIDE {
             placed.push(PlacedRegion { region, corners });
@@ -246,18 +250,22 @@ fn share_inside([x0, y0, x1, y1]: [f64; 4], [width, height]: [f64; 2]) -> f64 {
 
 /// Keeps the first of boxes with the same edges. It gets the name and the text of the others if it has none.
 fn without_repeats(placed: Vec<PlacedRegion>, warnings: &mut Vec<String>) -> Vec<PlacedRegion> {
-    let mut known: HashMap<[i64; 4], usize> = HashMap::new();
+    let mut known: HashMap<[i64; 4], usize> = HashMap::with_capacity(placed.len());
     let mut unique: Vec<PlacedRegion> = Vec::with_capacity(placed.len());
     let mut repeats = Vec::new();
     for other in placed {
         let edges = bounds(&other.corners).map(|edge| (edge / SAME_EDGE).round() as i64);
-        if let Some(first) = known.get(&edges).map(|k| &mut unique[*k].region) {
-            repeats.push(format!("{} as {}", other.region.shown(), first.shown()));
-            first.name = first.name.take().or(other.region.name);
-            first.text = first.text.take().or(other.region.text);
-        } else {
-            known.insert(edges, unique.len());
-            unique.push(other);
+        match known.entry(edges) {
+            Entry::Occupied(first) => {
+                let first = &mut unique[*first.get()].region;
+                repeats.push(format!("{} as {}", other.region.shown(), first.shown()));
+                first.name = first.name.take().or(other.region.name);
+                first.text = first.text.take().or(other.region.text);
+            }
+            Entry::Vacant(free) => {
+                free.insert(unique.len());
+                unique.push(other);
+            }
         }
     }
     if !repeats.is_empty() {

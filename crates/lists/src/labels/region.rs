@@ -88,17 +88,16 @@ pub(super) struct PageRegions {
 
 /// Returns the first attribute in the order of `keys` that is a text, or also a whole number if `numbers`.
 fn attribute(attributes: &Map<String, Value>, keys: &[&str], numbers: bool) -> Option<String> {
-    let value_of = |key: &&str| {
-        let mut same = attributes
-            .iter()
-            .filter(|(k, _)| k.eq_ignore_ascii_case(key));
-        same.find_map(|(_, value)| match value {
-            Value::String(text) => filled(text),
-            Value::Number(number) if numbers && !number.is_f64() => Some(number.to_string()),
-            _ => None,
-        })
-    };
-    keys.iter().find_map(value_of)
+    let found = attributes.iter().filter_map(|(name, value)| {
+        let rank = keys.iter().position(|key| name.eq_ignore_ascii_case(key))?;
+        let text = match value {
+            Value::String(text) => filled(text)?,
+            Value::Number(number) if numbers && !number.is_f64() => number.to_string(),
+            _ => return None,
+        };
+        Some((rank, text))
+    });
+    found.min_by_key(|(rank, _)| *rank).map(|(_, text)| text)
 }
 
 /// Returns a text without spaces at its ends, or `None` if nothing is left.
