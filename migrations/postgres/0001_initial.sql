@@ -3,7 +3,7 @@
 -- changes numbers. Keys are compared byte by byte, whatever the collation of the database.
 
 CREATE TABLE catalog_version (version bigint NOT NULL);
-INSERT INTO catalog_version (version) VALUES (15);
+INSERT INTO catalog_version (version) VALUES (16);
 
 -- Half of a page is free, so that a heartbeat changes its row without changing the index.
 CREATE TABLE worker (
@@ -292,6 +292,7 @@ CREATE TABLE block (
     labels_path text COLLATE "C",
     unit text CHECK (unit IN ('mm', 'cm', 'm', 'in')),
     side text CHECK (side IN ('front', 'back')),
+    meta text NOT NULL CHECK (CAST(meta AS json) IS NOT NULL),
     attributes text NOT NULL CHECK (CAST(attributes AS json) IS NOT NULL),
     mesh_hash bytea CHECK (length(mesh_hash) = 32),
     mesh_stat text,

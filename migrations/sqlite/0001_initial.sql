@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`. In SQLite before 3.45, `json_valid(NULL)` is 0, so checks of columns that may be NULL ask for NULL first.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 15;
+PRAGMA user_version = 16;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -285,9 +285,9 @@ CREATE TABLE retired_pair (
 ) STRICT;
 
 -- A whole block as imported: the scan of a face, the image of its page, and perhaps labels; and these files as last read.
--- `attributes` are the columns that results depend on. `true_boxes` are boxes on the page that are known to be right, if
--- there are any: a list of `domain::TrueBox` as JSON. `control_points` are places that a person chose on the scan and on
--- the page, with the hashes of both files.
+-- `attributes` are the columns that results depend on, `meta` those without a meaning for the program. `true_boxes` are
+-- boxes on the page that are known to be right, if there are any: a list of `domain::TrueBox` as JSON. `control_points` are
+-- places that a person chose on the scan and on the page, with the hashes of both files.
 CREATE TABLE block (
     id INTEGER PRIMARY KEY,
     name TEXT NOT NULL UNIQUE,
@@ -296,6 +296,7 @@ CREATE TABLE block (
     labels_path TEXT,
     unit TEXT CHECK (unit IN ('mm', 'cm', 'm', 'in')),
     side TEXT CHECK (side IN ('front', 'back')),
+    meta TEXT NOT NULL CHECK (json_valid(meta)),
     attributes TEXT NOT NULL CHECK (json_valid(attributes)),
     mesh_hash BLOB CHECK (length(mesh_hash) = 32),
     mesh_stat TEXT,

@@ -298,13 +298,17 @@ fn check_report(dir: &Path) {
 fn check_refused_block(dir: &Path) {
     fs::write(dir.join("b0.stl"), "solid a\nendsolid a\n").expect("written");
     fs::write(dir.join("b0.png"), "no image").expect("written");
-    project(dir, &["import", "--block", "b0.stl", "--page", "b0.png"]).expect(0);
+    let list = "block,mesh,page,shelfmark\nb0,b0.stl,b0.png,R.12\n";
+    fs::write(dir.join("b0.csv"), list).expect("written");
+    project(dir, &["import", "b0.csv"]).expect(0);
     project(dir, &["run"]).expect(3);
     project(dir, &["export", "-o", "out"]).expect(0);
     let all = lines(&dir.join("out/blocks.jsonl"));
     let names: Vec<&Value> = all.iter().map(|line| &line["block"]).collect();
     assert_eq!(names, ["b0", "b1"]);
     assert_eq!(all[0]["status"], "failed");
+    assert_eq!(all[0]["meta"], json!({ "shelfmark": "R.12" }));
+    assert_eq!(all[1]["meta"], json!({}));
     assert!(
         all[0]["error"]
             .as_str()

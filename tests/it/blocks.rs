@@ -97,10 +97,10 @@ fn a_list_with_a_wrong_column_or_a_missing_file_imports_nothing() {
     let alone = project(dir.path(), &["import", "--block", "b1.stl"]).expect(2);
     assert!(alone.err.contains("--page"), "{}", alone.err);
     assert!(!dir.path().join("project").exists());
-    let list = "block,mesh,page,lables\nb1,b1.stl,b1.png,\n";
+    let list = "block,mesh,page,lables\nb1,b1.stl,b1.png,b1.json\n";
     fs::write(dir.path().join("list.csv"), list).expect("written");
     let imported = project(dir.path(), &["import", "list.csv"]).expect(0);
-    let warning = "column \"lables\" is ignored; rename \"lables\" to \"labels\" if it is meant, and import again; ";
+    let warning = "column \"lables\" is kept as metadata; rename it to \"labels\" if it is meant, and import again";
     assert!(imported.err.contains(warning), "{}", imported.err);
 }
 

@@ -48,6 +48,7 @@ mod bit_flips;
 mod block_correction;
 mod block_demo;
 mod block_export;
+mod block_metadata;
 #[cfg(unix)]
 mod block_outage;
 mod block_view;

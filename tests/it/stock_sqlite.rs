@@ -9,7 +9,7 @@ use crate::check::{done, sql};
 
 /// A block of which every column that may be NULL is NULL.
 const BLOCK: &str = "
-INSERT INTO block (id, name, mesh_path, page_path, attributes, imported) VALUES (1, 'b', 'b.stl', 'b.jpg', '{}', 1);
+INSERT INTO block (id, name, mesh_path, page_path, meta, attributes, imported) VALUES (1, 'b', 'b.stl', 'b.jpg', '{}', '{}', 1);
 INSERT INTO block_job (block, stage, status) VALUES (1, 0, 0);
 INSERT INTO block_character (block, label, place, box, state) VALUES (1, 'a', 0, '[]', 'left');
 INSERT INTO worker (host, pid, started, heartbeat) VALUES ('h', 1, 1, 1);";

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::{Map, Value};
 
 use super::block_grid::{BlockGrid, face_grid};
 use super::block_view::{BlockViewError, RegisteredFace};
@@ -36,6 +37,8 @@ struct BlockLine {
     labels: Option<String>,
     /// Unit of the scan, as given or as it follows from the size.
     unit: Option<LengthUnit>,
+    /// All other columns of the list of blocks.
+    meta: Map<String, Value>,
     /// `done`, `failed` or `pending`.
     status: RecordStatus,
     /// Class of the failure.
@@ -69,6 +72,7 @@ impl BlockLine {
             page: attributes.page_path.clone(),
             labels: attributes.labels_path.clone(),
             unit: attributes.unit,
+            meta: attributes.meta.clone(),
             status: RecordStatus::of(state.status),
             error_class: failure.map(|failure| failure.class),
             error: failure.map(|failure| failure.message.clone()),

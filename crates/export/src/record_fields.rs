@@ -94,12 +94,13 @@ pub(super) const METRIC_FIELDS: [RecordField; 23] = [
 ];
 
 /// The fields of a whole block, in their order.
-pub(super) const BLOCK_FIELDS: [RecordField; 13] = [
+pub(super) const BLOCK_FIELDS: [RecordField; 14] = [
     field("block", "", ""),
     field("mesh", "", ""),
     field("page", "", ""),
     field("labels", "", ""),
     field("unit", "", ""),
+    field("meta", "", ""),
     field("status", "", ""),
     field("error_class", "", ""),
     field("error", "", ""),

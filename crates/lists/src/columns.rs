@@ -1,5 +1,7 @@
 //! Columns of tables that people write: their names in any case, with blanks, and in Vietnamese.
 
+use std::collections::BTreeMap;
+
 use mocban_core::domain::spelling::plain_form;
 
 /// The columns of a kind of table.
@@ -42,6 +44,22 @@ impl SameColumn {
                 "columns {first} and {second}, {one:?} and {other:?}, are the same; rename one of them"
             )
         }
+    }
+}
+
+impl HeaderColumns {
+    /// Returns the first two columns of a header that are not known and have the same name. Columns without a name are left
+    /// out.
+    pub fn same_others(&self, header: &[&str]) -> Option<SameColumn> {
+        let mut others = BTreeMap::new();
+        let names = (1..).zip(header).zip(&self.columns);
+        let unknown = names.filter(|((_, name), known)| known.is_none() && !name.is_empty());
+        unknown
+            .map(|(column, _)| column)
+            .find_map(|(second, name)| {
+                let first = others.insert(*name, second)?;
+                Some(SameColumn { first, second })
+            })
     }
 }
 

@@ -1,5 +1,6 @@
 //! Imports whole blocks with their pages into a project, which is created if there is none.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::block_files;
@@ -196,6 +197,7 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
                     labels: files.labels.clone(),
                     unit: files.unit,
                     side: files.side,
+                    meta: BTreeMap::new(),
                 }],
                 label: "block".to_owned(),
                 warnings: Vec::new(),
@@ -203,7 +205,7 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
         }
     };
     let read = read_blocks(bytes).map_err(|problems| refuse(file, &problems))?;
-    let ReadBlocks { mut rows, unread } = read;
+    let ReadBlocks { mut rows, warnings } = read;
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut repeated = RepeatedFiles::default();
     for row in &mut rows {
@@ -216,7 +218,7 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
     Ok(BlockListing {
         rows,
         label: format!("{}: line", file.display()),
-        warnings: unread
+        warnings: warnings
             .into_iter()
             .chain(repeated.warning("blocks with the same scan and page"))
             .collect(),
@@ -258,6 +260,7 @@ fn stored_row(row: &BlockRow, project: &Project) -> ProjectResult<BlockAttribute
         labels_path: row.labels.as_ref().map(stored).transpose()?,
         unit: row.unit,
         side: row.side,
+        meta: row.meta.clone().into_iter().collect(),
     })
 }
 

@@ -102,7 +102,17 @@ fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) 
         ("control points", format!("{points} on the {}", chosen.side))
     });
     let rows = rows.into_iter().chain(points);
-    let rows = rows.map(|(word, value)| vec![format!("  {word}"), one_line(&value).into_owned()]);
+    let rows = rows.map(|(word, value)| (word.to_owned(), value));
+    let meta = attributes.meta.iter().map(|(name, value)| {
+        let text = value.as_str().map(ToOwned::to_owned);
+        (name.clone(), text.unwrap_or_else(|| value.to_string()))
+    });
+    let rows = rows.chain(meta).map(|(word, value)| {
+        vec![
+            format!("  {}", one_line(&word)),
+            one_line(&value).into_owned(),
+        ]
+    });
     parts.push(columns(rows, "<<"));
     if let Some(failure) = &state.failure {
         let message = one_line(&failure.failure.message).into_owned();

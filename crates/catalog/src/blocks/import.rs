@@ -35,19 +35,20 @@ pub struct BlockImportSummary {
 const LAST: &str = "SELECT coalesce(max(id), 0) FROM block";
 
 const SELECT: &str =
-    "SELECT name, mesh_path, page_path, labels_path, unit, side FROM block WHERE name = ?1";
+    "SELECT name, mesh_path, page_path, labels_path, unit, side, meta FROM block WHERE name = ?1";
 
 /// Adds a block or updates it. If a path changed, clears the `stat` of that file, so that the next run reads the file. True
 /// boxes belong to the page of one path; they are not compared with its content.
 const UPSERT: &str = "
-INSERT INTO block (name, mesh_path, page_path, labels_path, unit, side, attributes, imported)
-VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)
+INSERT INTO block (name, mesh_path, page_path, labels_path, unit, side, meta, attributes, imported)
+VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)
 ON CONFLICT (name) DO UPDATE SET
     mesh_stat = CASE WHEN block.mesh_path = excluded.mesh_path THEN block.mesh_stat ELSE '' END, mesh_path = excluded.mesh_path,
     page_stat = CASE WHEN block.page_path = excluded.page_path THEN block.page_stat ELSE '' END, page_path = excluded.page_path,
     labels_stat = CASE WHEN block.labels_path = excluded.labels_path THEN block.labels_stat ELSE '' END,
     true_boxes = CASE WHEN block.page_path = excluded.page_path THEN block.true_boxes END,
-    labels_path = excluded.labels_path, unit = excluded.unit, side = excluded.side, attributes = excluded.attributes
+    labels_path = excluded.labels_path, unit = excluded.unit, side = excluded.side, meta = excluded.meta,
+    attributes = excluded.attributes
 RETURNING id";
 
 const NEW_JOB: &str =
@@ -178,6 +179,7 @@ async fn import_block(
         .bind(&row.labels_path)
         .bind(row.unit.map(LengthUnit::name))
         .bind(row.side.map(BlockSide::name))
+        .bind(serde_json::to_string(&row.meta)?)
         .bind(row.of_results().to_string())
         .bind(now)
         .fetch_one(&mut *conn)
@@ -204,6 +206,7 @@ fn differing(old: &BlockAttributes, new: &BlockAttributes) -> Vec<&'static str> 
         ("labels", !are_same_labels),
         ("unit", old.unit != new.unit),
         ("side", old.side != new.side),
+        ("metadata", old.meta != new.meta),
     ]
     .into_iter()
     .filter_map(|(name, differs)| differs.then_some(name))

@@ -1,7 +1,7 @@
 //! Blocks as plain values: attributes, input files, and what is stored of them.
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::Result;
 use crate::db::row::{FromRow, Row, from_row};
@@ -26,9 +26,11 @@ pub struct BlockAttributes {
     pub unit: Option<LengthUnit>,
     /// The side of the scan that the page shows, if known.
     pub side: Option<BlockSide>,
+    /// All other columns of the list.
+    pub meta: Map<String, Value>,
 }
 
-from_row! { BlockAttributes { name, mesh_path, page_path, labels_path, unit, side } }
+from_row! { BlockAttributes { name, mesh_path, page_path, labels_path, unit, side, meta as Json } }
 
 impl BlockAttributes {
     /// Returns the attributes that results depend on, as JSON.

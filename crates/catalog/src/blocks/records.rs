@@ -19,12 +19,12 @@ use mocban_core::domain::{
 
 /// Selects a block with its input files as last read.
 pub(crate) const BLOCK: &str = "
-SELECT id, name, mesh_path, page_path, labels_path, unit, side, mesh_hash, mesh_stat, page_hash, page_stat, labels_hash,
-    labels_stat, control_points FROM block WHERE id = ?1";
+SELECT id, name, mesh_path, page_path, labels_path, unit, side, meta, mesh_hash, mesh_stat, page_hash, page_stat,
+    labels_hash, labels_stat, control_points FROM block WHERE id = ?1";
 
 const BLOCKS: &str = "
-SELECT id, name, mesh_path, page_path, labels_path, unit, side, mesh_hash, mesh_stat, page_hash, page_stat, labels_hash,
-    labels_stat FROM block ORDER BY id";
+SELECT id, name, mesh_path, page_path, labels_path, unit, side, meta, mesh_hash, mesh_stat, page_hash, page_stat,
+    labels_hash, labels_stat FROM block ORDER BY id";
 
 const RESULTS: &str =
     "SELECT stage, outcome, files, result_hash FROM block_result WHERE block = ?1 ORDER BY stage";
@@ -32,7 +32,7 @@ const RESULTS: &str =
 /// Selects one block or all, without the blocks of `?3`.
 const STATES: &str = concat!(
     "
-SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.control_points,
+SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.meta, b.control_points,
     j.stage, j.status, j.attempt, j.crashes,
     f.stage AS failed_stage, f.class, f.message, f.at AS failed_at,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND NOT EXISTS (

@@ -117,7 +117,7 @@ impl ChecksummedTable {
             Self::ManualAlignmentUndo => statements!("manual_alignment_undo", "alignment", "t.*",
                 "(SELECT a.pair FROM manual_alignment AS a WHERE a.id = t.alignment)", false),
             Self::Block => statements!("block", "id",
-                "t.name, t.mesh_path, t.page_path, t.labels_path, t.unit, t.side, t.attributes, t.imported, \
+                "t.name, t.mesh_path, t.page_path, t.labels_path, t.unit, t.side, t.meta, t.attributes, t.imported, \
                  t.true_boxes, t.control_points",
                 "NULL", false),
         }

@@ -2,6 +2,7 @@
 
 mod answers;
 mod block_leases;
+mod block_metadata;
 mod block_pairs;
 mod block_settings;
 mod blocks;

@@ -159,8 +159,8 @@ pub(super) const TABLES: [CopyTable; 26] = [
         "cause",
         "at"
     ),
-    table!("block", 17, "id", "name", "mesh_path", "page_path", "labels_path", "unit", "side", "attributes", "mesh_hash",
-        "mesh_stat", "page_hash", "page_stat", "labels_hash", "labels_stat", "imported", "true_boxes",
+    table!("block", 18, "id", "name", "mesh_path", "page_path", "labels_path", "unit", "side", "meta", "attributes",
+        "mesh_hash", "mesh_stat", "page_hash", "page_stat", "labels_hash", "labels_stat", "imported", "true_boxes",
         "control_points"; numbered),
     table!(
         "block_job",

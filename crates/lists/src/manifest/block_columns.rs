@@ -26,3 +26,6 @@ pub(super) const COLUMNS: KnownColumns = KnownColumns {
 
 /// Number of columns that every list of blocks needs.
 pub(super) const REQUIRED: usize = 3;
+
+/// The other columns with a meaning.
+pub(super) const OPTIONAL: [&str; 3] = ["labels", "unit", "side"];

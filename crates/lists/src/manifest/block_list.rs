@@ -1,19 +1,23 @@
-//! Lists of whole blocks: CSV with the columns block, mesh, page and optionally labels, unit and side.
+//! Lists of whole blocks: CSV with the columns block, mesh, page and optionally labels, unit and side. Other columns are
+//! metadata.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::block_columns::{COLUMNS, REQUIRED};
-use super::column_names::{missing_column, similar_column};
-use super::csv::column_names;
-use super::draft::{MAX_PATH_BYTES, parse_unit};
+use serde_json::Value;
+
+use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
+use super::column_names::missing_column;
+use super::csv::{BoundedRows, column_names};
+use super::draft::{MAX_PATH_BYTES, check_meta, parse_unit};
 use super::error::{ManifestError, at_line, of_list};
 use super::row::RowIds;
+use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::KnownColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
-use mocban_core::domain::{BlockName, BlockSide, LengthUnit, first_names, sanitize};
+use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
 
 /// A block of a list.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,6 +36,8 @@ pub struct BlockRow {
     pub unit: Option<LengthUnit>,
     /// The side of the scan that the page shows.
     pub side: Option<BlockSide>,
+    /// All other columns, without empty cells.
+    pub meta: BTreeMap<String, Value>,
 }
 
 /// What a list of blocks has.
@@ -39,8 +45,8 @@ pub struct BlockRow {
 pub struct ReadBlocks {
     /// The blocks.
     pub rows: Vec<BlockRow>,
-    /// A warning about columns that are not read.
-    pub unread: Option<String>,
+    /// Warnings about columns that are kept as metadata although their names are similar to those of others.
+    pub warnings: Vec<String>,
 }
 
 /// Returns whether a list is one of blocks, by its header: it has the column `page`, or the column `block` with `labels`
@@ -65,13 +71,13 @@ pub fn is_block_list(bytes: &[u8]) -> bool {
     page && !(id && print) || block && (labels || side) && !id && !print
 }
 
-fn reader<'t>(text: &'t CsvText<'_>) -> ::csv::Reader<&'t [u8]> {
+fn reader<'t>(text: &'t CsvText<'_>) -> ::csv::Reader<BoundedRows<'t>> {
     ::csv::ReaderBuilder::new()
         .delimiter(text.delimiter)
         .trim(::csv::Trim::All)
         .flexible(true)
         .has_headers(false)
-        .from_reader(&text.bytes)
+        .from_reader(BoundedRows::new(&text.bytes))
 }
 
 /// Parses a list of blocks. Columns may be in any order, and their names in any case. Blank lines are ignored.
@@ -83,7 +89,7 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
     read_blocks(bytes).map(|read| read.rows)
 }
 
-/// Parses a list of blocks like [`parse_blocks`], and returns a warning about other columns, too.
+/// Parses a list of blocks like [`parse_blocks`], and returns warnings about columns, too.
 ///
 /// # Errors
 /// Returns an error like [`parse_blocks`].
@@ -100,9 +106,10 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
         hint = encoding_hint(bytes);
         problems.add(of_list(&format!("the list is not UTF-8{hint}")));
     }
-    let mut header: Option<Vec<Option<&'static str>>> = None;
-    let (mut read, mut ids) = (ReadBlocks::default(), RowIds::default());
+    let mut header: Option<Vec<ListedColumn>> = None;
+    let (mut rows, mut ids) = (Vec::new(), RowIds::default());
     loop {
+        reader.get_mut().begin_row();
         let start = reader.position().clone();
         let is_read = match reader.read_byte_record(&mut record) {
             Ok(is_read) => is_read,
@@ -117,8 +124,7 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
         }
         let line = lines.at(Some(record.position().unwrap_or(&start)));
         let Some(columns) = &header else {
-            let (columns, unread) = columns_of(line, &record, &hint)?;
-            (header, read.unread) = (Some(columns), unread);
+            header = Some(columns_of(line, &record, &hint)?);
             continue;
         };
         if record.iter().all(<[u8]>::is_empty) {
@@ -130,103 +136,111 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             if let Some(first) = ids.insert(name, line) {
                 reasons.push(first.reason("block", name.as_str()));
             }
-            read.rows.push(row);
+            rows.push(row);
         }
         problems.extend(reasons.iter().map(|reason| at_line(line, reason)));
     }
-    if problems == ManifestError::default() && read.rows.is_empty() {
+    if problems == ManifestError::default() && rows.is_empty() {
         return Err(of_list("the list contains no blocks").into());
     }
     problems.check(false)?;
-    Ok(read)
+    let warnings = similar_columns(&rows);
+    Ok(ReadBlocks { rows, warnings })
 }
 
-/// The columns of a header, each with its name if it is known, and a warning about the others.
-type HeaderOfBlocks = (Vec<Option<&'static str>>, Option<String>);
+/// Returns warnings about metadata with names that are similar to those of optional columns without values.
+fn similar_columns(rows: &[BlockRow]) -> Vec<String> {
+    let [labels, unit, side] = OPTIONAL;
+    let mut similar = SimilarColumns::default();
+    for row in rows {
+        let optional = [
+            (labels, row.labels.is_some()),
+            (unit, row.unit.is_some()),
+            (side, row.side.is_some()),
+        ];
+        similar.add(&optional, row.meta.keys());
+    }
+    similar.warnings().collect()
+}
+
+/// A column of a header: its standard name, if it is known, and its name as written.
+type ListedColumn = (Option<&'static str>, String);
 
 /// Returns the columns of a header.
 fn columns_of(
     line: usize,
     record: &::csv::ByteRecord,
     encoding_hint: &str,
-) -> Result<HeaderOfBlocks, ManifestError> {
+) -> Result<Vec<ListedColumn>, ManifestError> {
     let names = column_names(line, record, encoding_hint)?;
-    let columns = COLUMNS
+    let found = COLUMNS
         .assign(&names)
-        .map_err(|same| at_line(line, &same.reason(&names)))?
-        .columns;
+        .map_err(|same| at_line(line, &same.reason(&names)))?;
+    if let Some(same) = found.same_others(&names) {
+        return Err(at_line(line, &same.reason(&names)).into());
+    }
+    let columns = found.columns;
     let mut problems = ManifestError::default();
     let required = COLUMNS.names[..REQUIRED].iter();
     let missing = required.filter(|name| !columns.contains(&Some(**name)));
     problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
     problems.check(false)?;
-    let unread = unread_columns(&names, &columns);
-    Ok((columns, unread))
+    let names = names.into_iter().map(str::to_owned);
+    Ok(columns.into_iter().zip(names).collect())
 }
 
-/// Returns a sentence about columns that are not read, with a hint for the first that resembles an optional one which is
-/// missing. Columns without a name are left out.
-fn unread_columns(names: &[&str], columns: &[Option<&'static str>]) -> Option<String> {
-    const MAX_NAMES: usize = 3;
-    const MAX_NAME_CHARS: usize = 40;
-    let quoted = |name: &str| format!("{:?}", sanitize(name, MAX_NAME_CHARS));
-    let unread = names.iter().zip(columns);
-    let unread = unread.filter(|(name, known)| known.is_none() && !name.is_empty());
-    let unread: Vec<&str> = unread.map(|(name, _)| *name).collect();
-    let (what, are) = match unread.as_slice() {
-        [] => return None,
-        [_] => ("column", "is"),
-        _ => ("columns", "are"),
-    };
-    let hint = |name: &&str| {
-        let found = name.to_lowercase();
-        let mut missing = COLUMNS.names[REQUIRED..].iter();
-        let column = missing
-            .find(|column| similar_column(&found, column) && !columns.contains(&Some(**column)))?;
-        let name = quoted(name);
-        Some(format!(
-            "; rename {name} to {column:?} if it is meant, and import again"
-        ))
-    };
-    let hint = unread.iter().find_map(hint).unwrap_or_default();
-    let shown: Vec<String> = unread.iter().map(|name| quoted(name)).collect();
-    let (shown, known) = (first_names(&shown, MAX_NAMES), COLUMNS.names.join(", "));
-    Some(format!(
-        "{what} {shown} {are} ignored{hint}; a list of blocks has: {known}"
-    ))
-}
+/// The cells of a row by the names of known columns, and its other columns, without empty cells.
+type RowCells<'r> = (BTreeMap<&'static str, &'r str>, BTreeMap<String, Value>);
 
-/// Returns a row, or records why it is not valid.
-fn row(
-    line: usize,
-    columns: &[Option<&'static str>],
-    record: &::csv::ByteRecord,
+/// Returns the cells of a row, or records why they are not valid.
+fn cells_of<'r>(
+    columns: &[ListedColumn],
+    record: &'r ::csv::ByteRecord,
     reasons: &mut Vec<String>,
-) -> Option<BlockRow> {
+) -> Option<RowCells<'r>> {
     if record.len() != columns.len() {
         let (cells, names) = (record.len(), columns.len());
         reasons.push(format!("the row has {cells} cells, the header has {names}"));
         return None;
     }
-    let mut cells = BTreeMap::new();
-    let known = columns.iter().zip(record);
-    for (column, cell) in known.filter_map(|(column, cell)| Some((column.as_ref()?, cell))) {
+    let (mut cells, mut meta) = RowCells::default();
+    for ((known, name), cell) in columns.iter().zip(record) {
         let Ok(cell) = std::str::from_utf8(cell) else {
-            reasons.push(format!("the cell of column {column:?} is not UTF-8"));
+            let name = known.unwrap_or(name);
+            reasons.push(format!("the cell of column {name:?} is not UTF-8"));
             return None;
         };
-        if cell.len() > MAX_PATH_BYTES {
+        let cell = trimmed(cell);
+        if let Some(column) = known
+            && cell.len() > MAX_PATH_BYTES
+        {
             let (len, limit) = (cell.len(), MAX_PATH_BYTES);
             reasons.push(format!(
                 "{column} has {len} bytes, over the limit of {limit}"
             ));
             return None;
         }
-        let cell = trimmed(cell);
-        if !cell.is_empty() {
+        if cell.is_empty() {
+            continue;
+        }
+        if let Some(column) = known {
             cells.insert(*column, cell);
+        } else if !name.is_empty() {
+            meta.insert(name.clone(), cell.into());
         }
     }
+    check_meta(&meta, reasons);
+    Some((cells, meta))
+}
+
+/// Returns a row, or records why it is not valid.
+fn row(
+    line: usize,
+    columns: &[ListedColumn],
+    record: &::csv::ByteRecord,
+    reasons: &mut Vec<String>,
+) -> Option<BlockRow> {
+    let (cells, meta) = cells_of(columns, record, reasons)?;
     for column in &COLUMNS.names[1..REQUIRED] {
         if !cells.contains_key(column) {
             reasons.push(format!("{column} is empty"));
@@ -248,6 +262,7 @@ fn row(
         labels: cells.get("labels").map(PathBuf::from),
         unit: unit.ok()?,
         side: side.ok()?,
+        meta,
     })
 }
 

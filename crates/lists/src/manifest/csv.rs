@@ -1,7 +1,5 @@
 //! CSV lists, separated by commas, semicolons or tabs.
 
-use std::collections::BTreeMap;
-
 use super::block_columns;
 use super::chosen_columns::ChosenColumns;
 use super::column_names::missing_column;
@@ -10,7 +8,7 @@ use super::error::{ManifestError, Problem, at_line, of_list};
 use super::later_header::later_header;
 use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
-use crate::columns::{HeaderColumns, SameColumn};
+use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::first_names;
 
@@ -62,7 +60,7 @@ pub fn read_csv_as(
     let mut header: Option<CsvHeader> = None;
     let mut rows = RowCollector::new(each);
     loop {
-        reader.get_mut().left = MAX_ROW_BYTES;
+        reader.get_mut().begin_row();
         let start = reader.position().clone();
         let is_read = reader.read_byte_record(&mut record);
         let position = record.position().unwrap_or(&start);
@@ -98,6 +96,11 @@ impl<'a> BoundedRows<'a> {
             rest,
             left: MAX_ROW_BYTES,
         }
+    }
+
+    /// Allows the bytes of another row.
+    pub(super) const fn begin_row(&mut self) {
+        self.left = MAX_ROW_BYTES;
     }
 }
 
@@ -197,19 +200,12 @@ impl CsvHeader {
             Err(_) => encoding_hint(list),
         };
         let names = column_names(line, record, &encoding_hint)?;
-        let refuse = |same: SameColumn| at_line(line, &same.reason(&names));
         let found = chosen.assign(&names);
-        let HeaderColumns { columns, renamed } = found.map_err(|reason| at_line(line, &reason))?;
-        let mut others = BTreeMap::new();
-        for (k, name) in names.iter().enumerate() {
-            if columns[k].is_none()
-                && !name.is_empty()
-                && let Some(first) = others.insert(*name, k + 1)
-            {
-                let second = k + 1;
-                return Err(refuse(SameColumn { first, second }).into());
-            }
+        let found = found.map_err(|reason| at_line(line, &reason))?;
+        if let Some(same) = found.same_others(&names) {
+            return Err(at_line(line, &same.reason(&names)).into());
         }
+        let HeaderColumns { columns, renamed } = found;
         let mut problems = ManifestError::default();
         let missing = REQUIRED
             .iter()

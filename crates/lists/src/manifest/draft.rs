@@ -159,23 +159,31 @@ fn is_swapped(cells: &BTreeMap<&'static str, String>) -> bool {
 
 /// Records cells that are too long. Lengths are limited because the catalog stores every cell and reports show them.
 fn check_lengths(draft: &DraftRow, reasons: &mut Vec<String>) {
-    let cells = draft.cells.iter().map(|(name, cell)| (*name, cell.len()));
-    let meta = draft.meta.iter().map(|(name, value)| {
-        let len = value
-            .as_str()
-            .map_or_else(|| value.to_string().len(), str::len);
-        (name.as_str(), name.len() + len)
-    });
-    for (name, len) in cells.chain(meta) {
-        let max = match name {
+    for (name, cell) in &draft.cells {
+        let max = match *name {
             "mesh" | "print" => MAX_PATH_BYTES,
             _ => MAX_CELL_BYTES,
         };
-        if len > max {
-            reasons.push(format!(
-                "{name:.40} has {len} bytes, over the limit of {max}"
-            ));
-        }
+        check_length(name, cell.len(), max, reasons);
+    }
+    check_meta(&draft.meta, reasons);
+}
+
+/// Records metadata that is too long with the name of its column.
+pub(super) fn check_meta(meta: &BTreeMap<String, serde_json::Value>, reasons: &mut Vec<String>) {
+    for (name, value) in meta {
+        let len = value
+            .as_str()
+            .map_or_else(|| value.to_string().len(), str::len);
+        check_length(name, name.len() + len, MAX_CELL_BYTES, reasons);
+    }
+}
+
+fn check_length(name: &str, len: usize, max: usize, reasons: &mut Vec<String>) {
+    if len > max {
+        reasons.push(format!(
+            "{name:.40} has {len} bytes, over the limit of {max}"
+        ));
     }
 }
 

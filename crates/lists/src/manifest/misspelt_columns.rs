@@ -1,22 +1,13 @@
 //! Misspelt names of optional columns, which are kept as metadata, and swapped ones.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
-
-use super::column_names::similar_column;
 use super::row::{ManifestRow, OPTIONAL};
-use mocban_core::domain::sanitize;
+use super::similar_columns::SimilarColumns;
 
-/// Maximum number of different names of columns that are compared. JSON Lines may have other names in each row.
-const MAX_NAMES: usize = 1000;
-
-/// Finds columns that are kept as metadata although their names are similar to that of an optional column. Such a column
-/// is not reported if a row has a value in the optional column itself.
+/// Finds columns of pairs that are kept as metadata although their names are similar to that of an optional column, and
+/// swapped ones.
 #[derive(Debug, Default)]
 pub struct MisspeltColumns {
-    names: HashSet<String>,
-    /// Found names by the optional column that they resemble.
-    similar: BTreeMap<&'static str, String>,
-    used: BTreeSet<&'static str>,
+    similar: SimilarColumns,
     /// Rows whose block is one Han character, and rows whose character is.
     han_blocks: usize,
     han_characters: usize,
@@ -25,47 +16,28 @@ pub struct MisspeltColumns {
 impl MisspeltColumns {
     /// Adds the columns of a row.
     pub fn add(&mut self, row: &ManifestRow) {
-        let used = [
-            row.character.is_some(),
-            row.block.is_some(),
-            row.unit.is_some(),
-            row.scanned_face_down.is_some(),
+        let [character, block, unit, face_down] = OPTIONAL;
+        let optional = [
+            (character, row.character.is_some()),
+            (block, row.block.is_some()),
+            (unit, row.unit.is_some()),
+            (face_down, row.scanned_face_down.is_some()),
         ];
-        let used = OPTIONAL.iter().zip(used).filter(|(_, is_used)| *is_used);
-        self.used.extend(used.map(|(name, _)| name));
+        self.similar.add(&optional, row.meta.keys());
         self.han_blocks += usize::from(is_han_character(row.block.as_deref()));
         self.han_characters += usize::from(is_han_character(row.character.as_deref()));
-        for name in row.meta.keys() {
-            if self.names.len() == MAX_NAMES || self.names.contains(name) {
-                continue;
-            }
-            self.names.insert(name.clone());
-            let found = name.trim().to_lowercase();
-            let mut optional = OPTIONAL.into_iter();
-            if let Some(known) = optional.find(|known| similar_column(&found, known)) {
-                self.similar.entry(known).or_insert_with(|| name.clone());
-            }
-        }
     }
 
     /// Returns a warning for each column.
     pub fn warnings(&self) -> Vec<String> {
-        let similar = self.similar.iter();
-        let unused = similar.filter(|(known, _)| !self.used.contains(*known));
-        let warning = |(known, name): (&&str, &String)| {
-            let name = sanitize(name, 100);
-            format!(
-                "column {name:?} is kept as metadata; rename it to {known:?} if it is meant, and import again"
-            )
-        };
-        let is_swapped =
-            self.han_blocks > 0 && self.han_characters == 0 && self.used.contains("character");
+        let has_characters = self.similar.is_used("character");
+        let is_swapped = self.han_blocks > 0 && self.han_characters == 0 && has_characters;
         let swapped = is_swapped.then(|| {
             "column \"block\" has single characters and column \"character\" has none; swap their names if they are mixed \
              up, and import again"
                 .to_owned()
         });
-        unused.map(warning).chain(swapped).collect()
+        self.similar.warnings().chain(swapped).collect()
     }
 }
 

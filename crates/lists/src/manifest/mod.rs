@@ -15,6 +15,7 @@ mod later_header;
 mod list_head;
 mod misspelt_columns;
 mod row;
+mod similar_columns;
 mod text;
 
 pub use self::csv::{parse_csv, read_csv, read_csv_as};

@@ -10,7 +10,7 @@ use maud::{Markup, html};
 use super::address::encoded;
 use super::blocks_page::state_badge;
 use super::components::{
-    NavSection, action_form, frame, grouped, scan_file, score, stored_message,
+    NavSection, action_form, frame, grouped, metadata, scan_file, score, stored_message,
 };
 use super::failure::{AppFailure, AppResult};
 use super::pass_on::{in_chosen_language, pass_on, path_below};
@@ -259,6 +259,7 @@ fn files(visit: &Visit, detail: &BlockDetail) -> Markup {
                         None => { (visit.t("none: the characters are found", "không có: chữ được tự tìm")) },
                     }
                 }
+                (metadata(&attributes.meta))
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use axum::response::Html;
 use maud::{Markup, html};
+use serde_json::{Map, Value};
 
 use super::address::encoded;
 pub(super) use super::number_text::grouped;
@@ -152,6 +153,15 @@ pub(super) fn figure(number: u64, name: &str, href: Option<&str>, tone: &str) ->
 pub(super) fn scan_file(visit: &Visit, path: &str, unit: Option<LengthUnit>) -> Markup {
     html! {
         dt { (visit.t("Scan", "Bản quét")) } dd { code { (one_line(path)) } @if let Some(unit) = unit { " (" (unit_name(visit, unit)) ")" } }
+    }
+}
+
+/// Returns the other columns of a list, as rows of a list of files.
+pub(super) fn metadata(columns: &Map<String, Value>) -> Markup {
+    html! {
+        @for (name, value) in columns {
+            dt { (one_line(name)) } dd { (one_line(&value.as_str().map_or_else(|| value.to_string(), str::to_owned))) }
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a person has chosen to import, as the address and the form of the page of imports have it.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -318,6 +319,7 @@ fn block_rows(source: &BlockSource) -> AppResult<Vec<BlockRow>> {
                 labels: block.labels.clone(),
                 unit: block.unit,
                 side: block.side,
+                meta: BTreeMap::new(),
             }])
         }
     }

@@ -7,7 +7,7 @@ use axum::response::{Html, IntoResponse as _, Response};
 use maud::{Markup, html};
 
 use super::address::encoded;
-use super::components::{NavSection, action_form, frame, scan_file, stored_message};
+use super::components::{NavSection, action_form, frame, metadata, scan_file, stored_message};
 use super::failure::AppResult;
 use super::pair_history::{history, verdict_line};
 use super::pair_numbers::numbers;
@@ -298,9 +298,7 @@ fn files(visit: &Visit, detail: &PairDetail) -> Markup {
             dl {
                 (scan_file(visit, &attributes.mesh_path, attributes.unit))
                 dt { (visit.t("Print", "Bản in")) } dd { code { (one_line(&attributes.print_path)) } }
-                @for (name, value) in &attributes.meta {
-                    dt { (one_line(name)) } dd { (one_line(&value.as_str().map_or_else(|| value.to_string(), str::to_owned))) }
-                }
+                (metadata(&attributes.meta))
             }
         }
     }

@@ -66,8 +66,14 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ("its path has a tab", "đường dẫn có dấu tab"),
     ("remove it", "hãy xóa nó"),
     ("write it on one line", "hãy viết trên một dòng"),
-    ("columns {} are ignored", "các cột {0} không được đọc"),
-    ("column {} is ignored", "cột {0} không được đọc"),
+    (
+        "column {} is kept as metadata",
+        "cột {0} được giữ làm thông tin thêm",
+    ),
+    (
+        "rename it to {} if it is meant, and import again",
+        "nếu đó là cột {0} thì hãy đổi tên rồi nhập lại",
+    ),
     ("and {} more", "và {0} mục khác"),
     ("line {}: column {} is missing", "dòng {0}: thiếu cột {1}"),
     ("column {} is missing", "thiếu cột {0}"),

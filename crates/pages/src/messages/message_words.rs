@@ -262,8 +262,8 @@ mod tests {
                 "a.csv: dòng 2: không có bản quét a b của 1; đường dẫn có ngắt dòng: hãy viết ô đó trên một dòng",
             ),
             (
-                "columns \"x\", \"y\" are ignored",
-                "các cột \"x\", \"y\" không được đọc",
+                "column \"units\" is kept as metadata; rename it to \"unit\" if it is meant, and import again",
+                "cột \"units\" được giữ làm thông tin thêm; nếu đó là cột \"unit\" thì hãy đổi tên rồi nhập lại",
             ),
         ] {
             assert_eq!(vietnamese(english).as_deref(), Some(expected));

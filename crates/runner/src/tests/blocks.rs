@@ -26,6 +26,7 @@ impl RunFixture {
             labels_path: Some(format!("{text}.txt")),
             unit: None,
             side: None,
+            meta: serde_json::Map::new(),
         });
         let imported = fixture.catalog.import_blocks(rows.collect(), true, 1).await;
         imported.expect("imported");

@@ -1,5 +1,7 @@
 //! Which lists of blocks are read, and why others are refused.
 
+use serde_json::json;
+
 use super::{is_block_list, parse_blocks, read_blocks};
 use mocban_core::domain::{BlockSide, LengthUnit};
 
@@ -86,27 +88,72 @@ fn problems_name_line_and_column() {
 }
 
 #[test]
-fn other_columns_are_named_and_not_read() {
-    let known = "; a list of blocks has: block, mesh, page, labels, unit, side";
+fn other_columns_are_metadata() {
+    let list = "sep=;\nSố hiệu ván;Bản quét;Ảnh trang;Triều đại; shelfmark ;;Bộ sưu tập\n\
+        b1;1.stl;1.png;Nguyễn;R.1234/5;;\"Viện; kho A\"\nb2;2.stl;2.png; ;;;Lê\n";
+    let read = read_blocks(list.as_bytes()).expect("valid");
+    assert_eq!(read.warnings, [""; 0]);
+    let meta = |row: usize| serde_json::to_value(&read.rows[row].meta).expect("JSON");
+    let first =
+        json!({ "Triều đại": "Nguyễn", "shelfmark": "R.1234/5", "Bộ sưu tập": "Viện; kho A" });
+    assert_eq!(meta(0), first);
+    assert_eq!(meta(1), json!({ "Bộ sưu tập": "Lê" }));
+    let list = "block,khối,mesh,page\nb,4,m,p\n";
+    let read = read_blocks(list.as_bytes()).expect("valid");
+    assert_eq!(read.rows[0].meta["khối"], "4");
+}
+
+#[test]
+fn metadata_with_the_name_of_another_column_is_reported() {
     for (columns, cells, expected) in [
-        ("color", "x", "column \"color\" is ignored"),
+        ("color,year", "x,1872", &[][..]),
+        ("lables", "l.json", &[("lables", "labels")]),
         (
-            "color,year,,folio,note",
-            "x,1,,2,y",
-            "columns \"color\", \"year\", \"folio\" and 1 more are ignored",
+            "Units,sides",
+            "mm,back",
+            &[("sides", "side"), ("Units", "unit")],
         ),
-        (
-            "color,lables",
-            "x,l.json",
-            "columns \"color\", \"lables\" are ignored; rename \"lables\" to \"labels\" if it is meant, and import again",
-        ),
-        ("unit,units", "mm,mm", "column \"units\" is ignored"),
+        ("unit,units", "mm,mm", &[]),
+        ("unit,units", ",mm", &[("units", "unit")]),
     ] {
         let list = format!("{columns},block,mesh,page\n{cells},b,m,p\n");
         let read = read_blocks(list.as_bytes()).expect("valid");
-        assert_eq!(read.unread, Some(format!("{expected}{known}")));
-        assert_eq!(read.rows[0].page.to_str(), Some("p"));
+        let expected = expected.iter().map(|(name, known)| {
+            format!(
+                "column {name:?} is kept as metadata; rename it to {known:?} if it is meant, and import again"
+            )
+        });
+        assert_eq!(read.warnings, expected.collect::<Vec<_>>(), "{columns}");
     }
-    let list = "block,mesh,page,,\nb,m,p,,\n";
-    assert_eq!(read_blocks(list.as_bytes()).expect("valid").unread, None);
+}
+
+#[test]
+fn metadata_has_the_limits_of_pairs() {
+    let list = |name: &str, cell: &str| format!("block,mesh,page,{name}\nb,m,p,{cell}\n");
+    let longest = list("note", &"x".repeat((1 << 16) - 4));
+    assert_eq!(
+        parse_blocks(longest.as_bytes()).map(|rows| rows.len()),
+        Ok(1)
+    );
+    for (text, expected) in [
+        (
+            list("note", &"x".repeat(1 << 16)),
+            "line 2: note has 65540 bytes, over the limit of 65536",
+        ),
+        (
+            list(&"n".repeat(1001), "x"),
+            "line 1: the name of column 4 has 1001 bytes, over the limit of 1000",
+        ),
+        (
+            list("note", &"x".repeat(2 << 20)),
+            "line 2: the row has more than 1048576 bytes; a closing quotation mark may be missing",
+        ),
+        (
+            list("note,year,note", "x,1872,y"),
+            "line 1: columns 4 and 6 are both named \"note\"",
+        ),
+    ] {
+        let found = refusal(&text);
+        assert!(found.starts_with(expected), "{found}");
+    }
 }

@@ -1,0 +1,43 @@
+//! The other columns of a list of blocks, which no result depends on.
+
+use serde_json::{Map, Value, json};
+
+use super::blocks::{attributes, block, character, world};
+use crate::BlockAttributes;
+
+fn with_metadata(meta: &Value) -> BlockAttributes {
+    BlockAttributes {
+        meta: meta.as_object().cloned().unwrap_or_default(),
+        ..attributes("b")
+    }
+}
+
+#[tokio::test]
+async fn metadata_of_a_block_is_stored_updated_and_makes_nothing_stale() {
+    let world = world().await;
+    world.finish_block(vec![character("a", "a")]).await;
+    let import = async |meta: &Value| {
+        let rows = vec![with_metadata(meta)];
+        let summary = world.catalog.import_blocks(rows, false, 2).await;
+        summary.expect("imported")
+    };
+    let stored = async || {
+        let detail = world.catalog.block(&block("b")).await.expect("a read");
+        Value::Object(detail.expect("a block").state.attributes.meta)
+    };
+    assert_eq!(stored().await, json!({}));
+    let first = json!({ "Triều đại": "Nguyễn", "shelfmark": "R.12" });
+    let second = json!({ "shelfmark": "R.13" });
+    for meta in [&first, &second, &Value::Null] {
+        let changed = import(meta).await;
+        assert_eq!(changed.changed, [(block("b"), vec!["metadata"])]);
+        assert_eq!(changed.other_files, 0);
+        assert_eq!(import(meta).await.unchanged, 1);
+        let expected = meta.as_object().cloned().unwrap_or_default();
+        assert_eq!(stored().await, Value::Object(expected));
+        assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
+        assert_eq!(world.requeue_blocks([1; 4]).await, []);
+    }
+    let known = world.catalog.known_blocks().await.expect("a read");
+    assert_eq!(known[0].attributes.meta, Map::new());
+}

@@ -1,0 +1,70 @@
+//! The other columns of a list of blocks: `show`, the app and a restored backup have them.
+
+use std::fs;
+use std::path::Path;
+
+use mocban::workbook::test_helpers::{text_rows, workbook};
+use serde_json::json;
+
+use crate::app::{open_app, text};
+use crate::blocks::write_blocks;
+use crate::cli::{Call, mocban};
+
+fn project(dir: &Path, args: &[&str]) -> Call {
+    mocban(dir, &[&["-C", "p"], args].concat())
+}
+
+/// Writes a workbook with one sheet of these rows.
+fn write_workbook(dir: &Path, rows: &[&[&str]]) {
+    let rows = text_rows(rows);
+    let book = workbook(&[("Ván", &rows)], "", "");
+    fs::write(dir.join("ván.xlsx"), book).expect("written");
+}
+
+#[test]
+fn other_columns_of_a_list_of_blocks_are_kept_shown_and_restored() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    write_blocks(dir, &["b1", "b2"]);
+    let header = [
+        "Số hiệu ván",
+        "Bản quét",
+        "Ảnh trang",
+        "Triều đại",
+        "shelfmark",
+    ];
+    let first = ["b1", "b1.stl", "b1.png", "Nguyễn", "R.12"];
+    let second = ["b2", "b2.stl", "b2.png", "", "R.13"];
+    write_workbook(dir, &[&header, &first, &second]);
+    let import = ["import", "ván.xlsx", "--json"];
+    let imported = project(dir, &import).expect(0);
+    assert_eq!(imported.json()["blocks"]["added"], 2);
+    assert!(!imported.err.contains("metadata"), "{}", imported.err);
+    let meta = |place: &str, block: &str| {
+        let shown = mocban(dir, &["-C", place, "show", block, "--json"]);
+        shown.expect(0).json()["meta"].clone()
+    };
+    let of_first = json!({ "Triều đại": "Nguyễn", "shelfmark": "R.12" });
+    assert_eq!(meta("p", "b1"), of_first);
+    let shown = project(dir, &["show", "b1"]).expect(0);
+    for part in ["Triều đại", "Nguyễn", "R.12"] {
+        assert!(shown.out.contains(part), "{part}: {}", shown.out);
+    }
+    let page = open_app(dir);
+    let html = text(&page.get("/p/p/block/b2/"));
+    assert!(html.contains("<dt>shelfmark</dt><dd>R.13</dd>"), "{html}");
+    assert!(!html.contains("Triều đại"), "an empty cell is no metadata");
+    drop(page);
+
+    project(dir, &["backup", "b.sqlite"]).expect(0);
+    mocban(dir, &["restore", "b.sqlite", "q"]).expect(0);
+    assert_eq!(meta("q", "b1"), of_first);
+
+    let changed = ["b1", "b1.stl", "b1.png", "Nguyễn", "R.14"];
+    write_workbook(dir, &[&header, &changed, &second]);
+    let again = project(dir, &import).expect(0).json();
+    assert_eq!(again["blocks"]["changed"][0]["id"], "b1");
+    assert_eq!(again["blocks"]["changed"][0]["fields"], json!(["metadata"]));
+    assert_eq!(again["blocks"]["unchanged"], 1);
+    assert_eq!(meta("p", "b1")["shelfmark"], "R.14");
+}
