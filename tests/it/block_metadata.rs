@@ -17,7 +17,7 @@ fn project(dir: &Path, args: &[&str]) -> Call {
 /// Writes a workbook with one sheet of these rows.
 fn write_workbook(dir: &Path, rows: &[&[&str]]) {
     let rows = text_rows(rows);
-    let book = workbook(&[("Ván", &rows)], "", "");
+    let book = workbook(&[("Ván", rows.as_str())], "", "");
     fs::write(dir.join("ván.xlsx"), book).expect("written");
 }
 
