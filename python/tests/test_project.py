@@ -80,7 +80,7 @@ def test_a_stored_alignment_is_that_of_align(demo: Path, pairs: list[DemoPair]) 
 def test_verdicts_have_the_rules_of_the_command_line(copied: Path, pair: DemoPair) -> None:
     project = mocban.open(copied, readonly=False)
     judged = project.pair(pair.id).metrics["relief"]["result_hash"]
-    assert project.add_verdict(pair.id, "Relief", "fail", reason="angle", reviewer="Lan", expect=judged)
+    assert project.add_verdict(pair.id, "Relief", "Fail", reason="ANGLE", reviewer="Lan", expect=judged)
     mocban_command("-C", copied, "verdict", "set", pair.id, "pass", "--reviewer", "Minh", "--metric", "density")
     log = project.verdicts()
     assert [(v["reviewer"], v["metric"], v["verdict"]) for v in log] == [

@@ -202,6 +202,7 @@ fn check_routes(dir: &Path) {
     );
     let shown = &block["sides"][printed_side(dir)];
     let side = &shown["side"];
+    assert_eq!(&block["side"], side, "the page opens on the carved side");
     let side_name = side.as_str().expect("a side");
     let image = page.get(&format!("/correct/face/{side_name}/1"));
     let image = decode(&image.body, &ImageLimits::SUGGESTED).expect("an image");
