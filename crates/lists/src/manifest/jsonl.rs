@@ -1,19 +1,9 @@
 //! JSON Lines lists: one object per line.
 
-use std::collections::BTreeSet;
-use std::fmt;
-
-use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
-use serde_json::Value;
-
-use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
-use super::error::{ManifestError, at_line, of_list};
-use super::json_array::{ArrayCursor, is_array, place_in_row};
+use super::draft::RowCollector;
+use super::error::ManifestError;
+use super::json_rows::json_rows;
 use super::row::{COLUMNS, ManifestRow, ReadRows};
-use super::text::{as_utf8, trimmed};
-use crate::columns::HeaderColumns;
-use crate::json_numbers::{nan_as_null, unknown_number};
-use mocban_core::domain::{KEY_TWICE, UniqueKeys, sanitize, value_error_text};
 
 /// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` counts as no value. Blank lines are ignored.
 ///
@@ -37,169 +27,15 @@ pub fn read_jsonl(
     bytes: &[u8],
     each: &mut dyn FnMut(ManifestRow),
 ) -> Result<ReadRows, ManifestError> {
-    let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
     let mut rows = RowCollector::new(each);
-    let mut keys = RowKeys::default();
-    let mut push = |line, content: &[u8]| {
-        let draft = if content.len() > MAX_ROW_BYTES {
-            let len = content.len();
-            Err(format!(
-                "the row has {len} bytes, over the limit of {MAX_ROW_BYTES}"
-            ))
-        } else {
-            draft(line, content, &mut keys).map(Some)
-        };
-        rows.add_renamed(std::mem::take(&mut keys.columns.renamed));
-        rows.push(line, draft);
-    };
-    if is_array(bytes) {
-        let mut cursor = ArrayCursor::default();
-        while let Some(next) = cursor.next_value(bytes) {
-            match next {
-                Ok((line, place)) => push(line, &bytes[place]),
-                Err(refused) => {
-                    rows.add_problem(at_line(refused.line, refused.reason));
-                    break;
-                }
-            }
-        }
-        return rows.finish();
-    }
-    for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
-        let content = content.trim_ascii();
-        if !content.is_empty() {
-            push(line, content);
-        }
+    let read = json_rows(bytes, COLUMNS, &mut |row| {
+        rows.add_renamed(row.renamed);
+        rows.push(row.line, row.draft.map(Some));
+    });
+    if let Err(refused) = read {
+        rows.add_problem(refused);
     }
     rows.finish()
-}
-
-/// The keys of the row before, and what they are: most rows of a list have the same keys.
-#[derive(Default)]
-struct RowKeys {
-    keys: Vec<String>,
-    columns: HeaderColumns,
-}
-
-impl RowKeys {
-    /// Finds out what the keys of a row are.
-    fn update(&mut self, object: &[(String, Value)]) -> Result<(), String> {
-        let keys = object.iter().map(|(key, _)| key);
-        if keys.clone().eq(&self.keys) {
-            return Ok(());
-        }
-        let twice = |k: usize| format!("the key {:?} {KEY_TWICE}", object[k].0);
-        let names: Vec<&str> = keys.clone().map(|key| key.trim()).collect();
-        let found = COLUMNS
-            .assign(&names)
-            .map_err(|same| twice(same.second - 1))?;
-        let mut others = BTreeSet::new();
-        let is_twice = |k: &usize| found.columns[*k].is_none() && !others.insert(&object[*k].0);
-        if let Some(k) = (0..object.len()).find(is_twice) {
-            return Err(twice(k));
-        }
-        self.keys = keys.cloned().collect();
-        self.columns = found;
-        Ok(())
-    }
-}
-
-/// Longest name of a key in a message, in characters.
-const MAX_KEY_CHARS: usize = 60;
-
-fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, String> {
-    let text = std::str::from_utf8(content)
-        .map_err(|error| format!("byte {} is not UTF-8", error.valid_up_to() + 1))?;
-    let JsonEntries(object) = parsed(text).map_err(|error| wrong_json(&error, line, text))?;
-    keys.update(&object)?;
-    if let [(key, Value::Array(_))] = object.as_slice()
-        && keys.columns.columns == [None]
-    {
-        return Err(format!(
-            "the rows are in the list {:?} of an object; save this list alone",
-            sanitize(key, MAX_KEY_CHARS)
-        ));
-    }
-    let mut draft = DraftRow::new(line);
-    for ((key, value), known) in object.into_iter().zip(&keys.columns.columns) {
-        match (*known, value) {
-            (_, Value::Null) => {}
-            (Some(name), value) => {
-                draft.cells.insert(name, cell(name, value)?);
-            }
-            (None, value) => {
-                draft.meta.insert(key, value);
-            }
-        }
-    }
-    Ok(draft)
-}
-
-/// Parses an object. If it is not JSON, tries again with `NaN` as no value.
-fn parsed(text: &str) -> serde_json::Result<JsonEntries> {
-    serde_json::from_str(text).or_else(|error| match nan_as_null(text) {
-        Some(text) => serde_json::from_str(&text),
-        None => Err(error),
-    })
-}
-
-/// The keys and values of a JSON object in their order. Unlike a map, it keeps keys that are given twice.
-struct JsonEntries(Vec<(String, Value)>);
-
-impl<'de> Deserialize<'de> for JsonEntries {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_map(EntriesVisitor)
-    }
-}
-
-/// Collects the entries of an object.
-struct EntriesVisitor;
-
-impl<'de> Visitor<'de> for EntriesVisitor {
-    type Value = JsonEntries;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a map")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<JsonEntries, A::Error> {
-        let mut entries = Vec::new();
-        while let Some((key, UniqueKeys(value))) = map.next_entry()? {
-            entries.push((key, value));
-        }
-        Ok(JsonEntries(entries))
-    }
-}
-
-/// Returns a cell's value as text. Numbers are accepted, because ids are often numbers.
-fn cell(name: &str, value: Value) -> Result<String, String> {
-    match value {
-        Value::String(text) => Ok(trimmed(&text).to_owned()),
-        Value::Number(number) => Ok(number.to_string()),
-        Value::Bool(flag) => Ok(flag.to_string()),
-        Value::Null | Value::Array(_) | Value::Object(_) => {
-            Err(format!("{name:?} is {value}, not text"))
-        }
-    }
-}
-
-/// Formats a parser error of a row that begins on a line. Its place is a column, or a line if the row has several.
-fn wrong_json(error: &serde_json::Error, first: usize, text: &str) -> String {
-    let message = error.to_string();
-    let reason = message.rsplit_once(" at line ");
-    let reason = reason.map_or(&*message, |(reason, _)| reason);
-    if reason.ends_with(KEY_TWICE) {
-        return reason.to_owned();
-    }
-    let reason = value_error_text(reason);
-    // The parser's column is that of one of the lines.
-    if !text.contains('\n')
-        && let Some(number) = unknown_number(text, error.column())
-    {
-        return format!("{number} is not a number of JSON; write null or leave it out");
-    }
-    let place = place_in_row(error, first, text.as_bytes());
-    format!("not a JSON object, {place}: {reason}")
 }
 
 #[cfg(test)]

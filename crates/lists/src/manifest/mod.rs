@@ -10,6 +10,7 @@ mod draft;
 mod error;
 mod folders;
 mod json_array;
+mod json_rows;
 mod jsonl;
 mod later_header;
 mod list_head;
