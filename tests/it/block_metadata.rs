@@ -67,4 +67,10 @@ fn other_columns_of_a_list_of_blocks_are_kept_shown_and_restored() {
     assert_eq!(again["blocks"]["changed"][0]["fields"], json!(["metadata"]));
     assert_eq!(again["blocks"]["unchanged"], 1);
     assert_eq!(meta("p", "b1")["shelfmark"], "R.14");
+
+    let line = r#"{"Khối":"b1","Bản quét":"b1.stl","Trang":"b1.png","shelfmark":14}"#;
+    fs::write(dir.join("ván.jsonl"), line).expect("written");
+    let lines = project(dir, &["import", "ván.jsonl", "--json"]).expect(0);
+    assert_eq!(lines.json()["blocks"]["changed"][0]["id"], "b1");
+    assert_eq!(meta("p", "b1"), json!({ "shelfmark": 14 }));
 }

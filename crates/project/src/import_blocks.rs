@@ -20,7 +20,8 @@ use crate::repeated_files::RepeatedFiles;
 use mocban_catalog::{BlockAttributes, BlockImportSummary, SameFiles};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
 use mocban_lists::manifest::{
-    BlockRow, ReadBlocks, is_block_list, is_named_like_mesh, read_blocks,
+    BlockRow, ManifestError, ReadBlocks, is_block_json, is_block_list, is_named_like_mesh,
+    read_block_json, read_blocks,
 };
 use mocban_store::Project;
 
@@ -97,8 +98,12 @@ impl ListedItems {
         }
         let ListFile { bytes, warning } = files::read_list(file, sheet)?;
         refuse_input(file, &bytes)?;
-        let is_list = !files::is_jsonl(file, &bytes) && is_block_list(&bytes);
-        let items = if is_list {
+        let is_of_blocks = if files::is_jsonl(file, &bytes) {
+            is_block_json(&bytes)
+        } else {
+            is_block_list(&bytes)
+        };
+        let items = if is_of_blocks {
             Self::Blocks(BlockSource::List {
                 file: file.to_owned(),
                 bytes,
@@ -176,6 +181,18 @@ pub async fn import_blocks(
     })
 }
 
+/// Parses a list of blocks in CSV or JSON.
+///
+/// # Errors
+/// Returns an error if the list has a problem.
+pub fn listed_blocks(file: &Path, bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
+    if files::is_jsonl(file, bytes) {
+        read_block_json(bytes)
+    } else {
+        read_blocks(bytes)
+    }
+}
+
 /// Returns warnings about a list of blocks, as [`import_blocks`] does, without storing anything.
 ///
 /// # Errors
@@ -204,7 +221,7 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
             });
         }
     };
-    let read = read_blocks(bytes).map_err(|problems| refuse(file, &problems))?;
+    let read = listed_blocks(file, bytes).map_err(|problems| refuse(file, &problems))?;
     let ReadBlocks { mut rows, warnings } = read;
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut repeated = RepeatedFiles::default();

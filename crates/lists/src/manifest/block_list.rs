@@ -1,5 +1,5 @@
-//! Lists of whole blocks: CSV with the columns block, mesh, page and optionally labels, unit and side. Other columns are
-//! metadata.
+//! Lists of whole blocks in CSV or JSON, with the columns block, mesh, page and optionally labels, unit and side. Other
+//! columns are metadata.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -9,8 +9,9 @@ use serde_json::Value;
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
 use super::column_names::missing_column;
 use super::csv::{BoundedRows, column_names};
-use super::draft::{MAX_PATH_BYTES, check_meta, parse_unit};
+use super::draft::{DraftRow, MAX_PATH_BYTES, check_meta, parse_unit};
 use super::error::{ManifestError, at_line, of_list};
+use super::json_rows::{first_keys, json_rows};
 use super::row::RowIds;
 use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
@@ -59,10 +60,19 @@ pub fn is_block_list(bytes: &[u8]) -> bool {
     if !matches!(reader(&text).read_byte_record(&mut record), Ok(true)) {
         return false;
     }
-    let Ok(names) = column_names(1, &record, "") else {
-        return false;
-    };
-    let of = |known: &KnownColumns| known.assign(&names).unwrap_or_default().columns;
+    column_names(1, &record, "").is_ok_and(|names| has_block_columns(&names))
+}
+
+/// Returns whether a list in JSON is one of blocks, by the keys of its first row, as [`is_block_list`] does.
+pub fn is_block_json(bytes: &[u8]) -> bool {
+    first_keys(bytes).is_some_and(|keys| {
+        let names: Vec<&str> = keys.iter().map(|key| key.trim()).collect();
+        has_block_columns(&names)
+    })
+}
+
+fn has_block_columns(names: &[&str]) -> bool {
+    let of = |known: &KnownColumns| known.assign(names).unwrap_or_default().columns;
     let (blocks, pairs) = (of(&COLUMNS), of(&super::row::COLUMNS));
     let has = |columns: &[Option<&str>], name: &str| columns.contains(&Some(name));
     let [id, print] = ["id", "print"].map(|name| has(&pairs, name));
@@ -100,14 +110,14 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
     let mut reader = reader(&text);
     let mut lines = LineCounter::new(bytes);
     let mut record = ::csv::ByteRecord::new();
-    let mut problems = ManifestError::default();
+    let mut rows = BlockRows::default();
     let mut hint = String::new();
     if std::str::from_utf8(bytes).is_err() {
         hint = encoding_hint(bytes);
-        problems.add(of_list(&format!("the list is not UTF-8{hint}")));
+        let reason = format!("the list is not UTF-8{hint}");
+        rows.problems.add(of_list(&reason));
     }
     let mut header: Option<Vec<ListedColumn>> = None;
-    let (mut rows, mut ids) = (Vec::new(), RowIds::default());
     loop {
         reader.get_mut().begin_row();
         let start = reader.position().clone();
@@ -115,7 +125,7 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             Ok(is_read) => is_read,
             Err(error) => {
                 let line = lines.at(Some(&start));
-                problems.add(at_line(line, &error.to_string()));
+                rows.problems.add(at_line(line, &error.to_string()));
                 break;
             }
         };
@@ -130,22 +140,61 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
         if record.iter().all(<[u8]>::is_empty) {
             continue;
         }
+        rows.push(line, draft(line, columns, &record));
+    }
+    rows.finish()
+}
+
+/// Parses a list of blocks in JSON like [`read_blocks`]: an object on each line, or an array of objects.
+///
+/// # Errors
+/// Returns an error like [`parse_blocks`].
+pub fn read_block_json(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
+    let mut rows = BlockRows::default();
+    let read = json_rows(bytes, COLUMNS, &mut |row| rows.push(row.line, row.draft));
+    if let Err(refused) = read {
+        rows.problems.add(refused);
+    }
+    rows.finish()
+}
+
+/// The rows of a list, and what is wrong with others.
+#[derive(Default)]
+struct BlockRows {
+    rows: Vec<BlockRow>,
+    ids: RowIds,
+    problems: ManifestError,
+}
+
+impl BlockRows {
+    /// Checks a row and keeps it if it is valid. Records its problems otherwise.
+    fn push(&mut self, line: usize, draft: Result<DraftRow, String>) {
         let mut reasons = Vec::new();
-        if let Some(row) = row(line, columns, &record, &mut reasons) {
-            let name = row.name.as_pair();
-            if let Some(first) = ids.insert(name, line) {
-                reasons.push(first.reason("block", name.as_str()));
+        match draft.map(|draft| row(draft, &mut reasons)) {
+            Ok(Some(row)) => {
+                let name = row.name.as_pair();
+                if let Some(first) = self.ids.insert(name, line) {
+                    reasons.push(first.reason("block", name.as_str()));
+                }
+                self.rows.push(row);
             }
-            rows.push(row);
+            Ok(None) => {}
+            Err(reason) => reasons.push(reason),
         }
-        problems.extend(reasons.iter().map(|reason| at_line(line, reason)));
+        let problems = reasons.iter().map(|reason| at_line(line, reason));
+        self.problems.extend(problems);
     }
-    if problems == ManifestError::default() && rows.is_empty() {
-        return Err(of_list("the list contains no blocks").into());
+
+    /// Returns the rows, or all problems of the list.
+    fn finish(self) -> Result<ReadBlocks, ManifestError> {
+        let Self { rows, problems, .. } = self;
+        if problems == ManifestError::default() && rows.is_empty() {
+            return Err(of_list("the list contains no blocks").into());
+        }
+        problems.check(false)?;
+        let warnings = similar_columns(&rows);
+        Ok(ReadBlocks { rows, warnings })
     }
-    problems.check(false)?;
-    let warnings = similar_columns(&rows);
-    Ok(ReadBlocks { rows, warnings })
 }
 
 /// Returns warnings about metadata with names that are similar to those of optional columns without values.
@@ -189,64 +238,53 @@ fn columns_of(
     Ok(columns.into_iter().zip(names).collect())
 }
 
-/// The cells of a row by the names of known columns, and its other columns, without empty cells.
-type RowCells<'r> = (BTreeMap<&'static str, &'r str>, BTreeMap<String, Value>);
-
-/// Returns the cells of a row, or records why they are not valid.
-fn cells_of<'r>(
-    columns: &[ListedColumn],
-    record: &'r ::csv::ByteRecord,
-    reasons: &mut Vec<String>,
-) -> Option<RowCells<'r>> {
-    if record.len() != columns.len() {
-        let (cells, names) = (record.len(), columns.len());
-        reasons.push(format!("the row has {cells} cells, the header has {names}"));
-        return None;
-    }
-    let (mut cells, mut meta) = RowCells::default();
-    for ((known, name), cell) in columns.iter().zip(record) {
-        let Ok(cell) = std::str::from_utf8(cell) else {
-            let name = known.unwrap_or(name);
-            reasons.push(format!("the cell of column {name:?} is not UTF-8"));
-            return None;
-        };
-        let cell = trimmed(cell);
-        if let Some(column) = known
-            && cell.len() > MAX_PATH_BYTES
-        {
-            let (len, limit) = (cell.len(), MAX_PATH_BYTES);
-            reasons.push(format!(
-                "{column} has {len} bytes, over the limit of {limit}"
-            ));
-            return None;
-        }
-        if cell.is_empty() {
-            continue;
-        }
-        if let Some(column) = known {
-            cells.insert(*column, cell);
-        } else if !name.is_empty() {
-            meta.insert(name.clone(), cell.into());
-        }
-    }
-    check_meta(&meta, reasons);
-    Some((cells, meta))
-}
-
-/// Returns a row, or records why it is not valid.
-fn row(
+/// Returns the cells of a row.
+///
+/// # Errors
+/// Returns an error if the number of cells is wrong or a cell is not UTF-8.
+fn draft(
     line: usize,
     columns: &[ListedColumn],
     record: &::csv::ByteRecord,
-    reasons: &mut Vec<String>,
-) -> Option<BlockRow> {
-    let (cells, meta) = cells_of(columns, record, reasons)?;
+) -> Result<DraftRow, String> {
+    if record.len() != columns.len() {
+        let (cells, names) = (record.len(), columns.len());
+        return Err(format!("the row has {cells} cells, the header has {names}"));
+    }
+    let mut draft = DraftRow::new(line);
+    for ((known, name), cell) in columns.iter().zip(record) {
+        let Ok(cell) = std::str::from_utf8(cell) else {
+            let name = known.unwrap_or(name);
+            return Err(format!("the cell of column {name:?} is not UTF-8"));
+        };
+        let cell = trimmed(cell);
+        if let Some(known) = known {
+            draft.cells.insert(known, cell.to_owned());
+        } else if !cell.is_empty() && !name.is_empty() {
+            draft.meta.insert(name.clone(), cell.into());
+        }
+    }
+    Ok(draft)
+}
+
+/// Returns a row, or records why it is not valid.
+fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
+    draft.cells.retain(|_, cell| !cell.is_empty());
+    let cells = &draft.cells;
+    let mut lengths = cells.iter().map(|(column, cell)| (column, cell.len()));
+    if let Some((column, len)) = lengths.find(|(_, len)| *len > MAX_PATH_BYTES) {
+        reasons.push(format!(
+            "{column} has {len} bytes, over the limit of {MAX_PATH_BYTES}"
+        ));
+        return None;
+    }
+    check_meta(&draft.meta, reasons);
     for column in &COLUMNS.names[1..REQUIRED] {
         if !cells.contains_key(column) {
             reasons.push(format!("{column} is empty"));
         }
     }
-    let name = cells.get("block").copied().unwrap_or_default();
+    let name = cells.get("block").map_or("", String::as_str);
     let name = BlockName::new(name).map_err(|error| error.to_string());
     let unit = cells.get("unit").map(|cell| parse_unit(cell)).transpose();
     let side = cells.get("side").map(|cell| side(cell)).transpose();
@@ -255,14 +293,14 @@ fn row(
     record(unit.as_ref().err());
     record(side.as_ref().err());
     Some(BlockRow {
-        line,
+        line: draft.line,
         name: name.ok()?,
         mesh: PathBuf::from(cells.get("mesh")?),
         page: PathBuf::from(cells.get("page")?),
         labels: cells.get("labels").map(PathBuf::from),
         unit: unit.ok()?,
         side: side.ok()?,
-        meta,
+        meta: draft.meta,
     })
 }
 

@@ -70,6 +70,26 @@ pub(super) fn json_rows(
     Ok(())
 }
 
+/// Returns the keys of the first row of a list in JSON, if it can be read.
+pub(super) fn first_keys(bytes: &[u8]) -> Option<Vec<String>> {
+    let bytes = as_utf8(bytes).ok()?;
+    let row = if is_array(&bytes) {
+        let (_, place) = ArrayCursor::default().next_value(&bytes)?.ok()?;
+        &bytes[place]
+    } else {
+        let lines = bytes.split(|byte| *byte == b'\n');
+        lines
+            .map(<[u8]>::trim_ascii)
+            .find(|line| !line.is_empty())?
+    };
+    let text = std::str::from_utf8(row).ok()?;
+    if text.len() > MAX_ROW_BYTES {
+        return None;
+    }
+    let JsonEntries(entries) = parsed(text).ok()?;
+    Some(entries.into_iter().map(|(key, _)| key).collect())
+}
+
 /// The keys of the row before, and what they are: most rows of a list have the same keys.
 struct RowKeys {
     known: KnownColumns,

@@ -1,5 +1,5 @@
-//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem; and CSV lists of whole blocks. The functions
-//! parse text or lists of paths and read no files. All problems of a list are reported together.
+//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem; and lists of whole blocks in CSV or JSON. The
+//! functions parse text or lists of paths and read no files. All problems of a list are reported together.
 
 mod block_columns;
 mod block_list;
@@ -20,7 +20,9 @@ mod similar_columns;
 mod text;
 
 pub use self::csv::{parse_csv, read_csv, read_csv_as};
-pub use block_list::{BlockRow, ReadBlocks, is_block_list, parse_blocks, read_blocks};
+pub use block_list::{
+    BlockRow, ReadBlocks, is_block_json, is_block_list, parse_blocks, read_block_json, read_blocks,
+};
 pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;
 pub use folders::{

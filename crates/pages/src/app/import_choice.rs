@@ -16,11 +16,13 @@ use super::sentence::Sentence;
 use mocban_core::domain::{BlockName, LengthUnit};
 use mocban_lists::manifest::{
     BlockRow, ChosenColumns, ListHead, PairingChanges, is_named_like_mesh, is_named_like_print,
-    parse_blocks, read_head,
+    read_head,
 };
 use mocban_project::ProjectError;
 use mocban_project::files::{is_jsonl, list_below};
-use mocban_project::import_blocks::{BlockSource, ImportedBlock, ListedItems, list_warnings};
+use mocban_project::import_blocks::{
+    BlockSource, ImportedBlock, ListedItems, list_warnings, listed_blocks,
+};
 use mocban_project::import_pairs::PairSource;
 use mocban_project::import_plan::{ImportPlan, plan_import};
 use mocban_project::location::Location;
@@ -303,8 +305,10 @@ const fn kept_start(from: u64) -> u64 {
 fn block_rows(source: &BlockSource) -> AppResult<Vec<BlockRow>> {
     let refused = |why: String| AppFailure::refused(Sentence::of_program(&why));
     match source {
-        BlockSource::List { bytes, .. } => {
-            parse_blocks(bytes).map_err(|problems| refused(problems.to_string()))
+        BlockSource::List { file, bytes } => {
+            let read = listed_blocks(file, bytes);
+            let read = read.map_err(|problems| refused(problems.to_string()))?;
+            Ok(read.rows)
         }
         BlockSource::One(block) => {
             let shown = block.mesh.display();

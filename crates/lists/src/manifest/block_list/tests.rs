@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::{is_block_list, parse_blocks, read_blocks};
+use super::{is_block_json, is_block_list, parse_blocks, read_block_json, read_blocks};
 use mocban_core::domain::{BlockSide, LengthUnit};
 
 fn refusal(text: &str) -> String {
@@ -156,4 +156,44 @@ fn metadata_has_the_limits_of_pairs() {
         let found = refusal(&text);
         assert!(found.starts_with(expected), "{found}");
     }
+}
+
+#[test]
+fn lists_in_json_have_the_rows_of_csv() {
+    let csv = "Số hiệu ván,Bản quét,Ảnh trang,Mặt,Triều đại\nb1,1.stl,1.png,sau,Nguyễn\nb2,2.stl,2.png,,\n";
+    let mut expected = parse_blocks(csv.as_bytes()).expect("valid");
+    let rows = [
+        r#"{"Số hiệu ván":"b1","Bản quét":"1.stl","Ảnh trang":"1.png","Mặt":"sau","Triều đại":"Nguyễn"}"#,
+        r#"{"Số hiệu ván":"b2","Bản quét":"2.stl","Ảnh trang":"2.png","Mặt":null,"Triều đại":NaN}"#,
+    ];
+    for (list, first) in [
+        (rows.join("\n"), 1),
+        (format!("[\n{}\n]", rows.join(",\n")), 2),
+    ] {
+        assert!(is_block_json(list.as_bytes()), "{list}");
+        let read = read_block_json(list.as_bytes()).expect("valid");
+        for (row, line) in expected.iter_mut().zip(first..) {
+            row.line = line;
+        }
+        assert_eq!(read.rows, expected, "{list}");
+    }
+    for other in [
+        r#"{"id":"a","mesh":"m","print":"p","block":"b"}"#,
+        r#"{"id":"a","mesh":"m","print":"p","page":"4"}"#,
+        "block,mesh,page\n",
+        "{",
+        "",
+    ] {
+        assert!(!is_block_json(other.as_bytes()), "{other}");
+    }
+    let damaged =
+        "{\"block\":\"b\",\"mesh\":\"m\",\"page\":\"p\"}\n{\"block\":\"b\",\"mesh\":\"m\"}\n[1]\n";
+    let refused = read_block_json(damaged.as_bytes()).expect_err("refused");
+    let lines: Vec<String> = refused.to_string().lines().map(str::to_owned).collect();
+    assert_eq!(lines[0], "line 2: page is empty");
+    assert!(
+        lines[1].starts_with("line 3: not a JSON object"),
+        "{lines:?}"
+    );
+    assert_eq!(lines.len(), 2);
 }
