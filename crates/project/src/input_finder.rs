@@ -2,10 +2,11 @@
 
 use std::collections::HashMap;
 use std::fs::Metadata;
-use std::path::{Component, Path};
+use std::path::Path;
 
 use crate::events::{Listener, warn};
 use crate::input_list::{InputList, has_list, is_not_there};
+use crate::input_names::named_parts;
 use mocban_store::{Project, StoreError};
 
 /// The path of an input that was found.
@@ -54,12 +55,7 @@ pub(crate) fn finder_in(
 
 /// Returns a stored path as names below a folder: whole, without its first folder, and so on down to its file name.
 fn ends_of(stored: &str) -> Vec<String> {
-    let parts = Path::new(stored).components();
-    let parts = parts.filter_map(|part| match part {
-        Component::Normal(part) => part.to_str(),
-        _ => None,
-    });
-    let parts: Vec<&str> = parts.collect();
+    let parts = named_parts(stored);
     let ends = 0..parts.len();
     ends.map(|first| parts[first..].join("/")).collect()
 }

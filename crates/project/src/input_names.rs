@@ -43,12 +43,7 @@ impl InputNames {
     /// Returns a new name for the copy of an input: its stored path below the root, with slashes, as far as all file
     /// systems can hold it.
     pub(crate) fn next(&mut self, stored: &str) -> String {
-        let parts = Path::new(stored).components();
-        let parts = parts.filter_map(|part| match part {
-            Component::Normal(part) => part.to_str(),
-            _ => None,
-        });
-        let parts: Vec<&str> = parts.collect();
+        let parts = named_parts(stored);
         let (file, folders) = parts.split_last().unwrap_or((&UNNAMED, &[]));
         let mut parent = String::new();
         for folder in folders {
@@ -60,22 +55,14 @@ impl InputNames {
 
     /// Keeps the name that an input has in an earlier list. New copies in its folders get other names.
     pub(crate) fn reserve(&mut self, stored: &str, name: &str) {
-        let normal = |path: &str| {
-            let parts = Path::new(path).components();
-            let parts = parts.filter_map(|part| match part {
-                Component::Normal(part) => part.to_str().map(str::to_owned),
-                _ => None,
-            });
-            parts.collect::<Vec<String>>()
-        };
-        let (stored, name) = (normal(stored), normal(name));
+        let (stored, name) = (named_parts(stored), named_parts(name));
         let is_alike = stored.len() == name.len();
         let mut parent = String::new();
         for (depth, part) in name.iter().enumerate() {
             self.taken.insert((parent.clone(), folded(part)));
             let path = joined(&parent, part);
             if is_alike && depth + 1 < name.len() {
-                let key = (parent, stored[depth].clone());
+                let key = (parent, stored[depth].to_owned());
                 self.folders.entry(key).or_insert_with(|| path.clone());
             }
             parent = path;
@@ -108,6 +95,16 @@ impl InputNames {
         }
         name
     }
+}
+
+/// Returns the folders and the file of a path, without its root and without `.` and `..`.
+pub(crate) fn named_parts(path: &str) -> Vec<&str> {
+    let parts = Path::new(path).components();
+    let parts = parts.filter_map(|part| match part {
+        Component::Normal(part) => part.to_str(),
+        _ => None,
+    });
+    parts.collect()
 }
 
 fn joined(parent: &str, name: &str) -> String {
