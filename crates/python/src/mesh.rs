@@ -10,7 +10,7 @@ use crate::compute::{NativeCancel, compute};
 use crate::failure::{raise, unreadable};
 use crate::settings::NativeSettings;
 use mocban_align::stages::Scan;
-use mocban_core::domain::LengthUnit;
+use mocban_core::domain::{LengthUnit, any_case};
 use mocban_core::mesh::{Mesh, PositionSlice};
 use mocban_project::align;
 
@@ -23,12 +23,6 @@ pub(crate) struct NativeMesh {
     pub(crate) path: Option<PathBuf>,
     /// Why the unit must be wrong, once that was asked for.
     wrong_unit: OnceLock<Option<String>>,
-}
-
-/// Parses one of a few names, in any case. The error shows the name as given.
-pub(crate) fn any_case<T: std::str::FromStr>(name: &str) -> Result<T, T::Err> {
-    let plain = name.trim().to_lowercase();
-    plain.parse().or_else(|_: T::Err| name.parse())
 }
 
 /// Parses the name of a unit, in any case.

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
 use crate::cli::output::digits::{
     DEGREES, LENGTH_DIGITS, PIXELS, SCORE, fixed, length, significant,
@@ -10,7 +9,7 @@ use crate::cli::output::digits::{
 use crate::cli::output::table::columns;
 use clap::Args;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
-use mocban_core::domain::LengthUnit;
+use mocban_core::domain::{LengthUnit, any_case};
 use mocban_project::align::{self, AlignInput, FileAlignment, side};
 use mocban_project::{ExitCode, ProjectResult};
 

@@ -7,11 +7,10 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::import_blocks::{self, BlockArgs};
-use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use crate::cli::output::terminal::Terminal;
-use mocban_core::domain::LengthUnit;
+use mocban_core::domain::{LengthUnit, any_case};
 use mocban_project::import_blocks::{ListedItems, import_blocks};
 use mocban_project::import_pairs::{
     AllowedChanges, ImportOutcome, PairImport, PairSource, import_pairs,

@@ -5,10 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
-use mocban_core::domain::{BlockSide, LengthUnit};
+use mocban_core::domain::{BlockSide, LengthUnit, any_case};
 use mocban_project::import_blocks::{BlockImportOutcome, BlockSource, ImportedBlock};
 
 /// Arguments of an import of one block.

@@ -6,10 +6,10 @@ use clap::Args;
 use serde_json::json;
 
 use super::compare::side_by_side;
-use crate::cli::input::any_case::any_case;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
 use crate::cli::output::terminal::Terminal;
+use mocban_core::domain::any_case;
 use mocban_project::files;
 use mocban_project::report::{self, RenderedReport, ReportOptions};
 use mocban_project::{ExitCode, ProjectResult, Refusal};

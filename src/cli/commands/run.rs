@@ -7,14 +7,13 @@ use serde_json::json;
 
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
-use crate::cli::input::any_case::any_case;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::missing_results;
 use crate::cli::output::terminal::Terminal;
 use mocban_catalog::RerunPolicy;
 use mocban_config::Config;
-use mocban_core::domain::Stage;
+use mocban_core::domain::{Stage, any_case};
 use mocban_project::files;
 use mocban_project::run::{self, PlannedRun, PreparedRun, RunOutcome, TWO_METHODS};
 use mocban_project::shell::shell_quoted;

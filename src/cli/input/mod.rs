@@ -1,6 +1,5 @@
 //! What users name: flags, pairs, folders, signals.
 
-pub(crate) mod any_case;
 pub(crate) mod browser;
 pub(crate) mod examples;
 pub(crate) mod global;

@@ -2,6 +2,7 @@
 
 mod address;
 mod alignment_prior;
+mod any_case;
 mod artifact;
 pub mod artifact_role;
 mod attention_check;
@@ -49,6 +50,7 @@ mod worker_metrics;
 
 pub use address::{has_password, is_address, without_password};
 pub use alignment_prior::AlignmentPrior;
+pub use any_case::any_case;
 pub use artifact::{ARTIFACTS, ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;
 pub use block::{

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
 use super::column_names::missing_column;
 use super::csv::{BoundedRows, column_names};
-use super::draft::{DraftRow, MAX_PATH_BYTES, check_meta, parse_unit};
+use super::draft::{DraftRow, MAX_PATH_BYTES, check_meta};
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::{first_keys, json_rows};
 use super::row::RowIds;
@@ -18,7 +18,7 @@ use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::KnownColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
-use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
+use mocban_core::domain::{BlockName, BlockSide, LengthUnit, any_case};
 
 /// A block of a list.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -286,7 +286,10 @@ fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
     }
     let name = cells.get("block").map_or("", String::as_str);
     let name = BlockName::new(name).map_err(|error| error.to_string());
-    let unit = cells.get("unit").map(|cell| parse_unit(cell)).transpose();
+    let unit = cells
+        .get("unit")
+        .map(|cell| any_case::<LengthUnit>(cell))
+        .transpose();
     let side = cells.get("side").map(|cell| side(cell)).transpose();
     let mut record = |reason: Option<&String>| reasons.extend(reason.cloned());
     record(name.as_ref().err());

@@ -7,7 +7,7 @@ use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
 use mocban_core::domain::spelling::plain_form;
-use mocban_core::domain::{LengthUnit, PairName, PairNameError, sanitize};
+use mocban_core::domain::{LengthUnit, PairName, PairNameError, any_case, sanitize};
 
 /// The cells of one row by lower-case column name, and its other columns.
 #[derive(Debug, Default)]
@@ -131,7 +131,10 @@ fn complete(
     if is_swapped(&draft.cells) {
         reasons.push("mesh names an image and print names a mesh; swap the two".to_owned());
     }
-    let unit = draft.cells.remove("unit").map(|cell| parse_unit(&cell));
+    let unit = draft
+        .cells
+        .remove("unit")
+        .map(|cell| any_case::<LengthUnit>(&cell));
     let face_down = draft
         .cells
         .remove("scanned_face_down")
@@ -200,12 +203,6 @@ const MAX_CELL_BYTES: usize = 1 << 16;
 /// Returns a value, or records why it is not valid.
 fn record<T>(value: Result<T, String>, reasons: &mut Vec<String>) -> Option<T> {
     value.map_err(|reason| reasons.push(reason)).ok()
-}
-
-/// Parses a unit in any case. The error shows the cell as written.
-pub(super) fn parse_unit(cell: &str) -> Result<LengthUnit, String> {
-    let plain = cell.to_ascii_lowercase();
-    plain.parse().or_else(|_: String| cell.parse())
 }
 
 fn parse_flag(cell: &str) -> Result<bool, String> {
