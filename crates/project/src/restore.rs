@@ -20,7 +20,7 @@ use mocban_catalog::Catalog;
 use mocban_config::{LocalSettings, make_local};
 use mocban_core::domain::ErrorCode;
 use mocban_store::{
-    CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StagingFolder, TargetLock,
+    CATALOG_FILE, NewFolder, Project, ProjectStorage, SETTINGS_FILE, StagingFolder, TargetLock,
     place_new_file, write_synced,
 };
 
@@ -127,10 +127,8 @@ pub fn is_free(dir: &Path) -> ProjectResult<bool> {
 /// a folder of copies.
 fn is_left_over(name: &OsStr) -> bool {
     let beside = format!(".{CATALOG_FILE}.");
-    let name_bytes = name.as_encoded_bytes();
-    let is_new_folder =
-        name_bytes.starts_with(b".new.") && name_bytes.ends_with(b".mocban-partial");
-    name == SETTINGS_FILE || name_bytes.starts_with(beside.as_bytes()) || is_new_folder
+    let is_beside_catalog = name.as_encoded_bytes().starts_with(beside.as_bytes());
+    name == SETTINGS_FILE || is_beside_catalog || NewFolder::is_unfinished(name)
 }
 
 /// Warns about a folder beside the backup that is not used, because nothing says which inputs its files are.

@@ -1,12 +1,13 @@
 //! A folder that gets a free name when it is whole.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::create_folders::create_folders;
 use super::parent_folder::sync_folder;
-use super::staging::StagingFolder;
+use super::staging::{StagingFolder, is_staging_of};
 use mocban_system::platform::{rename, sync_tree};
 
 /// The output that the names of staging folders are made of, because the name of the new folder is chosen at the end.
@@ -41,6 +42,11 @@ impl NewFolder {
     /// Removes what dead processes left in `parent`. Returns the number of their folders.
     pub fn remove_unfinished(parent: &Path) -> usize {
         StagingFolder::remove_stale(&parent.join(TARGET))
+    }
+
+    /// Returns whether a name is that of what a process leaves in the parent if it is killed.
+    pub fn is_unfinished(name: &OsStr) -> bool {
+        is_staging_of(Path::new(TARGET), name)
     }
 
     /// Returns the folder to write to.
@@ -152,6 +158,7 @@ mod tests {
         let dead = parent.join(".new.1-7.mocban-partial");
         fs::create_dir_all(dead.join("new")).expect("a folder");
         fs::write(dead.join("lock"), "1").expect("written");
+        assert!(dead.file_name().is_some_and(NewFolder::is_unfinished));
         assert_eq!(NewFolder::remove_unfinished(&parent), 1);
         assert!(!dead.exists() && alive.path().exists());
         assert_eq!(NewFolder::remove_unfinished(&dir.path().join("none")), 0);

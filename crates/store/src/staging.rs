@@ -187,6 +187,12 @@ pub(super) fn hidden_sibling(target: &Path, ending: &str) -> PathBuf {
     parent_folder(target).join(hidden)
 }
 
+/// Returns whether a name is that of a staging folder of an output.
+pub(super) fn is_staging_of(target: &Path, name: &OsStr) -> bool {
+    let own = hidden_sibling(target, "");
+    is_staging_name(name, own.file_name().unwrap_or_default())
+}
+
 /// Returns whether a name is that of a staging folder: the prefix, a pid, a number and the suffix.
 fn is_staging_name(name: &OsStr, prefix: &OsStr) -> bool {
     let unique = name
