@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::byte_size::byte_size;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::exit::Refusal;
-use crate::input_names::folded;
+use mocban_core::domain::spelling::fold_case;
 use mocban_core::domain::{ContentHash, ErrorCode};
 use mocban_store::{InputError, StagingFolder, open_regular, read_up_to, write_atomic};
 
@@ -189,7 +189,7 @@ pub(crate) fn has_list(folder: &Path) -> bool {
 
 /// Returns whether a name is that of the list, or of what is written beside it, also where upper and lower case are the same.
 pub(crate) fn is_of_list(name: &OsStr) -> bool {
-    let name = folded(&name.to_string_lossy());
+    let name = fold_case(&name.to_string_lossy());
     name == INPUT_LIST || name.starts_with(&format!(".{INPUT_LIST}."))
 }
 
@@ -205,7 +205,7 @@ pub(crate) fn is_not_there(kind: ErrorKind) -> bool {
 /// `None` if it leads out of the folder, or to the list.
 fn comparable(name: &str) -> Option<String> {
     let parts = Path::new(name).components().map(|part| match part {
-        Component::Normal(part) => part.to_str().map(folded),
+        Component::Normal(part) => part.to_str().map(fold_case),
         _ => None,
     });
     let parts = parts.collect::<Option<Vec<String>>>()?;

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Component, Path};
 
-use unicode_normalization::UnicodeNormalization as _;
+use mocban_core::domain::spelling::fold_case;
 
 /// Longest name of a file or folder in bytes.
 const MAX_NAME: usize = 255;
@@ -33,10 +33,10 @@ impl InputNames {
     /// Gives no name yet. No copy is named like the file `reserved`, or like what is written beside it.
     pub(crate) fn without(reserved: &str) -> Self {
         let mut names = Self {
-            hidden: folded(&format!(".{reserved}.")),
+            hidden: fold_case(&format!(".{reserved}.")),
             ..Self::default()
         };
-        names.taken.insert((String::new(), folded(reserved)));
+        names.taken.insert((String::new(), fold_case(reserved)));
         names
     }
 
@@ -59,7 +59,7 @@ impl InputNames {
         let is_alike = stored.len() == name.len();
         let mut parent = String::new();
         for (depth, part) in name.iter().enumerate() {
-            self.taken.insert((parent.clone(), folded(part)));
+            self.taken.insert((parent.clone(), fold_case(part)));
             let path = joined(&parent, part);
             if is_alike && depth + 1 < name.len() {
                 let key = (parent, stored[depth].to_owned());
@@ -84,12 +84,12 @@ impl InputNames {
     /// Returns a name that nothing else has in a folder, and notes it.
     fn unused(&mut self, parent: &str, name: &str, is_file: bool) -> String {
         let mut plain = portable(name);
-        if parent.is_empty() && folded(&plain).starts_with(&self.hidden) {
+        if parent.is_empty() && fold_case(&plain).starts_with(&self.hidden) {
             plain = plain.replacen('.', "_", 1);
         }
         let mut name = plain.clone();
         let mut number = 1_u64;
-        while !self.taken.insert((parent.to_owned(), folded(&name))) {
+        while !self.taken.insert((parent.to_owned(), fold_case(&name))) {
             number += 1;
             name = numbered(&plain, number, is_file);
         }
@@ -113,13 +113,6 @@ fn joined(parent: &str, name: &str) -> String {
     } else {
         format!("{parent}/{name}")
     }
-}
-
-/// Returns a name in the form in which file systems without upper and lower case compare it.
-pub(crate) fn folded(name: &str) -> String {
-    let decomposed: String = name.nfd().collect();
-    let lower = decomposed.to_uppercase().to_lowercase();
-    lower.nfd().collect()
 }
 
 /// Returns a name with `_` for what some file system cannot hold.
