@@ -81,7 +81,7 @@ pub(super) async fn problems(
     let after: u64 = visit.query.parsed("after").unwrap_or_default();
     let InspectedFiles {
         headers,
-        most,
+        reachable,
         total,
         ..
     } = inspect(&state, chosen, after, MOST, STEP_TIME).await?;
@@ -94,10 +94,10 @@ pub(super) async fn problems(
             one_line(&format!("{}: {why}", files.name)).into_owned()
         })
         .collect();
-    let is_over = headers.is_empty() || next >= most;
+    let is_over = headers.is_empty() || next >= reachable;
     Ok(Json(json!({
         "problems": problems,
-        "looked_at": next.min(most),
+        "looked_at": next.min(reachable),
         "total": total,
         "next": (!is_over).then_some(next),
     })))

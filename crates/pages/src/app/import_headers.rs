@@ -83,7 +83,7 @@ impl UnreadFile {
 pub(super) struct PlannedPart {
     pub(super) files: Vec<PlannedFiles>,
     /// Number of pairs or blocks whose files can be looked at.
-    pub(super) most: u64,
+    pub(super) reachable: u64,
     /// Number of all pairs or blocks.
     pub(super) total: u64,
 }
@@ -146,8 +146,12 @@ impl ImportChoice {
         if !is_there {
             files.clear();
         }
-        let most = total.min(KEPT_PAIRS);
-        Some(PlannedPart { files, most, total })
+        let reachable = total.min(KEPT_PAIRS);
+        Some(PlannedPart {
+            files,
+            reachable,
+            total,
+        })
     }
 
     /// Returns the block at a place in the list that would be imported.
@@ -244,7 +248,7 @@ pub(super) struct InspectedFiles {
     /// Number of pairs or blocks that the request asked for.
     pub(super) asked: usize,
     /// Number of pairs or blocks whose files can be looked at.
-    pub(super) most: u64,
+    pub(super) reachable: u64,
     /// Number of all pairs or blocks.
     pub(super) total: u64,
 }
@@ -297,7 +301,7 @@ fn inspected(
     InspectedFiles {
         headers,
         asked,
-        most: part.most,
+        reachable: part.reachable,
         total: part.total,
     }
 }
