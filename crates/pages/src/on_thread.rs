@@ -4,11 +4,10 @@ use std::convert::Infallible;
 
 use tokio::runtime::Handle;
 use tokio::sync::oneshot;
-use tokio::task::spawn_blocking;
 
 use crate::local_server::{WorkFailed, WorkThread};
 use mocban_project::ProjectResult;
-use mocban_project::error::TaskStopped;
+use mocban_project::blocking::blocking;
 
 /// Runs a future on a blocking thread and waits for its result. The futures that open a catalog are not `Send`. The work
 /// goes on to its end even if nobody waits for it any more, as a change must.
@@ -17,8 +16,7 @@ where
     T: Send + 'static,
     F: Future<Output = ProjectResult<T>>,
 {
-    let done = spawn_blocking(move || Handle::current().block_on(work())).await;
-    done.map_err(TaskStopped)?
+    blocking(move || Handle::current().block_on(work())).await?
 }
 
 /// Like [`on_thread`], for work that changes nothing: it ends when its caller leaves, for example because the browser has
@@ -32,7 +30,7 @@ where
 {
     let (wanted, _caller) = oneshot::channel();
     let read = move || Handle::current().block_on(until_left(wanted, work));
-    match spawn_blocking(read).await.map_err(TaskStopped)? {
+    match blocking(read).await? {
         Some(done) => done,
         // The channel is closed only when this future is dropped.
         None => std::future::pending().await,

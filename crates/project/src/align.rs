@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-use crate::error::{ProjectResult, TaskStopped};
+use crate::blocking::blocking;
+use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::generated_folder::GeneratedFolder;
 use crate::input_paths::in_existing_form;
@@ -49,9 +50,7 @@ pub enum FileAlignment {
 pub async fn align(input: AlignInput, location: &Location) -> ProjectResult<FileAlignment> {
     let config = location.settings()?.config;
     let work = move || align_files(&input, &config.stages, &config.limits);
-    Ok(tokio::task::spawn_blocking(work)
-        .await
-        .map_err(TaskStopped)??)
+    Ok(blocking(work).await??)
 }
 
 fn align_files(

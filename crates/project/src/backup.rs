@@ -6,7 +6,8 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use crate::backup_inputs::{InputSaver, SavedInputs};
-use crate::error::{ProjectError, ProjectResult, TaskStopped, WithContext as _};
+use crate::blocking::blocking;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
@@ -78,8 +79,7 @@ pub async fn backup(
         Some((saver, copier)) => {
             let _work = LongWork::begin(listener, "copying the scans and prints");
             let save = move || saver.save(&copier);
-            let saved = tokio::task::spawn_blocking(save).await;
-            let saved = saved.map_err(TaskStopped)?;
+            let saved = blocking(save).await?;
             Some(saved.with_context(|| {
                 format!("the backup {shown} is complete, but not its scans and prints")
             })?)

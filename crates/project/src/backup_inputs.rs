@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::blocking::blocking;
 use crate::byte_size::byte_size;
-use crate::error::{ProjectResult, TaskStopped, WithContext as _};
+use crate::error::{ProjectResult, WithContext as _};
 use crate::exit::Refusal;
 use crate::growing_list::{GrowingList, earlier_copies};
 use crate::input_copy::{CopyOutcome, InputCopier, link_below};
@@ -111,8 +112,7 @@ pub async fn inputs_size(folder: &Path, location: &Location) -> ProjectResult<In
         size.is_partial |= is_cut;
         size
     };
-    let size = tokio::task::spawn_blocking(measure).await;
-    Ok(size.map_err(TaskStopped)?)
+    blocking(measure).await
 }
 
 /// Measures inputs. Counts only the first ones if that takes longer than `until`.

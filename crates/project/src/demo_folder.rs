@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use crate::error::{ProjectResult, TaskStopped, WithContext as _};
+use crate::blocking::blocking;
+use crate::error::{ProjectResult, WithContext as _};
 
 use crate::exit::Refusal;
 use crate::files;
@@ -120,10 +121,7 @@ pub async fn replace_data<T: Send + 'static>(
     let note = folder.path().join(NOTE);
     std::fs::write(&note, NOTE_TEXT).with_context(|| format!("cannot write {}", note.display()))?;
     let (target, stop) = (folder.path().to_owned(), stop.clone());
-    let written = match tokio::task::spawn_blocking(move || write(&target, &stop))
-        .await
-        .map_err(TaskStopped)?
-    {
+    let written = match blocking(move || write(&target, &stop)).await? {
         Err(DatasetError::Stopped) => return Ok(None),
         written => written?,
     };

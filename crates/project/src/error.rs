@@ -4,8 +4,6 @@ use std::error::Error;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use tokio::task::JoinError;
-
 use crate::exit::Refusal;
 use mocban_core::domain::{ErrorCode, Explained, FREE_SPACE};
 use mocban_system::platform;
@@ -144,13 +142,6 @@ impl<T, E: Into<ProjectError>> WithContext<T> for Result<T, E> {
         self.map_err(|error| error.into().context(what()))
     }
 }
-
-/// A task panicked or was cancelled.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct TaskStopped(pub JoinError);
-
-impl Explained for TaskStopped {}
 
 /// Returns the sentence that explains an error, such as one of the catalog, without its context.
 pub fn explanation<E: Explained>(error: &E, project: &Path) -> String {

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::blocking::blocking;
 use crate::empty_import;
-use crate::error::{ProjectResult, TaskStopped, WithContext as _};
+use crate::error::{ProjectResult, WithContext as _};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
@@ -125,10 +126,10 @@ pub async fn import_pairs(
     // The files are looked at before the catalog is locked, because a disk may be slow and a list long.
     let looked_at = project.clone();
     let token = ThreadToken::current();
-    let spooled = tokio::task::spawn_blocking(move || {
+    let spooled = blocking(move || {
         token.scope(|| spool(&listing, &looked_at, import.allowed, &import.choices))
     });
-    let (rows, missing) = spooled.await.map_err(TaskStopped)??;
+    let (rows, missing) = spooled.await??;
     let (rows, terms) = (
         Arc::new(Mutex::new(rows)),
         ImportTerms {
@@ -165,13 +166,13 @@ async fn store_in(
 ) -> ProjectResult<(ImportSummary, u64)> {
     let (sender, chunks) = mpsc::channel(WAITING_CHUNKS);
     let rows = Arc::clone(rows);
-    let sent = tokio::task::spawn_blocking(move || {
+    let sent = blocking(move || {
         let mut rows = rows.lock().unwrap_or_else(PoisonError::into_inner);
         rows.send(&sender)
     });
     let stored = catalog.import_all(chunks, terms, now()).await;
     // Return the error of reading first, because the catalog then only reports that the list ended early.
-    let sent = sent.await.map_err(TaskStopped)?;
+    let sent = sent.await?;
     sent.with_context(|| "cannot read the temporary file of the list".to_owned())?;
     Ok(stored?)
 }

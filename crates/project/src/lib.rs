@@ -35,6 +35,7 @@ pub mod backup_inputs;
 mod block_files;
 mod block_scale;
 pub mod block_status;
+pub mod blocking;
 pub mod byte_size;
 pub mod change_setting;
 pub mod check;

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use crate::backup_inputs::{check_room, free_beside};
-use crate::error::{ProjectError, ProjectResult, TaskStopped, WithContext as _};
+use crate::blocking::blocking;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::files::metadata;
 use crate::input_copy::{CopyOutcome, InputCopier, file_hash};
 use crate::input_finder::{FoundPath, is_in_place, plain_file};
@@ -70,8 +71,7 @@ impl ListedCopies {
         catalog.close().await;
         let (project, wanted) = (project.clone(), wanted?);
         let copy = move || self.copy_wanted(&project, &wanted);
-        let copied = tokio::task::spawn_blocking(copy).await;
-        copied.map_err(TaskStopped)?
+        blocking(copy).await?
     }
 
     fn copy_wanted(

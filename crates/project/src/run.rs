@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use crate::blocking::blocking;
 use crate::closing::close;
-use crate::error::{ProjectResult, TaskStopped};
+use crate::error::ProjectResult;
 use crate::events::{Listener, ProjectEvent, warn};
 use crate::failures::Failures;
 use crate::location::{Location, now};
@@ -192,8 +193,7 @@ async fn open(location: &Location, listener: &dyn Listener) -> ProjectResult<(Pr
     }
     let checked = project.clone();
     let check = move || checked.storage().map_or(Ok(()), ProjectStorage::check);
-    let checked = tokio::task::spawn_blocking(check).await;
-    if let Err(error) = checked.map_err(TaskStopped)? {
+    if let Err(error) = blocking(check).await? {
         catalog.close().await;
         return Err(error.into());
     }

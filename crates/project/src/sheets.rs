@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{ProjectResult, TaskStopped};
+use crate::blocking::blocking;
+use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::exit::Refusal;
 use crate::files;
@@ -96,9 +97,9 @@ pub async fn block_sheet(
         };
         (png_rgb8(&picture), view.characters.len())
     };
-    let drawn = tokio::task::spawn_blocking(draw).await;
+    let drawn = blocking(draw).await;
     drop(work);
-    let (png, characters) = drawn.map_err(TaskStopped)?;
+    let (png, characters) = drawn?;
     catalog.close().await;
     files::or_elsewhere(files::write_output(&path, &png, true), output)?;
     Ok((path, characters))

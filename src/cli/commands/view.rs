@@ -12,7 +12,7 @@ use mocban_core::page_vec;
 use mocban_export::scan_view::ScanView;
 use mocban_pages::review::Language;
 use mocban_pages::view::{BlockPoints, open_block, scan_page};
-use mocban_project::error::TaskStopped;
+use mocban_project::blocking::blocking;
 use mocban_project::selection;
 use mocban_project::shell::shell_quoted;
 use mocban_project::verdict_words;
@@ -67,9 +67,7 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<Exi
     let read = move |metric| ScanView::read(&project, &pair, metric, limits);
     let scan = match metric {
         None => None,
-        Some(metric) => tokio::task::spawn_blocking(move || read(metric))
-            .await
-            .map_err(TaskStopped)??,
+        Some(metric) => blocking(move || read(metric)).await??,
     };
     let Some(scan) = scan else {
         let of = args

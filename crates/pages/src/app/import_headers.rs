@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tokio::task::spawn_blocking;
-
 use super::failure::AppResult;
 use super::folder_picker::PickerRoots;
 use super::import_choice::{ImportChoice, Planned, SHOWN_PAIRS};
@@ -17,8 +15,7 @@ use mocban_core::domain::LengthUnit;
 use mocban_core::domain::cancel::{CancelGuard, CancelToken, poll};
 use mocban_core::mesh::MeshExtent;
 use mocban_lists::labels::{LabelFormat, Labels};
-use mocban_project::ProjectError;
-use mocban_project::error::TaskStopped;
+use mocban_project::blocking::blocking;
 use mocban_project::file_headers::{
     ScanKind, image_size, page_labels, page_length_mm, scan_extent,
 };
@@ -270,10 +267,8 @@ pub(super) async fn inspect(
             .run(|| inspected(&state, &chosen, (from, most), time))
             .ok()
     };
-    let done = spawn_blocking(work).await;
     // It is cancelled only if the caller has left.
-    let done = done.map_err(|error| ProjectError::from(TaskStopped(error)))?;
-    Ok(done.unwrap_or_default())
+    Ok(blocking(work).await?.unwrap_or_default())
 }
 
 fn inspected(

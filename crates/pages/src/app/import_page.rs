@@ -26,11 +26,12 @@ use super::upload_form::upload_part;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
 use mocban_core::domain::{PairName, one_line};
+use mocban_project::ProjectResult;
+use mocban_project::blocking::blocking;
 use mocban_project::import_blocks::{BlockSource, ListedItems, import_blocks};
 use mocban_project::import_pairs::{AllowedChanges, PairImport, import_pairs};
 use mocban_project::location::Location;
 use mocban_project::pair_choices::PairChoices;
-use mocban_project::{ProjectError, ProjectResult};
 
 /// Values of the address that belong to the files that were chosen, beside the columns of a list.
 const OF_FILES: [&str; 5] = ["matches", "from", "left_out", "whole_block", "changed"];
@@ -61,9 +62,7 @@ pub(super) async fn page(
             (picked, preview, partners, roots, is_known)
         }
     };
-    let (picked, preview, mut partners, roots, is_known) = tokio::task::spawn_blocking(read)
-        .await
-        .map_err(|error| ProjectError::from(mocban_project::error::TaskStopped(error)))?;
+    let (picked, preview, mut partners, roots, is_known) = blocking(read).await?;
     if let (true, Some(partners), Some(preview)) = (is_known, &mut partners, &preview) {
         let open = state.open(&chosen.project).await?;
         partners.add_replacements(&open, preview, &roots).await?;
@@ -247,9 +246,7 @@ pub(super) async fn import(
             Ok((items, chosen.choices()?, dir))
         }
     };
-    let read: AppResult<(ListedItems, PairChoices, PathBuf)> = tokio::task::spawn_blocking(read)
-        .await
-        .map_err(|error| ProjectError::from(mocban_project::error::TaskStopped(error)))?;
+    let read: AppResult<(ListedItems, PairChoices, PathBuf)> = blocking(read).await?;
     let (items, choices, dir) = read?;
     let allowed = AllowedChanges {
         missing: !chosen.missing.is_empty(),

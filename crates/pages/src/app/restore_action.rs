@@ -7,7 +7,6 @@ use axum::Json;
 use axum::extract::State;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use tokio::task::spawn_blocking;
 
 use super::action_body::ActionBody;
 use super::address::PageQuery;
@@ -22,8 +21,8 @@ use super::state::AppState;
 use super::tasks::{FinishedTask, TaskKind};
 use crate::review::Language;
 use mocban_core::domain::{ErrorCode, one_line};
+use mocban_project::blocking::blocking;
 use mocban_project::check::check;
-use mocban_project::error::TaskStopped;
 use mocban_project::files::is_backup;
 use mocban_project::input_list::{InputCopies, copies_beside};
 use mocban_project::location::Location;
@@ -61,9 +60,7 @@ pub(super) async fn start(
         let (folder, name) = (folder.clone(), name.clone());
         move || request(&folder, &name, &body)
     };
-    let request = spawn_blocking(look)
-        .await
-        .map_err(|error| ProjectError::from(TaskStopped(error)))??;
+    let request = blocking(look).await??;
     let explain = {
         let (backup, folder, name) = (request.backup.clone(), folder.clone(), name.clone());
         move |error: &ProjectError| restore_sentence(error, &backup, &folder, &name)

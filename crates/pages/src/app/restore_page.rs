@@ -22,8 +22,7 @@ use super::task_part::task_part;
 use super::tasks::{TaskKind, TaskState};
 use super::visit::Visit;
 use mocban_core::domain::one_line;
-use mocban_project::ProjectError;
-use mocban_project::error::TaskStopped;
+use mocban_project::blocking::blocking;
 use mocban_store::{CATALOG_FILE, StagingFolder};
 
 /// Responds with the choice of a backup, or with the state of the restore whose name the address has.
@@ -50,9 +49,7 @@ pub(super) async fn page(
         let found = backups_below(whole.as_deref().unwrap_or(&folder));
         (picked, found, roots, is_project(&folder))
     };
-    let (picked, found, roots, is_one_project) = spawn_blocking(read)
-        .await
-        .map_err(|error| ProjectError::from(TaskStopped(error)))?;
+    let (picked, found, roots, is_one_project) = blocking(read).await?;
     let body = html! {
         p { (visit.t(
             "A backup becomes a new project in the folder of the app. The backup and the other projects stay as they are.",

@@ -8,7 +8,6 @@ use axum::response::Redirect;
 use maud::{Markup, html};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use tokio::task::spawn_blocking;
 
 use super::action_body::ActionBody;
 use super::address::{PageQuery, encoded};
@@ -21,7 +20,7 @@ use super::saved_views::{self, NAME_CHARS, SavedView, ViewChange, gone, view_nam
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_core::domain::one_line;
-use mocban_project::error::TaskStopped;
+use mocban_project::blocking::blocking;
 use mocban_system::platform;
 
 /// What is done with a view.
@@ -50,8 +49,8 @@ pub(super) struct ViewBody {
 
 async fn read_views(open: &OpenProject) -> AppResult<Vec<SavedView>> {
     let dir = open.dir.clone();
-    let read = spawn_blocking(move || saved_views::read(&dir)).await;
-    let read = read.map_err(|stopped| AppFailure::of(TaskStopped(stopped), &open.dir));
+    let read = blocking(move || saved_views::read(&dir)).await;
+    let read = read.map_err(|stopped| AppFailure::of(stopped, &open.dir));
     read?
 }
 
@@ -77,8 +76,8 @@ pub(super) async fn change(
     let open = state.open(&key).await?;
     let change = body.change()?;
     let dir = open.dir.clone();
-    let changed = spawn_blocking(move || saved_views::change(&dir, change)).await;
-    let changed = changed.map_err(|stopped| AppFailure::of(TaskStopped(stopped), &open.dir));
+    let changed = blocking(move || saved_views::change(&dir, change)).await;
+    let changed = changed.map_err(|stopped| AppFailure::of(stopped, &open.dir));
     changed??;
     Ok(Json(json!({ "reload": true })))
 }
