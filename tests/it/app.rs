@@ -32,6 +32,15 @@ pub(crate) fn text(reply: &Reply) -> String {
     String::from_utf8_lossy(&reply.body).into_owned()
 }
 
+/// Returns a page as its HTML.
+#[track_caller]
+pub(crate) fn html(page: &Page, path: &str) -> String {
+    let reply = page.get(path);
+    let shown = text(&reply);
+    assert_eq!(reply.status, 200, "{path}: {shown}");
+    shown
+}
+
 /// Returns the token that actions carry, from a page.
 pub(crate) fn token(page: &Page) -> String {
     let html = text(&page.get("/"));

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::accessible::axe;
-use crate::app::{app, open_app, text};
+use crate::app::{app, html, open_app, text};
 use crate::app_browser::{enter, looks_right};
 use crate::block_correction::{CorrectionSession, printed_side, refused_block, true_points};
 use crate::block_view::finished_block;
@@ -13,12 +13,6 @@ use crate::page::Page;
 
 const BLOCKS: &str = "/p/p/blocks";
 const BLOCK: &str = "/p/p/block/b1/";
-
-fn html(page: &Page, path: &str) -> String {
-    let reply = page.get(path);
-    assert_eq!(reply.status, 200, "{path}: {}", text(&reply));
-    text(&reply)
-}
 
 #[test]
 fn a_finished_block_is_listed_described_and_drawn() {

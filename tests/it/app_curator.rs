@@ -6,18 +6,11 @@ use std::path::Path;
 use mocban::raster::{Grid, png_grey8};
 use serde_json::{Value, json};
 
-use crate::app::{act, open_app, text, with_project};
+use crate::app::{act, html, open_app, text, with_project};
 use crate::app_uploads::{begun, encode, end, put};
 use crate::block_correction::refused_block;
 use crate::cli::mocban;
-use crate::page::Page;
 use crate::waiting::wait_until;
-
-fn html(page: &Page, path: &str) -> String {
-    let reply = page.get(path);
-    assert_eq!(reply.status, 200, "{path}: {}", text(&reply));
-    text(&reply)
-}
 
 /// Stores a verdict on the ensemble's result of a pair.
 fn judge(project: &Path, pair: &str, verdict: &str, reviewer: &str, more: &[&str]) {

@@ -5,7 +5,7 @@ use std::path::Path;
 use mocban::raster::{ImageLimits, decode};
 use serde_json::{Value, json};
 
-use crate::app::{open_app, text, with_project};
+use crate::app::{html, open_app, text, with_project};
 use crate::app_import::{copy_inputs, folders};
 use crate::app_uploads::encode;
 use crate::page::Page;
@@ -19,9 +19,7 @@ fn query(dir: &Path, more: &str) -> String {
 }
 
 fn files(page: &Page, query: &str) -> String {
-    let reply = page.get(&format!("/import/files{query}"));
-    assert_eq!(reply.status, 200, "{}", text(&reply));
-    text(&reply)
+    html(page, &format!("/import/files{query}"))
 }
 
 /// Returns all files that cannot be used, and the number of pairs.

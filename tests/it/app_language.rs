@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::app::{act, app, open_app, text, with_project};
+use crate::app::{act, app, html, open_app, text, with_project};
 use crate::app_browser::enter;
 use crate::block_view::finished_block;
 use crate::browser::Browser;
@@ -10,9 +10,7 @@ use crate::page::{Page, read_project};
 
 #[track_caller]
 fn has_language(page: &Page, path: &str, language: &str) {
-    let reply = page.get(path);
-    assert_eq!(reply.status, 200, "{path}: {}", text(&reply));
-    let html = text(&reply);
+    let html = html(page, path);
     let tag = format!("<html lang=\"{language}\"");
     assert!(html.contains(&tag), "{path} {language}: {html}");
 }

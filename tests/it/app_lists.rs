@@ -2,16 +2,10 @@
 
 use serde_json::{Value, json};
 
-use crate::app::{act, app, open_app, text, token, with_project};
+use crate::app::{act, app, html, open_app, text, token, with_project};
 use crate::app_browser::enter;
 use crate::browser::Browser;
 use crate::page::{Page, Reply, read_project, send};
-
-fn html(page: &Page, path: &str) -> String {
-    let reply = page.get(path);
-    assert_eq!(reply.status, 200, "{path}: {}", text(&reply));
-    text(&reply)
-}
 
 /// Returns the ids and confidences of the cards of a part of a page.
 fn cards(part: &str) -> Vec<(String, String)> {

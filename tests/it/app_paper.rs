@@ -1,14 +1,7 @@
 //! A pair aligned by the method of the paper, beside its stored result.
 
-use crate::app::{text, with_project};
+use crate::app::{html, text, with_project};
 use crate::cli::mocban;
-use crate::page::Page;
-
-fn html(page: &Page, path: &str) -> String {
-    let reply = page.get(path);
-    assert_eq!(reply.status, 200, "{path}: {}", text(&reply));
-    text(&reply)
-}
 
 #[test]
 fn a_pair_is_compared_with_the_method_of_the_paper_and_nothing_is_stored() {

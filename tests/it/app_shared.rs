@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::app::{act, open_app, text, with_project};
+use crate::app::{act, html, open_app, text, with_project};
 use crate::app_choice::{chosen, import_more};
 use crate::cli::{binary_beside, mocban};
 use crate::odd::{as_other_user, set_writable};
@@ -13,13 +13,6 @@ use crate::page::{Page, read_project};
 use crate::waiting::wait_until;
 
 const CHOSEN: &str = "/p/p/actions/chosen";
-
-fn html(page: &Page, path: &str) -> String {
-    let reply = page.get(path);
-    let shown = text(&reply);
-    assert_eq!(reply.status, 200, "{path}: {shown}");
-    shown
-}
 
 #[test]
 fn two_apps_on_one_project_show_and_change_the_same() {
