@@ -73,6 +73,7 @@ mod routes;
 mod run_actions;
 mod run_blocks;
 mod run_page;
+mod run_state;
 mod saved_views;
 mod sentence;
 mod setting_words;

@@ -6,180 +6,23 @@ use axum::extract::{Path, State};
 use axum::response::Html;
 use maud::{Markup, html};
 
-use super::child_run;
 use super::components::{NavSection, action_form, figure, frame, grouped, stored_message};
 use super::failure::AppResult;
 use super::home::free_space;
-use super::latest_results::{LatestResults, latest_results};
+use super::latest_results::latest_results;
 use super::projects::OpenProject;
 use super::run_blocks::{
-    blocks_text, failed_block_list, failed_blocks, other_blocks_text, outdated_blocks,
-    outdated_blocks_text,
+    blocks_text, failed_block_list, failed_blocks, other_blocks_text, outdated_blocks_text,
 };
-use super::sentence::Sentence;
+use super::run_state::RunState;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::review::Language;
-use mocban_catalog::{
-    Catalog, PairFilter, PairOrder, PairResults, Plan, StatusCounts, WorkerRecord, WorkerState,
-};
-use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, UnixMillis, one_line};
-use mocban_project::block_status::BlockStatus;
+use mocban_catalog::PairResults;
+use mocban_core::domain::{JobStatus, one_line};
+use mocban_project::ProjectError;
 use mocban_project::failures::may_succeed_unchanged;
-use mocban_project::location::now;
-use mocban_project::{ProjectError, ProjectResult};
-use mocban_runner::{fingerprints, is_running};
 use mocban_system::platform;
-
-/// Number of failed pairs that are shown as examples of each class.
-const EXAMPLES: usize = 3;
-/// Most pairs that failed or have other files with which the page asks what the next run would do: each is inspected.
-const MAX_INSPECTED: u64 = 1000;
-
-/// What the page shows of a project.
-struct RunState {
-    counts: StatusCounts,
-    is_running: bool,
-    workers: Vec<WorkerRecord>,
-    latest: LatestResults,
-    failures: Vec<(FailureClass, u64, Vec<PairResults>)>,
-    blocks: BlockStatus,
-    /// Number of finished or failed blocks that the next run would align again. 0 during a run.
-    outdated_blocks: u64,
-    /// Why the last run that the app started ended, if it failed.
-    failed_run: Option<Sentence>,
-    /// Number of pairs at the same time, as the settings give it.
-    jobs: usize,
-    /// What the next run would do. `None` during a run, and if it would take long to find out.
-    plan: Option<Plan>,
-}
-
-impl RunState {
-    async fn read(
-        open: &OpenProject,
-        failed: Option<(UnixMillis, Sentence)>,
-    ) -> ProjectResult<Self> {
-        let (catalog, location) = (&open.catalog, open.location());
-        let failed_run = match failed {
-            // Another run, also in a terminal, has begun since.
-            Some((at, _)) if began_since(catalog, at).await? => None,
-            failed => failed.map(|(_, why)| why),
-        };
-        let settings = location.settings()?;
-        // Read before the counts: a run that ends in between leaves no leases.
-        let running = is_running(&open.project, catalog, now()).await?;
-        let workers = child_run::workers(catalog).await;
-        let current = fingerprints(&settings.config.stages);
-        let counts = catalog.status(&current).await?;
-        let failed = counts.jobs.get(&JobStatus::Quarantined).copied();
-        let inspected = failed.unwrap_or(0) + counts.other_files;
-        let options = mocban_project::run::options(&settings.config);
-        let plan = if running || inspected > MAX_INSPECTED {
-            None
-        } else {
-            Some(catalog.plan(&current, None, options.rerun).await?)
-        };
-        let mut classes = catalog.failure_counts().await?;
-        classes.sort_by_key(|(class, number)| (std::cmp::Reverse(*number), *class));
-        let mut failures = Vec::new();
-        for (class, number) in classes {
-            let filter = PairFilter {
-                class: Some(class),
-                statuses: vec![JobStatus::Quarantined],
-                ..PairFilter::default()
-            };
-            let metric = ThresholdMetric::DEFAULT;
-            let list = catalog.pair_list(&filter, PairOrder::Imported, metric, None, EXAMPLES);
-            failures.push((class, number, list.await?.pairs));
-        }
-        let blocks = BlockStatus(catalog.block_states().await?);
-        let outdated_blocks = if running {
-            0
-        } else {
-            outdated_blocks(catalog, &options, &blocks).await?
-        };
-        Ok(Self {
-            counts,
-            is_running: running,
-            workers: workers.unwrap_or_default(),
-            latest: LatestResults::read(catalog, now()).await?,
-            failures,
-            blocks,
-            outdated_blocks,
-            failed_run,
-            jobs: options.workers,
-            plan,
-        })
-    }
-
-    fn jobs(&self, status: JobStatus) -> u64 {
-        self.counts.jobs.get(&status).copied().unwrap_or(0)
-    }
-
-    /// Returns the number of pairs that a run would work on or works on.
-    fn outstanding(&self) -> u64 {
-        [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased]
-            .map(|status| self.jobs(status))
-            .iter()
-            .sum()
-    }
-
-    /// Returns the number of pairs that the next run would align, each counted once although it may be both interrupted and
-    /// outdated.
-    fn to_align(&self) -> u64 {
-        match &self.plan {
-            Some(plan) => plan.pairs() + plan.leased,
-            None => (self.outstanding() + self.counts.stale).min(self.counts.pairs),
-        }
-    }
-
-    /// Returns how many of these pairs an earlier run has computed or refused, with other settings or files.
-    fn outdated(&self) -> u64 {
-        (self.plan.as_ref()).map_or(self.counts.stale, Plan::again)
-    }
-
-    /// Returns the number of blocks that a run would work on or works on, whose pairs are not yet all known.
-    fn open_blocks(&self) -> u64 {
-        self.blocks.waiting() + self.blocks.leased() + self.outdated_blocks
-    }
-
-    /// Returns the number of pairs that are computed now, and of pairs that wait. Workers also lease the next pairs, which
-    /// they read ahead.
-    fn computed_and_waiting(&self) -> [u64; 2] {
-        let leased = self.jobs(JobStatus::Leased);
-        let waiting = self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff);
-        let jobs = |worker: &WorkerRecord| worker.metrics.as_ref().map(|metrics| metrics.jobs);
-        let at_a_time: Option<u64> = self.workers.iter().map(jobs).sum();
-        let computed = match at_a_time {
-            Some(most) if self.is_running && most > 0 => leased.min(most),
-            _ => leased,
-        };
-        [computed, waiting + leased - computed]
-    }
-
-    /// Returns the pairs that the present workers settle in a second, since they started.
-    fn rate(&self) -> Option<f64> {
-        let rates = self.workers.iter().filter_map(|worker| {
-            let metrics = worker.metrics.as_ref()?;
-            let seconds = metrics.elapsed_ms as f64 / 1000.0;
-            (seconds > 0.0).then(|| (metrics.done + metrics.failed) as f64 / seconds)
-        });
-        let rate: f64 = rates.sum();
-        (rate > 0.0).then_some(rate)
-    }
-
-    fn is_stopping(&self) -> bool {
-        let now = now();
-        let mut workers = self.workers.iter();
-        self.is_running && workers.any(|worker| worker.state(now) == WorkerState::Stopping)
-    }
-}
-
-/// Returns whether a run has begun since a time.
-async fn began_since(catalog: &Catalog, at: UnixMillis) -> ProjectResult<bool> {
-    let workers = catalog.workers(at).await?;
-    Ok(workers.iter().any(|worker| worker.started > at))
-}
 
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
