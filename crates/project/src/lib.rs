@@ -30,6 +30,7 @@
 
 pub mod align;
 pub mod backup;
+pub mod backup_checks;
 pub mod backup_content;
 pub mod backup_inputs;
 mod block_files;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use crate::backup_inputs::{check_room, free_beside};
+use crate::backup_checks::{check_room, free_beside};
 use crate::blocking::blocking;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::files::metadata;

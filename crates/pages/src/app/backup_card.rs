@@ -23,9 +23,8 @@ use crate::review::Language;
 use mocban_core::domain::one_line;
 use mocban_project::ProjectResult;
 use mocban_project::backup::backup;
-use mocban_project::backup_inputs::{
-    InputsSize, LeftOutReason, SavedInputs, free_beside, inputs_size,
-};
+use mocban_project::backup_checks::free_beside;
+use mocban_project::backup_inputs::{InputsSize, LeftOutReason, SavedInputs, inputs_size};
 use mocban_project::input_list::inputs_folder;
 use mocban_project::location::Location;
 
