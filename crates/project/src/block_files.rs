@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::exit::Refusal;
 use crate::files::{self, listed};
-use crate::manifest_file::place_of;
+use crate::missing_files::place_of;
 use mocban_core::domain::{FileKind, sanitize};
 use mocban_lists::manifest::{BlockRow, is_named_like_mesh, is_named_like_print};
 use mocban_store::Project;

@@ -1,7 +1,7 @@
 //! Compares the sizes of scans and pages before blocks are imported, which shows a unit that is wrong but possible.
 
 use crate::file_headers::{ScanKind, image_size, page_length_mm, scan_extent, unit_of_page};
-use crate::manifest_file::place_of;
+use crate::missing_files::place_of;
 use mocban_core::InputLimits;
 use mocban_lists::manifest::BlockRow;
 use mocban_store::Project;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::{SimilarFiles, find_on_disk, in_existing_form};
-use super::missing_files::{IS_FOLDER, MAX_PATH_CHARS, missing_hint};
+use super::input_paths::{SimilarFiles, in_existing_form};
+use super::missing_files::locate_file;
 use super::repeated_files::RepeatedFiles;
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
@@ -286,50 +286,6 @@ fn renamed(read: &ReadRows) -> Option<String> {
 
 /// Longest name of a column in a message, in characters.
 const MAX_NAME_CHARS: usize = 60;
-
-/// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
-/// row with a label and a number; returns `None` if it exists.
-pub fn locate_file(
-    (label, line): (&str, usize),
-    kind: &str,
-    path: &mut PathBuf,
-    name: &dyn std::fmt::Display,
-    project: &Project,
-    searches: &mut SimilarFiles,
-) -> Option<String> {
-    let exists = match path.to_str() {
-        Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
-        _ => find_on_disk(path),
-    };
-    let problem = match exists {
-        Ok(true) if place_of(path, project).is_dir() => IS_FOLDER.to_owned(),
-        Ok(true) => return None,
-        Ok(false) if path.is_symlink() => "is a link to a file that does not exist".to_owned(),
-        Ok(false) if has_scheme(path, "file://") => {
-            "does not exist; write its path without file://".to_owned()
-        }
-        Ok(false) if has_scheme(path, "://") => {
-            "is a web address; download the file and write the path of the copy".to_owned()
-        }
-        Ok(false) => format!("does not exist{}", missing_hint(path, searches)),
-        Err(error) => format!("cannot be read: {error}"),
-    };
-    let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
-    Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
-}
-
-/// Returns the place of a file, which may be below a named root.
-pub(crate) fn place_of(path: &Path, project: &Project) -> PathBuf {
-    match path.to_str() {
-        Some(stored) if project.is_below_root(stored) => project.input_path(stored),
-        _ => path.to_owned(),
-    }
-}
-
-/// Returns whether a path of a list is an address. The folder of the list may stand before it, and a path has no `//`.
-fn has_scheme(path: &Path, scheme: &str) -> bool {
-    path.to_string_lossy().contains(scheme)
-}
 
 /// Returns a reason with the first paths: `ignored, mesh without print: a.stl, b.stl and 3 more`.
 fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {

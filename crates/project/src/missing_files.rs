@@ -1,11 +1,13 @@
 //! Files of a list that do not exist.
 
-use std::path::Path;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files::listed;
-use super::input_paths::{SimilarFiles, is_windows_path};
+use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
 use mocban_core::domain::sanitize;
+use mocban_store::Project;
 
 /// Maximum number of missing files that `--json` lists.
 const MAX_MISSING: usize = 1000;
@@ -25,6 +27,50 @@ const TAB_HINT: &str = "; its path has a tab: remove it";
 
 /// Ends the message of a path that leads to a folder.
 pub const IS_FOLDER: &str = "is a folder, not a file";
+
+/// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
+/// row with a label and a number; returns `None` if it exists.
+pub(crate) fn locate_file(
+    (label, line): (&str, usize),
+    kind: &str,
+    path: &mut PathBuf,
+    name: &dyn Display,
+    project: &Project,
+    searches: &mut SimilarFiles,
+) -> Option<String> {
+    let exists = match path.to_str() {
+        Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
+        _ => find_on_disk(path),
+    };
+    let problem = match exists {
+        Ok(true) if place_of(path, project).is_dir() => IS_FOLDER.to_owned(),
+        Ok(true) => return None,
+        Ok(false) if path.is_symlink() => "is a link to a file that does not exist".to_owned(),
+        Ok(false) if has_scheme(path, "file://") => {
+            "does not exist; write its path without file://".to_owned()
+        }
+        Ok(false) if has_scheme(path, "://") => {
+            "is a web address; download the file and write the path of the copy".to_owned()
+        }
+        Ok(false) => format!("does not exist{}", missing_hint(path, searches)),
+        Err(error) => format!("cannot be read: {error}"),
+    };
+    let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
+    Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
+}
+
+/// Returns the place of a file, which may be below a named root.
+pub(crate) fn place_of(path: &Path, project: &Project) -> PathBuf {
+    match path.to_str() {
+        Some(stored) if project.is_below_root(stored) => project.input_path(stored),
+        _ => path.to_owned(),
+    }
+}
+
+/// Returns whether a path of a list is an address. The folder of the list may stand before it, and a path has no `//`.
+fn has_scheme(path: &Path, scheme: &str) -> bool {
+    path.to_string_lossy().contains(scheme)
+}
 
 /// Returns what may be wrong with the path of a missing file, or nothing.
 pub(crate) fn missing_hint(path: &Path, searches: &mut SimilarFiles) -> String {
