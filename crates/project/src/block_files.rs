@@ -4,15 +4,13 @@ use std::path::Path;
 
 use crate::exit::Refusal;
 use crate::files::{self, listed};
-use crate::missing_files::place_of;
+use crate::missing_files::{MAX_PATH_CHARS, place_of};
 use mocban_core::domain::{FileKind, sanitize};
 use mocban_lists::manifest::{BlockRow, is_named_like_mesh, is_named_like_print};
 use mocban_store::Project;
 
 /// Largest number of files that a refusal names.
 const MAX_SHOWN: usize = 10;
-/// Longest path in a message, in characters.
-const MAX_PATH_CHARS: usize = 300;
 
 /// Refuses blocks with files that are of another kind. A file that cannot be read is left to the run, which says why.
 pub(crate) fn check(rows: &[BlockRow], label: &str, project: &Project) -> Result<(), Refusal> {

@@ -16,8 +16,7 @@ const MAX_MISSING: usize = 1000;
 pub(crate) const MAX_PATH_CHARS: usize = 300;
 
 /// Ends the message of a missing file whose path is one of Windows.
-pub const WINDOWS_HINT: &str =
-    "; it is a path of a Windows computer: write paths relative to the list";
+const WINDOWS_HINT: &str = "; it is a path of a Windows computer: write paths relative to the list";
 
 /// Ends the message of a missing file whose path is on several lines.
 const LINE_BREAK_HINT: &str = "; its path has a line break: write the cell on one line";
@@ -26,7 +25,7 @@ const LINE_BREAK_HINT: &str = "; its path has a line break: write the cell on on
 const TAB_HINT: &str = "; its path has a tab: remove it";
 
 /// Ends the message of a path that leads to a folder.
-pub const IS_FOLDER: &str = "is a folder, not a file";
+const IS_FOLDER: &str = "is a folder, not a file";
 
 /// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
 /// row with a label and a number; returns `None` if it exists.
@@ -73,7 +72,7 @@ fn has_scheme(path: &Path, scheme: &str) -> bool {
 }
 
 /// Returns what may be wrong with the path of a missing file, or nothing.
-pub(crate) fn missing_hint(path: &Path, searches: &mut SimilarFiles) -> String {
+fn missing_hint(path: &Path, searches: &mut SimilarFiles) -> String {
     let windows = || is_windows_path(path).then_some(WINDOWS_HINT);
     if let Some(hint) = blank_hint(path).or_else(windows) {
         return hint.to_owned();
