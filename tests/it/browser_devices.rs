@@ -1,8 +1,11 @@
-//! The devices at a browser: a keyboard, a screen for fingers, and a slow network.
+//! The devices at a browser: a keyboard, a mouse, a screen for fingers, and a slow network.
 
 use serde_json::json;
 
-use crate::browser::{SHIFT, Tab};
+use crate::browser::Tab;
+
+/// The key Shift in events.
+const SHIFT: u8 = 8;
 
 impl Tab<'_> {
     /// Presses and releases a key of the keyboard as a person does, with Shift or without, so that controls react to it.
@@ -22,6 +25,100 @@ impl Tab<'_> {
                 "modifiers": SHIFT * u8::from(with_shift),
             });
             self.call("Input.dispatchKeyEvent", &event);
+        }
+    }
+
+    /// Presses and releases a physical key.
+    pub(crate) fn key(&self, code: &str) {
+        self.key_down(code);
+        self.key_up(code);
+    }
+
+    pub(crate) fn key_down(&self, code: &str) {
+        self.dispatch("rawKeyDown", code);
+    }
+
+    pub(crate) fn key_up(&self, code: &str) {
+        self.dispatch("keyUp", code);
+    }
+
+    fn dispatch(&self, kind: &str, code: &str) {
+        let prefixes = ["Key", "Digit", "Numpad"];
+        let letter = prefixes.iter().find_map(|prefix| code.strip_prefix(prefix));
+        let key = letter.unwrap_or(code).to_lowercase();
+        let named = matches!(
+            code,
+            "Enter" | "NumpadEnter" | "Escape" | "Backspace" | "Tab"
+        );
+        let key = if named { code } else { &key };
+        let mut event = json!({ "type": kind, "code": code, "key": key });
+        if code == "Escape" {
+            // Dialogs react to the legacy key code.
+            event["windowsVirtualKeyCode"] = json!(27);
+        }
+        self.call("Input.dispatchKeyEvent", &event);
+    }
+
+    /// Clicks into the middle of an element, with Shift or without.
+    pub(crate) fn click(&self, element: &str, with_shift: bool) {
+        let [x, y] = self.middle(element);
+        for kind in ["mousePressed", "mouseReleased"] {
+            let params = json!({
+                "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1,
+                "modifiers": SHIFT * u8::from(with_shift),
+            });
+            self.call("Input.dispatchMouseEvent", &params);
+        }
+    }
+
+    /// Taps on the middle of an element.
+    pub(crate) fn tap(&self, element: &str) {
+        let middle = [self.middle(element)];
+        self.touch(&middle, &middle);
+    }
+
+    /// Returns the middle of an element after it was scrolled into the middle of the window.
+    fn middle(&self, element: &str) -> [f64; 2] {
+        let middle = self.eval(&format!(
+            "(() => {{
+                const element = document.querySelector(`{element}`);
+                element.scrollIntoView({{ block: 'center' }});
+                const bounds = element.getBoundingClientRect();
+                return [bounds.x + bounds.width / 2, bounds.y + bounds.height / 2];
+            }})()"
+        ));
+        [0, 1].map(|index| middle[index].as_f64().expect("a number"))
+    }
+
+    /// Types text into the focused element.
+    pub(crate) fn text(&self, text: &str) {
+        self.call("Input.insertText", &json!({ "text": text }));
+    }
+
+    /// Drags with the left button.
+    pub(crate) fn drag(&self, from: [f64; 2], to: [f64; 2]) {
+        for (kind, [x, y], buttons) in [
+            ("mousePressed", from, 1),
+            ("mouseMoved", to, 1),
+            ("mouseReleased", to, 0),
+        ] {
+            let params = json!({
+                "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1,
+            });
+            self.call("Input.dispatchMouseEvent", &params);
+        }
+    }
+
+    /// Puts fingers on the screen at the first points, moves them to the second, and lifts them.
+    pub(crate) fn touch(&self, from: &[[f64; 2]], to: &[[f64; 2]]) {
+        let points = |places: &[[f64; 2]]| {
+            let places = places.iter().enumerate();
+            let points = places.map(|(id, [x, y])| json!({ "x": x, "y": y, "id": id }));
+            points.collect::<Vec<_>>()
+        };
+        for (kind, places) in [("touchStart", from), ("touchMove", to), ("touchEnd", &[])] {
+            let params = json!({ "type": kind, "touchPoints": points(places) });
+            self.call("Input.dispatchTouchEvent", &params);
         }
     }
 
