@@ -8,20 +8,19 @@ use pyo3::prelude::*;
 use serde_json::{Value, json};
 
 use crate::alignment::NativeAlignment;
-use crate::compute::{EventSender, compute_with_events};
+use crate::compute::compute_with_events;
 use crate::failure::{project_failure, raise, wrong_argument};
+use crate::hearing::{Heard, Hearing};
 use crate::mesh::unit as mesh_unit;
 use crate::{log, stored_block, stored_pair};
 use mocban_catalog::{NewVerdict, ReviewContext};
 use mocban_core::domain::cancel::CancelToken;
 use mocban_core::domain::{ContentHash, ErrorCode, ThresholdMetric, any_case};
 use mocban_export::{ExportFormat, ExportOptions};
-use mocban_project::events::{Listener, ProjectEvent};
 use mocban_project::import_blocks::ImportedBlock;
-use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
+use mocban_project::import_pairs::AllowedChanges;
 use mocban_project::input_paths::in_existing_form;
 use mocban_project::location::Location;
-use mocban_project::pair_choices::PairChoices;
 use mocban_project::report::{ReportOptions, report};
 use mocban_project::run::{PreparedRun, options};
 use mocban_project::status::ProjectStatus;
@@ -35,25 +34,6 @@ use mocban_runner::{Stop, StopLevel};
 #[pyclass(frozen, module = "mocban._native")]
 pub(crate) struct NativeProject {
     location: Location,
-}
-
-/// An event in JSON: of a run, or a warning.
-enum Heard {
-    Run(String),
-    Warning(String),
-}
-
-/// Sends the events of a function to Python.
-struct Hearing(EventSender<Heard>);
-
-impl Listener for Hearing {
-    fn event(&self, event: ProjectEvent<'_>) {
-        match event {
-            ProjectEvent::Run(event) => self.0.send(Heard::Run(json!(event).to_string())),
-            ProjectEvent::Warning(text) => self.0.send(Heard::Warning(text)),
-            ProjectEvent::Begun(_) | ProjectEvent::Ended => {}
-        }
-    }
 }
 
 /// Parses an argument, such as the name of a format, in any case.
@@ -275,34 +255,13 @@ impl NativeProject {
         allow_changed_files: bool,
         replace: bool,
     ) -> PyResult<String> {
+        let allowed = AllowedChanges {
+            missing: allow_missing,
+            files: allow_changed_files,
+            replace,
+        };
         self.simple(py, move |location, hearing| async move {
-            let import = PairImport {
-                source: PairSource::List {
-                    file,
-                    bytes: Some(rows),
-                },
-                truth: None,
-                allowed: AllowedChanges {
-                    missing: allow_missing,
-                    files: allow_changed_files,
-                    replace,
-                },
-                choices: PairChoices::default(),
-            };
-            let outcome = import_pairs(import, &location, &hearing).await?;
-            let summary = outcome.summary;
-            let changed = summary.changed.iter().map(|pair| pair.name.to_string());
-            let counts = json!({
-                "added": summary.added,
-                "changed": changed.collect::<Vec<_>>(),
-                "unchanged": summary.unchanged,
-                "retired": summary.retired,
-                "restored": summary.restored,
-                "still_retired": summary.still_retired,
-                "missing_files": outcome.missing.lines,
-                "warnings": outcome.warnings,
-            });
-            Ok(counts.to_string())
+            stored_pair::import(file, rows, allowed, &location, &hearing).await
         })
     }
 

@@ -1,4 +1,8 @@
-//! A pair of a project: its numbers, and its alignment from the stored files.
+//! A pair of a project: its import, its numbers, and its alignment from the stored files.
+
+use std::path::PathBuf;
+
+use serde_json::json;
 
 use crate::state::NeededParts;
 use mocban_align::stages::normalize::PrintMasks;
@@ -8,7 +12,10 @@ use mocban_core::InputLimits;
 use mocban_core::domain::artifact_role::stroke_map;
 use mocban_core::domain::{JobStatus, NormalizeOutcome, RegisterOutcome, Stage};
 use mocban_export::SourcePrint;
+use mocban_project::events::Listener;
+use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
 use mocban_project::location::Location;
+use mocban_project::pair_choices::PairChoices;
 use mocban_project::{ProjectError, ProjectResult, Refusal, selection};
 use mocban_results::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_store::Project;
@@ -19,6 +26,39 @@ pub(crate) async fn detail(id: &str, location: &Location) -> ProjectResult<PairD
     let detail = read(&catalog, id).await;
     catalog.close().await;
     detail
+}
+
+/// Imports rows in JSON Lines. Returns what changed, in JSON.
+pub(crate) async fn import(
+    file: PathBuf,
+    rows: Vec<u8>,
+    allowed: AllowedChanges,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<String> {
+    let import = PairImport {
+        source: PairSource::List {
+            file,
+            bytes: Some(rows),
+        },
+        truth: None,
+        allowed,
+        choices: PairChoices::default(),
+    };
+    let outcome = import_pairs(import, location, listener).await?;
+    let summary = outcome.summary;
+    let changed = summary.changed.iter().map(|pair| pair.name.to_string());
+    let counts = json!({
+        "added": summary.added,
+        "changed": changed.collect::<Vec<_>>(),
+        "unchanged": summary.unchanged,
+        "retired": summary.retired,
+        "restored": summary.restored,
+        "still_retired": summary.still_retired,
+        "missing_files": outcome.missing.lines,
+        "warnings": outcome.warnings,
+    });
+    Ok(counts.to_string())
 }
 
 async fn read(catalog: &Catalog, id: &str) -> ProjectResult<PairDetail> {
