@@ -27,7 +27,7 @@ fn start() -> (tempfile::TempDir, Page) {
 }
 
 /// Starts the app and opens its session.
-fn start_entered() -> (tempfile::TempDir, Page) {
+pub(crate) fn start_entered() -> (tempfile::TempDir, Page) {
     let (dir, page) = start();
     (dir, page.entered())
 }
@@ -38,7 +38,7 @@ fn invitation(reviewer: &str) -> Value {
 }
 
 /// Invites a reviewer and returns the links of all invitations that were not opened.
-fn invite(page: &Page, reviewer: &str) -> Vec<String> {
+pub(crate) fn invite(page: &Page, reviewer: &str) -> Vec<String> {
     let reply = act(page, "/p/p/actions/review", &invitation(reviewer), |_| {});
     assert_eq!(reply.status, 200, "{}", text(&reply));
     links(page)
@@ -53,7 +53,7 @@ fn links(page: &Page) -> Vec<String> {
 }
 
 /// Opens a link as a browser does.
-fn open(url: &str) -> Site {
+pub(crate) fn open(url: &str) -> Site {
     let mut site = Site::closed(url);
     site.enter_as_guest();
     site

@@ -32,6 +32,7 @@ mod app_print;
 mod app_read_only;
 mod app_restore;
 mod app_resume_browser;
+mod app_routes;
 mod app_sentences;
 #[cfg(unix)]
 mod app_shared;
