@@ -19,6 +19,8 @@ mod app_import;
 mod app_import_files;
 mod app_invitations;
 #[cfg(target_os = "linux")]
+mod app_killed_actions;
+#[cfg(target_os = "linux")]
 mod app_kills;
 mod app_language;
 mod app_lists;
