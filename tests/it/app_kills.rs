@@ -6,6 +6,8 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::{Value, json};
 
 use crate::app::{act, app, open_app, text, token};
+use crate::app_killed_actions::killed_actions;
+use crate::app_routes::{REVIEW_ROUTES, ROUTES, writes};
 use crate::block_correction::{CorrectionSession, printed_side, refused_block, true_points};
 use crate::cli::mocban;
 use crate::fault::Fault;
@@ -124,6 +126,25 @@ fn a_killed_demo_is_whole_after_the_next_click() {
     mocban(&project, &["check"]).expect(0);
 }
 
+/// Returns whether the block `b1` has control points.
+fn has_points(page: &Page) -> bool {
+    text(&page.get("/p/p/block/b1/")).contains("places were chosen by a person")
+}
+
+/// Kills an app that removes control points, and removes them with the next one.
+fn kill_removal(root: &Path, saved_hash: &Value) {
+    let remove = "/p/p/block/b1/view/correct/remove";
+    let body = json!({ "saved_hash": saved_hash });
+    let held = HeldApp::start(root, Fault::slow("write", LOG, UNTIL_KILLED), 1);
+    let token = token(&held.page);
+    held.kill_in(remove, token, &body);
+    let next = open_app(root);
+    assert!(has_points(&next), "nothing is half removed");
+    let removed = act(&next, remove, &body, |_| {});
+    assert_eq!(removed.status, 200, "{}", text(&removed));
+    assert!(!has_points(&next));
+}
+
 #[test]
 fn killed_control_points_are_saved_by_the_next_app_or_not_at_all() {
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -136,20 +157,59 @@ fn killed_control_points_are_saved_by_the_next_app_or_not_at_all() {
         let id = session.tried(side, &true_points(&root, &block));
         (session, id)
     };
-    let is_saved = |page: &Page| {
-        let block = text(&page.get("/p/p/block/b1/"));
-        block.contains("places were chosen by a person")
-    };
     let HeldApp { page, notes } = HeldApp::start(&root, Fault::slow("write", LOG, UNTIL_KILLED), 1);
     let (session, id) = tried(page);
     let (page, token) = (session.page, session.token);
     let body = json!({"id": id, "saved_hash": null});
     HeldApp { page, notes }.kill_in("/p/p/block/b1/view/correct/save", token, &body);
     let next = open_app(&root);
-    assert!(!is_saved(&next), "nothing is half saved");
+    assert!(!has_points(&next), "nothing is half saved");
     let (session, id) = tried(next);
     let saved = session.save(id, &Value::Null);
     assert_eq!(saved.status, 200, "{}", text(&saved));
-    assert!(is_saved(&session.page));
+    assert!(has_points(&session.page));
+    let saved_hash = saved.json()["saved_hash"].clone();
+    drop(session);
+    kill_removal(&root, &saved_hash);
     mocban(&root.join("p"), &["check"]).expect(0);
+}
+
+/// Actions that are killed in another test, and those that leave nothing half done.
+const OTHER_ACTIONS: [(&str, &str); 13] = [
+    ("/actions/demo", "above"),
+    ("/actions/restore", "app_restore.rs"),
+    ("/actions/upload", "app_uploads.rs"),
+    ("/actions/upload-end", "app_uploads.rs"),
+    ("/uploads/1/x", "app_uploads.rs and app_upload_resume.rs"),
+    ("/p/p/actions/check", "above"),
+    ("/p/p/actions/run", "app_browser.rs: its process goes on"),
+    ("/p/p/actions/stop", "a signal to the process of the run"),
+    ("/p/p/actions/review", "it opens a page or makes a link"),
+    ("/p/p/actions/invitation", "a link ends with the app"),
+    ("/correct/try", "it stores nothing"),
+    ("/correct/save", "above"),
+    ("/correct/remove", "above"),
+];
+/// The routes of the page on which the alignment of a block is corrected.
+const CORRECTION_ROUTES: &str = include_str!("../../crates/pages/src/view/correction_page.rs");
+
+/// A new action must be killed in a test, too.
+#[test]
+fn every_action_of_the_app_is_killed_in_a_test() {
+    let killed = killed_actions();
+    let is_known = |path: &str| {
+        killed.iter().any(|known| known.ends_with(path))
+            || OTHER_ACTIONS.iter().any(|(known, _)| *known == path)
+    };
+    // The pages of a block and a review are passed on to their own routes.
+    let is_passed_on = |path: &str| path.contains("/block/") || path.contains("/lan/");
+    let of_app = writes(ROUTES)
+        .into_iter()
+        .filter(|path| !is_passed_on(path));
+    let unknown: Vec<String> = of_app
+        .chain(writes(REVIEW_ROUTES))
+        .chain(writes(CORRECTION_ROUTES))
+        .filter(|path| !is_known(path))
+        .collect();
+    assert_eq!(unknown, [""; 0]);
 }

@@ -13,9 +13,9 @@ use crate::page::{Page, Site, read_project, send};
 use crate::source_text::source_files;
 
 /// The routes of the app.
-const ROUTES: &str = include_str!("../../crates/pages/src/app/routes.rs");
+pub(crate) const ROUTES: &str = include_str!("../../crates/pages/src/app/routes.rs");
 /// The routes of a review, which a guest has.
-const REVIEW_ROUTES: &str = include_str!("../../crates/pages/src/review/routes.rs");
+pub(crate) const REVIEW_ROUTES: &str = include_str!("../../crates/pages/src/review/routes.rs");
 /// Values for the parts of an address that have a name; others are `x`.
 const VALUES: [(&str, &str); 6] = [
     ("project", "p"),
@@ -71,6 +71,14 @@ fn requests(source: &str) -> Vec<RouteRequest> {
         }));
     }
     found
+}
+
+/// Returns the paths to which the routes of a source file let a page write.
+#[cfg(target_os = "linux")]
+pub(crate) fn writes(source: &str) -> Vec<String> {
+    let writes = requests(source).into_iter();
+    let writes = writes.filter(|request| request.method == "POST");
+    writes.map(|request| request.path).collect()
 }
 
 /// Returns an address of the source with a value for each of its parts.
