@@ -26,7 +26,8 @@ fn click(tab: &Tab<'_>, element: &str, shown: &str) {
     tab.wait(shown);
 }
 
-fn on_page(section: &str) -> String {
+/// The page of a section is shown.
+pub(crate) fn on_page(section: &str) -> String {
     format!("document.body?.dataset.ready && location.pathname.endsWith('{section}')")
 }
 

@@ -16,27 +16,31 @@ const SMALLEST: u32 = 44;
 pub(crate) const SHOWN: &str = "document.body?.dataset.ready && !document.querySelector('#choice:not([data-ready])') && [...document.querySelectorAll('[data-load]')].every((part) => part.dataset.loaded)";
 
 /// Pages of the app.
-pub(crate) const PAGES: [&str; 17] = [
+pub(crate) const PAGES: [&str; 21] = [
     "",
     "p/p/",
     "p/p/pairs",
     "p/p/pairs?view=table&compare=density",
     "p/p/pairs?state=retired",
+    "p/p/pairs?state=failed",
     "p/p/pairs?id=nobody",
     "p/p/pair/upright-0000/?compare=density",
+    "p/p/pair/upright-0000/?compare=paper",
+    "p/p/pair/upright-0007/",
     "p/p/pair/broken/",
     "p/p/blocks",
     "p/p/review",
     "p/p/report",
     "p/p/export",
     "import",
+    "import?project=p&mend=broken",
     "restore",
     "p/p/settings?key=run.workers&value=3",
     "p/p/health",
     "p/nowhere/",
 ];
 
-/// Makes a project with a failed and a retired pair.
+/// Makes a project with a failed and a retired pair, a saved view and a backup.
 pub(crate) fn varied_project(dir: &tempfile::TempDir) {
     let project = read_project(dir);
     std::fs::write(project.dir().join("broken.stl"), "solid x").expect("written");
@@ -45,6 +49,9 @@ pub(crate) fn varied_project(dir: &tempfile::TempDir) {
     mocban(project.dir(), &["import", "more.csv"]).expect(0);
     mocban(project.dir(), &["run"]).expect(3);
     mocban(project.dir(), &["retire", "upright-0007"]).expect(0);
+    let views = r#"{"views":[{"name":"hỏng","list":"state=failed"}]}"#;
+    std::fs::write(project.dir().join("saved-views.json"), views).expect("written");
+    mocban(project.dir(), &["backup", "backups/backup.sqlite"]).expect(0);
 }
 
 /// Fails if a control that is shown is smaller than a finger. A link within a sentence is as high as its line.
@@ -124,19 +131,21 @@ fn every_control_of_the_views_of_a_block_fits_a_finger() {
     finished_block(dir.path());
     let page = Page::of(app(dir.path()).args(["--lang", "en"]));
     let (tab, home) = enter(&browser, &page, [1024, 768]);
-    tab.use_fingers([1024, 768]);
-    for (path, shown) in [
-        ("p/p/blocks", SHOWN),
-        ("p/p/block/b1/", SHOWN),
-        (
-            "p/p/block/b1/view/",
-            "window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100",
-        ),
-        ("p/p/block/b1/view/correct", "window.mocbanCorrection"),
-    ] {
-        tab.open(&format!("{home}{path}"));
-        tab.wait(shown);
-        fits_fingers(&tab, path);
+    let block = "window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100";
+    for size in [[400, 800], [1024, 768]] {
+        tab.use_fingers(size);
+        for (path, shown) in [
+            ("p/p/blocks", SHOWN),
+            ("p/p/block/b1/", SHOWN),
+            ("p/p/block/b1/view/", block),
+            ("p/p/block/b1/view/correct", "window.mocbanCorrection"),
+        ] {
+            tab.open(&format!("{home}{path}"));
+            tab.wait(shown);
+            fits_fingers(&tab, &format!("{path} {size:?}"));
+            let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
+            assert!(overflow.as_f64() <= Some(0.0), "{path}: {overflow}");
+        }
     }
 }
 

@@ -41,10 +41,14 @@ fn every_page_fits_a_phone_in_both_languages() {
     let page = Page::of(&mut app(dir.path()));
     let (tab, home) = enter(&browser, &page, PHONE);
     tab.use_fingers(PHONE);
-    let data = dir.path().canonicalize().expect("a path").join("p/data");
-    let data = data.to_str().expect("UTF-8");
+    let project = dir.path().canonicalize().expect("a path").join("p");
+    let project = project.to_str().expect("UTF-8");
+    let data = format!("{project}/data");
     let preview = format!("import?project=p&meshes={data}/meshes&prints={data}/prints");
-    for path in PAGES.iter().copied().chain([preview.as_str()]) {
+    let list = format!("import?project=new&list={data}/manifest.csv");
+    let restore = format!("restore?backup={project}/backups/backup.sqlite");
+    let more = [&preview, &list, &restore].map(String::as_str);
+    for path in PAGES.into_iter().chain(more) {
         for language in ["en", "vi"] {
             let join = if path.contains('?') { '&' } else { '?' };
             tab.open(&format!("{home}{path}{join}language={language}"));

@@ -12,6 +12,7 @@ impl Tab<'_> {
     pub(crate) fn press(&self, code: &str, with_shift: bool) {
         let (key, number) = match code {
             "Tab" => (code, 9),
+            "Enter" => (code, 13),
             "Space" => (" ", 32),
             "ArrowLeft" => (code, 37),
             "ArrowUp" => (code, 38),
@@ -19,11 +20,20 @@ impl Tab<'_> {
             "ArrowDown" => (code, 40),
             other => unreachable!("no test presses {other}"),
         };
-        for kind in ["rawKeyDown", "keyUp"] {
-            let event = json!({
+        // Buttons react to the character of Enter.
+        let down = if code == "Enter" {
+            "keyDown"
+        } else {
+            "rawKeyDown"
+        };
+        for kind in [down, "keyUp"] {
+            let mut event = json!({
                 "type": kind, "code": code, "key": key, "windowsVirtualKeyCode": number,
                 "modifiers": SHIFT * u8::from(with_shift),
             });
+            if kind == "keyDown" {
+                event["text"] = json!("\r");
+            }
             self.call("Input.dispatchKeyEvent", &event);
         }
     }

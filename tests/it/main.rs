@@ -14,6 +14,7 @@ mod app_choice;
 mod app_choice_browser;
 mod app_controls;
 mod app_curator;
+mod app_devices;
 mod app_export_zip;
 mod app_import;
 mod app_import_files;

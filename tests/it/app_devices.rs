@@ -1,0 +1,167 @@
+//! The app with one kind of device: from a folder of files to the report by touch alone on a phone, and by keys alone.
+
+use std::path::Path;
+
+use crate::app::app;
+use crate::app_browser::{enter, on_page};
+use crate::app_controls::SHOWN;
+use crate::browser::{Browser, Tab};
+use crate::cli::mocban;
+use crate::page::{Page, read_project};
+use crate::review_browser::{accepts_an_answer, judge, saved, shown};
+
+/// Number of pairs, each of which is judged.
+const PAIRS: usize = 5;
+/// Most times that a person presses Tab to reach a control.
+const MOST_TABS: usize = 200;
+/// The first item of the review is shown.
+const ITEM: &str = "document.body?.dataset.shown && document.getElementById('canvas')";
+
+/// Makes a folder with scans, prints and a list of some of them.
+fn files(dir: &Path) {
+    let from = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&from);
+    std::fs::rename(project.dir().join("data"), dir.join("data")).expect("moved");
+    let all = std::fs::read_to_string(dir.join("data/manifest.csv")).expect("a manifest");
+    let some: Vec<&str> = all.lines().take(1 + PAIRS).collect();
+    std::fs::write(dir.join("data/some.csv"), some.join("\n")).expect("written");
+}
+
+/// A person at the app.
+struct Curator<'t, 'b> {
+    tab: &'t Tab<'b>,
+    /// Uses a control.
+    activate: fn(&Tab<'_>, &str),
+    /// Moves into a field.
+    focus: fn(&Tab<'_>, &str),
+    /// Closes the guide of a first review.
+    close_guide: fn(&Tab<'_>),
+    /// Passes the item that is shown.
+    pass: fn(&Tab<'_>),
+}
+
+impl Curator<'_, '_> {
+    /// Uses a control, and waits for what follows.
+    fn use_control(&self, control: &str, follows: &str) {
+        (self.activate)(self.tab, control);
+        self.tab.wait(follows);
+    }
+
+    /// Types into a field.
+    fn write(&self, field: &str, text: &str) {
+        (self.focus)(self.tab, field);
+        self.tab.text(text);
+        let value = format!("document.querySelector(`{field}`).value === '{text}'");
+        self.tab.wait(&value);
+    }
+
+    /// Goes from a folder to the report of its pairs.
+    fn comes_to_the_report(&self, dir: &Path) {
+        let on_page = |section: &str| format!("{} && {SHOWN}", on_page(section));
+        self.use_control("main a[href=import]", &on_page("/import"));
+        let folder = "main a[href$='data'][href*='path=']";
+        let listed = "a.button[href*='some.csv']";
+        let shows_list = format!("{SHOWN} && document.querySelector(`{listed}`)");
+        self.use_control(folder, &shows_list);
+        let is_planned = format!("{SHOWN} && document.querySelector('#import')");
+        self.use_control(listed, &is_planned);
+        self.write("#project", "p");
+        self.use_control("#import", &on_page("/p/p/"));
+        let all = format!("document.querySelector('a.figure.good b')?.textContent === '{PAIRS}'");
+        self.use_control("#start", &all);
+        self.tab
+            .wait("!document.querySelector('#stop') && document.querySelector('#start')");
+        self.use_control("nav a[href$='/review']", &on_page("/review"));
+        self.write("#reviewer", "lan");
+        self.use_control("form.action .primary", ITEM);
+        self.tab.wait("document.querySelector('#guide[open]')");
+        (self.close_guide)(self.tab);
+        self.tab.wait("!document.querySelector('dialog[open]')");
+        for _ in 0..PAIRS {
+            // An image must be shown for some time before an answer is accepted.
+            self.tab.eval("window.since = Date.now(), null");
+            self.tab.wait("Date.now() - window.since > 400");
+            (self.pass)(self.tab);
+        }
+        saved(self.tab);
+        self.use_control("header a", &on_page("/p/p/"));
+        self.use_control("nav a[href$='/report']", &on_page("/report"));
+        self.tab.wait("document.querySelector('#numbers table')");
+        let status = mocban(&dir.join("p"), &["status", "--json"]).expect(0);
+        let status = status.json();
+        assert_eq!(status["jobs"]["done"], PAIRS);
+        // Some of the items are attention checks, or come twice.
+        let passed = status["verdicts"]["pass"].as_u64();
+        assert!(passed > Some(1), "{status}");
+    }
+}
+
+/// Taps on the verdict.
+fn tap_pass(tab: &Tab<'_>) {
+    let before = shown(tab);
+    accepts_an_answer(tab);
+    tab.tap("button.verdict[data-action=pass]");
+    tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
+}
+
+#[test]
+fn a_folder_comes_to_its_report_by_touch_alone_on_a_phone() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    files(dir.path());
+    let page = Page::of(app(dir.path()).args(["--lang", "vi"]));
+    let size = [400, 800];
+    let (tab, home) = enter(&browser, &page, size);
+    tab.use_fingers(size);
+    tab.open(&home);
+    tab.wait(SHOWN);
+    let curator = Curator {
+        tab: &tab,
+        activate: |tab, control| tab.tap(control),
+        focus: |tab, field| tab.tap(field),
+        close_guide: |tab| tab.tap("#guide form.title button"),
+        pass: tap_pass,
+    };
+    curator.comes_to_the_report(dir.path());
+    let aside = tab.eval("document.documentElement.scrollWidth - innerWidth");
+    assert_eq!(aside, 0, "the report scrolls sideways");
+}
+
+/// Presses Tab until a control has the focus.
+fn tab_to(tab: &Tab<'_>, control: &str) {
+    let is_there = format!("Boolean(document.activeElement?.matches(`{control}`))");
+    for _ in 0..MOST_TABS {
+        if tab.eval(&is_there) == true {
+            return;
+        }
+        tab.press("Tab", false);
+    }
+    unreachable!("{control} is not reached with the key Tab");
+}
+
+/// Moves to a control with Tab, and presses Enter.
+fn press_enter(tab: &Tab<'_>, control: &str) {
+    tab_to(tab, control);
+    tab.press("Enter", false);
+}
+
+#[test]
+fn a_folder_comes_to_its_report_with_the_keyboard_alone() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    files(dir.path());
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, _) = enter(&browser, &page, [1280, 800]);
+    let curator = Curator {
+        tab: &tab,
+        activate: press_enter,
+        focus: tab_to,
+        close_guide: |tab| tab.key("Escape"),
+        pass: |tab| judge(tab, "KeyP"),
+    };
+    curator.comes_to_the_report(dir.path());
+}
