@@ -27,8 +27,8 @@ and of the first request for the page. A part is loaded by its page after the pa
 memory of the app after the page.";
 
 /// Pages below the project.
-const PAGES: [(&str, &str); 21] = [
-    ("Run", ""),
+const PAGES: [(&str, &str); 22] = [
+    ("Run, with the worst of the hour", ""),
     ("Pairs", "pairs"),
     ("Pairs, table", "pairs?view=table"),
     ("Pairs, aligned", "pairs?state=aligned"),
@@ -46,6 +46,7 @@ const PAGES: [(&str, &str); 21] = [
     ("Pairs, no match", "pairs?block=nowhere"),
     ("Pairs, retired", "pairs?state=retired"),
     ("Pair", "pair/p00000001/"),
+    ("Pair, two metrics", "pair/p00000001/?compare=density"),
     ("Blocks", "blocks"),
     ("Review", "review"),
     ("Report", "report"),
@@ -57,11 +58,17 @@ const PAGES: [(&str, &str); 21] = [
     ("Health", "health"),
 ];
 /// Parts that pages load after they are shown.
-const PARTS: [(&str, &str); 3] = [
+const PARTS: [(&str, &str); 4] = [
     ("part: newest import", "last-import"),
+    ("part: size of scans and prints", "health/inputs"),
     ("part: agreement", "review/agreement"),
     ("part: numbers of the report", "report/numbers"),
 ];
+
+/// Views of the project, as many as can be saved.
+const VIEWS: usize = 100;
+/// Pairs of a list that is imported into the project, with files of its first pairs.
+const LISTED: usize = 200;
 
 /// The app in a process of its own, with the session of a browser.
 struct App {
@@ -88,13 +95,13 @@ pub(super) async fn table(options: &Options) -> anyhow::Result<String> {
         let catalog = world.catalog().await?;
         let (catalog, _) = filled(&world, catalog, pairs, WORKED).await?;
         catalog.close().await;
+        prepare(&world)?;
         let app = App::start(&world)?;
         let project = world.project.dir().file_name().context("a name")?;
-        let project = format!("p/{}/", project.to_str().context("a name in UTF-8")?);
+        let project = project.to_str().context("a name in UTF-8")?;
         let below = PAGES.iter().chain(&PARTS);
-        let below = below.map(|(name, page)| (*name, format!("{project}{page}")));
-        let others = ["Home", "Import"].into_iter().zip(["", "import"]);
-        let others = others.map(|(name, page)| (name, page.to_owned()));
+        let below = below.map(|(name, page)| (*name, format!("p/{project}/{page}")));
+        let others = others(&world, project)?.into_iter();
         for (name, page) in others.chain(below) {
             let first = app.first_byte(&page)?;
             let mut spread = Spread::default();
@@ -116,6 +123,49 @@ pub(super) async fn table(options: &Options) -> anyhow::Result<String> {
         }
     }
     Ok(table.render(NOTE))
+}
+
+/// Saves views, retires pairs, and makes a backup and a list.
+fn prepare(world: &World) -> anyhow::Result<()> {
+    let dir = world.project.dir();
+    let views = (0..VIEWS).map(|number| {
+        serde_json::json!({ "name": format!("{number:02}"), "list": format!("block=b{number}") })
+    });
+    let views = serde_json::json!({ "views": views.collect::<Vec<_>>() });
+    std::fs::write(dir.join("saved-views.json"), views.to_string())?;
+    world.run(&["retire", "p00000002", "p00000003"])?;
+    let backup = dir.join("backups/backup.sqlite");
+    world.run(&["backup", backup.to_str().context("a path in UTF-8")?])?;
+    let rows = (0..LISTED).map(|number| format!("p{number:08},mesh.stl,print.png\n"));
+    let list = format!("id,mesh,print\n{}", rows.collect::<String>());
+    std::fs::write(dir.join("listed.csv"), list)?;
+    Ok(())
+}
+
+/// Returns pages and parts that are not below the project.
+fn others(world: &World, project: &str) -> anyhow::Result<Vec<(&'static str, String)>> {
+    let dir = world.project.dir().canonicalize()?;
+    let dir = dir.to_str().context("a path in UTF-8")?;
+    let list = format!("project={project}&list={dir}/listed.csv");
+    Ok(vec![
+        ("Home", String::new()),
+        ("Import", "import".to_owned()),
+        (
+            "Import into the project",
+            format!("import?project={project}"),
+        ),
+        ("Import of a list", format!("import?{list}")),
+        ("Restore", "restore".to_owned()),
+        ("part: headers of files", format!("import/files?{list}")),
+        (
+            "part: files that cannot be used",
+            format!("import/problems?{list}"),
+        ),
+        (
+            "part: content of a backup",
+            format!("restore/content?backup={dir}/backups/backup.sqlite"),
+        ),
+    ])
 }
 
 impl App {
