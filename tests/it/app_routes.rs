@@ -294,6 +294,8 @@ impl OutsidePlaces {
 fn no_page_shows_files_outside_the_folders_of_the_user() {
     let places = OutsidePlaces::new();
     let page = places.open();
+    let inside = places.root().join("p/backups/backup.sqlite");
+    let inside = encode(inside.to_str().expect("UTF-8"));
     for paths in places.outside() {
         let [folder, list, backup] = paths.map(|path| encode(&path));
         let both = format!("project=new&meshes={folder}&prints={folder}");
@@ -311,6 +313,7 @@ fn no_page_shows_files_outside_the_folders_of_the_user() {
             format!("/restore?path={folder}"),
             format!("/restore?backup={backup}"),
             format!("/restore/content?backup={backup}"),
+            format!("/restore/content?backup={inside}&inputs={folder}"),
         ] {
             let said = text(&page.get(&address));
             assert!(!said.contains(SECRET), "{address}: {said}");

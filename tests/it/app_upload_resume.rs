@@ -7,7 +7,7 @@ use std::path::Path;
 use mocban::workbook::test_helpers::archive;
 use serde_json::{Value, json};
 
-use crate::app::{act, app, text};
+use crate::app::{act, app, open_app, text};
 use crate::app_uploads::{begin, empty_app, end, file_path, headers, put, refusal, stored};
 use crate::page::{Page, Reply, send};
 use crate::waiting::wait_until;
@@ -203,4 +203,28 @@ fn an_interrupted_upload_is_not_mixed_with_other_files() {
         refused.contains("other uploads are in progress"),
         "{refused}"
     );
+}
+
+#[test]
+fn an_app_that_is_stopped_in_the_middle_of_a_file_leaves_nothing_that_counts() {
+    let (dir, mut page) = empty_app();
+    let (upload, _) = begun_with(&page, "quét", 2);
+    put_modified(&page, &upload, "1.stl", b"solid 1", 5);
+    let stream = begin_file(&page, &upload, "2.stl");
+    let stop = rustix::process::Signal::TERM;
+    rustix::process::kill_process(page.pid(), stop).expect("stopped");
+    page.exit_code();
+    drop(stream);
+    let left = stored(dir.path());
+    let is_hidden = |path: &String| path.starts_with(".new.");
+    assert!(left.iter().all(is_hidden), "nothing counts: {left:?}");
+    let next = open_app(dir.path());
+    assert_eq!(stored(dir.path()), [""; 0]);
+    let (upload, arrived) = begun_with(&next, "quét", 2);
+    assert_eq!(arrived, json!([]));
+    for (file, bytes) in [("1.stl", b"solid 1"), ("2.stl", b"solid 2")] {
+        put_modified(&next, &upload, file, bytes, 5);
+    }
+    assert_eq!(end(&next, &upload, "finish").status, 200);
+    assert_eq!(stored(dir.path()), ["quét/1.stl", "quét/2.stl"]);
 }

@@ -143,11 +143,8 @@ async fn backup_lines(location: Location, with_inputs: bool) -> ProjectResult<Fi
         format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({vietnamese})."),
     ]];
     lines.extend(stored.inputs.as_ref().map_or_else(Vec::new, inputs_lines));
-    Ok(FinishedTask {
-        lines,
-        is_warning: stored.inputs.is_some_and(|inputs| inputs.left_out > 0),
-        lacks_most_files: false,
-    })
+    let is_warning = stored.inputs.is_some_and(|inputs| inputs.left_out > 0);
+    Ok(FinishedTask::new(lines, is_warning))
 }
 
 /// Says which scans and prints were saved, and which were not.

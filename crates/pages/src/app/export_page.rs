@@ -274,11 +274,8 @@ async fn run(
         let vietnamese = vietnamese(&line).unwrap_or_else(|| line.clone());
         lines.push([line, vietnamese]);
     }
-    Ok(FinishedTask {
-        is_warning: is_empty || summary.kept_earlier || !summary.unreadable.is_empty(),
-        lacks_most_files: false,
-        lines,
-    })
+    let is_warning = is_empty || summary.kept_earlier || !summary.unreadable.is_empty();
+    Ok(FinishedTask::new(lines, is_warning))
 }
 
 /// Responds with a file of an export. Only files that the page lists are found.

@@ -175,10 +175,10 @@ async fn check_lines(location: Location, options: CheckOptions) -> ProjectResult
             lines.push(what.map(|what| format!("{} {what}: {first}", grouped(notes.count))));
         }
     }
+    let is_damaged = summary.left() > 0;
     Ok(FinishedTask {
-        lines,
-        is_warning: summary.left() > 0,
-        lacks_most_files: summary.left() > 0 && summary.lacks_most_files(),
+        lacks_most_files: is_damaged && summary.lacks_most_files(),
+        ..FinishedTask::new(lines, is_damaged)
     })
 }
 

@@ -267,11 +267,8 @@ fn finished(
                 .map(|language| failure.text(language).to_owned()),
         );
     }
-    FinishedTask {
-        is_warning: missing.is_some() || failure.is_some() || restored.elsewhere > 0,
-        lacks_most_files: false,
-        lines,
-    }
+    let is_warning = missing.is_some() || failure.is_some() || restored.elsewhere > 0;
+    FinishedTask::new(lines, is_warning)
 }
 
 /// Says how much was copied into the project, and whether it needs no other folder.

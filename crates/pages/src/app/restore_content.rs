@@ -34,9 +34,11 @@ pub(super) async fn part(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let folder = state.options.folder.clone();
-    let given = visit.query.get("backup").unwrap_or_default().to_owned();
+    let given = |name| visit.query.get(name).unwrap_or_default().to_owned();
+    let (backup, inputs) = (given("backup"), given("inputs"));
     let read =
-        read_on_thread(async move || Ok::<_, ProjectError>(read(&folder, &given).await)).await;
+        read_on_thread(async move || Ok::<_, ProjectError>(read(&folder, &backup, &inputs).await));
+    let read = read.await;
     let part = match read? {
         Ok((content, name)) => content_part(&visit, &state.options.folder, &content, &name),
         Err(failure) => html! { p.notice.bad role="alert" { (failure.text(visit.language)) } },
@@ -44,10 +46,15 @@ pub(super) async fn part(
     Ok(Html(part.into_string()))
 }
 
-/// Reads a backup. Returns its content, and a name for the new project.
-async fn read(folder: &Path, given: &str) -> AppResult<(BackupContent, String)> {
-    let backup = chosen_path(&PickerRoots::new(folder), given)?;
+/// Reads a backup. Returns its content, and a name for the new project. Refuses `inputs`, the folder in which files are looked
+/// for, as the restore would.
+async fn read(folder: &Path, given: &str, inputs: &str) -> AppResult<(BackupContent, String)> {
+    let roots = PickerRoots::new(folder);
+    let backup = chosen_path(&roots, given)?;
     check_backup_file(&backup)?;
+    if !inputs.is_empty() {
+        roots.allowed(Path::new(inputs))?;
+    }
     let name = free_name(folder, &backup);
     let content: ProjectResult<BackupContent> = backup_content(&backup, &folder.join(&name)).await;
     let content = content

@@ -28,8 +28,19 @@ pub(super) struct FinishedTask {
     pub(super) lines: TaskLines,
     /// Whether the lines say that something is wrong.
     pub(super) is_warning: bool,
-    /// Whether most files of results are missing, which a button then computes again.
+    /// Whether a check found that most files of results are missing, which a button then computes again.
     pub(super) lacks_most_files: bool,
+}
+
+impl FinishedTask {
+    /// Returns what a task has done that checks no files of results.
+    pub(super) fn new(lines: TaskLines, is_warning: bool) -> Self {
+        Self {
+            lines,
+            is_warning,
+            lacks_most_files: false,
+        }
+    }
 }
 
 /// What became of a task.
