@@ -231,7 +231,7 @@ fn view(action: &str) -> Value {
     json!({"action": action, "view": view, "name": name, "list": "state=failed"})
 }
 
-/// Actions that only start a run are not here: its process goes on.
+/// Actions that only start a run change nothing by themselves: `app_kills.rs` tests that their run goes on.
 const IN_CATALOG: [KilledAction; 13] = [
     KilledAction::in_catalog(
         "/p/p/actions/retry",

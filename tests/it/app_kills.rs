@@ -6,6 +6,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::{Value, json};
 
 use crate::app::{act, app, open_app, text, token};
+use crate::app_choice::import_more;
 use crate::app_killed_actions::killed_actions;
 use crate::app_routes::{REVIEW_ROUTES, ROUTES, writes};
 use crate::block_correction::{CorrectionSession, printed_side, refused_block, true_points};
@@ -126,6 +127,38 @@ fn a_killed_demo_is_whole_after_the_next_click() {
     mocban(&project, &["check"]).expect(0);
 }
 
+#[test]
+fn a_run_outlives_a_killed_app_and_is_stopped_and_resumed_by_the_next() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let root = dir.path().canonicalize().expect("a path");
+    import_more(&root, ["late".to_owned()]);
+    let hold = root.join("hold");
+    let mut command = app(&root);
+    command.env("MOCBAN_HOLD_AT", "fit:computed");
+    command.env("MOCBAN_HOLD_FILE", &hold);
+    let mut page = Page::of(&mut command).entered();
+    let send = |page: &Page, action: &str, body: &Value| {
+        let reply = act(page, &format!("/p/p/actions/{action}"), body, |_| {});
+        assert_eq!(reply.status, 200, "{action}: {}", text(&reply));
+    };
+    let all = json!({"which": "all"});
+    send(&page, "run", &all);
+    wait_until("the run is held", || hold.exists());
+    page.kill();
+    let project = root.join("p");
+    let status = || mocban(&project, &["status", "--json"]).expect(0).json();
+    assert_eq!(status()["running"], true, "the run goes on");
+    let next = open_app(&root);
+    send(&next, "stop", &json!({}));
+    std::fs::remove_file(&hold).expect("the run waits");
+    wait_until("the run ends", || status()["running"] == false);
+    assert_eq!(status()["jobs"]["leased"], 0);
+    send(&next, "run", &all);
+    wait_until("all pairs are done", || status()["jobs"]["done"] == 16);
+    mocban(&project, &["check"]).expect(0);
+}
+
 /// Returns whether the block `b1` has control points.
 fn has_points(page: &Page) -> bool {
     text(&page.get("/p/p/block/b1/")).contains("places were chosen by a person")
@@ -182,8 +215,8 @@ const OTHER_ACTIONS: [(&str, &str); 13] = [
     ("/actions/upload-end", "app_uploads.rs"),
     ("/uploads/1/x", "app_uploads.rs and app_upload_resume.rs"),
     ("/p/p/actions/check", "above"),
-    ("/p/p/actions/run", "app_browser.rs: its process goes on"),
-    ("/p/p/actions/stop", "a signal to the process of the run"),
+    ("/p/p/actions/run", "above"),
+    ("/p/p/actions/stop", "above"),
     ("/p/p/actions/review", "it opens a page or makes a link"),
     ("/p/p/actions/invitation", "a link ends with the app"),
     ("/correct/try", "it stores nothing"),

@@ -94,7 +94,7 @@ fn filled(address: &str) -> String {
     while let Some((before, rest)) = path.split_once('{') {
         let (name, after) = rest.split_once('}').expect("a name");
         let value = VALUES.iter().find(|(known, _)| *known == name);
-        let value = value.map_or("x", |(_, value)| value);
+        let value = value.map_or("x", |(_, value)| *value);
         path = format!("{before}{value}{after}");
     }
     path
