@@ -244,5 +244,5 @@ fn every_action_of_the_app_is_killed_in_a_test() {
         .chain(writes(CORRECTION_ROUTES))
         .filter(|path| !is_known(path))
         .collect();
-    assert_eq!(unknown, [""; 0]);
+    assert_eq!(unknown, [""; 0], "kill the app in these, too");
 }
