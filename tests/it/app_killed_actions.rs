@@ -32,7 +32,7 @@ struct KilledAction {
 }
 
 impl KilledAction {
-    /// An action that changes the catalog in one transaction.
+    /// Returns an action that changes the catalog in one transaction.
     const fn in_catalog(
         action: &'static str,
         body: fn(&Page, &Path) -> Value,
@@ -48,7 +48,7 @@ impl KilledAction {
         }
     }
 
-    /// An action that replaces a file.
+    /// Returns an action that replaces a file.
     const fn in_file(
         action: &'static str,
         body: fn(&Page, &Path) -> Value,
@@ -61,7 +61,7 @@ impl KilledAction {
         }
     }
 
-    /// The action after a change of the project.
+    /// Returns the action after a change of the project.
     const fn after(self, prepare: fn(&Path)) -> Self {
         Self { prepare, ..self }
     }
