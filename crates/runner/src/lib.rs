@@ -24,7 +24,7 @@
 //! (`RunContext::alive_since`), and the job has the token of the lease; a checkpoint of a pair on PostgreSQL also needs its
 //! stage. A release needs only worker and token. A checkpoint does not renew the lease. A repair, a new cut of its block and a
 //! recovery give a job a new token, and retiring a pair removes its job. A job is recovered when its worker has sent no
-//! heartbeat for 50 s (`timing.rs`), when a run starts alone on SQLite, or when its deadline is more than 60 s past and another
+//! heartbeat for 50 s (`Timing` in `run_context.rs`), when a run starts alone on SQLite, or when its deadline is more than 60 s past and another
 //! worker has read the catalog without a gap for two stage timeouts; a passed deadline alone ends nothing. On PostgreSQL, 7 s
 //! without lock and heartbeat are enough for a worker that has been connected, or has appeared, since the last gap in the reads
 //! of the process that recovers (`liveness.rs`).
@@ -98,7 +98,6 @@ mod stage_output;
 mod stop;
 #[cfg(test)]
 mod tests;
-mod timing;
 mod worker_session;
 
 pub use artifacts_owner::claim_artifacts;

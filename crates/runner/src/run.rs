@@ -21,13 +21,12 @@ use super::options::{RunOptions, RunPart};
 use super::pair_pipeline::{PairPipeline, PairStages};
 use super::policy;
 use super::retry::retried;
-use super::run_context::RunContext;
+use super::run_context::{Clock, RunContext, Timing};
 use super::run_end::{RunEnd, block_limits, compute, stop_waiting_after_stop};
 use super::run_guard::RunGuard;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::Stop;
-use super::timing::{Clock, Timing};
 use super::worker_session::this_process;
 use mocban_align::stages::Settings;
 use mocban_catalog::{

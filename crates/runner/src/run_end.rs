@@ -9,11 +9,10 @@ use super::error::RunError;
 use super::events::{BlockSummary, RunEvent, RunSummary};
 use super::options::RunOptions;
 use super::retry::retried;
-use super::run_context::RunContext;
+use super::run_context::{Clock, RunContext};
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::{Stop, StopLevel};
-use super::timing::Clock;
 use mocban_catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
 use mocban_core::domain::Stage;
 

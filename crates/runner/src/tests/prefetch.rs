@@ -6,7 +6,7 @@ use std::time::Duration;
 use tokio::time::timeout;
 
 use super::{RunFixture, name, options};
-use crate::timing::Clock;
+use crate::run_context::Clock;
 use crate::{RunEvent, RunOptions, StopLevel};
 use mocban_catalog::{Catalog, DeadWorker, Lease};
 use mocban_core::domain::{JobStatus, PairId, PairName, Stage, WorkerId};
