@@ -27,7 +27,7 @@
 //! heartbeat for 50 s (`Timing` in `run_context.rs`), when a run starts alone on SQLite, or when its deadline is more than 60 s past and another
 //! worker has read the catalog without a gap for two stage timeouts; a passed deadline alone ends nothing. On PostgreSQL, 7 s
 //! without lock and heartbeat are enough for a worker that has been connected, or has appeared, since the last gap in the reads
-//! of the process that recovers (`liveness.rs`).
+//! of the process that recovers (`Liveness` in `worker_session.rs`).
 //!
 //! | who finds out | by | refused by (in `crates/catalog/src`) | what happens |
 //! |---|---|---|---|
@@ -74,7 +74,6 @@ mod folder_check;
 mod free_memory;
 mod input_changes;
 mod input_reads;
-mod liveness;
 mod memory_budget;
 pub mod memory_estimate;
 mod options;
