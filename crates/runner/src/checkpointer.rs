@@ -12,7 +12,7 @@ use super::compute_thread::ComputedStage;
 use super::error::RunError;
 use super::events::RunEvent;
 use super::policy::{self, FailedAttempt};
-use super::run_context::{PairEnd, PairReport, RunContext};
+use super::run_context::{JobEnd, PairReport, RunContext};
 use super::stage_files::{Unwritten, write_batch};
 use mocban_catalog::{
     CheckpointOutcome, FailureAction, InputVersions, Lease, PairProvenance, StageFailure,
@@ -54,12 +54,12 @@ impl StoredStages {
     /// Ends the lease if it is still held. If something else has the name of a file, stores that as the failure of the
     /// stage; otherwise releases the pair. Returns `end`, but `LeaseLost` if the lease was lost, and `Released` if a stage
     /// could not be stored.
-    pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
+    pub(super) async fn finish(self, context: &RunContext, end: JobEnd) -> PairReport {
         let stages = self.stages;
         let end = match (self.lease, self.unwritten) {
             (CheckpointOutcome::Refused, _) => {
                 tracing::info!(pair = %self.pair, "no result of the pair is stored: its lease is lost, or its files were written too long ago");
-                Ok(PairEnd::LeaseLost)
+                Ok(JobEnd::LeaseLost)
             }
             (CheckpointOutcome::Lease(lease), Some(Unwritten::Blocked(stage, error))) => {
                 let failed = PairFailure {
@@ -74,10 +74,10 @@ impl StoredStages {
                 failed.store(context, lease).await
             }
             (CheckpointOutcome::Lease(lease), unwritten) => {
-                let end = unwritten.map_or(end, |_| PairEnd::Released);
+                let end = unwritten.map_or(end, |_| JobEnd::Released);
                 match context.catalog.release(lease).await {
                     Ok(true) => Ok(end),
-                    Ok(false) => Ok(PairEnd::LeaseLost),
+                    Ok(false) => Ok(JobEnd::LeaseLost),
                     Err(error) => Err(error.into()),
                 }
             }
@@ -124,9 +124,9 @@ impl Checkpointer {
 
     /// Waits until the task has stored the sent stages, and releases the lease if it is still held. Returns how the
     /// pair ended.
-    pub(super) async fn finish(self, end: PairEnd) -> PairReport {
+    pub(super) async fn finish(self, end: JobEnd) -> PairReport {
         let context = Arc::clone(&self.context);
-        let settled = if end == PairEnd::Done {
+        let settled = if end == JobEnd::Done {
             // Nothing waits for the last stages of this pair, so their commit may be delayed.
             drop(self.stages);
             task_result(self.task.await)
@@ -211,7 +211,7 @@ impl PairFailure {
         self,
         context: &RunContext,
         lease: Lease,
-    ) -> Result<PairEnd, RunError> {
+    ) -> Result<JobEnd, RunError> {
         let Self { stage, failure, .. } = self;
         let now = context.clock.now();
         let attempt = FailedAttempt {
@@ -238,7 +238,7 @@ impl PairFailure {
         };
         if !context.catalog.fail(lease, record).await? {
             tracing::info!(pair = %self.name, "the lease is lost, so its failure is not stored");
-            return Ok(PairEnd::LeaseLost);
+            return Ok(JobEnd::LeaseLost);
         }
         let pair = self.name;
         if action == FailureAction::Quarantine {
@@ -249,7 +249,7 @@ impl PairFailure {
                 failure,
                 skipped,
             });
-            return Ok(PairEnd::Failed);
+            return Ok(JobEnd::Failed);
         }
         context.emit(RunEvent::PairBackingOff {
             pair,
@@ -257,6 +257,6 @@ impl PairFailure {
             failure,
             wait_ms: action.wait_ms(now),
         });
-        Ok(PairEnd::Retry)
+        Ok(JobEnd::Retry)
     }
 }

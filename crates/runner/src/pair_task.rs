@@ -13,7 +13,7 @@ use super::folder_check::check_folders;
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::pair_context::{FileInUse, PairContext};
-use super::run_context::{PairEnd, PairReport, RunContext};
+use super::run_context::{JobEnd, PairReport, RunContext};
 use super::stop::{Stop, StopLevel};
 use mocban_catalog::{InputVersions, Lease, PairAttributes, PairWork};
 use mocban_core::domain::{Failure, FailureClass, Stage, WaitReason};
@@ -80,7 +80,7 @@ async fn compute(
                 match next {
                     Some(_) => {}
                     None if stage < context.until => {
-                        return PairOutcome::Ended(checkpointer.finish(PairEnd::Released).await);
+                        return PairOutcome::Ended(checkpointer.finish(JobEnd::Released).await);
                     }
                     None => return PairOutcome::Storing(checkpointer),
                 }
@@ -111,7 +111,7 @@ async fn compute(
             }
             ComputeEvent::Cancelled => return end_cancelled(checkpointer, thread).await,
             ComputeEvent::Stopped => {
-                return PairOutcome::Ended(checkpointer.finish(PairEnd::Released).await);
+                return PairOutcome::Ended(checkpointer.finish(JobEnd::Released).await);
             }
         }
     };
@@ -121,7 +121,7 @@ async fn compute(
 /// Cancels a pair whose later stages cannot be stored.
 async fn end_cancelled(checkpointer: Checkpointer, thread: ComputeThread) -> PairOutcome {
     thread.end().await;
-    PairOutcome::Ended(checkpointer.finish(PairEnd::Released).await)
+    PairOutcome::Ended(checkpointer.finish(JobEnd::Released).await)
 }
 
 /// Longest time for which a file is read after a stop request. It includes decoding, so it is longer than that of the
@@ -163,7 +163,7 @@ fn timeout_text(stage: Stage, timeout: Duration, reading: Option<PathBuf>) -> St
 /// Releases a pair whose files an object store did not give. If the store is unavailable, the pair is tried again
 /// later. Any other error, such as refused credentials, concerns all pairs and ends the run.
 async fn end_without_store(checkpointer: Checkpointer, error: ArtifactError) -> PairReport {
-    let report = checkpointer.finish(PairEnd::Released).await;
+    let report = checkpointer.finish(JobEnd::Released).await;
     if error.is_unavailable() {
         tracing::warn!("{error}; the pair is tried again");
         return report;
@@ -190,7 +190,7 @@ async fn fail(
     let stages = settled.stages;
     let lease = match settled.into_lease() {
         Ok(lease) => lease,
-        Err(settled) => return settled.finish(context, PairEnd::Released).await,
+        Err(settled) => return settled.finish(context, JobEnd::Released).await,
     };
     let end = store_failure(context, lease, stage, pair, failed).await;
     let waited = begun.elapsed();
@@ -204,7 +204,7 @@ async fn store_failure(
     stage: Stage,
     pair: PairSummary,
     failed: FailedStage,
-) -> Result<PairEnd, RunError> {
+) -> Result<JobEnd, RunError> {
     let paths = [&pair.attributes.mesh_path, &pair.attributes.print_path];
     if let Err(error) = check_folders(context, paths.map(String::clone)).await {
         if let Err(error) = context.catalog.release(lease).await {

@@ -141,18 +141,19 @@ pub(super) struct RunContext {
     pub(super) metrics: RunMetrics,
 }
 
-/// How a pair's task ended.
+/// How the task of a pair or block ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum PairEnd {
-    /// Every stage up to the run's last one is stored.
+pub(super) enum JobEnd {
+    /// Every stage is stored, for a pair up to the run's last one.
     Done,
-    /// The pair is quarantined.
+    /// The job is quarantined.
     Failed,
-    /// The pair will be retried.
+    /// The job will be retried.
     Retry,
-    /// The pair was released unfinished.
+    /// The job was released unfinished.
     Released,
     /// The lease was lost: it expired, another process of the run recovered the job, or the files are too old to be stored.
+    /// Counts neither as done nor as failed.
     LeaseLost,
 }
 
@@ -160,7 +161,7 @@ pub(super) enum PairEnd {
 #[derive(Debug)]
 pub(super) struct PairReport {
     /// How it ended, or the error that ends the run.
-    pub(super) end: Result<PairEnd, RunError>,
+    pub(super) end: Result<JobEnd, RunError>,
     /// Number of stages that were computed and stored.
     pub(super) stages: u64,
 }

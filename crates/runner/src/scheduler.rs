@@ -17,7 +17,7 @@ use super::pair_task::{PairOutcome, process_pair};
 use super::policy;
 use super::prefetch::{Prefetch, SlotId};
 use super::retry::retried;
-use super::run_context::{PairEnd, PairReport, RunContext};
+use super::run_context::{JobEnd, PairReport, RunContext};
 use super::run_selection::RunSelection;
 use super::stop::StopLevel;
 use super::worker_session::{HeartbeatOutcome, WorkerSession};
@@ -244,7 +244,7 @@ impl Scheduler {
         match outcome {
             PairOutcome::Ended(report) => self.count(report),
             PairOutcome::Storing(checkpointer) => {
-                drop(self.storing.spawn(checkpointer.finish(PairEnd::Done)));
+                drop(self.storing.spawn(checkpointer.finish(JobEnd::Done)));
             }
         }
     }
@@ -253,15 +253,15 @@ impl Scheduler {
         self.prefetch.expect_more();
         self.counts.stages += report.stages;
         match report.end {
-            Ok(PairEnd::Done) => {
+            Ok(JobEnd::Done) => {
                 self.counts.done += 1;
                 self.context.metrics.count_done();
             }
-            Ok(PairEnd::Failed) => {
+            Ok(JobEnd::Failed) => {
                 self.counts.failed += 1;
                 self.context.metrics.count_failed();
             }
-            Ok(PairEnd::Retry | PairEnd::Released | PairEnd::LeaseLost) => {}
+            Ok(JobEnd::Retry | JobEnd::Released | JobEnd::LeaseLost) => {}
             Err(error) => {
                 self.drain("the run cannot go on");
                 self.fatal.get_or_insert(error);

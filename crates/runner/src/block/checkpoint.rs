@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::Deserialize;
 
 use super::inputs::as_failure;
-use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
+use super::progress::{AfterStage, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
 use crate::blocking::run_blocking;
 use crate::error::RunError;
@@ -13,7 +13,7 @@ use crate::events::RunEvent;
 use crate::folder_check::check_folders;
 use crate::policy::{self, FailedAttempt};
 use crate::retry::stored;
-use crate::run_context::RunContext;
+use crate::run_context::{JobEnd, RunContext};
 use crate::stage_output::result_hash;
 use mocban_catalog::{
     BlockJob, CheckpointOutcome, CutPair, CutReply, CutSummary, FailureAction, InputVersion,
@@ -111,7 +111,7 @@ async fn advance(
     let (catalog, lease) = (&context.catalog, &block.lease);
     let stored = stored!(catalog.checkpoint_block(lease.clone(), checkpoint.clone()))?;
     let CheckpointOutcome::Lease(lease) = stored else {
-        return Ok(AfterStage::End(BlockEnd::LeaseLost));
+        return Ok(AfterStage::End(JobEnd::LeaseLost));
     };
     let stage = checkpoint.stage;
     finished(context, &block.work.attributes.name, &checkpoint);
@@ -139,7 +139,7 @@ async fn finish_cut(
         characters.clone()
     ))? {
         CutReply::Stored(summary) => summary,
-        CutReply::Refused => return Ok(AfterStage::End(BlockEnd::LeaseLost)),
+        CutReply::Refused => return Ok(AfterStage::End(JobEnd::LeaseLost)),
         CutReply::NameTaken(taken) => {
             let text = format!(
                 "there is a pair {taken} that was not cut from this block, and ids must differ in more than upper and lower case; import the block with another --name"
@@ -165,7 +165,7 @@ async fn finish_cut(
         retired,
         stages: context.until.index() as u64 + 1,
     });
-    Ok(AfterStage::End(BlockEnd::Done))
+    Ok(AfterStage::End(JobEnd::Done))
 }
 
 /// Stores a failure of a stage.
@@ -208,7 +208,7 @@ pub(crate) async fn store_failure(
     };
     let (catalog, lease) = (&context.catalog, &block.lease);
     if !stored!(catalog.fail_block(lease.clone(), failed.clone()))? {
-        return Ok(AfterStage::End(BlockEnd::LeaseLost));
+        return Ok(AfterStage::End(JobEnd::LeaseLost));
     }
     let block = block.work.attributes.name;
     let end = match action {
@@ -218,7 +218,7 @@ pub(crate) async fn store_failure(
                 stage,
                 failure,
             });
-            BlockEnd::Failed
+            JobEnd::Failed
         }
         FailureAction::BackOff { .. } | FailureAction::RetryExclusive => {
             context.emit(RunEvent::BlockBackingOff {
@@ -227,7 +227,7 @@ pub(crate) async fn store_failure(
                 failure,
                 wait_ms: action.wait_ms(now),
             });
-            BlockEnd::Retry
+            JobEnd::Retry
         }
     };
     Ok(AfterStage::End(end))

@@ -6,23 +6,9 @@ use serde_json::Value;
 
 use super::inputs::BlockSources;
 use crate::block_stages::BlockStageOutput;
+use crate::run_context::JobEnd;
 use mocban_catalog::{BlockInputVersions, BlockJob, BlockProvenance, BlockWork, Lease};
 use mocban_core::domain::{ArtifactSet, BlockStage};
-
-/// How a block's task ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum BlockEnd {
-    /// Every stage is stored.
-    Done,
-    /// The block failed.
-    Failed,
-    /// The block will be retried.
-    Retry,
-    /// The block was released unfinished.
-    Released,
-    /// The lease was lost, or a result was not stored because its files were written too long ago.
-    LeaseLost,
-}
 
 /// A block in progress.
 pub(crate) struct BlockInProgress {
@@ -65,5 +51,5 @@ pub(crate) enum AfterStage {
     /// The job continues with this stage.
     Continue(Box<BlockInProgress>, BlockStage),
     /// Its task ends.
-    End(BlockEnd),
+    End(JobEnd),
 }

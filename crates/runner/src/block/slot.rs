@@ -5,7 +5,6 @@ use std::sync::Arc;
 use tokio::task::JoinSet;
 
 use super::memory::{BLOCK_BYTES, EstimatedBlock, map_bytes};
-use super::progress::BlockEnd;
 use super::task::{BlockReport, process_block};
 use crate::blocking::task_result;
 use crate::error::RunError;
@@ -14,7 +13,7 @@ use crate::options::RunOptions;
 use crate::policy;
 use crate::prefetch::Prefetch;
 use crate::retry::retried;
-use crate::run_context::RunContext;
+use crate::run_context::{JobEnd, RunContext};
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
 use mocban_core::domain::WorkerId;
@@ -140,12 +139,12 @@ impl BlockSlot {
     pub(crate) fn count(&mut self, ended: BlockReport) -> Result<(), RunError> {
         self.may_find_one = true;
         match ended? {
-            BlockEnd::Done => self.counts.done += 1,
-            BlockEnd::Failed => self.counts.failed += 1,
-            BlockEnd::LeaseLost => tracing::info!(
+            JobEnd::Done => self.counts.done += 1,
+            JobEnd::Failed => self.counts.failed += 1,
+            JobEnd::LeaseLost => tracing::info!(
                 "no result of a block is stored: its lease is lost, or its files were written too long ago"
             ),
-            BlockEnd::Retry | BlockEnd::Released => {}
+            JobEnd::Retry | JobEnd::Released => {}
         }
         Ok(())
     }

@@ -11,14 +11,14 @@ use tokio::sync::oneshot;
 use super::artifacts::StageArtifacts;
 use super::checkpoint::{store_failure, store_stage};
 use super::inputs::{BlockSources, outdated};
-use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
+use super::progress::{AfterStage, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::BlockStageError;
 use crate::blocking::panic_text;
 use crate::compute_thread::LONGEST_END;
 use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::retry::stored;
-use crate::run_context::RunContext;
+use crate::run_context::{JobEnd, RunContext};
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease};
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
@@ -31,7 +31,7 @@ use mocban_system::platform::sleep_active;
 const MAX_RERUNS: usize = 4;
 
 /// How a block's task ended, or the error that ends the run.
-pub(crate) type BlockReport = Result<BlockEnd, RunError>;
+pub(crate) type BlockReport = Result<JobEnd, RunError>;
 
 /// Runs the remaining stages of a leased block.
 pub(crate) async fn process_block(
@@ -71,7 +71,7 @@ pub(crate) async fn process_block(
             Err(Interruption::Stopped) => {
                 return release(&context, &block.lease).await;
             }
-            Err(Interruption::LeaseLost) => return Ok(BlockEnd::LeaseLost),
+            Err(Interruption::LeaseLost) => return Ok(JobEnd::LeaseLost),
             Err(Interruption::Store(error)) => {
                 return end_without_store(&context, &block.lease, error).await;
             }
@@ -99,10 +99,10 @@ async fn end_without_store(
     Err(error.into())
 }
 
-async fn release(context: &RunContext, lease: &Lease<BlockJob>) -> Result<BlockEnd, RunError> {
+async fn release(context: &RunContext, lease: &Lease<BlockJob>) -> Result<JobEnd, RunError> {
     let catalog = &context.catalog;
     stored!(catalog.release_block(lease.clone()))?;
-    Ok(BlockEnd::Released)
+    Ok(JobEnd::Released)
 }
 
 /// Why a stage has no result.
