@@ -10,18 +10,3 @@ macro_rules! retried {
     };
 }
 pub(crate) use retried;
-
-/// Calls an operation that stores what a block's task has computed. It may take any time, even after a stop request, and
-/// its future is `Send`.
-macro_rules! stored {
-    ($catalog:ident.$operation:ident($($argument:expr),*)) => {{
-        let mut attempt = 0;
-        loop {
-            match $catalog.$operation($($argument),*).await {
-                Err(error) if $catalog.may_retry(attempt, &error).await => attempt += 1,
-                outcome => break outcome,
-            }
-        }
-    }};
-}
-pub(crate) use stored;

@@ -1,27 +1,88 @@
-//! Stores results and failures of the stages of a block.
+//! A block between two of its stages; stores the results and failures of its stages under its lease.
 
 use std::collections::BTreeSet;
+use std::time::Instant;
 
 use serde::Deserialize;
+use serde_json::Value;
 
-use super::inputs::as_failure;
-use super::progress::{AfterStage, BlockInProgress, ComputedBlockStage};
+use super::inputs::{BlockSources, as_failure};
 use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
 use crate::blocking::run_blocking;
 use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::folder_check::check_folders;
 use crate::policy::{self, FailedAttempt};
-use crate::retry::stored;
 use crate::run_context::{JobEnd, RunContext};
 use crate::stage_output::result_hash;
 use mocban_catalog::{
-    BlockJob, CheckpointOutcome, CutPair, CutReply, CutSummary, FailureAction, InputVersion,
-    NewCharacter, StageCheckpoint, StageFailure,
+    BlockInputVersions, BlockJob, BlockProvenance, BlockWork, CheckpointOutcome, CutPair, CutReply,
+    CutSummary, FailureAction, InputVersion, Lease, NewCharacter, StageCheckpoint, StageFailure,
 };
-use mocban_core::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
+use mocban_core::domain::{
+    ArtifactRef, ArtifactSet, BlockName, BlockStage, BlockStageRecord, FailureClass,
+};
 use mocban_store::{Project, stat_input};
 use mocban_system::failpoint::{self, Point};
+
+/// Calls an operation that stores what a block's task has computed. It may take any time, even after a stop request, and
+/// its future is `Send`.
+macro_rules! stored {
+    ($catalog:ident.$operation:ident($($argument:expr),*)) => {{
+        let mut attempt = 0;
+        loop {
+            match $catalog.$operation($($argument),*).await {
+                Err(error) if $catalog.may_retry(attempt, &error).await => attempt += 1,
+                outcome => break outcome,
+            }
+        }
+    }};
+}
+pub(crate) use stored;
+
+/// A block in progress.
+pub(crate) struct BlockInProgress {
+    pub(crate) lease: Lease<BlockJob>,
+    pub(crate) work: BlockWork,
+    pub(crate) sources: BlockSources,
+    /// Versions of the input files, as far as they are known.
+    pub(crate) inputs: BlockInputVersions,
+}
+
+impl BlockInProgress {
+    /// Describes what a stage is computed from.
+    pub(crate) fn provenance(&self, stage: BlockStage, settings: &Value) -> BlockProvenance {
+        let BlockWork {
+            attributes,
+            control_points,
+            ..
+        } = &self.work;
+        BlockProvenance::new(
+            stage,
+            settings,
+            attributes,
+            &self.inputs,
+            control_points.as_ref(),
+        )
+    }
+}
+
+/// A computed stage.
+pub(crate) struct ComputedBlockStage {
+    pub(crate) output: BlockStageOutput,
+    pub(crate) files: ArtifactSet,
+    pub(crate) ms: u64,
+    /// When the write of its files began.
+    pub(crate) began: Instant,
+}
+
+/// What happens to a block after a stage.
+pub(crate) enum AfterStage {
+    /// The job continues with this stage.
+    Continue(Box<BlockInProgress>, BlockStage),
+    /// Its task ends.
+    End(JobEnd),
+}
 
 /// Stores a computed stage. Fails the block instead if the output is not valid.
 pub(crate) async fn store_stage(

@@ -5,6 +5,5 @@ pub(crate) mod checkpoint;
 pub(crate) mod inputs;
 pub(crate) mod memory;
 pub(crate) mod pipeline;
-pub(crate) mod progress;
 pub(crate) mod slot;
 pub(crate) mod task;

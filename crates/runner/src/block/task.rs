@@ -9,15 +9,15 @@ use std::time::Instant;
 use tokio::sync::oneshot;
 
 use super::artifacts::StageArtifacts;
-use super::checkpoint::{store_failure, store_stage};
+use super::checkpoint::{
+    AfterStage, BlockInProgress, ComputedBlockStage, store_failure, store_stage, stored,
+};
 use super::inputs::{BlockSources, outdated};
-use super::progress::{AfterStage, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::BlockStageError;
 use crate::blocking::panic_text;
 use crate::compute_thread::LONGEST_END;
 use crate::error::RunError;
 use crate::events::RunEvent;
-use crate::retry::stored;
 use crate::run_context::{JobEnd, RunContext};
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease};
