@@ -141,10 +141,7 @@ impl BlockSlot {
         match ended? {
             JobEnd::Done => self.counts.done += 1,
             JobEnd::Failed => self.counts.failed += 1,
-            JobEnd::LeaseLost => tracing::info!(
-                "no result of a block is stored: its lease is lost, or its files were written too long ago"
-            ),
-            JobEnd::Retry | JobEnd::Released => {}
+            JobEnd::Retry | JobEnd::Released | JobEnd::LeaseLost => {}
         }
         Ok(())
     }

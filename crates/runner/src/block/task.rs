@@ -33,8 +33,22 @@ const MAX_RERUNS: usize = 4;
 /// How a block's task ended, or the error that ends the run.
 pub(crate) type BlockReport = Result<JobEnd, RunError>;
 
-/// Runs the remaining stages of a leased block.
+/// Runs the remaining stages of a leased block. Logs it if the lease is lost.
 pub(crate) async fn process_block(
+    context: Arc<RunContext>,
+    lease: Lease<BlockJob>,
+    work: BlockWork,
+) -> BlockReport {
+    let report = run_stages(context, lease, work).await;
+    if matches!(report, Ok(JobEnd::LeaseLost)) {
+        tracing::info!(
+            "no result of a block is stored: its lease is lost, or its files were written too long ago"
+        );
+    }
+    report
+}
+
+async fn run_stages(
     context: Arc<RunContext>,
     lease: Lease<BlockJob>,
     work: BlockWork,
