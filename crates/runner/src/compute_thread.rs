@@ -1,4 +1,5 @@
-//! Computes the stages of a pair one after another on the pair's own thread, and reports them to async code.
+//! Computes the stages of a pair one after another on the pair's own thread, and reports them to the pair's task
+//! (`pair_task.rs`).
 //!
 //! Each pair has its own thread instead of one from a pool. A stage past its deadline is cancelled; if it hangs in the
 //! system, its thread can be abandoned without blocking other pairs. All stages of a pair run on the same thread, because waking another thread
@@ -6,7 +7,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use tokio::sync::mpsc;
 
@@ -14,13 +15,11 @@ use super::blocking::panic_text;
 use super::pair_context::{PairContext, StoredStage};
 use super::run_context::RunContext;
 use super::stage_output::{self, PairStageError, PairStageOutput};
-use super::stop::{Stop, StopLevel};
 use mocban_catalog::{InputVersions, PairProvenance, StageCheckpoint};
-use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
+use mocban_core::domain::cancel::{CancelToken, Cancelled};
 use mocban_core::domain::{ArtifactSet, Failure, FailureClass, Stage};
 use mocban_store::{ArtifactError, NewArtifact};
 use mocban_system::failpoint::{self, Point};
-use mocban_system::platform::sleep_active;
 
 /// A computed stage: its catalog row, and the files that must be on the disk before the row is stored.
 pub(super) type ComputedStage = (StageCheckpoint, Vec<NewArtifact>);
@@ -53,68 +52,9 @@ pub(super) enum ComputeEvent {
     Cancelled,
 }
 
-/// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer. Unit tests wait longer,
-/// because they also run on busy machines.
-pub(super) const LONGEST_END: Duration =
-    Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
-
-/// The thread that computes the stages of a pair. If this handle is dropped, the computation is cancelled.
-#[derive(Debug)]
-pub(super) struct ComputeThread {
-    /// Closed when the thread has returned the pair's memory.
-    events: mpsc::UnboundedReceiver<ComputeEvent>,
-    token: CancelGuard,
-}
-
-impl ComputeThread {
-    /// Starts a thread that computes a pair's stages from `first` on.
-    ///
-    /// # Errors
-    /// Returns an error if the system cannot start a thread. In that case the pair's data is lost.
-    pub(super) fn start(
-        context: Arc<RunContext>,
-        first: Stage,
-        pair: Box<PairContext>,
-    ) -> std::io::Result<Self> {
-        let (sender, events) = mpsc::unbounded_channel();
-        let token = CancelToken::default();
-        let inner = token.clone();
-        let thread = std::thread::Builder::new().name(pair.attributes.name.to_string());
-        thread.spawn(move || run_stages(&context, first, pair, &inner, &sender))?;
-        Ok(Self {
-            events,
-            token: CancelGuard(token),
-        })
-    }
-
-    /// Cancels the computation and waits until the pair's memory is free, so that no other pair gets it before.
-    pub(super) async fn end(mut self) {
-        self.token.0.cancel();
-        let ended = async { while self.events.recv().await.is_some() {} };
-        if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
-            tracing::warn!(
-                "a thread still waits for a file; its memory no longer counts for --memory"
-            );
-        }
-    }
-
-    /// Waits for the next event, for at most as long as one stage may take. Time while the process is suspended does not
-    /// count.
-    pub(super) async fn next_event(&mut self, timeout: Duration, stop: &Stop) -> ComputeEvent {
-        tokio::select! {
-            biased;
-            event = self.events.recv() => event.unwrap_or_else(|| {
-                ComputeEvent::Panicked("the pair's thread ended without an event".to_owned())
-            }),
-            () = stop.reached(StopLevel::Now) => ComputeEvent::Stopped,
-            () = sleep_active(timeout) => ComputeEvent::TimedOut,
-        }
-    }
-}
-
 /// Computes stages until none is left, a stage fails, the computation is cancelled, or the receiver of the events is
 /// closed.
-fn run_stages(
+pub(super) fn run_stages(
     context: &RunContext,
     mut stage: Stage,
     mut pair: Box<PairContext>,

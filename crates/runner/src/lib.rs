@@ -70,6 +70,7 @@ mod compute_thread;
 mod error;
 mod event_log;
 mod events;
+mod failed_stage;
 mod folder_check;
 mod free_memory;
 mod input_changes;

@@ -1,25 +1,26 @@
-//! The task of one pair: receives each stage from the pair's compute thread, passes it to the checkpointer, and stores
-//! a failure.
+//! The task of one pair: starts the pair's compute thread, passes each stage to the checkpointer, cancels the thread if
+//! later stages cannot be stored, and stores a failure.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use tokio::sync::mpsc;
+
 use super::checkpointer::{Checkpointer, PairFailure};
-use super::compute_thread::{ComputeEvent, ComputeThread};
+use super::compute_thread::{ComputeEvent, run_stages};
 use super::error::RunError;
 use super::events::RunEvent;
+use super::failed_stage::{FailedStage, PairSummary, timeout_text};
 use super::folder_check::check_folders;
-use super::input_changes;
-use super::input_reads::ReadLimits;
 use super::pair_context::{FileInUse, PairContext};
 use super::run_context::{JobEnd, PairReport, RunContext};
 use super::stop::{Stop, StopLevel};
-use mocban_catalog::{InputVersions, Lease, PairAttributes, PairWork};
-use mocban_core::domain::{Failure, FailureClass, Stage, WaitReason};
+use mocban_catalog::{Lease, PairWork};
+use mocban_core::domain::cancel::{CancelGuard, CancelToken};
+use mocban_core::domain::{FailureClass, Stage, WaitReason};
 use mocban_store::ArtifactError;
 use mocban_system::failpoint::{self, Point};
-use mocban_system::platform::ActiveClock;
+use mocban_system::platform::{ActiveClock, sleep_active};
 
 /// What is left to do for a pair when its stages are computed.
 pub(super) enum PairOutcome {
@@ -27,6 +28,65 @@ pub(super) enum PairOutcome {
     Ended(PairReport),
     /// To wait until its last stages are stored.
     Storing(Checkpointer),
+}
+
+/// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer. Unit tests wait longer,
+/// because they also run on busy machines.
+pub(super) const LONGEST_END: Duration =
+    Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
+
+/// The thread that computes the stages of a pair. If this handle is dropped, the computation is cancelled.
+#[derive(Debug)]
+pub(super) struct ComputeThread {
+    /// Closed when the thread has returned the pair's memory.
+    events: mpsc::UnboundedReceiver<ComputeEvent>,
+    token: CancelGuard,
+}
+
+impl ComputeThread {
+    /// Starts a thread that computes a pair's stages from `first` on.
+    ///
+    /// # Errors
+    /// Returns an error if the system cannot start a thread. In that case the pair's data is lost.
+    pub(super) fn start(
+        context: Arc<RunContext>,
+        first: Stage,
+        pair: Box<PairContext>,
+    ) -> std::io::Result<Self> {
+        let (sender, events) = mpsc::unbounded_channel();
+        let token = CancelToken::default();
+        let inner = token.clone();
+        let thread = std::thread::Builder::new().name(pair.attributes.name.to_string());
+        thread.spawn(move || run_stages(&context, first, pair, &inner, &sender))?;
+        Ok(Self {
+            events,
+            token: CancelGuard(token),
+        })
+    }
+
+    /// Cancels the computation and waits until the pair's memory is free, so that no other pair gets it before.
+    pub(super) async fn end(mut self) {
+        self.token.0.cancel();
+        let ended = async { while self.events.recv().await.is_some() {} };
+        if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
+            tracing::warn!(
+                "a thread still waits for a file; its memory no longer counts for --memory"
+            );
+        }
+    }
+
+    /// Waits for the next event, for at most as long as one stage may take. Time while the process is suspended does not
+    /// count.
+    pub(super) async fn next_event(&mut self, timeout: Duration, stop: &Stop) -> ComputeEvent {
+        tokio::select! {
+            biased;
+            event = self.events.recv() => event.unwrap_or_else(|| {
+                ComputeEvent::Panicked("the pair's thread ended without an event".to_owned())
+            }),
+            () = stop.reached(StopLevel::Now) => ComputeEvent::Stopped,
+            () = sleep_active(timeout) => ComputeEvent::TimedOut,
+        }
+    }
 }
 
 /// Computes the remaining stages of a leased pair. Earlier stages are stored while later stages are computed.
@@ -147,19 +207,6 @@ async fn reading_after_stop(file: &FileInUse, stop: &Stop) {
     }
 }
 
-/// Describes a stage that took too long, and the input file that it was reading.
-fn timeout_text(stage: Stage, timeout: Duration, reading: Option<PathBuf>) -> String {
-    let seconds = timeout.as_secs_f64();
-    let text = format!("{stage} took longer than {seconds} s");
-    match reading {
-        Some(path) => format!(
-            "{text} while it read {}; its disk or network may hang",
-            path.display()
-        ),
-        None => text,
-    }
-}
-
 /// Releases a pair whose files an object store did not give. If the store is unavailable, the pair is tried again
 /// later. Any other error, such as refused credentials, concerns all pairs and ends the run.
 async fn end_without_store(checkpointer: Checkpointer, error: ArtifactError) -> PairReport {
@@ -226,70 +273,4 @@ async fn store_failure(
         ms: failed.ms,
     };
     failed.store(context, lease).await
-}
-
-/// Data that is stored if the pair fails. The task keeps this copy, because the thread's data is lost if the thread
-/// hangs or panics.
-struct PairSummary {
-    attributes: PairAttributes,
-    attributes_json: String,
-    inputs: InputVersions,
-    file_in_use: FileInUse,
-}
-
-impl PairSummary {
-    fn of(pair: &PairContext) -> Self {
-        Self {
-            attributes: pair.attributes.clone(),
-            attributes_json: pair.attributes_json.clone(),
-            inputs: pair.inputs.clone(),
-            file_in_use: pair.file_in_use.clone(),
-        }
-    }
-
-    /// Returns the versions of the input files that the thread reported. For an unreported file, returns the current
-    /// version, if it can be read. Later runs compare the files with these versions to notice a replacement.
-    async fn inputs_now(&self, context: &RunContext) -> InputVersions {
-        let read = self.inputs.clone();
-        if read.mesh.is_some() && read.print.is_some() {
-            return read;
-        }
-        let paths = [&self.attributes.mesh_path, &self.attributes.print_path]
-            .map(|path| context.project.input(path));
-        let limits = ReadLimits {
-            timeout: context.stage_timeout.min(MAX_REREAD),
-            stop: context.stop.clone(),
-            until: StopLevel::Now,
-        };
-        let [mesh, print] = input_changes::current_of_both(paths, &limits).await;
-        InputVersions {
-            mesh: read.mesh.or(mesh),
-            print: read.print.or(print),
-        }
-    }
-}
-
-/// Longest time for reading the input files again after a stage hung or panicked.
-const MAX_REREAD: Duration = Duration::from_secs(30);
-
-/// How a stage failed.
-struct FailedStage {
-    failure: Failure,
-    /// Whether a retry may succeed.
-    is_transient: bool,
-    /// The input files as read, if the pair's data was not lost.
-    inputs: Option<InputVersions>,
-    ms: Option<u64>,
-}
-
-impl FailedStage {
-    /// A failure after which the pair's data is lost.
-    fn without_pair(class: FailureClass, text: String) -> Self {
-        Self {
-            failure: Failure::new(class, text),
-            is_transient: false,
-            inputs: None,
-            ms: None,
-        }
-    }
 }

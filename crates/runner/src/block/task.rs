@@ -15,9 +15,9 @@ use super::checkpoint::{
 use super::inputs::{BlockSources, outdated};
 use crate::block_stages::BlockStageError;
 use crate::blocking::panic_text;
-use crate::compute_thread::LONGEST_END;
 use crate::error::RunError;
 use crate::events::RunEvent;
+use crate::pair_task::LONGEST_END;
 use crate::run_context::{JobEnd, RunContext};
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease};
