@@ -32,8 +32,14 @@ pub(super) enum PairOutcome {
 
 /// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer. Unit tests wait longer,
 /// because they also run on busy machines.
-pub(super) const LONGEST_END: Duration =
-    Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
+const LONGEST_END: Duration = Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
+
+/// Waits until the cancelled work of a pair or block has returned its memory, but not longer than [`LONGEST_END`].
+pub(super) async fn wait_for_end<T>(ended: impl Future<Output = T>) {
+    if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
+        tracing::warn!("a thread still waits for a file; its memory no longer counts for --memory");
+    }
+}
 
 /// The thread that computes the stages of a pair. If this handle is dropped, the computation is cancelled.
 #[derive(Debug)]
@@ -68,11 +74,7 @@ impl ComputeThread {
     pub(super) async fn end(mut self) {
         self.token.0.cancel();
         let ended = async { while self.events.recv().await.is_some() {} };
-        if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
-            tracing::warn!(
-                "a thread still waits for a file; its memory no longer counts for --memory"
-            );
-        }
+        wait_for_end(ended).await;
     }
 
     /// Waits for the next event, for at most as long as one stage may take. Time while the process is suspended does not

@@ -17,7 +17,7 @@ use crate::block_stages::BlockStageError;
 use crate::blocking::panic_text;
 use crate::error::RunError;
 use crate::events::RunEvent;
-use crate::pair_task::LONGEST_END;
+use crate::pair_task::wait_for_end;
 use crate::run_context::{JobEnd, RunContext};
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease};
@@ -284,8 +284,6 @@ async fn on_thread<T: Send + 'static>(
         }
     };
     token.cancel();
-    if tokio::time::timeout(LONGEST_END, receiver).await.is_err() {
-        tracing::warn!("a thread still waits for a file; its memory no longer counts for --memory");
-    }
+    wait_for_end(receiver).await;
     Err(interruption)
 }
