@@ -27,11 +27,9 @@ use super::run_guard::RunGuard;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::Stop;
-use super::worker_session::this_process;
+use super::worker_session::{recover_all, this_process};
 use mocban_align::stages::Settings;
-use mocban_catalog::{
-    Catalog, DeadWorker, FingerprintIds, Fingerprints, PairSelection, WorkerSettings,
-};
+use mocban_catalog::{Catalog, FingerprintIds, Fingerprints, PairSelection, WorkerSettings};
 use mocban_core::domain::WorkerId;
 use mocban_core::page_vec;
 use mocban_store::Project;
@@ -251,14 +249,11 @@ impl RunStart<'_> {
         let Some(lock) = guard.exclusive() else {
             return Ok(0);
         };
-        let (catalog, now) = (self.catalog, self.clock.now());
-        let recovered = retried!(catalog.recover(DeadWorker::AllExcept(worker), now))?;
-        let (project, poisoned) = (self.project, &recovered.poisoned);
         let limits = read_limits(self.options, self.stop);
-        input_changes::store_inputs_of_quarantined(project, self.catalog, poisoned, &limits)
-            .await?;
+        let now = self.clock.now();
+        let ready = recover_all(self.project, self.catalog, worker, &limits, now).await?;
         self.project.clear_temporary()?;
         lock.downgrade()?;
-        Ok(recovered.ready)
+        Ok(ready)
     }
 }

@@ -10,8 +10,9 @@ use super::input_reads::ReadLimits;
 use super::retry::retried;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use mocban_catalog::{CatalogError, DeadWorker, LeaseHolder, WorkerInfo};
+use mocban_catalog::{Catalog, CatalogError, DeadWorker, LeaseHolder, WorkerInfo};
 use mocban_core::domain::{UnixMillis, WorkerId};
+use mocban_store::Project;
 use mocban_system::platform;
 
 /// Time without a connection and without a new heartbeat after which a worker is dead, as a fraction of the lease: 7 of
@@ -137,6 +138,21 @@ impl WorkerSession {
             .await?;
         Ok(ready)
     }
+}
+
+/// Recovers all leases but those of `me`, when a run starts and no other process of the catalog can live. Returns how many
+/// pairs are ready again.
+pub(super) async fn recover_all(
+    project: &Project,
+    catalog: &Catalog,
+    me: WorkerId,
+    limits: &ReadLimits,
+    now: UnixMillis,
+) -> Result<u64, RunError> {
+    let recovered = retried!(catalog.recover(DeadWorker::AllExcept(me), now))?;
+    let poisoned = &recovered.poisoned;
+    input_changes::store_inputs_of_quarantined(project, catalog, poisoned, limits).await?;
+    Ok(recovered.ready)
 }
 
 /// Returns what the catalog records about this process.
