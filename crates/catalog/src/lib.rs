@@ -87,12 +87,11 @@ pub use queue::claim::ClaimRequest;
 pub use queue::commit::commit_delay::Waiting;
 pub use queue::counters::JobCounts;
 pub use queue::kind::JobKind;
-pub use queue::lease::{
-    CheckpointOutcome, FailureAction, Lease, MetricResult, StageCheckpoint, StageFailure,
-};
+pub use queue::lease::{CheckpointOutcome, Lease};
 pub use queue::pair_job::PairJob;
 pub use queue::provenance::{FingerprintId, InputVersions, PairProvenance};
 pub use queue::selection::PairSelection;
+pub use queue::stage_record::{FailureAction, MetricResult, StageCheckpoint, StageFailure};
 pub use records::append_verdicts::{ImportedVerdicts, ListedVerdict};
 pub use records::faulty_rows::{FaultyRow, RowFault};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, ImportTerms, PairChange};

@@ -15,7 +15,8 @@ use crate::queue::claim::{ClaimRequest, add_claim, add_release, in_order, leases
 use crate::queue::commit::known_leases::{is_end_stored, stored_before};
 use crate::queue::counters::Deltas;
 use crate::queue::kind::{StoredKind as _, Template};
-use crate::queue::lease::{CheckpointOutcome, FencedRow, Lease, StageCheckpoint, StageFailure};
+use crate::queue::lease::{CheckpointOutcome, FencedRow, Lease};
+use crate::queue::stage_record::{StageCheckpoint, StageFailure};
 use crate::queue::{checkpoint, fail, server_claim};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{BlockId, BlockStage, UnixMillis, WorkerId};

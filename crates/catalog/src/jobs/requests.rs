@@ -5,7 +5,8 @@ use crate::queue::claim::{ClaimRequest, Heartbeat};
 use crate::queue::commit::commit_delay::Waiting;
 use crate::queue::commit::request::{Message, Reply, Request};
 use crate::queue::counters::{JobCounts, by_status, counters};
-use crate::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
+use crate::queue::lease::{CheckpointOutcome, Lease};
+use crate::queue::stage_record::{StageCheckpoint, StageFailure};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{UnixMillis, WorkerId, WorkerMetrics};
 

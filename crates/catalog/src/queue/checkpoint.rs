@@ -10,11 +10,12 @@ use crate::db::error::Result;
 use crate::db::script::{Script, Statement};
 use crate::queue::counters::{CounterKey, Cursor, Deltas};
 use crate::queue::kind::{JobKind, StoredKind, Template};
-use crate::queue::lease::{FencedRow, Lease, StageCheckpoint, position, was_written_long_ago};
+use crate::queue::lease::{FencedRow, Lease, position, was_written_long_ago};
 use crate::queue::pair_job::PairJob;
 #[cfg(test)]
 use crate::queue::pair_job::UPDATE_INPUTS;
 use crate::queue::provenance::FingerprintId;
+use crate::queue::stage_record::StageCheckpoint;
 use mocban_core::domain::{
     ArtifactSet, ContentHash, JobStatus, ThresholdMetric, UnixMillis, WorkerId,
 };

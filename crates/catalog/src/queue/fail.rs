@@ -8,8 +8,9 @@ use crate::db::row::from_row;
 use crate::db::script::{Script, Statement};
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::kind::{JobKind, StoredKind, Template};
-use crate::queue::lease::{FailureAction, Lease, StageFailure};
+use crate::queue::lease::Lease;
 use crate::queue::pair_job::PairJob;
+use crate::queue::stage_record::{FailureAction, StageFailure};
 use mocban_core::domain::JobStatus;
 use mocban_system::failpoint::{self, Point};
 

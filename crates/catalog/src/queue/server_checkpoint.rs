@@ -12,7 +12,8 @@ use crate::db::error_kind::CatalogErrorKind;
 use crate::db::query::limited;
 use crate::db::row::{FromRow as _, Row};
 use crate::queue::checkpoint::{AdvancedJob, LeasedCheckpoints};
-use crate::queue::lease::{FencedRow, MetricResult, StageCheckpoint};
+use crate::queue::lease::FencedRow;
+use crate::queue::stage_record::{MetricResult, StageCheckpoint};
 use mocban_core::domain::{ContentHash, InputVersion};
 use mocban_system::failpoint::{self, Point};
 
