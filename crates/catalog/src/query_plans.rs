@@ -13,7 +13,7 @@ use crate::jobs::staleness;
 use crate::jobs::workers;
 use crate::queue::checkpoint;
 use crate::queue::claim;
-use crate::queue::fail;
+use crate::queue::lease;
 use crate::queue::pair_job::PairJob;
 use crate::records::pair_lookups;
 use crate::records::pair_results;
@@ -65,9 +65,9 @@ async fn a_claim_scans_the_ready_index_in_order() {
 #[tokio::test]
 async fn fenced_writes_find_their_jobs_by_key() {
     for sql in [
-        checkpoint::ADVANCE.of::<PairJob>(),
-        fail::FAIL.of::<PairJob>(),
-        claim::RELEASE.of::<PairJob>(),
+        lease::ADVANCE.of::<PairJob>(),
+        lease::FAIL.of::<PairJob>(),
+        lease::RELEASE.of::<PairJob>(),
         requeue::REQUEUE.of::<PairJob>(),
         requeue::SEND_BACK.of::<PairJob>(),
     ] {

@@ -11,11 +11,12 @@ use crate::db::row::{FromRow as _, from_row};
 use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::jobs::requeue::{RetrySelection, retry, retry_pairs};
-use crate::queue::claim::{ClaimRequest, add_claim, add_release, in_order, leases, release_due};
-use crate::queue::commit::known_leases::{is_end_stored, stored_before};
+use crate::queue::claim::{ClaimRequest, add_claim, in_order, release_due};
 use crate::queue::counters::Deltas;
-use crate::queue::kind::{StoredKind as _, Template};
-use crate::queue::lease::{CheckpointOutcome, FencedRow, Lease};
+use crate::queue::kind::StoredKind as _;
+use crate::queue::lease::{
+    CheckpointOutcome, FencedRow, LEASED, Lease, add_release, is_end_stored, leases, stored_before,
+};
 use crate::queue::stage_record::{StageCheckpoint, StageFailure};
 use crate::queue::{checkpoint, fail, server_claim};
 use crate::{Catalog, CatalogError, Result};
@@ -26,14 +27,6 @@ SELECT count(*) FILTER (WHERE status = 0) AS ready, count(*) FILTER (WHERE statu
     count(*) FILTER (WHERE status = 2) AS backoff, count(*) FILTER (WHERE status = 4) AS quarantined,
     min(run_at) AS next_due FROM block_job
 WHERE ?1 IS NULL OR block IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
-
-/// Selects a job if its lease is valid, and locks it, so that the lease cannot be lost before the transaction ends.
-static LEASED: Template = Template::new(
-    "
-SELECT {unit} AS unit, token FROM {job}
-WHERE {unit} = ?1 AND worker = ?2 AND token = ?3 AND status = 1 AND EXISTS (
-        SELECT 1 FROM worker AS w WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= ?4) FOR UPDATE",
-);
 
 /// Numbers of blocks that have a stage to run, and of blocks that failed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

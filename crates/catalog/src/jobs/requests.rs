@@ -1,11 +1,11 @@
 //! Requests of the queue to the writer task, and its counters.
 
 use crate::jobs::job_counts::count_jobs;
-use crate::queue::claim::{ClaimRequest, Heartbeat};
+use crate::queue::claim::ClaimRequest;
 use crate::queue::commit::commit_delay::Waiting;
 use crate::queue::commit::request::{Message, Reply, Request};
 use crate::queue::counters::{JobCounts, by_status, counters};
-use crate::queue::lease::{CheckpointOutcome, Lease};
+use crate::queue::lease::{CheckpointOutcome, Heartbeat, Lease};
 use crate::queue::stage_record::{StageCheckpoint, StageFailure};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{UnixMillis, WorkerId, WorkerMetrics};

@@ -8,34 +8,19 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::error::Result;
 use crate::db::script::{Script, Statement};
-use crate::queue::counters::{CounterKey, Cursor, Deltas};
+use crate::queue::counters::{Cursor, Deltas};
 use crate::queue::kind::{JobKind, StoredKind, Template};
-use crate::queue::lease::{FencedRow, Lease, position, was_written_long_ago};
-use crate::queue::pair_job::PairJob;
+use crate::queue::lease::{
+    ADVANCE, FencedRow, Lease, LeasedCheckpoints, is_late, key_after, position,
+};
 #[cfg(test)]
-use crate::queue::pair_job::UPDATE_INPUTS;
+use crate::queue::pair_job::{PairJob, UPDATE_INPUTS};
 use crate::queue::provenance::FingerprintId;
 use crate::queue::stage_record::StageCheckpoint;
 use mocban_core::domain::{
     ArtifactSet, ContentHash, JobStatus, ThresholdMetric, UnixMillis, WorkerId,
 };
 use mocban_system::failpoint::{self, Point};
-
-/// A lease, and the finished stages to store under it, in the order they were computed.
-pub(crate) type LeasedCheckpoints<K = PairJob> = (Lease<K>, Vec<StageCheckpoint<K>>);
-
-/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead. Resets the crash count. Marks the job of
-/// a pair dirty if the new results do not build on the stored ones: see [`AdvancedJob`].
-pub(crate) static ADVANCE: Template = Template::new(
-    "
-UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [status] = 1 THEN worker END,
-    deadline = [deadline], attempt = 1, crashes = 0{and_advance}
-FROM jsonb_each(?) AS item
-WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status = 1{and_in_place} AND EXISTS (
-        SELECT 1 FROM worker AS w
-        WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= [alive_since])
-RETURNING {unit} AS unit, token",
-);
 
 /// Items: [`ResultItem`].
 static RESULT: Template = Template::new(
@@ -86,8 +71,7 @@ pub(crate) async fn store<K: StoredKind>(
     checkpoint: &LeasedCheckpoints<K>,
     deltas: &mut Deltas,
 ) -> Result<bool> {
-    let mut stages = checkpoint.1.iter();
-    if stages.any(|stage| was_written_long_ago(stage.write_began)) {
+    if is_late(checkpoint) {
         return Ok(false);
     }
     let mut script = Script::default();
@@ -192,24 +176,6 @@ impl<'i> ResultItem<'i, ()> {
             at: result.at,
         })
     }
-}
-
-/// Returns the counter key of a job after a stage is stored.
-fn key_after<K: JobKind>(stage: &StageCheckpoint<K>) -> CounterKey {
-    let (cursor, status) = match K::next(stage.stage) {
-        Some(next) => (position::<K>(next), JobStatus::Leased),
-        None => (K::STAGES as Cursor, JobStatus::Done),
-    };
-    let fingerprint = K::fingerprint(&stage.provenance);
-    CounterKey::new(cursor, status, fingerprint.map(|FingerprintId(id)| id))
-}
-
-/// Returns the position and the status of a job after stages are stored, or `None` if there are none.
-pub(crate) fn position_after<K: JobKind>(
-    stages: &[StageCheckpoint<K>],
-) -> Option<(Cursor, JobStatus)> {
-    let after = key_after(stages.last()?);
-    Some((after.cursor, after.status))
 }
 
 /// A job to advance, and its state afterwards. An item of [`ADVANCE`].

@@ -1,8 +1,6 @@
-//! Statements that take leases, keep them alive and give them back, for pairs and blocks.
+//! Statements that take leases and end back-offs, for pairs and blocks.
 
 use std::cmp::Reverse;
-
-use serde_json::json;
 
 use crate::db::conn::Conn;
 use crate::db::error::Result;
@@ -10,7 +8,7 @@ use crate::db::query::query_as;
 use crate::db::script::{Script, Statement};
 use crate::queue::counters::{CounterKey, Cursor, Deltas};
 use crate::queue::kind::{JobKind, StoredKind, Template};
-use crate::queue::lease::{FencedRow, Lease, position};
+use crate::queue::lease::{Lease, position};
 use crate::queue::pair_job::PairJob;
 use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 use mocban_system::failpoint::{self, Point};
@@ -62,16 +60,6 @@ impl<K: JobKind> ClaimRequest<K> {
     }
 }
 
-/// A worker's sign of life.
-#[derive(Debug, Clone)]
-pub(crate) struct Heartbeat {
-    pub(crate) worker: WorkerId,
-    pub(crate) now: UnixMillis,
-    pub(crate) alive_since: UnixMillis,
-    /// Its counts and times as JSON. `None` leaves those of the last heartbeat.
-    pub(crate) metrics: Option<String>,
-}
-
 /// Leases the first ready jobs, for pairs in the order of the index `job_ready`. While a pair must run exclusively, no
 /// worker leases anything. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite
 /// would prepare the statement again each time.
@@ -99,45 +87,12 @@ WHERE {unit} IN (
 RETURNING {unit} AS unit, worker, token, stage, {fingerprint} AS fingerprint, attempt, {exclusive} AS exclusive",
 );
 
-/// Selects the leases of a worker.
-static LEASES: Template = Template::new(
-    "
-SELECT {unit} AS unit, worker, token, stage, {fingerprint} AS fingerprint, attempt, {exclusive} AS exclusive
-FROM {job} WHERE status = 1 AND worker = ?1 ORDER BY {unit}",
-);
-
-/// Gives leases back. Their attempts do not count. `status + 0` keeps the planner of PostgreSQL from the index of leases,
-/// which contains all leases that ended while a snapshot is held.
-pub(crate) static RELEASE: Template = Template::new(
-    "
-UPDATE {job} SET status = 0, worker = NULL, deadline = NULL, attempt = max({job}.attempt - 1, 0)
-FROM jsonb_each(?) AS item
-WHERE {job}.{unit} = [0] AND {job}.worker = [1] AND {job}.token = [2] AND {job}.status + 0 = 1
-RETURNING {unit} AS unit, token",
-);
-
 /// Ends the back-offs that are due at `?1`. Also ends back-offs beyond `?2`, which only a clock jump can cause.
 pub(crate) static DUE: Template = Template::new(
     "
 UPDATE {job} SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
 RETURNING stage, status, coalesce({fingerprint}, 0) AS fingerprint",
 );
-
-/// Stores a heartbeat, unless the worker has ended, or its last heartbeat is so old that others may consider it dead. A
-/// worker that others took for dead is then known to live.
-pub(crate) const HEARTBEAT: &str = "
-UPDATE worker SET heartbeat = ?, died = 0, metrics = coalesce(?, metrics)
-WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
-
-/// Adds a heartbeat to a script. The statement returns the worker's id, or nothing if the heartbeat is refused.
-pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: &Heartbeat) -> Statement<(i64,)> {
-    let statement = script.add(HEARTBEAT);
-    script.bind(heartbeat.now);
-    script.bind(heartbeat.metrics.clone());
-    script.bind(heartbeat.worker.0);
-    script.bind(heartbeat.alive_since);
-    statement
-}
 
 /// Adds a claim to a script, in SQLite.
 pub(crate) fn add_claim<K: StoredKind>(
@@ -163,15 +118,6 @@ pub(crate) fn add_claim<K: StoredKind>(
     statement
 }
 
-/// Returns the leases of a worker.
-pub(crate) async fn leases<K: StoredKind>(
-    conn: &mut Conn,
-    worker: WorkerId,
-) -> Result<Vec<Lease<K>>> {
-    let leases = query_as(LEASES.of::<K>()).bind(worker.0);
-    leases.fetch_all(conn).await
-}
-
 /// Returns the key by which claims sort jobs.
 pub(crate) const fn order(turn: Cursor, unit: i64) -> (Reverse<Cursor>, i64) {
     (Reverse(turn), unit)
@@ -192,15 +138,6 @@ pub(crate) fn count_claimed(leases: &[Lease], deltas: &mut Deltas) {
         let from = lease.counter_key().with_status(JobStatus::Ready);
         deltas.move_job(from, lease.counter_key());
     }
-}
-
-/// Adds the release of leases to a script.
-pub(crate) fn add_release<'l, K: StoredKind>(
-    script: &mut Script,
-    leases: impl Iterator<Item = &'l Lease<K>>,
-) -> Result<Option<Statement<FencedRow>>> {
-    let fences = leases.map(|lease| json!([lease.id(), lease.worker, lease.token]));
-    script.add_over(RELEASE.of::<K>(), fences)
 }
 
 /// Counts released leases.

@@ -8,7 +8,7 @@ use crate::db::row::from_row;
 use crate::db::script::{Script, Statement};
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::kind::{JobKind, StoredKind, Template};
-use crate::queue::lease::Lease;
+use crate::queue::lease::{FAIL, Lease};
 use crate::queue::pair_job::PairJob;
 use crate::queue::stage_record::{FailureAction, StageFailure};
 use mocban_core::domain::JobStatus;
@@ -16,18 +16,6 @@ use mocban_system::failpoint::{self, Point};
 
 /// Number of attempts kept per pair or block. Older ones are deleted.
 const ATTEMPTS_KEPT: i64 = 64;
-
-/// Updates failed jobs. Skips a job if its lease was lost or its worker counts as dead. `status + 0` keeps the planner of
-/// PostgreSQL from the index of leases, which contains all leases that ended while a snapshot is held.
-pub(crate) static FAIL: Template = Template::new(
-    "
-UPDATE {job} SET stage = min({job}.stage, [stage]), status = [status], run_at = [run_at], worker = NULL, deadline = NULL{and_fail}
-FROM jsonb_each(?) AS item
-WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status + 0 = 1 AND EXISTS (
-        SELECT 1 FROM worker AS w
-        WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= [alive_since])
-RETURNING {unit} AS unit, token, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
-);
 
 /// Stores why a job backs off or is quarantined. Items: see [`item`].
 static FAILURE: Template = Template::new(

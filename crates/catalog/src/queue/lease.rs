@@ -1,15 +1,23 @@
-//! Leases, and what is stored under them.
+//! Leases, and the statements that a lost lease refuses: each changes a job only while the lease is valid, and returns a row
+//! for each job that it changed. What is stored with them is in `checkpoint.rs` and `fail.rs`.
 
-use std::time::{Duration, Instant};
+use std::collections::BTreeMap;
+use std::time::Duration;
 
+use serde_json::json;
+
+use crate::db::conn::Conn;
+use crate::db::query::query_as;
 use crate::db::row::{FromRow, Row, from_row};
+use crate::db::rows::json_array;
+use crate::db::script::{Script, Statement};
 use crate::queue::counters::{CounterKey, Cursor};
-use crate::queue::kind::JobKind;
+use crate::queue::kind::{JobKind, StoredKind, Template};
 use crate::queue::pair_job::PairJob;
 use crate::queue::provenance::FingerprintId;
 use crate::queue::stage_record::StageCheckpoint;
 use crate::{CatalogError, Result};
-use mocban_core::domain::{JobStatus, PairId, WorkerId};
+use mocban_core::domain::{JobStatus, PairId, UnixMillis, WorkerId};
 use mocban_system::failpoint;
 
 /// The right to run stages of one pair or block. A claim creates the lease, and a checkpoint continues it with the next
@@ -136,11 +144,208 @@ pub enum CheckpointOutcome<K: JobKind = PairJob> {
     Refused,
 }
 
+/// A worker's sign of life.
+#[derive(Debug, Clone)]
+pub(crate) struct Heartbeat {
+    pub(crate) worker: WorkerId,
+    pub(crate) now: UnixMillis,
+    pub(crate) alive_since: UnixMillis,
+    /// Its counts and times as JSON. `None` leaves those of the last heartbeat.
+    pub(crate) metrics: Option<String>,
+}
+
+/// Stores a heartbeat, unless the worker has ended, or its last heartbeat is so old that others may consider it dead. A
+/// worker that others took for dead is then known to live.
+const HEARTBEAT: &str = "
+UPDATE worker SET heartbeat = ?, died = 0, metrics = coalesce(?, metrics)
+WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
+
+/// Adds a heartbeat to a script. The statement returns the worker's id, or nothing if the heartbeat is refused.
+pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: &Heartbeat) -> Statement<(i64,)> {
+    let statement = script.add(HEARTBEAT);
+    script.bind(heartbeat.now);
+    script.bind(heartbeat.metrics.clone());
+    script.bind(heartbeat.worker.0);
+    script.bind(heartbeat.alive_since);
+    statement
+}
+
+/// A lease, and the finished stages to store under it, in the order they were computed.
+pub(crate) type LeasedCheckpoints<K = PairJob> = (Lease<K>, Vec<StageCheckpoint<K>>);
+
+/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead. Resets the crash count. Marks the job of
+/// a pair dirty if the new results do not build on the stored ones: see `AdvancedJob` in `checkpoint.rs`.
+pub(crate) static ADVANCE: Template = Template::new(
+    "
+UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [status] = 1 THEN worker END,
+    deadline = [deadline], attempt = 1, crashes = 0{and_advance}
+FROM jsonb_each(?) AS item
+WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status = 1{and_in_place} AND EXISTS (
+        SELECT 1 FROM worker AS w
+        WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= [alive_since])
+RETURNING {unit} AS unit, token",
+);
+
+/// The part of a statement of PostgreSQL that advances the jobs of pairs, in `item`, if their leases are valid: the same as
+/// [`ADVANCE`], and the job must still be at the stage of its lease. `job.status + 0` keeps the planner from the index of
+/// leases, which contains all leases that ended while a snapshot is held.
+pub(crate) const ADVANCED_ON_SERVER: &str = "
+advanced AS (
+    UPDATE job SET stage = item.next, status = item.status,
+        worker = CASE WHEN item.status = 1 THEN job.worker END, deadline = item.deadline,
+        attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.low_confidence, fingerprint = item.fingerprint,
+        dirty = CASE WHEN job.dirty = 1 OR item.mixed = 1 OR (item.first IS NOT NULL AND job.fingerprint IS DISTINCT FROM (
+            SELECT upstream FROM fingerprint WHERE id = item.first)) THEN 1 ELSE 0 END
+    FROM item
+    WHERE job.pair = item.pair AND job.worker = item.worker AND job.token = item.token AND job.status + 0 = 1
+        AND job.stage = item.stage AND EXISTS (
+            SELECT 1 FROM worker AS w
+            WHERE w.id = item.worker AND w.ended IS NULL AND w.heartbeat >= item.alive_since)
+    RETURNING item.*)";
+
+/// Updates failed jobs. Skips a job if its lease was lost or its worker counts as dead. `status + 0` keeps the planner of
+/// PostgreSQL from the index of leases, which contains all leases that ended while a snapshot is held.
+pub(crate) static FAIL: Template = Template::new(
+    "
+UPDATE {job} SET stage = min({job}.stage, [stage]), status = [status], run_at = [run_at], worker = NULL, deadline = NULL{and_fail}
+FROM jsonb_each(?) AS item
+WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status + 0 = 1 AND EXISTS (
+        SELECT 1 FROM worker AS w
+        WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= [alive_since])
+RETURNING {unit} AS unit, token, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
+);
+
+/// Gives leases back. Their attempts do not count. `status + 0` keeps the planner of PostgreSQL from the index of leases,
+/// which contains all leases that ended while a snapshot is held.
+pub(crate) static RELEASE: Template = Template::new(
+    "
+UPDATE {job} SET status = 0, worker = NULL, deadline = NULL, attempt = max({job}.attempt - 1, 0)
+FROM jsonb_each(?) AS item
+WHERE {job}.{unit} = [0] AND {job}.worker = [1] AND {job}.token = [2] AND {job}.status + 0 = 1
+RETURNING {unit} AS unit, token",
+);
+
+/// Adds the release of leases to a script.
+pub(crate) fn add_release<'l, K: StoredKind>(
+    script: &mut Script,
+    leases: impl Iterator<Item = &'l Lease<K>>,
+) -> Result<Option<Statement<FencedRow>>> {
+    let fences = leases.map(|lease| json!([lease.id(), lease.worker, lease.token]));
+    script.add_over(RELEASE.of::<K>(), fences)
+}
+
+/// Selects a job if its lease is valid, and locks it, so that the lease cannot be lost before the transaction ends.
+pub(crate) static LEASED: Template = Template::new(
+    "
+SELECT {unit} AS unit, token FROM {job}
+WHERE {unit} = ?1 AND worker = ?2 AND token = ?3 AND status = 1 AND EXISTS (
+        SELECT 1 FROM worker AS w WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= ?4) FOR UPDATE",
+);
+
+/// Selects the leases of a worker.
+static LEASES: Template = Template::new(
+    "
+SELECT {unit} AS unit, worker, token, stage, {fingerprint} AS fingerprint, attempt, {exclusive} AS exclusive
+FROM {job} WHERE status = 1 AND worker = ?1 ORDER BY {unit}",
+);
+
+/// Returns the leases of a worker.
+pub(crate) async fn leases<K: StoredKind>(
+    conn: &mut Conn,
+    worker: WorkerId,
+) -> Result<Vec<Lease<K>>> {
+    let leases = query_as(LEASES.of::<K>()).bind(worker.0);
+    leases.fetch_all(conn).await
+}
+
 /// Longest time from the writing of files to the commit of their rows, which may wait for a server that is unavailable.
 /// Later, the files may have been removed as unreferenced (`crates/store/src/collect.rs`), so their stages are computed again.
 const LONGEST_COMMIT: Duration = Duration::from_mins(30);
 
-/// Returns whether files that were written at this time may have been removed, because no row names them yet.
-pub(crate) fn was_written_long_ago(write_began: Instant) -> bool {
-    write_began.elapsed() > LONGEST_COMMIT / failpoint::time_scale("MOCBAN_COMMIT_TIME_SCALE")
+/// Returns whether files of a stage may have been removed, because no row names them yet.
+pub(crate) fn is_late<K: JobKind>((_, stages): &LeasedCheckpoints<K>) -> bool {
+    let longest = LONGEST_COMMIT / failpoint::time_scale("MOCBAN_COMMIT_TIME_SCALE");
+    let mut stages = stages.iter();
+    stages.any(|stage| stage.write_began.elapsed() > longest)
+}
+
+/// Returns the counter key of a job after a stage is stored.
+pub(crate) fn key_after<K: JobKind>(stage: &StageCheckpoint<K>) -> CounterKey {
+    let (cursor, status) = match K::next(stage.stage) {
+        Some(next) => (position::<K>(next), JobStatus::Leased),
+        None => (K::STAGES as Cursor, JobStatus::Done),
+    };
+    let fingerprint = K::fingerprint(&stage.provenance);
+    CounterKey::new(cursor, status, fingerprint.map(|FingerprintId(id)| id))
+}
+
+/// Returns the position and the status of a job after stages are stored, or `None` if there are none.
+pub(crate) fn position_after<K: JobKind>(
+    stages: &[StageCheckpoint<K>],
+) -> Option<(Cursor, JobStatus)> {
+    let after = key_after(stages.last()?);
+    Some((after.cursor, after.status))
+}
+
+/// Selects jobs by pair or block.
+static JOBS: Template = Template::new(
+    "
+SELECT j.{unit} AS unit, j.token, j.stage, j.status, j.worker FROM json_each(?1) AS wanted
+    CROSS JOIN {job} AS j ON j.{unit} = CAST(wanted.atom AS bigint)",
+);
+
+/// The state of a job.
+struct StoredJob {
+    unit: i64,
+    token: i64,
+    stage: i64,
+    status: JobStatus,
+    worker: Option<i64>,
+}
+
+from_row! { StoredJob { unit, token, stage, status, worker } }
+
+/// Returns the jobs of checkpoints, and of failures and releases (`ended`), which an earlier commit has already stored.
+pub(crate) async fn stored_before<'i, K: StoredKind>(
+    conn: &mut Conn,
+    checkpoints: impl Iterator<Item = &'i LeasedCheckpoints<K>>,
+    ended: impl Iterator<Item = &'i Lease<K>>,
+) -> Result<Vec<FencedRow>> {
+    let checkpoints: BTreeMap<_, _> = checkpoints
+        .filter_map(|(lease, stages)| Some((lease.id(), (lease, position_after(stages)?))))
+        .collect();
+    let ended: BTreeMap<_, _> = ended.map(|lease| (lease.id(), lease)).collect();
+    let units: Vec<_> = checkpoints.keys().chain(ended.keys()).copied().collect();
+    if units.is_empty() {
+        return Ok(Vec::new());
+    }
+    let jobs = query_as(JOBS.of::<K>()).bind(json_array(units));
+    let jobs = jobs.fetch_all(conn);
+    let jobs: Vec<StoredJob> = jobs.await?;
+    let is_stored = |job: &StoredJob| {
+        if let Some((lease, (stage, status))) = checkpoints.get(&job.unit) {
+            let worker = (*status == JobStatus::Leased).then_some(lease.worker.0);
+            return job.token == lease.token
+                && (job.stage, job.status, job.worker) == (*stage, *status, worker);
+        }
+        ended
+            .get(&job.unit)
+            .is_some_and(|lease| job.token == lease.token && job.worker.is_none())
+    };
+    let stored = jobs.into_iter().filter(is_stored);
+    Ok(stored
+        .map(|job| FencedRow {
+            unit: job.unit,
+            token: job.token,
+        })
+        .collect())
+}
+
+/// Returns whether an earlier commit has stored a failure or a release under this lease.
+pub(crate) async fn is_end_stored<K: StoredKind>(
+    conn: &mut Conn,
+    lease: &Lease<K>,
+) -> Result<bool> {
+    let stored = stored_before(conn, [].into_iter(), [lease].into_iter()).await?;
+    Ok(lease.is_in(&stored))
 }

@@ -11,8 +11,8 @@ use crate::db::error::Result;
 use crate::db::error_kind::CatalogErrorKind;
 use crate::db::query::limited;
 use crate::db::row::{FromRow as _, Row};
-use crate::queue::checkpoint::{AdvancedJob, LeasedCheckpoints};
-use crate::queue::lease::FencedRow;
+use crate::queue::checkpoint::AdvancedJob;
+use crate::queue::lease::{ADVANCED_ON_SERVER, FencedRow, LeasedCheckpoints};
 use crate::queue::stage_record::{MetricResult, StageCheckpoint};
 use mocban_core::domain::{ContentHash, InputVersion};
 use mocban_system::failpoint::{self, Point};
@@ -92,8 +92,7 @@ static STORE: LazyLock<String> = LazyLock::new(|| statement(false));
 static STORE_FIRST: LazyLock<String> = LazyLock::new(|| statement(true));
 
 /// Returns a statement that advances jobs whose lease is valid, and stores their results, metrics, attempts, input versions
-/// and counters. It returns the advanced jobs. `job.status + 0` keeps the planner from the index of leases, which contains
-/// all leases that ended while a snapshot is held.
+/// and counters. It returns the advanced jobs.
 fn statement(is_first: bool) -> String {
     let jobs = ArrayParameters {
         columns: JobRows::COLUMNS,
@@ -121,19 +120,7 @@ fn statement(is_first: bool) -> String {
     };
     format!(
         "
-WITH item AS {jobs},
-advanced AS (
-    UPDATE job SET stage = item.next, status = item.status,
-        worker = CASE WHEN item.status = 1 THEN job.worker END, deadline = item.deadline,
-        attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.low_confidence, fingerprint = item.fingerprint,
-        dirty = CASE WHEN job.dirty = 1 OR item.mixed = 1 OR (item.first IS NOT NULL AND job.fingerprint IS DISTINCT FROM (
-            SELECT upstream FROM fingerprint WHERE id = item.first)) THEN 1 ELSE 0 END
-    FROM item
-    WHERE job.pair = item.pair AND job.worker = item.worker AND job.token = item.token AND job.status + 0 = 1
-        AND job.stage = item.stage AND EXISTS (
-            SELECT 1 FROM worker AS w
-            WHERE w.id = item.worker AND w.ended IS NULL AND w.heartbeat >= item.alive_since)
-    RETURNING item.*),
+WITH item AS {jobs},{ADVANCED_ON_SERVER},
 result AS (
     INSERT INTO stage_result ({result_columns})
     SELECT {result_columns}

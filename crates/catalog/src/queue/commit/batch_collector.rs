@@ -83,10 +83,10 @@ mod tests {
 
     use super::{BATCH, collect};
     use crate::Catalog;
-    use crate::queue::claim::Heartbeat;
     use crate::queue::commit::commit_delay::CommitDelay;
     use crate::queue::commit::request::Message;
     use crate::queue::commit::request::Request;
+    use crate::queue::lease::Heartbeat;
     use mocban_core::domain::WorkerId;
 
     fn request() -> Request {

@@ -6,14 +6,15 @@ use std::sync::Arc;
 use crate::db::conn::Conn;
 use crate::db::error::{CatalogError, Result};
 use crate::db::script::{Script, ScriptRows, Statement};
-use crate::queue::checkpoint::{self, LeasedCheckpoints};
-use crate::queue::claim::{self, ClaimRequest, Heartbeat};
-use crate::queue::commit::known_leases::stored_before;
+use crate::queue::checkpoint;
+use crate::queue::claim::{self, ClaimRequest};
 use crate::queue::commit::request::{Reply, Request};
 use crate::queue::commit::write_connection::BEGIN;
 use crate::queue::counters::Deltas;
 use crate::queue::fail::{self, FailedRow, LeasedFailure};
-use crate::queue::lease::{FencedRow, Lease};
+use crate::queue::lease::{
+    FencedRow, Heartbeat, Lease, LeasedCheckpoints, add_heartbeat, add_release, stored_before,
+};
 
 /// Requests of one kind, and where the reply to each goes.
 pub(crate) struct Pending<I, R>(Vec<(I, Reply<R>)>);
@@ -140,7 +141,7 @@ impl Batch {
     /// Adds the statements that change workers and jobs.
     fn add_jobs(&self, script: &mut Script) -> Result<JobStatements> {
         let heartbeats = self.heartbeats.items();
-        let heartbeats = heartbeats.map(|heartbeat| claim::add_heartbeat(script, heartbeat));
+        let heartbeats = heartbeats.map(|heartbeat| add_heartbeat(script, heartbeat));
         Ok(JobStatements {
             heartbeats: heartbeats.collect(),
             advanced: checkpoint::add_advance(
@@ -148,7 +149,7 @@ impl Batch {
                 self.checkpoints.items().map(|item| &**item),
             )?,
             failed: fail::add_failures(script, self.failures.items().map(|item| &**item))?,
-            released: claim::add_release(script, self.releases.items())?,
+            released: add_release(script, self.releases.items())?,
             claims: self
                 .claims
                 .items()

@@ -4,11 +4,10 @@ use tokio::sync::oneshot;
 
 use crate::db::conn::Work;
 use crate::db::error::Result;
-use crate::queue::checkpoint::LeasedCheckpoints;
-use crate::queue::claim::{ClaimRequest, Heartbeat};
+use crate::queue::claim::ClaimRequest;
 use crate::queue::commit::write_connection::WriteConnection;
 use crate::queue::fail::LeasedFailure;
-use crate::queue::lease::Lease;
+use crate::queue::lease::{Heartbeat, Lease, LeasedCheckpoints};
 
 /// Where a reply goes.
 pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;

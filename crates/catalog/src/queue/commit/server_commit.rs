@@ -5,13 +5,11 @@ use std::time::Instant;
 
 use crate::db::conn::Conn;
 use crate::db::error::Result;
-use crate::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::queue::claim::ClaimRequest;
 use crate::queue::commit::group_commit::{Batch, BatchReply};
-use crate::queue::commit::known_leases::stored_before;
 use crate::queue::commit::write_connection::CatalogServerState;
 use crate::queue::counters::{self, cursor};
-use crate::queue::lease::{Lease, was_written_long_ago};
+use crate::queue::lease::{Lease, LeasedCheckpoints, is_late, position_after, stored_before};
 use crate::queue::{server_checkpoint, server_claim};
 use mocban_core::domain::JobStatus;
 
@@ -68,12 +66,6 @@ async fn commit_parts(
     Ok(reply)
 }
 
-/// Returns whether files of a checkpoint may have been removed.
-fn is_late((_, stages): &LeasedCheckpoints) -> bool {
-    let mut stages = stages.iter();
-    stages.any(|stage| was_written_long_ago(stage.write_began))
-}
-
 /// Returns whether stages that were computed again end where their lease began. The position of the job then does not show
 /// whether they are stored.
 fn ends_at_its_start((lease, stages): &LeasedCheckpoints) -> bool {
@@ -90,7 +82,7 @@ async fn store(
         unreachable!("a server is PostgreSQL");
     };
     let (late, timely): (Vec<&LeasedCheckpoints>, Vec<_>) =
-        checkpoints.iter().partition(|item| is_late(item));
+        checkpoints.iter().partition(|item| is_late(**item));
     let stored = server_checkpoint::store(server, &timely).await?;
     if !late.is_empty() {
         // The next claim gets these leases back, and computes the stages again.
