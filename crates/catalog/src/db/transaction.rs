@@ -1,4 +1,9 @@
-//! Write transactions whose body is an `async` block.
+//! Write transactions: how they begin, and those whose body is an `async` block.
+
+use crate::db::dialect::Sql;
+
+/// Begins a transaction.
+pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
 
 /// Runs a block with a connection in a write transaction of its own: see [`Catalog::in_transaction`](crate::Catalog).
 macro_rules! in_transaction {

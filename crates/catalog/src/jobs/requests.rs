@@ -2,8 +2,9 @@
 
 use crate::jobs::job_counts::count_jobs;
 use crate::queue::claim::ClaimRequest;
+use crate::queue::commit::batch_collector::Message;
 use crate::queue::commit::commit_delay::Waiting;
-use crate::queue::commit::request::{Message, Reply, Request};
+use crate::queue::commit::group_commit::{Reply, Request};
 use crate::queue::counters::{JobCounts, by_status, counters};
 use crate::queue::lease::{CheckpointOutcome, Heartbeat, Lease};
 use crate::queue::stage_record::{StageCheckpoint, StageFailure};

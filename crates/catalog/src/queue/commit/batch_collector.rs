@@ -1,11 +1,30 @@
-//! Collects the requests of the next group commit.
+//! Messages to the writer task, and the collector of the requests of the next group commit.
 
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, timeout_at};
 
+use crate::db::conn::Work;
 use crate::queue::commit::commit_delay::CommitDelay;
-use crate::queue::commit::group_commit::Batch;
-use crate::queue::commit::request::Message;
+use crate::queue::commit::group_commit::{Batch, Request};
+use crate::queue::commit::write_connection::WriteConnection;
+
+/// A separate transaction, which sends its own reply.
+pub(crate) type TransactionTask =
+    Box<dyn for<'c> FnOnce(&'c mut WriteConnection) -> Work<'c, ()> + Send>;
+
+/// A message to the writer task.
+pub(crate) enum Message {
+    /// Joins the next group commit.
+    Grouped(Request),
+    /// Joins the next group commit, which may be delayed so that later requests share it.
+    Deferrable(Request),
+    /// Ends the delay of the next commit, because somebody waits for it.
+    Flush,
+    /// Runs in its own transaction.
+    Transaction(TransactionTask),
+    /// Ends the writer after everything sent before.
+    Close(oneshot::Sender<()>),
+}
 
 /// Most requests in one commit.
 const BATCH: usize = 256;
@@ -81,11 +100,10 @@ mod tests {
     use tokio::sync::{mpsc, oneshot};
     use tokio::time::timeout;
 
-    use super::{BATCH, collect};
+    use super::{BATCH, Message, collect};
     use crate::Catalog;
     use crate::queue::commit::commit_delay::CommitDelay;
-    use crate::queue::commit::request::Message;
-    use crate::queue::commit::request::Request;
+    use crate::queue::commit::group_commit::Request;
     use crate::queue::lease::Heartbeat;
     use mocban_core::domain::WorkerId;
 

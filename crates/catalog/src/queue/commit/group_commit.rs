@@ -3,18 +3,31 @@
 
 use std::sync::Arc;
 
+use tokio::sync::oneshot;
+
 use crate::db::conn::Conn;
 use crate::db::error::{CatalogError, Result};
 use crate::db::script::{Script, ScriptRows, Statement};
+use crate::db::transaction::BEGIN;
 use crate::queue::checkpoint;
 use crate::queue::claim::{self, ClaimRequest};
-use crate::queue::commit::request::{Reply, Request};
-use crate::queue::commit::write_connection::BEGIN;
 use crate::queue::counters::Deltas;
 use crate::queue::fail::{self, FailedRow, LeasedFailure};
 use crate::queue::lease::{
     FencedRow, Heartbeat, Lease, LeasedCheckpoints, add_heartbeat, add_release, stored_before,
 };
+
+/// Where a reply goes.
+pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
+
+/// A request that may share a commit with others. The reply `false` means that its lease or worker was not valid.
+pub(crate) enum Request {
+    Heartbeat(Heartbeat, Reply<bool>),
+    Checkpoint(Box<LeasedCheckpoints>, Reply<bool>),
+    Fail(Box<LeasedFailure>, Reply<bool>),
+    Release(Lease, Reply<bool>),
+    Claim(ClaimRequest, Reply<Vec<Lease>>),
+}
 
 /// Requests of one kind, and where the reply to each goes.
 pub(crate) struct Pending<I, R>(Vec<(I, Reply<R>)>);

@@ -16,6 +16,7 @@ use crate::db::postgres::LOCK_FOR_ANY_PLAN;
 use crate::db::postgres_address::PostgresAddress;
 use crate::db::query::query;
 use crate::db::retry_wait::RetryWait;
+use crate::db::transaction::BEGIN;
 use crate::queue::claim_tracker::ClaimTracker;
 use crate::queue::commit::known_leases::KnownLeases;
 use crate::queue::worker_lock::WorkerLock;
@@ -23,9 +24,6 @@ use mocban_core::domain::WorkerId;
 
 /// Time after a connection was given up in which no other is tried.
 const PAUSE_AFTER_GIVING_UP: Duration = Duration::from_secs(10);
-
-/// Begins a transaction.
-pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
 
 /// The write connection.
 pub(crate) struct WriteConnection {

@@ -10,10 +10,9 @@ use tokio::sync::mpsc;
 use crate::db::busy_retry::retry_while_busy;
 use crate::db::error::{CatalogError, Result};
 use crate::db::error_kind::CatalogErrorKind;
-use crate::queue::commit::batch_collector::collect;
+use crate::queue::commit::batch_collector::{Message, collect};
 use crate::queue::commit::commit_delay::CommitDelay;
 use crate::queue::commit::group_commit::{Batch, BatchReply};
-use crate::queue::commit::request::Message;
 use crate::queue::commit::server_commit;
 use crate::queue::commit::write_connection::{WriteConnection, rollback};
 
