@@ -12,7 +12,7 @@
 //!   the last claimed pair, because a snapshot that another session holds would keep dead rows in the way. Each request for a
 //!   block is a transaction of its own.
 //! - If the server is unavailable, the writer reconnects and repeats requests for pairs, and the runner those for blocks. The
-//!   fencing token shows whether an earlier attempt was stored (`queue/commit/known_leases.rs`). The write connection of a
+//!   fencing token shows whether an earlier attempt was stored (`queue/lease.rs`). The write connection of a
 //!   worker holds a lock, by which others see that it is gone.
 //! - Rows that no run can compute again, such as verdicts, have checksums (`records/checksums.rs`).
 //! - `db init --roles` gives the tables to group roles: the database refuses what a role may not do.

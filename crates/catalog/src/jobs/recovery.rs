@@ -11,12 +11,12 @@ use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
+use crate::queue::commit::server_commit::connected_workers;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::queue::fail::{add_records, merged};
 use crate::queue::kind::{JobKind, StoredKind, Template};
 use crate::queue::pair_job::{UPDATE_INPUTS, input_item};
 use crate::queue::provenance::InputVersions;
-use crate::queue::worker_lock;
 use crate::{Catalog, Result};
 use mocban_core::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
@@ -152,7 +152,7 @@ impl Catalog {
         let mut holders: Vec<LeaseHolder> = query_as(HOLDERS).fetch_all(&mut conn).await?;
         if self.is_shared() && !holders.is_empty() {
             let workers = holders.iter().map(|holder| holder.worker);
-            let connected = worker_lock::connected(&mut conn, workers).await?;
+            let connected = connected_workers(&mut conn, workers).await?;
             for holder in &mut holders {
                 holder.is_connected = connected.contains(&holder.worker);
             }
@@ -262,7 +262,7 @@ async fn still_dead(conn: &mut Conn, seen: &[LeaseHolder]) -> Result<Vec<WorkerI
     let connected = if unconnected.is_empty() {
         BTreeSet::new()
     } else {
-        worker_lock::connected(conn, unconnected.into_iter()).await?
+        connected_workers(conn, unconnected.into_iter()).await?
     };
     let silent = silent.into_iter().map(WorkerId);
     Ok(silent

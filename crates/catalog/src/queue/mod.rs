@@ -16,4 +16,3 @@ pub(crate) mod selection;
 pub(crate) mod server_checkpoint;
 pub(crate) mod server_claim;
 pub(crate) mod stage_record;
-pub(crate) mod worker_lock;

@@ -3,7 +3,6 @@
 pub(crate) mod batch_collector;
 pub(crate) mod commit_delay;
 pub(crate) mod group_commit;
-pub(crate) mod known_leases;
 pub(crate) mod server_commit;
 pub(crate) mod write_connection;
 pub(crate) mod writer;

@@ -1,17 +1,36 @@
-//! Commits requests in PostgreSQL. Checkpoints, and each claim, are one statement that commits by itself; the rarer
-//! requests share a transaction.
+//! Commits requests in PostgreSQL, and what this process remembers of them: leases whose replies were lost, and the lock of
+//! its worker. Checkpoints, and each claim, are one statement that commits by itself; the rarer requests share a
+//! transaction.
 
-use std::time::Instant;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use crate::db::conn::Conn;
 use crate::db::error::Result;
+use crate::db::query::query_scalar;
+use crate::db::retry_wait::RetryWait;
 use crate::queue::claim::ClaimRequest;
+use crate::queue::claim_tracker::ClaimTracker;
 use crate::queue::commit::group_commit::{Batch, BatchReply};
-use crate::queue::commit::write_connection::CatalogServerState;
 use crate::queue::counters::{self, cursor};
-use crate::queue::lease::{Lease, LeasedCheckpoints, is_late, position_after, stored_before};
+use crate::queue::lease::{
+    Lease, LeasedCheckpoints, is_late, leases, position_after, stored_before,
+};
+use crate::queue::pair_job::PairJob;
 use crate::queue::{server_checkpoint, server_claim};
-use mocban_core::domain::JobStatus;
+use mocban_core::domain::{JobStatus, PairId, WorkerId};
+
+/// What this process remembers of its requests to a server.
+#[derive(Debug, Default)]
+pub(crate) struct CatalogServerState {
+    pub(crate) leases: KnownLeases,
+    pub(crate) claim_tracker: ClaimTracker,
+    /// Whether the counters of all earlier slots were added up over this connection.
+    pub(crate) has_folded_all: bool,
+    pub(crate) worker_lock: WorkerLock,
+    pub(crate) retry_wait: Arc<RetryWait>,
+}
 
 /// Commits a batch of [`Batch::split_for_server`]. An earlier commit of the same batch may have been stored although its
 /// reply was lost.
@@ -139,4 +158,121 @@ fn note_exclusive<'l>(leases: impl Iterator<Item = &'l Lease>, state: &mut Catal
     for lease in leases.filter(|lease| lease.exclusive) {
         state.claim_tracker.note_release(lease);
     }
+}
+
+/// Time after a reconnection or a failed claim during which unknown leases are searched for. A server may execute a commit
+/// of the broken connection until it notices that the connection is broken.
+const SEARCH_TIME: Duration = Duration::from_mins(2);
+
+/// Leases that this process has received from a server: their tokens by pair. The reply to a claim can be lost after its
+/// commit. Then the catalog contains leases that this process has not received, and its heartbeats keep them valid.
+#[derive(Debug, Default)]
+pub(crate) struct KnownLeases {
+    tokens: BTreeMap<PairId, i64>,
+    search_until: Option<Instant>,
+}
+
+impl KnownLeases {
+    /// Records that replies may have been lost.
+    pub(crate) fn replies_may_be_lost(&mut self) {
+        self.search_until = Some(Instant::now() + SEARCH_TIME);
+    }
+
+    /// Returns whether an earlier commit may have been stored although its reply was lost.
+    pub(crate) fn is_searching(&self) -> bool {
+        self.search_until
+            .is_some_and(|until| Instant::now() <= until)
+    }
+
+    /// Adds leases that a claim returned.
+    pub(crate) fn add(&mut self, leases: &[Lease]) {
+        let tokens = leases.iter().map(|lease| (lease.unit, lease.token));
+        self.tokens.extend(tokens);
+    }
+
+    /// Removes a lease that has ended. A later lease of the same pair stays.
+    pub(crate) fn remove(&mut self, lease: &Lease) {
+        if self.tokens.get(&lease.unit) == Some(&lease.token) {
+            self.tokens.remove(&lease.unit);
+        }
+    }
+
+    /// Returns the leases of a worker that this process has not received. Queries the server only for `SEARCH_TIME` after
+    /// a reconnection or a failed claim.
+    pub(crate) async fn unknown(&self, conn: &mut Conn, worker: WorkerId) -> Result<Vec<Lease>> {
+        if !self.is_searching() {
+            return Ok(Vec::new());
+        }
+        let mut leases = leases::<PairJob>(conn, worker).await?;
+        leases.retain(|lease| self.tokens.get(&lease.unit) != Some(&lease.token));
+        Ok(leases)
+    }
+}
+
+/// Takes the lock of a worker until the end of the session. Returns `false` if another session holds it, such as a broken
+/// connection of the same worker.
+const TRY_LOCK: &str = "
+SELECT pg_try_advisory_lock(hashtext(current_setting('search_path')), CAST(?1 % 2147483648 AS integer))";
+
+/// Selects the numbers of all locks of workers in this catalog.
+const LOCKS: &str = "
+SELECT CAST(objid AS bigint) FROM pg_locks
+WHERE locktype = 'advisory' AND objsubid = 2 AND granted
+    AND database = (SELECT oid FROM pg_database WHERE datname = current_database())
+    AND classid = CAST(hashtext(current_setting('search_path')) AS oid)";
+
+/// The lock of a worker, as far as its connection knows. It shows others that the worker is connected, and the server releases
+/// it when the process dies. A lock that is free is only a hint: a connection may break while its worker lives.
+#[derive(Debug, Default)]
+pub(crate) struct WorkerLock {
+    worker: Option<WorkerId>,
+    is_held: bool,
+}
+
+impl WorkerLock {
+    /// Sets the worker whose lock is taken from now on.
+    pub(crate) fn set_worker(&mut self, worker: WorkerId) {
+        if self.worker != Some(worker) {
+            *self = Self {
+                worker: Some(worker),
+                is_held: false,
+            };
+        }
+    }
+
+    /// Records that the session has ended.
+    pub(crate) const fn session_ended(&mut self) {
+        self.is_held = false;
+    }
+
+    /// Takes the lock if it is not held. Otherwise, only finds out whether the connection works.
+    pub(crate) async fn take(&mut self, conn: &mut Conn) -> Result<()> {
+        let Some(worker) = self.worker else {
+            return Ok(());
+        };
+        if self.is_held {
+            let _: i64 = query_scalar("SELECT CAST(1 AS bigint)")
+                .fetch_one(conn)
+                .await?;
+        } else {
+            self.is_held = query_scalar(TRY_LOCK)
+                .bind(worker.0)
+                .fetch_one(conn)
+                .await?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns which of the workers hold their locks.
+pub(crate) async fn connected_workers(
+    conn: &mut Conn,
+    workers: impl Iterator<Item = WorkerId>,
+) -> Result<BTreeSet<WorkerId>> {
+    let held: Vec<i64> = query_scalar(LOCKS).fetch_all(conn).await?;
+    let held: BTreeSet<i64> = held.into_iter().collect();
+    let number = |worker: &WorkerId| worker.0 % (1 << 31);
+    Ok(workers
+        .filter(|worker| held.contains(&number(worker)))
+        .collect())
 }

@@ -17,9 +17,7 @@ use crate::db::postgres_address::PostgresAddress;
 use crate::db::query::query;
 use crate::db::retry_wait::RetryWait;
 use crate::db::transaction::BEGIN;
-use crate::queue::claim_tracker::ClaimTracker;
-use crate::queue::commit::known_leases::KnownLeases;
-use crate::queue::worker_lock::WorkerLock;
+use crate::queue::commit::server_commit::CatalogServerState;
 use mocban_core::domain::WorkerId;
 
 /// Time after a connection was given up in which no other is tried.
@@ -43,17 +41,6 @@ struct Server {
     state: CatalogServerState,
     /// When a connection was last given up, because the server did not reply.
     given_up: Option<Instant>,
-}
-
-/// What this process remembers of its requests to a server.
-#[derive(Debug, Default)]
-pub(crate) struct CatalogServerState {
-    pub(crate) leases: KnownLeases,
-    pub(crate) claim_tracker: ClaimTracker,
-    /// Whether the counters of all earlier slots were added up over this connection.
-    pub(crate) has_folded_all: bool,
-    pub(crate) worker_lock: WorkerLock,
-    pub(crate) retry_wait: Arc<RetryWait>,
 }
 
 impl WriteConnection {
