@@ -49,6 +49,7 @@ mod transfer;
     reason = "the module's name selects the database"
 )]
 mod tests_on_postgres;
+mod worker_requests;
 
 pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;

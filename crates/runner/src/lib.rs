@@ -32,7 +32,7 @@
 //! | who finds out | by | refused by (in `crates/catalog/src`) | what happens |
 //! |---|---|---|---|
 //! | `checkpointer.rs` | a checkpoint of a pair is refused | SQLite: `ADVANCE` in `queue/checkpoint.rs`; PostgreSQL: `queue/server_checkpoint.rs` | this and later results are dropped; the stage that runs is cancelled |
-//! | `block/checkpoint.rs`, `block/task.rs` | a checkpoint of a block, or versions of its files, are refused | `ADVANCE` in `queue/checkpoint.rs`, `LEASED` in `blocks/queue.rs` | the task ends; no stage runs meanwhile |
+//! | `block/checkpoint.rs`, `block/task.rs` | a checkpoint of a block, or versions of its files, are refused | `ADVANCE`, `LEASED` in `queue/lease.rs` | the task ends; no stage runs meanwhile |
 //! | `checkpointer.rs`, `block/checkpoint.rs` | a failure is refused | `FAIL` in `queue/fail.rs` | the failure is not stored |
 //! | `worker_session.rs`, for `scheduler.rs` | a heartbeat is refused | `HEARTBEAT` in `queue/claim.rs` | the process becomes a new worker: see below |
 //! | the worker, as a refused checkpoint | files were written more than 30 minutes ago | pairs on PostgreSQL: `is_late` in `queue/commit/server_commit.rs`; blocks: `store` in `queue/checkpoint.rs`; pairs on SQLite: not checked | nothing is stored; the job stays leased to this worker, which claims it again |

@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 
 use crate::db::conn::Conn;
-use crate::db::error::Result;
 use crate::db::query::{query_as, query_scalar};
-use crate::queue::counters::{CounterKey, JobGroup};
+use crate::queue::counters::{CounterKey, JobCounts, JobGroup, by_status, counters};
+use crate::{Catalog, Result};
 
 /// Pairs counted in one statement.
 const RANGE: i64 = 100_000;
@@ -16,6 +16,20 @@ SELECT stage, status, coalesce(fingerprint, 0) AS fingerprint, count(*) AS n FRO
 GROUP BY stage, status, job.fingerprint";
 
 pub(crate) const NEXT_PAIR: &str = "SELECT min(pair) FROM job WHERE pair > ?1";
+
+impl Catalog {
+    /// Reads the counters of jobs.
+    pub async fn counters(&self) -> Result<JobCounts> {
+        let mut conn = self.read_conn().await?;
+        Ok(by_status(counters(&mut conn).await?))
+    }
+
+    /// Counts all jobs from their rows. In an undamaged catalog, [`Catalog::counters`] gives the same result.
+    pub async fn recount(&self) -> Result<JobCounts> {
+        let mut conn = self.snapshot().await?;
+        Ok(by_status(count_jobs(&mut conn).await?))
+    }
+}
 
 /// Counts all jobs. In a transaction, all counts are of the same moment.
 pub(crate) async fn count_jobs(conn: &mut Conn) -> Result<BTreeMap<CounterKey, u64>> {

@@ -1,11 +1,10 @@
-//! What the catalog does with jobs and workers: the requests of a worker, stale and overdue jobs, retired pairs, settings.
+//! What the catalog does with jobs and workers: counts, stale jobs, retired pairs, settings.
 
 pub(crate) mod block_settings;
 pub(crate) mod fingerprint;
 pub(crate) mod job_counts;
 pub(crate) mod plan;
 pub(crate) mod recovery;
-mod requests;
 pub(crate) mod requeue;
 pub(crate) mod retired;
 mod run_plan;

@@ -1,7 +1,6 @@
-//! Worker registration, due back-offs and open work.
+//! What workers register with, due back-offs and open work.
 
-use crate::db::conn::Conn;
-use crate::db::query::{query, query_as, query_scalar};
+use crate::db::query::query_as;
 use crate::db::row::from_row;
 use crate::db::transaction::in_transaction;
 use crate::jobs::block_settings::BlockSettings;
@@ -11,7 +10,7 @@ use crate::queue::counters::{Cursor, Deltas, cursor};
 use crate::queue::pair_job::PairJob;
 use crate::queue::selection::PairSelection;
 use crate::{Catalog, Result};
-use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId, WorkerMetrics};
+use mocban_core::domain::{JobStatus, Stage, UnixMillis};
 
 /// The process a worker runs in.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -79,36 +78,6 @@ SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job A
 GROUP BY j.stage, j.status";
 
 impl Catalog {
-    /// Registers a worker process with its settings. Returns an id that no worker had before.
-    pub async fn register_worker(
-        &self,
-        info: WorkerInfo,
-        settings: WorkerSettings,
-        now: UnixMillis,
-    ) -> Result<WorkerId> {
-        self.in_transaction(move |conn| Box::pin(insert_worker(conn, info, settings, now)))
-            .await
-    }
-
-    /// Records that a worker ended properly, and with which metrics. Without metrics, the worker is not listed any more.
-    pub async fn end_worker(
-        &self,
-        worker: WorkerId,
-        now: UnixMillis,
-        metrics: Option<&WorkerMetrics>,
-    ) -> Result<()> {
-        let metrics = metrics.map(serde_json::to_string).transpose()?;
-        in_transaction!(self, |conn| {
-            query("UPDATE worker SET ended = ?2, metrics = ?3 WHERE id = ?1")
-                .bind(worker.0)
-                .bind(now)
-                .bind(metrics)
-                .execute(conn)
-                .await?;
-            Ok(())
-        })
-    }
-
     /// Ends the back-offs that are due, and returns the number of pairs made ready. Also ends back-offs with more than
     /// `longest` milliseconds left, which only a clock jump can cause.
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
@@ -162,25 +131,4 @@ impl Catalog {
         }
         Ok(left)
     }
-}
-
-async fn insert_worker(
-    conn: &mut Conn,
-    info: WorkerInfo,
-    settings: WorkerSettings,
-    now: UnixMillis,
-) -> Result<WorkerId> {
-    let id: i64 = query_scalar(
-        "INSERT INTO worker (host, pid, boot_id, started, heartbeat, fingerprints, block_settings)
-        VALUES (?1, ?2, ?3, ?4, ?4, ?5, ?6) RETURNING id",
-    )
-    .bind(info.host)
-    .bind(info.pid)
-    .bind(info.boot_id)
-    .bind(now)
-    .bind(settings.fingerprints.json())
-    .bind(settings.blocks.json())
-    .fetch_one(conn)
-    .await?;
-    Ok(WorkerId(id))
 }

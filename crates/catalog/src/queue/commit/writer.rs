@@ -1,6 +1,6 @@
 //! The writer task, which commits pending requests together and replies after the commit. Only heartbeats and the requests
 //! for pairs are grouped. Everything else comes from `Catalog::in_transaction` as a transaction of its own, also the jobs of
-//! blocks (`blocks/queue.rs`).
+//! blocks (`worker_requests.rs`).
 
 use std::sync::Arc;
 use std::time::Duration;
