@@ -7,10 +7,10 @@ use crate::audit::audited_pairs;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::jobs::job_counts;
-use crate::jobs::recovery;
 use crate::jobs::requeue;
 use crate::jobs::staleness;
 use crate::jobs::workers;
+use crate::lease_recovery;
 use crate::queue::checkpoint;
 use crate::queue::claim;
 use crate::queue::lease;
@@ -84,11 +84,11 @@ async fn fenced_writes_find_their_jobs_by_key() {
 #[tokio::test]
 async fn recovery_and_holders_use_the_index_of_leases() {
     for sql in [
-        recovery::RECOVER.of::<PairJob>(),
-        recovery::ORPHANED.into(),
-        recovery::OVERDUE.of::<PairJob>(),
-        recovery::HOLDERS.into(),
-        recovery::AFFECTED.of::<PairJob>(),
+        lease_recovery::RECOVER.of::<PairJob>(),
+        lease_recovery::ORPHANED.into(),
+        lease_recovery::OVERDUE.of::<PairJob>(),
+        lease_recovery::HOLDERS.into(),
+        lease_recovery::AFFECTED.of::<PairJob>(),
     ] {
         let plan = plan(sql).await;
         assert!(

@@ -4,7 +4,6 @@ pub(crate) mod block_settings;
 pub(crate) mod fingerprint;
 pub(crate) mod job_counts;
 pub(crate) mod plan;
-pub(crate) mod recovery;
 pub(crate) mod requeue;
 pub(crate) mod retired;
 mod run_plan;

@@ -9,7 +9,7 @@ use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::Lease;
-use crate::queue::pair_job::PairJob;
+use crate::queue::pair_job::{PairJob, UPDATE_INPUTS, input_item};
 use crate::queue::provenance::InputVersions;
 use crate::queue::selection::PairSelection;
 use crate::records::model::{PairAttributes, StageRecord};
@@ -58,6 +58,12 @@ WHERE id > ?1 ORDER BY id LIMIT ?2";
 const INPUTS_AMONG: &str = "
 SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat
 FROM pair WHERE id > ?1 AND id IN (SELECT CAST(atom AS bigint) FROM json_each(?3)) ORDER BY id LIMIT ?2";
+
+/// Adds the versions of input files to the failures of pairs.
+const FATAL_INPUTS: &str = "
+UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> 'mesh_hash')),
+    print_hash = coalesce(failure.print_hash, unhex(item.value ->> 'print_hash'))
+FROM json_each(?) AS item WHERE failure.pair = CAST(item.value ->> 'pair' AS bigint)";
 
 impl Catalog {
     /// Returns the leased pairs with their results, in the same order as the leases.
@@ -115,6 +121,22 @@ impl Catalog {
             let mut script = Script::default();
             let inputs = seen.iter().map(|(pair, inputs)| (*pair, inputs));
             PairJob::add_inputs(&mut script, inputs)?;
+            script.run(conn).await?;
+            Ok(())
+        })
+    }
+
+    /// Stores the current versions of input files that no stage of a quarantined pair has read. A later run compares
+    /// the stored hashes to detect replaced files.
+    pub async fn record_poisoned_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
+        in_transaction!(self, |conn| {
+            let mut script = Script::default();
+            let items = || {
+                seen.iter()
+                    .map(|(pair, inputs)| input_item((*pair, inputs)))
+            };
+            script.execute_over(UPDATE_INPUTS, items())?;
+            script.execute_over(FATAL_INPUTS, items())?;
             script.run(conn).await?;
             Ok(())
         })
