@@ -70,28 +70,6 @@ impl JobKind for BlockJob {
 impl StoredKind for BlockJob {
     const NUMBER: usize = 1;
     const IS_COUNTED: bool = false;
-    const NAMES: &'static [(&'static str, &'static str)] = &[
-        ("job", "block_job"),
-        ("unit", "block"),
-        ("result", "block_result"),
-        ("attempt", "block_attempt"),
-        ("failure", "block_failure"),
-        ("settings", "block_settings"),
-        ("prio", ""),
-        ("turn", "stage"),
-        ("exclusive", "0"),
-        ("fingerprint", "NULL"),
-        ("and_advance", ""),
-        // A checkpoint that is sent again is stored once.
-        ("and_in_place", " AND block_job.stage = [stage]"),
-        ("and_fail", ""),
-        ("and_requeue", ""),
-        ("and_send_back", ""),
-        ("and_not_retired", ""),
-        ("and_recover", ""),
-        ("and_overdue", ""),
-        ("and_count_claimed", ""),
-    ];
     const PROVENANCE: &'static [(&'static str, &'static str)] =
         &[("made_with", "item.value ->> 'made_with'")];
 

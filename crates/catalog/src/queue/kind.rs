@@ -12,6 +12,7 @@ use crate::Result;
 use crate::db::conn::Conn;
 use crate::db::dialect::{Sql, postgres_text};
 use crate::db::script::Script;
+use crate::queue::fragments::fingerprint_before;
 use crate::queue::provenance::FingerprintId;
 use mocban_core::domain::WorkerId;
 
@@ -56,12 +57,10 @@ pub trait JobKind: Debug + Clone + Copy + PartialEq + Eq + Send + Sync + 'static
 
 /// How the jobs of a kind are stored.
 pub(crate) trait StoredKind: JobKind {
-    /// Number of the kind.
+    /// Number of the kind: its place in [`NAMES`].
     const NUMBER: usize;
     /// Whether jobs are counted by position, status and fingerprint.
     const IS_COUNTED: bool;
-    /// The names in braces in a [`Template`] and what they stand for.
-    const NAMES: &'static [(&'static str, &'static str)];
     /// Columns of results and failures that hold the provenance, each with its value in an item of a statement.
     const PROVENANCE: &'static [(&'static str, &'static str)];
 
@@ -85,6 +84,85 @@ pub(crate) trait StoredKind: JobKind {
         inputs: impl Iterator<Item = (Self::Unit, &'i Self::Inputs)>,
     ) -> Result<()>;
 }
+
+/// Counts claimed pairs, in PostgreSQL.
+const COUNT_CLAIMED: &str = ",
+counted AS (
+    INSERT INTO counter_part (stage, status, fingerprint, n)
+    SELECT c.stage, moved.status, coalesce(c.fingerprint, 0), sum(moved.n)
+    FROM claimed AS c, (VALUES (0, -1), (1, 1)) AS moved (status, n)
+    GROUP BY 1, 2, 3 ORDER BY 1, 2, 3
+    ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n)";
+
+/// Sets the fingerprint to that of the result before a stage, for a job that goes back to the stage.
+macro_rules! go_back_to {
+    ($stage:literal) => {
+        concat!(", fingerprint = ", fingerprint_before!($stage))
+    };
+}
+
+/// The names in braces in a [`Template`], and what each stands for: for pairs, and for blocks.
+const NAMES: [(&str, [&str; 2]); 19] = [
+    ("job", ["job", "block_job"]),
+    ("unit", ["pair", "block"]),
+    ("result", ["stage_result", "block_result"]),
+    ("attempt", ["attempt", "block_attempt"]),
+    ("failure", ["failure", "block_failure"]),
+    ("settings", ["fingerprints", "block_settings"]),
+    ("prio", ["prio, ", ""]),
+    ("turn", ["turn", "stage"]),
+    ("exclusive", ["exclusive", "0"]),
+    ("fingerprint", ["fingerprint", "NULL"]),
+    // A checkpoint of a block that is sent again is stored once. Checkpoints of pairs in PostgreSQL have a statement of their
+    // own, with this condition.
+    ("and_in_place", ["", " AND block_job.stage = [stage]"]),
+    (
+        "and_advance",
+        [
+            ", exclusive = 0, low_confidence = [low_confidence], fingerprint = [fingerprint],
+    dirty = dirty OR [mixed] OR ([first] IS NOT NULL
+        AND job.fingerprint IS NOT (SELECT upstream FROM fingerprint WHERE id = [first]))",
+            "",
+        ],
+    ),
+    (
+        "and_fail",
+        [
+            concat!(
+                ", exclusive = max(exclusive, [exclusive])",
+                go_back_to!("min(job.stage, [stage])")
+            ),
+            "",
+        ],
+    ),
+    (
+        "and_requeue",
+        [
+            concat!(", prio = 0, exclusive = 0", go_back_to!("([1])")),
+            "",
+        ],
+    ),
+    (
+        "and_send_back",
+        [
+            concat!(
+                ", prio = 0, exclusive = 0",
+                go_back_to!("min(job.stage, [1])")
+            ),
+            "",
+        ],
+    ),
+    (
+        "and_not_retired",
+        [
+            " AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = [0])",
+            "",
+        ],
+    ),
+    ("and_recover", [", exclusive = max(exclusive, [1])", ""]),
+    ("and_overdue", [", exclusive = 1", ""]),
+    ("and_count_claimed", [COUNT_CLAIMED, ""]),
+];
 
 /// A statement for all kinds of job and both databases. `{name}` stands for a name of the kind, and `[field]` for a number
 /// of `item`, a row of `jsonb_each`. The text for a kind and a database never changes, so that it is prepared once.
@@ -132,8 +210,8 @@ fn with_names<K: StoredKind>(template: &str) -> String {
             "{provenance_updates}",
             &updates.collect::<Vec<_>>().join(", "),
         );
-    for (name, value) in K::NAMES {
-        text = text.replace(&format!("{{{name}}}"), value);
+    for (name, values) in NAMES {
+        text = text.replace(&format!("{{{name}}}"), values[K::NUMBER]);
     }
     text
 }

@@ -10,7 +10,6 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::query;
 use crate::db::script::Script;
-use crate::queue::fragments::fingerprint_before;
 use crate::queue::kind::{JobKind, StoredKind};
 use crate::queue::provenance::{FingerprintId, InputVersions, PairProvenance};
 use crate::queue::selection::PairSelection;
@@ -42,15 +41,6 @@ WHERE pair.id = new.id AND (pair.mesh_hash IS DISTINCT FROM new.mesh_hash OR pai
 const CRASHED: &str = "
 SELECT p.mesh_hash, p.print_hash, p.attributes, CAST(w.fingerprints ->> CAST(?2 AS bigint) AS bigint) AS fingerprint
 FROM pair AS p LEFT JOIN worker AS w ON w.id = ?3 WHERE p.id = ?1";
-
-/// Counts claimed pairs, in PostgreSQL.
-const COUNT_CLAIMED: &str = ",
-counted AS (
-    INSERT INTO counter_part (stage, status, fingerprint, n)
-    SELECT c.stage, moved.status, coalesce(c.fingerprint, 0), sum(moved.n)
-    FROM claimed AS c, (VALUES (0, -1), (1, 1)) AS moved (status, n)
-    GROUP BY 1, 2, 3 ORDER BY 1, 2, 3
-    ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n)";
 
 /// The kind of the jobs of pairs. Besides what all jobs have, these have a priority, may have to run exclusively, and are
 /// counted by the fingerprint of their last result.
@@ -96,61 +86,9 @@ impl JobKind for PairJob {
     }
 }
 
-/// Sets the fingerprint to that of the result before a stage, for a job that goes back to the stage.
-macro_rules! go_back_to {
-    ($stage:literal) => {
-        concat!(", fingerprint = ", fingerprint_before!($stage))
-    };
-}
-
 impl StoredKind for PairJob {
     const NUMBER: usize = 0;
     const IS_COUNTED: bool = true;
-    const NAMES: &'static [(&'static str, &'static str)] = &[
-        ("job", "job"),
-        ("unit", "pair"),
-        ("result", "stage_result"),
-        ("attempt", "attempt"),
-        ("failure", "failure"),
-        ("settings", "fingerprints"),
-        ("prio", "prio, "),
-        ("turn", "turn"),
-        ("exclusive", "exclusive"),
-        ("fingerprint", "fingerprint"),
-        // Only in SQLite: in PostgreSQL, checkpoints of pairs have a statement of their own.
-        ("and_in_place", ""),
-        (
-            "and_advance",
-            ", exclusive = 0, low_confidence = [low_confidence], fingerprint = [fingerprint],
-    dirty = dirty OR [mixed] OR ([first] IS NOT NULL
-        AND job.fingerprint IS NOT (SELECT upstream FROM fingerprint WHERE id = [first]))",
-        ),
-        (
-            "and_fail",
-            concat!(
-                ", exclusive = max(exclusive, [exclusive])",
-                go_back_to!("min(job.stage, [stage])")
-            ),
-        ),
-        (
-            "and_requeue",
-            concat!(", prio = 0, exclusive = 0", go_back_to!("([1])")),
-        ),
-        (
-            "and_send_back",
-            concat!(
-                ", prio = 0, exclusive = 0",
-                go_back_to!("min(job.stage, [1])")
-            ),
-        ),
-        (
-            "and_not_retired",
-            " AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = [0])",
-        ),
-        ("and_recover", ", exclusive = max(exclusive, [1])"),
-        ("and_overdue", ", exclusive = 1"),
-        ("and_count_claimed", COUNT_CLAIMED),
-    ];
     const PROVENANCE: &'static [(&'static str, &'static str)] = &[
         ("fingerprint", "[fingerprint]"),
         ("mesh_hash", "unhex(item.value ->> 'mesh_hash')"),
