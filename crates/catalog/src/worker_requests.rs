@@ -11,7 +11,7 @@ use crate::db::query::{query, query_as, query_scalar};
 use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::jobs::workers::{WorkerInfo, WorkerSettings};
-use crate::queue::claim::{ClaimRequest, add_claim, in_order};
+use crate::queue::claim::{ClaimRequest, add_claim, claim_on_server, in_order};
 use crate::queue::commit::batch_collector::Message;
 use crate::queue::commit::commit_delay::Waiting;
 use crate::queue::commit::group_commit::{Reply, Request};
@@ -21,7 +21,7 @@ use crate::queue::lease::{
     stored_before,
 };
 use crate::queue::stage_record::{StageCheckpoint, StageFailure};
-use crate::queue::{checkpoint, fail, server_claim};
+use crate::queue::{checkpoint, fail};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{BlockStage, UnixMillis, WorkerId, WorkerMetrics};
 
@@ -275,7 +275,7 @@ impl Catalog {
 
 async fn claim(conn: &mut Conn, request: &ClaimRequest<BlockJob>) -> Result<Vec<Lease<BlockJob>>> {
     if matches!(conn, Conn::Postgres(_)) {
-        return server_claim::claim(conn, request, None).await;
+        return claim_on_server(conn, request, None).await;
     }
     let mut script = Script::default();
     let statement = add_claim(&mut script, request);

@@ -7,10 +7,9 @@
 
 use std::time::{Duration, Instant};
 
-use crate::queue::claim::ClaimRequest;
+use crate::queue::claim::{ClaimCursor, ClaimRequest};
 use crate::queue::counters::cursor;
 use crate::queue::lease::Lease;
-use crate::queue::server_claim::ClaimCursor;
 use mocban_core::domain::{Stage, WorkerId};
 
 /// Time between searches from the beginning, which find earlier pairs that other processes made ready.
@@ -108,9 +107,8 @@ impl ClaimTracker {
 #[cfg(test)]
 mod tests {
     use super::{ClaimTracker, PAUSE, SEARCH_ALL_EVERY};
-    use crate::queue::claim::ClaimRequest;
+    use crate::queue::claim::{ClaimCursor, ClaimRequest};
     use crate::queue::lease::Lease;
-    use crate::queue::server_claim::ClaimCursor;
     use mocban_core::domain::{PairId, Stage, WorkerId};
     use std::time::Instant;
 

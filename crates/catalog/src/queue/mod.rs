@@ -14,5 +14,4 @@ pub(crate) mod pair_job;
 pub(crate) mod provenance;
 pub(crate) mod selection;
 pub(crate) mod server_checkpoint;
-pub(crate) mod server_claim;
 pub(crate) mod stage_record;

@@ -5,7 +5,7 @@ use sqlx::AssertSqlSafe;
 
 use super::World;
 use crate::db::conn::Conn;
-use crate::queue::{server_checkpoint, server_claim};
+use crate::queue::{claim, server_checkpoint};
 
 /// Tables with a row or more for each pair.
 const LARGE: [&str; 5] = ["job", "pair", "stage_result", "metric_result", "attempt"];
@@ -17,8 +17,8 @@ async fn claims_and_checkpoints_read_no_large_table() {
     let Conn::Postgres(mut conn) = world.place.conn().await else {
         return;
     };
-    let claims = server_claim::texts();
-    let exclusive = server_claim::exclusive_texts();
+    let claims = claim::server_texts();
+    let exclusive = claim::exclusive_server_texts();
     let texts = claims.into_iter().chain(server_checkpoint::texts());
     for (number, text) in texts.enumerate() {
         let prepare = AssertSqlSafe(format!("PREPARE statement{number} AS {text}"));

@@ -10,7 +10,7 @@ use crate::db::conn::Conn;
 use crate::db::error::Result;
 use crate::db::query::query_scalar;
 use crate::db::retry_wait::RetryWait;
-use crate::queue::claim::ClaimRequest;
+use crate::queue::claim::{ClaimRequest, claim_on_server};
 use crate::queue::claim_tracker::ClaimTracker;
 use crate::queue::commit::group_commit::{Batch, BatchReply};
 use crate::queue::counters::{self, cursor};
@@ -18,7 +18,7 @@ use crate::queue::lease::{
     Lease, LeasedCheckpoints, is_late, leases, position_after, stored_before,
 };
 use crate::queue::pair_job::PairJob;
-use crate::queue::{server_checkpoint, server_claim};
+use crate::queue::server_checkpoint;
 use mocban_core::domain::{JobStatus, PairId, WorkerId};
 
 /// What this process remembers of its requests to a server.
@@ -139,7 +139,7 @@ async fn claim(
     let unknown = state.leases.unknown(conn, request.worker).await?;
     let began = Instant::now();
     let start = state.claim_tracker.of(request, began);
-    let mut claimed = server_claim::claim(conn, request, start).await?;
+    let mut claimed = claim_on_server(conn, request, start).await?;
     let times = [began, Instant::now()];
     state.claim_tracker.note(request, start, &claimed, times);
     claimed.extend(without_pairs_of(unknown, &claimed));
