@@ -69,7 +69,7 @@ async fn fenced_writes_find_their_jobs_by_key() {
         lease::FAIL.of::<PairJob>(),
         lease::RELEASE.of::<PairJob>(),
         requeue::REQUEUE.of::<PairJob>(),
-        requeue::SEND_BACK.of::<PairJob>(),
+        lease::SEND_BACK.of::<PairJob>(),
     ] {
         let plan = plan(sql).await;
         assert!(

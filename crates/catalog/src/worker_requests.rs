@@ -3,7 +3,8 @@
 //! transaction of its own, which a call again, because the reply was lost, does not repeat.
 
 use crate::blocks::block_job::BlockJob;
-use crate::blocks::model::{BlockInputVersions, BlockWork};
+use crate::blocks::cut::{CutReply, CutSummary, store_cut, taken_name};
+use crate::blocks::model::{BlockInputVersions, BlockWork, NewCharacter};
 use crate::blocks::queue::{uncounted, work};
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
@@ -15,13 +16,15 @@ use crate::queue::claim::{ClaimRequest, add_claim, claim_on_server, in_order};
 use crate::queue::commit::batch_collector::Message;
 use crate::queue::commit::commit_delay::Waiting;
 use crate::queue::commit::group_commit::{Reply, Request};
+use crate::queue::fail::LeasedFailure;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::{
-    CheckpointOutcome, FencedRow, Heartbeat, LEASED, Lease, add_release, is_end_stored, leases,
-    stored_before,
+    CheckpointOutcome, FencedRow, Heartbeat, LEASED, Lease, LeasedCheckpoints, add_release,
+    is_end_stored, is_late, leases, stored_before,
 };
 use crate::queue::stage_record::{StageCheckpoint, StageFailure};
 use crate::queue::{checkpoint, fail};
+use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{BlockStage, UnixMillis, WorkerId, WorkerMetrics};
 
@@ -210,7 +213,7 @@ impl Catalog {
         let moves = next.as_ref().is_none_or(|next| next.cursor != lease.cursor);
         let item = (lease, vec![stage]);
         let stored = in_transaction!(self, |conn| {
-            let is_stored = checkpoint::store(conn, &item, &mut uncounted()).await?;
+            let is_stored = store_checkpoint(conn, &item).await?;
             if is_stored || !moves {
                 return Ok(is_stored);
             }
@@ -224,6 +227,33 @@ impl Catalog {
         })
     }
 
+    /// Stores the stage `cut`: its result, the characters, and a pair for each character that was cut. All files must
+    /// be on disk already. A pair whose files and attributes are the same stays as it is, a changed one runs again from
+    /// the first stage, and one whose box is gone is retired. Verdicts stay in all cases.
+    ///
+    /// # Errors
+    /// Returns an error if the name of a pair is invalid, or if a database operation fails.
+    pub async fn finish_cut(
+        &self,
+        lease: Lease<BlockJob>,
+        stage: StageCheckpoint<BlockJob>,
+        characters: Vec<NewCharacter>,
+    ) -> Result<CutReply> {
+        let done = (lease, vec![stage]);
+        // Other writers need not wait while the names of all pairs are read. Ids grow, and no pair is renamed, so the
+        // transaction reads only newer pairs.
+        let mut conn = self.read_conn().await?;
+        let last = similar_names::last_pair(&mut conn).await?;
+        let taken = taken_name(&mut conn, done.0.unit, &characters, 0).await?;
+        drop(conn);
+        if let Some(taken) = taken {
+            return Ok(CutReply::NameTaken(taken));
+        }
+        in_transaction!(self, |conn| {
+            store_last(conn, &done, &characters, last).await
+        })
+    }
+
     /// Stores a failed stage of a block. Returns `false`, and stores nothing, if the lease was lost. A call again, because
     /// the reply was lost, stores nothing and returns `true`.
     pub async fn fail_block(
@@ -233,7 +263,7 @@ impl Catalog {
     ) -> Result<bool> {
         let item = (lease, failed);
         in_transaction!(self, |conn| {
-            let is_stored = fail::store(conn, &item, &mut uncounted()).await?;
+            let is_stored = store_failure(conn, &item).await?;
             Ok(is_stored || is_end_stored(conn, &item.0).await?)
         })
     }
@@ -281,6 +311,62 @@ async fn claim(conn: &mut Conn, request: &ClaimRequest<BlockJob>) -> Result<Vec<
     let statement = add_claim(&mut script, request);
     let rows = script.run(conn).await?;
     Ok(in_order(rows.read(&statement)?))
+}
+
+/// Stores a finished stage of a block. Returns `false`, and stores nothing, if the lease was lost, or if the files of the
+/// stage may have been removed as unreferenced.
+async fn store_checkpoint(conn: &mut Conn, done: &LeasedCheckpoints<BlockJob>) -> Result<bool> {
+    if is_late(done) {
+        return Ok(false);
+    }
+    let mut script = Script::default();
+    let statement = checkpoint::add_advance(&mut script, [done].into_iter())?;
+    let advanced = script.run(conn).await?.read_if_any(statement.as_ref())?;
+    if !done.0.is_in(&advanced) {
+        return Ok(false);
+    }
+    let mut script = Script::default();
+    checkpoint::add_results(&mut script, &[done], &mut uncounted())?;
+    script.run(conn).await?;
+    Ok(true)
+}
+
+/// Stores the last stage of a block with its characters and pairs.
+async fn store_last(
+    conn: &mut Conn,
+    done: &LeasedCheckpoints<BlockJob>,
+    found: &[NewCharacter],
+    last: i64,
+) -> Result<CutReply> {
+    let (lease, stages) = done;
+    let at = stages.last().map_or(0, |last| last.at);
+    if let Some(taken) = taken_name(conn, lease.unit, found, last).await? {
+        return Ok(CutReply::NameTaken(taken));
+    }
+    if !store_checkpoint(conn, done).await? {
+        let stored = stored_before(conn, [done].into_iter(), [].into_iter()).await?;
+        return Ok(if lease.is_in(&stored) {
+            CutReply::Stored(CutSummary::default())
+        } else {
+            CutReply::Refused
+        });
+    }
+    let summary = store_cut(conn, lease.unit, found, at).await?;
+    Ok(CutReply::Stored(summary))
+}
+
+/// Stores a failed stage of a block. Returns `false`, and stores nothing, if the lease was lost.
+async fn store_failure(conn: &mut Conn, failed: &LeasedFailure<BlockJob>) -> Result<bool> {
+    let mut script = Script::default();
+    let statement = fail::add_failures(&mut script, [failed].into_iter())?;
+    let rows = script.run(conn).await?.read_if_any(statement.as_ref())?;
+    let Some(row) = fail::row_of(&failed.0, &rows) else {
+        return Ok(false);
+    };
+    let mut script = Script::default();
+    fail::add_failure_records(&mut script, &[(failed, row)], &mut uncounted())?;
+    script.run(conn).await?;
+    Ok(true)
 }
 
 async fn insert_worker(

@@ -1,28 +1,22 @@
-//! Stores the last stage of a block: its result, its characters, and the pairs that were cut, in one transaction.
+//! Stores the characters of a block and the pairs that were cut, with its last stage (`worker_requests.rs`).
 
 use std::collections::BTreeSet;
 
-use crate::blocks::block_job::BlockJob;
+use crate::Result;
 use crate::blocks::characters;
 use crate::blocks::model::{CutPair, NewCharacter};
-use crate::blocks::queue::uncounted;
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::names_json;
 use crate::db::script::Script;
-use crate::db::transaction::in_transaction;
 use crate::jobs::requeue::send_back;
 use crate::jobs::retired;
-use crate::queue::checkpoint;
 use crate::queue::counters::Deltas;
 use crate::queue::kind::StoredKind as _;
-use crate::queue::lease::{Lease, LeasedCheckpoints, stored_before};
 use crate::queue::pair_job::PairJob;
 use crate::queue::provenance::InputVersions;
-use crate::queue::stage_record::StageCheckpoint;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::records::similar_names;
-use crate::{Catalog, Result};
 use mocban_core::domain::{BlockId, BlockName, PairId, PairName, RetireCause, Stage};
 
 /// What the cut of a block changed.
@@ -62,34 +56,34 @@ SELECT p.id, p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?
 /// The columns of a pair whose change does not affect its results.
 const WITHOUT_EFFECT: [&str; 3] = ["character", "block", "metadata"];
 
-impl Catalog {
-    /// Stores the stage `cut`: its result, the characters, and a pair for each character that was cut. All files must
-    /// be on disk already. A pair whose files and attributes are the same stays as it is, a changed one runs again from
-    /// the first stage, and one whose box is gone is retired. Verdicts stay in all cases.
-    ///
-    /// # Errors
-    /// Returns an error if the name of a pair is invalid, or if a database operation fails.
-    pub async fn finish_cut(
-        &self,
-        lease: Lease<BlockJob>,
-        stage: StageCheckpoint<BlockJob>,
-        characters: Vec<NewCharacter>,
-    ) -> Result<CutReply> {
-        let done = (lease, vec![stage]);
-        // Other writers need not wait while the names of all pairs are read. Ids grow, and no pair is renamed, so the
-        // transaction reads only newer pairs.
-        let mut conn = self.read_conn().await?;
-        let last = similar_names::last_pair(&mut conn).await?;
-        let new = new_names(&mut conn, done.0.unit, &characters).await?;
-        let taken = similar_names::taken(&mut conn, done.0.unit, &new, 0).await?;
-        drop(conn);
-        if let Some(taken) = taken {
-            return Ok(CutReply::NameTaken(taken));
-        }
-        in_transaction!(self, |conn| {
-            finish(conn, &done, &characters, last).await
-        })
-    }
+/// Returns the name of a new pair that another pair has, or that differs from its name at most in upper and lower case. The
+/// other pair's id is above `after`, and it was not cut from this block.
+pub(crate) async fn taken_name(
+    conn: &mut Conn,
+    block: BlockId,
+    found: &[NewCharacter],
+    after: i64,
+) -> Result<Option<PairName>> {
+    let new = new_names(conn, block, found).await?;
+    similar_names::taken(conn, block, &new, after).await
+}
+
+/// Stores the characters of a block, and a pair for each character that was cut.
+pub(crate) async fn store_cut(
+    conn: &mut Conn,
+    block: BlockId,
+    found: &[NewCharacter],
+    at: i64,
+) -> Result<CutSummary> {
+    let name = query_scalar(NAME).bind(block.0);
+    let name: BlockName = name.fetch_one(&mut *conn).await?;
+    let rows = pair_rows(&name, found)?;
+    let mut deltas = Deltas::default();
+    let summary = store_pairs(conn, &rows, at, &mut deltas).await?;
+    let gone = characters::store(conn, block, &name, found).await?;
+    let retired = retired::retire(conn, &gone, RetireCause::Labels, at, &mut deltas).await?;
+    deltas.apply(conn).await?;
+    Ok(CutSummary { retired, ..summary })
 }
 
 /// Returns the names of the pairs that a block does not have yet.
@@ -110,37 +104,6 @@ async fn new_names(
     let rows = pair_rows(&name, found)?.into_iter();
     let names = rows.map(|cut| cut.row.name);
     Ok(names.filter(|name| !own.contains(name)).collect())
-}
-
-async fn finish(
-    conn: &mut Conn,
-    done: &LeasedCheckpoints<BlockJob>,
-    found: &[NewCharacter],
-    last: i64,
-) -> Result<CutReply> {
-    let (lease, stages) = done;
-    let at = stages.last().map_or(0, |last| last.at);
-    let name = query_scalar(NAME).bind(lease.unit.0);
-    let name: BlockName = name.fetch_one(&mut *conn).await?;
-    let rows = pair_rows(&name, found)?;
-    let new = new_names(conn, lease.unit, found).await?;
-    if let Some(taken) = similar_names::taken(conn, lease.unit, &new, last).await? {
-        return Ok(CutReply::NameTaken(taken));
-    }
-    if !checkpoint::store(conn, done, &mut uncounted()).await? {
-        let stored = stored_before(conn, [done].into_iter(), [].into_iter()).await?;
-        return Ok(if lease.is_in(&stored) {
-            CutReply::Stored(CutSummary::default())
-        } else {
-            CutReply::Refused
-        });
-    }
-    let mut deltas = Deltas::default();
-    let summary = store_pairs(conn, &rows, at, &mut deltas).await?;
-    let gone = characters::store(conn, lease.unit, &name, found).await?;
-    let retired = retired::retire(conn, &gone, RetireCause::Labels, at, &mut deltas).await?;
-    deltas.apply(conn).await?;
-    Ok(CutReply::Stored(CutSummary { retired, ..summary }))
 }
 
 /// A pair to import with the character that was cut.

@@ -14,6 +14,7 @@ use crate::jobs::staleness::{
 };
 use crate::queue::counters::{CounterKey, Cursor, Deltas, KeyedJob, cursor};
 use crate::queue::kind::{JobKind, StoredKind, Template};
+use crate::queue::lease::SEND_BACK;
 use crate::queue::pair_job::PairJob;
 use crate::queue::selection::{PairSelection, unknown_names};
 use crate::{Catalog, CatalogError, Result};
@@ -43,16 +44,6 @@ static NEW_JOBS: Template = Template::new(
     "
 INSERT INTO {job} ({unit}, stage, status)
 SELECT [0], 0, 0 FROM json_each(?1) AS item WHERE NOT EXISTS (SELECT 1 FROM {job} WHERE {unit} = [0]){and_not_retired}",
-);
-
-/// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
-/// lease fail.
-pub(crate) static SEND_BACK: Template = Template::new(
-    "
-UPDATE {job} SET stage = min({job}.stage, [1]), status = 0, run_at = NULL, attempt = 0, crashes = 0, worker = NULL,
-    deadline = NULL, token = token + 1{and_send_back}
-FROM json_each(?1) AS item WHERE {job}.{unit} = [0]
-RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
 );
 
 /// Selects jobs, and locks them in PostgreSQL, always in the order of ids.

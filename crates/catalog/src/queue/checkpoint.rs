@@ -3,16 +3,13 @@
 
 use serde::Serialize;
 
-use crate::db::conn::Conn;
 #[cfg(test)]
 use crate::db::dialect::Sql;
 use crate::db::error::Result;
 use crate::db::script::{Script, Statement};
 use crate::queue::counters::{Cursor, Deltas};
 use crate::queue::kind::{JobKind, StoredKind, Template};
-use crate::queue::lease::{
-    ADVANCE, FencedRow, Lease, LeasedCheckpoints, is_late, key_after, position,
-};
+use crate::queue::lease::{ADVANCE, FencedRow, Lease, LeasedCheckpoints, key_after, position};
 #[cfg(test)]
 use crate::queue::pair_job::{PairJob, UPDATE_INPUTS};
 use crate::queue::provenance::FingerprintId;
@@ -62,28 +59,6 @@ pub(crate) fn rows() -> [Sql; 6] {
         UPDATE_INPUTS,
         CLEAR_FAILURE.of::<PairJob>(),
     ]
-}
-
-/// Stores finished stages of one job. Returns `false`, and stores nothing, if the lease was lost, or if the files of a
-/// stage may have been removed as unreferenced.
-pub(crate) async fn store<K: StoredKind>(
-    conn: &mut Conn,
-    checkpoint: &LeasedCheckpoints<K>,
-    deltas: &mut Deltas,
-) -> Result<bool> {
-    if is_late(checkpoint) {
-        return Ok(false);
-    }
-    let mut script = Script::default();
-    let statement = add_advance(&mut script, [checkpoint].into_iter())?;
-    let advanced = script.run(conn).await?.read_if_any(statement.as_ref())?;
-    if !checkpoint.0.is_in(&advanced) {
-        return Ok(false);
-    }
-    let mut script = Script::default();
-    add_results(&mut script, &[checkpoint], deltas)?;
-    script.run(conn).await?;
-    Ok(true)
 }
 
 /// Adds the statement `ADVANCE` to a script. The statement returns one row for each job that it changed.

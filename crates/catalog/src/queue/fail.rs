@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-use crate::db::conn::Conn;
 use crate::db::error::Result;
 use crate::db::row::from_row;
 use crate::db::script::{Script, Statement};
@@ -99,24 +98,6 @@ pub(crate) fn add_records<K: StoredKind>(script: &mut Script, items: &[Value]) -
     script.execute_over(PRUNE.of::<K>(), items.iter())?;
     script.bind(ATTEMPTS_KEPT);
     Ok(())
-}
-
-/// Stores a failed stage of one job. Returns `false`, and stores nothing, if the lease was lost.
-pub(crate) async fn store<K: StoredKind>(
-    conn: &mut Conn,
-    failed: &LeasedFailure<K>,
-    deltas: &mut Deltas,
-) -> Result<bool> {
-    let mut script = Script::default();
-    let statement = add_failures(&mut script, [failed].into_iter())?;
-    let rows = script.run(conn).await?.read_if_any(statement.as_ref())?;
-    let Some(row) = row_of(&failed.0, &rows) else {
-        return Ok(false);
-    };
-    let mut script = Script::default();
-    add_failure_records(&mut script, &[(failed, row)], deltas)?;
-    script.run(conn).await?;
-    Ok(true)
 }
 
 const fn status(action: FailureAction) -> JobStatus {

@@ -242,6 +242,16 @@ WHERE {unit} = ?1 AND worker = ?2 AND token = ?3 AND status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= ?4) FOR UPDATE",
 );
 
+/// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
+/// lease fail.
+pub(crate) static SEND_BACK: Template = Template::new(
+    "
+UPDATE {job} SET stage = min({job}.stage, [1]), status = 0, run_at = NULL, attempt = 0, crashes = 0, worker = NULL,
+    deadline = NULL, token = token + 1{and_send_back}
+FROM json_each(?1) AS item WHERE {job}.{unit} = [0]
+RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
+);
+
 /// Selects the leases of a worker.
 static LEASES: Template = Template::new(
     "
