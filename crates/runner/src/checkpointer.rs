@@ -8,9 +8,9 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
 use super::blocking::task_result;
-use super::compute_thread::ComputedStage;
 use super::error::RunError;
 use super::events::RunEvent;
+use super::pair_stage::ComputedStage;
 use super::policy::{self, FailedAttempt};
 use super::run_context::{JobEnd, PairReport, RunContext};
 use super::stage_files::{Unwritten, write_batch};

@@ -1,7 +1,7 @@
 //! Runs the stages of pairs and blocks, several pairs at a time, and checks a project.
 //!
 //! [`run()`] prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
-//! `pair_task`, and the task a `compute_thread`, which calls the stages through `pair_pipeline`. The task hands computed
+//! `pair_task`, and the task a thread, which runs each `pair_stage` through `pair_pipeline`. The task hands computed
 //! stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what follows a failure.
 //! Whole blocks run before pairs, one at a time: `block/slot.rs` leases a block, `block/task.rs` runs its stages, and
 //! `block/pipeline` reads their files. [`check`] compares a project with its catalog and repairs it.
@@ -55,7 +55,7 @@
 //! # Cancellation
 //!
 //! A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled: inner loops poll the
-//! token of their thread ([`mocban_core::domain::cancel`]) and unwind to `compute_thread.rs` (`block/task.rs`), which waits
+//! token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs` (`block/task.rs`), which waits
 //! up to 500 ms for the end of the thread; after that its memory no longer counts. After an immediate stop, the task of a pair
 //! does not wait. Work on other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
 
@@ -66,7 +66,6 @@ mod blocking;
 pub mod check;
 mod checkpointer;
 mod claim_size;
-mod compute_thread;
 mod error;
 mod event_log;
 mod events;
@@ -80,6 +79,7 @@ pub mod memory_estimate;
 mod options;
 mod pair_context;
 mod pair_pipeline;
+mod pair_stage;
 mod pair_task;
 mod policy;
 mod prefetch;

@@ -3,15 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use super::stop::{Stop, StopLevel};
 use mocban_align::stages::normalize::Normalized;
 use mocban_align::stages::{Print, Scan};
 use mocban_catalog::{InputVersions, PairAttributes, PairWork};
 use mocban_core::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
 use mocban_core::raster::DepthMap;
+use mocban_system::platform::ActiveClock;
 
 /// The stored result of an earlier stage.
 #[derive(Debug, Clone)]
@@ -37,6 +40,29 @@ impl FileInUse {
     pub(super) fn get(&self) -> Option<PathBuf> {
         let file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         file.clone()
+    }
+}
+
+/// Longest time for which a file is read after a stop request. It includes decoding, so it is longer than that of the
+/// largest usual scans.
+const LONGEST_READ_AFTER_STOP: Duration = Duration::from_secs(5);
+/// Interval at which the file in use is looked at.
+const LOOK_EVERY: Duration = Duration::from_millis(250);
+
+/// Waits for a stop request, and then until one file has been read for too long: its disk or object store may be
+/// unavailable.
+pub(super) async fn reading_after_stop(file: &FileInUse, stop: &Stop) {
+    stop.reached(StopLevel::Drain).await;
+    let mut clock = ActiveClock::start(2 * LOOK_EVERY);
+    let (mut path, mut since) = (file.get(), clock.now());
+    loop {
+        tokio::time::sleep(LOOK_EVERY).await;
+        let (found, now) = (file.get(), clock.now());
+        if found != path {
+            (path, since) = (found, now);
+        } else if path.is_some() && now.saturating_sub(since) >= LONGEST_READ_AFTER_STOP {
+            return;
+        }
     }
 }
 

@@ -1,26 +1,29 @@
-//! The task of one pair: starts the pair's compute thread, passes each stage to the checkpointer, cancels the thread if
+//! The task of one pair: starts the pair's thread, passes each stage to the checkpointer, cancels the thread if
 //! later stages cannot be stored, and stores a failure.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
 
+use super::blocking::panic_text;
 use super::checkpointer::{Checkpointer, PairFailure};
-use super::compute_thread::{ComputeEvent, run_stages};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::failed_stage::{FailedStage, PairSummary, timeout_text};
 use super::folder_check::check_folders;
-use super::pair_context::{FileInUse, PairContext};
+use super::pair_context::{PairContext, reading_after_stop};
+use super::pair_stage::{ComputedStage, run_stage};
 use super::run_context::{JobEnd, PairReport, RunContext};
+use super::stage_output::PairStageError;
 use super::stop::{Stop, StopLevel};
-use mocban_catalog::{Lease, PairWork};
-use mocban_core::domain::cancel::{CancelGuard, CancelToken};
-use mocban_core::domain::{FailureClass, Stage, WaitReason};
+use mocban_catalog::{InputVersions, Lease, PairWork};
+use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
+use mocban_core::domain::{Failure, FailureClass, Stage, WaitReason};
 use mocban_store::ArtifactError;
 use mocban_system::failpoint::{self, Point};
-use mocban_system::platform::{ActiveClock, sleep_active};
+use mocban_system::platform::sleep_active;
 
 /// What is left to do for a pair when its stages are computed.
 pub(super) enum PairOutcome {
@@ -28,6 +31,34 @@ pub(super) enum PairOutcome {
     Ended(PairReport),
     /// To wait until its last stages are stored.
     Storing(Checkpointer),
+}
+
+/// What happens on a pair's thread.
+#[derive(Debug)]
+enum ComputeEvent {
+    /// A stage starts. The input files as read so far.
+    Started(Stage, InputVersions),
+    /// A stage is computed. The stage that follows, if any.
+    Finished(Box<ComputedStage>, Option<Stage>),
+    /// A stage failed; this is the last event.
+    Failed {
+        failure: Failure,
+        /// Whether a retry may succeed.
+        is_transient: bool,
+        /// The input files as read.
+        inputs: InputVersions,
+        ms: u64,
+    },
+    /// An object store failed; this is the last event.
+    StoreFailed(ArtifactError),
+    /// A stage panicked; the pair's data is lost.
+    Panicked(String),
+    /// A stage took too long.
+    TimedOut,
+    /// The run is to stop at once.
+    Stopped,
+    /// Later stages cannot be stored: the lease is lost, or an earlier stage was not stored.
+    Cancelled,
 }
 
 /// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer. Unit tests wait longer,
@@ -41,9 +72,13 @@ pub(super) async fn wait_for_end<T>(ended: impl Future<Output = T>) {
     }
 }
 
-/// The thread that computes the stages of a pair. If this handle is dropped, the computation is cancelled.
+/// The thread that computes the stages of a pair one after another. If this handle is dropped, the computation is cancelled.
+///
+/// Each pair has its own thread instead of one from a pool. A stage past its deadline is cancelled; if it hangs in the
+/// system, its thread can be abandoned without blocking other pairs. All stages of a pair run on the same thread, because
+/// waking another thread for each stage can leave a core idle for some milliseconds.
 #[derive(Debug)]
-pub(super) struct ComputeThread {
+struct ComputeThread {
     /// Closed when the thread has returned the pair's memory.
     events: mpsc::UnboundedReceiver<ComputeEvent>,
     token: CancelGuard,
@@ -54,7 +89,7 @@ impl ComputeThread {
     ///
     /// # Errors
     /// Returns an error if the system cannot start a thread. In that case the pair's data is lost.
-    pub(super) fn start(
+    fn start(
         context: Arc<RunContext>,
         first: Stage,
         pair: Box<PairContext>,
@@ -71,7 +106,7 @@ impl ComputeThread {
     }
 
     /// Cancels the computation and waits until the pair's memory is free, so that no other pair gets it before.
-    pub(super) async fn end(mut self) {
+    async fn end(mut self) {
         self.token.0.cancel();
         let ended = async { while self.events.recv().await.is_some() {} };
         wait_for_end(ended).await;
@@ -79,7 +114,7 @@ impl ComputeThread {
 
     /// Waits for the next event, for at most as long as one stage may take. Time while the process is suspended does not
     /// count.
-    pub(super) async fn next_event(&mut self, timeout: Duration, stop: &Stop) -> ComputeEvent {
+    async fn next_event(&mut self, timeout: Duration, stop: &Stop) -> ComputeEvent {
         tokio::select! {
             biased;
             event = self.events.recv() => event.unwrap_or_else(|| {
@@ -89,6 +124,57 @@ impl ComputeThread {
             () = sleep_active(timeout) => ComputeEvent::TimedOut,
         }
     }
+}
+
+/// Computes stages until none is left, a stage fails, the computation is cancelled, or the receiver of the events is
+/// closed.
+fn run_stages(
+    context: &RunContext,
+    mut stage: Stage,
+    mut pair: Box<PairContext>,
+    token: &CancelToken,
+    events: &mpsc::UnboundedSender<ComputeEvent>,
+) {
+    let last = loop {
+        let started = ComputeEvent::Started(stage, pair.inputs.clone());
+        if events.send(started).is_err() {
+            return;
+        }
+        let begun = Instant::now();
+        let work = || token.run(|| run_stage(context, stage, &mut pair));
+        let outcome = match catch_unwind(AssertUnwindSafe(work)) {
+            Ok(Ok(outcome)) => Ok(outcome),
+            Ok(Err(Cancelled)) => return,
+            Err(payload) => Err(payload),
+        };
+        match outcome {
+            Ok(Ok(computed)) => match context.next_stage(stage) {
+                Some(next) => {
+                    // A closed channel is noticed when the next stage starts.
+                    let _ = events.send(ComputeEvent::Finished(Box::new(computed), Some(next)));
+                    stage = next;
+                }
+                None => break ComputeEvent::Finished(Box::new(computed), None),
+            },
+            Ok(Err(PairStageError::RerunFrom(earlier))) => stage = earlier,
+            Ok(Err(PairStageError::Store(error))) => break ComputeEvent::StoreFailed(error),
+            Ok(Err(PairStageError::Failed {
+                failure,
+                is_transient,
+            })) => {
+                break ComputeEvent::Failed {
+                    failure,
+                    is_transient,
+                    inputs: pair.inputs.clone(),
+                    ms: begun.elapsed().as_millis() as u64,
+                };
+            }
+            Err(payload) => break ComputeEvent::Panicked(panic_text(&*payload)),
+        }
+    };
+    // Free the pair's memory before the scheduler gives it to another pair.
+    drop(pair);
+    let _ = events.send(last);
 }
 
 /// Computes the remaining stages of a leased pair. Earlier stages are stored while later stages are computed.
@@ -184,29 +270,6 @@ async fn compute(
 async fn end_cancelled(checkpointer: Checkpointer, thread: ComputeThread) -> PairOutcome {
     thread.end().await;
     PairOutcome::Ended(checkpointer.finish(JobEnd::Released).await)
-}
-
-/// Longest time for which a file is read after a stop request. It includes decoding, so it is longer than that of the
-/// largest usual scans.
-const LONGEST_READ_AFTER_STOP: Duration = Duration::from_secs(5);
-/// Interval at which the file in use is looked at.
-const LOOK_EVERY: Duration = Duration::from_millis(250);
-
-/// Waits for a stop request, and then until one file has been read for too long: its disk or object store may be
-/// unavailable.
-async fn reading_after_stop(file: &FileInUse, stop: &Stop) {
-    stop.reached(StopLevel::Drain).await;
-    let mut clock = ActiveClock::start(2 * LOOK_EVERY);
-    let (mut path, mut since) = (file.get(), clock.now());
-    loop {
-        tokio::time::sleep(LOOK_EVERY).await;
-        let (found, now) = (file.get(), clock.now());
-        if found != path {
-            (path, since) = (found, now);
-        } else if path.is_some() && now.saturating_sub(since) >= LONGEST_READ_AFTER_STOP {
-            return;
-        }
-    }
 }
 
 /// Releases a pair whose files an object store did not give. If the store is unavailable, the pair is tried again

@@ -9,8 +9,8 @@ use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout_at};
 
 use super::blocking::run_blocking;
-use super::compute_thread::ComputedStage;
 use super::error::RunError;
+use super::pair_stage::ComputedStage;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use mocban_catalog::StageCheckpoint;
