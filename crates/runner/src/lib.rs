@@ -46,8 +46,8 @@
 //! Heartbeats do not show that another worker recovered a job, or that a repair or a new cut reset it: the stage runs on,
 //! and its next write is refused. If heartbeats fail with an error for as long as a lease lasts, or the log of SQLite is
 //! lost, the run finishes the stages in progress and ends with that error. If the connection to a server breaks, writes are
-//! sent again until a stop ends the waits, and `stored_before` finds those that were stored without a reply. A checkpoint of
-//! a block whose stage before its position was computed again is accepted twice, with two rows in `block_attempt`.
+//! sent again until a stop ends the waits, and `stored_before` finds what was stored without a reply. A checkpoint of a
+//! block whose stage before its position was computed again is accepted twice, with two rows in `block_attempt`.
 //!
 //! The rest of the walk: `run_context.rs`, `crates/core/src/domain/cancel.rs`; in the catalog `src/worker_requests.rs` (what
 //! a worker asks), `queue/kind.rs` (names in statements), `commit/group_commit.rs`, `commit/server_commit.rs`,

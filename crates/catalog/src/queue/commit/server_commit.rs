@@ -101,7 +101,7 @@ async fn store(
         unreachable!("a server is PostgreSQL");
     };
     let (late, timely): (Vec<&LeasedCheckpoints>, Vec<_>) =
-        checkpoints.iter().partition(|item| is_late(**item));
+        checkpoints.iter().partition(|item| is_late(item));
     let stored = server_checkpoint::store(server, &timely).await?;
     if !late.is_empty() {
         // The next claim gets these leases back, and computes the stages again.
