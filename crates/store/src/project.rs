@@ -75,7 +75,7 @@ impl Project {
         if !catalog.try_exists().map_err(StoreError::io(&catalog))? {
             return Err(StoreError::NoProject(dir.to_owned()));
         }
-        Self::found(dir)
+        Self::open_directory(dir)
     }
 
     /// Opens a project whose catalog is not a file in its directory.
@@ -83,7 +83,12 @@ impl Project {
     /// # Errors
     /// Returns an error if there is no such directory.
     pub fn open_directory(dir: &Path) -> Result<Self, StoreError> {
-        Self::found(dir)
+        let found = stat(dir).map_err(StoreError::io(dir))?;
+        Ok(Self {
+            dir: dir.to_owned(),
+            identity: Some(found.id),
+            storage: None,
+        })
     }
 
     /// Returns a project that may not exist yet; touches no file.
@@ -93,16 +98,6 @@ impl Project {
             identity: None,
             storage: None,
         }
-    }
-
-    /// Returns the project in an existing directory.
-    fn found(dir: &Path) -> Result<Self, StoreError> {
-        let found = stat(dir).map_err(StoreError::io(dir))?;
-        Ok(Self {
-            dir: dir.to_owned(),
-            identity: Some(found.id),
-            storage: None,
-        })
     }
 
     /// Returns whether the directory is still at its path. If not, nothing may be created at that path.
@@ -125,7 +120,7 @@ impl Project {
             let folder = parent_folder(created);
             sync_folder(&folder).map_err(StoreError::io(&folder))?;
         }
-        Self::found(dir)
+        Self::open_directory(dir)
     }
 
     /// Returns the directory.
