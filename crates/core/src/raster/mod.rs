@@ -14,6 +14,8 @@ mod resample;
 mod resize;
 mod supersample;
 #[cfg(any(test, feature = "test-helpers"))]
+pub mod test_images;
+#[cfg(any(test, feature = "test-helpers"))]
 pub mod test_profiles;
 mod warp_depth;
 mod warp_mask;

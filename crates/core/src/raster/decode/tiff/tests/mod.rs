@@ -5,11 +5,10 @@ mod pages;
 mod refusals;
 mod samples;
 mod storage;
-mod test_tiff;
 
 use super::super::{DecodeError, ImageLimits, decode};
 use crate::raster::Grid;
-use test_tiff::{TestPage, TestTiff, TestValues};
+use crate::raster::test_images::{TestPage, TestTiff};
 
 const BLACK_IS_ZERO: u16 = 1;
 const RGB: u16 = 2;
@@ -50,21 +49,6 @@ fn rgb_bytes(picture: &Grid<[u8; 3]>) -> Vec<u8> {
 fn plain_page(picture: &Grid<[u8; 3]>) -> TestPage {
     let size = [picture.width() as u32, picture.height() as u32];
     TestPage::new(size, RGB, 8, 3).strips(size[1], vec![rgb_bytes(picture)])
-}
-
-/// Packs numbers of some bits, each row from a new byte.
-fn packed(numbers: &[u32], width: usize, bits: usize) -> Vec<u8> {
-    let rows = numbers.chunks(width).map(|row| {
-        let bit = |at: usize| {
-            row.get(at / bits)
-                .map_or(0, |number| number >> (bits - 1 - at % bits) & 1)
-        };
-        let bytes = 0..(width * bits).div_ceil(8);
-        bytes
-            .map(|byte| (0..8).fold(0, |sum, at| sum << 1 | bit(8 * byte + at) as u8))
-            .collect::<Vec<_>>()
-    });
-    rows.collect::<Vec<_>>().concat()
 }
 
 /// Returns black strokes on white as numbers of some bits.

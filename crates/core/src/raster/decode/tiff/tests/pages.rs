@@ -2,9 +2,10 @@
 
 use proptest::prelude::*;
 
-use super::{TestPage, TestTiff, TestValues, colours, picture, plain_page, refusal, widened};
+use super::{colours, picture, plain_page, refusal, widened};
 use crate::raster::Grid;
 use crate::raster::decode::{ImageLimits, decode, header_pixel_count};
+use crate::raster::test_images::{TestPage, TestTiff, TestValues};
 
 /// Returns a preview whose picture is in a subdirectory, as cameras and Photoshop write it.
 fn preview(pictures: Vec<TestPage>) -> TestPage {

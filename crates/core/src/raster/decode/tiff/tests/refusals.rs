@@ -1,6 +1,7 @@
 //! The sentences for pages that are not read.
 
-use super::{TestValues, picture, plain_page, refusal};
+use super::{picture, plain_page, refusal};
+use crate::raster::test_images::TestValues;
 
 #[test]
 fn what_is_not_read_is_refused_with_what_to_do() {

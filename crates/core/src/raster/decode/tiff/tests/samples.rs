@@ -1,10 +1,8 @@
 //! Samples of all sizes, and what they mean.
 
-use super::{
-    BLACK_IS_ZERO, RGB, TestPage, TestTiff, TestValues, bilevel, colours, levels, packed, picture,
-    plain_page, widened,
-};
+use super::{BLACK_IS_ZERO, RGB, bilevel, colours, levels, picture, plain_page, widened};
 use crate::raster::Grid;
+use crate::raster::test_images::{TestPage, TestTiff, TestValues, packed, ycbcr};
 
 #[test]
 fn grey_of_every_size_spans_black_to_white() {
@@ -78,13 +76,6 @@ fn a_palette_of_8_bit_colours_is_widened() {
             .zip(narrow.data())
             .all(|(a, b)| close(a, b))
     );
-}
-
-/// Returns luma and chroma as JFIF defines them.
-fn ycbcr([r, g, b]: [u8; 3]) -> [u8; 3] {
-    let [r, g, b] = [r, g, b].map(f64::from);
-    let y = 0.299 * r + 0.587 * g + 0.114 * b;
-    [y, 128.0 + (b - y) / 1.772, 128.0 + (r - y) / 1.402].map(|value| value.round() as u8)
 }
 
 #[test]

@@ -2,11 +2,9 @@
 
 use std::io::Write as _;
 
-use super::{
-    BLACK_IS_ZERO, RGB, TestPage, TestTiff, TestValues, colours, group4, levels, packed, picture,
-    rgb_bytes, widened,
-};
+use super::{BLACK_IS_ZERO, RGB, colours, group4, levels, picture, rgb_bytes, widened};
 use crate::raster::Grid;
+use crate::raster::test_images::{TestPage, TestTiff, TestValues, packed};
 
 const UNCOMPRESSED: u16 = 1;
 const LZW: u16 = 5;

@@ -2,12 +2,18 @@
 
 /// The values of a tag, in the type that the file stores.
 #[derive(Debug, Clone)]
-pub(super) enum TestValues {
+pub enum TestValues {
+    /// BYTE.
     Bytes(Vec<u8>),
+    /// SHORT.
     Shorts(Vec<u16>),
+    /// LONG.
     Longs(Vec<u32>),
+    /// SLONG.
     SignedLongs(Vec<i32>),
+    /// RATIONAL: numbers above and below the line.
     Ratios(Vec<[u32; 2]>),
+    /// LONG8.
     Longs8(Vec<u64>),
 }
 
@@ -32,15 +38,18 @@ impl TestValues {
 
 /// A page with its strips or tiles, and the pages of which it is a preview.
 #[derive(Debug, Clone, Default)]
-pub(super) struct TestPage {
-    pub(super) tags: Vec<(u16, TestValues)>,
-    pub(super) chunks: Vec<Vec<u8>>,
-    pub(super) pictures: Vec<TestPage>,
+pub struct TestPage {
+    /// Tags in any order, without offsets.
+    pub tags: Vec<(u16, TestValues)>,
+    /// The stored strips or tiles.
+    pub chunks: Vec<Vec<u8>>,
+    /// The pages in its subdirectories.
+    pub pictures: Vec<TestPage>,
 }
 
 impl TestPage {
     /// Returns a page of a size, with its photometric interpretation, bits and samples per pixel.
-    pub(super) fn new(size: [u32; 2], photometric: u16, bits: u16, samples: u16) -> Self {
+    pub fn new(size: [u32; 2], photometric: u16, bits: u16, samples: u16) -> Self {
         Self::default()
             .with(256, TestValues::Longs(vec![size[0]]))
             .with(257, TestValues::Longs(vec![size[1]]))
@@ -51,7 +60,7 @@ impl TestPage {
 
     /// Sets a tag.
     #[must_use]
-    pub(super) fn with(mut self, tag: u16, values: TestValues) -> Self {
+    pub fn with(mut self, tag: u16, values: TestValues) -> Self {
         self.tags.retain(|(other, _)| *other != tag);
         self.tags.push((tag, values));
         self
@@ -59,13 +68,13 @@ impl TestPage {
 
     /// Sets a tag of one number.
     #[must_use]
-    pub(super) fn short(self, tag: u16, value: u16) -> Self {
+    pub fn short(self, tag: u16, value: u16) -> Self {
         self.with(tag, TestValues::Shorts(vec![value]))
     }
 
     /// Sets strips of some rows.
     #[must_use]
-    pub(super) fn strips(self, rows: u32, strips: Vec<Vec<u8>>) -> Self {
+    pub fn strips(self, rows: u32, strips: Vec<Vec<u8>>) -> Self {
         Self {
             chunks: strips,
             ..self.with(278, TestValues::Longs(vec![rows]))
@@ -74,7 +83,7 @@ impl TestPage {
 
     /// Sets tiles of a size.
     #[must_use]
-    pub(super) fn tiles(self, [width, height]: [u16; 2], tiles: Vec<Vec<u8>>) -> Self {
+    pub fn tiles(self, [width, height]: [u16; 2], tiles: Vec<Vec<u8>>) -> Self {
         Self {
             chunks: tiles,
             ..self.short(322, width).short(323, height)
@@ -84,16 +93,18 @@ impl TestPage {
 
 /// A file whose byte order and kind can be chosen.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct TestTiff {
-    pub(super) is_big_endian: bool,
-    pub(super) is_big_tiff: bool,
+pub struct TestTiff {
+    /// Whether the most significant byte of a number is first.
+    pub is_big_endian: bool,
+    /// Whether offsets have eight bytes.
+    pub is_big_tiff: bool,
 }
 
 impl TestTiff {
     /// Both byte orders.
-    pub(super) const BYTE_ORDERS: [Self; 2] = [Self::of(false, false), Self::of(true, false)];
+    pub const BYTE_ORDERS: [Self; 2] = [Self::of(false, false), Self::of(true, false)];
     /// Both byte orders, with offsets of four bytes and of eight.
-    pub(super) const ALL: [Self; 4] = [
+    pub const ALL: [Self; 4] = [
         Self::of(false, false),
         Self::of(true, false),
         Self::of(false, true),
@@ -126,7 +137,7 @@ impl TestTiff {
     }
 
     /// Writes the pages one after the other.
-    pub(super) fn encode(self, pages: &[TestPage]) -> Vec<u8> {
+    pub fn encode(self, pages: &[TestPage]) -> Vec<u8> {
         let len = if self.is_big_tiff { 8 } else { 4 };
         let mut file = if self.is_big_endian { b"MM" } else { b"II" }.to_vec();
         if self.is_big_tiff {

@@ -6,7 +6,7 @@ use crate::raster::Grid;
 
 /// How the coefficients are divided into scans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum TestScans {
+pub enum TestScans {
     /// All components in one scan.
     Interleaved,
     /// A scan for each component, in this order.
@@ -17,10 +17,11 @@ pub(super) enum TestScans {
 
 /// A JPEG of luma and chroma.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TestJpeg {
+pub struct TestJpeg {
     /// Columns and rows of luma samples for each chroma sample.
-    pub(super) shared: [usize; 2],
-    pub(super) scans: TestScans,
+    pub shared: [usize; 2],
+    /// The scans.
+    pub scans: TestScans,
 }
 
 const QUANTIZATION: i32 = 2;
@@ -166,7 +167,7 @@ impl TestJpeg {
     }
 
     /// Encodes a picture. `before_scans` are segments in front of the first scan.
-    pub(super) fn encode(&self, picture: &Grid<[u8; 3]>, before_scans: &[Vec<u8>]) -> Vec<u8> {
+    pub fn encode(&self, picture: &Grid<[u8; 3]>, before_scans: &[Vec<u8>]) -> Vec<u8> {
         let components = [0, 1, 2].map(|channel| self.component(picture, channel));
         let mut file = vec![0xff, 0xd8];
         file.extend(segment(

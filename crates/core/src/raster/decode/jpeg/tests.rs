@@ -1,13 +1,11 @@
 //! Tests of the JPEG decoder, with files that are made by code.
 
-mod test_jpeg;
-
 use super::super::{DecodeError, ImageLimits, PrintImage, decode};
 use crate::domain::FileKind;
 use crate::domain::cancel::{CancelToken, Cancelled};
 use crate::raster::Grid;
+use crate::raster::test_images::{TestJpeg, TestScans};
 use crate::raster::test_profiles::TestProfile;
-use test_jpeg::{TestJpeg, TestScans};
 
 const SHARED: [[usize; 2]; 4] = [[1, 1], [2, 1], [1, 2], [2, 2]];
 const SEPARATE: TestScans = TestScans::Separate([0, 1, 2]);
