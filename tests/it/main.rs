@@ -110,6 +110,7 @@ mod lab;
 #[cfg(target_os = "linux")]
 mod large_lists;
 mod layers;
+mod like_plain;
 mod limits;
 mod made_once;
 #[cfg(unix)]
@@ -140,6 +141,7 @@ mod pooler;
 #[path = "../support/postgres_server.rs"]
 mod postgres_server;
 mod power;
+mod print_forms;
 mod processes;
 mod queue;
 mod readers;
@@ -192,6 +194,7 @@ mod tiff_kinds;
 #[cfg(unix)]
 mod tls_to_server;
 mod uninterrupted;
+mod unusual_prints;
 mod unusual_scans;
 mod verdict_files;
 mod waiting;

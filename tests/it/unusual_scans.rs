@@ -5,35 +5,10 @@ use std::fs;
 use std::path::Path;
 
 use mocban::demo::{PairGenerator, Tier};
-use serde_json::Value;
 
 use crate::cli::{empty, mocban};
+use crate::like_plain::assert_like_first;
 use crate::mesh_forms::{self, MeshForm};
-
-/// Largest error of a landmark, px.
-const LANDMARK_PX: f64 = 3.0;
-/// Largest difference between the IoU of a form and that of the plain file.
-const IOU: f64 = 0.005;
-
-/// Returns the exported results with the consensus of all metrics, one a pair.
-fn exported(dir: &Path) -> Vec<Value> {
-    mocban(dir, &["-C", "p", "export", "--to", "jsonl", "-o", "out"]).expect(0);
-    let text = fs::read_to_string(dir.join("out/pairs.jsonl")).expect("the lines");
-    text.lines()
-        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"))
-        .filter(|line| line["metric"] == "ensemble")
-        .collect()
-}
-
-/// Returns where a map with rows of four numbers puts a point, px.
-fn place(map: &Value, point: &Value) -> [f64; 2] {
-    let number = |value: &Value| value.as_f64().expect("a number");
-    [0, 1].map(|axis| {
-        let row = &map[axis];
-        let terms = (0..3).map(|k| number(&row[k]) * number(&point[k]));
-        terms.sum::<f64>() + number(&row[3])
-    })
-}
 
 /// Every form is aligned like its plain twin; the user learns of vertices without a position, and why other files are
 /// refused.
@@ -80,29 +55,10 @@ fn every_form_of_a_scan_is_aligned_like_its_plain_twin() {
         let shown = mocban(dir.path(), &["-C", "p", "show", name]).expect(0).out;
         assert!(shown.contains(sentence), "{name}: {shown}");
     }
-    let results = exported(dir.path());
-    let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
     for forms in &groups {
-        let result = |form: &MeshForm| {
-            let found = results.iter().find(|line| line["id"] == form.name);
-            found.unwrap_or_else(|| panic!("{} has no result: {}", form.name, run.err))
-        };
-        let iou = |form: &MeshForm| result(form)["iou"].as_f64().expect("a score");
-        let plain = iou(&forms[0]);
-        assert!(plain > 0.5, "{plain}");
+        let names: Vec<&str> = forms.iter().map(|form| form.name).collect();
+        assert_like_first(dir.path(), &names, &pair.truth, &run.err);
         for form in forms {
-            let name = form.name;
-            assert!(
-                (iou(form) - plain).abs() < IOU,
-                "{name}: {} {plain}",
-                iou(form)
-            );
-            for landmark in truth["landmarks"].as_array().expect("points") {
-                let [found, wanted] = [result(form), &truth]
-                    .map(|source| place(&source["print_from_mesh"], landmark));
-                let error = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
-                assert!(error < LANDMARK_PX, "{name}: {error} px");
-            }
             assert_says_losses(dir.path(), form, &run.err);
         }
     }

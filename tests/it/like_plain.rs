@@ -1,0 +1,61 @@
+//! Compares the exported results of files that show the same in unusual forms with those of a plain file.
+
+use std::fs;
+use std::path::Path;
+
+use mocban::demo::TruthLine;
+use serde_json::Value;
+
+use crate::cli::mocban;
+
+/// Largest error of a landmark, px.
+const LANDMARK_PX: f64 = 3.0;
+/// Largest difference between the `IoU` of a form and that of the plain file.
+const IOU: f64 = 0.005;
+
+/// Returns the exported results with the consensus of all metrics, one a pair.
+fn exported(dir: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(dir.join("out/pairs.jsonl")).expect("the lines");
+    text.lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"))
+        .filter(|line| line["metric"] == "ensemble")
+        .collect()
+}
+
+/// Returns where a map with rows of four numbers puts a point, px.
+fn place(map: &Value, point: &Value) -> [f64; 2] {
+    let number = |value: &Value| value.as_f64().expect("a number");
+    [0, 1].map(|axis| {
+        let row = &map[axis];
+        let terms = (0..3).map(|k| number(&row[k]) * number(&point[k]));
+        terms.sum::<f64>() + number(&row[3])
+    })
+}
+
+/// Exports the project `p`, and asserts that the pairs with these ids have landmarks where the truth puts them, and the `IoU`
+/// of the first pair. `log` is the log of the run.
+pub(crate) fn assert_like_first(dir: &Path, ids: &[&str], truth: &TruthLine, log: &str) {
+    if !dir.join("out").exists() {
+        mocban(dir, &["-C", "p", "export", "--to", "jsonl", "-o", "out"]).expect(0);
+    }
+    let results = exported(dir);
+    let truth = serde_json::to_value(truth).expect("a truth is JSON");
+    let result = |id: &str| {
+        let mut lines = results.iter();
+        let found = lines.find(|line| line["id"] == id && line["status"] == "done");
+        assert!(found.is_some(), "{id} has no result: {log}");
+        found.expect("a result")
+    };
+    let iou = |id: &str| result(id)["iou"].as_f64().expect("a score");
+    let plain = iou(ids[0]);
+    assert!(plain > 0.5, "{plain}");
+    for id in ids {
+        assert!((iou(id) - plain).abs() < IOU, "{id}: {} {plain}", iou(id));
+        for landmark in truth["landmarks"].as_array().expect("points") {
+            let [found, wanted] =
+                [result(id), &truth].map(|source| place(&source["print_from_mesh"], landmark));
+            let error = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
+            assert!(error < LANDMARK_PX, "{id}: {error} px");
+        }
+    }
+}
