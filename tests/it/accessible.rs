@@ -7,15 +7,12 @@ use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
 use crate::review_browser::{PLAIN, enter, judge};
+use crate::skipped::say_skipped;
 
 /// Returns the source of axe-core. Returns `None`, with a line on stderr, if axe-core is not available.
-#[expect(
-    clippy::print_stderr,
-    reason = "the one line that says why a test was skipped"
-)]
 pub(crate) fn axe() -> Option<String> {
     let Some(path) = std::env::var_os("AXE_JS") else {
-        eprintln!("skipped: AXE_JS names no axe.min.js");
+        say_skipped("AXE_JS names no axe.min.js");
         return None;
     };
     Some(std::fs::read_to_string(path).expect("axe.min.js"))

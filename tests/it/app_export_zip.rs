@@ -10,6 +10,7 @@ use serde_json::json;
 
 use crate::app::{act, open_app, text, with_project};
 use crate::page::{Page, Reply, read_project};
+use crate::skipped::say_skipped;
 use crate::waiting::wait_until;
 
 /// Lists the files of an archive with their lengths, after it checked their checksums.
@@ -22,17 +23,13 @@ with zipfile.ZipFile(sys.argv[1]) as archive:
 ";
 
 /// Lists the files of an archive with Python. `None`, with a line on stderr, if there is none.
-#[expect(
-    clippy::print_stderr,
-    reason = "the one line that says why a check was skipped"
-)]
 fn listed(archive: &[u8], dir: &Path) -> Option<Vec<(u64, String)>> {
     let path = dir.join("read.zip");
     fs::write(&path, archive).expect("written");
     let mut python = Command::new("python3");
     python.env("PYTHONIOENCODING", "utf-8");
     let Ok(done) = python.args(["-c", LIST]).arg(&path).output() else {
-        eprintln!("skipped: no python3 on the path");
+        say_skipped("no python3 on the path");
         return None;
     };
     let [out, err] = [&done.stdout, &done.stderr].map(|bytes| String::from_utf8_lossy(bytes));

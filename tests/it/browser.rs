@@ -1,5 +1,5 @@
 //! Controls headless Chromium by the `DevTools` protocol. JSON objects, each ended by a zero byte, go through two
-//! pipes. If there is no Chromium, tests are skipped with a line on stderr.
+//! pipes. If there is no Chromium, tests are skipped with a line on stderr that names them.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -12,6 +12,7 @@ use std::time::Instant;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};
 
+use crate::skipped::say_skipped;
 use crate::waiting::{LONGEST, pause};
 
 /// Names of the executable, the one that starts fastest first.
@@ -94,13 +95,9 @@ fn messages(from: File) -> Receiver<Vec<u8>> {
 
 impl Browser {
     /// Starts a browser; `None` if there is none, with a line on stderr.
-    #[expect(
-        clippy::print_stderr,
-        reason = "the one line that says why a test was skipped"
-    )]
     pub(crate) fn start() -> Option<Self> {
         let Some(program) = program() else {
-            eprintln!("skipped: no Chromium on the path and none in CHROME");
+            say_skipped("no Chromium on the path and none in CHROME");
             return None;
         };
         let dir = tempfile::tempdir().expect("a temporary directory");

@@ -181,6 +181,7 @@ mod show_low;
 mod silent_review;
 #[cfg(unix)]
 mod silent_server;
+mod skipped;
 mod small_block;
 mod snapshots;
 mod source_text;

@@ -11,6 +11,7 @@ use serde_json::Value;
 
 use crate::cli::{Call, call, mocban};
 use crate::export_readback::every_format;
+use crate::skipped::say_skipped;
 use crate::source_text::package_dir;
 
 /// Number of pairs of the project.
@@ -102,20 +103,11 @@ pub(crate) fn exported_demo() -> &'static ExportedDemo {
     MADE.get_or_init(ExportedDemo::create)
 }
 
-/// Prints why a test is skipped.
-#[expect(
-    clippy::print_stderr,
-    reason = "the one line that says why a test was skipped"
-)]
-fn skip(reason: &str) {
-    eprintln!("skipped: {reason}");
-}
-
 /// Returns a command that runs a script, given by its path in the package, in the Python interpreter that an environment
 /// variable names. Returns `None`, with a line on stderr, if the variable is not set.
 pub(crate) fn python(variable: &str, script: &str) -> Option<Command> {
     let Some(interpreter) = std::env::var_os(variable) else {
-        skip(&format!("{variable} names no Python interpreter"));
+        say_skipped(&format!("{variable} names no Python interpreter"));
         return None;
     };
     let mut command = Command::new(interpreter);
@@ -139,11 +131,11 @@ fn reader(script: &str, export: Option<&Path>) -> Option<Command> {
 pub(crate) fn output(command: &mut Command) -> Option<String> {
     let done = call(command);
     if done.code == SKIPPED {
-        skip(done.out.trim().trim_start_matches("skipped: "));
+        say_skipped(done.out.trim().trim_start_matches("skipped: "));
         return None;
     }
     if let Some((_, module)) = done.err.split_once("ModuleNotFoundError: ") {
-        skip(module.trim());
+        say_skipped(module.trim());
         return None;
     }
     Some(done.expect(0).out)
@@ -211,7 +203,7 @@ fn a_script_fails_with_one_sentence_if_a_number_is_wrong() {
     std::fs::write(dir.path().join("jsonl/pairs.jsonl"), changed).expect("lines");
     let done = call(&mut command);
     if done.code == SKIPPED {
-        skip(done.out.trim());
+        say_skipped(done.out.trim().trim_start_matches("skipped: "));
         return;
     }
     let done = done.expect(1);
