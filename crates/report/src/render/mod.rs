@@ -200,4 +200,37 @@ mod tests {
             assert_eq!(&truth[name], wanted, "{name}");
         }
     }
+
+    #[test]
+    fn one_verdict_compares_no_metrics_and_every_row_says_how_many_were_judged() {
+        let mut report = ReportAccumulator::default();
+        for i in 0..60 {
+            let verdicts: &[Verdict] = if i == 0 { &[Verdict::Fail] } else { &[] };
+            let pair = test_fixtures::done(&format!("p{i:02}"), 0.75, verdicts);
+            report.add(&pair, &TruthEvaluation::default());
+        }
+        let report = report.finish();
+        assert_eq!(report.comparisons, []);
+        for (format, row) in [
+            (ReportFormat::Text, "Ensemble 60 1 0.0 "),
+            (ReportFormat::Markdown, "| Ensemble | 60 | 1 | 0.0 |"),
+            (ReportFormat::Latex, "Ensemble & 60 & 1 & 0.0 &"),
+            (
+                ReportFormat::Html,
+                "<th scope=\"row\">Ensemble</th><td class=\"number\">60</td><td class=\"number\">1</td>\
+                 <td class=\"number\">0.0</td>",
+            ),
+        ] {
+            let text = render(&report, format);
+            let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+            let why =
+                "Metrics are not compared, because fewer than 6 pairs are judged for two of them";
+            assert!(words.contains(why), "{format}: {words}");
+            assert!(words.contains(row), "{format}: {words}");
+            // Two metrics that are wrong about the only judged pair are not said to be alike or right.
+            for untrue in ["By verdicts,", "metrics are right", "no two metrics differ"] {
+                assert!(!words.contains(untrue), "{format}: {words}");
+            }
+        }
+    }
 }
