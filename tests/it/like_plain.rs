@@ -23,7 +23,7 @@ fn exported(dir: &Path) -> Vec<Value> {
 }
 
 /// Returns where a map with rows of four numbers puts a point, px.
-fn place(map: &Value, point: &Value) -> [f64; 2] {
+pub(crate) fn place(map: &Value, point: &Value) -> [f64; 2] {
     let number = |value: &Value| value.as_f64().expect("a number");
     [0, 1].map(|axis| {
         let row = &map[axis];

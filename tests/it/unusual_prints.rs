@@ -4,10 +4,11 @@ use std::fs;
 
 use mocban::demo::{PairGenerator, Tier};
 use mocban::mesh::write::MeshFormat;
-use mocban::raster::{Grid, ImageLimits, decode, png_rgb8};
+use mocban::raster::{ImageLimits, decode};
+use serde_json::Value;
 
 use crate::cli::{empty, mocban};
-use crate::like_plain::assert_like_first;
+use crate::like_plain::{assert_like_first, place};
 use crate::print_forms;
 
 /// Every form is aligned like its plain twin; the user learns that a print was turned, and why other files are refused.
@@ -54,5 +55,37 @@ fn every_form_of_a_print_is_aligned_like_its_plain_twin() {
             let says_turned = shown.contains("turned upright by its EXIF orientation 6");
             assert_eq!(says_turned, form.is_turned, "{}: {shown}", form.name);
         }
+    }
+}
+
+/// The pose of the larger part is right, the sentence says where the smaller part lies, and the result is trusted less.
+#[test]
+fn a_folded_print_is_aligned_on_its_larger_part_and_the_other_part_is_named() {
+    let dir = empty();
+    let pair = PairGenerator::new(Tier::Torn, 1).pair(9);
+    let pair = pair.expect("images encode");
+    let print = format!("print.{}", pair.print_extension);
+    let mesh = MeshFormat::PlyLittleEndian.encode(&pair.mesh);
+    fs::write(dir.path().join("scan.ply"), mesh).expect("written");
+    fs::write(dir.path().join(&print), &pair.print).expect("written");
+    let aligned = mocban(dir.path(), &["--json", "align", "scan.ply", &print]).expect(0);
+    let found = aligned.json();
+    assert!(found["displaced"].is_object(), "{found}");
+    let confidence = found["confidence"].as_f64().expect("a confidence");
+    assert!((0.5..0.9).contains(&confidence), "{confidence}");
+    let start = "print: a part of the print with ";
+    let is_sentence =
+        |text: &&str| text.starts_with(start) && text.contains(" degrees from where ");
+    let warnings = found["warnings"].as_array().expect("sentences").iter();
+    let said = warnings
+        .filter_map(Value::as_str)
+        .filter(is_sentence)
+        .count();
+    assert_eq!(said, 1, "{found}");
+    let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
+    for landmark in truth["landmarks"].as_array().expect("points") {
+        let [a, b] = [&found, &truth].map(|source| place(&source["print_from_mesh"], landmark));
+        let apart = (a[0] - b[0]).hypot(a[1] - b[1]) / pair.truth.char_height_px;
+        assert!(apart < 0.03, "{apart}");
     }
 }
