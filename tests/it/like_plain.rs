@@ -13,12 +13,12 @@ const LANDMARK_PX: f64 = 3.0;
 /// Largest difference between the `IoU` of a form and that of the plain file.
 const IOU: f64 = 0.005;
 
-/// Returns the exported results with the consensus of all metrics, one a pair.
-fn exported(dir: &Path) -> Vec<Value> {
+/// Returns the exported results of a metric, one a pair.
+fn exported(dir: &Path, metric: &str) -> Vec<Value> {
     let text = fs::read_to_string(dir.join("out/pairs.jsonl")).expect("the lines");
     text.lines()
         .map(|line| serde_json::from_str::<Value>(line).expect("JSON"))
-        .filter(|line| line["metric"] == "ensemble")
+        .filter(|line| line["metric"] == metric)
         .collect()
 }
 
@@ -33,12 +33,18 @@ pub(crate) fn place(map: &Value, point: &Value) -> [f64; 2] {
 }
 
 /// Exports the project `p`, and asserts that the pairs with these ids have landmarks where the truth puts them, and the `IoU`
-/// of the first pair. `log` is the log of the run.
-pub(crate) fn assert_like_first(dir: &Path, ids: &[&str], truth: &TruthLine, log: &str) {
+/// of the first pair, by a metric. `log` is the log of the run.
+pub(crate) fn assert_like_first(
+    dir: &Path,
+    ids: &[&str],
+    truth: &TruthLine,
+    metric: &str,
+    log: &str,
+) {
     if !dir.join("out").exists() {
         mocban(dir, &["-C", "p", "export", "--to", "jsonl", "-o", "out"]).expect(0);
     }
-    let results = exported(dir);
+    let results = exported(dir, metric);
     let truth = serde_json::to_value(truth).expect("a truth is JSON");
     let result = |id: &str| {
         let mut lines = results.iter();

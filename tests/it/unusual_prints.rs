@@ -11,6 +11,10 @@ use crate::cli::{empty, mocban};
 use crate::like_plain::{assert_like_first, place};
 use crate::print_forms;
 
+/// The metric whose threshold varies least with the print. For the others, colours that are rounded otherwise may choose
+/// another level, which changes the `IoU` by up to 0.02.
+const METRIC: &str = "relief";
+
 /// Every form is aligned like its plain twin; the user learns that a print was turned, and why other files are refused.
 #[test]
 fn every_form_of_a_print_is_aligned_like_its_plain_twin() {
@@ -49,7 +53,7 @@ fn every_form_of_a_print_is_aligned_like_its_plain_twin() {
     }
     for forms in &groups {
         let names: Vec<&str> = forms.iter().map(|form| form.name).collect();
-        assert_like_first(dir.path(), &names, &pair.truth, &run.err);
+        assert_like_first(dir.path(), &names, &pair.truth, METRIC, &run.err);
         for form in forms {
             let shown = shown(form.name);
             let says_turned = shown.contains("turned upright by its EXIF orientation 6");

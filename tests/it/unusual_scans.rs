@@ -57,7 +57,7 @@ fn every_form_of_a_scan_is_aligned_like_its_plain_twin() {
     }
     for forms in &groups {
         let names: Vec<&str> = forms.iter().map(|form| form.name).collect();
-        assert_like_first(dir.path(), &names, &pair.truth, &run.err);
+        assert_like_first(dir.path(), &names, &pair.truth, "ensemble", &run.err);
         for form in forms {
             assert_says_losses(dir.path(), form, &run.err);
         }
