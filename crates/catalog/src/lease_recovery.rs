@@ -13,7 +13,6 @@ use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
-use crate::queue::commit::server_commit::connected_workers;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::queue::fail::{add_records, merged};
 use crate::queue::kind::{JobKind, StoredKind, Template};
@@ -100,6 +99,13 @@ const DIED: &str = "UPDATE worker SET died = 1 WHERE ended IS NULL AND id IN (SE
 const ALL_DIED: &str = "
 UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
     AND id IN (SELECT id FROM worker ORDER BY id DESC LIMIT 33)";
+
+/// Selects the numbers of all locks of workers in this catalog.
+const WORKER_LOCKS: &str = "
+SELECT CAST(objid AS bigint) FROM pg_locks
+WHERE locktype = 'advisory' AND objsubid = 2 AND granted
+    AND database = (SELECT oid FROM pg_database WHERE datname = current_database())
+    AND classid = CAST(hashtext(current_setting('search_path')) AS oid)";
 
 /// Counts the workers that died among the newest 32.
 const DEATHS: &str = "
@@ -360,4 +366,17 @@ async fn store_recovered<K: StoredKind>(
     }
     script.run(conn).await?;
     Ok(recovered)
+}
+
+/// Returns which of the workers hold their locks.
+async fn connected_workers(
+    conn: &mut Conn,
+    workers: impl Iterator<Item = WorkerId>,
+) -> Result<BTreeSet<WorkerId>> {
+    let held: Vec<i64> = query_scalar(WORKER_LOCKS).fetch_all(conn).await?;
+    let held: BTreeSet<i64> = held.into_iter().collect();
+    let number = |worker: &WorkerId| worker.0 % (1 << 31);
+    Ok(workers
+        .filter(|worker| held.contains(&number(worker)))
+        .collect())
 }

@@ -1,6 +1,7 @@
-//! Blocking calls and tasks whose panics go on in their callers, and the text of a panic.
+//! Blocking calls and tasks whose panics go on in their callers, the end of cancelled ones, and the text of a panic.
 
 use std::any::Any;
+use std::time::Duration;
 
 use tokio::task::JoinError;
 
@@ -21,6 +22,17 @@ pub(super) fn panic_text(payload: &(dyn Any + Send)) -> String {
     format!(
         "the stage panicked{message}: this is a bug, please report it with the output of `run --rerun failed -v`"
     )
+}
+
+/// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer. Unit tests wait longer,
+/// because they also run on busy machines.
+const LONGEST_END: Duration = Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
+
+/// Waits until the cancelled work of a pair or block has returned its memory, but not longer than [`LONGEST_END`].
+pub(super) async fn wait_for_end<T>(ended: impl Future<Output = T>) {
+    if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
+        tracing::warn!("a thread still waits for a file; its memory no longer counts for --memory");
+    }
 }
 
 /// Runs a blocking call on a thread for such calls; resumes its panic.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
 
-use super::blocking::panic_text;
+use super::blocking::{panic_text, wait_for_end};
 use super::checkpointer::{Checkpointer, PairFailure};
 use super::error::RunError;
 use super::events::RunEvent;
@@ -59,17 +59,6 @@ enum ComputeEvent {
     Stopped,
     /// Later stages cannot be stored: the lease is lost, or an earlier stage was not stored.
     Cancelled,
-}
-
-/// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer. Unit tests wait longer,
-/// because they also run on busy machines.
-const LONGEST_END: Duration = Duration::from_millis(if cfg!(test) { 3_000 } else { 500 });
-
-/// Waits until the cancelled work of a pair or block has returned its memory, but not longer than [`LONGEST_END`].
-pub(super) async fn wait_for_end<T>(ended: impl Future<Output = T>) {
-    if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
-        tracing::warn!("a thread still waits for a file; its memory no longer counts for --memory");
-    }
 }
 
 /// The thread that computes the stages of a pair one after another. If this handle is dropped, the computation is cancelled.

@@ -14,10 +14,9 @@ use super::checkpoint::{
 };
 use super::inputs::{BlockSources, outdated};
 use crate::block_stages::BlockStageError;
-use crate::blocking::panic_text;
+use crate::blocking::{panic_text, wait_for_end};
 use crate::error::RunError;
 use crate::events::RunEvent;
-use crate::pair_task::wait_for_end;
 use crate::run_context::{JobEnd, RunContext};
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease};

@@ -2,7 +2,7 @@
 //! its worker. Checkpoints, and each claim, are one statement that commits by itself; the rarer requests share a
 //! transaction.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -179,19 +179,19 @@ impl KnownLeases {
     }
 
     /// Returns whether an earlier commit may have been stored although its reply was lost.
-    pub(crate) fn is_searching(&self) -> bool {
+    fn is_searching(&self) -> bool {
         self.search_until
             .is_some_and(|until| Instant::now() <= until)
     }
 
     /// Adds leases that a claim returned.
-    pub(crate) fn add(&mut self, leases: &[Lease]) {
+    fn add(&mut self, leases: &[Lease]) {
         let tokens = leases.iter().map(|lease| (lease.unit, lease.token));
         self.tokens.extend(tokens);
     }
 
     /// Removes a lease that has ended. A later lease of the same pair stays.
-    pub(crate) fn remove(&mut self, lease: &Lease) {
+    fn remove(&mut self, lease: &Lease) {
         if self.tokens.get(&lease.unit) == Some(&lease.token) {
             self.tokens.remove(&lease.unit);
         }
@@ -199,7 +199,7 @@ impl KnownLeases {
 
     /// Returns the leases of a worker that this process has not received. Queries the server only for `SEARCH_TIME` after
     /// a reconnection or a failed claim.
-    pub(crate) async fn unknown(&self, conn: &mut Conn, worker: WorkerId) -> Result<Vec<Lease>> {
+    async fn unknown(&self, conn: &mut Conn, worker: WorkerId) -> Result<Vec<Lease>> {
         if !self.is_searching() {
             return Ok(Vec::new());
         }
@@ -213,13 +213,6 @@ impl KnownLeases {
 /// connection of the same worker.
 const TRY_LOCK: &str = "
 SELECT pg_try_advisory_lock(hashtext(current_setting('search_path')), CAST(?1 % 2147483648 AS integer))";
-
-/// Selects the numbers of all locks of workers in this catalog.
-const LOCKS: &str = "
-SELECT CAST(objid AS bigint) FROM pg_locks
-WHERE locktype = 'advisory' AND objsubid = 2 AND granted
-    AND database = (SELECT oid FROM pg_database WHERE datname = current_database())
-    AND classid = CAST(hashtext(current_setting('search_path')) AS oid)";
 
 /// The lock of a worker, as far as its connection knows. It shows others that the worker is connected, and the server releases
 /// it when the process dies. A lock that is free is only a hint: a connection may break while its worker lives.
@@ -262,17 +255,4 @@ impl WorkerLock {
         }
         Ok(())
     }
-}
-
-/// Returns which of the workers hold their locks.
-pub(crate) async fn connected_workers(
-    conn: &mut Conn,
-    workers: impl Iterator<Item = WorkerId>,
-) -> Result<BTreeSet<WorkerId>> {
-    let held: Vec<i64> = query_scalar(LOCKS).fetch_all(conn).await?;
-    let held: BTreeSet<i64> = held.into_iter().collect();
-    let number = |worker: &WorkerId| worker.0 % (1 << 31);
-    Ok(workers
-        .filter(|worker| held.contains(&number(worker)))
-        .collect())
 }
