@@ -1,6 +1,6 @@
 //! What a worker asks of the catalog, for pairs and blocks: its registration, heartbeats, claims, checkpoints, failures,
 //! releases and its end. The requests for pairs share commits. There are few blocks, so each of their requests is a
-//! transaction of its own, which a call again, because the reply was lost, does not repeat.
+//! transaction of its own. If its reply is lost, it may be called again.
 
 use crate::blocks::block_job::BlockJob;
 use crate::blocks::cut::{CutReply, CutSummary, store_cut, taken_name};
@@ -200,8 +200,8 @@ impl Catalog {
     }
 
     /// Stores a finished stage and advances the job. Its artifacts must be on disk already. If the lease was lost, nothing
-    /// is stored. A call again, because the reply was lost, returns the same and stores nothing more. The last
-    /// stage is stored with [`Catalog::finish_cut`].
+    /// is stored. A call again, because the reply was lost, returns the same and stores nothing more, unless an earlier stage
+    /// was computed again: then the attempt is recorded twice. The last stage is stored with [`Catalog::finish_cut`].
     pub async fn checkpoint_block(
         &self,
         lease: Lease<BlockJob>,

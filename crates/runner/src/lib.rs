@@ -2,62 +2,62 @@
 //!
 //! [`run()`] prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
 //! `pair_task`, and the task a thread, which runs each `pair_stage` through `pair_pipeline`. The task hands computed
-//! stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what follows a failure.
-//! Whole blocks run before pairs, one at a time: `block/slot.rs` leases a block, `block/task.rs` runs its stages, and
-//! `block/pipeline` reads their files. [`check`] compares a project with its catalog and repairs it. Every call fails if the
-//! catalog, an input or an artifact cannot be read or written. `# Errors` names other reasons.
+//! stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what follows a
+//! failure. Whole blocks run before pairs, one at a time: `block/slot.rs` leases a block, `block/task.rs` runs its stages,
+//! and `block/pipeline` reads their files. [`check`] compares a project with its catalog and repairs it. Every call fails
+//! if the catalog, an input or an artifact cannot be read or written. `# Errors` names other reasons.
 //!
 //! **Invariant:** a kill at any moment costs the stages in progress and uncommitted ones, nothing else; and a worker whose
-//! lease was lost stores no row. Files that it wrote before stay, until `check --repair` or `check --collect` removes those
-//! without a row.
+//! lease was lost stores no row. Files that it wrote before stay, until `check --repair` or `check --collect` removes
+//! those without a row.
 //!
 //! # A lost lease
+//! Files of the catalog are below `crates/catalog/src`. Names in capitals are statements of `queue/lease.rs`, but `RECOVER`
+//! and `OVERDUE` of `lease_recovery.rs`.
 //! ```text
-//!   ready ---- claim: queue/claim.rs ----> leased ---- ADVANCE of the last stage: queue/lease.rs ----> done
+//!   ready ---- claim: queue/claim.rs ----> leased ---- ADVANCE of the last stage ----> done
 //!     ^                                      |
-//!     +---- RELEASE, SEND_BACK: queue/lease.rs -+
-//!     +---- RECOVER, OVERDUE: lease_recovery.rs +---- if the job has crashed too many workers ----> quarantined
+//!     +---- RELEASE, SEND_BACK, FAIL --------+---- FAIL, or RECOVER after too many crashes ----> quarantined
+//!     +---- RECOVER, OVERDUE ----------------+
 //! ```
 //!
-//! A write under a lease is stored if the worker has not ended, its last heartbeat is at most 50 s old
-//! (`RunContext::alive_since`), and the job has the token of the lease; a checkpoint of a pair on PostgreSQL also needs its
-//! stage. A release needs only worker and token. A checkpoint does not renew the lease. A repair, a new cut of its block and
-//! a recovery give a job a new token, and retiring a pair removes its job. A job is recovered when its worker has sent no
-//! heartbeat for 50 s (`Timing` in `run_context.rs`), when a run starts alone on SQLite, or when its deadline is more than
-//! 60 s past and another worker has read the catalog without a gap for two stage timeouts; a passed deadline alone ends
-//! nothing. On PostgreSQL, 7 s without lock and heartbeat are enough for a worker that has been connected, or has appeared,
-//! since the last gap in the reads of the process that recovers (`Liveness` in `worker_session.rs`).
+//! A write under a lease is stored if the worker has not ended, its last heartbeat was at most 50 s old when the write was
+//! prepared (`RunContext::alive_since`), and the job has the token of the lease; a checkpoint of a block, or of a pair on
+//! PostgreSQL, also needs the stage of the lease. A release needs only worker and token. A checkpoint is no heartbeat. A
+//! repair, a new cut of its block and a recovery give a job a new token, and retiring a pair removes its job. A job is
+//! recovered when its worker has sent no heartbeat for 50 s (`Timing` in `run_context.rs`), when a run starts alone on
+//! SQLite, or when its deadline is more than 60 s past and another worker has read the catalog without a gap for two stage
+//! timeouts. On PostgreSQL, 7 s without lock and heartbeat are enough, if the process that recovers has seen the worker
+//! since the last gap in its reads (`Liveness` in `worker_session.rs`).
 //!
-//! | who finds out | by | refused by, in `queue/lease.rs` | what happens |
+//! | what is refused | where it is noticed | by | what happens |
 //! |---|---|---|---|
-//! | `checkpointer.rs` | a checkpoint of a pair is refused | SQLite: `ADVANCE`; PostgreSQL: `ADVANCED_ON_SERVER` | this and later results are dropped; the stage that runs is cancelled |
-//! | `block/checkpoint.rs`, `block/task.rs` | a checkpoint of a block, or versions of its files, are refused | `ADVANCE`, `LEASED` | the task ends; no stage runs meanwhile |
-//! | `checkpointer.rs`, `block/checkpoint.rs` | a failure is refused | `FAIL` | the failure is not stored |
-//! | `worker_session.rs`, for `scheduler.rs` | a heartbeat is refused | `HEARTBEAT` | the process becomes a new worker: see below |
-//! | the worker, as a refused checkpoint | files were written more than 30 minutes ago | blocks, and pairs on PostgreSQL: `is_late`; pairs on SQLite: not checked | nothing is stored; the job stays leased to this worker, which claims it again |
-//! | `checkpointer.rs`; others ignore it | a release is refused | `RELEASE` | the pair ends as `LeaseLost` |
+//! | a checkpoint of a pair | `checkpointer.rs` | SQLite: `ADVANCE`; PostgreSQL: `ADVANCED_ON_SERVER` | this and later results are dropped; the stage that runs is cancelled |
+//! | a checkpoint of a block, or versions of its files | `block/checkpoint.rs`, `block/task.rs` | `ADVANCE`, `LEASED` | the task ends; no stage runs meanwhile |
+//! | a failure | `checkpointer.rs`, `block/checkpoint.rs` | `FAIL` | the failure is not stored |
+//! | a heartbeat | `worker_session.rs`, for `scheduler.rs` | `HEARTBEAT` | the process becomes a new worker: see below |
+//! | files written more than 30 minutes ago (pairs on SQLite: not checked) | as a checkpoint | `is_late` | nothing is stored; the job stays leased to this worker, which claims it again |
+//! | a release | `checkpointer.rs`; others ignore it | `RELEASE` | the pair ends as `LeaseLost`, a block as `Released` |
 //!
-//! A pair or block that loses its lease while it runs ends as `LeaseLost`, which counts neither as done nor as failed; after
-//! a refused heartbeat, a pair may also end as `Released`. Stages stored before stay. A recovered pair may have killed its
-//! worker, so no other pair runs beside it (on PostgreSQL: on its host): in its own process until it has ended, in others
-//! until its next stage is stored. After a refused heartbeat, `prefetch.rs` releases what has not started, and the process
-//! registers as a new worker and recovers the jobs of its old id. The new id ends the waits for `RunContext::expired`, which
-//! cancels the stages that run: in `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of `block/task.rs`.
-//! Heartbeats do not show that another worker recovered a job, or that a repair or a new cut reset it: the stage runs on,
-//! and its next write is refused. If heartbeats fail with an error for as long as a lease lasts, or the log of SQLite is
-//! lost, the run finishes the stages in progress and ends with that error. If the connection to a server breaks, writes are
-//! sent again until a stop ends the waits, and `stored_before` finds what was stored without a reply. A checkpoint of a
-//! block whose stage before its position was computed again is accepted twice, with two rows in `block_attempt`.
+//! A job that loses its lease while it runs ends as `LeaseLost`, which counts neither as done nor as failed; after a
+//! refused heartbeat, a pair may also end as `Released`. Stages stored before stay. A pair recovered from a worker that
+//! did not end may have killed it, so no other pair runs beside it (on PostgreSQL: on its host): in its own process until
+//! it has ended, in others until its next stage is stored. After a refused heartbeat, `prefetch.rs` releases what has not
+//! started, and the process ends its old id, registers as a new worker and recovers the jobs of the old id, which count no
+//! crash. The new id ends the waits for `RunContext::expired`, which cancels the stages that run: in
+//! `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of `block/task.rs`. Heartbeats do not show that another
+//! worker recovered a job, or that a repair or a new cut reset it: the stage runs on, and its next write is refused. If
+//! the connection to a server breaks, writes are sent again until a stop ends the waits, and `stored_before`
+//! (`queue/lease.rs`) finds what was stored without a reply. If the reply to a checkpoint of a block is lost whose earlier
+//! stage was computed again, it is stored twice, with two rows in `block_attempt`.
 //!
-//! The rest of the walk: `run_context.rs`, `crates/core/src/domain/cancel.rs`; in the catalog `src/worker_requests.rs` (what
-//! a worker asks), `queue/kind.rs` (names in statements), `commit/group_commit.rs`, `commit/server_commit.rs`,
-//! `commit/writer.rs`, `commit/write_connection.rs`.
+//! The rest of the walk: `run_context.rs`, `block/slot.rs`; in the catalog `worker_requests.rs`, and in `queue` `kind.rs`,
+//! `checkpoint.rs`, `server_checkpoint.rs`, `fail.rs`, `commit/{group_commit,server_commit,writer,write_connection}.rs`.
 //!
 //! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled:
 //! inner loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs`
-//! (`block/task.rs`), which waits up to 500 ms for the end of the thread; after that its memory no longer counts. After an
-//! immediate stop, the task of a pair does not wait. Work on other threads, such as those of `rayon`, takes the token along
-//! as a `ThreadToken`.
+//! (`block/task.rs`), which waits up to 500 ms for the end of the thread; after that its memory no longer counts. Work on
+//! other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
 
 mod artifacts_owner;
 mod block;

@@ -1,5 +1,5 @@
 //! Data shared by the tasks of a run: its clock, the intervals of heartbeats and recovery, its worker and until when the
-//! leases of that worker are valid. Also the report of a pair's task.
+//! leases of that worker are valid. Also how the tasks of pairs and blocks end.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -152,8 +152,8 @@ pub(super) enum JobEnd {
     Retry,
     /// The job was released unfinished.
     Released,
-    /// The lease was lost: it expired, another process of the run recovered the job, or the files are too old to be stored.
-    /// Counts neither as done nor as failed.
+    /// The lease was lost: it expired, the job was recovered, repaired, cut again or retired, or the files are too old to be
+    /// stored. Counts neither as done nor as failed.
     LeaseLost,
 }
 

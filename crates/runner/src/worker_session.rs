@@ -140,8 +140,8 @@ impl WorkerSession {
     }
 }
 
-/// Recovers all leases but those of `me`, when a run starts and no other process of the catalog can live. Returns how many
-/// pairs are ready again.
+/// Recovers all leases but those of `me`, when a run starts with the exclusive run lock. Returns how many pairs are ready
+/// again.
 pub(super) async fn recover_all(
     project: &Project,
     catalog: &Catalog,

@@ -1,8 +1,8 @@
 //! Whole blocks: import, the jobs of their stages, their results, and the pairs that are cut from them.
 //!
 //! The jobs of blocks are a kind of the queue: see `block_job.rs`. There are few blocks and their stages take seconds, so
-//! each step is a transaction of its own (`worker_requests.rs`). The last step inserts pairs, which the queue
-//! of pairs then runs.
+//! each step is a transaction of its own (`worker_requests.rs`). The last step inserts pairs, which the queue of pairs then
+//! runs.
 
 pub(crate) mod block_job;
 pub(crate) mod block_results;

@@ -14,7 +14,7 @@ use mocban_system::platform::sleep_active;
 /// First wait before another attempt.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
 /// Longest wait. A random factor of at most 1.5 spreads the attempts of many processes. A worker that waits must not be
-/// taken for dead: see `runner/worker_session.rs`.
+/// taken for dead: see `crates/runner/src/worker_session.rs`.
 const LONGEST_WAIT: Duration = Duration::from_secs(3);
 /// Time without a reply after which an operation is given up once waits have ended.
 const REPLY_AFTER_STOP: Duration = Duration::from_secs(5);

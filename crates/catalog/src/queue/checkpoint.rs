@@ -1,5 +1,5 @@
-//! Statements that store finished stages if the lease is still valid. In PostgreSQL, those of pairs have a statement of
-//! their own: see `server_checkpoint.rs`.
+//! Statements that store the finished stages of jobs that `ADVANCE` in `lease.rs` has changed. In PostgreSQL, pairs have a
+//! statement of their own: see `server_checkpoint.rs`.
 
 use serde::Serialize;
 

@@ -60,8 +60,8 @@ impl<K: JobKind> ClaimRequest<K> {
     }
 }
 
-/// Leases the first ready jobs in SQLite, for pairs in the order of the index `job_ready`. While a pair must run exclusively, no
-/// worker leases anything. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite
+/// Leases the first ready jobs in SQLite, for pairs in the order of the index `job_ready`. While a pair must run exclusively,
+/// no worker leases anything. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite
 /// would prepare the statement again each time.
 pub(crate) static CLAIM: Template = Template::new(
     "
@@ -310,8 +310,8 @@ impl ClaimCursor {
 }
 
 /// Leases jobs in PostgreSQL, in one statement that also counts pairs and commits by itself, so a claim takes one round trip.
-/// Returns the leases in the order of the claim. `behind` is only for a claim of pairs that is neither
-/// exclusive nor for selected pairs.
+/// Returns the leases in the order of the claim. `behind` is only for a claim of pairs that is neither exclusive nor for
+/// selected pairs.
 ///
 /// # Errors
 /// Returns an error if a database operation fails. The leases may exist nevertheless, if the reply was lost.

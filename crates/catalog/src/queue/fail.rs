@@ -1,4 +1,4 @@
-//! Statements that store a failed stage if the lease is still valid.
+//! Statements that store the failed stage of jobs that `FAIL` in `lease.rs` has changed.
 
 use serde_json::{Value, json};
 

@@ -57,7 +57,7 @@ pub trait JobKind: Debug + Clone + Copy + PartialEq + Eq + Send + Sync + 'static
 
 /// How the jobs of a kind are stored.
 pub(crate) trait StoredKind: JobKind {
-    /// Number of the kind: its place in [`NAMES`].
+    /// Number of the kind: the place of its values in [`NAMES`].
     const NUMBER: usize;
     /// Whether jobs are counted by position, status and fingerprint.
     const IS_COUNTED: bool;

@@ -1,5 +1,5 @@
-//! Leases, and the statements that a lost lease refuses: each changes a job only while the lease is valid, and returns a row
-//! for each job that it changed. What is stored with them is in `checkpoint.rs` and `fail.rs`.
+//! Leases; the statements that change a job only while its lease is valid, and return a row for each job that they changed;
+//! and those that end leases or read them. What is stored with a changed job is in `checkpoint.rs` and `fail.rs`.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -173,7 +173,8 @@ pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: &Heartbeat) -> State
 /// A lease, and the finished stages to store under it, in the order they were computed.
 pub(crate) type LeasedCheckpoints<K = PairJob> = (Lease<K>, Vec<StageCheckpoint<K>>);
 
-/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead. Resets the crash count. Marks the job of
+/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead, and that of a block if it is not at the stage
+/// of the lease. Resets the crash count. Marks the job of
 /// a pair dirty if the new results do not build on the stored ones: see `AdvancedJob` in `checkpoint.rs`.
 pub(crate) static ADVANCE: Template = Template::new(
     "
@@ -186,8 +187,8 @@ WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token
 RETURNING {unit} AS unit, token",
 );
 
-/// The part of a statement of PostgreSQL that advances the jobs of pairs, in `item`, if their leases are valid: the same as
-/// [`ADVANCE`], and the job must still be at the stage of its lease. `job.status + 0` keeps the planner from the index of
+/// The part of a statement of PostgreSQL that advances the jobs of pairs if their leases are valid: the same as [`ADVANCE`],
+/// and the job must still be at the stage of its lease. The columns of `item` are `JobRows` in `server_checkpoint.rs`. `job.status + 0` keeps the planner from the index of
 /// leases, which contains all leases that ended while a snapshot is held.
 pub(crate) const ADVANCED_ON_SERVER: &str = "
 advanced AS (
@@ -253,7 +254,7 @@ RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerpri
 );
 
 /// Selects the leases of a worker.
-static LEASES: Template = Template::new(
+static LEASES_OF_WORKER: Template = Template::new(
     "
 SELECT {unit} AS unit, worker, token, stage, {fingerprint} AS fingerprint, attempt, {exclusive} AS exclusive
 FROM {job} WHERE status = 1 AND worker = ?1 ORDER BY {unit}",
@@ -264,7 +265,7 @@ pub(crate) async fn leases<K: StoredKind>(
     conn: &mut Conn,
     worker: WorkerId,
 ) -> Result<Vec<Lease<K>>> {
-    let leases = query_as(LEASES.of::<K>()).bind(worker.0);
+    let leases = query_as(LEASES_OF_WORKER.of::<K>()).bind(worker.0);
     leases.fetch_all(conn).await
 }
 

@@ -1,6 +1,6 @@
 //! The queue of pairs and blocks: leases, checkpoints, failures, and the task that writes them. Its functions take
-//! connections. The handle of the catalog uses them; methods of the handle are in `jobs`, `blocks`, `records` and
-//! `worker_requests.rs`.
+//! connections. The handle of the catalog uses them; methods of the handle are in `jobs`, `blocks`, `records`,
+//! `worker_requests.rs` and `lease_recovery.rs`.
 
 pub(crate) mod checkpoint;
 pub(crate) mod claim;

@@ -25,8 +25,8 @@ use mocban_core::domain::{
 use mocban_store::{Project, stat_input};
 use mocban_system::failpoint::{self, Point};
 
-/// Calls an operation that stores what a block's task has computed. It may take any time, even after a stop request, and
-/// its future is `Send`.
+/// Calls an operation that stores what a block's task has computed, again if it failed for a while; the arguments are
+/// evaluated for each call. It may take any time, even after a stop request, and its future is `Send`.
 macro_rules! stored {
     ($catalog:ident.$operation:ident($($argument:expr),*)) => {{
         let mut attempt = 0;
