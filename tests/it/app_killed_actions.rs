@@ -404,6 +404,7 @@ fn kill_each(actions: &[KilledAction]) {
         let reply = act(&next, action.action, &body, |_| {});
         assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
         wait_until(&what, || (action.state)(&project) != before);
+        wait_until("its run ends", || status(&project)["running"] == false);
         mocban(&project, &["check"]).expect(0);
     }
 }

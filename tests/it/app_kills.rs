@@ -156,6 +156,7 @@ fn a_run_outlives_a_killed_app_and_is_stopped_and_resumed_by_the_next() {
     assert_eq!(status()["jobs"]["leased"], 0);
     send(&next, "run", &all);
     wait_until("all pairs are done", || status()["jobs"]["done"] == 16);
+    wait_until("the run ends", || status()["running"] == false);
     mocban(&project, &["check"]).expect(0);
 }
 
