@@ -32,8 +32,13 @@ pub(crate) fn place(map: &Value, point: &Value) -> [f64; 2] {
     })
 }
 
-/// Exports the project `p`, and asserts that the pairs with these ids have landmarks where the truth puts them, and the `IoU`
-/// of the first pair, by a metric. `log` is the log of the run.
+/// Exports the project `p`.
+pub(crate) fn export(dir: &Path) {
+    mocban(dir, &["-C", "p", "export", "--to", "jsonl", "-o", "out"]).expect(0);
+}
+
+/// Asserts that the exported pairs with these ids have landmarks where the truth puts them, and the `IoU` of the first pair, by a
+/// metric. `log` is the log of the run.
 pub(crate) fn assert_like_first(
     dir: &Path,
     ids: &[&str],
@@ -41,9 +46,6 @@ pub(crate) fn assert_like_first(
     metric: &str,
     log: &str,
 ) {
-    if !dir.join("out").exists() {
-        mocban(dir, &["-C", "p", "export", "--to", "jsonl", "-o", "out"]).expect(0);
-    }
     let results = exported(dir, metric);
     let truth = serde_json::to_value(truth).expect("a truth is JSON");
     let result = |id: &str| {

@@ -8,7 +8,7 @@ use mocban::raster::{ImageLimits, decode};
 use serde_json::Value;
 
 use crate::cli::{empty, mocban};
-use crate::like_plain::{assert_like_first, place};
+use crate::like_plain::{assert_like_first, export, place};
 use crate::print_forms;
 
 /// The metric whose threshold varies least with the print. For the others, colours that are rounded otherwise may choose
@@ -51,6 +51,7 @@ fn every_form_of_a_print_is_aligned_like_its_plain_twin() {
         let shown = shown(name);
         assert!(shown.contains(sentence), "{name}: {shown}");
     }
+    export(dir.path());
     for forms in &groups {
         let names: Vec<&str> = forms.iter().map(|form| form.name).collect();
         assert_like_first(dir.path(), &names, &pair.truth, METRIC, &run.err);

@@ -7,7 +7,7 @@ use std::path::Path;
 use mocban::demo::{PairGenerator, Tier};
 
 use crate::cli::{empty, mocban};
-use crate::like_plain::assert_like_first;
+use crate::like_plain::{assert_like_first, export};
 use crate::mesh_forms::{self, MeshForm};
 
 /// Every form is aligned like its plain twin; the user learns of vertices without a position, and why other files are
@@ -55,6 +55,7 @@ fn every_form_of_a_scan_is_aligned_like_its_plain_twin() {
         let shown = mocban(dir.path(), &["-C", "p", "show", name]).expect(0).out;
         assert!(shown.contains(sentence), "{name}: {shown}");
     }
+    export(dir.path());
     for forms in &groups {
         let names: Vec<&str> = forms.iter().map(|form| form.name).collect();
         assert_like_first(dir.path(), &names, &pair.truth, "ensemble", &run.err);
