@@ -6,7 +6,7 @@ use crate::app::app;
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
-use crate::review_browser::{judge, saved};
+use crate::review_browser::{ITEM, judge, saved, shown_long_enough};
 use crate::waiting::wait_until;
 
 /// Opens the app in a tab and returns the address of its home page.
@@ -57,14 +57,11 @@ fn the_demo_comes_to_its_report_without_a_typed_command() {
     tab.wait("!document.querySelector('#stop') && document.querySelector('#start')");
     click(&tab, "nav a[href$='/review']", &on_page("/review"));
     tab.eval("document.querySelector('#reviewer').value = 'lan', document.querySelector('[name=sample]').value = '2', null");
-    let item = "document.body?.dataset.shown && document.getElementById('canvas')";
-    click(&tab, "form.action button", item);
+    click(&tab, "form.action button", ITEM);
     tab.key("Escape");
     tab.wait("!document.querySelector('dialog[open]')");
     for _ in 0..4 {
-        // An image must be shown for some time before an answer is accepted.
-        tab.eval("window.since = Date.now(), null");
-        tab.wait("Date.now() - window.since > 400");
+        shown_long_enough(&tab);
         judge(&tab, "KeyP");
     }
     saved(&tab);
@@ -148,7 +145,7 @@ pub(crate) fn looks_right(
         tab.dark(dark);
         let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
         assert!(
-            overflow.as_f64() <= Some(0.0),
+            overflow.as_f64().is_some_and(|px| px <= 0.0),
             "{name} is {overflow} wider than {size:?}"
         );
         let theme = if dark { "dark" } else { "light" };

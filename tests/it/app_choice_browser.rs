@@ -9,6 +9,7 @@ use crate::app_choice::import_many;
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
+use crate::review_browser::ITEM;
 
 /// Opens a list of pairs.
 fn open_list(tab: &Tab<'_>, home: &str, query: &str) {
@@ -238,7 +239,7 @@ fn exactly_the_chosen_pairs_are_judged_in_a_browser() {
     tab.wait("document.body?.dataset.ready && document.querySelector('#chosen-pairs b')?.textContent === '2'");
     tab.screenshot("app_judge_these");
     tab.eval("document.querySelector('#reviewer').value = 'lan', document.querySelector('form.action .primary').click(), null");
-    tab.wait("document.body?.dataset.shown && document.getElementById('canvas')");
+    tab.wait(ITEM);
     let pairs = tab.eval(
         "fetch('api/queue').then((reply) => reply.json()).then(({ items }) => items.map(({ pair }) => pair).sort())",
     );

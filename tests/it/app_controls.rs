@@ -8,6 +8,7 @@ use crate::block_view::finished_block;
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
+use crate::review_browser::ITEM;
 
 /// Smallest width and height of a control in CSS pixels.
 const SMALLEST: u32 = 44;
@@ -88,7 +89,10 @@ fn every_control_of_the_app_fits_a_finger() {
             tab.wait(SHOWN);
             fits_fingers(&tab, &format!("{path} {size:?}"));
             let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
-            assert!(overflow.as_f64() <= Some(0.0), "{path}: {overflow}");
+            assert!(
+                overflow.as_f64().is_some_and(|px| px <= 0.0),
+                "{path}: {overflow}"
+            );
         }
         tab.screenshot(&format!("app_fingers_{}", size[0]));
         tab.open(&format!("{home}p/p/pair/upright-0000/3d/"));
@@ -114,7 +118,7 @@ fn every_control_of_a_review_fits_a_finger() {
     tab.open(&format!("{home}p/p/review"));
     tab.wait(SHOWN);
     tab.eval("document.querySelector('#reviewer').value = 'lan', document.querySelector('form.action .primary').click(), null");
-    tab.wait("document.body?.dataset.shown && document.getElementById('canvas')");
+    tab.wait(ITEM);
     for size in [[400, 800], [1024, 768]] {
         tab.use_fingers(size);
         fits_fingers(&tab, &format!("review {size:?}"));
@@ -144,7 +148,10 @@ fn every_control_of_the_views_of_a_block_fits_a_finger() {
             tab.wait(shown);
             fits_fingers(&tab, &format!("{path} {size:?}"));
             let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
-            assert!(overflow.as_f64() <= Some(0.0), "{path}: {overflow}");
+            assert!(
+                overflow.as_f64().is_some_and(|px| px <= 0.0),
+                "{path}: {overflow}"
+            );
         }
     }
 }

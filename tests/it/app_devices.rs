@@ -8,14 +8,12 @@ use crate::app_controls::SHOWN;
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
-use crate::review_browser::{accepts_an_answer, judge, saved, shown};
+use crate::review_browser::{ITEM, accepts_an_answer, judge, saved, shown, shown_long_enough};
 
 /// Number of pairs, each of which is judged.
 const PAIRS: usize = 5;
 /// Most times that a person presses Tab to reach a control.
 const MOST_TABS: usize = 200;
-/// The first item of the review is shown.
-const ITEM: &str = "document.body?.dataset.shown && document.getElementById('canvas')";
 
 /// Makes a folder with scans, prints and a list of some of them.
 fn files(dir: &Path) {
@@ -78,9 +76,7 @@ impl Curator<'_, '_> {
         (self.close_guide)(self.tab);
         self.tab.wait("!document.querySelector('dialog[open]')");
         for _ in 0..PAIRS {
-            // An image must be shown for some time before an answer is accepted.
-            self.tab.eval("window.since = Date.now(), null");
-            self.tab.wait("Date.now() - window.since > 400");
+            shown_long_enough(self.tab);
             (self.pass)(self.tab);
         }
         saved(self.tab);

@@ -7,6 +7,7 @@ use crate::app_browser::enter;
 use crate::app_controls::{PAGES, SHOWN, fits_fingers, varied_project};
 use crate::browser::{Browser, Tab};
 use crate::page::Page;
+use crate::review_browser::ITEM;
 
 const PHONE: [u32; 2] = [400, 800];
 
@@ -93,11 +94,7 @@ fn what_follows_an_action_fits_a_phone() {
             start("minh", "[name=invite]"),
             "document.querySelector('.qr')",
         ),
-        (
-            "p/p/review",
-            start("lan", "form.action .primary"),
-            "document.body?.dataset.shown && document.getElementById('canvas')",
-        ),
+        ("p/p/review", start("lan", "form.action .primary"), ITEM),
     ] {
         tab.open(&format!("{home}{path}"));
         tab.wait(SHOWN);

@@ -57,7 +57,10 @@ fn look(tab: &Tab<'_>, axe: Option<&str>, what: &str) {
         tab.resize(size);
         tab.dark(dark);
         let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
-        assert!(overflow.as_f64() <= Some(0.0), "{what}: {overflow}");
+        assert!(
+            overflow.as_f64().is_some_and(|px| px <= 0.0),
+            "{what}: {overflow}"
+        );
         let what = format!("app_{what}_{}", size[0]);
         if let Some(axe) = axe {
             no_violation(tab, axe, &what);

@@ -68,6 +68,15 @@ pub(crate) fn accepts_an_answer(tab: &Tab<'_>) {
     tab.wait("!document.getElementById('saved').classList.contains('waiting')");
 }
 
+/// The first item of a review is shown.
+pub(crate) const ITEM: &str = "document.body?.dataset.shown && document.getElementById('canvas')";
+
+/// Waits until an image was shown as long as it must be before an answer to it is accepted.
+pub(crate) fn shown_long_enough(tab: &Tab<'_>) {
+    tab.eval("window.since = Date.now(), null");
+    tab.wait("Date.now() - window.since > 400");
+}
+
 /// Presses a verdict key as soon as the page is ready, and waits until the next item is shown.
 pub(crate) fn judge(tab: &Tab<'_>, key: &str) {
     let before = shown(tab);
