@@ -105,6 +105,8 @@ mod import_graph;
 mod import_snapshots;
 mod invariance;
 mod kill;
+#[cfg(target_os = "linux")]
+mod killed_project;
 #[cfg(unix)]
 mod lab;
 #[cfg(target_os = "linux")]

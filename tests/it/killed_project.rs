@@ -1,0 +1,169 @@
+//! An action of `mocban app`, and a copy of the shared project in which it is killed.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::app::{act, open_app, text, token};
+use crate::app_kills::{HeldApp, LOG, UNTIL_KILLED};
+use crate::cli::mocban;
+use crate::fault::Fault;
+use crate::page::{Page, read_project};
+use crate::waiting::wait_until;
+
+/// An action that is killed.
+pub(crate) struct KilledAction {
+    /// Changes the project before.
+    pub(crate) prepare: fn(&Path),
+    /// Address below that of the session.
+    pub(crate) action: &'static str,
+    /// Returns what the page sends for a project.
+    pub(crate) body: fn(&Page, &Path) -> Value,
+    /// The system call at which it is killed, and the file.
+    pub(crate) at: [&'static str; 2],
+    /// Returns what the action changes in a project.
+    pub(crate) state: fn(&Path) -> Value,
+    /// The page that says of long work that it was killed, and what it says.
+    pub(crate) said: Option<[&'static str; 2]>,
+}
+
+impl KilledAction {
+    /// Returns an action that changes the catalog in one transaction.
+    pub(crate) const fn in_catalog(
+        action: &'static str,
+        body: fn(&Page, &Path) -> Value,
+        state: fn(&Path) -> Value,
+    ) -> Self {
+        Self {
+            prepare: |_| {},
+            action,
+            body,
+            at: ["write", LOG],
+            state,
+            said: None,
+        }
+    }
+
+    /// Returns an action that replaces a file.
+    pub(crate) const fn in_file(
+        action: &'static str,
+        body: fn(&Page, &Path) -> Value,
+        file: &'static str,
+        state: fn(&Path) -> Value,
+    ) -> Self {
+        Self {
+            at: ["rename", file],
+            ..Self::in_catalog(action, body, state)
+        }
+    }
+
+    /// Returns the action after a change of the project.
+    pub(crate) const fn after(self, prepare: fn(&Path)) -> Self {
+        Self { prepare, ..self }
+    }
+}
+
+/// Returns what `status --json` says of a project.
+pub(crate) fn status(project: &Path) -> Value {
+    mocban(project, &["status", "--json"]).expect(0).json()
+}
+
+/// A copy of the shared project in which an action is killed.
+struct KilledProject<'a> {
+    action: &'a KilledAction,
+    dir: tempfile::TempDir,
+    /// What the action changes, as it is before.
+    before: Value,
+}
+
+impl<'a> KilledProject<'a> {
+    fn of(action: &'a KilledAction) -> Self {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        read_project(&dir);
+        let project = dir.path().canonicalize().expect("a path").join("p");
+        mocban(&project, &["retire", "upright-0007"]).expect(0);
+        (action.prepare)(&project);
+        let before = (action.state)(&project);
+        Self {
+            action,
+            dir,
+            before,
+        }
+    }
+
+    fn root(&self) -> PathBuf {
+        self.dir.path().canonicalize().expect("a path")
+    }
+
+    fn state(&self) -> Value {
+        (self.action.state)(&self.root().join("p"))
+    }
+
+    fn body(&self, page: &Page) -> Value {
+        (self.action.body)(page, &self.root().join("p"))
+    }
+
+    /// Sends the action, and kills the app at the n-th of some calls. No damage is left.
+    fn kill_at(&self, call: &'static str, nth: usize) {
+        let held = Fault::slow(call, self.action.at[1], UNTIL_KILLED);
+        let held = HeldApp::start(&self.root(), held, nth);
+        let body = self.body(&held.page);
+        let token = token(&held.page);
+        held.kill_in(self.action.action, token, &body);
+        mocban(&self.root().join("p"), &["check"]).expect(0);
+    }
+
+    /// Sends an action to the next app, and returns what it has changed in the end.
+    fn change(&self, next: &Page, path: &str, body: &Value) -> Value {
+        let (what, project) = (self.action.action, self.root().join("p"));
+        let reply = act(next, path, body, |_| {});
+        assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
+        wait_until(what, || self.state() != self.before);
+        wait_until("its run ends", || status(&project)["running"] == false);
+        mocban(&project, &["check"]).expect(0);
+        self.state()
+    }
+
+    /// Kills the app before anything is stored, and does the action with the next app. Returns what it has changed.
+    fn kill_before(&self) -> Value {
+        let what = format!("{} at {:?}", self.action.action, self.action.at);
+        self.kill_at(self.action.at[0], 1);
+        assert_eq!(self.state(), self.before, "{what}");
+        let next = open_app(&self.root());
+        if let Some([page, part]) = self.action.said {
+            let html = text(&next.get(&format!("/p/p/{page}")));
+            assert!(html.contains(part), "{what}: {html}");
+        }
+        self.change(&next, self.action.action, &self.body(&next))
+    }
+
+    /// Kills the app as soon as its first transaction is in the log. If the action needs more than that, the next app does it.
+    fn kill_after_transaction(&self, after: &Value) {
+        // The beginning of an empty log is synced before its first transaction.
+        let log = std::fs::metadata(self.root().join(LOG));
+        let has_log = log.is_ok_and(|log| log.len() > 0);
+        self.kill_at("sync", if has_log { 1 } else { 2 });
+        let mut found = self.state();
+        if found == self.before {
+            let next = open_app(&self.root());
+            let jobs = status(&self.root().join("p"))["jobs"].clone();
+            found = if jobs["ready"].as_u64() > Some(0) {
+                // Its pairs wait for a run.
+                self.change(&next, "/p/p/actions/run", &json!({"which": "all"}))
+            } else {
+                self.change(&next, self.action.action, &self.body(&next))
+            };
+        }
+        assert_eq!(&found, after, "{} is half done", self.action.action);
+    }
+}
+
+/// Kills an app in each of the actions, and does them with the next app.
+pub(crate) fn kill_each(actions: &[KilledAction]) {
+    for action in actions {
+        let after = KilledProject::of(action).kill_before();
+        if action.at[1] == LOG {
+            KilledProject::of(action).kill_after_transaction(&after);
+        }
+    }
+}
