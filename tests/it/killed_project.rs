@@ -72,7 +72,7 @@ pub(crate) fn status(project: &Path) -> Value {
 struct KilledProject<'a> {
     action: &'a KilledAction,
     dir: tempfile::TempDir,
-    /// What the action changes, as it is before.
+    /// The state before the action.
     before: Value,
 }
 
