@@ -38,7 +38,8 @@ const CHARACTER_FACTOR: f64 = 1.5;
 
 const NOTE: &str = "\
 Pairs and decoys of the held-out seeds, one row for each range of confidence: number of results, mean confidence and \
-share that is right (rotation, landmarks and mask), under the built-in weights and under the fitted ones.";
+share that is right (rotation, landmarks and mask), under the built-in weights and under the fitted ones. A share is \
+marked with ! if the mean lies outside its interval.";
 
 /// One metric's result of one pair.
 #[derive(Debug, Clone, Copy)]

@@ -11,10 +11,13 @@ use super::trial::{Found, Trial, of};
 
 /// Confidence from which a wrong result counts as an error with high confidence.
 pub(super) const SURE: f64 = 0.5;
+/// Confidence from which hardly any result may be wrong.
+const VERY_SURE: f64 = 0.95;
 
 const NOTE: &str = "\
 Pose right: angle within 5° and landmarks within 5 % of the character's height. Refused pairs count as wrong. The last \
-column is the number of wrong results with a confidence of at least 0.5, by metric.";
+columns are, by metric, the numbers of wrong results with a confidence of at least 0.5 and of at least 0.95, and of \
+right results with a confidence below 0.5.";
 
 /// Makes the table. The pose is that of `metric`.
 pub(super) fn table(
@@ -24,8 +27,18 @@ pub(super) fn table(
     metric: ThresholdMetric,
 ) -> String {
     let names = ThresholdMetric::ALL.map(ThresholdMetric::name).join(" / ");
-    let (acc, wrong) = (format!("Acc {names}"), format!("wrong at 0.5: {names}"));
-    let heads = ["tier", "preset", "n", "pose right", &acc, "refused", &wrong];
+    let acc = format!("Acc {names}");
+    let heads = [
+        "tier",
+        "preset",
+        "n",
+        "pose right",
+        &acc,
+        "refused",
+        "wrong at 0.5",
+        "wrong at 0.95",
+        "right below 0.5",
+    ];
     let mut table = Table::new("Kinds", &heads);
     for method in methods {
         for tier in tiers {
@@ -47,10 +60,19 @@ fn row(name: &str, method: &Method, trials: &[&Trial], metric: ThresholdMetric) 
         let right = found(metric).filter(|found| found.errors.pass()).count();
         format!("{:.2}", right as f64 / trials.len().max(1) as f64)
     });
-    let is_wrong_but_sure =
-        |found: &&Found| !found.errors.pass() && found.confidence.is_some_and(|sure| sure >= SURE);
-    let wrong = ThresholdMetric::ALL
-        .map(|metric| found(metric).filter(is_wrong_but_sure).count().to_string());
+    let counts = |is_counted: &dyn Fn(&Found) -> bool| {
+        let of_metric = |metric| found(metric).filter(|found| is_counted(found)).count();
+        ThresholdMetric::ALL
+            .map(|metric| of_metric(metric).to_string())
+            .join(" / ")
+    };
+    let is_wrong_from = |least: f64| {
+        move |found: &Found| {
+            !found.errors.pass() && found.confidence.is_some_and(|sure| sure >= least)
+        }
+    };
+    let is_right_but_doubted =
+        |found: &Found| found.errors.pass() && found.confidence.is_some_and(|sure| sure < SURE);
     vec![
         name.to_owned(),
         method.name.to_owned(),
@@ -62,6 +84,8 @@ fn row(name: &str, method: &Method, trials: &[&Trial], metric: ThresholdMetric) 
             .filter(|trial| trial.outcome.is_err())
             .count()
             .to_string(),
-        wrong.join(" / "),
+        counts(&is_wrong_from(SURE)),
+        counts(&is_wrong_from(VERY_SURE)),
+        counts(&is_right_but_doubted),
     ]
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use mocban::domain::ThresholdMetric;
+use mocban::results::stats::wilson_95;
 
 use super::accuracy::share;
 use super::markdown::{Table, number};
@@ -14,7 +15,8 @@ const BINS: [f64; 7] = [0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0];
 
 const NOTE: &str = "\
 Results of all tiers and metrics, one row for each range of confidence: number of results, mean confidence, and share \
-that is right with Wilson's 95 % interval. Refused pairs have no confidence and are not counted.";
+that is right with Wilson's 95 % interval, marked with ! if the mean lies outside it. Refused pairs have no confidence \
+and are not counted.";
 
 /// The confidence of a result and whether the result is right.
 pub(super) type Judged = (f64, bool);
@@ -51,7 +53,8 @@ pub(super) fn table(title: &'static str, columns: &[(&str, Vec<Judged>)], note: 
             let bin = bin(judged, index);
             cells.push(bin.len().to_string());
             cells.push(number(mean(&bin), 3));
-            cells.push(share(right(&bin), bin.len()));
+            let outside = if is_outside(&bin) { " !" } else { "" };
+            cells.push(format!("{}{outside}", share(right(&bin), bin.len())));
         }
         table.push(cells);
     }
@@ -83,6 +86,13 @@ fn bin(judged: &[Judged], index: usize) -> Vec<Judged> {
 fn mean(judged: &[Judged]) -> Option<f64> {
     let sum: f64 = judged.iter().map(|(confidence, _)| confidence).sum();
     (!judged.is_empty()).then(|| sum / judged.len() as f64)
+}
+
+/// Returns whether the mean confidence lies outside the interval of the share that is right.
+fn is_outside(judged: &[Judged]) -> bool {
+    let interval = wilson_95(right(judged) as u64, judged.len() as u64);
+    let both = mean(judged).zip(interval);
+    both.is_some_and(|(mean, [low, high])| !(low..=high).contains(&mean))
 }
 
 fn right(judged: &[Judged]) -> usize {
