@@ -122,6 +122,8 @@ class BlockAlignment(Frozen):
         ``"done"``, or the state of its job.
     error : str or None
         Why the block failed.
+    meta : dict
+        Other columns of the list.
     agreement : float or None
         Part of the page's windows in which carving and ink agree, from 0 to 1; None before the block is aligned.
     characters : tuple of BlockCharacter
@@ -130,10 +132,11 @@ class BlockAlignment(Frozen):
         The project that holds the block and its pairs.
     """
 
-    __slots__ = ("id", "status", "error", "agreement", "characters", "project", "_stored")
+    __slots__ = ("id", "status", "error", "meta", "agreement", "characters", "project", "_stored")
     id: str
     status: str
     error: str | None
+    meta: dict[str, Any]
     agreement: float | None
     characters: tuple[BlockCharacter, ...]
     project: Project
@@ -147,6 +150,7 @@ class BlockAlignment(Frozen):
             id=stored["name"],
             status=stored["status"],
             error=None if failure is None else failure["message"],
+            meta=stored["meta"],
             agreement=None if aligned is None else aligned["agreement"]["share"],
             characters=tuple(BlockCharacter(one, project) for one in stored["character_list"]),
             project=project,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import logging
 import pickle
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import mocban
 import numpy as np
 import pytest
+from conftest import mocban_command
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +86,18 @@ def test_warnings_of_an_import_are_logged(block: Path, tmp_path: Path, caplog: p
         assert first == {"added": 1, "changed": [], "unchanged": 0} and not caplog.records
         project.import_block(block / "block.ply", block / "page.jpg", id="b")
     assert "blocks with the same scan and page as one of the project: 1, first b, as a" in caplog.text
+
+
+def test_another_import_keeps_the_metadata_of_a_list(block: Path, tmp_path: Path) -> None:
+    project = mocban.Project.create(tmp_path / "new")
+    files = (block / "block.ply", block / "page.jpg")
+    row = {"block": "a", "mesh": str(files[0]), "page": str(files[1]), "shelfmark": "R.4"}
+    blocks = tmp_path / "blocks.jsonl"
+    blocks.write_text(json.dumps(row), encoding="utf-8")
+    mocban_command("-C", project.folder, "import", blocks)
+    assert project.block("a").meta == {"shelfmark": "R.4"}
+    assert project.import_block(*files, id="a", side="front")["changed"] == ["a"]
+    assert project.block("a").meta == {"shelfmark": "R.4"}
 
 
 def test_wrong_files_are_named(block: Path, demo: Path, tmp_path: Path) -> None:

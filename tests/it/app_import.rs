@@ -167,6 +167,16 @@ fn one_scan_and_its_page_are_imported_as_a_whole_block() {
     assert_eq!(reply.status, 200, "{}", text(&reply));
     let blocks = text(&page.get("/p/new/blocks"));
     assert!(blocks.contains("href=\"block/b04/\""), "{blocks}");
+
+    let line =
+        r#"{"block":"b04","mesh":"scans/b04.ply","page":"prints/page 4.jpg","shelfmark":"R.4"}"#;
+    std::fs::write(dir.join("x/blocks.jsonl"), line).expect("written");
+    let project = dir.join("new");
+    mocban(&project, &["import", "../x/blocks.jsonl"]).expect(0);
+    let again = import(&page, &fields(&folders(&page, dir, "&whole_block=yes")));
+    assert_eq!(again.status, 200, "{}", text(&again));
+    let shown = mocban(&project, &["show", "b04", "--json"]).expect(0);
+    assert_eq!(shown.json()["meta"], json!({ "shelfmark": "R.4" }));
 }
 
 #[test]

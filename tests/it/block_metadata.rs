@@ -1,4 +1,5 @@
-//! The other columns of a list of blocks: `show`, the app and a restored backup have them.
+//! The other columns of lists: `show`, the app and a restored backup have those of blocks, and imports without a list keep
+//! them.
 
 use std::fs;
 use std::path::Path;
@@ -73,4 +74,32 @@ fn other_columns_of_a_list_of_blocks_are_kept_shown_and_restored() {
     let lines = project(dir, &["import", "ván.jsonl", "--json"]).expect(0);
     assert_eq!(lines.json()["blocks"]["changed"][0]["id"], "b1");
     assert_eq!(meta("p", "b1"), json!({ "shelfmark": 14 }));
+
+    let alone = [
+        "import", "--block", "b1.stl", "--page", "b1.png", "--unit", "mm", "--json",
+    ];
+    let alone = project(dir, &alone).expect(0).json();
+    assert_eq!(alone["blocks"]["changed"][0]["fields"], json!(["unit"]));
+    assert_eq!(meta("p", "b1"), json!({ "shelfmark": 14 }));
+}
+
+#[test]
+fn folders_keep_the_columns_of_a_list_of_pairs() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    for (file, content) in [("m/a.stl", "solid a"), ("i/a.png", "no image")] {
+        let file = dir.join(file);
+        fs::create_dir_all(file.parent().expect("a folder")).expect("created");
+        fs::write(file, content).expect("written");
+    }
+    let list = "id,mesh,print,character,block,scanned_face_down,shelfmark\na,m/a.stl,i/a.png,天,k1,yes,R.1\n";
+    fs::write(dir.join("pairs.csv"), list).expect("written");
+    project(dir, &["import", "pairs.csv"]).expect(0);
+    let folders = ["import", "--meshes", "m", "--prints", "i", "--json"];
+    let again = project(dir, &folders).expect(0).json();
+    assert_eq!(again["unchanged"], 1, "{again}");
+    let shown = project(dir, &["show", "a", "--json"]).expect(0).json();
+    assert_eq!(shown["meta"], json!({ "shelfmark": "R.1" }));
+    let columns = ["character", "block", "scanned_face_down"].map(|column| shown[column].clone());
+    assert_eq!(columns, [json!("天"), json!("k1"), json!(true)]);
 }

@@ -72,7 +72,7 @@ impl BlockLine {
             page: attributes.page_path.clone(),
             labels: attributes.labels_path.clone(),
             unit: attributes.unit,
-            meta: attributes.meta.clone(),
+            meta: attributes.meta.clone().unwrap_or_default(),
             status: RecordStatus::of(state.status),
             error_class: failure.map(|failure| failure.class),
             error: failure.map(|failure| failure.message.clone()),

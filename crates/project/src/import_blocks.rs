@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::block_files;
 use crate::block_scale;
@@ -20,8 +21,8 @@ use crate::repeated_files::RepeatedFiles;
 use mocban_catalog::{BlockAttributes, BlockImportSummary, SameFiles};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
 use mocban_lists::manifest::{
-    BlockRow, ManifestError, ReadBlocks, is_block_json, is_block_list, is_named_like_mesh,
-    read_block_json, read_blocks,
+    BlockRow, ReadBlocks, is_block_json, is_block_list, is_named_like_mesh, read_block_json,
+    read_blocks,
 };
 use mocban_store::Project;
 
@@ -39,6 +40,8 @@ pub struct BlockImportOutcome {
 /// Blocks to import.
 struct BlockListing {
     rows: Vec<BlockRow>,
+    /// Whether rows have metadata, although it may be empty.
+    has_metadata: bool,
     /// Label of row numbers in messages: `blocks.csv: line`, or `block` for a single one.
     label: String,
     warnings: Vec<String>,
@@ -158,12 +161,13 @@ pub async fn import_blocks(
     let limits = location.settings()?.config.limits;
     let doubts = block_scale::doubts(&listing.rows, &listing.label, &project, &limits);
     listing.warnings.extend(doubts);
-    let rows = listing.rows.iter().map(|row| stored_row(row, &project));
-    let rows: Vec<BlockAttributes> = rows.collect::<Result<_, _>>()?;
+    let has_metadata = listing.has_metadata;
+    let rows = listing.rows.into_iter();
+    let rows = rows.map(|row| stored_row(row, has_metadata, &project));
+    let rows: Arc<[BlockAttributes]> = rows.collect::<ProjectResult<_>>()?;
     let summary = import_with(&project, url.as_deref(), async |catalog| {
-        Ok(catalog
-            .import_blocks(rows.clone(), allowed.files, now())
-            .await?)
+        let rows = Arc::clone(&rows);
+        Ok(catalog.import_blocks(rows, allowed.files, now()).await?)
     });
     let summary = summary.await?;
     let same_files = summary.same_files.as_ref().map(
@@ -181,24 +185,24 @@ pub async fn import_blocks(
     })
 }
 
-/// Parses a list of blocks in CSV or JSON.
-///
-/// # Errors
-/// Returns an error if the list has a problem.
-pub fn listed_blocks(file: &Path, bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
-    if files::is_jsonl(file, bytes) {
-        read_block_json(bytes)
-    } else {
-        read_blocks(bytes)
-    }
-}
-
-/// Returns warnings about a list of blocks, as [`import_blocks`] does, without storing anything.
+/// Parses a list of blocks in CSV or JSON. Returns the warnings of an import, too.
 ///
 /// # Errors
 /// Returns an error if an import would refuse the list.
-pub fn list_warnings(source: &BlockSource) -> ProjectResult<Vec<String>> {
-    Ok(listing(source)?.warnings)
+pub fn listed_blocks(file: &Path, bytes: &[u8]) -> ProjectResult<ReadBlocks> {
+    let read = if files::is_jsonl(file, bytes) {
+        read_block_json(bytes)
+    } else {
+        read_blocks(bytes)
+    };
+    let mut read = read.map_err(|problems| refuse(file, &problems))?;
+    let mut repeated = RepeatedFiles::default();
+    for row in &read.rows {
+        repeated.add(row.line, row.name.as_str(), &row.mesh, &row.page);
+    }
+    let repeated = repeated.warning("blocks with the same scan and page");
+    read.warnings.extend(repeated);
+    Ok(read)
 }
 
 fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
@@ -216,17 +220,15 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
                     side: files.side,
                     meta: BTreeMap::new(),
                 }],
+                has_metadata: false,
                 label: "block".to_owned(),
                 warnings: Vec::new(),
             });
         }
     };
-    let read = listed_blocks(file, bytes).map_err(|problems| refuse(file, &problems))?;
-    let ReadBlocks { mut rows, warnings } = read;
+    let ReadBlocks { mut rows, warnings } = listed_blocks(file, bytes)?;
     let folder = file.parent().unwrap_or(Path::new(""));
-    let mut repeated = RepeatedFiles::default();
     for row in &mut rows {
-        repeated.add(row.line, row.name.as_str(), &row.mesh, &row.page);
         let paths = [&mut row.mesh, &mut row.page].into_iter();
         for path in paths.chain(row.labels.as_mut()) {
             *path = folder.join(&*path);
@@ -234,11 +236,9 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
     }
     Ok(BlockListing {
         rows,
+        has_metadata: true,
         label: format!("{}: line", file.display()),
-        warnings: warnings
-            .into_iter()
-            .chain(repeated.warning("blocks with the same scan and page"))
-            .collect(),
+        warnings,
     })
 }
 
@@ -268,31 +268,35 @@ fn locate(
     }
 }
 
-fn stored_row(row: &BlockRow, project: &Project) -> ProjectResult<BlockAttributes> {
+fn stored_row(
+    row: BlockRow,
+    has_metadata: bool,
+    project: &Project,
+) -> ProjectResult<BlockAttributes> {
     let stored = |path: &PathBuf| project.stored_path(path);
     Ok(BlockAttributes {
-        name: row.name.clone(),
+        name: row.name,
         mesh_path: stored(&row.mesh)?,
         page_path: stored(&row.page)?,
         labels_path: row.labels.as_ref().map(stored).transpose()?,
         unit: row.unit,
         side: row.side,
-        meta: row.meta.clone().into_iter().collect(),
+        meta: has_metadata.then(|| row.meta.into_iter().collect()),
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BlockSource, ListedItems, list_warnings};
+    use std::path::Path;
+
+    use super::{ListedItems, listed_blocks};
 
     #[test]
     fn the_same_files_under_the_ids_of_two_blocks_are_counted_with_the_first() {
         let warnings = |rows: &str| {
-            let source = BlockSource::List {
-                file: "blocks.csv".into(),
-                bytes: format!("block,mesh,page\n{rows}").into_bytes(),
-            };
-            list_warnings(&source).expect("valid")
+            let list = format!("block,mesh,page\n{rows}");
+            let read = listed_blocks(Path::new("blocks.csv"), list.as_bytes());
+            read.expect("valid").warnings
         };
         let sentence =
             "blocks with the same scan and page as an earlier one: 1, first b, as on line 2";

@@ -106,6 +106,7 @@ pub async fn import_pairs(
     listener: &dyn Listener,
 ) -> ProjectResult<ImportOutcome> {
     let _work = LongWork::begin(listener, "importing");
+    let is_of_folders = matches!(import.source, PairSource::Folders { .. });
     let mut listing = listing(import.source, &import.choices)?;
     if let Some(why) = listing.no_pair.take() {
         return Err(why.into());
@@ -136,6 +137,7 @@ pub async fn import_pairs(
             truths,
             changed_files: import.allowed.files,
             replace: import.allowed.replace,
+            keep_columns: is_of_folders,
         },
     );
     let store = async |catalog: &Catalog| store_in(catalog, &rows, terms.clone()).await;

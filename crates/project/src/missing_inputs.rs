@@ -213,7 +213,7 @@ mod tests {
                 labels_path: Some("b.json".to_owned()),
                 unit: None,
                 side: None,
-                meta: serde_json::Map::new(),
+                meta: None,
             },
             inputs: BlockInputVersions {
                 mesh: read("1"),

@@ -103,7 +103,7 @@ fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) 
     });
     let rows = rows.into_iter().chain(points);
     let rows = rows.map(|(word, value)| (word.to_owned(), value));
-    let meta = attributes.meta.iter().map(|(name, value)| {
+    let meta = attributes.meta.iter().flatten().map(|(name, value)| {
         let text = value.as_str().map(ToOwned::to_owned);
         (name.clone(), text.unwrap_or_else(|| value.to_string()))
     });

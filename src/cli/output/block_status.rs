@@ -97,7 +97,7 @@ pub(crate) mod tests {
                 labels_path: None,
                 unit: None,
                 side: None,
-                meta: serde_json::Map::new(),
+                meta: None,
             },
             status,
             next_stage: (status == JobStatus::Leased).then_some(BlockStage::Align),

@@ -1,5 +1,9 @@
 //! Import of blocks: names, paths and attributes.
 
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+
 use crate::blocks::block_job::BlockJob;
 use crate::blocks::model::BlockAttributes;
 use crate::blocks::queue::uncounted;
@@ -9,6 +13,7 @@ use crate::db::left_out::is_counted;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::transaction::in_transaction;
+use crate::db::value::Json;
 use crate::jobs::requeue::{self, RetrySelection};
 use crate::records::checksums;
 use crate::records::import::is_same_file;
@@ -62,21 +67,23 @@ const NAMES: &str = concat!(
 
 impl Catalog {
     /// Imports blocks in one transaction. Adds new blocks and updates existing ones. The next run finds out which
-    /// stages of a changed block are stale. With `changed_files`, most known blocks may get another scan and another page.
+    /// stages of a changed block are stale. A known block keeps its metadata if none is given. With `changed_files`, most
+    /// known blocks may get another scan and another page.
     ///
     /// # Errors
     /// Returns an error if the names of two blocks differ only in case, if most known blocks would get other files, or if
     /// a database operation fails. In that case nothing is imported.
     pub async fn import_blocks(
         &self,
-        rows: Vec<BlockAttributes>,
+        rows: impl Into<Arc<[BlockAttributes]>>,
         changed_files: bool,
         now: UnixMillis,
     ) -> Result<BlockImportSummary> {
+        let rows = rows.into();
         in_transaction!(self, |conn| {
             let mut summary = BlockImportSummary::default();
             let last = query_scalar(LAST).fetch_one(&mut *conn).await?;
-            for row in &rows {
+            for row in &*rows {
                 import_block(conn, row, now, &mut summary).await?;
             }
             // What failed with another file is tried again, also if the earlier file was never read.
@@ -153,6 +160,10 @@ async fn import_block(
 ) -> Result<()> {
     let stored = query(SELECT).bind(row.name.as_str());
     let stored = stored.fetch_optional(&mut *conn).await?;
+    let kept = stored.as_ref().and_then(|row| row.get("meta").ok());
+    let kept: Option<Map<String, Value>> = kept.map(|Json(meta)| meta);
+    let meta = row.meta.as_ref().or(kept.as_ref());
+    let meta = meta.map_or_else(|| Ok("{}".to_owned()), serde_json::to_string)?;
     // A row with an invalid value is replaced.
     let stored = stored.map(|row| BlockAttributes::from_row(&row).ok());
     match stored {
@@ -179,7 +190,7 @@ async fn import_block(
         .bind(&row.labels_path)
         .bind(row.unit.map(LengthUnit::name))
         .bind(row.side.map(BlockSide::name))
-        .bind(serde_json::to_string(&row.meta)?)
+        .bind(meta)
         .bind(row.of_results().to_string())
         .bind(now)
         .fetch_one(&mut *conn)
@@ -206,7 +217,7 @@ fn differing(old: &BlockAttributes, new: &BlockAttributes) -> Vec<&'static str> 
         ("labels", !are_same_labels),
         ("unit", old.unit != new.unit),
         ("side", old.side != new.side),
-        ("metadata", old.meta != new.meta),
+        ("metadata", new.meta.is_some() && old.meta != new.meta),
     ]
     .into_iter()
     .filter_map(|(name, differs)| differs.then_some(name))

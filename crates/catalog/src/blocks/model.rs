@@ -26,11 +26,12 @@ pub struct BlockAttributes {
     pub unit: Option<LengthUnit>,
     /// The side of the scan that the page shows, if known.
     pub side: Option<BlockSide>,
-    /// All other columns of the list.
-    pub meta: Map<String, Value>,
+    /// All other columns of the list. `None` if they were not read, and in an import whose source has no such columns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub meta: Option<Map<String, Value>>,
 }
 
-from_row! { BlockAttributes { name, mesh_path, page_path, labels_path, unit, side, meta as Json } }
+from_row! { BlockAttributes { name, mesh_path, page_path, labels_path, unit, side, meta as JsonOrNull } }
 
 impl BlockAttributes {
     /// Returns the attributes that results depend on, as JSON.

@@ -17,22 +17,27 @@ use mocban_core::domain::{
     UnixMillis,
 };
 
-/// Selects a block with its input files as last read.
+/// Selects a block with its input files as last read, without its metadata.
 pub(crate) const BLOCK: &str = "
-SELECT id, name, mesh_path, page_path, labels_path, unit, side, meta, mesh_hash, mesh_stat, page_hash, page_stat,
+SELECT id, name, mesh_path, page_path, labels_path, unit, side, NULL AS meta, mesh_hash, mesh_stat, page_hash, page_stat,
     labels_hash, labels_stat, control_points FROM block WHERE id = ?1";
 
+/// Selects all blocks like [`BLOCK`].
 const BLOCKS: &str = "
-SELECT id, name, mesh_path, page_path, labels_path, unit, side, meta, mesh_hash, mesh_stat, page_hash, page_stat,
+SELECT id, name, mesh_path, page_path, labels_path, unit, side, NULL AS meta, mesh_hash, mesh_stat, page_hash, page_stat,
     labels_hash, labels_stat FROM block ORDER BY id";
 
 const RESULTS: &str =
     "SELECT stage, outcome, files, result_hash FROM block_result WHERE block = ?1 ORDER BY stage";
 
-/// Selects one block or all, without the blocks of `?3`.
-const STATES: &str = concat!(
-    "
-SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.meta, b.control_points,
+/// Builds the text that selects one block or all, without the blocks of `?3`, with this as metadata.
+macro_rules! states {
+    ($meta:literal) => {
+        concat!(
+            "
+SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, ",
+            $meta,
+            " AS meta, b.control_points,
     j.stage, j.status, j.attempt, j.crashes,
     f.stage AS failed_stage, f.class, f.message, f.at AS failed_at,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND NOT EXISTS (
@@ -45,9 +50,16 @@ SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.
     j.status = 3 AND coalesce(b.mesh_stat = '' OR b.page_stat = '' OR b.labels_path IS NOT NULL AND b.labels_stat = '', false)
         AS other_files
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id WHERE (?1 IS NULL OR b.name = ?1) AND ",
-    is_counted!("b.id", "?3"),
-    " ORDER BY b.name"
-);
+            is_counted!("b.id", "?3"),
+            " ORDER BY b.name"
+        )
+    };
+}
+
+/// Selects blocks without their metadata, which may have a MiB each.
+const STATES: &str = states!("NULL");
+
+const WITH_METADATA: &str = states!("b.meta");
 
 const STAGES: &str = "
 SELECT r.stage, r.outcome, r.files, r.result_hash, r.made_with, r.ms, r.at
@@ -179,7 +191,7 @@ impl Catalog {
     /// Confidence of a character's position below which it is counted as uncertain.
     pub const LOW_CHARACTER_CONFIDENCE: f64 = 0.5;
 
-    /// Returns all blocks with the states of their jobs, sorted by name.
+    /// Returns all blocks with the states of their jobs, sorted by name, without metadata.
     pub async fn block_states(&self) -> Result<Vec<BlockState>> {
         let mut conn = self.read_conn().await?;
         let states = query_as(STATES).bind(None::<&str>);
@@ -191,7 +203,7 @@ impl Catalog {
     /// Returns everything about a block, or `None` if it does not exist.
     pub async fn block(&self, name: &BlockName) -> Result<Option<BlockDetail>> {
         let mut conn = self.snapshot().await?;
-        let state = query_as(STATES).bind(name.as_str());
+        let state = query_as(WITH_METADATA).bind(name.as_str());
         let state = state.bind(Self::LOW_CHARACTER_CONFIDENCE);
         let state = state.bind(self.left_out.of(ChecksummedTable::Block));
         let Some(state) = state.fetch_optional(&mut conn).await? else {
@@ -206,7 +218,7 @@ impl Catalog {
         }))
     }
 
-    /// Returns all blocks with their input files as last read, sorted by id.
+    /// Returns all blocks with their input files as last read, sorted by id, without metadata.
     pub async fn known_blocks(&self) -> Result<Vec<KnownBlock>> {
         let mut conn = self.read_conn().await?;
         query_as(BLOCKS).fetch_all(&mut conn).await

@@ -24,7 +24,7 @@ use crate::{Catalog, InputVersion, Result};
 use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
 
 const JOBS: &str = "
-SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.meta, b.mesh_hash, b.mesh_stat,
+SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, NULL AS meta, b.mesh_hash, b.mesh_stat,
     b.page_hash, b.page_stat, b.labels_hash, b.labels_stat, b.control_points, j.stage, j.status, f.stage AS failed_stage,
     f.made_with AS failed_with
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id ORDER BY b.id";

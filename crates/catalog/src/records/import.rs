@@ -50,6 +50,8 @@ pub struct ImportTerms {
     pub changed_files: bool,
     /// Whether pairs that the list does not have are retired, except for pairs of blocks.
     pub replace: bool,
+    /// Whether known pairs keep the columns that folders do not have: character, block, scanned side and metadata.
+    pub keep_columns: bool,
 }
 
 /// Counts of an import.
@@ -173,8 +175,11 @@ impl Catalog {
             let mut listed = HashSet::new();
             loop {
                 match chunks.recv().await {
-                    Some(ImportChunk::Rows(rows)) => {
-                        for chunk in rows.chunks(CHUNK) {
+                    Some(ImportChunk::Rows(mut rows)) => {
+                        for chunk in rows.chunks_mut(CHUNK) {
+                            if terms.keep_columns {
+                                keep_columns(conn, chunk).await?;
+                            }
                             let ids = import_chunk(conn, chunk, now, &mut summary, &mut deltas);
                             let ids = ids.await?;
                             if terms.replace {
@@ -279,6 +284,25 @@ fn refuse_changed_files(summary: &ImportSummary) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Gives the rows of known pairs the columns that folders do not have.
+async fn keep_columns(conn: &mut Conn, chunk: &mut [ImportRow]) -> Result<()> {
+    let names = json_array(chunk.iter().map(|row| row.name.as_str()));
+    let known = query(SELECT).bind(&names).fetch_all(conn).await?;
+    let known = known.iter();
+    let known = known.filter_map(|row| PairAttributes::from_row(row).ok());
+    let mut known: BTreeMap<PairName, PairAttributes> =
+        known.map(|pair| (pair.name.clone(), pair)).collect();
+    for row in chunk {
+        if let Some(pair) = known.remove(&row.name) {
+            row.scanned_face_down = pair.scanned_face_down;
+            row.character = pair.character;
+            row.block = pair.block;
+            row.meta = pair.meta;
+        }
+    }
+    Ok(())
 }
 
 /// Adds and updates pairs. Pairs that no person retired get their jobs back. Returns the ids of the rows.

@@ -1,13 +1,13 @@
 //! The other columns of a list of blocks, which no result depends on.
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::blocks::{attributes, block, character, world};
 use crate::BlockAttributes;
 
 fn with_metadata(meta: &Value) -> BlockAttributes {
     BlockAttributes {
-        meta: meta.as_object().cloned().unwrap_or_default(),
+        meta: Some(meta.as_object().cloned().unwrap_or_default()),
         ..attributes("b")
     }
 }
@@ -23,7 +23,8 @@ async fn metadata_of_a_block_is_stored_updated_and_makes_nothing_stale() {
     };
     let stored = async || {
         let detail = world.catalog.block(&block("b")).await.expect("a read");
-        Value::Object(detail.expect("a block").state.attributes.meta)
+        let meta = detail.expect("a block").state.attributes.meta;
+        Value::Object(meta.expect("it is read"))
     };
     assert_eq!(stored().await, json!({}));
     let first = json!({ "Triều đại": "Nguyễn", "shelfmark": "R.12" });
@@ -34,10 +35,16 @@ async fn metadata_of_a_block_is_stored_updated_and_makes_nothing_stale() {
         assert_eq!(changed.other_files, 0);
         assert_eq!(import(meta).await.unchanged, 1);
         let expected = meta.as_object().cloned().unwrap_or_default();
-        assert_eq!(stored().await, Value::Object(expected));
+        assert_eq!(stored().await, Value::Object(expected.clone()));
         assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
         assert_eq!(world.requeue_blocks([1; 4]).await, []);
+        let others = attributes("b");
+        let others = world.catalog.import_blocks(vec![others], false, 3).await;
+        assert_eq!(others.expect("imported").unchanged, 1);
+        assert_eq!(stored().await, Value::Object(expected), "none is given");
     }
     let known = world.catalog.known_blocks().await.expect("a read");
-    assert_eq!(known[0].attributes.meta, Map::new());
+    assert_eq!(known[0].attributes.meta, None, "it is not read");
+    let states = world.catalog.block_states().await.expect("a read");
+    assert_eq!(states[0].attributes.meta, None, "it is not read");
 }

@@ -1,6 +1,6 @@
 //! Blocks: import, leases, results, and the pairs that are cut from them.
 
-use serde_json::{Map, json};
+use serde_json::json;
 
 use super::World;
 use crate::{
@@ -25,7 +25,7 @@ pub(super) fn attributes(text: &str) -> BlockAttributes {
         labels_path: Some(format!("{text}.json")),
         unit: None,
         side: None,
-        meta: Map::new(),
+        meta: None,
     }
 }
 

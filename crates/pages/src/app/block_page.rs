@@ -259,7 +259,7 @@ fn files(visit: &Visit, detail: &BlockDetail) -> Markup {
                         None => { (visit.t("none: the characters are found", "không có: chữ được tự tìm")) },
                     }
                 }
-                (metadata(&attributes.meta))
+                @if let Some(meta) = &attributes.meta { (metadata(meta)) }
             }
         }
     }

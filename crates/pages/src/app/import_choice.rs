@@ -15,14 +15,12 @@ use super::projects::find;
 use super::sentence::Sentence;
 use mocban_core::domain::{BlockName, LengthUnit};
 use mocban_lists::manifest::{
-    BlockRow, ChosenColumns, ListHead, PairingChanges, is_named_like_mesh, is_named_like_print,
-    read_head,
+    BlockRow, ChosenColumns, ListHead, PairingChanges, ReadBlocks, is_named_like_mesh,
+    is_named_like_print, read_head,
 };
 use mocban_project::ProjectError;
 use mocban_project::files::{is_jsonl, list_below};
-use mocban_project::import_blocks::{
-    BlockSource, ImportedBlock, ListedItems, list_warnings, listed_blocks,
-};
+use mocban_project::import_blocks::{BlockSource, ImportedBlock, ListedItems, listed_blocks};
 use mocban_project::import_pairs::PairSource;
 use mocban_project::import_plan::{ImportPlan, plan_import};
 use mocban_project::location::Location;
@@ -257,8 +255,8 @@ impl ImportChoice {
         let (mut head, items) = (None, self.items(roots).transpose()?);
         let planned = items.and_then(|items| match items {
             ListedItems::Blocks(source) => {
-                let warnings = list_warnings(&source).map_err(AppFailure::from)?;
-                Ok(Planned::Blocks(block_rows(&source)?, warnings))
+                let ReadBlocks { rows, warnings } = read_source(&source)?;
+                Ok(Planned::Blocks(rows, warnings))
             }
             ListedItems::Pairs(source) => {
                 let choices = self.choices()?;
@@ -298,24 +296,20 @@ const fn kept_start(from: u64) -> u64 {
     if from < KEPT_PAIRS { 0 } else { from }
 }
 
-/// Returns the blocks of a source, as their list has them.
+/// Returns the blocks of a source, as their list has them, with warnings about the list.
 ///
 /// # Errors
 /// Refuses a list with problems, and a scan whose name cannot be that of a block.
-fn block_rows(source: &BlockSource) -> AppResult<Vec<BlockRow>> {
+fn read_source(source: &BlockSource) -> AppResult<ReadBlocks> {
     let refused = |why: String| AppFailure::refused(Sentence::of_program(&why));
     match source {
-        BlockSource::List { file, bytes } => {
-            let read = listed_blocks(file, bytes);
-            let read = read.map_err(|problems| refused(problems.to_string()))?;
-            Ok(read.rows)
-        }
+        BlockSource::List { file, bytes } => listed_blocks(file, bytes).map_err(AppFailure::from),
         BlockSource::One(block) => {
             let shown = block.mesh.display();
             let stem = block.mesh.file_stem().unwrap_or_default().to_string_lossy();
             let name = BlockName::new(&stem)
                 .map_err(|error| refused(format!("{shown}: {error}; rename the file")))?;
-            Ok(vec![BlockRow {
+            let row = BlockRow {
                 line: 1,
                 name,
                 mesh: block.mesh.clone(),
@@ -324,7 +318,11 @@ fn block_rows(source: &BlockSource) -> AppResult<Vec<BlockRow>> {
                 unit: block.unit,
                 side: block.side,
                 meta: BTreeMap::new(),
-            }])
+            };
+            Ok(ReadBlocks {
+                rows: vec![row],
+                warnings: Vec::new(),
+            })
         }
     }
 }

@@ -26,9 +26,10 @@ impl RunFixture {
             labels_path: Some(format!("{text}.txt")),
             unit: None,
             side: None,
-            meta: serde_json::Map::new(),
+            meta: None,
         });
-        let imported = fixture.catalog.import_blocks(rows.collect(), true, 1).await;
+        let rows: Vec<BlockAttributes> = rows.collect();
+        let imported = fixture.catalog.import_blocks(rows, true, 1).await;
         imported.expect("imported");
         let _ = fixture.pairs.project.set(fixture.project.clone());
         fixture

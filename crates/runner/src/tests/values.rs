@@ -44,7 +44,7 @@ pub(crate) fn block_attributes(mesh_path: &str, page_path: &str) -> BlockAttribu
         labels_path: None,
         unit: None,
         side: None,
-        meta: Map::new(),
+        meta: None,
     }
 }
 

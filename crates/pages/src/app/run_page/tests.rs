@@ -22,7 +22,7 @@ fn block(name: &str, status: JobStatus) -> BlockState {
             labels_path: None,
             unit: None,
             side: None,
-            meta: serde_json::Map::new(),
+            meta: None,
         },
         status,
         next_stage: (status != JobStatus::Done).then_some(BlockStage::Align),
