@@ -28,8 +28,8 @@ const USAGE: &str = "mocban import [OPTIONS] FILE
 #[command(override_usage = USAGE)]
 pub(crate) struct ImportArgs {
     /// A CSV, XLSX or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
-    /// `scanned_face_down`; or a CSV or XLSX file of whole blocks with the columns block, mesh, page and optionally labels,
-    /// unit, side; paths are relative to the file
+    /// `scanned_face_down`; or such a file of whole blocks with the columns block, mesh, page and optionally labels, unit,
+    /// side; paths are relative to the file
     #[arg(required_unless_present_any = ["meshes", "block"], conflicts_with_all = ["meshes", "block"])]
     pub(crate) file: Option<PathBuf>,
     /// Sheet of an XLSX file [default: the first one]
