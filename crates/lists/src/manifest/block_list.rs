@@ -63,7 +63,8 @@ pub fn is_block_list(bytes: &[u8]) -> bool {
     column_names(1, &record, "").is_ok_and(|names| has_block_columns(&names))
 }
 
-/// Returns whether a list in JSON is one of blocks, by the keys of its first row, as [`is_block_list`] does.
+/// Returns whether a list in JSON is one of blocks, by the keys of its first row that can be read, as
+/// [`is_block_list`] does.
 pub fn is_block_json(bytes: &[u8]) -> bool {
     first_keys(bytes).is_some_and(|keys| {
         let names: Vec<&str> = keys.iter().map(|key| key.trim()).collect();

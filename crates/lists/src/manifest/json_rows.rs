@@ -70,23 +70,24 @@ pub(super) fn json_rows(
     Ok(())
 }
 
-/// Returns the keys of the first row of a list in JSON, if it can be read.
+/// Returns the keys of the first row of a list in JSON that can be read.
 pub(super) fn first_keys(bytes: &[u8]) -> Option<Vec<String>> {
-    let bytes = as_utf8(bytes).ok()?;
-    let row = if is_array(&bytes) {
-        let (_, place) = ArrayCursor::default().next_value(&bytes)?.ok()?;
-        &bytes[place]
-    } else {
-        let lines = bytes.split(|byte| *byte == b'\n');
-        lines
-            .map(<[u8]>::trim_ascii)
-            .find(|line| !line.is_empty())?
-    };
-    let text = std::str::from_utf8(row).ok()?;
-    if text.len() > MAX_ROW_BYTES {
+    let bytes = &*as_utf8(bytes).ok()?;
+    if is_array(bytes) {
+        let mut cursor = ArrayCursor::default();
+        let mut places = std::iter::from_fn(|| cursor.next_value(bytes)?.ok());
+        return places.find_map(|(_, place)| row_keys(&bytes[place]));
+    }
+    let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    lines.find_map(row_keys)
+}
+
+/// Returns the keys of a row, if it can be read.
+fn row_keys(row: &[u8]) -> Option<Vec<String>> {
+    if row.is_empty() || row.len() > MAX_ROW_BYTES {
         return None;
     }
-    let JsonEntries(entries) = parsed(text).ok()?;
+    let JsonEntries(entries) = parsed(std::str::from_utf8(row).ok()?).ok()?;
     Some(entries.into_iter().map(|(key, _)| key).collect())
 }
 

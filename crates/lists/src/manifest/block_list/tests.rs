@@ -186,6 +186,15 @@ fn lists_in_json_have_the_rows_of_csv() {
     ] {
         assert!(!is_block_json(other.as_bytes()), "{other}");
     }
+    let good = r#"{"block":"b","mesh":"m","page":"p"}"#;
+    let large = format!("{{\"block\":\"{}\"}}", "x".repeat(2 << 20));
+    for list in [
+        format!("{{\"block\":\"a\",}}\n{good}\n"),
+        format!("{large}\n{good}\n"),
+        format!("[[1], {good}]"),
+    ] {
+        assert!(is_block_json(list.as_bytes()), "{list:.40}");
+    }
     let damaged =
         "{\"block\":\"b\",\"mesh\":\"m\",\"page\":\"p\"}\n{\"block\":\"b\",\"mesh\":\"m\"}\n[1]\n";
     let refused = read_block_json(damaged.as_bytes()).expect_err("refused");
