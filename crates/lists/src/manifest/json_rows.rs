@@ -154,6 +154,13 @@ fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, St
             (Some(name), value) => {
                 draft.cells.insert(name, cell(name, value)?);
             }
+            (None, Value::String(text)) => {
+                // As a cell of CSV.
+                let text = trimmed(&text);
+                if !text.is_empty() {
+                    draft.meta.insert(key, text.into());
+                }
+            }
             (None, value) => {
                 draft.meta.insert(key, value);
             }

@@ -49,8 +49,8 @@ mod tests {
     #[test]
     fn rows_equal_those_of_the_same_csv() {
         let json = parse(
-            "{\"id\":\"a\",\"mesh\":\"m.stl\",\"print\":\"p.png\",\"unit\":\"cm\",\"scanned_face_down\":true,\"folio\":\"3\"}\n\
-             \n{\"id\":17,\"mesh\":\"n\",\"print\":\"q\",\"block\":null}",
+            "{\"id\":\"a\",\"mesh\":\"m.stl\",\"print\":\"p.png\",\"unit\":\"cm\",\"scanned_face_down\":true,\"folio\":\" 3\"}\n\
+             \n{\"id\":17,\"mesh\":\"n\",\"print\":\"q\",\"block\":null,\"folio\":\"\"}",
         )
         .expect("parses");
         let csv = super::super::parse_csv(
@@ -58,6 +58,7 @@ mod tests {
         )
         .expect("parses");
         assert_eq!(json[0].meta, csv[0].meta);
+        assert_eq!(json[1].meta, csv[1].meta);
         assert_eq!(
             (&json[0].unit, &json[0].scanned_face_down, &json[1].name),
             (&csv[0].unit, &csv[0].scanned_face_down, &csv[1].name)
