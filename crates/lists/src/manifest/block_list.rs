@@ -152,11 +152,29 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
 /// Returns an error like [`parse_blocks`].
 pub fn read_block_json(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
     let mut rows = BlockRows::default();
-    let read = json_rows(bytes, COLUMNS, &mut |row| rows.push(row.line, row.draft));
+    let read = json_rows(bytes, COLUMNS, &mut |row| {
+        let is_exported = row.draft.as_ref().is_ok_and(is_exported);
+        let draft = if is_exported {
+            Err(EXPORTED.to_owned())
+        } else {
+            row.draft
+        };
+        rows.push(row.line, draft);
+    });
     if let Err(refused) = read {
         rows.problems.add(refused);
     }
     rows.finish()
+}
+
+/// Refuses a line of `blocks.jsonl`: the side and unit that a run found would be stored as given.
+const EXPORTED: &str = "this is a line of an export with results; import your own list of blocks";
+
+/// Returns whether a row is a line of an export. These fields have a value in all of its lines.
+fn is_exported(draft: &DraftRow) -> bool {
+    let meta = draft.meta.get("meta");
+    let mut results = ["status", "characters"].iter();
+    meta.is_some_and(Value::is_object) && results.all(|name| draft.meta.contains_key(*name))
 }
 
 /// The rows of a list, and what is wrong with others.

@@ -159,6 +159,19 @@ fn metadata_has_the_limits_of_pairs() {
 }
 
 #[test]
+fn lines_of_an_export_are_refused_by_name() {
+    let line = r#"{"block":"b","mesh":"m","page":"p","meta":{},"status":"done","error":null,"characters":4}"#;
+    let refused = read_block_json(line.as_bytes()).expect_err("refused");
+    assert_eq!(
+        refused.to_string(),
+        "line 1: this is a line of an export with results; import your own list of blocks"
+    );
+    let own = line.replace("\"meta\":{},", "");
+    let read = read_block_json(own.as_bytes()).expect("valid");
+    assert_eq!(read.rows[0].meta.len(), 2);
+}
+
+#[test]
 fn lists_in_json_have_the_rows_of_csv() {
     let csv = "Số hiệu ván,Bản quét,Ảnh trang,Mặt,Triều đại\nb1,1.stl,1.png,sau,Nguyễn\nb2,2.stl,2.png,,\n";
     let mut expected = parse_blocks(csv.as_bytes()).expect("valid");
