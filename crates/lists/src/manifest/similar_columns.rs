@@ -8,6 +8,9 @@ use mocban_core::domain::sanitize;
 /// Maximum number of different names of columns that are compared. JSON Lines may have other names in each row.
 const MAX_NAMES: usize = 1000;
 
+/// Names of columns of their own that differ by one letter from `side`.
+const WORDS: [&str; 3] = ["site", "size", "slide"];
+
 /// Finds columns that are kept as metadata although their names are similar to that of an optional column. Such a column
 /// is not reported if a row has a value in the optional column itself.
 #[derive(Debug, Default)]
@@ -33,6 +36,9 @@ impl SimilarColumns {
             }
             self.names.insert(name.clone());
             let found = name.trim().to_lowercase();
+            if WORDS.contains(&&*found) {
+                continue;
+            }
             let mut known = optional.iter().map(|(known, _)| *known);
             if let Some(known) = known.find(|known| similar_column(&found, known)) {
                 self.similar.entry(known).or_insert_with(|| name.clone());

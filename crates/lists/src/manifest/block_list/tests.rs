@@ -107,6 +107,7 @@ fn other_columns_are_metadata() {
 fn metadata_with_the_name_of_another_column_is_reported() {
     for (columns, cells, expected) in [
         ("color,year", "x,1872", &[][..]),
+        ("Site,size,slide", "x,x,x", &[]),
         ("lables", "l.json", &[("lables", "labels")]),
         (
             "Units,sides",
