@@ -3,17 +3,13 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Component, Path};
 
+use mocban_core::domain::is_device;
 use mocban_core::domain::spelling::fold_case;
 
 /// Longest name of a file or folder in bytes.
 const MAX_NAME: usize = 255;
 /// Characters that Windows allows in no name.
 const RESERVED: &str = "<>:\"|?*\\/";
-/// Names that Windows keeps for devices.
-const DEVICES: [&str; 22] = [
-    "con", "prn", "aux", "nul", "com1", "com2", "com3", "com4", "com5", "com6", "com7", "com8",
-    "com9", "lpt1", "lpt2", "lpt3", "lpt4", "lpt5", "lpt6", "lpt7", "lpt8", "lpt9",
-];
 /// Name of a copy whose stored path has no name.
 const UNNAMED: &str = "file";
 
@@ -126,11 +122,7 @@ fn portable(name: &str) -> String {
     };
     let plain: String = name.chars().map(replaced).collect();
     let plain = plain.trim_end_matches(['.', ' ']);
-    let stem = plain.split('.').next().unwrap_or_default().trim_end();
-    let is_device = DEVICES
-        .iter()
-        .any(|device| stem.eq_ignore_ascii_case(device));
-    if plain.is_empty() || is_device {
+    if plain.is_empty() || is_device(plain) {
         format!("_{plain}")
     } else {
         plain.to_owned()
@@ -198,6 +190,7 @@ mod tests {
         for (stored, name) in [
             ("scans:1/a?.ply", "scans_1/a_.ply"),
             ("nul.png", "_nul.png"),
+            ("COM0.png", "_COM0.png"),
             ("folder./1.png ", "folder/1.png"),
             (".hidden/1.png", ".hidden/1.png"),
             ("../..", "file"),

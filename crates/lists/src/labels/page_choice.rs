@@ -3,7 +3,7 @@
 use super::error::LabelsProblem;
 use super::message::quoted;
 use super::model::PageFile;
-use mocban_core::domain::spelling::composed;
+use mocban_core::domain::spelling::fold_case;
 
 /// What a file says about one of its pages.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,8 +17,7 @@ pub(super) struct PageEntry {
 /// Returns a file name without folders for comparison: composed, in lower case.
 fn comparable(name: &str) -> String {
     let file = name.rsplit(['/', '\\']).next().unwrap_or_default();
-    // Lower case can decompose letters, so it comes first.
-    composed(&file.to_lowercase()).into_owned()
+    fold_case(file)
 }
 
 /// Returns whether two paths have the same file name. Folders, case and Unicode form are ignored.
