@@ -16,6 +16,7 @@ use crate::review::Language;
 use mocban_catalog::StatusCounts;
 use mocban_core::domain::{JobStatus, one_line};
 use mocban_project::block_status::BlockStatus;
+use mocban_project::blocking::blocking;
 use mocban_project::location::now;
 use mocban_runner::{fingerprints, is_running};
 use mocban_system::platform;
@@ -42,9 +43,9 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let folder = state.options.folder.clone();
-    let found = tokio::task::spawn_blocking(move || find(&folder)).await;
+    let found = blocking(move || find(&folder)).await?;
     let mut projects = Vec::new();
-    for found in found.unwrap_or_default() {
+    for found in found {
         projects.push(read(&state, found.key).await);
     }
     let shown = state.options.folder.canonicalize();

@@ -19,6 +19,7 @@ use super::uploads::Uploads;
 use super::zip_sizes::ZipSizes;
 use crate::local_server::WorkThread;
 use crate::review::{Language, PictureWork};
+use mocban_project::blocking::blocking;
 
 /// Options of the app.
 #[derive(Debug, Clone)]
@@ -114,8 +115,7 @@ impl AppState {
             return Ok(open);
         }
         let folder = self.options.folder.clone();
-        let found = tokio::task::spawn_blocking(move || find(&folder)).await;
-        let mut found = found.unwrap_or_default().into_iter();
+        let mut found = blocking(move || find(&folder)).await?.into_iter();
         let Some(found) = found.find(|found| found.key == key) else {
             self.lock_projects().remove(key);
             return Err(AppFailure::not_found());
