@@ -68,8 +68,8 @@ fn none(visit: &Visit, key: &str) -> Markup {
         text,
         &html! {
             p { (visit.t(
-                "The columns of such a list are block, mesh (the scan) and page (the image); labels (boxes of the characters), unit and side may follow. Paths are relative to the list.",
-                "Các cột của danh sách là block (mã ván), mesh (bản quét) và page (hình trang in); có thể thêm labels (khung các chữ), unit và side. Đường dẫn tính từ danh sách.",
+                "The columns of such a list are block, mesh (the scan) and page (the image); labels (boxes of the characters), unit and side may follow. Other columns are kept with the block. Paths are relative to the list.",
+                "Các cột của danh sách là block (mã ván), mesh (bản quét) và page (hình trang in); có thể thêm labels (khung các chữ), unit và side. Các cột khác được giữ cùng với ván. Đường dẫn tính từ danh sách.",
             )) }
             pre.scroll #block-sample tabindex="0" role="region" aria-label=(visit.t("Example of a list", "Ví dụ về danh sách")) { (SAMPLE) }
             p { (visit.t(
