@@ -10,7 +10,7 @@ use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::show_text::state_name;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
-use mocban_core::domain::{BlockCharacterState, BlockStage, JobStatus, one_line};
+use mocban_core::domain::{BlockCharacterState, BlockStage, JobStatus, one_line, value_text};
 use mocban_project::ProjectResult;
 use mocban_project::shell::shell_quoted;
 use mocban_store::Project;
@@ -102,18 +102,10 @@ fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) 
         ("control points", format!("{points} on the {}", chosen.side))
     });
     let rows = rows.into_iter().chain(points);
-    let rows = rows.map(|(word, value)| (word.to_owned(), value));
-    let meta = attributes.meta.iter().flatten().map(|(name, value)| {
-        let text = value.as_str().map(ToOwned::to_owned);
-        (name.clone(), text.unwrap_or_else(|| value.to_string()))
-    });
-    let rows = rows.chain(meta).map(|(word, value)| {
-        vec![
-            format!("  {}", one_line(&word)),
-            one_line(&value).into_owned(),
-        ]
-    });
-    parts.push(columns(rows, "<<"));
+    let rows = rows.map(|(word, value)| vec![format!("  {word}"), value]);
+    let meta = attributes.meta.iter().flatten();
+    let meta = meta.map(|(name, value)| vec![format!("  {name}"), value_text(value).into_owned()]);
+    parts.push(columns(rows.chain(meta), "<<"));
     if let Some(failure) = &state.failure {
         let message = one_line(&failure.failure.message).into_owned();
         let word = palette.paint(Tone::Bad, "failed");

@@ -10,7 +10,7 @@ use mocban_align::stages::ScanHints;
 use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome,
-    RegisterOutcome, Stage, Verdict, one_line,
+    RegisterOutcome, Stage, Verdict, one_line, value_text,
 };
 use mocban_project::details::{Adjustment, ManualResult};
 use mocban_results::ManualCorrection;
@@ -72,10 +72,8 @@ impl PairPage<'_> {
             ("print", print),
         ];
         let rows = rows.map(|(key, text)| vec![key.to_owned(), text]);
-        let meta = attributes.meta.iter().map(|(key, value)| {
-            let text = value.as_str().map(ToOwned::to_owned);
-            vec![key.clone(), text.unwrap_or_else(|| value.to_string())]
-        });
+        let meta = attributes.meta.iter();
+        let meta = meta.map(|(key, value)| vec![key.clone(), value_text(value).into_owned()]);
         columns(rows.into_iter().chain(meta), "<<")
     }
 

@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
+use serde_json::Value;
+
 /// Returns whether a terminal or a browser acts on a character instead of showing it: control characters, characters
 /// that change the direction of writing, and characters without width.
 ///
@@ -73,6 +75,19 @@ pub fn one_line(text: &str) -> Cow<'_, str> {
     let mut shown = String::with_capacity(text.len());
     text.chars().for_each(|c| push_in_line(&mut shown, c));
     Cow::Owned(shown)
+}
+
+/// Returns a value of metadata as text: a text without quotation marks, another value as JSON.
+///
+/// ```
+/// use mocban_core::domain::value_text;
+///
+/// assert_eq!(value_text(&serde_json::json!("R.12")), "R.12");
+/// assert_eq!(value_text(&serde_json::json!([1872])), "[1872]");
+/// ```
+pub fn value_text(value: &Value) -> Cow<'_, str> {
+    let text = value.as_str().map(Cow::Borrowed);
+    text.unwrap_or_else(|| Cow::Owned(value.to_string()))
 }
 
 /// Returns a text as one line, as [`one_line`] does. A result of more than `most` characters is cut, and three dots are

@@ -11,7 +11,7 @@ use super::visit::Visit;
 use crate::local_server::document;
 use crate::messages;
 use crate::review::Language;
-use mocban_core::domain::{LengthUnit, one_line};
+use mocban_core::domain::{LengthUnit, one_line, value_text};
 
 /// A page in the navigation of a project.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -160,7 +160,7 @@ pub(super) fn scan_file(visit: &Visit, path: &str, unit: Option<LengthUnit>) -> 
 pub(super) fn metadata(columns: &Map<String, Value>) -> Markup {
     html! {
         @for (name, value) in columns {
-            dt { (one_line(name)) } dd { (one_line(&value.as_str().map_or_else(|| value.to_string(), str::to_owned))) }
+            dt { (one_line(name)) } dd { (one_line(&value_text(value))) }
         }
     }
 }
