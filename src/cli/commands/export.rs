@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use crate::cli::output::terminal::Terminal;
-use mocban_core::domain::ThresholdMetric;
+use mocban_core::domain::{ThresholdMetric, any_case};
 use mocban_export::{
     ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
     SplitShares,
@@ -104,7 +104,7 @@ fn described(format: ExportFormat) -> PossibleValue {
 fn one_of<T: FromStr<Err = String> + Clone + Send + Sync + 'static>(
     names: impl IntoIterator<Item = impl Into<PossibleValue>>,
 ) -> impl TypedValueParser<Value = T> {
-    PossibleValuesParser::new(names).try_map(|name| name.to_lowercase().parse::<T>())
+    PossibleValuesParser::new(names).try_map(|name| any_case::<T>(&name))
 }
 
 /// Parses a number from 0 to 1.

@@ -87,9 +87,7 @@ pub use plain_path::plain_path;
 pub use print_outline::PrintOutline;
 pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;
-pub use sanitize::{
-    first_names, is_hidden, one_line, sanitize, value_text, visible, visible_json,
-};
+pub use sanitize::{first_names, is_hidden, one_line, sanitize, value_text, visible, visible_json};
 pub use seeded_random::SeededRandom;
 pub use significant::{fixed, significant};
 pub use stage::Stage;

@@ -8,13 +8,13 @@ use serde_json::Value;
 
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
 use super::column_names::missing_column;
-use super::csv::{BoundedRows, column_names};
+use super::csv::{BoundedRows, ListedColumn, column_names, draft_of};
 use super::draft::{DraftRow, MAX_PATH_BYTES, check_meta};
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::{first_keys, json_rows};
 use super::row::RowIds;
 use super::similar_columns::SimilarColumns;
-use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
+use super::text::{CsvText, LineCounter, encoding_hint};
 use crate::columns::KnownColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
@@ -141,7 +141,7 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
         if record.iter().all(<[u8]>::is_empty) {
             continue;
         }
-        rows.push(line, draft(line, columns, &record));
+        rows.push(line, draft_of(line, columns, &record, &hint));
     }
     rows.finish()
 }
@@ -231,9 +231,6 @@ fn similar_columns(rows: &[BlockRow]) -> Vec<String> {
     similar.warnings().collect()
 }
 
-/// A column of a header: its standard name, if it is known, and its name as written.
-type ListedColumn = (Option<&'static str>, String);
-
 /// Returns the columns of a header.
 fn columns_of(
     line: usize,
@@ -255,35 +252,6 @@ fn columns_of(
     problems.check(false)?;
     let names = names.into_iter().map(str::to_owned);
     Ok(columns.into_iter().zip(names).collect())
-}
-
-/// Returns the cells of a row.
-///
-/// # Errors
-/// Returns an error if the number of cells is wrong or a cell is not UTF-8.
-fn draft(
-    line: usize,
-    columns: &[ListedColumn],
-    record: &::csv::ByteRecord,
-) -> Result<DraftRow, String> {
-    if record.len() != columns.len() {
-        let (cells, names) = (record.len(), columns.len());
-        return Err(format!("the row has {cells} cells, the header has {names}"));
-    }
-    let mut draft = DraftRow::new(line);
-    for ((known, name), cell) in columns.iter().zip(record) {
-        let Ok(cell) = std::str::from_utf8(cell) else {
-            let name = known.unwrap_or(name);
-            return Err(format!("the cell of column {name:?} is not UTF-8"));
-        };
-        let cell = trimmed(cell);
-        if let Some(known) = known {
-            draft.cells.insert(known, cell.to_owned());
-        } else if !cell.is_empty() && !name.is_empty() {
-            draft.meta.insert(name.clone(), cell.into());
-        }
-    }
-    Ok(draft)
 }
 
 /// Returns a row, or records why it is not valid.
@@ -331,8 +299,7 @@ fn side(cell: &str) -> Result<BlockSide, String> {
     match plain_form(cell).as_str() {
         "truoc" | "mat truoc" => Ok(BlockSide::Front),
         "sau" | "mat sau" => Ok(BlockSide::Back),
-        // The error shows the text as written.
-        plain => plain.parse().or_else(|_: String| cell.parse()),
+        _ => any_case(cell),
     }
 }
 

@@ -178,10 +178,13 @@ fn header_below(list: &[u8], delimiter: u8, above: usize) -> Option<Problem> {
     Some(of_list(&text))
 }
 
+/// A column of a header: its standard name, if it is known, and its name as written.
+pub(super) type ListedColumn = (Option<&'static str>, String);
+
 /// The header of a list.
 struct CsvHeader {
-    /// The columns in order. Each has its standard name, if the column is known, and its name as written.
-    columns: Vec<(Option<&'static str>, String)>,
+    /// The columns in order.
+    columns: Vec<ListedColumn>,
     /// Columns with other names, as written, each with its name.
     renamed: Vec<(String, &'static str)>,
     /// What to do about cells that are not UTF-8.
@@ -233,30 +236,43 @@ impl CsvHeader {
     /// # Errors
     /// Returns an error if the number of cells is wrong or a cell is not UTF-8.
     fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<DraftRow>, String> {
-        let columns = &self.columns;
         if record.iter().all(<[u8]>::is_empty) {
             return Ok(None);
         }
-        if record.len() != columns.len() {
-            let (cells, names) = (record.len(), columns.len());
-            return Err(format!("the row has {cells} cells, the header has {names}"));
-        }
-        let mut draft = DraftRow::new(line);
-        for ((known, name), cell) in columns.iter().zip(record) {
-            let Ok(cell) = std::str::from_utf8(cell) else {
-                let name = known.unwrap_or(name);
-                let hint = &self.encoding_hint;
-                return Err(format!("the cell of column {name:?} is not UTF-8{hint}"));
-            };
-            let cell = trimmed(cell);
-            if let Some(known) = known {
-                draft.cells.insert(known, cell.to_owned());
-            } else if !cell.is_empty() && !name.is_empty() {
-                draft.meta.insert(name.clone(), cell.into());
-            }
-        }
-        Ok(Some(draft))
+        draft_of(line, &self.columns, record, &self.encoding_hint).map(Some)
     }
+}
+
+/// Returns a row's cells.
+///
+/// # Errors
+/// Returns an error if the number of cells is wrong or a cell is not UTF-8.
+pub(super) fn draft_of(
+    line: usize,
+    columns: &[ListedColumn],
+    record: &::csv::ByteRecord,
+    encoding_hint: &str,
+) -> Result<DraftRow, String> {
+    if record.len() != columns.len() {
+        let (cells, names) = (record.len(), columns.len());
+        return Err(format!("the row has {cells} cells, the header has {names}"));
+    }
+    let mut draft = DraftRow::new(line);
+    for ((known, name), cell) in columns.iter().zip(record) {
+        let Ok(cell) = std::str::from_utf8(cell) else {
+            let name = known.unwrap_or(name);
+            return Err(format!(
+                "the cell of column {name:?} is not UTF-8{encoding_hint}"
+            ));
+        };
+        let cell = trimmed(cell);
+        if let Some(known) = known {
+            draft.cells.insert(known, cell.to_owned());
+        } else if !cell.is_empty() && !name.is_empty() {
+            draft.meta.insert(name.clone(), cell.into());
+        }
+    }
+    Ok(draft)
 }
 
 #[cfg(test)]
