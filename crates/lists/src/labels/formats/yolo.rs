@@ -3,12 +3,14 @@
 use super::yolo_columns::{FileColumns, MAX_COLUMNS, MIN_COLUMNS, YoloRow};
 use crate::labels::error::LabelsProblem;
 use crate::labels::model::PageFile;
-use crate::labels::page_fit::{MAX_CORNERS, check_count};
+use crate::labels::page_fit::{MAX_BOXES, MAX_CORNERS, check_count};
 use crate::labels::region::{Corners, LabelRegion, PageRegions, box_between, polygon};
 use mocban_core::domain::cancel::polled;
 
 /// Fractions beyond this are taken for pixels.
 const MAX_FRACTION: f64 = 2.0;
+/// Most numbers of a file. All are in memory until the meaning of the columns is decided.
+const MAX_NUMBERS: usize = 64 * MAX_BOXES;
 
 /// Returns whether a line has at least a class and four numbers.
 pub(in crate::labels) fn is_region(line: &str) -> bool {
@@ -24,10 +26,17 @@ pub(in crate::labels) fn read(
     page: &PageFile<'_>,
 ) -> Result<PageRegions, LabelsProblem> {
     let mut columns = FileColumns::default();
-    let mut rows = Vec::new();
+    let (mut rows, mut numbers) = (Vec::new(), 0);
     for row in parsed_rows(text) {
         check_count(rows.len() + 1)?;
         let row = row?;
+        numbers += row.numbers.len();
+        if numbers > MAX_NUMBERS {
+            let reason = format!(
+                "the file has more than {MAX_NUMBERS} numbers up to here; simplify its outlines or draw boxes"
+            );
+            return Err(malformed(row.line, reason));
+        }
         columns
             .add(&row)
             .map_err(|reason| malformed(row.line, reason))?;

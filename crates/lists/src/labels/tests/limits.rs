@@ -98,6 +98,14 @@ fn outlines_with_more_corners_than_a_character_can_have_are_refused() {
 }
 
 #[test]
+fn outlines_with_more_numbers_than_are_kept_at_once_are_refused() {
+    let outline = format!("0{}\n", " 0 0".repeat(MAX_CORNERS));
+    let refused = problem(&outline.repeat(40)).to_string();
+    let expected = "line 32: the file has more than 6400000 numbers up to here";
+    assert!(refused.contains(expected), "{refused}");
+}
+
+#[test]
 fn boxes_that_cover_the_page_again_and_again_are_refused() {
     let boxes: Vec<String> = (0..40)
         .map(|k| {
