@@ -170,9 +170,10 @@ fn one_scan_and_its_page_are_imported_as_a_whole_block() {
 
     let line =
         r#"{"block":"b04","mesh":"scans/b04.ply","page":"prints/page 4.jpg","shelfmark":"R.4"}"#;
-    std::fs::write(dir.join("x/blocks.jsonl"), line).expect("written");
+    let list = dir.join("x/blocks.jsonl");
+    std::fs::write(&list, line).expect("written");
     let project = dir.join("new");
-    mocban(&project, &["import", "../x/blocks.jsonl"]).expect(0);
+    mocban(&project, &["import", list.to_str().expect("UTF-8")]).expect(0);
     let again = import(&page, &fields(&folders(&page, dir, "&whole_block=yes")));
     assert_eq!(again.status, 200, "{}", text(&again));
     let shown = mocban(&project, &["show", "b04", "--json"]).expect(0);

@@ -93,6 +93,7 @@ mod tests {
             let entries = [entry("p2.jpg", 500, true), entry(name, 7, true)];
             assert_eq!(choose_page(&entries, &PAGE), Ok(1), "{name}");
         }
+        assert!(super::is_same_file("ΟΔΟΣ.png", "a/οδος.png"));
     }
 
     #[test]
