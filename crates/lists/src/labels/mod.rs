@@ -10,6 +10,7 @@
 //! pixel: reading subtracts 0.5 from both coordinates, and writing adds it. The box around the top-left pixel is
 //! therefore [-0.5, -0.5, 0.5, 0.5] here.
 
+mod box_names;
 mod error;
 mod formats;
 mod json_size;
@@ -24,6 +25,7 @@ mod region;
 mod tests;
 mod write;
 
+pub use box_names::box_names;
 pub use error::{LabelsError, LabelsProblem};
 pub use model::{LabelBox, LabelFormat, Labels, PageFile};
 pub use page_fit::MAX_BOXES;

@@ -1,7 +1,5 @@
 //! The stage `boxes`: reads or finds the boxes of the characters, and places them on the face.
 
-use std::collections::HashSet;
-
 use super::context::StageContext;
 use super::failure::output;
 use super::stage_cache::{HeldInputs, HeldPage};
@@ -114,23 +112,10 @@ fn read_labels(
         .map_err(|error| BlockStageError::failed(FailureClass::BadInput, error.to_string()))?;
     let bounds: Vec<[f64; 4]> = read.boxes.iter().map(labels::LabelBox::bounds).collect();
     let order = reading_order(&bounds);
-    let given: HashSet<String> = read
-        .boxes
-        .iter()
-        .filter_map(|b| Some(b.name.as_deref()?.to_lowercase()))
-        .collect();
-    let mut boxes: Vec<(usize, CharacterBox)> = (read.boxes.iter().zip(&bounds).zip(&order))
+    let names = labels::box_names(&read.boxes, &order);
+    let mut boxes: Vec<(usize, CharacterBox)> = (read.boxes.iter().zip(&bounds).zip(names))
         .enumerate()
-        .map(|(place, ((label, bounds), place_name))| {
-            let name = label.name.clone().unwrap_or_else(|| {
-                let name = place_name.to_string();
-                // A name from the file may look like a place.
-                if given.contains(&name) {
-                    format!("{name}-{place}")
-                } else {
-                    name
-                }
-            });
+        .map(|(place, ((label, bounds), name))| {
             let text = label.text.clone();
             (
                 place,
