@@ -15,9 +15,9 @@ use serde_json::json;
 
 use super::block_points::{BlockPoints, PointsSaved};
 use super::page;
+use super::refusal::{refused, unavailable};
 use super::scan_page::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
-use crate::messages::vietnamese;
 use crate::review::Language;
 use mocban_core::domain::{BlockName, BlockSide, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
@@ -257,17 +257,4 @@ async fn image(
         Err(failed) => return failed,
     };
     jpeg(&state.work, move || draw(&shown).map(Bytes::from)).await
-}
-
-/// Responds with why something was refused, also in Vietnamese if that is known.
-fn refused(status: StatusCode, why: &str) -> Response {
-    (
-        status,
-        Json(json!({"error": why, "error_vi": vietnamese(why)})),
-    )
-        .into_response()
-}
-
-fn unavailable(why: &str) -> Response {
-    refused(StatusCode::SERVICE_UNAVAILABLE, why)
 }

@@ -5,6 +5,7 @@ mod block_points;
 mod correction_page;
 mod opened_block;
 pub(crate) mod page;
+mod refusal;
 mod scan_page;
 
 pub use block_points::BlockPoints;
