@@ -58,6 +58,7 @@ pub use blocks::block_job::BlockJob;
 pub use blocks::control_points::ControlPointsChange;
 pub use blocks::cut::{CutReply, CutSummary};
 pub use blocks::import::BlockImportSummary;
+pub use blocks::labels::BlockLabelsChange;
 pub use blocks::model::{
     BlockAttributes, BlockInputVersions, BlockProvenance, BlockWork, CharacterMaps, CutOrigin,
     CutPair, NewCharacter, StoredCharacter,

@@ -11,6 +11,7 @@ pub(crate) mod characters;
 pub(crate) mod control_points;
 pub(crate) mod cut;
 pub(crate) mod import;
+pub(crate) mod labels;
 pub(crate) mod model;
 pub(crate) mod queue;
 pub(crate) mod records;

@@ -1,6 +1,7 @@
 //! Tests of the catalog on real databases: files in the module `tests`, PostgreSQL in `tests_on_postgres`.
 
 mod answers;
+mod block_labels;
 mod block_leases;
 mod block_metadata;
 mod block_pairs;
