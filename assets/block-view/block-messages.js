@@ -33,6 +33,7 @@ const BLOCK_MESSAGES = {
     vi: "con lăn, + −: phóng · 0: cả trang · kéo, phím mũi tên: di chuyển · P R O: lớp · B: khung · nhấp, Enter: xem 3D",
   },
   correct: { en: "Correct the alignment", vi: "Chỉnh khớp" },
+  edit_boxes: { en: "Edit boxes", vi: "Sửa khung chữ" },
   back_to_page: { en: "Back to the page", vi: "Về trang in" },
   side: { en: "Side of the block", vi: "Mặt của ván" },
   front: { en: "Front", vi: "Mặt trước" },

@@ -80,7 +80,7 @@ class BlockPage {
     const agreement = (100 * this.block.agreement).toFixed(0);
     const summary = text("characters", { n: this.block.characters.length, agreement });
     return element("header", { class: "block-bar" },
-      element("h1", {}, this.block.block), layers, element("a", { href: "correct" }, text("correct")), this.switch, element("div", { class: "block-group" }, ...zooms),
+      element("h1", {}, this.block.block), layers, element("a", { href: "correct" }, text("correct")), element("a", { href: "boxes" }, text("edit_boxes")), this.switch, element("div", { class: "block-group" }, ...zooms),
       element("span", { class: "block-summary" }, summary), this.legend, element("span", { class: "block-keys" }, text("keys")));
   }
 

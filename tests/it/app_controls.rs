@@ -143,6 +143,7 @@ fn every_control_of_the_views_of_a_block_fits_a_finger() {
             ("p/p/block/b1/", SHOWN),
             ("p/p/block/b1/view/", block),
             ("p/p/block/b1/view/correct", "window.mocbanCorrection"),
+            ("p/p/block/b1/view/boxes", "window.mocbanBoxes"),
         ] {
             tab.open(&format!("{home}{path}"));
             tab.wait(shown);

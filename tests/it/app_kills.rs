@@ -10,6 +10,7 @@ use crate::app_choice::import_more;
 use crate::app_killed_actions::killed_actions;
 use crate::app_routes::{REVIEW_ROUTES, ROUTES, writes};
 use crate::block_correction::{CorrectionSession, printed_side, refused_block, true_points};
+use crate::block_view::finished_block;
 use crate::cli::mocban;
 use crate::fault::Fault;
 use crate::page::{Page, read_project, send};
@@ -208,8 +209,51 @@ fn killed_control_points_are_saved_by_the_next_app_or_not_at_all() {
     mocban(&root.join("p"), &["check"]).expect(0);
 }
 
+/// Returns the path of the labels of the block `b1`.
+fn labels_path(root: &Path) -> Value {
+    let shown = mocban(root, &["-C", "p", "--json", "show", "b1"]).expect(0);
+    shown.json()["labels_path"].clone()
+}
+
+/// Kills an app that replaces the labels of the block, and replaces them with the next one.
+fn kill_labels(root: &Path, action: &str, body: impl Fn(&Value) -> Value) {
+    let boxes = "/p/p/block/b1/view/boxes";
+    let body_of = |page: &Page| {
+        let shown = page.get(&format!("{boxes}/block.json")).json();
+        body(&shown["shown"])
+    };
+    let before = labels_path(root);
+    let held = HeldApp::start(root, Fault::slow("write", LOG, UNTIL_KILLED), 1);
+    let (sent, token) = (body_of(&held.page), token(&held.page));
+    held.kill_in(&format!("{boxes}{action}"), token, &sent);
+    assert_eq!(labels_path(root), before, "nothing is half stored");
+    let next = open_app(root);
+    let reply = act(&next, &format!("{boxes}{action}"), &body_of(&next), |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    assert_ne!(labels_path(root), before);
+    mocban(&root.join("p"), &["check"]).expect(0);
+}
+
+#[test]
+fn killed_boxes_are_saved_by_the_next_app_or_not_at_all() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let root = dir.path().canonicalize().expect("a path");
+    finished_block(&root);
+    let before = labels_path(&root);
+    kill_labels(
+        &root,
+        "/save",
+        |shown| json!({"shown": shown, "edits": {"removed": [0], "edited": []}}),
+    );
+    let saved = labels_path(&root);
+    let saved = saved.as_str().expect("a path");
+    assert!(saved.starts_with("labels/b1-"), "{saved}");
+    kill_labels(&root, "/earlier", |shown| json!({ "shown": shown }));
+    assert_eq!(labels_path(&root), before);
+}
+
 /// Actions that are killed in another test, and those that leave nothing half done.
-const OTHER_ACTIONS: [(&str, &str); 13] = [
+const OTHER_ACTIONS: [(&str, &str); 15] = [
     ("/actions/demo", "above"),
     ("/actions/restore", "app_restore.rs"),
     ("/actions/upload", "app_uploads.rs"),
@@ -223,9 +267,13 @@ const OTHER_ACTIONS: [(&str, &str); 13] = [
     ("/correct/try", "it stores nothing"),
     ("/correct/save", "above"),
     ("/correct/remove", "above"),
+    ("/boxes/save", "above"),
+    ("/boxes/earlier", "above"),
 ];
 /// The routes of the page on which the alignment of a block is corrected.
 const CORRECTION_ROUTES: &str = include_str!("../../crates/pages/src/view/correction_page.rs");
+/// The routes of the page on which the boxes of a block are changed.
+const BOXES_ROUTES: &str = include_str!("../../crates/pages/src/view/boxes_page.rs");
 
 /// A new action must be killed in a test, too.
 #[test]
@@ -243,6 +291,7 @@ fn every_action_of_the_app_is_killed_in_a_test() {
     let unknown: Vec<String> = of_app
         .chain(writes(REVIEW_ROUTES))
         .chain(writes(CORRECTION_ROUTES))
+        .chain(writes(BOXES_ROUTES))
         .filter(|path| !is_known(path))
         .collect();
     assert_eq!(unknown, [""; 0], "kill the app in these, too");

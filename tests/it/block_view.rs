@@ -134,7 +134,7 @@ fn check_routes(page: Page) {
     assert!(get("/scan/0").body.len() > 10_000);
 }
 
-/// Checks the language of the page of a block and of its correction, by flag and by locale.
+/// Checks the language of the pages of a block, by flag and by locale.
 fn check_languages(dir: &Path) {
     for (args, lang, expected) in [
         (&["--lang", "vi"][..], "C", Some("vi")),
@@ -147,7 +147,7 @@ fn check_languages(dir: &Path) {
         command.env_remove("LC_ALL").env_remove("LC_MESSAGES");
         command.args(["-C", "p", "--json", "view", "--no-open", "b1"]);
         let page = Page::of(command.args(args)).entered();
-        for path in ["/", "/correct"] {
+        for path in ["/", "/boxes", "/correct"] {
             let html = String::from_utf8(page.get(path).body).expect("UTF-8");
             let given = html.split("name=\"page-language\" content=\"").nth(1);
             let given = given.and_then(|rest| rest.split('"').next());

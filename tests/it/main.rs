@@ -49,6 +49,7 @@ mod backup;
 #[cfg(target_os = "linux")]
 mod backup_inputs;
 mod bit_flips;
+mod block_boxes;
 mod block_correction;
 mod block_demo;
 mod block_export;

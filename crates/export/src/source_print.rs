@@ -43,6 +43,11 @@ impl SourcePrint {
         self.file.version.hash
     }
 
+    /// Returns the size of the file in bytes.
+    pub(super) fn size(&self) -> u64 {
+        self.file.bytes.len() as u64
+    }
+
     /// Reads the print of a pair and checks that it has not changed since it was aligned.
     ///
     /// # Errors

@@ -14,6 +14,7 @@
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database;
 //!   [`backup_content`]: what such a file holds; [`backup_inputs`], [`input_list`]: scans and prints beside it
+//! - [`block_labels`]: labels that were made on the page of a block
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`], [`generated_folder`]: what may be replaced
 //! - [`events`]: what a function reports while it works
@@ -34,6 +35,7 @@ pub mod backup_checks;
 pub mod backup_content;
 pub mod backup_inputs;
 mod block_files;
+pub mod block_labels;
 mod block_scale;
 pub mod block_status;
 pub mod blocking;

@@ -32,4 +32,4 @@ pub use page_fit::MAX_BOXES;
 pub use read::{MAX_BYTES, read};
 pub use reading_order::reading_order;
 pub use region::{NAME_ATTRIBUTES, TEXT_ATTRIBUTES};
-pub use write::{write_coco, write_via};
+pub use write::{ReplacedLabels, replaced_labels, write_coco, write_edited, write_via};

@@ -1,4 +1,4 @@
-//! Writers of labels: projects of VIA 2, and COCO.
+//! Writers of labels: projects of VIA 2, also of boxes that were changed on the page of a block, and COCO.
 
 use std::collections::BTreeMap;
 
@@ -7,12 +7,43 @@ use serde_json::{Value, json};
 use super::model::{LabelBox, PageFile};
 use mocban_core::domain::rounded_edge;
 
+/// Key of the path of the labels that changed boxes replace. VIA and the reader of this crate ignore it.
+const REPLACES: &str = "mocban_replaces";
 /// Category of boxes without a character.
 const NO_TEXT: &str = "character";
 
 /// Returns a project of VIA 2 with the boxes of a page. VIA finds the image if it lies beside the project, because the
 /// key of an image is its name followed by its size in bytes. Names are the attribute `id`, characters `character`.
 pub fn write_via(boxes: &[LabelBox], page: &PageFile<'_>) -> Vec<u8> {
+    text(&via_project(boxes, page))
+}
+
+/// What labels have replaced.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReplacedLabels {
+    /// Path of the earlier labels, as stored; `None` if the boxes were found.
+    pub path: Option<String>,
+}
+
+/// Returns the same project as [`write_via`], which also names the labels that it replaces.
+pub fn write_edited(boxes: &[LabelBox], page: &PageFile<'_>, replaced: &ReplacedLabels) -> Vec<u8> {
+    let mut project = via_project(boxes, page);
+    project[REPLACES] = json!(replaced.path);
+    text(&project)
+}
+
+/// Returns which labels a file has replaced; `None` if [`write_edited`] did not write it.
+pub fn replaced_labels(bytes: &[u8]) -> Option<ReplacedLabels> {
+    let project: Value = serde_json::from_slice(bytes).ok()?;
+    let path = match project.get(REPLACES)? {
+        Value::Null => None,
+        Value::String(path) => Some(path.clone()),
+        _ => return None,
+    };
+    Some(ReplacedLabels { path })
+}
+
+fn via_project(boxes: &[LabelBox], page: &PageFile<'_>) -> Value {
     let name = file_name(page);
     let key = format!("{name}{}", page.bytes);
     let attribute = |description: &str| json!({"type": "text", "description": description, "default_value": ""});
@@ -22,7 +53,7 @@ pub fn write_via(boxes: &[LabelBox], page: &PageFile<'_>) -> Vec<u8> {
         "regions": boxes.iter().map(via_region).collect::<Vec<_>>(),
         "file_attributes": {},
     });
-    let project = json!({
+    json!({
         "_via_settings": {
             "ui": {
                 "image": {"region_label": "character", "region_color": "__via_default_region_color__"},
@@ -40,8 +71,7 @@ pub fn write_via(boxes: &[LabelBox], page: &PageFile<'_>) -> Vec<u8> {
         },
         "_via_data_format_version": "2.0.10",
         "_via_image_id_list": [key],
-    });
-    text(&project)
+    })
 }
 
 /// Returns a COCO file with the boxes of a page. A category is a character; names and characters are attributes too.

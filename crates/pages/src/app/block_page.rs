@@ -67,7 +67,7 @@ pub(super) async fn pages(
     let [key, block, ..] = parts.as_slice() else {
         return Err(AppFailure::not_found());
     };
-    let request = match in_chosen_language(&state, request, &["", "correct"]) {
+    let request = match in_chosen_language(&state, request, &["", "boxes", "correct"]) {
         Ok(request) => request,
         Err(plain) => return Ok(plain.into_response()),
     };
@@ -125,6 +125,9 @@ fn state_part(visit: &Visit, detail: &BlockDetail) -> Markup {
             div.notice.bad {
                 p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored_message(visit, &stored.failure.message)) }
                 p { (visit.block_remedy(stored.stage, stored.failure.class)) }
+                @if stored.stage == BlockStage::Boxes {
+                    p { a href="view/boxes" { (visit.t("Edit the boxes on the page", "Sửa khung chữ trên trang in")) } }
+                }
             }
         }
         @for warning in warnings(detail) {
@@ -155,6 +158,7 @@ fn ways(visit: &Visit, detail: &BlockDetail) -> Markup {
             }
             @if has(BlockStage::Align) || is_refused {
                 a.button href="view/correct" { (visit.t("Align by places you choose", "Căn chỉnh theo các điểm tự chọn")) }
+                a.button href="view/boxes" { (visit.t("Edit boxes", "Sửa khung chữ")) }
             }
             @if state.status == JobStatus::Quarantined {
                 (action_form("../../actions/retry", "inline", &html! {

@@ -77,6 +77,32 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "the page was opened again, or other points were tried: try these again before saving them",
         "trang đã được mở lại, hoặc các điểm khác đã được thử: hãy thử lại các điểm này trước khi lưu",
     ),
+    // The boxes of a block.
+    (
+        "the labels of this block were changed since this page was opened: reload the page",
+        "nhãn của ván này đã được thay đổi sau khi mở trang: hãy tải lại trang",
+    ),
+    (
+        "no box is left: keep at least one, or retire the pairs of the block",
+        "không còn khung nào: hãy giữ ít nhất một khung, hoặc đưa các cặp của ván ra khỏi thống kê",
+    ),
+    (
+        "box {} was not shown: reload the page",
+        "trang chưa hiện khung {0}: hãy tải lại trang",
+    ),
+    (
+        "box {} and box {} are both named {} (upper and lower case are equal)",
+        "khung {0} và khung {1} cùng có tên {2} (không phân biệt chữ hoa và chữ thường)",
+    ),
+    ("rename one of them", "hãy đổi tên một khung"),
+    (
+        "1 box repeats another and was left out: {}",
+        "có một khung trùng với khung khác: {0}",
+    ),
+    (
+        "1 box is smaller than a pixel, a point or a line and was left out: {}",
+        "có một khung nhỏ hơn một điểm ảnh: {0}",
+    ),
     (
         "is this the scan of a whole block?",
         "đây có phải bản quét của cả ván không?",

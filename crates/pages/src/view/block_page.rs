@@ -10,6 +10,7 @@ use axum::response::{Html, IntoResponse as _, Redirect, Response};
 use axum::routing::get;
 
 use super::block_points::BlockPoints;
+use super::boxes_page;
 use super::correction_page;
 use super::page;
 use super::scan_page::jpeg;
@@ -22,7 +23,7 @@ use mocban_export::scan_view::assets;
 const SCRIPT_KIND: &str = "text/javascript; charset=utf-8";
 const STYLE_KIND: &str = "text/css; charset=utf-8";
 /// Name, content type and text of the assets of this page.
-const ASSETS: [(&str, &str, &str); 5] = [
+const ASSETS: [(&str, &str, &str); 8] = [
     (
         "block-view.js",
         SCRIPT_KIND,
@@ -32,6 +33,21 @@ const ASSETS: [(&str, &str, &str); 5] = [
         "block-correct.js",
         SCRIPT_KIND,
         include_str!("../../../../assets/block-view/block-correct.js"),
+    ),
+    (
+        "block-boxes.js",
+        SCRIPT_KIND,
+        include_str!("../../../../assets/block-view/block-boxes.js"),
+    ),
+    (
+        "box-edits.js",
+        SCRIPT_KIND,
+        include_str!("../../../../assets/block-view/box-edits.js"),
+    ),
+    (
+        "box-messages.js",
+        SCRIPT_KIND,
+        include_str!("../../../../assets/block-view/box-messages.js"),
     ),
     (
         "block-messages.js",
@@ -63,7 +79,7 @@ struct ShownBlock {
     overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
 }
 
-/// Returns the routes of the page of a block, and of its correction. Without `view`, only the correction is shown. A language in
+/// Returns the routes of the page of a block, of its correction and of its boxes. Without `view`, the correction is shown first. A language in
 /// the address of a page, as in `?lang=vi`, is preferred to `language`; without both, the browser decides.
 pub(super) fn block_page(
     block: &BlockName,
@@ -78,6 +94,12 @@ pub(super) fn block_page(
     };
     pages
         .route("/assets/{name}", get(asset))
+        .merge(boxes_page::routes(
+            block.clone(),
+            &store,
+            Arc::clone(&work),
+            language,
+        ))
         .merge(correction_page::routes(
             block.clone(),
             store,

@@ -25,8 +25,8 @@ pub(super) enum PointsSaved {
 /// open does not hold it.
 #[derive(Debug, Clone)]
 pub struct BlockPoints {
-    location: Location,
-    block: BlockName,
+    pub(super) location: Location,
+    pub(super) block: BlockName,
     next_command: Option<String>,
 }
 

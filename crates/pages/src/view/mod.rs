@@ -1,7 +1,9 @@
 //! The pages of `mocban view`: one scan on its print in 3D, or a whole block.
 
+mod block_labels;
 mod block_page;
 mod block_points;
+mod boxes_page;
 mod correction_page;
 mod opened_block;
 pub(crate) mod page;

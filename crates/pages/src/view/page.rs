@@ -46,6 +46,11 @@ pub(super) fn correction(name: &str, language: Option<Language>, back: Option<&s
     block_page(name, language, back, "assets/block-correct.js")
 }
 
+/// Returns the page on which the boxes of a block are changed, with a link to `back`.
+pub(super) fn boxes(name: &str, language: Option<Language>, back: Option<&str>) -> String {
+    block_page(name, language, back, "assets/block-boxes.js")
+}
+
 fn block_page(name: &str, language: Option<Language>, back: Option<&str>, script: &str) -> String {
     let head = html! {
         (chosen(language))
@@ -67,7 +72,7 @@ fn block_page(name: &str, language: Option<Language>, back: Option<&str>, script
 
 #[cfg(test)]
 mod tests {
-    use super::{Language, block, correction, view};
+    use super::{Language, block, boxes, correction, view};
 
     #[test]
     fn pages_load_only_from_this_server() {
@@ -77,15 +82,15 @@ mod tests {
         assert!(view("a<b", None, None).contains("<title>a&lt;b</title>"));
     }
 
-    fn pages(language: Option<Language>) -> [String; 3] {
-        let pages = [view, block, correction];
+    fn pages(language: Option<Language>) -> [String; 4] {
+        let pages = [view, block, boxes, correction];
         pages.map(|page| page("a<b", language, None))
     }
 
     #[test]
     fn a_page_of_the_app_leads_back() {
         let link = r#"<nav class="scan-back"><a href="../">← a&lt;b</a></nav>"#;
-        for page in [view, block, correction] {
+        for page in [view, block, boxes, correction] {
             let shown = page("a<b", None, Some("../"));
             assert!(shown.contains(link), "{shown}");
             assert!(!page("a<b", None, None).contains("scan-back"));

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::samples::{PAGE, expected};
 use crate::labels::model::{LabelBox, LabelFormat, PageFile, bounds, rectangle};
-use crate::labels::{read, write_coco, write_via};
+use crate::labels::{ReplacedLabels, read, replaced_labels, write_coco, write_edited, write_via};
 use mocban_core::domain::rounded_edge;
 
 /// Returns boxes with edges in thousandths of a pixel, all different, some of them polygons.
@@ -57,6 +57,19 @@ proptest! {
         prop_assert_eq!((labels.format, labels.warnings), (LabelFormat::Coco, vec![]));
         prop_assert_eq!(labels.boxes, boxes);
     }
+}
+
+#[test]
+fn edited_labels_are_read_as_others_and_name_what_they_replace() {
+    for path in [None, Some("more/labels.json".to_owned())] {
+        let replaced = ReplacedLabels { path };
+        let bytes = write_edited(&expected(), &PAGE, &replaced);
+        let labels = read(&bytes, "b1-1.json", &PAGE).expect("a valid file");
+        assert_eq!((labels.boxes, labels.warnings), (expected(), vec![]));
+        assert_eq!(replaced_labels(&bytes), Some(replaced));
+    }
+    assert_eq!(replaced_labels(&write_via(&expected(), &PAGE)), None);
+    assert_eq!(replaced_labels(b"no labels"), None);
 }
 
 #[test]

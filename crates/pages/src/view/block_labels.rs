@@ -1,0 +1,121 @@
+//! Reads the boxes of a block for their page, and stores changed ones as labels of the project.
+
+use super::block_points::BlockPoints;
+use crate::on_thread::{on_thread, read_on_thread};
+use mocban_catalog::{BlockLabelsChange, Catalog};
+use mocban_core::domain::{BlockName, ContentHash};
+use mocban_export::block_view::{BoxEdits, EditableBoxes};
+use mocban_project::location::Location;
+use mocban_project::{ProjectError, ProjectResult, block_labels};
+use mocban_store::{Project, hash_input};
+
+/// What became of boxes that were to be saved.
+#[derive(Debug)]
+pub(super) enum BoxesSaved {
+    /// They are the labels of the block.
+    Saved,
+    /// They are the same as before.
+    Unchanged,
+    /// The page, its boxes or their file have changed since they were shown.
+    OthersSaved,
+    /// An import would not take them as they are.
+    Refused(String),
+}
+
+/// The labels of a block of the project. The catalog is open only while it is used.
+#[derive(Debug, Clone)]
+pub(super) struct BlockLabels {
+    location: Location,
+    block: BlockName,
+}
+
+impl BlockLabels {
+    /// Creates the access to the labels of the block of these points.
+    pub(super) fn of(points: &BlockPoints) -> Self {
+        Self {
+            location: points.location.clone(),
+            block: points.block.clone(),
+        }
+    }
+
+    /// Reads the page and its boxes. Returns a sentence if that fails.
+    pub(super) async fn read(&self) -> Result<EditableBoxes, String> {
+        let own = self.clone();
+        let read = read_on_thread(async move || own.read_boxes().await).await;
+        read.map_err(|error| error.text(&self.location.dir))
+    }
+
+    /// Stores changed boxes, or the labels that the stored ones have replaced, if the page still has what was `shown`. Returns
+    /// a sentence if that fails.
+    pub(super) async fn save(
+        &self,
+        shown: ContentHash,
+        edits: Option<BoxEdits>,
+    ) -> Result<BoxesSaved, String> {
+        let own = self.clone();
+        let stored = on_thread(async move || own.store(shown, edits.as_ref()).await).await;
+        stored.map_err(|error| error.text(&self.location.dir))
+    }
+
+    async fn read_boxes(&self) -> ProjectResult<EditableBoxes> {
+        let (project, catalog) = self.location.open_read_only().await?;
+        let read = self.boxes_of(&catalog, &project).await;
+        catalog.close().await;
+        read
+    }
+
+    async fn boxes_of(&self, catalog: &Catalog, project: &Project) -> ProjectResult<EditableBoxes> {
+        let limits = self.location.settings()?.config.limits.image;
+        Ok(EditableBoxes::read(catalog, project, &self.block, limits).await?)
+    }
+
+    async fn store(
+        &self,
+        shown: ContentHash,
+        edits: Option<&BoxEdits>,
+    ) -> ProjectResult<BoxesSaved> {
+        let (project, catalog) = self.location.open().await?;
+        let stored = self.store_in(&catalog, &project, shown, edits).await;
+        catalog.close().await;
+        stored
+    }
+
+    async fn store_in(
+        &self,
+        catalog: &Catalog,
+        project: &Project,
+        shown: ContentHash,
+        edits: Option<&BoxEdits>,
+    ) -> ProjectResult<BoxesSaved> {
+        let boxes = self.boxes_of(catalog, project).await?;
+        if boxes.shown_hash() != shown {
+            return Ok(BoxesSaved::OthersSaved);
+        }
+        let labels = match edits {
+            Some(edits) => match boxes.edited(edits) {
+                Ok(Some(bytes)) => Some(block_labels::write_new(project, &self.block, &bytes)?),
+                Ok(None) => return Ok(BoxesSaved::Unchanged),
+                Err(error) => return Ok(BoxesSaved::Refused(error.to_string())),
+            },
+            None => match boxes.earlier() {
+                Some(earlier) => {
+                    if let Some(path) = &earlier.path {
+                        hash_input(&project.input(path))?;
+                    }
+                    earlier.path.clone()
+                }
+                None => return Ok(BoxesSaved::OthersSaved),
+            },
+        };
+        let read = boxes.labels_path();
+        let changed = catalog.set_block_labels(&self.block, read, labels.as_deref());
+        match changed.await? {
+            BlockLabelsChange::Stored => Ok(BoxesSaved::Saved),
+            BlockLabelsChange::Outdated => Ok(BoxesSaved::OthersSaved),
+            BlockLabelsChange::NoBlock => {
+                let text = format!("block {} was removed meanwhile", self.block);
+                Err(ProjectError::unexpected(text))
+            }
+        }
+    }
+}
