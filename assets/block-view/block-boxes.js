@@ -27,7 +27,8 @@ function svg(tag, attributes) {
 
 class BoxesPage {
   constructor(container) {
-    [this.selected, this.shapes, this.drag, this.isBusy] = [null, new Map(), null, false];
+    [this.block, this.selected, this.shapes, this.drag, this.isBusy] = [null, null, new Map(), null, false];
+    this.edits = new BoxEdits([], [1, 1]);
     this.image = element("img", { class: "block-overview", alt: text("page"), draggable: "false" });
     this.layer = svg("svg", { class: "block-boxes" });
     this.stage = element("div", { class: "block-stage" }, this.image, this.layer);
@@ -46,7 +47,7 @@ class BoxesPage {
     this.canvas.addEventListener("keydown", (event) => this.press(event));
     document.addEventListener("keydown", (event) => this.pressAnywhere(event));
     addEventListener("beforeunload", (event) => {
-      if (this.edits?.count() > 0) event.preventDefault();
+      if (this.edits.count() > 0) event.preventDefault();
     });
     new ResizeObserver(() => this.camera.resized()).observe(this.canvas);
   }
@@ -78,7 +79,8 @@ class BoxesPage {
     }
     this.update();
     const hint = block.boxes.length === 0 ? "no_boxes" : block.has_labels ? "how" : "found";
-    this.tell([...block.warnings, text(hint)].join(" "), block.warnings.length > 0);
+    const warnings = block[`warnings_${language}`] ?? block.warnings;
+    this.tell([...warnings, text(hint)].join(" "), warnings.length > 0);
   }
 
   bar() {
@@ -161,7 +163,7 @@ class BoxesPage {
     this.redoButton.disabled = this.edits.future.length === 0;
     this.addButton.setAttribute("aria-pressed", !this.cover.hidden);
     this.saveButton.disabled = this.earlierButton.disabled = this.isBusy;
-    this.earlierButton.hidden = !this.block.has_earlier;
+    this.earlierButton.hidden = !this.block?.has_earlier;
     this.status.classList.toggle("block-busy", this.isBusy);
     this.moved();
   }
@@ -182,7 +184,7 @@ class BoxesPage {
     const { x, y, zoom } = this.camera;
     this.stage.style.transform = `translate(${x}px, ${y}px) scale(${zoom})`;
     this.stage.style.setProperty("--block-stroke", `${STROKE_PX / zoom}px`);
-    const box = this.edits && this.box();
+    const box = this.box();
     this.grip.hidden = !box;
     if (box) this.frame(this.grip, this.drag?.now ?? boundsOf(box.outline));
   }

@@ -55,7 +55,7 @@ impl Catalog {
             };
             checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
             // What failed with the other labels is tried again.
-            let failed = RetrySelection::<BlockJob>::Names(vec![block.clone()]);
+            let failed = RetrySelection::<BlockJob>::Names(vec![block]);
             requeue::retry(conn, &failed, &mut uncounted()).await?;
             Ok(BlockLabelsChange::Stored)
         })

@@ -159,6 +159,11 @@ impl EditableBoxes {
         jpeg(&resized(&self.page, width, height))
     }
 
+    /// Returns what the labels say of themselves, or why they cannot be read.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
     /// Returns the path of the labels, as stored.
     pub fn labels_path(&self) -> Option<&str> {
         self.labels_path.as_deref()

@@ -95,6 +95,9 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "khung {0} và khung {1} cùng có tên {2} (không phân biệt chữ hoa và chữ thường)",
     ),
     ("rename one of them", "hãy đổi tên một khung"),
+    ("the boxes", "các khung chữ"),
+    ("the name of box {}: {}", "tên của khung {0}: {1}"),
+    ("correct or remove it", "hãy sửa hoặc bỏ đi"),
     (
         "1 box repeats another and was left out: {}",
         "có một khung trùng với khung khác: {0}",

@@ -18,6 +18,7 @@ use super::page;
 use super::refusal::{refused, unavailable};
 use super::scan_page::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
+use crate::messages::vietnamese;
 use crate::review::Language;
 use mocban_core::domain::{BlockName, ContentHash};
 use mocban_export::block_view::{BoxEdits, EditableBoxes};
@@ -122,6 +123,9 @@ async fn block_json(
         Ok(shown) => {
             let mut value = shown.to_json();
             value["csrf_token"] = json!(access.csrf_token());
+            let warnings = shown.warnings().iter();
+            let warnings = warnings.map(|one| vietnamese(one).unwrap_or_else(|| one.clone()));
+            value["warnings_vi"] = warnings.collect();
             Json(value).into_response()
         }
         Err(failed) => failed,
