@@ -129,7 +129,7 @@ export class BoxEdits {
     return !before || box.isMoved || box.name !== before.name || box.text !== before.text;
   }
 
-  /** Returns what the server stores: which of the shown boxes are gone, and those that are new or changed. */
+  /** Returns what the server stores: which of the shown boxes are gone, and the new or changed ones. */
   toJson() {
     const kept = new Set(this.list.map((box) => box.was));
     const removed = this.shown.map((box) => box.was).filter((was) => !kept.has(was));

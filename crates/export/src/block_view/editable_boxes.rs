@@ -20,7 +20,7 @@ use mocban_store::{Project, read_input};
 /// Longer side of the picture of the page, pixels.
 const LONGEST_SIDE: usize = 3000;
 
-/// The page of a block with its boxes: those of its labels, or else those that were found.
+/// The page of a block with its boxes: the ones of its labels, or else found ones.
 #[derive(Debug)]
 pub struct EditableBoxes {
     name: BlockName,
