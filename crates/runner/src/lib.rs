@@ -13,7 +13,7 @@
 //!
 //! # A lost lease
 //! Files of the catalog are below `crates/catalog/src`. Names in capitals are statements of `queue/lease.rs`, but `RECOVER`
-//! and `OVERDUE` of `lease_recovery.rs`.
+//! and `OVERDUE` of `src/lease_recovery.rs`.
 //! ```text
 //!   ready ---- claim: queue/claim.rs ----> leased ---- ADVANCE of the last stage ----> done
 //!     ^                                      |
@@ -40,19 +40,19 @@
 //! | a release | `checkpointer.rs`; others ignore it | `RELEASE` | the pair ends as `LeaseLost`, a block as `Released` |
 //!
 //! A job that loses its lease while it runs ends as `LeaseLost`, which counts neither as done nor as failed; after a
-//! refused heartbeat, a pair may also end as `Released`. Stages stored before stay. A pair recovered from a worker that
-//! did not end may have killed it, so no other pair runs beside it (on PostgreSQL: on its host): in its own process until
-//! it has ended, in others until its next stage is stored. After a refused heartbeat, `prefetch.rs` releases what has not
-//! started, and the process ends its old id, registers as a new worker and recovers the jobs of the old id, which count no
-//! crash. The new id ends the waits for `RunContext::expired`, which cancels the stages that run: in
-//! `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of `block/task.rs`. Heartbeats do not show that another
-//! worker recovered a job, or that a repair or a new cut reset it: the stage runs on, and its next write is refused. If
-//! the connection to a server breaks, writes are sent again until a stop ends the waits, and `stored_before`
-//! (`queue/lease.rs`) finds what was stored without a reply. If the reply to a checkpoint of a block is lost whose earlier
-//! stage was computed again, it is stored twice, with two rows in `block_attempt`.
+//! refused heartbeat, a pair may also end as `Released`. A pair recovered from a worker that did not end may have killed
+//! it, so no other pair runs beside it (on PostgreSQL: on its host): in its own process until it has ended, in others
+//! until its next stage is stored. After a refused heartbeat, `prefetch.rs` releases what has not started, and the process
+//! ends its old id, registers as a new worker and recovers the jobs of the old id, which count no crash. The new id ends
+//! the waits for `RunContext::expired`, which cancels the stages that run: in `Checkpointer::closed` for `pair_task.rs`,
+//! and in `on_thread` of `block/task.rs`. Heartbeats do not show that another worker recovered a job, or that a repair or
+//! a new cut reset it: the stage runs on, and its next write is refused. If the connection to a server breaks, writes are
+//! sent again until a stop ends the waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
+//! If the reply to a checkpoint of a block is lost whose earlier stage was computed again, it is stored twice, with two
+//! rows in `block_attempt`.
 //!
-//! The rest of the walk: `run_context.rs`, `block/slot.rs`; in the catalog `worker_requests.rs`, and in `queue` `kind.rs`,
-//! `checkpoint.rs`, `server_checkpoint.rs`, `fail.rs`, `commit/{group_commit,server_commit,writer,write_connection}.rs`.
+//! The rest of the walk: `run_context.rs`, `block/slot.rs`; in the catalog `src/worker_requests.rs`, `queue/kind.rs`,
+//! `queue/checkpoint.rs`, `queue/server_checkpoint.rs`, `queue/fail.rs`, the group commits and the writer in `queue/commit`.
 //!
 //! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled:
 //! inner loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs`
