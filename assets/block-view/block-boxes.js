@@ -1,6 +1,7 @@
 // The boxes of a page, which a person moves, resizes, names, adds and deletes.
 
 import { followPage, PageCamera } from "./block-camera.js";
+import { request, send } from "./block-request.js";
 import { BoxEdits, boundsOf } from "./box-edits.js";
 import { boxText } from "./box-messages.js";
 import { preferredLanguage } from "./scan-messages.js";
@@ -54,9 +55,7 @@ class BoxesPage {
 
   /** Reads the boxes, and shows them. */
   async load() {
-    const response = await fetch("boxes/block.json");
-    const block = await response.json();
-    if (!response.ok) throw new Error(block[`error_${language}`] ?? block.error);
+    const block = await request(language, "boxes/block.json");
     const isFirst = !this.block;
     this.block = block;
     this.edits = new BoxEdits(block.boxes, block.page_size);
@@ -352,13 +351,8 @@ class BoxesPage {
     this.update();
   }
 
-  async send(path, body) {
-    const headers = { "content-type": "application/json", "x-csrf-token": this.block.csrf_token };
-    const response = await fetch(path, { method: "POST", headers, body: JSON.stringify(body) }).catch(() => null);
-    if (!response) throw new Error(text("no_answer"));
-    const answer = await response.json().catch(() => ({ error: response.statusText }));
-    if (!response.ok) throw new Error(answer[`error_${language}`] ?? answer.error);
-    return answer;
+  send(path, body) {
+    return send(language, path, this.block.csrf_token, body);
   }
 
   async save() {

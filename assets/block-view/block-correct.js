@@ -2,6 +2,7 @@
 
 import { followPage, PageCamera } from "./block-camera.js";
 import { blockText } from "./block-messages.js";
+import { request, send } from "./block-request.js";
 import { preferredLanguage } from "./scan-messages.js";
 import { element } from "./scan-panel.js";
 
@@ -256,13 +257,8 @@ class CorrectionPage {
     this.update();
   }
 
-  async send(path, body) {
-    const headers = { "content-type": "application/json", "x-csrf-token": this.block.csrf_token };
-    const response = await fetch(path, { method: "POST", headers, body: JSON.stringify(body) }).catch(() => null);
-    if (!response) throw new Error(text("no_answer"));
-    const answer = await response.json().catch(() => ({ error: response.statusText }));
-    if (!response.ok) throw new Error(answer[`error_${language}`] ?? answer.error);
-    return answer;
+  send(path, body) {
+    return send(language, path, this.block.csrf_token, body);
   }
 
   async try() {
@@ -303,12 +299,7 @@ class CorrectionPage {
 document.documentElement.lang = language;
 const container = document.getElementById("block-view");
 try {
-  const response = await fetch("correct/block.json");
-  if (!response.ok) {
-    const answer = await response.json();
-    throw new Error(answer[`error_${language}`] ?? answer.error);
-  }
-  window.mocbanCorrection = new CorrectionPage(container, await response.json());
+  window.mocbanCorrection = new CorrectionPage(container, await request(language, "correct/block.json"));
 } catch (error) {
   container.textContent = text("no_data", { why: error.message });
 }

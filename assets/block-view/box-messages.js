@@ -1,11 +1,11 @@
 // Texts of the page on which boxes are changed, in English and Vietnamese.
 
+import { blockText } from "./block-messages.js";
 import { withValues } from "./scan-messages.js";
 
 const BOX_MESSAGES = {
   boxes_view: { en: "Page with its boxes", vi: "Trang in với các khung chữ" },
   page: { en: "Page", vi: "Trang in" },
-  back_to_page: { en: "Back to the page", vi: "Về trang in" },
   choose: { en: "Choose a box", vi: "Chọn khung" },
   previous: { en: "Previous box", vi: "Khung trước" },
   next: { en: "Next box", vi: "Khung sau" },
@@ -17,9 +17,6 @@ const BOX_MESSAGES = {
   undo: { en: "Undo", vi: "Hoàn tác" },
   redo: { en: "Redo", vi: "Làm lại" },
   step: { en: "10 px steps", vi: "Bước 10 px" },
-  closer: { en: "Closer", vi: "Phóng to" },
-  farther: { en: "Farther", vi: "Thu nhỏ" },
-  whole: { en: "Whole page", vi: "Cả trang" },
   name: { en: "Name", vi: "Tên" },
   text: { en: "Character", vi: "Chữ" },
   save: { en: "Save", vi: "Lưu" },
@@ -58,11 +55,10 @@ const BOX_MESSAGES = {
     en: "Page Up, Page Down: previous, next box · arrow keys: move the box, or the page without one · Shift: resize · Alt: 10 px · A, Enter: add · Delete: delete · Escape: no box · Ctrl + Z, Ctrl + Y: undo, redo · wheel, + −: zoom · 0: whole page",
     vi: "Page Up, Page Down: khung trước, sau · phím mũi tên: di chuyển khung, hoặc trang nếu chưa chọn · Shift: đổi cỡ · Alt: 10 px · A, Enter: thêm · Delete: xóa · Escape: bỏ chọn · Ctrl + Z, Ctrl + Y: hoàn tác, làm lại · con lăn, + −: phóng · 0: cả trang",
   },
-  no_answer: { en: "The program does not answer. If it was ended, start it again.", vi: "Chương trình không trả lời. Nếu chương trình đã dừng, hãy mở lại." },
   no_data: { en: "The boxes cannot be displayed: {why}", vi: "Không hiển thị được các khung: {why}" },
 };
 
-/** Returns a text with `{name}` replaced by the values. */
+/** Returns a text of this page, or else of the page of the block, with `{name}` replaced by the values. */
 export function boxText(language, key, values = {}) {
-  return withValues(BOX_MESSAGES[key][language], values);
+  return key in BOX_MESSAGES ? withValues(BOX_MESSAGES[key][language], values) : blockText(language, key, values);
 }

@@ -252,7 +252,7 @@ fn killed_boxes_are_saved_by_the_next_app_or_not_at_all() {
     assert_eq!(labels_path(&root), before);
 }
 
-/// Actions that are killed in another test, and those that leave nothing half done.
+/// Actions that another test kills, or that leave nothing half done, each with the reason.
 const OTHER_ACTIONS: [(&str, &str); 15] = [
     ("/actions/demo", "above"),
     ("/actions/restore", "app_restore.rs"),

@@ -143,7 +143,7 @@ from_row! { RecoveredJob { job in row, crashes } }
 struct RecoveredJobs<K: JobKind> {
     /// Number of jobs that are ready again.
     ready: u64,
-    /// Those that killed too many workers and are now quarantined.
+    /// Units whose jobs killed too many workers and are now quarantined.
     poisoned: Vec<K::Unit>,
 }
 

@@ -7,7 +7,7 @@ use super::block_error::BlockViewError;
 use super::page_layers::{PageRegion, jpeg, overlay, relief};
 use super::page_picture::PagePicture;
 use super::page_view::not_aligned;
-use super::registered_face::{outcome, read_face, unusable};
+use super::registered_face::{outcome, read_face, stored_block, unusable};
 use crate::pictures::{Rgb, resized};
 use mocban_align::block::{
     AlignOutcome, CarvedFace, ControlPointError, FaceOutcome, HEIGHT_STEP_MM, PageMap, align_at,
@@ -107,8 +107,7 @@ impl BlockCorrection {
         name: &BlockName,
         limits: ImageLimits,
     ) -> Result<Self, BlockViewError> {
-        let detail = catalog.block(name).await?;
-        let detail = detail.ok_or_else(|| BlockViewError::Gone(name.clone()))?;
+        let detail = stored_block(catalog, name).await?;
         let (name, project) = (name.clone(), project.clone());
         let read = move || Self::read_files(name, &detail, &project, &limits);
         tokio::task::spawn_blocking(read).await?

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::block_error::BlockViewError;
-use super::registered_face::unusable;
+use super::registered_face::{stored_block, unusable};
 use mocban_catalog::{BlockDetail, Catalog};
 use mocban_core::domain::{BlockName, BlockStage, ContentHash, ControlPoints};
 use mocban_store::{Project, hash_input};
@@ -16,8 +16,7 @@ pub async fn replaced_file(
     block: &BlockName,
     points: &ControlPoints,
 ) -> Result<Option<PathBuf>, BlockViewError> {
-    let detail = catalog.block(block).await?;
-    let detail = detail.ok_or_else(|| BlockViewError::Gone(block.clone()))?;
+    let detail = stored_block(catalog, block).await?;
     let (project, chosen) = (project.clone(), [points.mesh, points.page]);
     tokio::task::spawn_blocking(move || compare(&project, &detail, chosen)).await?
 }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::block_error::BlockViewError;
 use super::box_edits::{BoxEditError, BoxEdits};
 use super::page_layers::{PageRegion, jpeg};
-use super::registered_face::outcome;
+use super::registered_face::{outcome, stored_block};
 use crate::pictures::{Rgb, resized};
 use crate::source_print::SourcePrint;
 use mocban_align::block::BoxesOutcome;
@@ -56,8 +56,7 @@ impl EditableBoxes {
         name: &BlockName,
         limits: ImageLimits,
     ) -> Result<Self, BlockViewError> {
-        let detail = catalog.block(name).await?;
-        let detail = detail.ok_or_else(|| BlockViewError::Gone(name.clone()))?;
+        let detail = stored_block(catalog, name).await?;
         let (name, project) = (name.clone(), project.clone());
         let read = move || Self::read_files(name, &detail, &project, &limits);
         tokio::task::spawn_blocking(read).await?

@@ -8,7 +8,7 @@ use super::block_error::BlockViewError;
 use super::characters::{CharacterView, shown_record};
 use super::page_layers::PageLayers;
 use super::page_picture::PagePicture;
-use super::registered_face::RegisteredFace;
+use super::registered_face::{RegisteredFace, stored_block};
 use crate::pair_pictures::PictureError;
 use crate::scan_view::ScanView;
 use mocban_catalog::{BlockDetail, Catalog, PairResults, StoredCharacter};
@@ -47,8 +47,7 @@ impl BlockView {
         metric: Option<ThresholdMetric>,
         limits: InputLimits,
     ) -> Result<Self, BlockViewError> {
-        let detail = catalog.block(name).await?;
-        let detail = detail.ok_or_else(|| BlockViewError::Gone(name.clone()))?;
+        let detail = stored_block(catalog, name).await?;
         let registered = RegisteredFace::of(&detail)?.ok_or_else(|| not_aligned(name, &detail))?;
         let characters = catalog.block_characters(name).await?;
         let is_on_page = |one: &StoredCharacter| one.state != BlockCharacterState::Retired;

@@ -7,10 +7,19 @@ use mocban_align::block::{
     AlignOutcome, BoxesOutcome, CarvedFace, FaceOutcome, FoundFace, PageMap, StoredHeights,
     StoredPageMap, Support, heights_role,
 };
-use mocban_catalog::{BlockDetail, BlockStageDetail};
-use mocban_core::domain::{ArtifactSet, BlockSide, BlockStage, ContentHash, LengthUnit};
+use mocban_catalog::{BlockDetail, BlockStageDetail, Catalog};
+use mocban_core::domain::{ArtifactSet, BlockName, BlockSide, BlockStage, ContentHash, LengthUnit};
 use mocban_core::raster;
 use mocban_store::Project;
+
+/// Returns what is stored of a block.
+pub(super) async fn stored_block(
+    catalog: &Catalog,
+    name: &BlockName,
+) -> Result<BlockDetail, BlockViewError> {
+    let detail = catalog.block(name).await?;
+    detail.ok_or_else(|| BlockViewError::Gone(name.clone()))
+}
 
 /// The registration of a block, and where its heights are.
 #[derive(Debug)]
