@@ -100,7 +100,8 @@ const ALL_DIED: &str = "
 UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
     AND id IN (SELECT id FROM worker ORDER BY id DESC LIMIT 33)";
 
-/// Selects the numbers of all locks of workers in this catalog.
+/// Selects the numbers of all locks of workers in this catalog. The key is that of `TRY_LOCK` in
+/// `queue/commit/server_commit.rs`.
 const WORKER_LOCKS: &str = "
 SELECT CAST(objid AS bigint) FROM pg_locks
 WHERE locktype = 'advisory' AND objsubid = 2 AND granted
@@ -143,7 +144,7 @@ from_row! { RecoveredJob { job in row, crashes } }
 struct RecoveredJobs<K: JobKind> {
     /// Number of jobs that are ready again.
     ready: u64,
-    /// Units whose jobs killed too many workers and are now quarantined.
+    /// Jobs that killed too many workers and are now quarantined.
     poisoned: Vec<K::Unit>,
 }
 

@@ -1,8 +1,8 @@
 //! The catalog: pairs, blocks, jobs, leases, results and verdicts in SQLite or PostgreSQL.
 //!
 //! - From the lowest to the highest, each imports only from those before it. `db`: connections, statements, errors; `queue`:
-//!   leases, and what workers store under them; `handle.rs`: the open catalog; `jobs`: settings, stale and retired jobs, and counts;
-//!   `records`: the data of pairs, verdicts and imports; `blocks`: the data of whole blocks; `worker_requests.rs` and
+//!   leases, and what workers store under them; `handle.rs`: the open catalog; `jobs`: settings, stale and retired jobs, and
+//!   counts; `records`: the data of pairs, verdicts and imports; `blocks`: the data of whole blocks; `worker_requests.rs` and
 //!   `lease_recovery.rs`: both kinds of job; `audit`: checks and repairs; `transfer`: copies to another catalog
 //! - A process has one write connection, which a task owns. It commits the requests of several pairs together, each at most
 //!   250 ms after it arrived. Reads use other connections and go on during a run. Callers pass the current time.

@@ -1,6 +1,6 @@
 //! What a worker asks of the catalog, for pairs and blocks: its registration, heartbeats, claims, checkpoints, failures,
 //! releases and its end. The requests for pairs share commits. There are few blocks, so each of their requests is a
-//! transaction of its own. If its reply is lost, it may be called again.
+//! transaction of its own. After a lost reply, such a request may be sent again.
 
 use crate::blocks::block_job::BlockJob;
 use crate::blocks::cut::{CutReply, CutSummary, store_cut, taken_name};
@@ -136,11 +136,7 @@ impl Catalog {
         let stored = self
             .reply_to(|reply| Message::Deferrable(Request::Checkpoint(item, reply)))
             .await?;
-        Ok(match (stored, advanced) {
-            (false, _) => CheckpointOutcome::Refused,
-            (true, Some(lease)) => CheckpointOutcome::Lease(lease),
-            (true, None) => CheckpointOutcome::Done,
-        })
+        Ok(CheckpointOutcome::of(stored, advanced))
     }
 
     /// Stores a failed stage. Returns `false`, and stores nothing, if the lease was lost.
@@ -220,11 +216,7 @@ impl Catalog {
             let stored = stored_before(conn, [&item].into_iter(), [].into_iter()).await?;
             Ok(item.0.is_in(&stored))
         });
-        Ok(match (stored?, next) {
-            (false, _) => CheckpointOutcome::Refused,
-            (true, Some(lease)) => CheckpointOutcome::Lease(lease),
-            (true, None) => CheckpointOutcome::Done,
-        })
+        Ok(CheckpointOutcome::of(stored?, next))
     }
 
     /// Stores the stage `cut`: its result, the characters, and a pair for each character that was cut. All files must

@@ -9,7 +9,7 @@
 //!
 //! **Invariant:** a kill at any moment costs the stages in progress and uncommitted ones, nothing else; and a worker whose
 //! lease was lost stores no row. Files that it wrote before stay, until `check --repair` or `check --collect` removes
-//! those without a row.
+//! files without a row.
 //!
 //! # A lost lease
 //! Files of the catalog are below `crates/catalog/src`. Names in capitals are statements of `queue/lease.rs`, but `RECOVER`
@@ -48,10 +48,10 @@
 //! and in `on_thread` of `block/task.rs`. Heartbeats do not show that another worker recovered a job, or that a repair or
 //! a new cut reset it: the stage runs on, and its next write is refused. If the connection to a server breaks, writes are
 //! sent again until a stop ends the waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
-//! If the reply to a checkpoint of a block is lost whose earlier stage was computed again, it is stored twice, with two
+//! If an earlier stage of a block was computed again and the reply to its checkpoint is lost, it is stored twice, with two
 //! rows in `block_attempt`.
 //!
-//! The rest of the walk: `run_context.rs`, `block/slot.rs`; in the catalog `src/worker_requests.rs`, `queue/kind.rs`,
+//! Other files on this path: `run_context.rs`, `block/slot.rs`; in the catalog `src/worker_requests.rs`, `queue/kind.rs`,
 //! `queue/checkpoint.rs`, `queue/server_checkpoint.rs`, `queue/fail.rs`, the group commits and the writer in `queue/commit`.
 //!
 //! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled:

@@ -44,7 +44,7 @@ impl NewFolder {
         StagingFolder::remove_stale(&parent.join(TARGET))
     }
 
-    /// Returns whether a name is that of what a process leaves in the parent if it is killed.
+    /// Returns whether a name is that of a folder that a killed process leaves in the parent.
     pub fn is_unfinished(name: &OsStr) -> bool {
         is_staging_of(Path::new(TARGET), name)
     }

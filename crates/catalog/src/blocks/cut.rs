@@ -140,9 +140,9 @@ async fn store_pairs(
     now: i64,
     deltas: &mut Deltas,
 ) -> Result<CutSummary> {
-    let imported: Vec<ImportRow> = rows.iter().map(|cut| cut.row.clone()).collect();
+    let mut imported: Vec<ImportRow> = rows.iter().map(|cut| cut.row.clone()).collect();
     let mut summary = ImportSummary::default();
-    import_chunk(conn, &imported, now, &mut summary, deltas).await?;
+    import_chunk(conn, &mut imported, false, now, (&mut summary, deltas)).await?;
     let names: Vec<PairName> = imported.into_iter().map(|row| row.name).collect();
     let stored = query_as(PAIRS).bind(names_json(&names));
     let stored: Vec<(PairId, PairName)> = stored.fetch_all(&mut *conn).await?;

@@ -30,14 +30,11 @@ SELECT id, name, mesh_path, page_path, labels_path, unit, side, NULL AS meta, me
 const RESULTS: &str =
     "SELECT stage, outcome, files, result_hash FROM block_result WHERE block = ?1 ORDER BY stage";
 
-/// Builds the text that selects one block or all, without the blocks of `?3`, with this as metadata.
-macro_rules! states {
-    ($meta:literal) => {
-        concat!(
-            "
-SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, ",
-            $meta,
-            " AS meta, b.control_points,
+/// Selects one block, or all without the blocks of `?3`. Only one block has its metadata, which may have a MiB.
+const STATES: &str = concat!(
+    "
+SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side,
+    CASE WHEN ?1 IS NOT NULL THEN b.meta END AS meta, b.control_points,
     j.stage, j.status, j.attempt, j.crashes,
     f.stage AS failed_stage, f.class, f.message, f.at AS failed_at,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND NOT EXISTS (
@@ -50,16 +47,9 @@ SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, ",
     j.status = 3 AND coalesce(b.mesh_stat = '' OR b.page_stat = '' OR b.labels_path IS NOT NULL AND b.labels_stat = '', false)
         AS other_files
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id WHERE (?1 IS NULL OR b.name = ?1) AND ",
-            is_counted!("b.id", "?3"),
-            " ORDER BY b.name"
-        )
-    };
-}
-
-/// Selects blocks without their metadata, which may have a MiB each.
-const STATES: &str = states!("NULL");
-
-const WITH_METADATA: &str = states!("b.meta");
+    is_counted!("b.id", "?3"),
+    " ORDER BY b.name"
+);
 
 const STAGES: &str = "
 SELECT r.stage, r.outcome, r.files, r.result_hash, r.made_with, r.ms, r.at
@@ -203,7 +193,7 @@ impl Catalog {
     /// Returns everything about a block, or `None` if it does not exist.
     pub async fn block(&self, name: &BlockName) -> Result<Option<BlockDetail>> {
         let mut conn = self.snapshot().await?;
-        let state = query_as(WITH_METADATA).bind(name.as_str());
+        let state = query_as(STATES).bind(name.as_str());
         let state = state.bind(Self::LOW_CHARACTER_CONFIDENCE);
         let state = state.bind(self.left_out.of(ChecksummedTable::Block));
         let Some(state) = state.fetch_optional(&mut conn).await? else {

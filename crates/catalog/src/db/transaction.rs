@@ -1,4 +1,4 @@
-//! Write transactions: how they begin, and those whose body is an `async` block.
+//! Write transactions: their first statement, and a macro that runs an `async` block in one.
 
 use crate::db::dialect::Sql;
 

@@ -144,6 +144,17 @@ pub enum CheckpointOutcome<K: JobKind = PairJob> {
     Refused,
 }
 
+impl<K: JobKind> CheckpointOutcome<K> {
+    /// Returns the outcome of a checkpoint. `next` is the lease of the next stage, if there is one.
+    pub(crate) fn of(is_stored: bool, next: Option<Lease<K>>) -> Self {
+        match (is_stored, next) {
+            (false, _) => Self::Refused,
+            (true, Some(lease)) => Self::Lease(lease),
+            (true, None) => Self::Done,
+        }
+    }
+}
+
 /// A worker's sign of life.
 #[derive(Debug, Clone)]
 pub(crate) struct Heartbeat {
@@ -173,9 +184,9 @@ pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: &Heartbeat) -> State
 /// A lease, and the finished stages to store under it, in the order they were computed.
 pub(crate) type LeasedCheckpoints<K = PairJob> = (Lease<K>, Vec<StageCheckpoint<K>>);
 
-/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead, and that of a block if it is not at the stage
-/// of the lease. Resets the crash count. Marks the job of
-/// a pair dirty if the new results do not build on the stored ones: see `AdvancedJob` in `checkpoint.rs`.
+/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead, and the job of a block if it is not at the
+/// stage of the lease. Resets the crash count. Marks the job of a pair dirty if the new results do not build on the stored
+/// ones: see `AdvancedJob` in `checkpoint.rs`.
 pub(crate) static ADVANCE: Template = Template::new(
     "
 UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [status] = 1 THEN worker END,
@@ -188,8 +199,8 @@ RETURNING {unit} AS unit, token",
 );
 
 /// The part of a statement of PostgreSQL that advances the jobs of pairs if their leases are valid: the same as [`ADVANCE`],
-/// and the job must still be at the stage of its lease. The columns of `item` are `JobRows` in `server_checkpoint.rs`. `job.status + 0` keeps the planner from the index of
-/// leases, which contains all leases that ended while a snapshot is held.
+/// and the job must still be at the stage of its lease. The columns of `item` are `JobRows` in `server_checkpoint.rs`.
+/// `job.status + 0` keeps the planner from the index of leases, which contains all leases that ended while a snapshot is held.
 pub(crate) const ADVANCED_ON_SERVER: &str = "
 advanced AS (
     UPDATE job SET stage = item.next, status = item.status,

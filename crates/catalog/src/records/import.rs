@@ -177,11 +177,9 @@ impl Catalog {
                 match chunks.recv().await {
                     Some(ImportChunk::Rows(mut rows)) => {
                         for chunk in rows.chunks_mut(CHUNK) {
-                            if terms.keep_columns {
-                                keep_columns(conn, chunk).await?;
-                            }
-                            let ids = import_chunk(conn, chunk, now, &mut summary, &mut deltas);
-                            let ids = ids.await?;
+                            let keeps = terms.keep_columns;
+                            let counts = (&mut summary, &mut deltas);
+                            let ids = import_chunk(conn, chunk, keeps, now, counts).await?;
                             if terms.replace {
                                 listed.extend(ids);
                             }
@@ -286,32 +284,14 @@ fn refuse_changed_files(summary: &ImportSummary) -> Result<()> {
     }
 }
 
-/// Gives the rows of known pairs the columns that folders do not have.
-async fn keep_columns(conn: &mut Conn, chunk: &mut [ImportRow]) -> Result<()> {
-    let names = json_array(chunk.iter().map(|row| row.name.as_str()));
-    let known = query(SELECT).bind(&names).fetch_all(conn).await?;
-    let known = known.iter();
-    let known = known.filter_map(|row| PairAttributes::from_row(row).ok());
-    let mut known: BTreeMap<PairName, PairAttributes> =
-        known.map(|pair| (pair.name.clone(), pair)).collect();
-    for row in chunk {
-        if let Some(pair) = known.remove(&row.name) {
-            row.scanned_face_down = pair.scanned_face_down;
-            row.character = pair.character;
-            row.block = pair.block;
-            row.meta = pair.meta;
-        }
-    }
-    Ok(())
-}
-
-/// Adds and updates pairs. Pairs that no person retired get their jobs back. Returns the ids of the rows.
+/// Adds and updates pairs. Pairs that no person retired get their jobs back. If `keeps_columns`, the rows of known pairs get
+/// the columns that folders do not have. Returns the ids of the rows.
 pub(crate) async fn import_chunk(
     conn: &mut Conn,
-    chunk: &[ImportRow],
+    chunk: &mut [ImportRow],
+    keeps_columns: bool,
     now: UnixMillis,
-    summary: &mut ImportSummary,
-    deltas: &mut Deltas,
+    (summary, deltas): (&mut ImportSummary, &mut Deltas),
 ) -> Result<Vec<i64>> {
     let names = json_array(chunk.iter().map(|row| row.name.as_str()));
     summary.restored += retired::restore(conn, &names, false, deltas).await?;
@@ -321,6 +301,17 @@ pub(crate) async fn import_chunk(
         // A row with an invalid value is replaced.
         stored.insert(row.get("name")?, PairAttributes::from_row(row).ok());
     }
+    if keeps_columns {
+        for row in chunk.iter_mut() {
+            if let Some(Some(known)) = stored.get(&row.name) {
+                row.scanned_face_down = known.scanned_face_down;
+                row.character.clone_from(&known.character);
+                row.block.clone_from(&known.block);
+                row.meta.clone_from(&known.meta);
+            }
+        }
+    }
+    let chunk = &*chunk;
     // Pairs with another mesh or print. What failed is tried again, also if the earlier file was never read.
     let mut moved = Vec::new();
     for row in chunk {

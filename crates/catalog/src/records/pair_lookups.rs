@@ -17,9 +17,9 @@ SELECT a.pair FROM attempt AS a CROSS JOIN job AS j ON j.pair = a.pair
 WHERE a.stage = 3 AND a.class IS NULL AND j.status = 3 AND a.id > (SELECT coalesce(max(id), 0) - ?1 FROM attempt)
 ORDER BY a.id DESC LIMIT ?2";
 
-/// Completed pairs whose last stage was stored since a time, least confident first. Confidences are looked up
-/// pair by pair in a subquery: for a join, the statistics of PostgreSQL may lead to a scan of the whole table. A result without a
-/// confidence comes last.
+/// Completed pairs whose last stage was stored since a time, least confident first. Confidences are looked up pair by pair in
+/// a subquery: for a join, the statistics of PostgreSQL may lead to a scan of the whole table. A result without a confidence
+/// comes last.
 pub(crate) const LEAST_CONFIDENT: &str = "
 SELECT DISTINCT a.pair, coalesce(
         (SELECT m.confidence FROM metric_result AS m WHERE m.pair = a.pair AND m.metric = ?3), 2.0) AS confidence

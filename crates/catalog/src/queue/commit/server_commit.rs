@@ -1,5 +1,5 @@
-//! Commits requests in PostgreSQL, and what this process remembers of them: leases whose replies were lost, and the lock of
-//! its worker. Checkpoints, and each claim, are one statement that commits by itself; the rarer requests share a
+//! Commits requests in PostgreSQL, and what this process remembers: the leases that it has received, and the lock of its
+//! worker. Checkpoints, and each claim, are one statement that commits by itself; the rarer requests share a
 //! transaction.
 
 use std::collections::BTreeMap;
@@ -210,7 +210,7 @@ impl KnownLeases {
 }
 
 /// Takes the lock of a worker until the end of the session. Returns `false` if another session holds it, such as a broken
-/// connection of the same worker.
+/// connection of the same worker. `WORKER_LOCKS` in `lease_recovery.rs` has the same key.
 const TRY_LOCK: &str = "
 SELECT pg_try_advisory_lock(hashtext(current_setting('search_path')), CAST(?1 % 2147483648 AS integer))";
 
