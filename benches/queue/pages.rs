@@ -67,7 +67,7 @@ const PARTS: [(&str, &str); 4] = [
 
 /// Views of the project, as many as can be saved.
 const VIEWS: usize = 100;
-/// Pairs of a list that is imported into the project, with files of its first pairs.
+/// Number of pairs in the list whose import is previewed.
 const LISTED: usize = 200;
 
 /// The app in a process of its own, with the session of a browser.

@@ -123,6 +123,13 @@ fn every_page_is_accessible_in_both_themes_and_logs_no_error() {
     }
 }
 
+/// Asserts that a page is no wider than its window.
+pub(crate) fn fits_width(tab: &Tab<'_>, what: &str) {
+    let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
+    let fits = overflow.as_f64().is_some_and(|px| px <= 0.0);
+    assert!(fits, "{what} is {overflow} px too wide");
+}
+
 /// Opens a page in every size and theme. It must fit, have no fault that axe finds, and log no error.
 pub(crate) fn looks_right(
     browser: &Browser,
@@ -143,11 +150,7 @@ pub(crate) fn looks_right(
     ] {
         tab.resize(size);
         tab.dark(dark);
-        let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
-        assert!(
-            overflow.as_f64().is_some_and(|px| px <= 0.0),
-            "{name} is {overflow} wider than {size:?}"
-        );
+        fits_width(tab, &format!("{name} {size:?}"));
         let theme = if dark { "dark" } else { "light" };
         let what = format!("app_{name}_{}_{theme}", size[0]);
         match axe {

@@ -10,7 +10,7 @@ use crate::cli::mocban;
 use crate::page::{Page, read_project};
 use crate::review_browser::{ITEM, accepts_an_answer, judge, saved, shown, shown_long_enough};
 
-/// Number of pairs, each of which is judged.
+/// Number of pairs, and of the items that are judged.
 const PAIRS: usize = 5;
 /// Most times that a person presses Tab to reach a control.
 const MOST_TABS: usize = 200;

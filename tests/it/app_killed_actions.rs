@@ -1,5 +1,5 @@
-//! Every action of `mocban app` that changes a project is killed: the project is as before it, and the same action then does its
-//! work. Once a transaction is stored, the project is as before or after the action, and never between.
+//! Kills `mocban app` in every action that changes a project. Before anything is stored, the project is unchanged, and the same
+//! action then does its work. Once a transaction is stored, the project is as before or after the action, and never between.
 
 use std::path::Path;
 

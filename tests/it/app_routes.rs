@@ -161,7 +161,7 @@ fn changeable(dir: &Path) -> (Vec<Value>, Vec<String>) {
             names.push(entry.file_name().to_string_lossy().into_owned());
         }
     }
-    // The log of the catalog comes and goes with those who read it.
+    // The log of the catalog comes and goes with its readers.
     names.retain(|name| !name.starts_with("catalog.sqlite-"));
     names.sort();
     (counts, names)
@@ -324,6 +324,13 @@ fn no_page_shows_files_outside_the_folders_of_the_user() {
     let number = "<b>15</b>";
     let allowed = text(&page.get(&format!("/restore/content?backup={inside}")));
     assert!(allowed.contains(number), "{allowed}");
+    let allowed = places.root().join("allowed");
+    std::fs::create_dir_all(allowed.join(SECRET)).expect("a folder");
+    let allowed = encode(allowed.to_str().expect("UTF-8"));
+    for address in ["/import?path=", "/restore?path="].map(|page| format!("{page}{allowed}")) {
+        let said = text(&page.get(&address));
+        assert!(said.contains(SECRET), "{address}: {said}");
+    }
     for paths in places.outside() {
         let [folder, list, backup] = paths.map(|path| encode(&path));
         let both = format!("project=new&meshes={folder}&prints={folder}");
@@ -385,6 +392,7 @@ fn no_action_reads_files_outside_the_folders_of_the_user() {
 #[test]
 fn a_saved_view_leads_to_no_other_page() {
     let (_dir, page) = with_project();
+    let mut saved = 0;
     for (number, list) in [
         "//evil.example/?state=failed",
         "../../../other/pairs?state=failed",
@@ -402,10 +410,12 @@ fn a_saved_view_leads_to_no_other_page() {
             assert_eq!(reply.status, 422, "{list}: {}", text(&reply));
             continue;
         }
+        saved += 1;
         let shown = page.get(&format!("/p/p/pairs/view/{name}"));
         let to = shown.header("location").expect("an address");
         assert_eq!(to, "../../pairs?state=failed", "{list}");
     }
+    assert_ne!(saved, 0, "a list with a value is saved");
     for name in ["..%2F..%2Fcatalog.sqlite", "%2Fetc%2Fpasswd", "..", "."] {
         let reply = page.get(&format!("/p/p/pairs/view/{name}"));
         assert_eq!(reply.status, 404, "{name}: {}", text(&reply));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::accessible::{axe, no_violation};
 use crate::app::app;
-use crate::app_browser::{enter, looks_right};
+use crate::app_browser::{enter, fits_width, looks_right};
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
@@ -56,11 +56,7 @@ fn look(tab: &Tab<'_>, axe: Option<&str>, what: &str) {
     for (size, dark) in [([1366, 660], false), ([400, 800], true)] {
         tab.resize(size);
         tab.dark(dark);
-        let overflow = tab.eval("document.documentElement.scrollWidth - innerWidth");
-        assert!(
-            overflow.as_f64().is_some_and(|px| px <= 0.0),
-            "{what}: {overflow}"
-        );
+        fits_width(tab, what);
         let what = format!("app_{what}_{}", size[0]);
         if let Some(axe) = axe {
             no_violation(tab, axe, &what);

@@ -1,12 +1,12 @@
 //! Compares the exported results of files that show the same in unusual forms with those of a plain file.
 
-use std::fs;
 use std::path::Path;
 
 use mocban::demo::TruthLine;
 use serde_json::Value;
 
 use crate::cli::mocban;
+use crate::export_readback::lines;
 
 /// Largest error of a landmark, px.
 const LANDMARK_PX: f64 = 3.0;
@@ -15,21 +15,30 @@ const IOU: f64 = 0.005;
 
 /// Returns the exported results of a metric, one a pair.
 fn exported(dir: &Path, metric: &str) -> Vec<Value> {
-    let text = fs::read_to_string(dir.join("out/pairs.jsonl")).expect("the lines");
-    text.lines()
-        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"))
-        .filter(|line| line["metric"] == metric)
-        .collect()
+    let all = lines(&dir.join("out")).into_iter();
+    all.filter(|line| line["metric"] == metric).collect()
 }
 
 /// Returns where a map with rows of four numbers puts a point, px.
-pub(crate) fn place(map: &Value, point: &Value) -> [f64; 2] {
+fn place(map: &Value, point: &Value) -> [f64; 2] {
     let number = |value: &Value| value.as_f64().expect("a number");
     [0, 1].map(|axis| {
         let row = &map[axis];
         let terms = (0..3).map(|k| number(&row[k]) * number(&point[k]));
         terms.sum::<f64>() + number(&row[3])
     })
+}
+
+/// Returns how far a result puts each landmark from where the truth puts it, px.
+pub(crate) fn landmark_errors(result: &Value, truth: &TruthLine) -> Vec<f64> {
+    let truth = serde_json::to_value(truth).expect("a truth is JSON");
+    let landmarks = truth["landmarks"].as_array().expect("points").iter();
+    let errors = landmarks.map(|landmark| {
+        let [found, wanted] =
+            [result, &truth].map(|source| place(&source["print_from_mesh"], landmark));
+        (found[0] - wanted[0]).hypot(found[1] - wanted[1])
+    });
+    errors.collect()
 }
 
 /// Exports the project `p`.
@@ -47,7 +56,6 @@ pub(crate) fn assert_like_first(
     log: &str,
 ) {
     let results = exported(dir, metric);
-    let truth = serde_json::to_value(truth).expect("a truth is JSON");
     let result = |id: &str| {
         let mut lines = results.iter();
         let found = lines.find(|line| line["id"] == id && line["status"] == "done");
@@ -59,10 +67,7 @@ pub(crate) fn assert_like_first(
     assert!(plain > 0.5, "{plain}");
     for id in ids {
         assert!((iou(id) - plain).abs() < IOU, "{id}: {} {plain}", iou(id));
-        for landmark in truth["landmarks"].as_array().expect("points") {
-            let [found, wanted] =
-                [result(id), &truth].map(|source| place(&source["print_from_mesh"], landmark));
-            let error = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
+        for error in landmark_errors(result(id), truth) {
             assert!(error < LANDMARK_PX, "{id}: {error} px");
         }
     }

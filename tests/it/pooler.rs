@@ -1,6 +1,5 @@
 //! A catalog in PostgreSQL behind the connection pooler `PgBouncer`.
 
-use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -11,6 +10,7 @@ use sqlx::{ConnectOptions as _, Row as _};
 use crate::cli::{Call, binary, call, empty, mocban};
 use crate::postgres_server::{Server, other_user};
 use crate::resume::{copy_folder, project};
+use crate::skipped::say_skipped;
 use crate::waiting::wait_until;
 
 /// A running pooler, which ends with this value.
@@ -90,8 +90,7 @@ fn program() -> Option<PathBuf> {
     let mut files = folders.map(|folder| folder.join("pgbouncer"));
     let found = files.find(|file| file.is_file());
     if found.is_none() {
-        let text = "skipped: pgbouncer is not installed, so no test uses a connection pooler\n";
-        let _ = std::io::stderr().write_all(text.as_bytes());
+        say_skipped("pgbouncer is not installed, so no test uses a connection pooler");
     }
     found
 }

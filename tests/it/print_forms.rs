@@ -115,7 +115,7 @@ fn bits_reversed(page: TestPage) -> TestPage {
     }
 }
 
-/// Returns colours in other ways than RGB, pixel by pixel from the upper left.
+/// Returns TIFF files that store the colours otherwise than as upright, interleaved bytes of red, green and blue.
 fn stored_colours(print: &Grid<[u8; 3]>) -> [PrintForm; 5] {
     let inks = |colour: &[u8; 3]| {
         let [cyan, magenta, yellow] = colour.map(|level| 255 - level);

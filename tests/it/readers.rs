@@ -125,13 +125,18 @@ fn reader(script: &str, export: Option<&Path>) -> Option<Command> {
     Some(command)
 }
 
+/// Returns why a script was skipped, from its output.
+fn reason(output: &str) -> &str {
+    output.trim().trim_start_matches("skipped: ")
+}
+
 /// Calls a prepared script and returns its output. Returns `None`, with a line on stderr, if a module or a program that
 /// it needs is not installed. Fails if the script fails.
 #[track_caller]
 pub(crate) fn output(command: &mut Command) -> Option<String> {
     let done = call(command);
     if done.code == SKIPPED {
-        say_skipped(done.out.trim().trim_start_matches("skipped: "));
+        say_skipped(reason(&done.out));
         return None;
     }
     if let Some((_, module)) = done.err.split_once("ModuleNotFoundError: ") {
@@ -203,7 +208,7 @@ fn a_script_fails_with_one_sentence_if_a_number_is_wrong() {
     std::fs::write(dir.path().join("jsonl/pairs.jsonl"), changed).expect("lines");
     let done = call(&mut command);
     if done.code == SKIPPED {
-        say_skipped(done.out.trim().trim_start_matches("skipped: "));
+        say_skipped(reason(&done.out));
         return;
     }
     let done = done.expect(1);

@@ -10,6 +10,7 @@ use crate::cli::{binary, call, empty};
 use crate::own_port::own_port;
 use crate::postgres_server::Server;
 use crate::resume::project;
+use crate::skipped::say_skipped;
 use crate::waiting::PATIENT_CONNECT;
 
 /// Longer than a busy machine needs, and shorter than the wait for a connection with [`PATIENT_CONNECT`].
@@ -49,9 +50,7 @@ fn write_certificates(dir: &Path) {
 fn has_openssl() -> bool {
     let found = Command::new("openssl").arg("version").output().is_ok();
     if !found {
-        let text = "skipped: openssl is not installed, so no certificate of a server is tested\n";
-        // Written directly, because the test harness hides what a passing test prints.
-        let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
+        say_skipped("openssl is not installed, so no certificate of a server is tested");
     }
     found
 }

@@ -8,7 +8,7 @@ use mocban::raster::{ImageLimits, decode};
 use serde_json::Value;
 
 use crate::cli::{empty, mocban};
-use crate::like_plain::{assert_like_first, export, place};
+use crate::like_plain::{assert_like_first, export, landmark_errors};
 use crate::print_forms;
 
 /// The metric whose threshold varies least with the print. For the others, colours that are rounded otherwise may choose
@@ -87,10 +87,8 @@ fn a_folded_print_is_aligned_on_its_larger_part_and_the_other_part_is_named() {
         .filter(is_sentence)
         .count();
     assert_eq!(said, 1, "{found}");
-    let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
-    for landmark in truth["landmarks"].as_array().expect("points") {
-        let [a, b] = [&found, &truth].map(|source| place(&source["print_from_mesh"], landmark));
-        let apart = (a[0] - b[0]).hypot(a[1] - b[1]) / pair.truth.char_height_px;
-        assert!(apart < 0.03, "{apart}");
+    for error in landmark_errors(&found, &pair.truth) {
+        let share = error / pair.truth.char_height_px;
+        assert!(share < 0.03, "{share}");
     }
 }
