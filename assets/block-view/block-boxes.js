@@ -28,7 +28,7 @@ function svg(tag, attributes) {
 
 class BoxesPage {
   constructor(container) {
-    [this.block, this.selected, this.shapes, this.drag, this.isBusy] = [null, null, new Map(), null, false];
+    [this.block, this.selected, this.shapes, this.drag, this.start, this.isBusy] = [null, null, new Map(), null, null, false];
     this.edits = new BoxEdits([], [1, 1]);
     this.image = element("img", { class: "block-overview", alt: text("page"), draggable: "false" });
     this.layer = svg("svg", { class: "block-boxes" });
@@ -100,12 +100,12 @@ class BoxesPage {
     // A key that presses the button has no place on the page.
     this.addButton = button("add", (event) => (event.detail === 0 ? this.addUsual() : this.drawing(this.cover.hidden)));
     this.removeButton = button("remove", () => this.remove());
-    this.undoButton = button("undo", () => this.goBack("undo"));
-    this.redoButton = button("redo", () => this.goBack("redo"));
+    this.undoButton = button("undo", () => this.undoOrRedo("undo"));
+    this.redoButton = button("redo", () => this.undoOrRedo("redo"));
     this.stepButton = button("step", () => this.stepButton.setAttribute("aria-pressed", this.stepButton.getAttribute("aria-pressed") === "false"));
     this.stepButton.setAttribute("aria-pressed", "false");
-    const zooms = [["closer", "+"], ["away", "−", "farther"], ["reset", text("whole"), "whole"]];
-    const zoom = ([work, shown, key = work]) => button(key, () => this.camera[work](), shown);
+    const zooms = [["closer", "closer", "+"], ["farther", "away", "−"], ["whole", "reset", text("whole")]];
+    const zoom = ([key, work, shown]) => button(key, () => this.camera[work](), shown);
     this.saveButton = button("save", () => this.run(() => this.save()));
     this.earlierButton = button("use_earlier", () => this.question.showModal());
     [this.name, this.nameField] = field("name");
@@ -254,7 +254,7 @@ class BoxesPage {
     this.canvas.focus({ preventScroll: true });
   }
 
-  goBack(way) {
+  undoOrRedo(way) {
     this.edits[way]();
     this.update();
     this.describe();
@@ -381,7 +381,7 @@ class BoxesPage {
     if (!(event.ctrlKey || event.metaKey) || event.altKey || event.target.matches?.("input") || this.question.open) return;
     const isRedo = event.code === "KeyY" || (event.code === "KeyZ" && event.shiftKey);
     if (!isRedo && event.code !== "KeyZ") return;
-    this.goBack(isRedo ? "redo" : "undo");
+    this.undoOrRedo(isRedo ? "redo" : "undo");
     event.preventDefault();
   }
 

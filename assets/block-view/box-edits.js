@@ -24,7 +24,8 @@ export class BoxEdits {
   /** Begins with the boxes of a page of `size` pixels. */
   constructor(boxes, size) {
     this.size = size;
-    this.shown = boxes.map(({ name, text, outline }, was) => ({ id: was, was, name: name ?? "", text: text ?? "", outline, isMoved: false }));
+    // The id of a box that was shown is its index.
+    this.shown = boxes.map(({ name, text, outline }, id) => ({ id, name: name ?? "", text: text ?? "", outline }));
     this.nextId = boxes.length;
     this.list = this.shown;
     [this.past, this.future, this.lastKind] = [[], [], null];
@@ -61,13 +62,13 @@ export class BoxEdits {
 
   /** Gives a box other edges. It becomes a rectangle. */
   place(id, bounds, kind) {
-    this.change(id, { outline: rectangle(bounds), isMoved: true }, kind);
+    this.change(id, { outline: rectangle(bounds) }, kind);
   }
 
   /** Adds a box, and returns its id. */
   add(bounds) {
     const id = this.nextId++;
-    this.become([...this.list, { id, was: null, name: "", text: "", outline: rectangle(bounds), isMoved: true }]);
+    this.become([...this.list, { id, name: "", text: "", outline: rectangle(bounds) }]);
     return id;
   }
 
@@ -125,19 +126,20 @@ export class BoxEdits {
   }
 
   isChanged(box) {
-    const before = this.shown[box.was];
-    return !before || box.isMoved || box.name !== before.name || box.text !== before.text;
+    const before = this.shown[box.id];
+    return !before || ["name", "text", "outline"].some((key) => box[key] !== before[key]);
   }
 
   /** Returns what the server stores: which of the shown boxes are gone, and the new or changed ones. */
   toJson() {
-    const kept = new Set(this.list.map((box) => box.was));
-    const removed = this.shown.map((box) => box.was).filter((was) => !kept.has(was));
+    const kept = new Set(this.list.map((box) => box.id));
+    const removed = this.shown.map((box) => box.id).filter((id) => !kept.has(id));
     const edited = this.list.filter((box) => this.isChanged(box));
-    return {
-      removed,
-      edited: edited.map(({ was, name, text, outline, isMoved }) => ({ was, name, text, bounds: isMoved ? boundsOf(outline) : null })),
+    const change = ({ id, name, text, outline }) => {
+      const before = this.shown[id];
+      return { was: before ? id : null, name, text, bounds: outline === before?.outline ? null : boundsOf(outline) };
     };
+    return { removed, edited: edited.map(change) };
   }
 
   /** Returns how many boxes are gone, new or changed. */

@@ -11,6 +11,8 @@ use parquet::errors::Result;
 use parquet::schema::types::{Type, TypePtr};
 use serde_json::Value;
 
+use mocban_core::domain::value_text;
+
 /// Type of a column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum ColumnType {
@@ -261,9 +263,7 @@ impl LeafValues {
     fn push(&mut self, value: &Value) -> bool {
         match self {
             Self::Bytes(values) => {
-                let text = value
-                    .as_str()
-                    .map_or_else(|| value.to_string(), str::to_owned);
+                let text = value_text(value).into_owned();
                 values.push(ByteArray::from(text.into_bytes()));
                 true
             }

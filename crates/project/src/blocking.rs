@@ -1,4 +1,4 @@
-//! Work that waits for files or computes, on the threads for such work.
+//! Work that waits for files or computes, on tokio's blocking threads.
 
 use tokio::task::{JoinError, spawn_blocking};
 
@@ -12,7 +12,7 @@ struct TaskStopped(JoinError);
 
 impl Explained for TaskStopped {}
 
-/// Starts a function on a thread for such work. The future returns what the function returns; the function goes on if nobody
+/// Starts a function on a blocking thread. The future returns what the function returns; the function goes on if nobody
 /// waits for it any more.
 pub fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,

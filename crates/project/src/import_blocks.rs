@@ -40,7 +40,7 @@ pub struct BlockImportOutcome {
 /// Blocks to import.
 struct BlockListing {
     rows: Vec<BlockRow>,
-    /// Whether rows have metadata, although it may be empty.
+    /// Whether the source can have metadata. If not, known blocks keep theirs.
     has_metadata: bool,
     /// Label of row numbers in messages: `blocks.csv: line`, or `block` for a single one.
     label: String,

@@ -4,11 +4,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
-use super::page_layers::{PageRegion, jpeg, overlay, relief};
+use super::page_layers::{PageRegion, jpeg, overlay, relief, whole_jpeg};
 use super::page_picture::PagePicture;
 use super::page_view::not_aligned;
 use super::registered_face::{outcome, read_face, stored_block, unusable};
-use crate::pictures::{Rgb, resized};
+use crate::pictures::Rgb;
 use mocban_align::block::{
     AlignOutcome, CarvedFace, ControlPointError, FaceOutcome, HEIGHT_STEP_MM, PageMap, align_at,
 };
@@ -200,18 +200,14 @@ impl BlockCorrection {
         });
         let (low, high) = (bounds.map(|side| side[0]), bounds.map(|side| side[1]));
         let map = PageMap::affine(&shown.from_face, low, high);
-        let region = PageRegion {
-            corner: [0, 0],
-            size: shown.size,
-        };
+        let region = PageRegion::whole(shown.size);
         let picture = relief(&shown.face, &map, region, shown.size);
         Some(jpeg(&turned(picture, turns)))
     }
 
     /// Returns the image of the page as JPEG.
     pub fn page_jpeg(&self) -> Vec<u8> {
-        let [width, height] = self.whole_page().picture_size(LONGEST_SIDE as usize);
-        jpeg(&resized(&self.page.picture, width, height))
+        whole_jpeg(&self.page.picture, LONGEST_SIDE as usize)
     }
 
     /// Aligns the page with a face from points.
@@ -268,10 +264,7 @@ impl BlockCorrection {
     }
 
     fn whole_page(&self) -> PageRegion {
-        PageRegion {
-            corner: [0, 0],
-            size: [self.page.picture.width(), self.page.picture.height()],
-        }
+        PageRegion::whole([self.page.picture.width(), self.page.picture.height()])
     }
 }
 

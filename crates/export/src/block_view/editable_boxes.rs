@@ -4,9 +4,9 @@ use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
 use super::box_edits::{BoxEditError, BoxEdits};
-use super::page_layers::{PageRegion, jpeg};
+use super::page_layers::whole_jpeg;
 use super::registered_face::{outcome, stored_block};
-use crate::pictures::{Rgb, resized};
+use crate::pictures::Rgb;
 use crate::source_print::SourcePrint;
 use mocban_align::block::BoxesOutcome;
 use mocban_catalog::{BlockDetail, Catalog};
@@ -31,7 +31,7 @@ pub struct EditableBoxes {
     page_hash: ContentHash,
     labels_path: Option<String>,
     boxes: Vec<LabelBox>,
-    /// What the labels say of themselves, or why they cannot be read.
+    /// Warnings of the reader of labels, or why the labels cannot be read.
     warnings: Vec<String>,
     /// What the labels have replaced, if they were made on this page.
     earlier: Option<ReplacedLabels>,
@@ -150,15 +150,10 @@ impl EditableBoxes {
 
     /// Returns the image of the page as JPEG.
     pub fn page_jpeg(&self) -> Vec<u8> {
-        let whole = PageRegion {
-            corner: [0, 0],
-            size: [self.page.width(), self.page.height()],
-        };
-        let [width, height] = whole.picture_size(LONGEST_SIDE);
-        jpeg(&resized(&self.page, width, height))
+        whole_jpeg(&self.page, LONGEST_SIDE)
     }
 
-    /// Returns what the labels say of themselves, or why they cannot be read.
+    /// Returns the warnings of the reader of labels, or why the labels cannot be read.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }

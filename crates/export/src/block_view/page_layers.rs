@@ -48,6 +48,12 @@ pub struct PageRegion {
 }
 
 impl PageRegion {
+    /// Returns a whole page of this width and height.
+    pub(super) const fn whole(size: [usize; 2]) -> Self {
+        let corner = [0, 0];
+        Self { corner, size }
+    }
+
     /// Returns the part of the region within a page; `None` if there is none.
     #[must_use]
     pub fn within(self, page: [usize; 2]) -> Option<Self> {
@@ -89,10 +95,7 @@ impl PageLayers {
 
     /// Returns the whole page.
     pub fn whole(&self) -> PageRegion {
-        PageRegion {
-            corner: [0, 0],
-            size: self.size(),
-        }
+        PageRegion::whole(self.size())
     }
 
     /// Returns the pixels of the page per mm.
@@ -131,6 +134,13 @@ impl PageLayers {
 /// Encodes a picture as JPEG.
 pub(super) fn jpeg(picture: &Rgb) -> Vec<u8> {
     jpeg_rgb8(picture, QUALITY)
+}
+
+/// Encodes a whole page as JPEG, so that its longer side has at most `longest` pixels.
+pub(super) fn whole_jpeg(page: &Rgb, longest: usize) -> Vec<u8> {
+    let whole = PageRegion::whole([page.width(), page.height()]);
+    let [width, height] = whole.picture_size(longest);
+    jpeg(&resized(page, width, height))
 }
 
 /// Draws the relief of a face as it lies on a region of a page, lit from the upper left.

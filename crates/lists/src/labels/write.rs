@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::model::{LabelBox, PageFile};
@@ -9,6 +10,17 @@ use mocban_core::domain::rounded_edge;
 
 /// Key of the path of the labels that changed boxes replace. VIA and the reader of this crate ignore it.
 const REPLACES: &str = "mocban_replaces";
+
+/// What [`replaced_labels`] reads of a file. All else is skipped, so that it takes no memory.
+#[derive(Deserialize)]
+struct EditedProject {
+    mocban_replaces: StoredPath,
+}
+
+/// A path or null, which must be there.
+#[derive(Deserialize)]
+struct StoredPath(Option<String>);
+
 /// Category of boxes without a character.
 const NO_TEXT: &str = "character";
 
@@ -34,12 +46,9 @@ pub fn write_edited(boxes: &[LabelBox], page: &PageFile<'_>, replaced: &Replaced
 
 /// Returns which labels a file has replaced; `None` if [`write_edited`] did not write it.
 pub fn replaced_labels(bytes: &[u8]) -> Option<ReplacedLabels> {
-    let project: Value = serde_json::from_slice(bytes).ok()?;
-    let path = match project.get(REPLACES)? {
-        Value::Null => None,
-        Value::String(path) => Some(path.clone()),
-        _ => return None,
-    };
+    let EditedProject {
+        mocban_replaces: StoredPath(path),
+    } = serde_json::from_slice(bytes).ok()?;
     Some(ReplacedLabels { path })
 }
 

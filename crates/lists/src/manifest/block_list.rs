@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
 use super::column_names::missing_column;
-use super::csv::{BoundedRows, ListedColumn, column_names, draft_of};
+use super::csv::{ListedColumn, column_names, draft_of, row_reader};
 use super::draft::{DraftRow, MAX_PATH_BYTES, check_meta};
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::{first_keys, json_rows};
@@ -57,7 +57,10 @@ pub fn is_block_list(bytes: &[u8]) -> bool {
         return false;
     };
     let mut record = ::csv::ByteRecord::new();
-    if !matches!(reader(&text).read_byte_record(&mut record), Ok(true)) {
+    if !matches!(
+        row_reader(&text.bytes, text.delimiter).read_byte_record(&mut record),
+        Ok(true)
+    ) {
         return false;
     }
     column_names(1, &record, "").is_ok_and(|names| has_block_columns(&names))
@@ -82,15 +85,6 @@ fn has_block_columns(names: &[&str]) -> bool {
     page && !(id && print) || block && (labels || side) && !id && !print
 }
 
-fn reader<'t>(text: &'t CsvText<'_>) -> ::csv::Reader<BoundedRows<'t>> {
-    ::csv::ReaderBuilder::new()
-        .delimiter(text.delimiter)
-        .trim(::csv::Trim::All)
-        .flexible(true)
-        .has_headers(false)
-        .from_reader(BoundedRows::new(&text.bytes))
-}
-
 /// Parses a list of blocks. Columns may be in any order, and their names in any case. Blank lines are ignored.
 ///
 /// # Errors
@@ -108,7 +102,7 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
     let text = CsvText::new(bytes).map_err(|error| of_list(&error.to_string()))?;
     let bytes = &*text.bytes;
     check_quotes(bytes, text.delimiter).map_err(|error| at_line(error.line, &error.to_string()))?;
-    let mut reader = reader(&text);
+    let mut reader = row_reader(&text.bytes, text.delimiter);
     let mut lines = LineCounter::new(bytes);
     let mut record = ::csv::ByteRecord::new();
     let mut rows = BlockRows::default();
@@ -153,11 +147,9 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
 pub fn read_block_json(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
     let mut rows = BlockRows::default();
     let read = json_rows(bytes, COLUMNS, &mut |row| {
-        let is_exported = row.draft.as_ref().is_ok_and(is_exported);
-        let draft = if is_exported {
-            Err(EXPORTED.to_owned())
-        } else {
-            row.draft
+        let draft = match row.draft {
+            Ok(draft) if is_exported(&draft) => Err(EXPORTED.to_owned()),
+            draft => draft,
         };
         rows.push(row.line, draft);
     });

@@ -49,12 +49,7 @@ pub fn read_csv_as(
     let text = CsvText::new(bytes).map_err(|error| of_list(&error.to_string()))?;
     let (bytes, delimiter) = (&*text.bytes, text.delimiter);
     check_quotes(bytes, delimiter).map_err(|error| at_line(error.line, &error.to_string()))?;
-    let mut reader = ::csv::ReaderBuilder::new()
-        .delimiter(delimiter)
-        .trim(::csv::Trim::All)
-        .flexible(true)
-        .has_headers(false)
-        .from_reader(BoundedRows::new(bytes));
+    let mut reader = row_reader(bytes, delimiter);
     let mut lines = LineCounter::new(bytes);
     let mut record = ::csv::ByteRecord::new();
     let mut header: Option<CsvHeader> = None;
@@ -81,6 +76,16 @@ pub fn read_csv_as(
         }
     }
     rows.finish()
+}
+
+/// Reads the rows of a list, the header too, without blanks at the ends of cells.
+pub(super) fn row_reader(bytes: &[u8], delimiter: u8) -> ::csv::Reader<BoundedRows<'_>> {
+    ::csv::ReaderBuilder::new()
+        .delimiter(delimiter)
+        .trim(::csv::Trim::All)
+        .flexible(true)
+        .has_headers(false)
+        .from_reader(BoundedRows::new(bytes))
 }
 
 /// Reads a list, and fails in a row that is longer than [`MAX_ROW_BYTES`].

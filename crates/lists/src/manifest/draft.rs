@@ -7,7 +7,7 @@ use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
 use mocban_core::domain::spelling::plain_form;
-use mocban_core::domain::{LengthUnit, PairName, PairNameError, any_case, sanitize};
+use mocban_core::domain::{LengthUnit, PairName, PairNameError, any_case, sanitize, value_text};
 
 /// The cells of one row by lower-case column name, and its other columns.
 #[derive(Debug, Default)]
@@ -175,10 +175,8 @@ fn check_lengths(draft: &DraftRow, reasons: &mut Vec<String>) {
 /// Records metadata that is too long with the name of its column.
 pub(super) fn check_meta(meta: &BTreeMap<String, serde_json::Value>, reasons: &mut Vec<String>) {
     for (name, value) in meta {
-        let len = value
-            .as_str()
-            .map_or_else(|| value.to_string().len(), str::len);
-        check_length(name, name.len() + len, MAX_CELL_BYTES, reasons);
+        let len = name.len() + value_text(value).len();
+        check_length(name, len, MAX_CELL_BYTES, reasons);
     }
 }
 

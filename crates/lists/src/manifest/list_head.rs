@@ -1,7 +1,7 @@
 //! The header of a list and its first rows, which help to choose its columns.
 
 use super::chosen_columns::ChosenColumns;
-use super::csv::{BoundedRows, column_names};
+use super::csv::{column_names, row_reader};
 use super::text::CsvText;
 use mocban_core::domain::sanitize;
 
@@ -38,12 +38,7 @@ impl ListHead {
 /// Reads the header of a CSV list and up to `rows` rows. `None` if it has no header that can be read.
 pub fn read_head(bytes: &[u8], chosen: &ChosenColumns, rows: usize) -> Option<ListHead> {
     let text = CsvText::new(bytes).ok()?;
-    let mut reader = ::csv::ReaderBuilder::new()
-        .delimiter(text.delimiter)
-        .trim(::csv::Trim::All)
-        .flexible(true)
-        .has_headers(false)
-        .from_reader(BoundedRows::new(&text.bytes));
+    let mut reader = row_reader(&text.bytes, text.delimiter);
     let mut record = ::csv::ByteRecord::new();
     if !reader.read_byte_record(&mut record).ok()? {
         return None;

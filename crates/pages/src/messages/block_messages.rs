@@ -100,11 +100,11 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ("correct or remove it", "hãy sửa hoặc bỏ đi"),
     (
         "1 box repeats another and was left out: {}",
-        "có một khung trùng với khung khác: {0}",
+        "có một khung trùng với khung khác và đã bị bỏ: {0}",
     ),
     (
         "1 box is smaller than a pixel, a point or a line and was left out: {}",
-        "có một khung nhỏ hơn một điểm ảnh: {0}",
+        "có một khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ, và đã bị bỏ: {0}",
     ),
     (
         "is this the scan of a whole block?",

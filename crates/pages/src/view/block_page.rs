@@ -84,8 +84,9 @@ struct ShownBlock {
     overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
 }
 
-/// Returns the routes of the page of a block, of its correction and of its boxes. Without `view`, the correction is shown first. A language in
-/// the address of a page, as in `?lang=vi`, is preferred to `language`; without both, the browser decides.
+/// Returns the routes of the page of a block, of its correction and of its boxes. Without `view`, the correction is shown
+/// first. A language in the address of a page, as in `?lang=vi`, is preferred to `language`; without both, the browser
+/// decides.
 pub(super) fn block_page(
     block: &BlockName,
     view: Option<BlockView>,

@@ -43,7 +43,7 @@ struct BoxesBody {
     edits: BoxEdits,
 }
 
-/// The hash of what the page has shown, whose labels are replaced by the earlier ones.
+/// The hash of what the page has shown, to go back to the earlier labels.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EarlierBody {
