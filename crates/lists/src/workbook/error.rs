@@ -78,6 +78,14 @@ pub enum WorkbookError {
         /// Name of its column.
         column: String,
     },
+    /// A value that several columns share.
+    #[error(
+        "cells {} are merged over several columns; unmerge them, and write each value into its own cell", sanitize(.cells, MAX_SHOWN)
+    )]
+    MergedColumns {
+        /// The cells, such as `B5:C6`.
+        cells: String,
+    },
     /// Several cells.
     #[error("{count} cells cannot be read:{}", lines(.first, *.count))]
     Cells {
@@ -98,6 +106,7 @@ impl WorkbookError {
                 | Self::NoResult { .. }
                 | Self::CellError { .. }
                 | Self::LineBreak { .. }
+                | Self::MergedColumns { .. }
         )
     }
 }

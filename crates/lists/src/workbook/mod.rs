@@ -1,7 +1,9 @@
 //! Workbooks of Excel (XLSX): ZIP archives of XML. A sheet becomes CSV text, which is then read like any list.
 
 mod archive;
+mod cell_names;
 mod error;
+mod merged;
 mod number_format;
 mod parts;
 mod table;
@@ -33,11 +35,12 @@ pub fn is_workbook(bytes: &[u8]) -> bool {
 }
 
 /// Reads the sheet with a name, or else the first one that is not hidden. Numbers and dates become text as a reader sees
-/// them, `0117` with the format `0000` and `2026-11-21`; of formulas, the stored results are taken.
+/// them, `0117` with the format `0000` and `2026-11-21`; of formulas, the stored results are taken. Cells that are merged over
+/// rows of a column all have the value of the first.
 ///
 /// # Errors
 /// Returns an error if the bytes are not those of an XLSX workbook, it is damaged or too large, has no such sheet, or if a
-/// cell holds the error of a formula.
+/// cell holds the error of a formula or is merged over several columns.
 pub fn read_sheet(bytes: &[u8], name: Option<&str>) -> Result<SheetTable, WorkbookError> {
     let archive = WorkbookArchive::open(bytes)?;
     let workbook = Workbook::read(&archive)?;

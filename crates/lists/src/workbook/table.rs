@@ -3,14 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::archive::damaged;
+use super::cell_names::{MAX_COLUMNS, MAX_ROWS, column, letters};
 use super::error::WorkbookError;
+use super::merged::MergedCells;
 use super::parts::{TextCollector, Workbook, read_part, value};
 use crate::manifest::{is_id_or_path_column, is_text_column};
 use crate::xml::{XmlPart, local_name};
 
-/// Largest sheet: rows and columns of Excel.
-const MAX_ROWS: usize = 1 << 20;
-const MAX_COLUMNS: usize = 1 << 14;
 /// Longest table, in bytes. Cells share texts, so a small workbook may hold a large one. Less in tests.
 const MAX_TABLE_BYTES: usize = if cfg!(test) { 4 << 20 } else { 512 << 20 };
 
@@ -45,6 +44,8 @@ struct TableWriter<'w> {
     /// Column of the next cell if it does not say where it is.
     next_column: usize,
     cell: Option<OpenCell>,
+    /// Cells that share the value of the first of them.
+    merged: MergedCells,
     /// The first cells that cannot be read.
     refused: Vec<WorkbookError>,
     /// Number of these cells.
@@ -55,7 +56,7 @@ struct TableWriter<'w> {
 const MAX_REFUSED: usize = 10;
 
 /// Returns the text of a sheet as CSV. Columns without a name in the header are left out. Line breaks in cells that are no ids and
-/// no paths become blanks.
+/// no paths become blanks. Cells that are merged over rows of a column all have the value of the first.
 ///
 /// The header is the first row with a value that is no title: see [`is_header`]. A parser refuses titles above it.
 pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>, WorkbookError> {
@@ -70,6 +71,7 @@ pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>
         row_bytes: 0,
         next_column: 0,
         cell: None,
+        merged: MergedCells::read(file, text)?,
         refused: Vec::new(),
         refused_count: 0,
     };
@@ -160,10 +162,7 @@ impl TableWriter<'_> {
         }
         let text = match self.text(cell) {
             Err(error) if error.is_of_cell() => {
-                self.refused_count += 1;
-                if self.refused.len() < MAX_REFUSED {
-                    self.refused.push(error);
-                }
+                self.refuse(error);
                 // The row is not empty.
                 "?".to_owned()
             }
@@ -179,6 +178,14 @@ impl TableWriter<'_> {
         }
         self.cells[column] = text;
         Ok(())
+    }
+
+    /// Counts a cell that cannot be read, and keeps the first ones.
+    fn refuse(&mut self, error: WorkbookError) {
+        self.refused_count += 1;
+        if self.refused.len() < MAX_REFUSED {
+            self.refused.push(error);
+        }
     }
 
     /// Returns the text of a cell.
@@ -255,6 +262,24 @@ impl TableWriter<'_> {
         Ok(())
     }
 
+    /// Gives the cells of the open row, which is below the header, the values of those above with which they are merged.
+    fn fill_merged(&mut self) -> Result<(), WorkbookError> {
+        for refused in self.merged.begin_row(self.row, &self.cells, self.width) {
+            self.refuse(refused);
+        }
+        for (column, text) in self.merged.values() {
+            if self.cells.len() <= column {
+                self.cells.resize(column + 1, String::new());
+            }
+            if self.cells[column].is_empty() {
+                self.row_bytes += text.len();
+                check_table(self.csv.len() + self.row_bytes)?;
+                text.clone_into(&mut self.cells[column]);
+            }
+        }
+        Ok(())
+    }
+
     /// Writes the open row. Rows before it that are missing become blank lines.
     fn end_row(&mut self) -> Result<(), WorkbookError> {
         if self.cells.is_empty() {
@@ -265,6 +290,8 @@ impl TableWriter<'_> {
             let cells = self.cells.iter().enumerate();
             let names = cells.filter(|(_, name)| is_text_column(name));
             self.text_columns = names.map(|(k, name)| (k, name.clone())).collect();
+        } else if self.width > 0 {
+            self.fill_merged()?;
         }
         for _ in self.rows + 1..self.row {
             self.csv.push(b'\n');
@@ -310,44 +337,5 @@ fn push_cell(csv: &mut Vec<u8>, text: &str) {
     let one_line = text.replace(['\r', '\n'], " ").replace('"', "\"\"");
     for part in ["\"", &one_line, "\""] {
         csv.extend_from_slice(part.as_bytes());
-    }
-}
-
-/// Returns the column of a cell such as `AB12`, from 0.
-fn column(place: &str) -> Option<usize> {
-    let letters = place.bytes().take_while(u8::is_ascii_alphabetic);
-    let number = letters.take(4).fold(0, |number, letter| {
-        number * 26 + usize::from(letter.to_ascii_uppercase() - b'A') + 1
-    });
-    number.checked_sub(1)
-}
-
-/// Returns the letters of a column.
-fn letters(column: usize) -> String {
-    let mut letters = Vec::new();
-    let mut rest = column + 1;
-    while rest > 0 {
-        rest -= 1;
-        letters.insert(0, b'A' + (rest % 26) as u8);
-        rest /= 26;
-    }
-    String::from_utf8_lossy(&letters).into_owned()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{column, letters};
-
-    #[test]
-    fn columns_have_letters() {
-        for (name, number) in [("A1", 0), ("Z9", 25), ("AA1", 26), ("xfd1048576", 16_383)] {
-            assert_eq!(column(name), Some(number));
-            let upper = name
-                .trim_end_matches(|c: char| c.is_ascii_digit())
-                .to_uppercase();
-            assert_eq!(letters(number), upper);
-        }
-        assert_eq!(column("12"), None);
-        assert!(column("ZZZZZZZZZZZZZZZZ1").is_some_and(|column| column > 16_383));
     }
 }

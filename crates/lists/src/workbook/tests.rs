@@ -146,6 +146,61 @@ fn ids_that_became_dates_or_powers_of_ten_are_refused_and_other_columns_are_not(
     assert_eq!(csv(&sheet("weight", 2)), "\"weight\"\n\"46115\"\n");
 }
 
+/// Returns a workbook of a table with an id, files and a block in each row, and of these merged cells.
+fn with_merged(rows: &[&[&str]], areas: &[&str]) -> Vec<u8> {
+    let areas = areas.join("\"/><mergeCell ref=\"");
+    let rows = text_rows(rows);
+    // The helper writes the rows into the element that ends here.
+    let sheet = format!(
+        "{rows}</sheetData><mergeCells><mergeCell ref=\"{areas}\"/></mergeCells><sheetData>"
+    );
+    workbook(&[("a", &sheet)], "", "")
+}
+
+#[test]
+fn cells_merged_over_rows_all_have_the_value_of_the_first() {
+    let rows: [&[&str]; 6] = [
+        &["id", "mesh", "print", "block", "folio"],
+        &["1", "a", "a", "tale 1", "3a"],
+        &["2", "b", "b", "", ""],
+        &["", "", "", "", ""],
+        &["3", "c", "c"],
+        &["4", "d", "d", "", "4"],
+    ];
+    let bytes = with_merged(&rows, &["D2:D5", "E2:E3", "E6", "A1:A1"]);
+    assert_eq!(
+        csv(&bytes),
+        "\"id\",\"mesh\",\"print\",\"block\",\"folio\"\n\
+         \"1\",\"a\",\"a\",\"tale 1\",\"3a\"\n\"2\",\"b\",\"b\",\"tale 1\",\"3a\"\n\n\
+         \"3\",\"c\",\"c\",\"tale 1\",\n\"4\",\"d\",\"d\",,\"4\"\n"
+    );
+}
+
+#[test]
+fn cells_merged_over_columns_are_refused_below_the_header() {
+    let rows: [&[&str]; 4] = [
+        &["Khối 4"],
+        &["id", "mesh", "print", "block"],
+        &["1", "a", "a", "tale 1", "beside the table"],
+        &["2", "b", "", "tale 2"],
+    ];
+    let beside = with_merged(&rows, &["A1:D1", "D3:E3", "E3:F4"]);
+    assert!(csv(&beside).ends_with("\n\"2\",\"b\",,\"tale 2\"\n"));
+    assert_eq!(
+        refusal(&with_merged(&rows, &["A1:D1", "B4:C4"])),
+        "cells B4:C4 are merged over several columns; unmerge them, and write each value into its own cell"
+    );
+    let damaged = refusal(&with_merged(&rows, &["B4:4"]));
+    assert!(damaged.contains("there are no cells B4:4"), "{damaged}");
+    let areas: Vec<String> = (1..=1001).map(|row| format!("A{row}:B{row}")).collect();
+    let areas: Vec<&str> = areas.iter().map(String::as_str).collect();
+    let many = refusal(&with_merged(&rows, &areas));
+    assert!(
+        many.contains("more than 1000 areas of merged cells"),
+        "{many}"
+    );
+}
+
 #[test]
 fn the_first_visible_sheet_is_read_or_the_one_that_is_named() {
     let rows = |id: &str| text_rows(&[&["id", "mesh", "print"], &[id, "m", "p"]]);
