@@ -107,6 +107,10 @@ pub enum RunEvent {
         unchanged: u64,
         /// Pairs that were retired because their boxes are gone.
         retired: u64,
+        /// Retired pairs with verdicts.
+        judged: u64,
+        /// Retired pairs that came back with their boxes.
+        restored: u64,
         /// Stages that each new or changed pair has to run.
         stages: u64,
     },
@@ -155,6 +159,42 @@ fn is_now<S: Serializer>(level: &StopLevel, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_bool(*level == StopLevel::Now)
 }
 
+/// How the pairs of blocks changed when a run cut these.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct CutPairs {
+    /// Pairs that are new.
+    pub added: u64,
+    /// Pairs that changed and run again.
+    pub changed: u64,
+    /// Pairs that were retired because their boxes are gone.
+    pub retired: u64,
+    /// Retired pairs with verdicts.
+    pub judged: u64,
+    /// Retired pairs that came back with their boxes.
+    pub restored: u64,
+}
+
+impl CutPairs {
+    /// Counts the pairs of a block that is cut.
+    pub(super) const fn observe(&mut self, event: &RunEvent) {
+        if let RunEvent::BlockDone {
+            added,
+            changed,
+            retired,
+            judged,
+            restored,
+            ..
+        } = event
+        {
+            self.added += *added;
+            self.changed += *changed;
+            self.retired += *retired;
+            self.judged += *judged;
+            self.restored += *restored;
+        }
+    }
+}
+
 /// What a run did with blocks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct BlockSummary {
@@ -166,6 +206,8 @@ pub struct BlockSummary {
     pub left: u64,
     /// Blocks that failed in this or an earlier run.
     pub failed_in_all: u64,
+    /// The pairs of the blocks that this run finished.
+    pub pairs: CutPairs,
 }
 
 /// How a run ended.

@@ -106,7 +106,7 @@ pub use block_stages::{
     CharacterOutput, CutFiles,
 };
 pub use error::RunError;
-pub use events::{BlockSummary, RunEvent, RunSummary};
+pub use events::{BlockSummary, CutPairs, RunEvent, RunSummary};
 pub use free_memory::default_memory_limit;
 pub use options::{NamedWork, RunOptions, RunPart};
 pub use run::{fingerprints, run};

@@ -110,6 +110,7 @@ impl RunEnd {
                 failed: counts.blocks.failed,
                 left: blocks.left(),
                 failed_in_all: blocks.quarantined,
+                pairs: counts.cut,
             },
             stopped: is_left && stop.level() > StopLevel::Go,
             too_many_failures: counts.too_many_failures,

@@ -11,7 +11,7 @@ use super::block::slot::{BlockRunCounts, BlockSlot};
 use super::block::task::BlockReport;
 use super::blocking::task_result;
 use super::error::RunError;
-use super::events::RunEvent;
+use super::events::{CutPairs, RunEvent};
 use super::options::RunOptions;
 use super::pair_task::{PairOutcome, process_pair};
 use super::policy;
@@ -39,6 +39,7 @@ pub(super) struct RunCounts {
     pub(super) stages: u64,
     pub(super) too_many_failures: bool,
     pub(super) blocks: BlockRunCounts,
+    pub(super) cut: CutPairs,
 }
 
 /// The state of the main loop.
@@ -119,6 +120,7 @@ impl Scheduler {
                 _ = heartbeats.tick() => self.heartbeat().await?,
                 Some(event) = events.recv() => {
                     self.prefetch.observe(&event);
+                    self.counts.cut.observe(&event);
                     on_event(event);
                 }
                 Some(computed) = self.computing.join_next() => self.finish_computing(task_result(computed)),
@@ -132,6 +134,7 @@ impl Scheduler {
         }
         context.metrics.set_leased(0);
         while let Ok(event) = events.try_recv() {
+            self.counts.cut.observe(&event);
             on_event(event);
         }
         match self.fatal.take() {

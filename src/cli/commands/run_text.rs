@@ -10,13 +10,16 @@ use mocban_core::domain::JobStatus;
 use mocban_project::failures::Failures;
 use mocban_project::run::RunOutcome;
 use mocban_project::shell::shell_quoted;
-use mocban_runner::{BlockSummary, RunSummary};
+use mocban_runner::{BlockSummary, CutPairs, RunSummary};
 use mocban_system::time_text::duration;
 
 /// Prints how a run ended and which pairs failed.
 pub(crate) fn print_outcome(outcome: &RunOutcome, context: &Context) {
     let (summary, failures) = (&outcome.summary, &outcome.failures);
     context.info(&headline(summary));
+    if let Some(text) = cut_pairs_text(&summary.blocks.pairs) {
+        context.info(&text);
+    }
     if summary.failed_in_all > 0 {
         let heading = failed_heading("pair", summary.failed_in_all, summary.failed);
         let text = failures_text(failures, false);
@@ -54,6 +57,34 @@ fn headline(summary: &RunSummary) -> String {
     }
     let blocks = count(done, "block");
     format!("{blocks} done, {failed} failed, {left} left; {pairs}")
+}
+
+/// Says how the pairs of blocks changed, unless all are new: `pairs of blocks: 8 retired (1 judged), 8 added`.
+fn cut_pairs_text(pairs: &CutPairs) -> Option<String> {
+    let CutPairs {
+        added,
+        changed,
+        retired,
+        judged,
+        restored,
+    } = *pairs;
+    if changed + retired + restored == 0 {
+        return None;
+    }
+    let judged = if judged > 0 {
+        format!(" ({judged} judged)")
+    } else {
+        String::new()
+    };
+    let parts = [
+        (retired, format!("{retired} retired{judged}")),
+        (changed, format!("{changed} changed")),
+        (added, format!("{added} added")),
+        (restored, format!("{restored} came back")),
+    ];
+    let parts = parts.into_iter().filter(|(number, _)| *number > 0);
+    let parts: Vec<String> = parts.map(|(_, text)| text).collect();
+    Some(format!("pairs of blocks: {}", parts.join(", ")))
 }
 
 fn pair_headline(summary: &RunSummary) -> String {
@@ -179,7 +210,7 @@ pub(crate) fn block_plan_text(blocks: &[BlockPlanEntry]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Plan, failed_heading, plan_text};
+    use super::{CutPairs, Plan, cut_pairs_text, failed_heading, plan_text};
     use mocban_catalog::{FieldChange, FingerprintId, PlanEntry, StaleReason};
     use mocban_core::domain::Stage;
 
@@ -189,6 +220,25 @@ mod tests {
         assert_eq!(heading(3, 3), "3 blocks failed:");
         assert_eq!(heading(3, 1), "3 blocks failed, 2 of them in earlier runs:");
         assert_eq!(heading(1, 0), "1 block failed in earlier runs:");
+    }
+
+    #[test]
+    fn changes_of_the_pairs_of_blocks_are_told_with_lost_verdicts() {
+        let mut pairs = CutPairs {
+            added: 8,
+            ..CutPairs::default()
+        };
+        assert_eq!(cut_pairs_text(&pairs), None);
+        (pairs.retired, pairs.judged) = (8, 1);
+        let text = cut_pairs_text(&pairs).expect("a text");
+        assert_eq!(text, "pairs of blocks: 8 retired (1 judged), 8 added");
+        let pairs = CutPairs {
+            changed: 2,
+            restored: 1,
+            ..CutPairs::default()
+        };
+        let text = cut_pairs_text(&pairs).expect("a text");
+        assert_eq!(text, "pairs of blocks: 2 changed, 1 came back");
     }
 
     #[test]

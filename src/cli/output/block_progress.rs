@@ -102,6 +102,8 @@ mod tests {
             changed: 0,
             unchanged: 0,
             retired: 0,
+            judged: 0,
+            restored: 0,
             stages: 4,
         });
         progress.observe(&stage_of("b2", BlockStage::Face));

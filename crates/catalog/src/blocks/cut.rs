@@ -7,7 +7,7 @@ use crate::blocks::characters;
 use crate::blocks::model::{CutPair, NewCharacter};
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
-use crate::db::rows::names_json;
+use crate::db::rows::{json_array, names_json};
 use crate::db::script::Script;
 use crate::jobs::requeue::send_back;
 use crate::jobs::retired;
@@ -30,6 +30,10 @@ pub struct CutSummary {
     pub unchanged: u64,
     /// Pairs that were retired because their boxes are gone.
     pub retired: u64,
+    /// Retired pairs with verdicts.
+    pub judged: u64,
+    /// Retired pairs that came back with their boxes.
+    pub restored: u64,
 }
 
 /// What became of the checkpoint of a cut.
@@ -52,6 +56,13 @@ SELECT p.name FROM block_character AS c JOIN pair AS p ON p.id = c.pair WHERE c.
 
 const PAIRS: &str = "
 SELECT p.id, p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id";
+
+/// Selects the pairs among `?1` that have a job and a verdict that nobody has undone or set apart.
+const JUDGED: &str = "
+SELECT j.pair FROM job AS j WHERE j.pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) AND EXISTS (
+    SELECT 1 FROM verdict AS v WHERE v.pair = j.pair
+        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+        AND v.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))";
 
 /// The columns of a pair whose change does not affect its results.
 const WITHOUT_EFFECT: [&str; 3] = ["character", "block", "metadata"];
@@ -81,9 +92,24 @@ pub(crate) async fn store_cut(
     let mut deltas = Deltas::default();
     let summary = store_pairs(conn, &rows, at, &mut deltas).await?;
     let gone = characters::store(conn, block, &name, found).await?;
+    let judged = count_judged(conn, &gone).await?;
     let retired = retired::retire(conn, &gone, RetireCause::Labels, at, &mut deltas).await?;
     deltas.apply(conn).await?;
-    Ok(CutSummary { retired, ..summary })
+    Ok(CutSummary {
+        retired,
+        judged,
+        ..summary
+    })
+}
+
+/// Counts the pairs among these that are not retired and have verdicts.
+async fn count_judged(conn: &mut Conn, pairs: &[PairId]) -> Result<u64> {
+    if pairs.is_empty() {
+        return Ok(0);
+    }
+    let pairs = json_array(pairs.iter().map(|pair| pair.0));
+    let judged: Vec<PairId> = query_scalar(JUDGED).bind(pairs).fetch_all(conn).await?;
+    Ok(judged.len() as u64)
 }
 
 /// Returns the names of the pairs that a block does not have yet.
@@ -180,5 +206,7 @@ async fn store_pairs(
         changed,
         unchanged: all - summary.added - changed,
         retired: 0,
+        judged: 0,
+        restored: summary.restored,
     })
 }

@@ -6,7 +6,7 @@ use super::blocks::{attributes, block, character, stored, version, world};
 use super::{World, name};
 use crate::{
     BlockAttributes, BlockInputVersions, BlockReason, CharacterMaps, CheckpointOutcome, CutOrigin,
-    CutReply, NewCharacter, NewVerdict, RetiredPair, ReviewContext,
+    CutReply, CutSummary, NewCharacter, NewVerdict, RetiredPair, ReviewContext,
 };
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockStage, JobStatus, PairName, PrintFromMesh, RetireCause,
@@ -132,7 +132,14 @@ async fn only_changed_characters_run_again_and_verdicts_stay() {
     assert_eq!(requeued, [(BlockStage::Boxes, BlockReason::Labels)]);
     // `b` has other bytes, the box of `c` is gone.
     let second = vec![a.clone(), character("b", "new b")];
-    assert_eq!(world.finish_block(second).await, stored(0, 1, 1, 1));
+    let summary = CutSummary {
+        changed: 1,
+        unchanged: 1,
+        retired: 1,
+        judged: 1,
+        ..CutSummary::default()
+    };
+    assert_eq!(world.finish_block(second).await, CutReply::Stored(summary));
     world.assert_counters().await;
     assert_eq!(status_of(&world, "b_a").await, Some(JobStatus::Done));
     assert_eq!(status_of(&world, "b_b").await, Some(JobStatus::Ready));
@@ -158,7 +165,12 @@ async fn only_changed_characters_run_again_and_verdicts_stay() {
         .await
         .expect("reset");
     let third = vec![a, character("b", "new b"), c];
-    assert_eq!(world.finish_block(third).await, stored(0, 0, 3, 0));
+    let summary = CutSummary {
+        unchanged: 3,
+        restored: 1,
+        ..CutSummary::default()
+    };
+    assert_eq!(world.finish_block(third).await, CutReply::Stored(summary));
     world.assert_counters().await;
     assert_eq!(status_of(&world, "b_c").await, Some(JobStatus::Done));
     let log = world.catalog.verdict_log(None).await.expect("a read");
@@ -232,7 +244,15 @@ async fn verdicts_of_a_retired_pair_are_kept_but_not_counted() {
     let known = world.catalog.known_blocks().await.expect("a read");
     let reset = vec![(known[0].block, BlockStage::Cut)];
     world.catalog.reset_blocks(reset).await.expect("reset");
-    assert_eq!(world.finish_block(Vec::new()).await, stored(0, 0, 0, 1));
+    let summary = CutSummary {
+        retired: 1,
+        judged: 1,
+        ..CutSummary::default()
+    };
+    assert_eq!(
+        world.finish_block(Vec::new()).await,
+        CutReply::Stored(summary)
+    );
     let status = world.catalog.status(&fingerprints).await.expect("a read");
     assert_eq!((status.pairs, status.verdicts[&Verdict::Pass]), (0, 0));
     assert_eq!(

@@ -172,6 +172,8 @@ pub(super) fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> 
         changed,
         unchanged,
         retired,
+        judged: 0,
+        restored: 0,
     })
 }
 

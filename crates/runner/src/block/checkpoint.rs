@@ -215,6 +215,8 @@ async fn finish_cut(
         changed,
         unchanged,
         retired,
+        judged,
+        restored,
     } = summary;
     let block = block.work.attributes.name;
     finished(context, &block, &checkpoint);
@@ -224,6 +226,8 @@ async fn finish_cut(
         changed,
         unchanged,
         retired,
+        judged,
+        restored,
         stages: context.until.index() as u64 + 1,
     });
     Ok(AfterStage::End(JobEnd::Done))
