@@ -108,6 +108,7 @@ impl Listing {
         let refused = refused.map(|problems| refuse(file, problems));
         let read = parsed.unwrap_or_default();
         let mut warnings = misspelt.warnings();
+        warnings.extend(read.unnamed.warning());
         match unread.warnings() {
             Ok(unread) => warnings.extend(unread),
             Err(sentences) if refused.is_none() => return Err(refuse(file, &sentences).into()),

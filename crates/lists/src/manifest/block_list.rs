@@ -15,6 +15,7 @@ use super::json_rows::{first_keys, json_rows};
 use super::row::RowIds;
 use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter, encoding_hint};
+use super::unnamed_values::UnnamedValues;
 use crate::columns::KnownColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
@@ -174,6 +175,7 @@ fn is_exported(draft: &DraftRow) -> bool {
 struct BlockRows {
     rows: Vec<BlockRow>,
     ids: RowIds,
+    unnamed: UnnamedValues,
     problems: ManifestError,
 }
 
@@ -181,6 +183,9 @@ impl BlockRows {
     /// Checks a row and keeps it if it is valid. Records its problems otherwise.
     fn push(&mut self, line: usize, draft: Result<DraftRow, String>) {
         let mut reasons = Vec::new();
+        if let Ok(draft) = &draft {
+            self.unnamed.add(line, draft.unnamed);
+        }
         match draft.map(|draft| row(draft, &mut reasons)) {
             Ok(Some(row)) => {
                 let name = row.name.as_pair();
@@ -198,12 +203,18 @@ impl BlockRows {
 
     /// Returns the rows, or all problems of the list.
     fn finish(self) -> Result<ReadBlocks, ManifestError> {
-        let Self { rows, problems, .. } = self;
+        let Self {
+            rows,
+            unnamed,
+            problems,
+            ..
+        } = self;
         if problems == ManifestError::default() && rows.is_empty() {
             return Err(of_list("the list contains no blocks").into());
         }
         problems.check(false)?;
-        let warnings = similar_columns(&rows);
+        let similar = similar_columns(&rows);
+        let warnings = unnamed.warning().into_iter().chain(similar).collect();
         Ok(ReadBlocks { rows, warnings })
     }
 }

@@ -275,6 +275,8 @@ pub(super) fn draft_of(
             draft.cells.insert(known, cell.to_owned());
         } else if !cell.is_empty() && !name.is_empty() {
             draft.meta.insert(name.clone(), cell.into());
+        } else if !cell.is_empty() {
+            draft.unnamed += 1;
         }
     }
     Ok(draft)

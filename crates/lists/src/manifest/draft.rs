@@ -15,6 +15,8 @@ pub(super) struct DraftRow {
     pub(super) line: usize,
     pub(super) cells: BTreeMap<&'static str, String>,
     pub(super) meta: BTreeMap<String, serde_json::Value>,
+    /// Number of values in columns without a name.
+    pub(super) unnamed: usize,
 }
 
 impl DraftRow {
@@ -72,6 +74,7 @@ impl<'e> RowCollector<'e> {
         let mut reasons = Vec::new();
         let row = match draft {
             Ok(Some(draft)) => {
+                self.read.unnamed.add(line, draft.unnamed);
                 let name = self.name(&draft, &mut reasons);
                 complete(draft, name, &mut reasons)
             }

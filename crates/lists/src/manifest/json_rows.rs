@@ -158,15 +158,22 @@ fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, St
                 // As a cell of CSV.
                 let text = trimmed(&text);
                 if !text.is_empty() {
-                    draft.meta.insert(key, text.into());
+                    add_other(&mut draft, key, text.into());
                 }
             }
-            (None, value) => {
-                draft.meta.insert(key, value);
-            }
+            (None, value) => add_other(&mut draft, key, value),
         }
     }
     Ok(draft)
+}
+
+/// Adds the value of another column. A column without a name is not kept.
+fn add_other(draft: &mut DraftRow, key: String, value: Value) {
+    if key.trim().is_empty() {
+        draft.unnamed += 1;
+    } else {
+        draft.meta.insert(key, value);
+    }
 }
 
 /// Parses an object. If it is not JSON, tries again with `NaN` as no value.

@@ -18,6 +18,7 @@ mod misspelt_columns;
 mod row;
 mod similar_columns;
 mod text;
+mod unnamed_values;
 
 pub use self::csv::{parse_csv, read_csv, read_csv_as};
 pub use block_list::{
@@ -37,3 +38,4 @@ pub use misspelt_columns::MisspeltColumns;
 pub use row::{ManifestRow, ReadRows, RowIds};
 pub(crate) use row::{is_id_or_path_column, is_text_column};
 pub use text::{CsvText, LineCounter, NotText, as_utf8, trimmed};
+pub use unnamed_values::UnnamedValues;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 
+use super::unnamed_values::UnnamedValues;
 use crate::columns::{KnownColumns, plain_name};
 use mocban_core::domain::{ContentHash, LengthUnit, PairName};
 
@@ -125,6 +126,8 @@ pub struct ReadRows {
     pub ids: RowIds,
     /// Columns that were read under other names, as written, each with its name.
     pub renamed: BTreeMap<String, &'static str>,
+    /// Values in columns without a name.
+    pub unnamed: UnnamedValues,
 }
 
 /// Why ids that differ only in case are refused.

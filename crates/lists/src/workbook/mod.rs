@@ -25,7 +25,7 @@ const START: &[u8] = b"PK\x03\x04";
 pub struct SheetTable {
     /// The table, separated by commas. Its lines are the rows of the sheet, so an error in a line is one in that row.
     pub csv: Vec<u8>,
-    /// Says which sheet was read if there are others.
+    /// Says which sheet was read if there are others, and how many values stand beside the table.
     pub warning: Option<String>,
 }
 
@@ -74,8 +74,11 @@ pub fn read_sheet(bytes: &[u8], name: Option<&str>) -> Result<SheetTable, Workbo
         let (read, others) = (list(std::slice::from_ref(&sheet.name)), list(&others));
         format!("only the sheet {read} is read; name another one with --sheet: {others}")
     };
+    let (csv, beside) = table::csv(&workbook, &sheet.file, &text)?;
+    let warnings = (!is_chosen).then(warning).into_iter();
+    let warnings: Vec<String> = warnings.chain(beside.warning()).collect();
     Ok(SheetTable {
-        csv: table::csv(&workbook, &sheet.file, &text)?,
-        warning: (!is_chosen).then(warning),
+        csv,
+        warning: (!warnings.is_empty()).then(|| warnings.join("; ")),
     })
 }

@@ -7,7 +7,7 @@ use super::cell_names::{MAX_COLUMNS, MAX_ROWS, column, letters};
 use super::error::WorkbookError;
 use super::merged::MergedCells;
 use super::parts::{TextCollector, Workbook, read_part, value};
-use crate::manifest::{is_id_or_path_column, is_text_column};
+use crate::manifest::{UnnamedValues, is_id_or_path_column, is_text_column};
 use crate::xml::{XmlPart, local_name};
 
 /// Longest table, in bytes. Cells share texts, so a small workbook may hold a large one. Less in tests.
@@ -35,6 +35,8 @@ struct TableWriter<'w> {
     rows: usize,
     /// Number of columns of the header; 0 before it.
     width: usize,
+    /// Values beside the table, whose columns have no name.
+    beside: UnnamedValues,
     /// Columns whose values are names, with the header's.
     text_columns: BTreeMap<usize, String>,
     /// Number of the open row, from 1, its cells, and the bytes of their texts.
@@ -55,16 +57,21 @@ struct TableWriter<'w> {
 /// Largest number of cells that are named because they cannot be read.
 const MAX_REFUSED: usize = 10;
 
-/// Returns the text of a sheet as CSV. Columns without a name in the header are left out. Line breaks in cells that are no ids and
+/// Returns the text of a sheet as CSV, and the values to the right of the header, which are left out. Line breaks in cells that are no ids and
 /// no paths become blanks. Cells that are merged over rows of a column all have the value of the first.
 ///
 /// The header is the first row with a value that is no title: see [`is_header`]. A parser refuses titles above it.
-pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>, WorkbookError> {
+pub(super) fn csv(
+    workbook: &Workbook,
+    file: &str,
+    text: &str,
+) -> Result<(Vec<u8>, UnnamedValues), WorkbookError> {
     let mut writer = TableWriter {
         workbook,
         csv: Vec::new(),
         rows: 0,
         width: 0,
+        beside: UnnamedValues::default(),
         text_columns: BTreeMap::new(),
         row: 0,
         cells: Vec::new(),
@@ -106,7 +113,7 @@ pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>
         }
     })?;
     match (writer.refused_count, writer.refused.pop()) {
-        (0, _) | (_, None) => Ok(writer.csv),
+        (0, _) | (_, None) => Ok((writer.csv, writer.beside)),
         (1, Some(alone)) => Err(alone),
         (count, Some(last)) => {
             let mut first = writer.refused;
@@ -158,6 +165,8 @@ impl TableWriter<'_> {
         };
         let column = cell.column;
         if self.width > 0 && column >= self.width {
+            let has_value = !cell.value.trim().is_empty();
+            self.beside.add(self.row, usize::from(has_value));
             return Ok(());
         }
         let text = match self.text(cell) {

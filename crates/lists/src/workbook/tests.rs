@@ -42,6 +42,13 @@ fn a_sheet_becomes_lines_with_the_numbers_of_its_rows() {
         "\n\"id\",\"mesh \",\"print\",\"made\",\"seen\",\"note\"\n\n\n\
          \"0117\",\"stl/1, \"\"a\"\" & b.stl\",\"p.png \",\"2026-11-21\",\"true\",\"x y\"\n\"12\",,,\"0.25\",,\n"
     );
+    let warning = read_sheet(&bytes, None).expect("a sheet").warning;
+    assert_eq!(
+        warning.as_deref(),
+        Some(
+            "a value in a column without a name is left out, on line 5; name the column to keep it"
+        )
+    );
     let rows = parse_csv(csv(&bytes).as_bytes()).expect_err("a row without files");
     assert_eq!(
         rows.to_string(),
