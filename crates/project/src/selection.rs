@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use crate::shell::shell_quoted;
+use crate::shell::quoted_id;
 use mocban_catalog::{Catalog, RetiredPair};
 use mocban_core::domain::spelling::nearest;
 use mocban_core::domain::{BlockName, PairName, RetireCause};
@@ -244,7 +244,7 @@ pub async fn existing_block(catalog: &Catalog, typed: &str) -> ProjectResult<Blo
         return Ok(name);
     }
     if !catalog.pairs_of_listed_block(typed).await?.is_empty() {
-        let quoted = shell_quoted(typed);
+        let quoted = quoted_id(typed);
         let text = format!(
             "block {typed} has no page, because a list names it for its pairs; `contact-sheet {quoted}` draws them"
         );

@@ -25,9 +25,27 @@ pub fn shell_quoted(word: &str) -> String {
     }
 }
 
+/// Quotes an id as the last argument of a command. One that begins with a hyphen stands behind `--`, so that it is no
+/// option.
+pub fn quoted_id(id: &str) -> String {
+    let quoted = shell_quoted(id);
+    if id.starts_with('-') {
+        format!("-- {quoted}")
+    } else {
+        quoted
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::shell_quoted;
+    use super::{quoted_id, shell_quoted};
+
+    #[test]
+    fn an_id_with_a_hyphen_at_its_start_is_no_option() {
+        assert_eq!(quoted_id("-2+3"), "-- -2+3");
+        assert_eq!(quoted_id("-a b"), "-- '-a b'");
+        assert_eq!(quoted_id("a-b"), "a-b");
+    }
 
     #[test]
     fn words_that_a_shell_would_split_are_quoted() {

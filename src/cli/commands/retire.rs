@@ -6,7 +6,7 @@ use serde_json::json;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use mocban_project::retire::{self, RetireChoice, RetireOutcome};
-use mocban_project::shell::shell_quoted;
+use mocban_project::shell::quoted_id;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_system::time_text::local;
 
@@ -83,7 +83,7 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
     } else if args.last_import && others == 0 {
         context.next("retire --undo --last-import");
     } else if let ([typed], 0, true) = (args.pairs.as_slice(), others, changed > 0) {
-        context.next(&format!("retire --undo {}", shell_quoted(typed)));
+        context.next(&format!("retire --undo {}", quoted_id(typed)));
     }
     Ok(ExitCode::Done)
 }

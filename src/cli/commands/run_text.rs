@@ -9,7 +9,7 @@ use mocban_catalog::{BlockPlanEntry, Plan, StatusCounts};
 use mocban_core::domain::JobStatus;
 use mocban_project::failures::Failures;
 use mocban_project::run::RunOutcome;
-use mocban_project::shell::shell_quoted;
+use mocban_project::shell::quoted_id;
 use mocban_runner::{BlockSummary, CutPairs, RunSummary};
 use mocban_system::time_text::duration;
 
@@ -133,7 +133,7 @@ pub(crate) fn next_steps(outcome: &RunOutcome) -> Vec<String> {
         steps.push("run".to_owned());
     }
     if let Some(first) = failures.blocks.first_failed() {
-        steps.push(format!("show {}", shell_quoted(&first)));
+        steps.push(format!("show {}", quoted_id(&first)));
     }
     if summary.failed_in_all > 0 {
         steps.extend(failed_pair_steps(failures));
@@ -162,7 +162,7 @@ pub(crate) fn empty_project_step(counts: &StatusCounts, failures: &Failures) -> 
 /// Returns the commands that show a failed pair and let failed pairs run again.
 pub(crate) fn failed_pair_steps(failures: &Failures) -> Vec<String> {
     let first = failures.pairs.first();
-    let show = first.map(|first| format!("show {}", shell_quoted(first.name.as_str())));
+    let show = first.map(|first| format!("show {}", quoted_id(first.name.as_str())));
     let may_retry = first.is_some() && failures.may_succeed_unchanged();
     let retry = may_retry.then(|| "retry".to_owned());
     show.into_iter().chain(retry).collect()

@@ -15,7 +15,7 @@ use mocban_core::domain::{JobStatus, MetricOutcome, PairName, ThresholdMetric};
 use mocban_project::details::{self, Details, PairOverview};
 use mocban_project::failures::may_succeed_unchanged;
 use mocban_project::pair_table::{self, PairChoice};
-use mocban_project::shell::shell_quoted;
+use mocban_project::shell::quoted_id;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_store::Project;
 use mocban_system::time_text::local;
@@ -49,7 +49,7 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<Exi
         Details::ListedBlock(rows) => {
             let json = json!({"schema": 1, "block": id, "pairs": rows});
             context.print(&json, || table_text(&rows, context.stdout))?;
-            context.next(&format!("contact-sheet {}", shell_quoted(&id)));
+            context.next(&format!("contact-sheet {}", quoted_id(&id)));
             return Ok(ExitCode::Done);
         }
     };
@@ -158,7 +158,7 @@ fn may_retry(detail: &PairDetail) -> bool {
 }
 
 fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
-    let name = shell_quoted(detail.results.attributes.name.as_str());
+    let name = quoted_id(detail.results.attributes.name.as_str());
     match detail.results.status {
         JobStatus::Quarantined | JobStatus::Done if has_work => vec![format!("run {name}")],
         JobStatus::Quarantined if !may_retry(detail) => Vec::new(),

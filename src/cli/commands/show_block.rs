@@ -12,7 +12,7 @@ use crate::cli::output::table::{columns, count};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, BlockStage, JobStatus, one_line, value_text};
 use mocban_project::ProjectResult;
-use mocban_project::shell::shell_quoted;
+use mocban_project::shell::quoted_id;
 use mocban_store::Project;
 use mocban_system::time_text::{duration, local};
 
@@ -35,7 +35,7 @@ pub(crate) fn show_block(
 ) -> ProjectResult<()> {
     let json = as_json(detail, characters, project)?;
     context.print(&json, || text(detail, characters, context.stdout))?;
-    let quoted = shell_quoted(detail.state.attributes.name.as_str());
+    let quoted = quoted_id(detail.state.attributes.name.as_str());
     let failure = detail.state.failure.as_ref();
     match detail.state.status {
         // Control points may help.

@@ -23,7 +23,7 @@ use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::hosts::WorkerTable;
 use mocban_project::location::now;
 use mocban_project::pair_table::{self, PairChoice, PairRow};
-use mocban_project::shell::shell_quoted;
+use mocban_project::shell::quoted_id;
 use mocban_project::status::ProjectStatus;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::Stop;
@@ -181,7 +181,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
         steps.push("run".to_owned());
     }
     if let Some(first) = status.failures.blocks.first_failed() {
-        steps.push(format!("show {}", shell_quoted(&first)));
+        steps.push(format!("show {}", quoted_id(&first)));
     }
     steps.extend(failed_pair_steps(&status.failures));
     if status.counts.low_confidence > 0 {

@@ -14,7 +14,7 @@ use mocban_pages::review::Language;
 use mocban_pages::view::{BlockPoints, open_block, scan_page};
 use mocban_project::blocking::blocking;
 use mocban_project::selection;
-use mocban_project::shell::shell_quoted;
+use mocban_project::shell::quoted_id;
 use mocban_project::verdict_words;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_store::Project;
@@ -73,7 +73,7 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<Exi
         let of = args
             .metric
             .map_or_else(String::new, |metric| format!(" of {metric}"));
-        let command = context.command(&format!("show {}", shell_quoted(name.as_str())));
+        let command = context.command(&format!("show {}", quoted_id(name.as_str())));
         let text = format!("pair {name} has no result{of} to show; see: {command}");
         return Err(Refusal::NothingSelected(text).into());
     };
