@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
+use super::cell_errors::formula_error;
 use super::column_names::missing_column;
 use super::csv::{ListedColumn, column_names, draft_of, row_reader};
 use super::draft::{DraftRow, MAX_PATH_BYTES, check_meta};
@@ -275,7 +276,10 @@ fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
         }
     }
     let name = cells.get("block").map_or("", String::as_str);
-    let name = BlockName::new(name).map_err(|error| error.to_string());
+    let name = match formula_error(name) {
+        Some(reason) => Err(reason),
+        None => BlockName::new(name).map_err(|error| error.to_string()),
+    };
     let unit = cells
         .get("unit")
         .map(|cell| any_case::<LengthUnit>(cell))

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::cell_errors::formula_error;
 use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
@@ -94,6 +95,10 @@ impl<'e> RowCollector<'e> {
     /// Returns the row's id if it is valid and new.
     fn name(&mut self, draft: &DraftRow, reasons: &mut Vec<String>) -> Option<PairName> {
         let text = draft.cells.get("id").map_or("", String::as_str);
+        if let Some(reason) = formula_error(text) {
+            reasons.push(reason);
+            return None;
+        }
         // Without the id, the reason is the same in all rows and is shown once.
         let reason = |error: PairNameError| {
             if is_named_like_input(Path::new(text)) {

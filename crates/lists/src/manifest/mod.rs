@@ -3,6 +3,7 @@
 
 mod block_columns;
 mod block_list;
+mod cell_errors;
 mod chosen_columns;
 mod column_names;
 mod csv;
