@@ -170,7 +170,7 @@ pub(crate) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
     if summary.other_files > 0 {
         let pairs = count(summary.other_files, "pair");
         context.info(&format!(
-            "{pairs} with another mesh or print; the next run reads them"
+            "{pairs} with another mesh or print; the next run looks at them"
         ));
     }
     for (number, text) in [

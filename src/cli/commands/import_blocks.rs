@@ -71,7 +71,7 @@ pub(crate) fn print_outcome(outcome: &BlockImportOutcome, context: &Context) {
     if summary.other_files > 0 {
         let blocks = count(summary.other_files, "block");
         context.info(&format!(
-            "{blocks} with another scan, page or labels; the next run reads them"
+            "{blocks} with another scan, page or labels; the next run looks at them"
         ));
     }
     for (name, fields) in &summary.changed {

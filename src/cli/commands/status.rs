@@ -292,7 +292,7 @@ mod tests {
         assert!(!next_steps(&status).contains(&"run".to_owned()));
         status.counts.other_files = 2;
         let text = screen(&status, "demo", false, Palette::PLAIN);
-        let line = "changed      2 pairs with another mesh or print in the list than before; the next run reads them\n";
+        let line = "changed      2 pairs with another mesh or print in the list than before; the next run looks at them\n";
         assert!(text.ends_with(line), "{text}");
         assert_eq!(next_steps(&status)[0], "run");
     }
@@ -332,7 +332,7 @@ mod tests {
         status.failures.blocks.0 = vec![block.clone()];
         assert_eq!(next_steps(&status)[0], "run");
         let text = screen(&status, "demo", false, Palette::PLAIN);
-        let line = "changed      1 block with another scan, page or labels than before; the next run reads them\n";
+        let line = "changed      1 block with another scan, page or labels than before; the next run looks at them\n";
         assert!(text.contains(line), "{text}");
         block.other_files = false;
         status.failures.blocks.0 = vec![block];

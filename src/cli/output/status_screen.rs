@@ -37,7 +37,7 @@ pub(crate) fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Pale
     if status.counts.other_files > 0 {
         let pairs = count(status.counts.other_files, "pair");
         let text = format!(
-            "{pairs} with another mesh or print in the list than before; the next run reads them"
+            "{pairs} with another mesh or print in the list than before; the next run looks at them"
         );
         parts.push(line("changed", &text));
     }
@@ -45,7 +45,7 @@ pub(crate) fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Pale
     if blocks > 0 {
         let blocks = count(blocks, "block");
         let text = format!(
-            "{blocks} with another scan, page or labels than before; the next run reads them"
+            "{blocks} with another scan, page or labels than before; the next run looks at them"
         );
         parts.push(line("changed", &text));
     }
