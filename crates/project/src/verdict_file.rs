@@ -14,7 +14,7 @@ use super::verdict_columns::{COLUMNS, REQUIRED};
 use super::verdict_json::{array_rows, json_rows};
 use super::verdict_row::{GivenTime, VerdictRow, at_line};
 use super::verdict_words;
-use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext, person_name};
+use mocban_catalog::{InvalidVerdict, ListedVerdict, NewVerdict, ReviewContext, person_name};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
@@ -22,6 +22,7 @@ use mocban_lists::manifest::{
     CsvText, LineCounter, NotText, as_utf8, is_array, later_header, trimmed,
 };
 use mocban_lists::quotes::check_quotes;
+use mocban_system::time_text::day;
 
 /// The text of a verdict file. Its rows are parsed whenever they are needed, so that a long file takes little memory.
 #[derive(Debug, Clone)]
@@ -146,7 +147,16 @@ fn csv_rows(
 /// Refuses a row with values that no verdict has.
 pub fn check_values(row: &VerdictRow, now: UnixMillis) -> Result<(), RefusedLine> {
     let checked = row.listed.verdict.check(now);
-    checked.map_err(|error| RefusedLine::new(row.line, &error.to_string()))
+    checked.map_err(|error| {
+        let mut reason = error.to_string();
+        if let (InvalidVerdict::At, Some(at)) = (error, row.listed.verdict.at) {
+            reason = format!(
+                "{reason}, and this is {} in UTC; a date such as 3/4/2026 has the day first",
+                day(at)
+            );
+        }
+        RefusedLine::new(row.line, &reason)
+    })
 }
 
 /// Returns why a list with unknown pairs is refused, one line for each pair. `first_lines` has the first line of each pair,

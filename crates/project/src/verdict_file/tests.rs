@@ -226,6 +226,10 @@ fn values_that_no_verdict_has_are_refused_by_line() {
             "the time of a verdict is from 1970",
         ),
         (
+            "1,pass,lan,,,12/1/2999\n",
+            "the time of a verdict is from 1970 to now, and this is 2999-01-12 in UTC; a date such as 3/4/2026 has the day first",
+        ),
+        (
             "1,pass,lan,,,1815-01-01\n",
             "the time of a verdict is from 1970",
         ),
