@@ -18,6 +18,11 @@ function showProblem(form, text) {
   const problem = form.querySelector(".problem");
   problem.textContent = text;
   problem.hidden = !text;
+  if (!text) return;
+  // A refusal of a long form would stand below the window.
+  problem.tabIndex = -1;
+  problem.focus({ preventScroll: true });
+  problem.scrollIntoView({ block: "nearest" });
 }
 
 /** Returns the name under which this tab keeps the pairs that a form sends, if it sends any. */

@@ -54,16 +54,20 @@ pub(super) const COLUMNS: KnownColumns = KnownColumns {
         ("ky_hieu", "id"),
         ("ma_chu", "id"),
         ("so_hieu_chu", "id"),
+        ("ma_cap", "id"),
         ("ma", "id"),
+        ("ma_hien_vat", "id"),
         ("ban_quet", "mesh"),
         ("ban_quet_3d", "mesh"),
         ("tep_quet", "mesh"),
+        ("tep_ban_quet", "mesh"),
         ("mo_hinh_3d", "mesh"),
         ("luoi", "mesh"),
         ("ban_in", "print"),
         ("anh_ban_in", "print"),
         ("anh_in", "print"),
         ("tep_anh", "print"),
+        ("tep_ban_in", "print"),
         ("chu", "character"),
         ("mat_chu", "character"),
         ("chu_nom", "character"),
@@ -73,6 +77,7 @@ pub(super) const COLUMNS: KnownColumns = KnownColumns {
         ("ten_chu", "character"),
         ("so_hieu_van", "block"),
         ("ma_van", "block"),
+        ("van_so", "block"),
         ("so_hieu_khoi", "block"),
         ("van", "block"),
         ("van_khac", "block"),
@@ -80,21 +85,27 @@ pub(super) const COLUMNS: KnownColumns = KnownColumns {
         ("moc_ban", "block"),
         ("don_vi", "unit"),
         ("don_vi_do", "unit"),
+        ("don_vi_cua_ban_quet", "unit"),
         ("quet_up", "scanned_face_down"),
         ("quet_up_mat", "scanned_face_down"),
     ],
 };
 
 /// Columns with ids or paths that only lists of blocks or of verdicts have, and their other names.
-const OTHER_LISTS: [&str; 8] = [
+const OTHER_LISTS: [&str; 13] = [
     "pair",
     "cap",
     "ma_cap",
     "page",
     "trang",
+    "trang_in",
     "anh_trang",
+    "anh_trang_in",
+    "tep_trang",
+    "tep_trang_in",
     "labels",
     "nhan",
+    "tep_nhan",
 ];
 
 /// Returns whether the values of a column in a list of pairs, of blocks or of verdicts are names of things or of files, so

@@ -15,6 +15,7 @@ use super::components::{
 use super::failure::{AppFailure, AppResult};
 use super::pass_on::{in_chosen_language, pass_on, path_below};
 use super::projects::OpenProject;
+use super::remedies::block_remedy;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
@@ -45,7 +46,7 @@ pub(super) async fn page(
     let characters = open.catalog.block_characters(&name).await?;
     let body = html! {
         nav.pager { a href="../../blocks" { (visit.t("All blocks", "Tất cả các ván")) } }
-        (state_part(&visit, &detail))
+        (state_part(&visit, &key, &detail))
         (ways(&visit, &detail))
         (stages(&visit, &detail))
         (character_list(&visit, &name, &characters))
@@ -117,14 +118,14 @@ async fn opened(open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router>
         .pages)
 }
 
-fn state_part(visit: &Visit, detail: &BlockDetail) -> Markup {
+fn state_part(visit: &Visit, key: &str, detail: &BlockDetail) -> Markup {
     let state = &detail.state;
     html! {
         p { (state_badge(visit, state)) }
         @if let Some(stored) = &state.failure {
             div.notice.bad {
                 p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored_message(visit, &stored.failure.message)) }
-                p { (visit.block_remedy(stored.stage, stored.failure.class)) }
+                (block_remedy(visit, key, &state.attributes, stored.stage, (stored.failure.class, &stored.failure.message)))
                 @if stored.stage == BlockStage::Boxes {
                     p { a href="view/boxes" { (visit.t("Edit the boxes on the page", "Sửa khung chữ trên trang in")) } }
                 }

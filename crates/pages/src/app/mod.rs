@@ -61,6 +61,7 @@ mod qr_code;
 mod read_only;
 mod received_archive;
 mod received_files;
+mod remedies;
 mod report_page;
 mod report_sentences;
 mod restore_action;

@@ -3,8 +3,9 @@
 use maud::{Markup, html};
 
 use super::components::{score, stored_message};
+use super::remedies::failed_part;
 use super::visit::Visit;
-use mocban_catalog::{AttemptRecord, VerdictEvent};
+use mocban_catalog::{AttemptRecord, PairAttributes, VerdictEvent};
 use mocban_core::domain::{UnixMillis, one_line};
 use mocban_project::details::{ManualResult, PairOverview};
 
@@ -14,8 +15,9 @@ const SHOWN_EVENTS: usize = 50;
 /// Returns the newest events, oldest first.
 pub(super) fn history(visit: &Visit, overview: &PairOverview) -> Markup {
     let detail = &overview.detail;
+    let attributes = &detail.results.attributes;
     let attempts = detail.attempts.iter();
-    let attempts = attempts.map(|attempt| (attempt.at, attempt_line(visit, attempt)));
+    let attempts = attempts.map(|attempt| (attempt.at, attempt_line(visit, attributes, attempt)));
     let verdicts = detail.verdict_log.iter();
     let verdicts = verdicts.map(|event| (event.at, verdict_line(visit, event)));
     let manual = overview.manual.iter();
@@ -33,10 +35,15 @@ pub(super) fn history(visit: &Visit, overview: &PairOverview) -> Markup {
     }
 }
 
-fn attempt_line(visit: &Visit, attempt: &AttemptRecord) -> Markup {
+fn attempt_line(visit: &Visit, pair: &PairAttributes, attempt: &AttemptRecord) -> Markup {
+    let failure = attempt.failure.as_ref();
+    let part = failure.map_or_else(
+        || visit.stage(attempt.stage),
+        |failure| failed_part(visit, pair, attempt.stage, &failure.message),
+    );
     html! {
         li {
-            (visit.time(attempt.at)) " · " (visit.stage(attempt.stage)) " · "
+            (visit.time(attempt.at)) " · " (part) " · "
             @match &attempt.failure {
                 Some(failure) => span.bad { (visit.class(failure.class)) ": " (stored_message(visit, &failure.message)) },
                 None => { (visit.t("done", "xong")) @if let Some(ms) = attempt.ms { " (" (visit.duration(ms)) ")" } }

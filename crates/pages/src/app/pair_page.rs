@@ -12,6 +12,7 @@ use super::failure::AppResult;
 use super::pair_history::{history, verdict_line};
 use super::pair_numbers::numbers;
 use super::paper_method::{PAPER, is_comparable};
+use super::remedies::{failed_part, pair_remedy};
 use super::retired_pairs::retired_band;
 use super::state::AppState;
 use super::visit::Visit;
@@ -77,7 +78,7 @@ pub(super) async fn page(
         visit.query.get("compare") == Some(PAPER) && is_comparable(&overview.detail.results);
     let body = html! {
         (neighbour_links(&visit, &neighbours))
-        (state_line(&visit, &overview))
+        (state_line(&visit, &key, &overview))
         @if let Some(record) = record {
             @let (metric, other_metric) = (record.outcome.metric, other.map(|other| other.outcome.metric));
             (metric_links(&visit, &overview.detail, metric, other_metric))
@@ -137,7 +138,7 @@ fn neighbour_links(visit: &Visit, neighbours: &[Option<PairName>; 2]) -> Markup 
     }
 }
 
-fn state_line(visit: &Visit, overview: &PairOverview) -> Markup {
+fn state_line(visit: &Visit, key: &str, overview: &PairOverview) -> Markup {
     let results = &overview.detail.results;
     html! {
         p {
@@ -149,8 +150,8 @@ fn state_line(visit: &Visit, overview: &PairOverview) -> Markup {
         }
         @if let Some(stored) = &results.failure {
             div.notice.bad {
-                p { b { (visit.class(stored.failure.class)) } " (" (visit.stage(stored.stage)) "): " (stored_message(visit, &stored.failure.message)) }
-                p { (visit.remedy(stored.failure.class)) }
+                p { b { (visit.class(stored.failure.class)) } " (" (failed_part(visit, &results.attributes, stored.stage, &stored.failure.message)) "): " (stored_message(visit, &stored.failure.message)) }
+                (pair_remedy(visit, key, stored.failure.class, &[results]))
             }
         }
     }

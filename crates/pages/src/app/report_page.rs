@@ -14,6 +14,7 @@ use super::run_blocks::failed_blocks_part;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::read_in_turn;
+use crate::review::Language;
 use mocban_core::domain::one_line;
 use mocban_project::location::now;
 use mocban_project::report::{ReportOptions, read, report};
@@ -52,6 +53,7 @@ pub(super) async fn page(
             @for (_, extension, _, name) in DOWNLOADS {
                 a.button href={ "report/file/report." (extension) } download { (name) }
             }
+            @if visit.language == Language::Vietnamese { span.muted #file-language { "(tệp bằng tiếng Anh)" } " " }
             // The numbers of the page are loaded first.
             button #print type="button" data-print disabled { (visit.t("Print or save as PDF", "In hoặc lưu thành PDF")) }
         }

@@ -11,6 +11,7 @@ use super::failure::AppResult;
 use super::home::free_space;
 use super::latest_results::latest_results;
 use super::projects::OpenProject;
+use super::remedies::pair_remedy;
 use super::run_blocks::{
     blocks_text, failed_block_list, failed_blocks, other_blocks_text, outdated_blocks_text,
 };
@@ -45,7 +46,7 @@ pub(super) async fn page(
             (disk(&visit, &open))
             (latest_results(&visit, &run.latest))
             (failed_block_list(&visit, &run.blocks))
-            (failures(&visit, &run))
+            (failures(&visit, &key, &run))
         }
     };
     let title = visit.t("Run", "Căn chỉnh");
@@ -234,7 +235,7 @@ fn disk(visit: &Visit, open: &OpenProject) -> Markup {
     html! { @if let Some(free) = free { p.muted { (free_space(visit, free)) } } }
 }
 
-fn failures(visit: &Visit, run: &RunState) -> Markup {
+fn failures(visit: &Visit, key: &str, run: &RunState) -> Markup {
     html! {
         @if !run.failures.is_empty() {
             section {
@@ -242,7 +243,7 @@ fn failures(visit: &Visit, run: &RunState) -> Markup {
                 @for (class, number, examples) in &run.failures {
                     article.card {
                         h3 { (grouped(*number)) " · " (visit.class(*class)) }
-                        p { (visit.remedy(*class)) }
+                        (pair_remedy(visit, key, *class, &examples.iter().collect::<Vec<_>>()))
                         ul { @for pair in examples { (example(visit, pair)) } }
                         div.row {
                             a.button href={ "pairs?view=table&state=failed&class=" (class) } { (visit.t("Show them", "Xem các cặp này")) }

@@ -99,8 +99,8 @@ impl Visit {
                 "Trang in có thể của ván khác, hoặc bản quét chỉ có một phần. Nếu chúng cùng một ván, hãy căn chỉnh theo các điểm tự chọn.",
             ),
             (_, FailureClass::BadInput | FailureClass::NoSolution) => self.t(
-                "Replace the file that is named, or correct it; the next run notices that by itself.",
-                "Hãy thay hoặc sửa tệp được nêu; lần chạy sau sẽ tự nhận ra.",
+                "Replace the file that is named; the next run notices that by itself.",
+                "Hãy thay tệp được nêu; lần chạy sau sẽ tự nhận ra.",
             ),
             (_, class) => self.remedy(class),
         }
@@ -136,8 +136,8 @@ impl Visit {
     pub(super) const fn remedy(&self, class: FailureClass) -> &'static str {
         match class {
             FailureClass::BadInput => self.t(
-                "Each pair says what is wrong with its file. Replace the file or correct the row of the list; the next run notices that by itself.",
-                "Mỗi cặp cho biết tệp của nó bị gì. Hãy thay tệp hoặc sửa dòng trong danh sách; lần chạy sau sẽ tự nhận ra.",
+                "Each pair says what is wrong with its file. Replace the file; the next run notices that by itself.",
+                "Mỗi cặp cho biết tệp của nó bị gì. Hãy thay tệp đó; lần chạy sau sẽ tự nhận ra.",
             ),
             FailureClass::NoSolution => self.t(
                 "The scan and the print may not belong together, the unit may be wrong, or the scan may show the back. Look at the pictures of the pair first.",

@@ -55,6 +55,33 @@ fn a_list_may_be_vietnamese() {
 }
 
 #[test]
+fn the_headings_of_the_app_are_read() {
+    for header in [
+        "Ván,Bản quét,Trang in,Nhãn,Đơn vị,Mặt",
+        "Mã ván,Tệp quét,Ảnh trang,Tệp nhãn,Đơn vị của bản quét,Mặt",
+        "Mã hiện vật,Bản quét 3D,Ảnh trang in,nhãn,đơn vị đo,mặt",
+        "Ván số,Tệp bản quét,Tệp trang in,NHÃN,Đơn vị,MẶT",
+    ] {
+        let list = format!("{header}\nb1,m.stl,p.jpg,l.json,mm,sau\n");
+        assert!(is_block_list(list.as_bytes()), "{header}");
+        let rows = parse_blocks(list.as_bytes()).expect(header);
+        let row = &rows[0];
+        assert_eq!(row.name.as_str(), "b1", "{header}");
+        assert_eq!(row.page.to_str(), Some("p.jpg"), "{header}");
+        assert_eq!(row.labels.as_deref(), Some("l.json".as_ref()), "{header}");
+        assert_eq!(
+            (row.unit, row.side, row.meta.len()),
+            (Some(LengthUnit::Mm), Some(BlockSide::Back), 0),
+            "{header}"
+        );
+    }
+    // Without a page, a scan and a print are a pair, although no column has the name of an id.
+    for header in ["Nr,Bản quét,Bản in", "Ván,Bản quét,Bản in"] {
+        assert!(!is_block_list(header.as_bytes()), "{header}");
+    }
+}
+
+#[test]
 fn problems_name_line_and_column() {
     for (text, expected) in [
         (

@@ -222,6 +222,9 @@ fn headers_may_be_vietnamese_in_any_case_and_with_blanks() {
     for header in [
         "Mã số,Bản quét,Bản in,Tên chữ,Khối,Đơn vị,Quét úp,note",
         "MA SO,BAN QUET,BAN IN,CHU,SO HIEU VAN,DON VI,QUET UP,note",
+        "Mã,Tệp quét,Ảnh bản in,Chữ,Ván,Đơn vị của bản quét,Quét úp,note",
+        "Mã cặp,Tệp bản quét,Tệp bản in,Chữ,Ván số,Đơn vị đo,Quét úp,note",
+        "Mã hiện vật,Bản quét,Bản in,Chữ,Mã ván,Đơn vị,Quét úp mặt,note",
         "ID,Mesh ,print\u{a0},ký tự,số hiệu ván,unit,Scanned Face-Down,note",
     ] {
         let rows = parse(&format!("{header}\na,b,c,d,e,mm,Có,f\n")).expect(header);

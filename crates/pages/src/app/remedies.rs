@@ -1,0 +1,221 @@
+//! What helps after failures of pairs and blocks, by their classes and by the files that their messages name.
+
+use std::path::Path;
+
+use maud::{Markup, html};
+
+use super::address::encoded;
+use super::visit::Visit;
+use mocban_catalog::{BlockAttributes, PairAttributes, PairResults};
+use mocban_core::domain::{BlockStage, FailureClass, Stage};
+
+/// The end of the message of a file that does not exist.
+const NOT_THERE: &str = " is not there";
+
+/// Where the files of pairs or blocks were named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FileOrigin {
+    /// In a list.
+    List,
+    /// In a list, in folders or by themselves.
+    Unknown,
+    /// In a block from which the pairs were cut.
+    Block,
+}
+
+impl FileOrigin {
+    fn of_pair(pair: &PairAttributes) -> Self {
+        let is_listed = pair.character.is_some()
+            || pair.block.is_some()
+            || pair.scanned_face_down.is_some()
+            || !pair.meta.is_empty();
+        match (&pair.prior, is_listed) {
+            (Some(_), _) => Self::Block,
+            (None, true) => Self::List,
+            (None, false) => Self::Unknown,
+        }
+    }
+
+    /// Returns what to correct; `None` if no import would help.
+    const fn correction(self, visit: &Visit) -> Option<&'static str> {
+        match self {
+            Self::List => Some(visit.t(
+                "If the list names a wrong file or unit, correct the list and import it again.",
+                "Nếu danh sách ghi sai tệp hoặc đơn vị, hãy sửa danh sách rồi nhập lại.",
+            )),
+            Self::Unknown => Some(visit.t(
+                "If another file or unit is right, import it again.",
+                "Nếu cần tệp hoặc đơn vị khác, hãy nhập lại.",
+            )),
+            Self::Block => None,
+        }
+    }
+
+    /// Returns what helps if a file does not exist.
+    const fn missing(self, visit: &Visit) -> &'static str {
+        match self {
+            Self::List => visit.t(
+                "The file is not there: put it there, or correct its path in the list and import the list again.",
+                "Không có tệp này: hãy đặt tệp vào đó, hoặc sửa đường dẫn trong danh sách rồi nhập lại danh sách.",
+            ),
+            Self::Unknown => visit.t(
+                "The file is not there: put it there, or import it again from where it is now.",
+                "Không có tệp này: hãy đặt tệp vào đó, hoặc nhập lại từ chỗ hiện có tệp.",
+            ),
+            Self::Block => visit.t(
+                "The file is not there. Run the block again, which cuts it anew.",
+                "Không có tệp này. Hãy chạy lại ván để cắt lại.",
+            ),
+        }
+    }
+}
+
+/// Returns what helps after failures of a class, of which some pairs are examples. `key` names the project.
+pub(super) fn pair_remedy(
+    visit: &Visit,
+    key: &str,
+    class: FailureClass,
+    examples: &[&PairResults],
+) -> Markup {
+    let mut origins = examples
+        .iter()
+        .map(|pair| FileOrigin::of_pair(&pair.attributes));
+    let origin = origins.next().unwrap_or(FileOrigin::Unknown);
+    let origin = if origins.all(|other| other == origin) {
+        origin
+    } else {
+        FileOrigin::Unknown
+    };
+    let messages = examples.iter().filter_map(|pair| pair.failure.as_ref());
+    let missing = messages.filter(|stored| stored.failure.message.ends_with(NOT_THERE));
+    let missing = missing.count();
+    let all_missing = missing > 0 && missing == examples.len();
+    remedy(
+        visit,
+        key,
+        origin,
+        class,
+        (!all_missing).then(|| visit.remedy(class)),
+        missing > 0,
+    )
+}
+
+/// Returns what helps after a stage of a block failed. `key` names the project.
+pub(super) fn block_remedy(
+    visit: &Visit,
+    key: &str,
+    block: &BlockAttributes,
+    stage: BlockStage,
+    (class, message): (FailureClass, &str),
+) -> Markup {
+    let is_listed = block.meta.as_ref().is_some_and(|meta| !meta.is_empty());
+    let origin = if is_listed {
+        FileOrigin::List
+    } else {
+        FileOrigin::Unknown
+    };
+    let is_missing = message.ends_with(NOT_THERE);
+    let general = (!is_missing).then(|| visit.block_remedy(stage, class));
+    remedy(visit, key, origin, class, general, is_missing)
+}
+
+fn remedy(
+    visit: &Visit,
+    key: &str,
+    origin: FileOrigin,
+    class: FailureClass,
+    general: Option<&str>,
+    is_missing: bool,
+) -> Markup {
+    let is_input = matches!(class, FailureClass::BadInput | FailureClass::NoSolution);
+    let correction = origin.correction(visit).filter(|_| is_input);
+    let has_import = correction.is_some() || (is_missing && origin != FileOrigin::Block);
+    html! {
+        @if let Some(general) = general { p { (general) } }
+        @if is_missing { p { (origin.missing(visit)) } }
+        @if let Some(correction) = correction { p { (correction) } }
+        @if has_import {
+            p { a href={ (visit.root) "import?project=" (encoded(key)) } { (visit.t("Import", "Nhập dữ liệu")) } }
+        }
+    }
+}
+
+/// Returns the part of a pair that failed: the file that the message names, or else the stage.
+pub(super) fn failed_part(
+    visit: &Visit,
+    pair: &PairAttributes,
+    stage: Stage,
+    message: &str,
+) -> &'static str {
+    let is_named = |path: &str| {
+        let name = Path::new(path).file_name();
+        name.and_then(|name| name.to_str())
+            .is_some_and(|name| message.contains(name))
+    };
+    match [&pair.mesh_path, &pair.print_path].map(|path| is_named(path)) {
+        [true, false] => visit.t("scan", "bản quét"),
+        [false, true] => visit.t("print", "bản in"),
+        [true, true] | [false, false] => visit.stage(stage),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FileOrigin, failed_part, remedy};
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+    use mocban_catalog::PairAttributes;
+    use mocban_core::domain::{FailureClass, PairName, Stage};
+    use serde_json::Map;
+
+    fn attributes(character: Option<&str>) -> PairAttributes {
+        PairAttributes {
+            name: PairName::new("1").expect("a name"),
+            mesh_path: "stl/1.stl".to_owned(),
+            print_path: "print/1.png".to_owned(),
+            unit: None,
+            scanned_face_down: None,
+            character: character.map(str::to_owned),
+            block: None,
+            meta: Map::new(),
+            prior: None,
+        }
+    }
+
+    #[test]
+    fn only_pairs_of_a_list_are_told_of_a_list() {
+        let origins = [Some("天"), None].map(|text| FileOrigin::of_pair(&attributes(text)));
+        assert_eq!(origins, [FileOrigin::List, FileOrigin::Unknown]);
+        let cases = [
+            (FailureClass::BadInput, false),
+            (FailureClass::NoSolution, false),
+            (FailureClass::Io, true),
+        ];
+        for (language, word) in [
+            (Language::English, "list"),
+            (Language::Vietnamese, "danh sách"),
+        ] {
+            let visit = Visit::in_language(language);
+            for (class, is_missing) in cases {
+                let [listed, unknown] = origins.map(|origin| {
+                    remedy(&visit, "a b", origin, class, None, is_missing).into_string()
+                });
+                assert!(listed.contains(word), "{listed}");
+                assert!(!unknown.contains(word), "{unknown}");
+                for shown in [listed, unknown] {
+                    assert!(shown.contains("import?project=a%20b"), "{shown}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_failure_names_its_file_or_its_stage() {
+        let visit = Visit::in_language(Language::Vietnamese);
+        let pair = attributes(None);
+        let of = |message| failed_part(&visit, &pair, Stage::Fit, message);
+        assert_eq!(of("print/1.png: the image is empty"), "bản in");
+        assert_eq!(of("/a/stl/1.stl is not there"), "bản quét");
+        assert_eq!(of("no plane"), "khớp mặt khắc");
+    }
+}
