@@ -1,7 +1,10 @@
 //! What an import of pairs would store, without storing anything.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
+
+use serde_json::Value;
 
 use crate::error::ProjectResult;
 use crate::import_pairs::{PairSource, listing};
@@ -27,6 +30,10 @@ pub struct PlannedPair {
     pub block: Option<String>,
     /// The unit of its scan, if it is given.
     pub unit: Option<LengthUnit>,
+    /// Whether its block lay face down, if the list says so.
+    pub scanned_face_down: Option<bool>,
+    /// Hash of its other columns, as [`metadata_hash`] returns it.
+    pub metadata: Option<ContentHash>,
     /// Messages about its files that do not exist.
     pub missing: Vec<String>,
 }
@@ -50,6 +57,16 @@ pub struct ImportPlan {
     pub warnings: Vec<String>,
     /// Which columns of the list were read under other names.
     pub renamed: Option<String>,
+}
+
+/// Returns a hash of columns, by which they are compared. `None` if there are none.
+pub fn metadata_hash<'m>(
+    columns: impl IntoIterator<Item = (&'m String, &'m Value)>,
+) -> Option<ContentHash> {
+    let sorted: BTreeMap<&String, &Value> = columns.into_iter().collect();
+    // Values with names always have a JSON form.
+    let text = serde_json::to_string(&sorted).unwrap_or_default();
+    (!sorted.is_empty()).then(|| ContentHash::of(text.as_bytes()))
 }
 
 /// Reads a list or folders and looks at the files, as an import into a project does before it stores the pairs. Folders
@@ -81,6 +98,8 @@ pub fn plan_import(
                 character: row.character,
                 block: row.block,
                 unit: row.unit,
+                scanned_face_down: row.scanned_face_down,
+                metadata: metadata_hash(&row.meta),
                 missing: lines,
             });
         }

@@ -1,9 +1,15 @@
 //! Single pairs: the latest results, the neighbours of a pair, and the blocks of lists.
 
-use crate::db::query::{query_as, query_scalar};
-use crate::records::model::PairResults;
+use crate::db::query::{query, query_as, query_scalar};
+use crate::db::row::FromRow as _;
+use crate::db::rows::json_array;
+use crate::records::import::SELECT;
+use crate::records::model::{PairAttributes, PairResults};
 use crate::{Catalog, Result};
 use mocban_core::domain::{PairName, ThresholdMetric, UnixMillis};
+
+/// Number of names in one statement.
+const LOOKED_UP: usize = 2_000;
 
 /// How many attempts are searched for the latest results.
 const RECENT_ATTEMPTS: usize = 2000;
@@ -77,6 +83,19 @@ impl Catalog {
     pub async fn last_activity(&self) -> Result<Option<UnixMillis>> {
         let mut conn = self.read_conn().await?;
         query_scalar(LAST_ATTEMPT).fetch_optional(&mut conn).await
+    }
+
+    /// Returns the attributes of the known ones of some pairs. Pairs with an invalid value are left out.
+    pub async fn pair_attributes(&self, names: &[&PairName]) -> Result<Vec<PairAttributes>> {
+        let mut conn = self.read_conn().await?;
+        let mut found = Vec::new();
+        for names in names.chunks(LOOKED_UP) {
+            let names = json_array(names.iter().map(|name| name.as_str()));
+            let rows = query(SELECT).bind(&names).fetch_all(&mut conn).await?;
+            let pairs = rows.iter();
+            found.extend(pairs.filter_map(|row| PairAttributes::from_row(row).ok()));
+        }
+        Ok(found)
     }
 
     /// Returns the names of the pairs before and after a pair, by name.

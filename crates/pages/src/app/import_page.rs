@@ -14,6 +14,7 @@ use super::address::{PageQuery, encoded};
 use super::components::{NavSection, frame, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::{FileCounts, PickedFolder, PickerRoots};
+use super::import_changes::ColumnChanges;
 use super::import_choice::{ImportChoice, ImportPreview, Planned, with_change};
 use super::import_columns::columns_part;
 use super::import_partners::{ImportPartners, mending_part};
@@ -67,11 +68,18 @@ pub(super) async fn page(
         let open = state.open(&chosen.project).await?;
         partners.add_replacements(&open, preview, &roots).await?;
     }
+    let changes = match &preview {
+        Some(preview) if is_known && !chosen.list.is_empty() => {
+            let open = state.open(&chosen.project).await?;
+            ColumnChanges::find(preview, &open).await?
+        }
+        _ => ColumnChanges::default(),
+    };
     let mended = visit.query.parsed::<PairName>("mend");
     let body = html! {
         @if let Some(pair) = &mended { (mending_part(&visit, pair)) }
         (chosen_part(&visit, &chosen))
-        @if let Some(preview) = preview { (preview_part(&visit, &chosen, &preview)) }
+        @if let Some(preview) = preview { (preview_part(&visit, &chosen, &preview, &changes)) }
         @if let Some(partners) = partners { (partners.part(&visit)) }
         (upload_part(&visit, &state.uploads, &chosen.project))
         @if is_known {
@@ -90,7 +98,12 @@ pub(super) async fn page(
 }
 
 /// Returns the columns of a list, and the pairs or why there are none.
-fn preview_part(visit: &Visit, chosen: &ImportChoice, preview: &ImportPreview) -> Markup {
+fn preview_part(
+    visit: &Visit,
+    chosen: &ImportChoice,
+    preview: &ImportPreview,
+    changes: &ColumnChanges,
+) -> Markup {
     let head = preview.head.as_ref();
     // The form says what is missing, in both languages.
     let asks_for_columns = head.is_some_and(|head| !head.is_complete() && head.refused.is_none());
@@ -101,7 +114,7 @@ fn preview_part(visit: &Visit, chosen: &ImportChoice, preview: &ImportPreview) -
                 p.notice.bad role="alert" { (failure.text(visit.language)) }
                 (changes_part(visit, &chosen.changes().unwrap_or_default()))
             },
-            Ok(planned) => (plan_part(visit, chosen, planned, preview.from)),
+            Ok(planned) => (plan_part(visit, chosen, planned, preview.from, &changes.part(visit))),
         }
         @if let Some(head) = head { (columns_part(visit, chosen, head)) }
     }

@@ -22,12 +22,14 @@ const SHOWN_LINES: usize = 12;
 /// Number of files without a partner from which one is chosen.
 const SHOWN_FILES: usize = 500;
 
-/// Returns what would be imported, with the form that imports it. `from` is the position of the first pair that is shown.
+/// Returns what would be imported, with the form that imports it. `from` is the position of the first pair that is shown,
+/// and `changed` says what changes in known pairs.
 pub(super) fn plan_part(
     visit: &Visit,
     chosen: &ImportChoice,
     planned: &Planned,
     from: u64,
+    changed: &Markup,
 ) -> Markup {
     html! {
         section.card {
@@ -42,6 +44,7 @@ pub(super) fn plan_part(
                 Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
             }
             @if has_files(planned) { (files_part(visit)) }
+            (changed)
             (import_form(visit, chosen, planned))
         }
     }

@@ -29,6 +29,7 @@ mod file_upload;
 mod folder_picker;
 mod health_page;
 mod home;
+mod import_changes;
 mod import_choice;
 mod import_columns;
 mod import_files;

@@ -1,0 +1,183 @@
+//! What the import of a list would change in the columns of known pairs.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use super::components::grouped;
+use super::failure::AppResult;
+use super::import_choice::{ImportPreview, Planned};
+use super::projects::OpenProject;
+use super::visit::Visit;
+use mocban_catalog::PairAttributes;
+use mocban_project::import_plan::{PlannedPair, metadata_hash};
+
+/// What may happen to each column, in English and Vietnamese: pairs lose its value, or get another one.
+const COLUMNS: [[[&str; 2]; 2]; 5] = [
+    [
+        ["Pairs that lose their block", "Số cặp mất tên ván"],
+        ["Pairs that get another block", "Số cặp có tên ván khác"],
+    ],
+    [
+        ["Pairs that lose their character", "Số cặp mất chữ"],
+        ["Pairs that get another character", "Số cặp có chữ khác"],
+    ],
+    [
+        ["Pairs that lose their unit", "Số cặp mất đơn vị"],
+        ["Pairs that get another unit", "Số cặp có đơn vị khác"],
+    ],
+    [
+        [
+            "Pairs that lose their scanned side",
+            "Số cặp mất mặt được quét",
+        ],
+        [
+            "Pairs that get another scanned side",
+            "Số cặp có mặt được quét khác",
+        ],
+    ],
+    [
+        [
+            "Pairs that lose all their other columns",
+            "Số cặp mất mọi cột khác",
+        ],
+        [
+            "Pairs whose other columns change",
+            "Số cặp có các cột khác bị đổi",
+        ],
+    ],
+];
+
+/// How many known pairs of a list would change.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct ColumnChanges {
+    /// Number of pairs that change.
+    pairs: u64,
+    /// For each of [`COLUMNS`], the numbers of pairs that lose its value and that get another one.
+    columns: [[u64; 2]; COLUMNS.len()],
+    /// Whether there are further pairs, which were not compared.
+    is_cut: bool,
+}
+
+impl ColumnChanges {
+    /// Compares the pairs of a preview of a list with those of its project. Folders change no columns.
+    pub(super) async fn find(preview: &ImportPreview, open: &OpenProject) -> AppResult<Self> {
+        let mut changes = Self::default();
+        let Ok(Planned::Pairs(plan, _)) = &preview.planned else {
+            return Ok(changes);
+        };
+        let names: Vec<_> = plan.shown.iter().map(|pair| &pair.name).collect();
+        let known = open.catalog.pair_attributes(&names).await?;
+        let known: BTreeMap<_, _> = known.iter().map(|pair| (&pair.name, pair)).collect();
+        for pair in &plan.shown {
+            if let Some(old) = known.get(&pair.name) {
+                changes.add(old, pair);
+            }
+        }
+        changes.is_cut = plan.pairs > plan.shown.len() as u64;
+        Ok(changes)
+    }
+
+    fn add(&mut self, old: &PairAttributes, new: &PlannedPair) {
+        let columns = [
+            change(old.block.as_ref(), new.block.as_ref()),
+            change(old.character.as_ref(), new.character.as_ref()),
+            change(old.unit, new.unit),
+            change(old.scanned_face_down, new.scanned_face_down),
+            change(metadata_hash(&old.meta), new.metadata),
+        ];
+        self.pairs += u64::from(columns.iter().any(Option::is_some));
+        for (counts, found) in self.columns.iter_mut().zip(columns) {
+            if let Some(what) = found {
+                counts[what] += 1;
+            }
+        }
+    }
+
+    /// Says how many pairs change, and in which columns.
+    pub(super) fn part(&self, visit: &Visit) -> Markup {
+        let counts = self.columns.iter().zip(&COLUMNS);
+        let lines = counts.flat_map(|(counts, texts)| counts.iter().zip(texts));
+        let lines = lines.filter(|(number, _)| **number > 0);
+        let loses = self.columns.iter().any(|[lost, _]| *lost > 0);
+        html! {
+            @if self.pairs > 0 {
+                div.notice.warn #column-changes {
+                    p {
+                        (visit.t("Known pairs that this import changes", "Số cặp đã có bị lần nhập này thay đổi")) ": "
+                        @if self.is_cut { (visit.t("at least", "ít nhất")) " " }
+                        b { (grouped(self.pairs)) }
+                    }
+                    ul { @for (number, texts) in lines { li { (texts[visit.index()]) ": " b { (grouped(*number)) } } } }
+                    @if loses {
+                        p { (visit.t(
+                            "A column that is not chosen is emptied. To keep it, choose it under Columns of the list.",
+                            "Cột không được chọn sẽ bị xóa giá trị. Để giữ, hãy chọn cột đó ở phần Các cột của danh sách.",
+                        )) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Returns 0 if a value is lost, and 1 if there is another one.
+fn change<T: PartialEq>(old: Option<T>, new: Option<T>) -> Option<usize> {
+    match (&old, &new) {
+        (Some(_), None) => Some(0),
+        _ => (old != new).then_some(1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ColumnChanges;
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+    use mocban_catalog::PairAttributes;
+    use mocban_core::domain::{LengthUnit, PairName};
+    use mocban_project::import_plan::PlannedPair;
+    use serde_json::Map;
+
+    #[test]
+    fn lost_and_other_values_are_counted() {
+        let old = PairAttributes {
+            name: PairName::new("1").expect("a name"),
+            mesh_path: "1.stl".to_owned(),
+            print_path: "1.png".to_owned(),
+            unit: Some(LengthUnit::Mm),
+            scanned_face_down: None,
+            character: Some("天".to_owned()),
+            block: Some("Ván 1".to_owned()),
+            meta: Map::new(),
+            prior: None,
+        };
+        let mut new = PlannedPair {
+            name: old.name.clone(),
+            mesh: "1.stl".into(),
+            print: "1.png".into(),
+            character: old.character.clone(),
+            block: old.block.clone(),
+            unit: old.unit,
+            scanned_face_down: None,
+            metadata: None,
+            missing: Vec::new(),
+        };
+        let mut changes = ColumnChanges::default();
+        changes.add(&old, &new);
+        assert_eq!(changes, ColumnChanges::default());
+        new.block = None;
+        changes.add(&old, &new);
+        new.unit = Some(LengthUnit::Cm);
+        changes.add(&old, &new);
+        let shown = changes.part(&Visit::in_language(Language::Vietnamese));
+        let shown = shown.into_string();
+        for text in [
+            "thay đổi: <b>2</b>",
+            "mất tên ván: <b>2</b>",
+            "đơn vị khác: <b>1</b>",
+        ] {
+            assert!(shown.contains(text), "{shown}");
+        }
+    }
+}
