@@ -1,5 +1,6 @@
 //! What a backup holds, before a project is made of it.
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::time::UNIX_EPOCH;
 
@@ -8,9 +9,15 @@ use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::input_list::{InputCopies, InputList, inputs_folder};
 use crate::missing_inputs::{self, InputInspection};
 use crate::restore::check_backup;
+use crate::wanted_inputs::first_wanted_inputs;
 use mocban_catalog::Catalog;
 use mocban_core::domain::UnixMillis;
 use mocban_store::Project;
+
+/// Number of pairs whose files are looked for among the copies.
+const MAX_COMPARED: usize = 100_000;
+/// Most files that are named.
+const MAX_NAMED: usize = 3;
 
 /// What a backup holds. Scans and prints may be beside it; artifacts are in no backup.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,6 +36,10 @@ pub struct BackupContent {
     pub verdicts: u64,
     /// Scans and prints beside it, which a restore copies.
     pub copies: Option<InputCopies>,
+    /// Number of scans and prints that are not among the copies, because they were missing or changed when they were copied.
+    pub not_copied: u64,
+    /// Paths of the first ones.
+    pub first_not_copied: Vec<String>,
     /// What is wrong with their list, if it cannot be read. They are then found by their paths, and not copied.
     pub list_problem: Option<String>,
     /// Without copies, scans and prints that a project in the new folder would not find, among a few.
@@ -48,9 +59,8 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
         Ok(list) => (list, None),
         Err(error) => (None, Some(error.text(dir))),
     };
-    let copies = list
-        .filter(|list| !list.files.is_empty())
-        .map(|list| list.copies(&folder));
+    let list = list.filter(|list| !list.files.is_empty());
+    let copies = list.as_ref().map(|list| list.copies(&folder));
     let catalog = Catalog::open_backup(backup).await?;
     let read = async {
         let (pairs, verdicts) = rows_of(&catalog).await?;
@@ -60,6 +70,10 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
             Some(_) => InputInspection::default(),
             None => missing_inputs::inspect(&Project::at(dir), &catalog, pairs).await?,
         };
+        let (not_copied, first_not_copied) = match &list {
+            Some(list) => missing_copies(list, &catalog).await?,
+            None => (0, Vec::new()),
+        };
         Ok::<_, ProjectError>(BackupContent {
             bytes: meta.len(),
             written: written(&meta),
@@ -68,6 +82,8 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
             blocks,
             verdicts,
             copies,
+            not_copied,
+            first_not_copied,
             list_problem,
             inputs,
         })
@@ -75,6 +91,23 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
     let content = read.await;
     catalog.close().await;
     content
+}
+
+/// Returns how many inputs of the catalog a list of copies does not have, among those of the first pairs and of all blocks,
+/// and the paths of a few.
+async fn missing_copies(list: &InputList, catalog: &Catalog) -> ProjectResult<(u64, Vec<String>)> {
+    let copied: HashSet<&str> = list.files.iter().map(|copy| copy.stored.as_str()).collect();
+    let (wanted, _) = first_wanted_inputs(catalog, MAX_COMPARED).await?;
+    let (mut number, mut first) = (0, Vec::new());
+    for input in wanted {
+        if !copied.contains(input.stored.as_str()) {
+            number += 1;
+            if first.len() < MAX_NAMED {
+                first.push(input.stored);
+            }
+        }
+    }
+    Ok((number, first))
 }
 
 /// Returns when a file was last written, if the file system knows.

@@ -207,7 +207,7 @@ fn character_list(visit: &Visit, block: &BlockName, characters: &[StoredCharacte
                 p.muted { (visit.t("A run finds them on the page.", "Lần chạy sẽ tìm chúng trên trang in.")) }
             } @else {
                 p.row {
-                    (grouped(characters.len() as u64)) " · "
+                    (grouped(characters.len() as u64)) " " (visit.t("characters", "chữ")) " · "
                     a href={ "../../pairs?block=" (encoded(block.as_str())) } { (visit.t("All pairs of this block", "Tất cả các cặp của ván này")) }
                 }
                 div.scroll tabindex="0" role="region" aria-label=(label) {
@@ -264,7 +264,10 @@ fn files(visit: &Visit, detail: &BlockDetail) -> Markup {
                         None => { (visit.t("none: the characters are found", "không có: chữ được tự tìm")) },
                     }
                 }
-                @if let Some(meta) = &attributes.meta { (metadata(meta)) }
+            }
+            @if let Some(meta) = attributes.meta.as_ref().filter(|meta| !meta.is_empty()) {
+                h2 { (visit.t("Other columns of the list", "Các cột khác của danh sách")) }
+                dl { (metadata(meta)) }
             }
         }
     }

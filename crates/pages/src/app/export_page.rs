@@ -101,7 +101,7 @@ fn form(visit: &Visit) -> Markup {
             }
             label { span { (visit.t("Which results", "Kết quả nào")) }
                 select name="only" {
-                    (choice(ResultFilter::All.name(), visit.t("all pairs", "tất cả các cặp"), None))
+                    (choice(ResultFilter::All.name(), visit.t("all pairs with a result", "tất cả các cặp có kết quả"), None))
                     (choice(ResultFilter::Confident.name(), visit.t("without low confidence", "trừ độ tin cậy thấp"), None))
                     (choice(ResultFilter::Passed.name(), visit.t("passed by reviewers", "được người đánh giá cho đạt"), None))
                 }
@@ -263,6 +263,14 @@ async fn run(
             format!("{vietnamese_title}: đã xuất {done} cặp."),
         ]
     }];
+    let without_result = summary.pairs.without_result;
+    if without_result > 0 {
+        let number = grouped(without_result);
+        lines.push([
+            format!("Pairs without a result, which are left out: {number}."),
+            format!("Số cặp chưa có kết quả nên bị bỏ qua: {number}."),
+        ]);
+    }
     if summary.kept_earlier {
         lines.push([
             "The earlier export was kept, because files of results are missing; check the project first.".to_owned(),

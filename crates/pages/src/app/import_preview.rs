@@ -22,6 +22,17 @@ const SHOWN_LINES: usize = 12;
 /// Number of files without a partner from which one is chosen.
 const SHOWN_FILES: usize = 500;
 
+/// The columns of a list, and what the page calls them in Vietnamese.
+const COLUMN_NAMES: [[&str; 2]; 7] = [
+    ["id", "Mã"],
+    ["mesh", "Bản quét"],
+    ["print", "Bản in"],
+    ["character", "Chữ"],
+    ["block", "Ván"],
+    ["unit", "Đơn vị"],
+    ["scanned_face_down", "Quét úp"],
+];
+
 /// Returns what would be imported, with the form that imports it. `from` is the position of the first pair that is shown,
 /// and `changed` says what changes in known pairs.
 pub(super) fn plan_part(
@@ -176,7 +187,10 @@ fn warning(visit: &Visit, line: &str) -> String {
 
 /// Returns the end of a list of names or columns in Vietnamese.
 fn with_vietnamese_rest(rest: &str) -> String {
-    let rest = rest.replace("\" as ", "\" là ");
+    let columns = COLUMN_NAMES.iter();
+    let rest = columns.fold(rest.to_owned(), |rest, [name, vietnamese]| {
+        rest.replace(&format!("\" as {name}"), &format!("\" là {vietnamese}"))
+    });
     messages::with_more(&rest, "tệp khác").unwrap_or(rest)
 }
 

@@ -101,6 +101,18 @@ fn content_part(visit: &Visit, folder: &Path, content: &BackupContent, name: &st
             dd { (visit.file_size(content.bytes)) @if let Some(free) = platform::free_bytes(folder) { " · " (free_space(visit, free)) } }
             dt { (visit.t("Scans and prints", "Bản quét và bản in")) } dd { (inputs_text(visit, content, inputs)) }
         }
+        @if copies.is_some() && content.not_copied > 0 {
+            @let named = content.first_not_copied.iter().map(|path| one_line(path).to_string()).collect::<Vec<_>>().join(", ");
+            p.notice.warn #not-copied {
+                (visit.t(
+                    "Scans and prints that are not beside the backup, because they were missing or changed when it was made",
+                    "Số bản quét và bản in không có bên cạnh bản sao lưu, vì bị thiếu hoặc đã đổi khi sao lưu",
+                )) ": " b { (grouped(content.not_copied)) } " (" (named)
+                @if content.not_copied > content.first_not_copied.len() as u64 { ", …" }
+                "). "
+                (visit.t("Their pairs fail in the new project until the files are at their places.", "Các cặp của chúng sẽ lỗi trong dự án mới cho đến khi các tệp có ở đúng chỗ."))
+            }
+        }
         @if let Err(why) = &room { p.notice.bad role="alert" { (why.text(visit.language)) } }
         @if let Some(problem) = list_problem {
             (list_problem_part(visit, problem))

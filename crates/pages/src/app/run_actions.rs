@@ -32,7 +32,7 @@ pub(super) struct RunBody {
     /// Pairs at the same time, as the field has it.
     #[serde(default)]
     jobs: String,
-    /// `all` or `failed`.
+    /// `all`, `failed`, or `look` for files that changed although everything is aligned.
     which: String,
 }
 
@@ -74,7 +74,12 @@ pub(super) async fn run(
     if body.which == "failed" {
         args.extend(["--rerun".to_owned(), "failed".to_owned()]);
     }
+    let started = now();
     child_run::start(&state, &open.dir, &args, &[]).await?;
+    if body.which == "look" {
+        // The page then says whether a file has changed.
+        return Ok(Json(json!({ "go": format!("?looked={started}") })));
+    }
     Ok(reload())
 }
 

@@ -20,7 +20,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::review::Language;
 use mocban_catalog::PairResults;
-use mocban_core::domain::{JobStatus, one_line};
+use mocban_core::domain::{JobStatus, UnixMillis, one_line};
 use mocban_project::ProjectError;
 use mocban_project::failures::may_succeed_unchanged;
 use mocban_system::platform;
@@ -35,6 +35,12 @@ pub(super) async fn page(
     let read = RunState::read(&open, failed).await;
     let run =
         read.map_err(|error: ProjectError| super::failure::AppFailure::of(error, &open.dir))?;
+    let looked = visit.query.parsed::<UnixMillis>("looked");
+    let last = open.catalog.last_activity().await?;
+    let is_unchanged = looked.is_some_and(|looked| last.is_none_or(|last| last < looked))
+        && !run.is_running
+        && run.failed_run.is_none()
+        && run.to_align() + run.open_blocks() == 0;
     let body = html! {
         div #live data-live="2000" {
             (figures(&visit, &run))
@@ -42,6 +48,7 @@ pub(super) async fn page(
                 p.notice.bad #failed-run role="alert" { (one_line(sentence.text(visit.language))) }
             }
             (progress(&visit, &run))
+            @if is_unchanged { p.good #no-change role="status" { (visit.t("No file has changed.", "Không có tệp nào thay đổi.")) } }
             (controls(&visit, &run))
             (disk(&visit, &open))
             (latest_results(&visit, &run.latest))
@@ -156,7 +163,7 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
             label { (visit.t("Pairs at the same time", "Số cặp cùng lúc")) " "
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
             }
-            button.primary #start name="which" value="all" disabled[is_empty] {
+            button.primary #start name="which" value=(if is_idle { "look" } else { "all" }) disabled[is_empty] {
                 @if is_idle {
                     (visit.t("Look for changed files", "Tìm tệp đã đổi"))
                 } @else {

@@ -15,7 +15,8 @@ pub(super) fn is_hidden(key: &str) -> bool {
     HIDDEN.contains(&first)
 }
 
-/// The settings of the page with their meaning, unit, range and reason in Vietnamese. Values to type keep the point.
+/// The settings of the page with their meaning, unit, range and reason in Vietnamese. Values to type keep the point; other
+/// numbers have a comma.
 const VIETNAMESE: [(&str, &str); 35] = [
     (
         "limits.mesh.max_bytes",
@@ -23,11 +24,11 @@ const VIETNAMESE: [(&str, &str); 35] = [
     ),
     (
         "limits.mesh.max_vertices",
-        "Số đỉnh nhiều nhất; 50 triệu đỉnh chiếm 0.6 GB ở độ chính xác đơn, 1.2 GB ở độ chính xác kép. 3 đến 4294967295.",
+        "Số đỉnh nhiều nhất; 50 triệu đỉnh chiếm 0,6 GB ở độ chính xác đơn, 1,2 GB ở độ chính xác kép. 3 đến 4294967295.",
     ),
     (
         "limits.mesh.max_triangles",
-        "Số tam giác nhiều nhất sau khi các đa giác được chia nhỏ; 100 triệu chiếm 1.2 GB. 1 đến 4294967295.",
+        "Số tam giác nhiều nhất sau khi các đa giác được chia nhỏ; 100 triệu chiếm 1,2 GB. 1 đến 4294967295.",
     ),
     (
         "limits.image.max_bytes",
@@ -35,7 +36,7 @@ const VIETNAMESE: [(&str, &str); 35] = [
     ),
     (
         "limits.image.max_pixels",
-        "Tích lớn nhất của chiều rộng và chiều cao, tính bằng điểm ảnh; mỗi điểm ảnh cần khoảng 50 byte khi tính, nên 30 triệu cần 1.5 GB. 1 đến 1e9.",
+        "Tích lớn nhất của chiều rộng và chiều cao, tính bằng điểm ảnh; mỗi điểm ảnh cần khoảng 50 byte khi tính, nên 30 triệu cần 1,5 GB. 1 đến 1e9.",
     ),
     (
         "run.workers",
@@ -55,7 +56,7 @@ const VIETNAMESE: [(&str, &str); 35] = [
     ),
     (
         "fit.curved_blocks",
-        "Có cho phép khớp mặt bậc hai ở chỗ ván bị cong không; ván cong khoảng 2.6 mm trên 330 mm. true hoặc false.",
+        "Có cho phép khớp mặt bậc hai ở chỗ ván bị cong không; ván cong khoảng 2,6 mm trên 330 mm. true hoặc false.",
     ),
     (
         "fit.min_relief",
@@ -250,8 +251,9 @@ mod tests {
         assert_eq!(translated.collect::<BTreeSet<_>>(), shown);
         for (key, text) in VIETNAMESE {
             let english = explanation(key).join(" ");
+            let with_points = text.replace(',', ".");
             let missing: Vec<_> = numbers(&english)
-                .difference(&numbers(text))
+                .difference(&numbers(&with_points))
                 .map(|number| (*number).to_owned())
                 .collect();
             assert!(missing.is_empty(), "{key}: {missing:?} of {english:?}");

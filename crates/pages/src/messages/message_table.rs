@@ -279,6 +279,18 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "chỉ đọc được lưới OBJ, PLY, STL và điểm XYZ",
     ),
     (
+        "the binary STL is truncated: it holds {} of {} triangles",
+        "tệp STL nhị phân bị cắt cụt: chỉ có {0} trong số {1} tam giác",
+    ),
+    (
+        "the {} is truncated: it holds {} of {} triangles",
+        "tệp {0} bị cắt cụt: chỉ có {1} trong số {2} tam giác",
+    ),
+    (
+        "the {} is truncated: it holds {} of {} vertices",
+        "tệp {0} bị cắt cụt: chỉ có {1} trong số {2} đỉnh",
+    ),
+    (
         "the {} is truncated: it holds {} of {} {}",
         "tệp {0} bị cắt cụt: chỉ có {1} trong số {2} phần tử",
     ),

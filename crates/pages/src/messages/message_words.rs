@@ -239,7 +239,11 @@ mod tests {
             ),
             (
                 "1.ply: the binary PLY is truncated: it holds 3 of 9 vertices",
-                "1.ply: tệp binary PLY bị cắt cụt: chỉ có 3 trong số 9 phần tử",
+                "1.ply: tệp binary PLY bị cắt cụt: chỉ có 3 trong số 9 đỉnh",
+            ),
+            (
+                "1.stl: the binary STL is truncated: it holds 1 of 2 triangles",
+                "1.stl: tệp STL nhị phân bị cắt cụt: chỉ có 1 trong số 2 tam giác",
             ),
         ] {
             assert_eq!(vietnamese(english).as_deref(), Some(expected));
