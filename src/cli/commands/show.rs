@@ -133,7 +133,7 @@ fn tail(pair: &PairOverview, palette: Palette) -> String {
             format!("  {changed} changed since the last run; `run` computes the pair again")
         }
         (None, JobStatus::Quarantined) if !may_retry(detail) => {
-            "  nothing; correct the file, its row in the list or a setting, and `run` computes the pair again".to_owned()
+            "  nothing; correct the file or a setting, or the list and import it again, and `run` computes the pair again".to_owned()
         }
         (None, JobStatus::Quarantined) => {
             "  nothing until `retry`, or until a missing file is there".to_owned()

@@ -125,7 +125,7 @@ fn state_part(visit: &Visit, key: &str, detail: &BlockDetail) -> Markup {
         @if let Some(stored) = &state.failure {
             div.notice.bad {
                 p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored_message(visit, &stored.failure.message)) }
-                (block_remedy(visit, key, &state.attributes, stored.stage, (stored.failure.class, &stored.failure.message)))
+                (block_remedy(visit, key, &state.attributes, stored.stage, (stored.failure.class, stored.failure.message.as_str())))
                 @if stored.stage == BlockStage::Boxes {
                     p { a href="view/boxes" { (visit.t("Edit the boxes on the page", "Sửa khung chữ trên trang in")) } }
                 }

@@ -122,8 +122,8 @@ impl ColumnChanges {
 }
 
 /// Returns 0 if a value is lost, and 1 if there is another one.
-fn change<T: PartialEq>(old: Option<T>, new: Option<T>) -> Option<usize> {
-    match (&old, &new) {
+fn change<T: Copy + PartialEq>(old: Option<T>, new: Option<T>) -> Option<usize> {
+    match (old, new) {
         (Some(_), None) => Some(0),
         _ => (old != new).then_some(1),
     }
