@@ -334,3 +334,21 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
         },
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::warning;
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+
+    #[test]
+    fn columns_have_the_names_of_the_page() {
+        let line = "columns with other names were read: \"Khối\" as block, \"Ký hiệu\" as id";
+        let of = |language| warning(&Visit::in_language(language), line);
+        assert_eq!(of(Language::English), line);
+        assert_eq!(
+            of(Language::Vietnamese),
+            "Đã hiểu các cột có tên khác: \"Khối\" là Ván, \"Ký hiệu\" là Mã"
+        );
+    }
+}
