@@ -135,7 +135,7 @@ fn remedy(
         @if is_missing { p { (origin.missing(visit)) } }
         @if let Some(correction) = correction { p { (correction) } }
         @if has_import {
-            p { a href={ (visit.root) "import?project=" (encoded(key)) } { (visit.t("Import", "Nhập dữ liệu")) } }
+            p.row { a href={ (visit.root) "import?project=" (encoded(key)) } { (visit.t("Import", "Nhập dữ liệu")) } }
         }
     }
 }
