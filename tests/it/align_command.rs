@@ -193,7 +193,12 @@ fn what_is_said_of_a_scan_is_compared_with_what_was_found() {
     let said = ["--unit", "in", "--scanned-face-down", &wrong];
     let args = [&["align", mesh, print, "--json"], &said[..]].concat();
     let warnings = mocban(dir.path(), &args).expect(0).json()["warnings"].to_string();
-    for part in ["mm deep, but most blocks", "scanned_face_down says"] {
+    let surface = "mm across, but most characters have 6 to 30 mm; is the unit mm?";
+    for part in [
+        "mm deep, but most blocks",
+        "scanned_face_down says",
+        surface,
+    ] {
         assert!(warnings.contains(part), "{warnings}");
     }
     // Project: the same, when the pair is run and when it is shown.
@@ -207,11 +212,13 @@ fn what_is_said_of_a_scan_is_compared_with_what_was_found() {
     let warned = lines.any(|line| line.contains("mm deep, but most blocks") && is_warning(line));
     assert!(warned, "{}", ran.err);
     let shown = mocban(dir.path(), &["-C", "p", "show", "a"]).expect(0);
-    assert!(
-        shown.out.contains("scanned_face_down says"),
-        "{}",
-        shown.out
-    );
+    assert!(ran.err.contains(surface), "{}", ran.err);
+    for part in ["scanned_face_down says", surface] {
+        assert!(shown.out.contains(part), "{}", shown.out);
+    }
+    let shown = mocban(dir.path(), &["-C", "p", "show", "a", "--json"]).expect(0);
+    let warnings = shown.json()["warnings"].to_string();
+    assert!(warnings.contains(surface), "{warnings}");
 }
 
 #[test]

@@ -70,6 +70,26 @@ fn no_page_names_a_command_or_an_option() {
 }
 
 #[test]
+fn the_page_of_a_pair_doubts_a_unit_that_gives_no_character() {
+    let (dir, page) = with_project();
+    let pair = "/p/p/pair/upright-0000/";
+    let said = "but most characters have 6 to 30 mm; is the unit mm?";
+    let before = text(&page.get(pair));
+    assert!(!before.contains("most characters have"), "{before}");
+    let list = "id,mesh,print,unit\n\
+                upright-0000,data/meshes/upright-0000.ply,data/prints/upright-0000.jpg,in\n";
+    let project = dir.path().join("p");
+    std::fs::write(project.join("list.csv"), list).expect("a list");
+    mocban(&project, &["import", "list.csv"]).expect(0);
+    let english = text(&page.get(&format!("{pair}?language=en")));
+    assert!(english.contains(said), "{english}");
+    assert!(!english.contains("--block"), "{english}");
+    let vietnamese = text(&page.get(&format!("{pair}?language=vi")));
+    let said = "trong khi đa số chữ có 6 đến 30 mm; đơn vị có phải là mm không?";
+    assert!(vietnamese.contains(said), "{vietnamese}");
+}
+
+#[test]
 fn a_refused_action_is_explained_in_the_language_of_the_page() {
     let (_dir, page) = with_project();
     for (language, expected) in [

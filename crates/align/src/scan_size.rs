@@ -3,7 +3,7 @@
 
 use crate::stages::{ScanHints, StageError};
 use mocban_core::domain::cancel::poll;
-use mocban_core::domain::{FailureClass, FitOutcome, LengthUnit};
+use mocban_core::domain::{DepthOutcome, FailureClass, FitOutcome, LengthUnit};
 use mocban_core::mesh::Vertices;
 use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
 use mocban_core::raster::DepthMap;
@@ -102,14 +102,43 @@ pub fn doubtful_characters(side_mm: f64, unit: LengthUnit) -> Option<String> {
     if side_mm.is_nan() || POSSIBLE_CHARACTER_MM.contains(&side_mm) {
         return None;
     }
-    let likely = nearest_unit(side_mm / unit.mm(), TYPICAL_CHARACTER_MM);
-    let question = if likely == unit {
+    let question = question(side_mm, unit);
+    Some(format!(
+        "characters of about {side_mm:.1} mm, but most have 6 to 30 mm; {question}"
+    ))
+}
+
+/// Asks for the unit in which a length has the size of a character.
+fn question(length_mm: f64, unit: LengthUnit) -> String {
+    let likely = nearest_unit(length_mm / unit.mm(), TYPICAL_CHARACTER_MM);
+    if likely == unit {
         "check the unit".to_owned()
     } else {
         format!("is the unit {likely}?")
+    }
+}
+
+/// Longer sides of the carved surface of one character, with the wood around it, that do not contradict the unit, mm.
+const POSSIBLE_SURFACE_MM: std::ops::RangeInclusive<f64> = 2.0..=150.0;
+
+/// Returns a warning about the unit of the scan of one character whose carved surface is less than 2 mm or more than 150 mm
+/// across. `length` is the longer side of the surface in units of the mesh.
+pub fn doubtful_surface(length: f64, unit: Option<LengthUnit>) -> Option<String> {
+    let unit = unit?;
+    let length_mm = length * unit.mm();
+    if length_mm.is_nan() || POSSIBLE_SURFACE_MM.contains(&length_mm) {
+        return None;
+    }
+    let is_small = length_mm < *POSSIBLE_SURFACE_MM.start();
+    let decimals = if is_small { 2 } else { 0 };
+    let question = question(length_mm, unit);
+    let advice = if is_small {
+        ""
+    } else {
+        "; a whole block is imported with its page by `mocban import --block`"
     };
     Some(format!(
-        "characters of about {side_mm:.1} mm, but most have 6 to 30 mm; {question}"
+        "with the unit {unit}, its carved surface is {length_mm:.decimals$} mm across, but most characters have 6 to 30 mm; {question}{advice}"
     ))
 }
 
@@ -184,9 +213,14 @@ pub fn length_of_map(depth: &DepthMap) -> f64 {
     pixels as f64 * depth.scale.mesh_unit_per_px
 }
 
+/// Returns the longer side of a stored depth map, in units of the mesh.
+pub fn length_of_outcome(depth: &DepthOutcome) -> f64 {
+    f64::from(depth.width.max(depth.height)) * depth.scale.mesh_unit_per_px
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{advice, doubtful_characters, length_of, short_face, wrong_unit};
+    use super::{advice, doubtful_characters, doubtful_surface, length_of, short_face, wrong_unit};
     use mocban_core::domain::LengthUnit;
     use mocban_core::mesh::Vertices;
 
@@ -246,6 +280,41 @@ mod tests {
         }
         let large = doubtful_characters(41.0, LengthUnit::Mm).expect("a doubt");
         assert!(large.ends_with("6 to 30 mm; check the unit"), "{large}");
+    }
+
+    #[test]
+    fn a_surface_that_is_too_small_or_large_for_a_character_is_doubted() {
+        for (length, unit, said) in [
+            (
+                0.5,
+                LengthUnit::Mm,
+                "0.50 mm across, but most characters have 6 to 30 mm; is the unit in?",
+            ),
+            (
+                1.2,
+                LengthUnit::Mm,
+                "1.20 mm across, but most characters have 6 to 30 mm; is the unit cm?",
+            ),
+            (
+                20.0,
+                LengthUnit::In,
+                "508 mm across, but most characters have 6 to 30 mm; is the unit mm?",
+            ),
+            (
+                500.0,
+                LengthUnit::Mm,
+                "500 mm across, but most characters have 6 to 30 mm; check the unit",
+            ),
+        ] {
+            let text = doubtful_surface(length, Some(unit)).expect("a doubt");
+            let expected = format!("with the unit {unit}, its carved surface is {said}");
+            assert!(text.starts_with(&expected), "{text}");
+            assert_eq!(text.contains("--block"), length > 2.0, "{text}");
+        }
+        for length in [2.0, 8.0, 30.0, 100.0, 150.0, f64::NAN] {
+            assert_eq!(doubtful_surface(length, Some(LengthUnit::Mm)), None);
+        }
+        assert_eq!(doubtful_surface(0.5, None), None);
     }
 
     #[test]

@@ -196,6 +196,8 @@ pub fn warnings(pair: &AlignedPair, print: &Print) -> Vec<String> {
     let profile = print.image().profile_warning();
     let profile = profile.map(|warning| format!("print: {warning}"));
     let said = scan_size::contradictions(&pair.fit, pair.hints).into_iter();
+    let length = scan_size::length_of_map(&pair.depth);
+    let said = said.chain(scan_size::doubtful_surface(length, pair.hints.unit));
     let said = said.map(|text| format!("mesh: {text}"));
     let displaced = pair.registered.outcome.displaced;
     let displaced = displaced.map(|part| format!("print: {part}"));

@@ -7,8 +7,8 @@
 //!   [`file_headers`]: what the files say of themselves
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
 //! - [`retire`]: takes pairs out of every count, and brings them back
-//! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
-//!   block, and whether files and rows are sound
+//! - [`status`], [`pair_table`], [`hosts`], [`details`], [`scan_warnings`], [`check`]: the state of all pairs, of workers and of one
+//!   pair or block, and whether scans, files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`change_setting`]: changes a setting, after saying what that costs
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
@@ -83,6 +83,7 @@ pub mod retry;
 pub mod reviewers;
 mod row_spool;
 pub mod run;
+pub mod scan_warnings;
 pub mod selection;
 pub mod sheets;
 pub mod shell;

@@ -103,6 +103,14 @@ impl PairPipeline {
         let scan = self.inputs.fitted_scan(pair)?;
         let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
             .map_err(|error| in_file(pair, &error.into(), 0.0))?;
+        let attributes = &pair.attributes;
+        // A block warns once about the unit of all pairs that are cut from it.
+        if attributes.prior.is_none()
+            && let Some(said) =
+                scan_size::doubtful_surface(scan_size::length_of_map(&map), attributes.unit)
+        {
+            tracing::warn!(pair = %attributes.name, "{}: {said}", attributes.mesh_path);
+        }
         let (outcome, json) = round_trip(&stage_output::depth_outcome(&map))?;
         let output = PairStageOutput {
             files: vec![png(DEPTH, png_grey16(&map.levels))],

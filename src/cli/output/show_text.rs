@@ -5,14 +5,13 @@ use super::digits::{
 };
 use super::screen::{Palette, Tone};
 use super::table::columns;
-use mocban_align::scan_size;
-use mocban_align::stages::ScanHints;
-use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
+use mocban_catalog::{AttemptRecord, MetricRecord, PairAttributes, PairDetail, StageRecord};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome,
     RegisterOutcome, Stage, Verdict, one_line, value_text,
 };
 use mocban_project::details::{Adjustment, ManualResult};
+use mocban_project::scan_warnings;
 use mocban_results::ManualCorrection;
 use mocban_store::Project;
 use mocban_system::time_text::{duration, local};
@@ -124,13 +123,9 @@ impl PairPage<'_> {
 
     fn stages(&self) -> String {
         let attributes = &self.detail.results.attributes;
-        let hints = ScanHints {
-            unit: attributes.unit,
-            scanned_face_down: attributes.scanned_face_down,
-        };
         let rows = self.detail.results.stages.iter().map(|record| {
             let (stage, took) = (format!("  {}", record.stage), duration(record.ms));
-            let numbers = numbers(record, hints);
+            let numbers = numbers(record, attributes);
             vec![stage, took, record.result_hash.short(), numbers]
         });
         section("stages", rows, "<><<", self.palette)
@@ -191,31 +186,40 @@ pub(crate) const fn state_name(status: JobStatus) -> &'static str {
 }
 
 /// Returns the few numbers of a stage that show whether it succeeded.
-fn numbers(record: &StageRecord, hints: ScanHints) -> String {
+fn numbers(record: &StageRecord, attributes: &PairAttributes) -> String {
     let text = match record.stage {
-        Stage::Fit => record.parse().map(|fit| fit_numbers(&fit, hints)),
-        Stage::Depth => record
-            .parse()
-            .map(|depth| depth_numbers(&depth, hints.unit)),
+        Stage::Fit => record.parse().map(|fit| {
+            fit_numbers(
+                &fit,
+                &scan_warnings::of_fit(&fit, attributes),
+                attributes.unit,
+            )
+        }),
+        Stage::Depth => record.parse().map(|depth| {
+            let numbers = depth_numbers(&depth, attributes.unit);
+            let warning = scan_warnings::of_depth(&depth, attributes);
+            std::iter::once(numbers)
+                .chain(warning)
+                .collect::<Vec<_>>()
+                .join("; ")
+        }),
         Stage::Normalize => record.parse().map(|found| ink_numbers(&found)),
         Stage::Register => record.parse().map(|found| displaced_text(&found)),
     };
     text.unwrap_or_else(|_| "written by another version of this program".to_owned())
 }
 
-fn fit_numbers(fit: &FitOutcome, hints: ScanHints) -> String {
+fn fit_numbers(fit: &FitOutcome, notes: &[String], unit: Option<LengthUnit>) -> String {
     let curvature = match fit.curvature {
-        Some(_) => format!(", curvature {}", length(fit.curvature_height, hints.unit)),
+        Some(_) => format!(", curvature {}", length(fit.curvature_height, unit)),
         None => String::new(),
     };
-    let mut notes = fit.losses().sentences();
-    notes.extend(scan_size::contradictions(fit, hints));
     let notes = if notes.is_empty() {
         String::new()
     } else {
         format!("; {}", notes.join("; "))
     };
-    let [relief, rms] = [fit.relief, fit.rms].map(|value| length(value, hints.unit));
+    let [relief, rms] = [fit.relief, fit.rms].map(|value| length(value, unit));
     let [inliers, side] = [fit.inlier_ratio, fit.side.confidence].map(|share| fixed(share, SCORE));
     format!(
         "relief {relief}, rms {rms}, inliers {inliers}, side confidence {side}{curvature}; {} vertices, {} triangles{notes}",

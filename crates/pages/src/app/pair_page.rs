@@ -14,12 +14,14 @@ use super::pair_numbers::numbers;
 use super::paper_method::{PAPER, is_comparable};
 use super::remedies::{failed_part, pair_remedy};
 use super::retired_pairs::retired_band;
+use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::view::{page as scan_page, scan_asset};
 use mocban_catalog::PairDetail;
 use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage, ThresholdMetric, one_line};
 use mocban_project::details::{self, Details, PairOverview};
+use mocban_project::scan_warnings;
 
 /// A picture: its key, and its name in both languages.
 type Layer = (&'static str, [&'static str; 2]);
@@ -153,6 +155,9 @@ fn state_line(visit: &Visit, key: &str, overview: &PairOverview) -> Markup {
                 p { b { (visit.class(stored.failure.class)) } " (" (failed_part(visit, &results.attributes, stored.stage, &stored.failure.message)) "): " (stored_message(visit, &stored.failure.message)) }
                 (pair_remedy(visit, key, stored.failure.class, &[results]))
             }
+        }
+        @for warning in scan_warnings::of_pair(results) {
+            div.notice.warn { p { (one_line(Sentence::of_program(&warning).text(visit.language))) } }
         }
     }
 }

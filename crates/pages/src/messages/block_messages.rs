@@ -1,4 +1,4 @@
-//! The frequent messages of the program on blocks with their Vietnamese texts.
+//! The frequent messages of the program on blocks and scans with their Vietnamese texts.
 
 /// Messages like those on pairs.
 pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
@@ -21,6 +21,30 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     (
         "characters of about {} mm, but most have 6 to 30 mm",
         "các chữ khoảng {0} mm, trong khi đa số có 6 đến 30 mm",
+    ),
+    (
+        "with the unit {}, its carved surface is {} mm across, but most characters have 6 to 30 mm",
+        "với đơn vị {0}, mặt khắc rộng {1} mm, trong khi đa số chữ có 6 đến 30 mm",
+    ),
+    (
+        "its carving is {} mm deep, but most blocks are carved 0.3 to 5 mm deep",
+        "nét khắc sâu {0} mm, trong khi đa số ván được khắc sâu 0,3 đến 5 mm",
+    ),
+    (
+        "if the unit is wrong, so are all lengths in mm",
+        "nếu đơn vị sai thì mọi độ dài tính bằng mm đều sai",
+    ),
+    (
+        "scanned_face_down says that the carved face points towards {}, but carving was found towards {}",
+        "theo scanned_face_down, mặt khắc hướng về {0}, nhưng nét khắc được tìm thấy ở phía {1}",
+    ),
+    (
+        "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces: {}",
+        "số đỉnh không có vị trí (NaN, vô hạn hoặc 0 0 0 lặp lại) đã bị bỏ cùng các mặt của chúng: {0}",
+    ),
+    (
+        "faces with fewer than three corners were left out: {}",
+        "số mặt có ít hơn ba góc đã bị bỏ: {0}",
     ),
     ("is the unit {}?", "đơn vị có phải là {0} không?"),
     ("check the unit", "hãy kiểm tra đơn vị"),

@@ -274,6 +274,26 @@ mod tests {
         }
     }
 
+    #[test]
+    fn doubts_about_a_scan_are_explained() {
+        for (english, expected) in [
+            (
+                "with the unit mm, its carved surface is 0.50 mm across, but most characters have 6 to 30 mm; is the unit in?",
+                "với đơn vị mm, mặt khắc rộng 0,50 mm, trong khi đa số chữ có 6 đến 30 mm; đơn vị có phải là in không?",
+            ),
+            (
+                "scanned_face_down says that the carved face points towards -z, but carving was found towards +z",
+                "theo scanned_face_down, mặt khắc hướng về -z, nhưng nét khắc được tìm thấy ở phía +z",
+            ),
+            (
+                "faces with fewer than three corners were left out: 12",
+                "số mặt có ít hơn ba góc đã bị bỏ: 12",
+            ),
+        ] {
+            assert_eq!(vietnamese(english).as_deref(), Some(expected));
+        }
+    }
+
     /// Returns the sources of all crates and tests as one text, with the strings that go on in the next line joined.
     fn sources() -> String {
         let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -1,8 +1,8 @@
 //! Tests of the text that `show` prints about one pair.
 
 use super::{
-    Adjustment, DepthOutcome, FitOutcome, ManualCorrection, ScanHints, adjustment_text,
-    depth_numbers, fit_numbers, metric_head,
+    Adjustment, DepthOutcome, FitOutcome, ManualCorrection, adjustment_text, depth_numbers,
+    fit_numbers, metric_head,
 };
 use mocban_core::domain::{
     Affine2, Curvature, DepthScale, LengthUnit, Rigid3, SideEvidence, ThresholdMetric,
@@ -12,10 +12,6 @@ use mocban_core::domain::{
 fn stage_texts(unit: LengthUnit, known: bool) -> [String; 2] {
     let unit_mm = unit.mm();
     let unit = known.then_some(unit);
-    let hints = ScanHints {
-        unit,
-        scanned_face_down: None,
-    };
     let fit = FitOutcome {
         plane_from_mesh: Rigid3([
             [1.0, 0.0, 0.0, 0.0],
@@ -53,7 +49,7 @@ fn stage_texts(unit: LengthUnit, known: bool) -> [String; 2] {
         },
         coverage: 1.0,
     };
-    [fit_numbers(&fit, hints), depth_numbers(&depth, unit)]
+    [fit_numbers(&fit, &[], unit), depth_numbers(&depth, unit)]
 }
 
 #[test]

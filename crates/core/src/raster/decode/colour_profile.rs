@@ -13,19 +13,22 @@ const TOLERANCE: f64 = 3.0 / 255.0;
 /// Levels of red, green and blue for which a profile is compared with sRGB.
 const PROBES: [f32; 5] = [0.0, 0.12, 0.35, 0.67, 1.0];
 
-/// Converts all colours from a profile to sRGB. Does nothing if the profile nearly is sRGB, or if it is of another kind
-/// than the image.
+/// Converts all colours from a profile to sRGB. Does nothing if the profile nearly is sRGB.
 ///
 /// # Errors
-/// Returns the name of a profile that cannot be read or applied.
-pub(super) fn apply(profile: &[u8], rgb: &mut Grid<[u16; 3]>) -> Result<(), String> {
-    let profile = ColorProfile::new_from_slice(profile).ok();
+/// Returns the name of a profile that cannot be read or applied, or is for colours of another kind than the image has.
+pub(super) fn apply(bytes: &[u8], rgb: &mut Grid<[u16; 3]>) -> Result<(), String> {
+    let profile = ColorProfile::new_from_slice(bytes).ok();
     let profile = profile.ok_or_else(|| "an ICC profile that cannot be read".to_owned())?;
     let is_grey = |rgb: &Grid<[u16; 3]>| rgb.data().iter().all(|[r, g, b]| r == g && g == b);
     let layout = match profile.color_space {
         DataColorSpace::Rgb => Layout::Rgb,
         DataColorSpace::Gray if is_grey(rgb) => Layout::Gray,
-        _ => return Ok(()),
+        _ => {
+            let space = bytes.get(16..20).unwrap_or_default();
+            let space = sanitize(String::from_utf8_lossy(space).trim_end(), 4);
+            return Err(format!("{}, for {space} colours", name(&profile)));
+        }
     };
     if is_nearly_srgb(&profile, layout) {
         return Ok(());
@@ -158,11 +161,28 @@ mod tests {
     }
 
     #[test]
-    fn an_image_in_srgb_and_one_of_another_kind_than_its_profile_stay() {
+    fn an_image_in_srgb_stays() {
         let srgb = moxcms::ColorProfile::new_srgb().encode().expect("encodes");
-        for profile in [srgb, TestProfile::GREY.icc()] {
+        let mut image = picture();
+        assert_eq!(apply(&srgb, &mut image), Ok(()));
+        assert_eq!(image, picture());
+    }
+
+    #[test]
+    fn a_profile_for_colours_of_another_kind_is_named_with_them() {
+        let of_space = |space: &[u8; 4]| {
+            let mut profile = TestProfile::WIDE.icc();
+            profile[16..20].copy_from_slice(space);
+            profile
+        };
+        for (profile, named) in [
+            (of_space(b"Lab "), "test, for Lab colours"),
+            (of_space(b"CMYK"), "test, for CMYK colours"),
+            (of_space(b"XYZ "), "test, for XYZ colours"),
+            (TestProfile::GREY.icc(), "test, for GRAY colours"),
+        ] {
             let mut image = picture();
-            assert_eq!(apply(&profile, &mut image), Ok(()));
+            assert_eq!(apply(&profile, &mut image), Err(named.to_owned()));
             assert_eq!(image, picture());
         }
     }
