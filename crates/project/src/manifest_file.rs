@@ -14,8 +14,8 @@ use crate::error::ProjectResult;
 use crate::pair_choices::{PairChoices, RowsHash};
 use mocban_core::domain::{ContentHash, FileKind, LengthUnit, PairName, first_names, sanitize};
 use mocban_lists::manifest::{
-    ChosenColumns, ListedFolder, ManifestError, ManifestRow, MisspeltColumns, PairingChanges,
-    ReadRows, RowIds, pair_folders, read_csv_as, read_jsonl,
+    ChangedIds, ChosenColumns, ListedFolder, ManifestError, ManifestRow, MisspeltColumns,
+    PairingChanges, ReadRows, RowIds, pair_folders, read_csv_as, read_jsonl,
 };
 use mocban_store::Project;
 
@@ -94,9 +94,10 @@ impl Listing {
         };
         let (mut misspelt, mut unread) = (MisspeltColumns::default(), UnreadRows::default());
         let left_out: BTreeSet<String> = choices.changes.left_out.iter().cloned().collect();
-        let mut repeated = RepeatedFiles::default();
+        let (mut repeated, mut ids) = (RepeatedFiles::default(), ChangedIds::default());
         let mut each = |row: ManifestRow| {
             misspelt.add(&row);
+            ids.add(row.line, row.name.as_str(), [&row.mesh, &row.print]);
             unread.add(&row);
             if !left_out.contains(row.name.as_str()) {
                 repeated.add(row.line, row.name.as_str(), &row.mesh, &row.print);
@@ -109,6 +110,7 @@ impl Listing {
         let read = parsed.unwrap_or_default();
         let mut warnings = misspelt.warnings();
         warnings.extend(read.unnamed.warning());
+        warnings.extend(ids.warning());
         match unread.warnings() {
             Ok(unread) => warnings.extend(unread),
             Err(sentences) if refused.is_none() => return Err(refuse(file, &sentences).into()),

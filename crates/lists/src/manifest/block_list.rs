@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
 use super::cell_errors::formula_error;
+use super::changed_ids::ChangedIds;
 use super::column_names::missing_column;
 use super::csv::{ListedColumn, column_names, draft_of, row_reader};
 use super::draft::{DraftRow, MAX_PATH_BYTES, check_meta};
@@ -48,7 +49,8 @@ pub struct BlockRow {
 pub struct ReadBlocks {
     /// The blocks.
     pub rows: Vec<BlockRow>,
-    /// Warnings about columns that are kept as metadata although their names are similar to those of others.
+    /// Warnings about ids that seem to be changed, values that are left out, and columns that are kept as metadata although
+    /// their names are similar to those of others.
     pub warnings: Vec<String>,
 }
 
@@ -214,8 +216,12 @@ impl BlockRows {
             return Err(of_list("the list contains no blocks").into());
         }
         problems.check(false)?;
-        let similar = similar_columns(&rows);
-        let warnings = unnamed.warning().into_iter().chain(similar).collect();
+        let mut ids = ChangedIds::default();
+        for row in &rows {
+            ids.add(row.line, row.name.as_str(), [&row.mesh, &row.page]);
+        }
+        let of_cells = unnamed.warning().into_iter().chain(ids.warning());
+        let warnings = of_cells.chain(similar_columns(&rows)).collect();
         Ok(ReadBlocks { rows, warnings })
     }
 }

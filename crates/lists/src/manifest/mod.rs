@@ -4,6 +4,7 @@
 mod block_columns;
 mod block_list;
 mod cell_errors;
+mod changed_ids;
 mod chosen_columns;
 mod column_names;
 mod csv;
@@ -25,6 +26,7 @@ pub use self::csv::{parse_csv, read_csv, read_csv_as};
 pub use block_list::{
     BlockRow, ReadBlocks, is_block_json, is_block_list, parse_blocks, read_block_json, read_blocks,
 };
+pub use changed_ids::ChangedIds;
 pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;
 pub use folders::{

@@ -275,6 +275,17 @@ mod tests {
     }
 
     #[test]
+    fn ids_that_a_spreadsheet_changed_are_explained() {
+        let english = "3 ids look like dates or powers of ten, such as \"1-Nov\" (lines 2, 4, 5): a spreadsheet program may \
+                       have made them of texts such as 1-11 and 1E5; give the column the format Text, correct the ids and \
+                       save the list again, best as XLSX";
+        let expected = "3 mã trông như ngày tháng hoặc lũy thừa của mười, chẳng hạn \"1-Nov\" (dòng 2, 4, 5): có thể chương \
+                        trình bảng tính đã đổi chúng từ các văn bản như 1-11 và 1E5; hãy đặt định dạng Văn bản cho cột, sửa \
+                        lại các mã rồi lưu lại danh sách, tốt nhất là XLSX";
+        assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    }
+
+    #[test]
     fn doubts_about_a_scan_are_explained() {
         for (english, expected) in [
             (

@@ -1,0 +1,364 @@
+//! Ids that a spreadsheet program made of others: it takes `1-11` for a date and `1E5` for a power of ten.
+
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// Number of lines that a warning names.
+const SHOWN_LINES: usize = 3;
+/// Number of ids in such a form that are too many for chance.
+const SEVERAL: usize = 2;
+/// Months of dates without a day or year, as spreadsheet programs write them. Capitals, as in `MAR-01`, are of other ids.
+const MONTHS: [&str; 12] = [
+    "Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec",
+];
+/// Years of dates. Smaller numbers of four digits are those of things.
+const YEARS: RangeInclusive<u32> = 1900..=2100;
+
+/// Finds ids in the forms in which spreadsheet programs write dates and powers of ten: `1-Nov`, `Nov-01`, `01-Thg11`, `2026-11-01`,
+/// `01.11.2026` and `1.00E+05`.
+///
+/// An id is right if the path of its mesh or print has it, as in `scans/2026-11-01.stl`. Of the others, there is a warning if a
+/// path has what an id was made of, such as `1-11.stl` for `1-Nov`, or if at least two ids have such a form and other ids do
+/// not. Dates in numbers do not count as two if another id has a year and two numbers, too, as in `1999.12.05` and `1999.13.01`.
+///
+/// So there is no warning about a list whose ids are all dates, and none about `1E5`, which no program writes for a power of ten.
+#[derive(Debug, Default)]
+pub struct ChangedIds {
+    /// Dates in numbers.
+    numeric: IdsOfForm,
+    /// Dates with the name of a month, and powers of ten.
+    others: IdsOfForm,
+    /// Whether there are ids in another form.
+    has_plain: bool,
+    /// Whether one of them has a year and two numbers.
+    has_year: bool,
+}
+
+/// Ids in a form.
+#[derive(Debug, Default)]
+struct IdsOfForm {
+    count: usize,
+    /// The first ones with their lines.
+    first: Vec<(usize, String)>,
+    /// Whether a path has what one of them was made of.
+    is_proved: bool,
+}
+
+impl IdsOfForm {
+    fn add(&mut self, line: usize, id: &str, is_proved: bool) {
+        self.count += 1;
+        self.is_proved |= is_proved;
+        if self.first.len() < SHOWN_LINES {
+            self.first.push((line, id.to_owned()));
+        }
+    }
+}
+
+impl ChangedIds {
+    /// Adds the id of a row with the paths of its files.
+    pub fn add(&mut self, line: usize, id: &str, files: [&Path; 2]) {
+        let Some(form) = SpreadsheetForm::of(id) else {
+            self.has_plain = true;
+            self.has_year |= has_year_and_two_numbers(id);
+            return;
+        };
+        let paths = files.map(|file| file.to_string_lossy().to_lowercase());
+        let folded = id.to_lowercase();
+        if paths.iter().any(|path| path.contains(&folded)) {
+            return;
+        }
+        let is_proved = paths.iter().any(|path| {
+            let path = path.rsplit_once('.').map_or(&**path, |(stem, _)| stem);
+            path.split(['/', '\\']).any(|name| form.is_made_of(name))
+        });
+        let ids = if form.is_numeric() {
+            &mut self.numeric
+        } else {
+            &mut self.others
+        };
+        ids.add(line, id, is_proved);
+    }
+
+    /// Returns a warning, if ids seem to be changed.
+    pub fn warning(&self) -> Option<String> {
+        let are_several = |ids: &IdsOfForm| ids.count >= SEVERAL && self.has_plain;
+        let numeric = &self.numeric;
+        let has_numeric = numeric.is_proved || are_several(numeric) && !self.has_year;
+        let has_others = self.others.is_proved || are_several(&self.others);
+        let found = [(numeric, has_numeric), (&self.others, has_others)];
+        let found = found.into_iter().filter(|(_, is_found)| *is_found);
+        let found: Vec<&IdsOfForm> = found.map(|(ids, _)| ids).collect();
+        let count: usize = found.iter().map(|ids| ids.count).sum();
+        let mut first: Vec<_> = found.iter().flat_map(|ids| &ids.first).collect();
+        first.sort();
+        let (line, id) = first.first()?;
+        let advice = "give the column the format Text, correct the ids and save the list again, best as XLSX";
+        if count == 1 {
+            return Some(format!(
+                "the id {id:?} on line {line} looks like a date or a power of ten: a spreadsheet program may have made it of a text such as 1-11 or 1E5; {advice}"
+            ));
+        }
+        let lines = first.iter().take(SHOWN_LINES);
+        let lines: Vec<String> = lines.map(|(line, _)| line.to_string()).collect();
+        let lines = lines.join(", ");
+        Some(format!(
+            "{count} ids look like dates or powers of ten, such as {id:?} (lines {lines}): a spreadsheet program may have made them of texts such as 1-11 and 1E5; {advice}"
+        ))
+    }
+}
+
+/// What a spreadsheet program writes for a text that it took for something else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum SpreadsheetForm {
+    /// A date.
+    Date {
+        /// Day and month, or month and year, in any order.
+        numbers: [u32; 2],
+        /// The year beside day and month.
+        year: Option<u32>,
+        /// Whether the month is a number.
+        is_numeric: bool,
+    },
+    /// A power of ten.
+    Power {
+        value: f64,
+        /// Digits behind the point.
+        decimals: usize,
+    },
+}
+
+impl SpreadsheetForm {
+    /// Returns the form of an id, if it is one of them.
+    fn of(id: &str) -> Option<Self> {
+        power(id).or_else(|| date(id))
+    }
+
+    const fn is_numeric(self) -> bool {
+        matches!(
+            self,
+            Self::Date {
+                is_numeric: true,
+                ..
+            }
+        )
+    }
+
+    /// Returns whether a program may write this form for the end of a name.
+    fn is_made_of(self, name: &str) -> bool {
+        match self {
+            Self::Power { value, decimals } => {
+                let end = name.rsplit(['_', '-', ' ']).next().unwrap_or(name);
+                let number = end.parse::<f64>().ok().filter(|number| number.is_finite());
+                number.is_some_and(|number| {
+                    format!("{number:.decimals$e}").parse::<f64>() == Ok(value)
+                })
+            }
+            Self::Date { numbers, year, .. } => {
+                let words = name.split(|c: char| !c.is_ascii_digit());
+                let found: Vec<u32> = words.filter_map(|word| word.parse().ok()).collect();
+                let [before @ .., a, b] = found.as_slice() else {
+                    return false;
+                };
+                let short = |number: u32| {
+                    if YEARS.contains(&number) {
+                        number % 100
+                    } else {
+                        number
+                    }
+                };
+                // A name with the year is that of the same date in another form.
+                let is_year = |number: &u32| year.map(short) == Some(short(*number));
+                let (mut ends, mut wanted) = ([*a, *b].map(short), numbers);
+                ends.sort_unstable();
+                wanted.sort_unstable();
+                ends == wanted && !before.iter().any(is_year)
+            }
+        }
+    }
+}
+
+/// Parses a power of ten with the sign and the digits that programs write, such as `1E+05` or `1,25E-10`.
+fn power(id: &str) -> Option<SpreadsheetForm> {
+    let (mantissa, exponent) = id.split_once('E')?;
+    let digits = exponent.strip_prefix(['+', '-'])?;
+    let (whole, fraction) = mantissa.split_once(['.', ',']).unwrap_or((mantissa, ""));
+    let is_form = whole.len() == 1 && (2..=3).contains(&digits.len());
+    if !is_form || ![whole, fraction, digits].into_iter().all(is_digits) {
+        return None;
+    }
+    Some(SpreadsheetForm::Power {
+        value: format!("{whole}.{fraction}E{exponent}").parse().ok()?,
+        decimals: fraction.len(),
+    })
+}
+
+/// Parses a date with day and month, month and year, or all three.
+fn date(id: &str) -> Option<SpreadsheetForm> {
+    let separator = if id.contains('-') { '-' } else { '.' };
+    let parts: Vec<&str> = id.splitn(4, separator).collect();
+    let of = |numbers, year, is_numeric| SpreadsheetForm::Date {
+        numbers,
+        year,
+        is_numeric,
+    };
+    match *parts.as_slice() {
+        [first, second] => {
+            let numbers = match (month(first), month(second)) {
+                (None, Some(month)) => [number(first, &(1..=31))?, month],
+                (Some(month), None) if second.len() == 2 => [month, number(second, &(0..=99))?],
+                _ => return None,
+            };
+            Some(of(numbers, None, false))
+        }
+        [day, name, year] if month(name).is_some() => {
+            let year = number(year, &(0..=99)).or_else(|| number(year, &YEARS))?;
+            let numbers = [number(day, &(1..=31))?, month(name)?];
+            Some(of(numbers, Some(year), false))
+        }
+        [a, b, c] => {
+            let (year, numbers) = if a.len() == 4 {
+                (a, [b, c])
+            } else {
+                (c, [a, b])
+            };
+            if year.len() != 4 || numbers.map(str::len) != [2; 2] {
+                return None;
+            }
+            let numbers = [
+                number(numbers[0], &(1..=31))?,
+                number(numbers[1], &(1..=31))?,
+            ];
+            let has_month = numbers.into_iter().any(|number| number <= 12);
+            let year = number(year, &YEARS).filter(|_| has_month)?;
+            Some(of(numbers, Some(year), true))
+        }
+        _ => None,
+    }
+}
+
+/// Returns whether an id has the parts of a date in numbers, also if there is no such date.
+fn has_year_and_two_numbers(id: &str) -> bool {
+    let parts: Vec<&str> = id.splitn(4, ['-', '.']).collect();
+    let has_year = parts.iter().any(|part| part.len() == 4);
+    parts.len() == 3 && has_year && parts.into_iter().all(is_digits)
+}
+
+/// Returns the number of a month from its name in English, or in Vietnamese, such as `Thg11`.
+fn month(name: &str) -> Option<u32> {
+    if let Some(month) = name.strip_prefix("Thg") {
+        return number(month.trim_start(), &(1..=12));
+    }
+    let at = MONTHS.iter().position(|month| *month == name)?;
+    Some(at as u32 + 1)
+}
+
+/// Parses a number of at most four digits in a range.
+fn number(text: &str, range: &RangeInclusive<u32>) -> Option<u32> {
+    let is_number = (1..=4).contains(&text.len()) && is_digits(text);
+    let number = text.parse::<u32>().ok().filter(|_| is_number);
+    number.filter(|number| range.contains(number))
+}
+
+fn is_digits(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::{read_block_json, read_blocks};
+    use super::ChangedIds;
+
+    /// Returns the warning about ids with their meshes, from line 2.
+    fn warning(rows: &[(&str, &str)]) -> Option<String> {
+        let mut ids = ChangedIds::default();
+        for (line, (id, mesh)) in (2..).zip(rows) {
+            ids.add(line, id, [Path::new(mesh), Path::new("print.png")]);
+        }
+        ids.warning()
+    }
+
+    #[test]
+    fn several_dates_and_powers_among_other_ids_are_counted() {
+        let found = warning(&[
+            ("1-Nov", "m/a.stl"),
+            ("0117", "m/b.stl"),
+            ("Nov-01", "m/c.stl"),
+            ("1.00E+05", "m/d.stl"),
+            ("01-Thg11", "m/e.stl"),
+        ]);
+        assert_eq!(
+            found.as_deref(),
+            Some(
+                "4 ids look like dates or powers of ten, such as \"1-Nov\" (lines 2, 4, 5): a spreadsheet program may have made \
+                 them of texts such as 1-11 and 1E5; give the column the format Text, correct the ids and save the list again, best \
+                 as XLSX"
+            )
+        );
+        let numeric = [("2026-11-01", "a"), ("01.11.2026", "b"), ("x", "c")];
+        assert!(warning(&numeric).is_some_and(|text| text.starts_with("2 ids")));
+    }
+
+    #[test]
+    fn a_file_shows_what_an_id_was_made_of() {
+        for (id, mesh) in [
+            ("1-Nov", "m/1-11.stl"),
+            ("Nov-01", "m\\b04_11-01.stl"),
+            ("1-Nov-26", "m/11.1.stl"),
+            ("2026-11-01", "scans 2026/01-11.stl"),
+            ("1.00E+05", "m/1E5.stl"),
+            ("1.23E+08", "m/b_123456789.stl"),
+            ("1E+05", "1e5/mesh.stl"),
+        ] {
+            let found = warning(&[(id, mesh)]);
+            let start = format!("the id {id:?} on line 2 looks like a date or a power of ten: ");
+            let is_found = found.as_ref().is_some_and(|text| text.starts_with(&start));
+            assert!(is_found, "{id} {mesh}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn real_ids_are_left_alone() {
+        // All are dates; the paths have them; one alone; ids of other forms; numbers of an inventory.
+        for rows in [
+            &[("2026-11-01", "a.stl"), ("2026-11-02", "b.stl")][..],
+            &[
+                ("1-Nov", "m/1-Nov.stl"),
+                ("2-Nov", "2-nov/a.stl"),
+                ("x", "x.stl"),
+            ],
+            &[("1-Nov", "a.stl"), ("0117", "b.stl"), ("0118", "c.stl")],
+            &[("1E5", "1e5.stl"), ("2E5", "b.stl"), ("1A5", "c.stl")],
+            &[("MAR-01", "a"), ("MAR-02", "b"), ("x", "c")],
+            &[
+                ("1-11", "a"),
+                ("1999.1.2", "b"),
+                ("32-Nov", "c"),
+                ("2026-13-40", "d"),
+            ],
+            &[
+                ("1999.12.05", "a"),
+                ("1999.12.06", "b"),
+                ("1999.13.40", "c"),
+            ],
+            &[
+                ("2026-11-01", "2026-11-1.stl"),
+                ("2026-11-02", "2.11.2026.stl"),
+            ],
+        ] {
+            assert_eq!(warning(rows), None, "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn blocks_are_looked_at_too() {
+        let csv = "block,mesh,page\n1-Nov,1-11.stl,p.png\n";
+        let read = read_blocks(csv.as_bytes()).expect("a list");
+        let is_warned = |text: &String| text.contains("\"1-Nov\" on line 2");
+        assert!(read.warnings.iter().any(is_warned), "{:?}", read.warnings);
+        let json = "[{\"block\":\"1-11\",\"mesh\":\"1-11.stl\",\"page\":\"p.png\"}]";
+        let read = read_block_json(json.as_bytes()).expect("a list");
+        assert_eq!(read.warnings, [""; 0]);
+    }
+}
