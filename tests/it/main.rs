@@ -124,6 +124,7 @@ mod many_reviewers;
 mod memory;
 mod mesh_forms;
 mod method_change;
+mod moved_inputs;
 mod names;
 mod object_store;
 mod object_store_blocks;

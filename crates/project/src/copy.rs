@@ -53,7 +53,8 @@ async fn warn_about_inputs(dir: &str, listener: &dyn Listener) {
         found
     };
     if let Ok(Some(missing)) = find.await {
-        warn(listener, format!("{missing}; put them there as well"));
+        let found = missing.found();
+        warn(listener, format!("{found}; put them there as well"));
     }
 }
 

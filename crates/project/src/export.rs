@@ -6,10 +6,22 @@ use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::exit::Refusal;
 use crate::location::Location;
+use crate::missing_inputs::{self, MissingInputs};
 use crate::own_files::refuse_project_file;
 use crate::status::{all_retired, warn_about_stale};
+use mocban_catalog::Catalog;
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{ExportFormat, ExportOptions, ExportSummary, export as export_pairs};
+use mocban_store::Project;
+
+/// An export of a project.
+#[derive(Debug)]
+pub struct ExportedProject {
+    /// What was written.
+    pub summary: ExportSummary,
+    /// Inputs that are no longer at their places, if files could not be read.
+    pub missing_inputs: Option<MissingInputs>,
+}
 
 /// Exports pairs to a folder. An earlier export there is replaced as a whole. Options without metrics choose all those of the
 /// settings.
@@ -23,7 +35,7 @@ pub async fn export(
     mut options: ExportOptions,
     location: &Location,
     listener: &dyn Listener,
-) -> ProjectResult<ExportSummary> {
+) -> ProjectResult<ExportedProject> {
     refuse_project_file(output)?;
     let (project, catalog) = location.open_read_only().await?;
     let config = location.settings()?.config;
@@ -51,6 +63,12 @@ pub async fn export(
     drop(work);
     let summary = summary?;
     let retired = all_retired(&catalog).await?;
+    let missing_inputs = if summary.is_complete() {
+        None
+    } else {
+        // The export is there already, so what cannot be looked up is no error.
+        missing_of(&project, &catalog).await.ok().flatten()
+    };
     catalog.close().await;
     if summary.is_nothing_selected {
         let nothing = match &retired {
@@ -65,5 +83,15 @@ pub async fn export(
     if let Some(retired) = retired {
         warn(listener, format!("the export has no pairs: {retired}"));
     }
-    Ok(summary)
+    Ok(ExportedProject {
+        summary,
+        missing_inputs,
+    })
+}
+
+/// Inspects the inputs of all pairs and blocks.
+async fn missing_of(project: &Project, catalog: &Catalog) -> ProjectResult<Option<MissingInputs>> {
+    let pairs: u64 = catalog.counters().await?.values().sum();
+    let pairs = pairs + catalog.retired_count().await?;
+    missing_inputs::missing(project, catalog, pairs).await
 }

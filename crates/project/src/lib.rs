@@ -68,6 +68,7 @@ pub mod input_paths;
 pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
+mod missing_folders;
 pub mod missing_inputs;
 mod named_inputs;
 pub mod new_project;

@@ -169,7 +169,7 @@ impl PreparedRun {
         let missing_inputs = match &ended {
             Ok(summary) if !summary.stopped => {
                 let pairs = summary.status.pairs + summary.status.retired;
-                missing_inputs::missing(project, catalog, pairs).await
+                missing_inputs::missing_after_failures(project, catalog, pairs).await
             }
             _ => Ok(None),
         };

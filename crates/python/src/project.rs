@@ -383,7 +383,8 @@ impl NativeProject {
                 images,
                 ..ExportOptions::all_of(&metrics, limits)
             };
-            let summary = export::export(&dir, &formats, options, &location, &hearing).await?;
+            let exported = export::export(&dir, &formats, options, &location, &hearing).await?;
+            let summary = exported.summary;
             let unreadable = summary.unreadable.iter();
             let unreadable: Vec<Value> = unreadable
                 .map(|(id, why)| json!({"id": id, "error": why}))

@@ -15,7 +15,7 @@ use mocban_export::{
     ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
     SplitShares,
 };
-use mocban_project::export::export as export_project;
+use mocban_project::export::{ExportedProject, export as export_project};
 use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `export`.
@@ -151,9 +151,9 @@ pub(crate) async fn export(args: ExportArgs, context: &Context) -> ProjectResult
     let (location, terminal) = (&context.location, Terminal::new(context));
     let formats = args.formats();
     let exported = export_project(&args.output, &formats, options, location, &terminal);
-    let summary = exported.await?;
-    print_summary(&summary, &args, context)?;
-    Ok(if summary.is_complete() {
+    let exported = exported.await?;
+    print_summary(&exported, &args, context)?;
+    Ok(if exported.summary.is_complete() {
         ExitCode::Done
     } else {
         ExitCode::SomeFailed
@@ -161,10 +161,11 @@ pub(crate) async fn export(args: ExportArgs, context: &Context) -> ProjectResult
 }
 
 fn print_summary(
-    summary: &ExportSummary,
+    exported: &ExportedProject,
     args: &ExportArgs,
     context: &Context,
 ) -> ProjectResult<()> {
+    let summary = &exported.summary;
     let unreadable = summary.unreadable.iter();
     let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
     let blocks = summary.unreadable_blocks.iter();
@@ -182,11 +183,20 @@ fn print_summary(
         "unreadable_blocks": blocks.collect::<Vec<_>>(),
         "kept_earlier": summary.kept_earlier,
     }))?;
+    let missing = exported.missing_inputs.as_ref();
+    let is_explained = |why: &str| missing.is_some_and(|missing| missing.explains(why));
     for (block, why) in &summary.unreadable_blocks {
-        context.warn(&format!("the export lacks files of block {block}: {why}"));
+        if !is_explained(why) {
+            context.warn(&format!("the export lacks files of block {block}: {why}"));
+        }
     }
     for (pair, why) in &summary.unreadable {
-        context.warn(&format!("the export has no files of {pair}: {why}"));
+        if !is_explained(why) {
+            context.warn(&format!("the export has no files of {pair}: {why}"));
+        }
+    }
+    if let Some(missing) = missing {
+        context.warn(&missing.to_string());
     }
     let shown = args.output.display();
     if summary.kept_earlier {

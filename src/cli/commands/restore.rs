@@ -66,7 +66,8 @@ pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResu
     }
     if let Some(missing) = &restored.not_in_place {
         context.warn(&format!(
-            "{missing}; `restore --inputs DIR` looks for them in another folder"
+            "{}; `restore --inputs DIR` looks for them in another folder",
+            missing.found()
         ));
     }
     if let Some(removed) = restored.settings.map(|settings| settings.removed)

@@ -374,6 +374,9 @@ mod tests {
             missing: 3,
             looked_at: 8,
             first: "d/1.stl".to_owned(),
+            pairs: 2,
+            folders: Vec::new(),
+            is_below_root: false,
         });
         done.are_results_missing = true;
         done.running = false;
@@ -387,7 +390,7 @@ mod tests {
             "{text}"
         );
         assert!(
-            text.contains("inputs       3 of 8 input files that were looked at are missing or have moved, first d/1.stl; `check --json` lists all\n"),
+            text.contains("inputs       3 of 8 input files that were looked at are missing or have moved, first d/1.stl; `check --json` lists all; put them back, or import them from their new place (`import LIST --allow-changed-files`)\n"),
             "{text}"
         );
     }

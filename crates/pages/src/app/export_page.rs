@@ -34,7 +34,7 @@ use mocban_core::domain::{PairName, ThresholdMetric, one_line};
 use mocban_export::{ExportFormat, ExportOptions, ResultFilter};
 use mocban_project::ProjectResult;
 use mocban_project::block_status::BlockStatus;
-use mocban_project::export::export;
+use mocban_project::export::{ExportedProject, export};
 use mocban_project::location::Location;
 
 /// Side of the pictures of a dataset for training, pixels.
@@ -246,7 +246,10 @@ async fn run(
         ..ExportOptions::all_of(&metrics, limits)
     };
     let output = exports_dir(&location.dir).join(format!("{name}{of_chosen}"));
-    let summary = export(&output, &[format], options, &location, &()).await?;
+    let ExportedProject {
+        summary,
+        missing_inputs,
+    } = export(&output, &[format], options, &location, &()).await?;
     let done = grouped(summary.pairs.done);
     let is_of_chosen = !of_chosen.is_empty();
     let [english, vietnamese_title] = [Language::English, Language::Vietnamese]
@@ -277,7 +280,18 @@ async fn run(
             "Bản xuất trước được giữ lại vì thiếu tệp kết quả; hãy kiểm tra dự án trước.".to_owned(),
         ]);
     }
-    for (pair, why) in summary.unreadable.iter().take(3) {
+    let missing = missing_inputs.as_ref();
+    if let Some(missing) = missing {
+        let said = Sentence::of_program(&missing.to_string());
+        lines.push(
+            [Language::English, Language::Vietnamese]
+                .map(|language| said.text(language).to_owned()),
+        );
+    }
+    let is_explained = |why: &str| missing.is_some_and(|missing| missing.explains(why));
+    let others = summary.unreadable.iter();
+    let others = others.filter(|(_, why)| !is_explained(why));
+    for (pair, why) in others.take(3) {
         let line = format!("{pair}: {why}");
         let vietnamese = vietnamese(&line).unwrap_or_else(|| line.clone());
         lines.push([line, vietnamese]);

@@ -46,6 +46,27 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "faces with fewer than three corners were left out: {}",
         "số mặt có ít hơn ba góc đã bị bỏ: {0}",
     ),
+    // Inputs that are no longer at their places.
+    (
+        "{} of {} input files that were looked at are missing or have moved, of {} pairs or blocks, with the folder {}",
+        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, thuộc {2} cặp hoặc ván, cùng với thư mục {3}",
+    ),
+    (
+        "{} of {} input files that were looked at are missing or have moved, of {} pairs or blocks, with the folders {}",
+        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, thuộc {2} cặp hoặc ván, cùng với các thư mục {3}",
+    ),
+    (
+        "{} of {} input files that were looked at are missing or have moved, first {}",
+        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, tệp đầu tiên là {2}",
+    ),
+    (
+        "put them back, or import them from their new place",
+        "hãy đưa chúng về chỗ cũ, hoặc nhập lại từ chỗ mới",
+    ),
+    (
+        "put them back, or write their new place below [storage.roots] in the settings",
+        "hãy đưa chúng về chỗ cũ, hoặc ghi chỗ mới dưới [storage.roots] trong thiết lập",
+    ),
     // Ids of a list.
     (
         "the id {} on line {} looks like a date or a power of ten: a spreadsheet program may have made it of a text such as 1-11 or 1E5",

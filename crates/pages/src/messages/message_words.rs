@@ -275,6 +275,15 @@ mod tests {
     }
 
     #[test]
+    fn moved_inputs_are_explained() {
+        let english = "4 of 4 input files that were looked at are missing or have moved, of 2 pairs or blocks, with the folder \
+                       q/data; put them back, or import them from their new place";
+        let expected = "4 trong số 4 tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, thuộc 2 cặp hoặc ván, cùng với thư \
+                        mục q/data; hãy đưa chúng về chỗ cũ, hoặc nhập lại từ chỗ mới";
+        assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    }
+
+    #[test]
     fn ids_that_a_spreadsheet_changed_are_explained() {
         let english = "3 ids look like dates or powers of ten, such as \"1-Nov\" (lines 2, 4, 5): a spreadsheet program may \
                        have made them of texts such as 1-11 and 1E5; give the column the format Text, correct the ids and \

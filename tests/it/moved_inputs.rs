@@ -1,0 +1,59 @@
+//! Scans and prints whose folder has moved: their folder is named once, with what to do.
+
+use crate::check::{at, done};
+
+#[test]
+fn a_moved_folder_is_named_once_and_its_new_place_can_be_imported() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let (data, moved) = (project.dir().join("data"), dir.path().join("away"));
+    std::fs::rename(&data, &moved).expect("moved");
+    let sentence = format!(
+        "4 of 4 input files that were looked at are missing or have moved, of 2 pairs or blocks, with the folder {}; `check --json` \
+         lists all; put them back, or import them from their new place (`import LIST --allow-changed-files`)",
+        data.display()
+    );
+    let path = |name: &str| {
+        dir.path()
+            .join(name)
+            .to_str()
+            .expect("a path in UTF-8")
+            .to_owned()
+    };
+    let output = path("export");
+    let export = ["export", "-o", &output];
+    let exported = at(&project, &export).expect(3);
+    for (shown, command) in [
+        (exported.err, "export"),
+        (at(&project, &["run"]).expect(0).err, "run"),
+        (at(&project, &["status"]).expect(0).out, "status"),
+    ] {
+        assert_eq!(shown.matches(&sentence).count(), 1, "{command}: {shown}");
+        assert!(!shown.contains("is not there"), "{command}: {shown}");
+    }
+    let (meshes, prints) = (path("away/meshes"), path("away/prints"));
+    let import = [
+        "import",
+        "--meshes",
+        &meshes,
+        "--prints",
+        &prints,
+        "--allow-changed-files",
+    ];
+    at(&project, &import).expect(0);
+    at(&project, &["run"]).expect(0);
+    let exported = at(&project, &export).expect(0);
+    assert!(!exported.err.contains("have moved"), "{}", exported.err);
+}
+
+#[test]
+fn a_run_that_finds_no_file_names_the_missing_folder() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let list = "id,mesh,print\na,scans/1.stl,p.png\nb,scans/2.stl,p.png\n";
+    std::fs::write(dir.path().join("pairs.csv"), list).expect("a list");
+    let on = |args: &[&str]| crate::cli::mocban(dir.path(), &[&["-C", "p"][..], args].concat());
+    on(&["import", "pairs.csv", "--allow-missing"]).expect(0);
+    let ran = on(&["--progress", "none", "run"]).expect(3);
+    let said = "of 2 pairs or blocks, with the folder ";
+    assert_eq!(ran.err.matches(said).count(), 1, "{}", ran.err);
+}
