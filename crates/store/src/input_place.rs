@@ -176,6 +176,12 @@ impl Project {
             .is_some_and(|storage| storage.root(stored).is_some())
     }
 
+    /// Returns whether the artifacts are in an object store, so that other computers need not share the project folder.
+    pub fn has_remote_artifacts(&self) -> bool {
+        let storage = self.storage();
+        storage.is_some_and(|storage| storage.artifacts().is_some())
+    }
+
     /// Returns whether inputs may be read from an object store.
     pub fn has_remote_inputs(&self) -> bool {
         self.storage()

@@ -46,6 +46,14 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "faces with fewer than three corners were left out: {}",
         "số mặt có ít hơn ba góc đã bị bỏ: {0}",
     ),
+    (
+        "the labels would be saved in {}, where workers on other computers do not find them",
+        "nhãn sẽ được lưu trong {0}, nơi các máy khác không tìm thấy",
+    ),
+    (
+        "use a project folder below one of [storage.roots] that all of them have, or correct the labels in another program and import them",
+        "hãy dùng thư mục dự án nằm dưới một thư mục của [storage.roots] mà mọi máy đều có, hoặc sửa nhãn bằng chương trình khác rồi nhập",
+    ),
     // Inputs that are no longer at their places.
     (
         "{} of {} input files that were looked at are missing or have moved, of {} pairs or blocks, with the folder {}",

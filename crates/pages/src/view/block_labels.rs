@@ -18,7 +18,7 @@ pub(super) enum BoxesSaved {
     Unchanged,
     /// The page, its boxes or their file have changed since they were shown.
     OthersSaved,
-    /// An import would not take them as they are.
+    /// An import would not take them as they are, or workers on other computers would not find them.
     Refused(String),
 }
 
@@ -87,6 +87,9 @@ impl BlockLabels {
         shown: ContentHash,
         edits: Option<&BoxEdits>,
     ) -> ProjectResult<BoxesSaved> {
+        if let Some(why) = block_labels::unreachable_place(project, catalog.is_shared())? {
+            return Ok(BoxesSaved::Refused(why));
+        }
         let boxes = self.boxes_of(catalog, project).await?;
         if boxes.shown_hash() != shown {
             return Ok(BoxesSaved::OthersSaved);
