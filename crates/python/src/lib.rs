@@ -5,7 +5,7 @@
 //! - `mesh.rs`, `print.rs`, `settings.rs`: inputs, from arrays and files; `memory.rs`: the memory that they need
 //! - `alignment.rs`: the result of a pair; `state.rs`: the same as bytes; `stages.rs`: single stages
 //! - `project.rs`: a project; `stored_pair.rs`: a pair of it; `stored_block.rs`: a block of it
-//! - `hearing.rs`: events of a project for Python; `log.rs`: messages for Python's `logging`, also those of panics
+//! - `python_events.rs`: events of a project for Python; `log.rs`: messages for Python's `logging`, also those of panics
 //!
 //! Classes here hold data and convert arrays of exactly one kind. The Python part checks and converts everything else, and
 //! has the documentation.
@@ -21,12 +21,12 @@
 mod alignment;
 mod compute;
 mod failure;
-mod hearing;
 mod log;
 mod memory;
 mod mesh;
 mod print;
 mod project;
+mod python_events;
 mod settings;
 mod stages;
 mod state;

@@ -10,8 +10,8 @@ use serde_json::{Value, json};
 use crate::alignment::NativeAlignment;
 use crate::compute::compute_with_events;
 use crate::failure::{project_failure, raise, wrong_argument};
-use crate::hearing::{Heard, Hearing};
 use crate::mesh::unit as mesh_unit;
+use crate::python_events::{PythonEvent, PythonEvents};
 use crate::{log, stored_block, stored_pair};
 use mocban_catalog::{NewVerdict, ReviewContext};
 use mocban_core::domain::cancel::CancelToken;
@@ -54,7 +54,7 @@ impl NativeProject {
     fn call<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(Location, Hearing, Arc<Stop>) -> F + Send + 'static,
+        work: impl FnOnce(Location, PythonEvents, Arc<Stop>) -> F + Send + 'static,
         mut on_event: impl FnMut(&str) -> PyResult<()>,
         also_stop: impl Fn(&CancelToken),
     ) -> PyResult<ProjectResult<T>> {
@@ -64,13 +64,13 @@ impl NativeProject {
             let mut builder = tokio::runtime::Builder::new_multi_thread();
             let runtime = builder.worker_threads(2).enable_all().build();
             let runtime = runtime.map_err(|error| ProjectError::unexpected(error.to_string()))?;
-            runtime.block_on(work(location, Hearing(events), inner))
+            runtime.block_on(work(location, PythonEvents(events), inner))
         };
-        let hear = |heard| match heard {
-            Heard::Run(event) => on_event(&event),
-            Heard::Warning(text) => log::write(py, [(log::WARNING, text)]),
+        let pass_on = |event| match event {
+            PythonEvent::Run(json) => on_event(&json),
+            PythonEvent::Warning(text) => log::write(py, [(log::WARNING, text)]),
         };
-        compute_with_events(py, body, hear, |token| {
+        compute_with_events(py, body, pass_on, |token| {
             stop.escalate();
             also_stop(token);
         })
@@ -82,12 +82,12 @@ impl NativeProject {
     fn outcome<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(Location, Hearing) -> F + Send + 'static,
+        work: impl FnOnce(Location, PythonEvents) -> F + Send + 'static,
     ) -> PyResult<ProjectResult<T>> {
-        let until_stopped = |location, hearing, stop: Arc<Stop>| async move {
+        let until_stopped = |location, events, stop: Arc<Stop>| async move {
             tokio::select! {
                 biased;
-                result = work(location, hearing) => result,
+                result = work(location, events) => result,
                 // The exception of the signal is raised in place of this error.
                 () = stop.reached(StopLevel::Drain) => Err(ProjectError::unexpected("stopped")),
             }
@@ -99,7 +99,7 @@ impl NativeProject {
     fn simple<T: Send + 'static, F: Future<Output = ProjectResult<T>>>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(Location, Hearing) -> F + Send + 'static,
+        work: impl FnOnce(Location, PythonEvents) -> F + Send + 'static,
     ) -> PyResult<T> {
         let result = self.outcome(py, work)?;
         result.map_err(|error| self.failure(py, &error))
@@ -260,8 +260,8 @@ impl NativeProject {
             files: allow_changed_files,
             replace,
         };
-        self.simple(py, move |location, hearing| async move {
-            stored_pair::import(file, rows, allowed, &location, &hearing).await
+        self.simple(py, move |location, events| async move {
+            stored_pair::import(file, rows, allowed, &location, &events).await
         })
     }
 
@@ -290,8 +290,8 @@ impl NativeProject {
             ("page", Some(block.page.clone())),
             ("labels", block.labels.clone()),
         ];
-        let imported = self.outcome(py, |location, hearing| async move {
-            stored_block::import(block, &location, &hearing).await
+        let imported = self.outcome(py, |location, events| async move {
+            stored_block::import(block, &location, &events).await
         })?;
         imported.map_err(|error| {
             // The import also finds files by other forms of their names.
@@ -332,7 +332,7 @@ impl NativeProject {
                 .as_ref()
                 .map_or(Ok(()), |call| call.call1((event,)).map(drop))
         };
-        let work = move |location: Location, hearing: Hearing, stop: Arc<Stop>| async move {
+        let work = move |location: Location, events: PythonEvents, stop: Arc<Stop>| async move {
             if stop_at_once {
                 tokio::spawn(stop_soon(Arc::clone(&stop)));
             }
@@ -340,8 +340,8 @@ impl NativeProject {
             if let Some(workers) = workers {
                 options.workers = workers;
             }
-            let run = PreparedRun::new(&ids, options, false, &location, &hearing).await?;
-            let outcome = run.run(&stop, &hearing).await?;
+            let run = PreparedRun::new(&ids, options, false, &location, &events).await?;
+            let outcome = run.run(&stop, &events).await?;
             Ok(serde_json::to_string(&outcome.summary)?)
         };
         let result = self.call(py, work, on_event, |_| ())?;
@@ -351,13 +351,13 @@ impl NativeProject {
     /// Returns the report in a format.
     fn report(&self, py: Python<'_>, format: String) -> PyResult<String> {
         let format = parsed(py, &format)?;
-        self.simple(py, move |location, hearing| async move {
+        self.simple(py, move |location, events| async move {
             let options = ReportOptions {
                 format,
                 interval: IntervalMethod::default(),
                 with_times: false,
             };
-            Ok(report(options, None, &location, &hearing).await?.text)
+            Ok(report(options, None, &location, &events).await?.text)
         })
     }
 
@@ -376,14 +376,14 @@ impl NativeProject {
         let metrics = metrics.iter().map(|name| parsed_metric(py, name));
         let metrics: Vec<ThresholdMetric> = metrics.collect::<PyResult<_>>()?;
         let only = parsed(py, &only)?;
-        self.simple(py, move |location, hearing| async move {
+        self.simple(py, move |location, events| async move {
             let limits = location.settings()?.config.limits;
             let options = ExportOptions {
                 only,
                 images,
                 ..ExportOptions::all_of(&metrics, limits)
             };
-            let exported = export::export(&dir, &formats, options, &location, &hearing).await?;
+            let exported = export::export(&dir, &formats, options, &location, &events).await?;
             let summary = exported.summary;
             let unreadable = summary.unreadable.iter();
             let unreadable: Vec<Value> = unreadable

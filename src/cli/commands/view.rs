@@ -11,7 +11,7 @@ use mocban_core::domain::{BlockName, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_export::scan_view::ScanView;
 use mocban_pages::review::Language;
-use mocban_pages::view::{BlockPoints, open_block, scan_page};
+use mocban_pages::view::{BlockAccess, open_block, scan_page};
 use mocban_project::blocking::blocking;
 use mocban_project::selection;
 use mocban_project::shell::quoted_id;
@@ -89,7 +89,7 @@ async fn block_page(
     catalog: &Catalog,
     context: &Context,
 ) -> ProjectResult<Router> {
-    let store = BlockPoints::new(&context.location, name, Some(context.command("run")));
+    let store = BlockAccess::new(&context.location, name, Some(context.command("run")));
     let limits = context.location.settings()?.config.limits;
     let language = args.language();
     let opened = open_block(catalog, project, name, args.metric, limits, store, language).await?;

@@ -21,7 +21,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
 use crate::on_thread::read_on_thread;
-use crate::view::{BlockPoints, open_block};
+use crate::view::{BlockAccess, open_block};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockStage, FailureClass, JobStatus, one_line,
@@ -98,7 +98,7 @@ async fn opened(open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router>
     let location = open.location();
     let own = Arc::clone(&open);
     let read = read_on_thread(async move || {
-        let store = BlockPoints::new(&location, &name, None);
+        let store = BlockAccess::new(&location, &name, None);
         let limits = location.settings()?.config.limits;
         open_block(
             &own.catalog,

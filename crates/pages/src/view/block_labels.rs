@@ -1,11 +1,10 @@
 //! Reads the boxes of a block for their page, and stores changed ones as labels of the project.
 
-use super::block_points::BlockPoints;
+use super::block_access::BlockAccess;
 use crate::on_thread::{on_thread, read_on_thread};
 use mocban_catalog::{BlockLabelsChange, Catalog};
-use mocban_core::domain::{BlockName, ContentHash};
+use mocban_core::domain::ContentHash;
 use mocban_export::block_view::{BoxEdits, EditableBoxes};
-use mocban_project::location::Location;
 use mocban_project::{ProjectError, ProjectResult, block_labels};
 use mocban_store::{Project, hash_input};
 
@@ -22,42 +21,27 @@ pub(super) enum BoxesSaved {
     Refused(String),
 }
 
-/// The labels of a block of the project. The catalog is open only while it is used.
-#[derive(Debug, Clone)]
-pub(super) struct BlockLabels {
-    location: Location,
-    block: BlockName,
-}
-
-impl BlockLabels {
-    /// Creates the access to the labels of the block of these points.
-    pub(super) fn of(points: &BlockPoints) -> Self {
-        Self {
-            location: points.location.clone(),
-            block: points.block.clone(),
-        }
-    }
-
+impl BlockAccess {
     /// Reads the page and its boxes. Returns a sentence if that fails.
-    pub(super) async fn read(&self) -> Result<EditableBoxes, String> {
+    pub(super) async fn read_boxes(&self) -> Result<EditableBoxes, String> {
         let own = self.clone();
-        let read = read_on_thread(async move || own.read_boxes().await).await;
+        let read = read_on_thread(async move || own.stored_boxes().await).await;
         read.map_err(|error| error.text(&self.location.dir))
     }
 
     /// Stores changed boxes, or the labels that the stored ones have replaced, if the page still has what was `shown`. Returns
     /// a sentence if that fails.
-    pub(super) async fn save(
+    pub(super) async fn save_boxes(
         &self,
         shown: ContentHash,
         edits: Option<BoxEdits>,
     ) -> Result<BoxesSaved, String> {
         let own = self.clone();
-        let stored = on_thread(async move || own.store(shown, edits.as_ref()).await).await;
+        let stored = on_thread(async move || own.store_boxes(shown, edits.as_ref()).await).await;
         stored.map_err(|error| error.text(&self.location.dir))
     }
 
-    async fn read_boxes(&self) -> ProjectResult<EditableBoxes> {
+    async fn stored_boxes(&self) -> ProjectResult<EditableBoxes> {
         let (project, catalog) = self.location.open_read_only().await?;
         let read = self.boxes_of(&catalog, &project).await;
         catalog.close().await;
@@ -69,25 +53,27 @@ impl BlockLabels {
         Ok(EditableBoxes::read(catalog, project, &self.block, limits).await?)
     }
 
-    async fn store(
+    async fn store_boxes(
         &self,
         shown: ContentHash,
         edits: Option<&BoxEdits>,
     ) -> ProjectResult<BoxesSaved> {
         let (project, catalog) = self.location.open().await?;
-        let stored = self.store_in(&catalog, &project, shown, edits).await;
+        let stored = self.store_boxes_in(&catalog, &project, shown, edits).await;
         catalog.close().await;
         stored
     }
 
-    async fn store_in(
+    async fn store_boxes_in(
         &self,
         catalog: &Catalog,
         project: &Project,
         shown: ContentHash,
         edits: Option<&BoxEdits>,
     ) -> ProjectResult<BoxesSaved> {
-        if let Some(why) = block_labels::unreachable_place(project, catalog.is_shared())? {
+        if edits.is_some()
+            && let Some(why) = block_labels::unreachable_place(project, catalog.is_shared())?
+        {
             return Ok(BoxesSaved::Refused(why));
         }
         let boxes = self.boxes_of(catalog, project).await?;

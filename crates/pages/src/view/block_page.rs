@@ -9,7 +9,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse as _, Redirect, Response};
 use axum::routing::get;
 
-use super::block_points::BlockPoints;
+use super::block_access::BlockAccess;
 use super::boxes_page;
 use super::correction_page;
 use super::page;
@@ -90,7 +90,7 @@ struct ShownBlock {
 pub(super) fn block_page(
     block: &BlockName,
     view: Option<BlockView>,
-    store: BlockPoints,
+    store: BlockAccess,
     language: Option<Language>,
 ) -> Router {
     let work = Arc::new(WorkThread::default());
@@ -102,7 +102,7 @@ pub(super) fn block_page(
         .route("/assets/{name}", get(asset))
         .merge(boxes_page::routes(
             block.clone(),
-            &store,
+            store.clone(),
             Arc::clone(&work),
             language,
         ))

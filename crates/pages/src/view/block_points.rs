@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use super::block_access::BlockAccess;
 use crate::on_thread::{on_thread, read_on_thread};
 use mocban_catalog::{Catalog, ControlPointsChange};
-use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
+use mocban_core::domain::{ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, replaced_file};
-use mocban_project::location::Location;
 use mocban_project::{ProjectError, ProjectResult};
 use mocban_store::Project;
 
@@ -21,27 +21,9 @@ pub(super) enum PointsSaved {
     FileReplaced(PathBuf),
 }
 
-/// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays
-/// open does not hold it.
-#[derive(Debug, Clone)]
-pub struct BlockPoints {
-    pub(super) location: Location,
-    pub(super) block: BlockName,
-    next_command: Option<String>,
-}
-
-impl BlockPoints {
-    /// Creates the access to the control points of a block. `next_command` aligns the block again.
-    pub fn new(location: &Location, block: &BlockName, next_command: Option<String>) -> Self {
-        Self {
-            location: location.clone(),
-            block: block.clone(),
-            next_command,
-        }
-    }
-
-    /// Reads the block. Returns a sentence if that fails.
-    pub(super) async fn read(&self) -> Result<BlockCorrection, String> {
+impl BlockAccess {
+    /// Reads the block for its correction. Returns a sentence if that fails.
+    pub(super) async fn read_correction(&self) -> Result<BlockCorrection, String> {
         let own = self.clone();
         let read = read_on_thread(async move || own.read_block().await).await;
         read.map_err(|error| error.text(&self.location.dir))
@@ -49,24 +31,14 @@ impl BlockPoints {
 
     /// Stores control points, or removes the stored ones, if these still have the hash `read`. Returns a sentence if that
     /// fails.
-    pub(super) async fn save(
+    pub(super) async fn save_points(
         &self,
         read: Option<ContentHash>,
         points: Option<ControlPoints>,
     ) -> Result<PointsSaved, String> {
         let own = self.clone();
-        let stored = on_thread(async move || own.store(read, points.as_ref()).await).await;
+        let stored = on_thread(async move || own.store_points(read, points.as_ref()).await).await;
         stored.map_err(|error| error.text(&self.location.dir))
-    }
-
-    /// Returns the command that aligns the block again; `None` if a page has a button for it.
-    pub(super) fn next_command(&self) -> Option<String> {
-        self.next_command.clone()
-    }
-
-    /// Returns the relative address of the page of the block. Only the app has one, and it has no command.
-    pub(super) fn back(&self) -> Option<&'static str> {
-        self.next_command.is_none().then_some("../")
     }
 
     async fn read_block(&self) -> ProjectResult<BlockCorrection> {
@@ -77,18 +49,18 @@ impl BlockPoints {
         Ok(read?)
     }
 
-    async fn store(
+    async fn store_points(
         &self,
         read: Option<ContentHash>,
         points: Option<&ControlPoints>,
     ) -> ProjectResult<PointsSaved> {
         let (project, catalog) = self.location.open().await?;
-        let stored = self.store_in(&catalog, &project, read, points).await;
+        let stored = self.store_points_in(&catalog, &project, read, points).await;
         catalog.close().await;
         stored
     }
 
-    async fn store_in(
+    async fn store_points_in(
         &self,
         catalog: &Catalog,
         project: &Project,

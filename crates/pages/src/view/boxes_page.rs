@@ -12,8 +12,8 @@ use axum::{Extension, Json, Router};
 use serde::Deserialize;
 use serde_json::json;
 
-use super::block_labels::{BlockLabels, BoxesSaved};
-use super::block_points::BlockPoints;
+use super::block_access::BlockAccess;
+use super::block_labels::BoxesSaved;
 use super::page;
 use super::refusal::{refused, unavailable};
 use super::scan_page::jpeg;
@@ -27,9 +27,7 @@ use mocban_export::block_view::{BoxEdits, EditableBoxes};
 struct BoxesState {
     block: BlockName,
     language: Option<Language>,
-    back: Option<&'static str>,
-    next_command: Option<String>,
-    store: BlockLabels,
+    store: BlockAccess,
     work: Arc<WorkThread>,
     /// The page with its boxes, which is read when it is opened.
     shown: tokio::sync::Mutex<Option<Arc<EditableBoxes>>>,
@@ -55,16 +53,14 @@ type BoxesPage = State<Arc<BoxesState>>;
 /// Returns the routes of the page of a block.
 pub(super) fn routes(
     block: BlockName,
-    points: &BlockPoints,
+    store: BlockAccess,
     work: Arc<WorkThread>,
     language: Option<Language>,
 ) -> Router {
     let state = BoxesState {
         block,
         language,
-        back: points.back(),
-        next_command: points.next_command(),
-        store: BlockLabels::of(points),
+        store,
         work,
         shown: tokio::sync::Mutex::default(),
     };
@@ -84,7 +80,7 @@ impl BoxesState {
         if let Some(shown) = &*shown {
             return Ok(Arc::clone(shown));
         }
-        let read = self.store.read().await.map(Arc::new);
+        let read = self.store.read_boxes().await.map(Arc::new);
         let read = read.map_err(|why| unavailable(&why))?;
         *shown = Some(Arc::clone(&read));
         Ok(read)
@@ -92,10 +88,10 @@ impl BoxesState {
 
     /// Stores boxes, and responds.
     async fn store(&self, shown: ContentHash, edits: Option<BoxEdits>) -> Response {
-        match self.store.save(shown, edits).await {
+        match self.store.save_boxes(shown, edits).await {
             Ok(BoxesSaved::Saved) => {
                 *self.shown.lock().await = None;
-                Json(json!({"is_saved": true, "next": self.next_command})).into_response()
+                Json(json!({"is_saved": true, "next": self.store.next_command()})).into_response()
             }
             Ok(BoxesSaved::Unchanged) => Json(json!({"is_saved": false})).into_response(),
             Ok(BoxesSaved::OthersSaved) => refused(
@@ -110,7 +106,8 @@ impl BoxesState {
 
 async fn index(State(state): BoxesPage, RawQuery(query): RawQuery) -> Html<String> {
     let language = Language::asked_for(query.as_deref()).or(state.language);
-    Html(page::boxes(state.block.as_str(), language, state.back))
+    let back = state.store.back();
+    Html(page::boxes(state.block.as_str(), language, back))
 }
 
 async fn block_json(

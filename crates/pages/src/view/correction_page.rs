@@ -13,7 +13,8 @@ use axum::{Extension, Json, Router};
 use serde::Deserialize;
 use serde_json::json;
 
-use super::block_points::{BlockPoints, PointsSaved};
+use super::block_access::BlockAccess;
+use super::block_points::PointsSaved;
 use super::page;
 use super::refusal::{refused, unavailable};
 use super::scan_page::jpeg;
@@ -30,7 +31,7 @@ static LAST_TRIED: AtomicU64 = AtomicU64::new(0);
 struct CorrectionState {
     block: BlockName,
     language: Option<Language>,
-    store: BlockPoints,
+    store: BlockAccess,
     work: Arc<WorkThread>,
     /// The block, which is read when the page is opened.
     shown: tokio::sync::Mutex<Option<Arc<BlockCorrection>>>,
@@ -66,7 +67,7 @@ type CorrectionPage = State<Arc<CorrectionState>>;
 /// Returns the routes of the page of a block.
 pub(super) fn routes(
     block: BlockName,
-    store: BlockPoints,
+    store: BlockAccess,
     work: Arc<WorkThread>,
     language: Option<Language>,
 ) -> Router {
@@ -97,7 +98,7 @@ impl CorrectionState {
         if let Some(shown) = &*shown {
             return Ok(Arc::clone(shown));
         }
-        let read = self.store.read().await.map(Arc::new);
+        let read = self.store.read_correction().await.map(Arc::new);
         let read = read.map_err(|why| unavailable(&why))?;
         *shown = Some(Arc::clone(&read));
         Ok(read)
@@ -124,7 +125,7 @@ impl CorrectionState {
         points: Option<ControlPoints>,
     ) -> Response {
         let saved_hash = points.as_ref().map(ControlPoints::hash);
-        match self.store.save(read, points).await {
+        match self.store.save_points(read, points).await {
             Ok(PointsSaved::Saved) => {
                 *self.shown.lock().await = None;
                 let next = self.store.next_command();

@@ -1,5 +1,6 @@
 //! The pages of `mocban view`: one scan on its print in 3D, or a whole block.
 
+mod block_access;
 mod block_labels;
 mod block_page;
 mod block_points;
@@ -10,7 +11,7 @@ pub(crate) mod page;
 mod refusal;
 mod scan_page;
 
-pub use block_points::BlockPoints;
+pub use block_access::BlockAccess;
 pub use opened_block::{OpenedBlock, open_block};
 pub(crate) use scan_page::asset as scan_asset;
 pub use scan_page::scan_page;

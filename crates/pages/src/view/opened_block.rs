@@ -2,8 +2,8 @@
 
 use axum::Router;
 
+use super::block_access::BlockAccess;
 use super::block_page::block_page;
-use super::block_points::BlockPoints;
 use crate::review::Language;
 use mocban_catalog::Catalog;
 use mocban_core::InputLimits;
@@ -32,7 +32,7 @@ pub async fn open_block(
     name: &BlockName,
     metric: Option<ThresholdMetric>,
     limits: InputLimits,
-    store: BlockPoints,
+    store: BlockAccess,
     language: Option<Language>,
 ) -> ProjectResult<OpenedBlock> {
     let read = BlockView::read(catalog, project, name, metric, limits).await;

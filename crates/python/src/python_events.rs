@@ -6,19 +6,19 @@ use crate::compute::EventSender;
 use mocban_project::events::{Listener, ProjectEvent};
 
 /// An event in JSON: of a run, or a warning.
-pub(crate) enum Heard {
+pub(crate) enum PythonEvent {
     Run(String),
     Warning(String),
 }
 
 /// Sends the events of a function to Python.
-pub(crate) struct Hearing(pub(crate) EventSender<Heard>);
+pub(crate) struct PythonEvents(pub(crate) EventSender<PythonEvent>);
 
-impl Listener for Hearing {
+impl Listener for PythonEvents {
     fn event(&self, event: ProjectEvent<'_>) {
         match event {
-            ProjectEvent::Run(event) => self.0.send(Heard::Run(json!(event).to_string())),
-            ProjectEvent::Warning(text) => self.0.send(Heard::Warning(text)),
+            ProjectEvent::Run(event) => self.0.send(PythonEvent::Run(json!(event).to_string())),
+            ProjectEvent::Warning(text) => self.0.send(PythonEvent::Warning(text)),
             ProjectEvent::Begun(_) | ProjectEvent::Ended => {}
         }
     }

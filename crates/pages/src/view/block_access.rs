@@ -1,0 +1,34 @@
+//! The access of pages to a block of the project, whose catalog is open only while it is used, so that a page that stays open
+//! does not hold it.
+
+use mocban_core::domain::BlockName;
+use mocban_project::location::Location;
+
+/// A block of the project, its control points and its labels.
+#[derive(Debug, Clone)]
+pub struct BlockAccess {
+    pub(super) location: Location,
+    pub(super) block: BlockName,
+    next_command: Option<String>,
+}
+
+impl BlockAccess {
+    /// Creates the access to a block. `next_command` aligns it again.
+    pub fn new(location: &Location, block: &BlockName, next_command: Option<String>) -> Self {
+        Self {
+            location: location.clone(),
+            block: block.clone(),
+            next_command,
+        }
+    }
+
+    /// Returns the command that aligns the block again; `None` if a page has a button for it.
+    pub(super) fn next_command(&self) -> Option<String> {
+        self.next_command.clone()
+    }
+
+    /// Returns the relative address of the page of the block. Only the app has one, and it has no command.
+    pub(super) fn back(&self) -> Option<&'static str> {
+        self.next_command.is_none().then_some("../")
+    }
+}
