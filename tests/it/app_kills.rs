@@ -14,6 +14,7 @@ use crate::block_view::finished_block;
 use crate::cli::mocban;
 use crate::fault::Fault;
 use crate::page::{Page, read_project, send};
+use crate::small_block::stored_block;
 use crate::waiting::wait_until;
 
 /// How long the interrupted call takes, in milliseconds: until the app is killed.
@@ -211,8 +212,7 @@ fn killed_control_points_are_saved_by_the_next_app_or_not_at_all() {
 
 /// Returns the path of the labels of the block `b1`.
 fn labels_path(root: &Path) -> Value {
-    let shown = mocban(root, &["-C", "p", "--json", "show", "b1"]).expect(0);
-    shown.json()["labels_path"].clone()
+    stored_block(root)["labels_path"].clone()
 }
 
 /// Kills an app that replaces the labels of the block, and replaces them with the next one.

@@ -12,6 +12,7 @@ use crate::block_view::finished_block;
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::Page;
+use crate::small_block::stored_block;
 
 const BOXES: &str = "/p/p/block/b1/view/boxes";
 /// The boxes are shown.
@@ -24,15 +25,9 @@ fn shown(page: &Page) -> Value {
     page.get(&format!("{BOXES}/block.json")).json()
 }
 
-/// Returns what is stored of the block.
-fn stored(dir: &Path) -> Value {
-    let shown = mocban(dir, &["-C", "p", "--json", "show", "b1"]).expect(0);
-    shown.json()
-}
-
 /// Returns the names of the characters that have a box, sorted.
 fn labels(dir: &Path) -> Vec<String> {
-    let stored = stored(dir);
+    let stored = stored_block(dir);
     let characters = stored["character_list"].as_array().expect("characters");
     let with_box = characters.iter().filter(|one| one["state"] != "retired");
     let labels = with_box.map(|one| one["label"].as_str().expect("a label").to_owned());
@@ -160,7 +155,7 @@ fn boxes_are_changed_saved_and_replaced_by_the_earlier_ones() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let dir = dir.path();
     finished_block(dir);
-    let first_labels = stored(dir)["labels_path"].clone();
+    let first_labels = stored_block(dir)["labels_path"].clone();
     let page = Page::of(app(dir).args(["--lang", "en"]));
     let (tab, home) = enter(&browser, &page, [1400, 900]);
     let other = browser.tab(1400, 900);
@@ -178,7 +173,7 @@ fn boxes_are_changed_saved_and_replaced_by_the_earlier_ones() {
     tab.eval("mocbanBoxes.saveButton.click(), null");
     tab.wait(SAVED);
     assert_eq!(tab.eval("mocbanBoxes.edits.count()"), 0);
-    assert_eq!(stored(dir)["labels_path"], "labels/b1-1.json");
+    assert_eq!(stored_block(dir)["labels_path"], "labels/b1-1.json");
     let file = fs::read_to_string(dir.join("p/labels/b1-1.json")).expect("labels");
     let file: Value = serde_json::from_str(&file).expect("JSON");
     assert_eq!(file["mocban_replaces"], first_labels);
@@ -200,7 +195,7 @@ fn boxes_are_changed_saved_and_replaced_by_the_earlier_ones() {
     assert!(after.contains(&"new".to_owned()), "{after:?}");
     tab.eval("mocbanBoxes.earlierButton.click(), document.querySelector('.box-question button').click(), null");
     tab.wait(&format!("{SAVED} && mocbanBoxes.earlierButton.hidden"));
-    assert_eq!(stored(dir)["labels_path"], first_labels);
+    assert_eq!(stored_block(dir)["labels_path"], first_labels);
     assert!(dir.join("p/labels/b1-1.json").exists(), "the file stays");
     let run = mocban(dir, &["-C", "p", "run"]);
     assert!([0, 3].contains(&run.code), "{}", run.err);

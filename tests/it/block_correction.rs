@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
 use crate::page::{Page, Reply, send};
-use crate::small_block::demo_block;
+use crate::small_block::{demo_block, stored_block};
 
 /// Part of the page's width and height that the fragment shows.
 const FRAGMENT: f64 = 0.42;
@@ -49,8 +49,7 @@ fn truth(dir: &Path) -> Value {
 
 /// Returns the faces that were found, in the order of the page's sides.
 fn faces(dir: &Path) -> Vec<Value> {
-    let shown = mocban(dir, &["-C", "p", "--json", "show", "b1"]).expect(0);
-    let shown = shown.json();
+    let shown = stored_block(dir);
     let faces = shown["stages"][0]["outcome"]["faces"].as_array();
     faces.expect("faces").clone()
 }
@@ -374,11 +373,7 @@ fn a_fragment_of_a_page_is_aligned_from_points_that_a_person_chooses() {
     };
     check_routes(dir);
     check_conflicts(dir);
-    let show = || {
-        mocban(dir, &["-C", "p", "--json", "show", "b1"])
-            .expect(0)
-            .json()
-    };
+    let show = || stored_block(dir);
     assert_eq!(
         show()["control_points"]["points"].as_array().map(Vec::len),
         Some(3)

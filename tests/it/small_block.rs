@@ -48,3 +48,9 @@ pub(crate) fn few_labels_with(dir: &Path, file: &Path, change: impl FnOnce(&mut 
     of_page["regions"] = json!(few);
     fs::write(file, labels.to_string()).expect("written");
 }
+
+/// Returns what the project `p` stores of the block `b1`.
+pub(crate) fn stored_block(dir: &Path) -> Value {
+    let shown = mocban(dir, &["-C", "p", "--json", "show", "b1"]).expect(0);
+    shown.json()
+}

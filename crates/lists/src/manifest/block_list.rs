@@ -11,7 +11,7 @@ use super::cell_errors::formula_error;
 use super::changed_ids::ChangedIds;
 use super::column_names::missing_column;
 use super::csv::{ListedColumn, column_names, draft_of, row_reader};
-use super::draft::{DraftRow, MAX_PATH_BYTES, check_meta};
+use super::draft::{DraftRow, MAX_PATH_BYTES, check_length, check_meta, record};
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::{first_keys, json_rows};
 use super::row::RowIds;
@@ -268,11 +268,10 @@ fn columns_of(
 fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
     draft.cells.retain(|_, cell| !cell.is_empty());
     let cells = &draft.cells;
-    let mut lengths = cells.iter().map(|(column, cell)| (column, cell.len()));
-    if let Some((column, len)) = lengths.find(|(_, len)| *len > MAX_PATH_BYTES) {
-        reasons.push(format!(
-            "{column} has {len} bytes, over the limit of {MAX_PATH_BYTES}"
-        ));
+    for (column, cell) in cells {
+        check_length(column, cell.len(), MAX_PATH_BYTES, reasons);
+    }
+    if !reasons.is_empty() {
         return None;
     }
     check_meta(&draft.meta, reasons);
@@ -291,18 +290,17 @@ fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
         .map(|cell| any_case::<LengthUnit>(cell))
         .transpose();
     let side = cells.get("side").map(|cell| side(cell)).transpose();
-    let mut record = |reason: Option<&String>| reasons.extend(reason.cloned());
-    record(name.as_ref().err());
-    record(unit.as_ref().err());
-    record(side.as_ref().err());
+    let name = record(name, reasons);
+    let unit = record(unit, reasons);
+    let side = record(side, reasons);
     Some(BlockRow {
         line: draft.line,
-        name: name.ok()?,
+        name: name?,
         mesh: PathBuf::from(cells.get("mesh")?),
         page: PathBuf::from(cells.get("page")?),
         labels: cells.get("labels").map(PathBuf::from),
-        unit: unit.ok()?,
-        side: side.ok()?,
+        unit: unit?,
+        side: side?,
         meta: draft.meta,
     })
 }

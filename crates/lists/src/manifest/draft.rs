@@ -188,7 +188,8 @@ pub(super) fn check_meta(meta: &BTreeMap<String, serde_json::Value>, reasons: &m
     }
 }
 
-fn check_length(name: &str, len: usize, max: usize, reasons: &mut Vec<String>) {
+/// Records a cell that is longer than `max` bytes.
+pub(super) fn check_length(name: &str, len: usize, max: usize, reasons: &mut Vec<String>) {
     if len > max {
         reasons.push(format!(
             "{name:.40} has {len} bytes, over the limit of {max}"
@@ -207,7 +208,7 @@ const MAX_BLOCK_CHARS: usize = 48;
 const MAX_CELL_BYTES: usize = 1 << 16;
 
 /// Returns a value, or records why it is not valid.
-fn record<T>(value: Result<T, String>, reasons: &mut Vec<String>) -> Option<T> {
+pub(super) fn record<T>(value: Result<T, String>, reasons: &mut Vec<String>) -> Option<T> {
     value.map_err(|reason| reasons.push(reason)).ok()
 }
 

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::draft::{DraftRow, MAX_ROW_BYTES};
 use super::error::{Problem, at_line, of_list};
-use super::json_array::{ArrayCursor, is_array, place_in_row};
+use super::json_array::{ArrayCursor, DamagedArray, is_array, place_in_row};
 use super::text::{as_utf8, trimmed};
 use crate::columns::{HeaderColumns, KnownColumns};
 use crate::json_numbers::{nan_as_null, unknown_number};
@@ -51,21 +51,9 @@ pub(super) fn json_rows(
             renamed,
         });
     };
-    if is_array(bytes) {
-        let mut cursor = ArrayCursor::default();
-        while let Some(next) = cursor.next_value(bytes) {
-            match next {
-                Ok((line, place)) => push(line, &bytes[place]),
-                Err(refused) => return Err(at_line(refused.line, refused.reason)),
-            }
-        }
-        return Ok(());
-    }
-    for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
-        let content = content.trim_ascii();
-        if !content.is_empty() {
-            push(line, content);
-        }
+    for next in row_contents(bytes) {
+        let (line, content) = next.map_err(|refused| at_line(refused.line, refused.reason))?;
+        push(line, content);
     }
     Ok(())
 }
@@ -73,18 +61,27 @@ pub(super) fn json_rows(
 /// Returns the keys of the first row of a list in JSON that can be read.
 pub(super) fn first_keys(bytes: &[u8]) -> Option<Vec<String>> {
     let bytes = &*as_utf8(bytes).ok()?;
+    let mut rows = row_contents(bytes).map_while(Result::ok);
+    rows.find_map(|(_, content)| row_keys(content))
+}
+
+/// A row with its line, or where an array is damaged.
+type RowContent<'b> = Result<(usize, &'b [u8]), DamagedArray>;
+
+/// Returns the rows of a list as text. Nothing follows an error.
+fn row_contents(bytes: &[u8]) -> Box<dyn Iterator<Item = RowContent<'_>> + '_> {
     if is_array(bytes) {
         let mut cursor = ArrayCursor::default();
-        let mut places = std::iter::from_fn(|| cursor.next_value(bytes)?.ok());
-        return places.find_map(|(_, place)| row_keys(&bytes[place]));
+        let values = std::iter::from_fn(move || cursor.next_value(bytes));
+        return Box::new(values.map(move |next| next.map(|(line, place)| (line, &bytes[place]))));
     }
-    let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
-    lines.find_map(row_keys)
+    let lines = (1..).zip(bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii));
+    Box::new(lines.filter(|(_, content)| !content.is_empty()).map(Ok))
 }
 
 /// Returns the keys of a row, if it can be read.
 fn row_keys(row: &[u8]) -> Option<Vec<String>> {
-    if row.is_empty() || row.len() > MAX_ROW_BYTES {
+    if row.len() > MAX_ROW_BYTES {
         return None;
     }
     let JsonEntries(entries) = parsed(std::str::from_utf8(row).ok()?).ok()?;
