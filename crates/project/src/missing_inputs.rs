@@ -23,8 +23,8 @@ const INSPECTION_TIME: Duration = Duration::from_secs(4);
 const MAX_TIME: Duration = Duration::from_secs(5);
 /// Largest number of missing folders that a sentence names.
 const MAX_FOLDERS: usize = 3;
-/// Ends the message of a file that is missing.
-const NOT_THERE: &str = " is not there";
+/// Ends of the message of a file that is missing.
+const NOT_THERE: [&str; 2] = [" is not there", " is missing"];
 
 /// Input files that were read before and are no longer at their places.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -78,7 +78,7 @@ impl MissingInputs {
     /// Returns whether a message is that of a missing file in one of the folders.
     pub fn explains(&self, message: &str) -> bool {
         let mut folders = self.folders.iter();
-        message.ends_with(NOT_THERE)
+        NOT_THERE.iter().any(|end| message.ends_with(end))
             && folders.any(|folder| message.contains(&format!("{folder}{MAIN_SEPARATOR}")))
     }
 }
