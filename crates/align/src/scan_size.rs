@@ -132,7 +132,8 @@ pub fn doubtful_surface(length: f64, unit: Option<LengthUnit>) -> Option<String>
     let is_small = length_mm < *POSSIBLE_SURFACE_MM.start();
     let decimals = if is_small { 2 } else { 0 };
     let question = question(length_mm, unit);
-    let advice = if is_small {
+    // No unit makes a long scan that of a character.
+    let advice = if is_small || question.ends_with('?') {
         ""
     } else {
         "; a whole block is imported with its page by `mocban import --block`"
@@ -309,7 +310,7 @@ mod tests {
             let text = doubtful_surface(length, Some(unit)).expect("a doubt");
             let expected = format!("with the unit {unit}, its carved surface is {said}");
             assert!(text.starts_with(&expected), "{text}");
-            assert_eq!(text.contains("--block"), length > 2.0, "{text}");
+            assert_eq!(text.contains("--block"), length > 100.0, "{text}");
         }
         for length in [2.0, 8.0, 30.0, 100.0, 150.0, f64::NAN] {
             assert_eq!(doubtful_surface(length, Some(LengthUnit::Mm)), None);
