@@ -8,6 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::jobs::job_counts;
 use crate::jobs::requeue;
+use crate::jobs::retired;
 use crate::jobs::staleness;
 use crate::jobs::workers;
 use crate::lease_recovery;
@@ -15,6 +16,7 @@ use crate::queue::checkpoint;
 use crate::queue::claim;
 use crate::queue::lease;
 use crate::queue::pair_job::PairJob;
+use crate::records::manual_alignments;
 use crate::records::pair_lookups;
 use crate::records::pair_results;
 use crate::records::pair_work;
@@ -204,6 +206,33 @@ async fn pages_of_results_are_searched_by_key() {
         let plan = plan(sql).await;
         assert_only(&plan, &["VIRTUAL TABLE"]);
     }
+}
+
+#[tokio::test]
+async fn the_log_of_one_pair_or_action_and_retired_pairs_read_no_others() {
+    let left_out = "VIRTUAL TABLE";
+    for (sql, key) in [
+        (
+            verdicts::LOG_OF_PAIR,
+            "SEARCH v USING INDEX verdict_pair (pair=?)",
+        ),
+        (
+            verdicts::LOG_OF_ACT,
+            "SEARCH v USING INDEX verdict_act (act=?)",
+        ),
+        (
+            manual_alignments::OF_NAMES,
+            "SEARCH a USING INDEX manual_alignment_pair (pair=?)",
+        ),
+    ] {
+        let plan = plan(sql).await;
+        assert_only(&plan, &[left_out]);
+        assert!(plan.iter().any(|line| line == key), "{key}: {plan:?}");
+    }
+    let plan = plan(retired::RETIRED).await;
+    assert_only(&plan, &["SCAN r"]);
+    let pairs = "SEARCH p USING INTEGER PRIMARY KEY (rowid=?)";
+    assert!(plan.iter().any(|line| line == pairs), "{plan:?}");
 }
 
 #[tokio::test]

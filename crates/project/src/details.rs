@@ -170,10 +170,11 @@ async fn manual_results(
     catalog: &Catalog,
     results: &PairResults,
 ) -> Result<Vec<ManualResult>, CatalogError> {
-    let all = catalog.manual_alignments().await?.into_iter();
-    let name = &results.attributes.name;
-    let of_pair = all.filter(|stored| stored.made.pair == *name && stored.undone_at.is_none());
-    let with_adjustment = of_pair.map(|stored| ManualResult {
+    let all = catalog
+        .manual_alignments_of(&results.attributes.name)
+        .await?;
+    let valid = all.into_iter().filter(|stored| stored.undone_at.is_none());
+    let with_adjustment = valid.map(|stored| ManualResult {
         adjustment: adjustment(&stored, results),
         stored,
     });

@@ -28,8 +28,12 @@ pub async fn pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<Pai
     Ok(names)
 }
 
-/// Refuses pairs that are retired.
+/// Refuses pairs that are retired. Reads all retired pairs only if one of these is.
 async fn refuse_retired(catalog: &Catalog, names: &[PairName]) -> ProjectResult<()> {
+    let selected = catalog.select(names).await?;
+    if catalog.retired_among(&selected).await?.is_empty() {
+        return Ok(());
+    }
     let names: BTreeSet<&PairName> = names.iter().collect();
     let retired = catalog.retired_pairs().await?;
     let Some(pair) = retired.iter().find(|pair| names.contains(&pair.name)) else {

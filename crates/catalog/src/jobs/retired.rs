@@ -62,8 +62,9 @@ const IDS: &str = "SELECT id FROM pair WHERE name IN (SELECT atom FROM json_each
 const CLEAR: &str = "
 DELETE FROM retired_pair WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
 
-const RETIRED: &str = "
-SELECT p.name, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair ORDER BY p.name";
+/// The order of the join keeps SQLite from reading the names of all pairs in their order.
+pub(crate) const RETIRED: &str = "
+SELECT p.name, r.cause, r.at FROM retired_pair AS r CROSS JOIN pair AS p ON p.id = r.pair ORDER BY p.name";
 
 const RETIRED_PAIR: &str = "
 SELECT p.name, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair WHERE p.name = ?1";

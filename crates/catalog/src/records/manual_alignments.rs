@@ -105,7 +105,7 @@ const LOG: &str = select_alignments!(
     "a.id > ?1 ORDER BY a.id LIMIT ?2"
 );
 
-const OF_NAMES: &str = select_alignments!(
+pub(crate) const OF_NAMES: &str = select_alignments!(
     "pair AS p CROSS JOIN manual_alignment AS a ON a.pair = p.id",
     "p.name BETWEEN ?1 AND ?2 ORDER BY a.id"
 );
@@ -173,11 +173,24 @@ impl Catalog {
         first: &PairName,
         last: &PairName,
     ) -> Result<BTreeMap<PairName, StoredAlignment>> {
+        Ok(newest(self.alignments_between(first, last).await?))
+    }
+
+    /// Returns the manual alignments of a pair, including undone ones, oldest first.
+    pub async fn manual_alignments_of(&self, name: &PairName) -> Result<Vec<StoredAlignment>> {
+        self.alignments_between(name, name).await
+    }
+
+    async fn alignments_between(
+        &self,
+        first: &PairName,
+        last: &PairName,
+    ) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
         let query = query_as(OF_NAMES).bind(first.as_str()).bind(last.as_str());
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignment));
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignmentUndo));
-        Ok(newest(query.fetch_all(&mut conn).await?))
+        query.fetch_all(&mut conn).await
     }
 }
 

@@ -115,20 +115,42 @@ SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
 RETURNING id";
 
-/// Selects the verdict log. If not NULL, `?1` limits it to one action, `?2` to one pair, `?3` to larger ids, and `?4` to
-/// that many rows. Leaves out the verdicts of `?5` and the undos of `?6`.
-const LOG: &str = concat!(
-    "
+/// Selects the verdict log, without the verdicts of `?1` and the undos of `?2`. The tables are in the order of the join, so
+/// that the log of one pair or action reads no other verdicts.
+macro_rules! select_log {
+    ($from:literal, $condition:literal) => {
+        concat!(
+            "
 SELECT v.id, v.act, p.name AS pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
     v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, false) AS current
-FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act AND ",
-    is_counted!("u.act", "?6"),
-    "
+FROM ",
+            $from,
+            "
+    LEFT JOIN verdict_undo AS u ON u.act = v.act AND ",
+            is_counted!("u.act", "?2"),
+            "
     LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
-WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) AND v.id > coalesce(?3, 0) AND ",
-    is_counted!("v.id", "?5"),
-    "
-ORDER BY v.id LIMIT coalesce(?4, 9223372036854775807)"
+WHERE ",
+            is_counted!("v.id", "?1"),
+            " AND ",
+            $condition
+        )
+    };
+}
+
+const LOG: &str = select_log!(
+    "verdict AS v JOIN pair AS p ON p.id = v.pair",
+    "v.id > ?3 ORDER BY v.id LIMIT ?4"
+);
+
+pub(crate) const LOG_OF_PAIR: &str = select_log!(
+    "pair AS p CROSS JOIN verdict AS v ON v.pair = p.id",
+    "p.name = ?3 ORDER BY v.id"
+);
+
+pub(crate) const LOG_OF_ACT: &str = select_log!(
+    "verdict AS v CROSS JOIN pair AS p ON p.id = v.pair",
+    "v.act = ?3 ORDER BY v.id"
 );
 
 /// Counts the verdicts of the log, without those of `?1`.
@@ -183,9 +205,8 @@ impl Catalog {
             query(UNDO).bind(act).bind(now).execute(&mut *conn).await?;
             checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
             let nothing = LeftOut::default();
-            select_log((Some(act), None), (None, None), &nothing)
-                .fetch_all(conn)
-                .await
+            let log = logged(LOG_OF_ACT, &nothing).bind(act);
+            log.fetch_all(conn).await
         })
     }
 
@@ -206,10 +227,8 @@ impl Catalog {
     /// Returns up to `limit` lines of the verdict log with ids above `after`, oldest first.
     pub async fn verdict_log_page(&self, after: i64, limit: usize) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
-        let (after, limit) = (Some(after), Some(limit as i64));
-        select_log((None, None), (after, limit), &self.left_out)
-            .fetch_all(&mut conn)
-            .await
+        let log = logged(LOG, &self.left_out).bind(after);
+        log.bind(limit as i64).fetch_all(&mut conn).await
     }
 }
 
@@ -263,20 +282,16 @@ pub(crate) async fn log(
     pair: Option<&PairName>,
     left_out: &LeftOut,
 ) -> Result<Vec<VerdictEvent>> {
-    select_log((None, pair), (None, None), left_out)
-        .fetch_all(conn)
-        .await
+    let log = match pair {
+        Some(pair) => logged(LOG_OF_PAIR, left_out).bind(pair.as_str()),
+        None => logged(LOG, left_out).bind(0_i64).bind(i64::MAX),
+    };
+    log.fetch_all(conn).await
 }
 
-/// Returns the query of [`LOG`]: of an action or a pair, for a limited number of rows after a row.
-fn select_log(
-    (act, pair): (Option<i64>, Option<&PairName>),
-    (after, limit): (Option<i64>, Option<i64>),
-    left_out: &LeftOut,
-) -> Query<As<VerdictEvent>> {
-    let query = query_as(LOG).bind(act).bind(pair.map(PairName::as_str));
-    let query = query.bind(after).bind(limit);
-    let query = query.bind(left_out.of(ChecksummedTable::Verdict));
+/// Returns a query of the log, for the parameters from `?3` on.
+fn logged(sql: &'static str, left_out: &LeftOut) -> Query<As<VerdictEvent>> {
+    let query = query_as(sql).bind(left_out.of(ChecksummedTable::Verdict));
     query.bind(left_out.of(ChecksummedTable::VerdictUndo))
 }
 
