@@ -8,6 +8,19 @@ export function noAnswer() {
   return new Error(document.getElementById("offline").textContent.trim());
 }
 
+/** Shows a message in its place; an empty text hides it. It gets the focus, unless the user goes on with a list. */
+export function showProblem(problem, text, hasFocus = true) {
+  problem.textContent = text;
+  problem.hidden = !text;
+  if (!text) return;
+  if (hasFocus) {
+    problem.tabIndex = -1;
+    problem.focus({ preventScroll: true });
+  }
+  // A refusal of a long form would stand below the window.
+  problem.scrollIntoView({ block: "nearest" });
+}
+
 /** Returns what a reply says; throws the sentence of a refusal, with its status and the retired pairs that it names. */
 export function read(status, text) {
   let reply = {};

@@ -1,6 +1,6 @@
 // Actions, and parts of pages that are read again while they are shown.
 
-import { act } from "./action.js";
+import { act, showProblem } from "./action.js";
 
 const offline = document.getElementById("offline");
 
@@ -12,17 +12,6 @@ function fields(form, button) {
     const values = data.getAll(name);
     return [name, values.length > 1 ? values : values[0]];
   }));
-}
-
-function showProblem(form, text) {
-  const problem = form.querySelector(".problem");
-  problem.textContent = text;
-  problem.hidden = !text;
-  if (!text) return;
-  // A refusal of a long form would stand below the window.
-  problem.tabIndex = -1;
-  problem.focus({ preventScroll: true });
-  problem.scrollIntoView({ block: "nearest" });
 }
 
 /** Returns the name under which this tab keeps the pairs that a form sends, if it sends any. */
@@ -38,7 +27,8 @@ document.addEventListener("submit", async (event) => {
   if (question && !window.confirm(question)) return;
   if (form.getAttribute("aria-busy") === "true") return;
   form.setAttribute("aria-busy", "true");
-  showProblem(form, "");
+  const problem = form.querySelector(".problem");
+  showProblem(problem, "");
   try {
     const kept = keptName(form);
     const pairs = kept && { pairs: JSON.parse(sessionStorage.getItem(kept) ?? "[]") };
@@ -47,7 +37,7 @@ document.addEventListener("submit", async (event) => {
     if (reply.go) location.assign(reply.go);
     else if (reply.reload) await refresh(true);
   } catch (error) {
-    showProblem(form, error.message);
+    showProblem(problem, error.message);
     if (keptName(form)) document.dispatchEvent(new CustomEvent("refused", { detail: error.retired ?? [] }));
   } finally {
     form.removeAttribute("aria-busy");

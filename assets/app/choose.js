@@ -1,7 +1,7 @@
 // Chooses pairs in a list: with a click, with Shift a range, and with the arrow keys. This tab keeps the choice, so it stays
 // while the list is paged through.
 
-import { noAnswer } from "./action.js";
+import { noAnswer, showProblem } from "./action.js";
 import { withValues } from "./scan-messages.js";
 
 const bar = document.getElementById("choice");
@@ -37,18 +37,14 @@ function show() {
   }
 }
 
-function showProblem(text) {
-  problem.textContent = text;
-  problem.hidden = !text;
-}
-
 /** Adds and removes pairs, unless there are then too many. */
 function change(added, removed = []) {
   const next = new Set(chosen);
   for (const name of removed) next.delete(name);
   for (const name of added) next.add(name);
   const isTooMuch = next.size > most && next.size > chosen.size;
-  showProblem(isTooMuch ? problem.dataset.most : "");
+  // Who chooses by keyboard goes on at the same pair.
+  showProblem(problem, isTooMuch ? problem.dataset.most : "", !boxes.includes(document.activeElement));
   if (!isTooMuch) {
     chosen.clear();
     for (const name of next) chosen.add(name);
@@ -115,10 +111,10 @@ all.addEventListener("click", async () => {
       for (const name of reply.open) open.add(name);
       change(reply.pairs);
     } else {
-      showProblem(reply.error);
+      showProblem(problem, reply.error);
     }
   } catch (error) {
-    showProblem(error.message);
+    showProblem(problem, error.message);
   } finally {
     all.removeAttribute("aria-busy");
   }

@@ -1,6 +1,6 @@
 // Files from the browser: they are chosen or dragged, and sent one after another.
 
-import { act, read, token } from "./action.js";
+import { act, read, showProblem, token } from "./action.js";
 import { localNumber } from "./scan-messages.js";
 
 const form = document.getElementById("upload");
@@ -147,8 +147,7 @@ async function start(chosen, takesOver = false) {
   refused = null;
   takeOver.hidden = true;
   const files = chosen.filter(isWanted);
-  problem.textContent = files.length > 0 ? "" : texts.nothing;
-  problem.hidden = files.length > 0;
+  showProblem(problem, files.length > 0 ? "" : texts.nothing);
   if (files.length === 0) return;
   form.setAttribute("aria-busy", "true");
   cancel.disabled = false;
@@ -159,12 +158,11 @@ async function start(chosen, takesOver = false) {
   try {
     await sendAll(files, takesOver);
   } catch (error) {
-    problem.textContent = error.message;
-    problem.hidden = false;
     if (error.status === CONFLICT) refused = files;
     takeOver.hidden = !refused;
     state.hidden = true;
     choice.hidden = false;
+    showProblem(problem, error.message);
   } finally {
     form.removeAttribute("aria-busy");
   }
@@ -217,8 +215,7 @@ form.addEventListener("drop", async (event) => {
     const found = await Promise.all(entries.map((entry) => below(entry, "")));
     await start(found.flat());
   } catch (error) {
-    problem.textContent = error.message;
-    problem.hidden = false;
+    showProblem(problem, error.message);
   }
 });
 

@@ -2,14 +2,12 @@
 
 import { followPage, PageCamera } from "./block-camera.js";
 import { request, send } from "./block-request.js";
+import { STROKE_PX, svg } from "./block-shapes.js";
 import { BoxEdits, boundsOf } from "./box-edits.js";
 import { boxText } from "./box-messages.js";
 import { preferredLanguage } from "./scan-messages.js";
 import { element } from "./scan-panel.js";
 
-const SVG = "http://www.w3.org/2000/svg";
-/** Width of the outline of a box on the screen. */
-const STROKE_PX = 2;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 /** Which of left, top, right and bottom a corner moves. */
 const CORNERS = [[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1], [1, 0, 0, 1]];
@@ -19,12 +17,6 @@ const LONG_STEP = 10;
 
 const language = preferredLanguage();
 const text = (key, values) => boxText(language, key, values);
-
-function svg(tag, attributes) {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  return made;
-}
 
 class BoxesPage {
   constructor(container) {
@@ -241,6 +233,7 @@ class BoxesPage {
     if (!this.box()) return;
     this.edits.change(this.selected, values, kind);
     this.update();
+    this.describe();
   }
 
   remove() {

@@ -2,6 +2,7 @@
 
 import { followPage, PageCamera } from "./block-camera.js";
 import { blockText } from "./block-messages.js";
+import { smallestAround, STROKE_PX, svg } from "./block-shapes.js";
 import { localNumber, preferredLanguage } from "./scan-messages.js";
 import { element } from "./scan-panel.js";
 import { mountScanViewer } from "./scan-viewer.js";
@@ -11,18 +12,9 @@ const STATUSES = ["done", "low_confidence", "failed", "waiting"];
 const OVERLAY_COLOURS = ["both", "stroke_only", "ink_only"];
 /** The wait before a region is loaded, ms. */
 const REGION_WAIT = 120;
-/** Width of the outline of a box on the screen. */
-const STROKE_PX = 2;
-const SVG = "http://www.w3.org/2000/svg";
 
 const language = preferredLanguage();
 const text = (key, values) => blockText(language, key, values);
-
-function svg(tag, attributes) {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  return made;
-}
 
 /** Returns the words that describe a character, its pair and its result. */
 function description(one) {
@@ -193,13 +185,8 @@ class BlockPage {
   characterAt(clientX, clientY) {
     if (this.boxes.classList.contains("block-hidden")) return -1;
     const { left, top } = this.canvas.getBoundingClientRect();
-    const [x, y] = [(clientX - left - this.camera.x) / this.camera.zoom, (clientY - top - this.camera.y) / this.camera.zoom];
-    let [found, area] = [-1, Infinity];
-    this.block.characters.forEach(({ box }, index) => {
-      const size = (box[2] - box[0]) * (box[3] - box[1]);
-      if (x >= box[0] && x <= box[2] && y >= box[1] && y <= box[3] && size < area) [found, area] = [index, size];
-    });
-    return found;
+    const place = [(clientX - left - this.camera.x) / this.camera.zoom, (clientY - top - this.camera.y) / this.camera.zoom];
+    return smallestAround(place, this.block.characters.map(({ box }) => box));
   }
 
   showTip({ clientX, clientY, buttons }) {

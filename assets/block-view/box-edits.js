@@ -1,5 +1,7 @@
 // The boxes of a page while a person changes them: what is shown, what was changed, and the steps back.
 
+import { smallestAround } from "./block-shapes.js";
+
 /** Smallest side of a box in pixels. */
 const SMALLEST = 2;
 /** Most steps that can be undone. */
@@ -115,14 +117,9 @@ export class BoxEdits {
   }
 
   /** Returns the box at a place; the smallest one counts. */
-  at([x, y]) {
-    let [found, area] = [null, Infinity];
-    for (const box of this.list) {
-      const [left, top, right, bottom] = boundsOf(box.outline);
-      const size = (right - left) * (bottom - top);
-      if (x >= left && x <= right && y >= top && y <= bottom && size < area) [found, area] = [box, size];
-    }
-    return found;
+  at(place) {
+    const index = smallestAround(place, this.list.map((box) => boundsOf(box.outline)));
+    return this.list[index] ?? null;
   }
 
   isChanged(box) {

@@ -197,6 +197,7 @@ fn pairs_are_chosen_by_touch_and_on_several_pages() {
     unfold(&tab);
     tab.tap("#choose-all");
     tab.wait("!document.querySelector('#choice-problem').hidden");
+    assert_eq!(tab.eval("document.activeElement.id"), "choice-problem");
     assert!(said(&tab).contains("48"), "{}", said(&tab));
     open_list(&tab, &home, "?state=waiting");
     unfold(&tab);

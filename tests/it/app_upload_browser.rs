@@ -139,6 +139,7 @@ fn an_upload_shows_its_progress_and_is_cancelled() {
     assert_eq!(tab.eval("document.activeElement.id"), "upload-cancel");
     tab.eval("document.querySelector('#upload-cancel').click(), null");
     tab.wait("document.querySelector('#upload-problem').textContent.includes('was cancelled')");
+    assert_eq!(tab.eval("document.activeElement.id"), "upload-problem");
     std::fs::remove_file(&hold).expect("the upload waits");
     look(&tab, axe.as_deref(), "import_cancelled");
     let left = || {

@@ -140,7 +140,21 @@ fn use_page(tab: &Tab<'_>) -> String {
         (drawn.iter().zip([left, top, right, bottom])).all(|(a, b)| (a - b).abs() <= 12.0);
     assert!(is_near, "{drawn:?}");
     tab.eval("mocbanBoxes.name.focus(), null");
+    let status = "mocbanBoxes.status.textContent";
+    let unnamed = tab.eval(status);
+    assert!(
+        unnamed
+            .as_str()
+            .expect("a text")
+            .starts_with("Box without a name:"),
+        "{unnamed}"
+    );
     tab.text("new");
+    let named = tab.eval(status);
+    assert!(
+        named.as_str().expect("a text").starts_with("Box new:"),
+        "{named}"
+    );
     let counts = tab.eval("mocbanBoxes.counts.textContent");
     assert_eq!(counts, "boxes: 6 · changed: 3");
     tab.screenshot("boxes-changed");

@@ -23,7 +23,7 @@ use mocban_export::scan_view::assets;
 const SCRIPT_KIND: &str = "text/javascript; charset=utf-8";
 const STYLE_KIND: &str = "text/css; charset=utf-8";
 /// Name, content type and text of the assets of this page.
-const ASSETS: [(&str, &str, &str); 9] = [
+const ASSETS: [(&str, &str, &str); 10] = [
     (
         "block-view.js",
         SCRIPT_KIND,
@@ -58,6 +58,11 @@ const ASSETS: [(&str, &str, &str); 9] = [
         "block-request.js",
         SCRIPT_KIND,
         include_str!("../../../../assets/block-view/block-request.js"),
+    ),
+    (
+        "block-shapes.js",
+        SCRIPT_KIND,
+        include_str!("../../../../assets/block-view/block-shapes.js"),
     ),
     (
         "block-camera.js",
