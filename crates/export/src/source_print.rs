@@ -43,11 +43,6 @@ impl SourcePrint {
         self.file.version.hash
     }
 
-    /// Returns the size of the file in bytes.
-    pub(super) fn size(&self) -> u64 {
-        self.file.bytes.len() as u64
-    }
-
     /// Reads the print of a pair and checks that it has not changed since it was aligned.
     ///
     /// # Errors
@@ -72,12 +67,34 @@ impl SourcePrint {
         aligned: Option<ContentHash>,
         limits: &ImageLimits,
     ) -> Result<Self, SourcePrintError> {
-        let input = project.input(path);
-        let path = input.path().to_owned();
-        let file = read_input(&input, limits.max_bytes, "limits.image.max_bytes")?;
+        let file = Self::read_file(project, path, limits)?;
+        let path = project.input(path).path().to_owned();
         if aligned.is_some_and(|hash| hash != file.version.hash) {
             return Err(SourcePrintError::Changed(path));
         }
+        Self::decoded(file, path, limits)
+    }
+
+    /// Reads the file of an image by its path in the catalog.
+    pub(super) fn read_file(
+        project: &Project,
+        path: &str,
+        limits: &ImageLimits,
+    ) -> Result<InputFile, SourcePrintError> {
+        let input = project.input(path);
+        Ok(read_input(
+            &input,
+            limits.max_bytes,
+            "limits.image.max_bytes",
+        )?)
+    }
+
+    /// Decodes the file of an image; `path` names it in errors.
+    pub(super) fn decoded(
+        file: InputFile,
+        path: PathBuf,
+        limits: &ImageLimits,
+    ) -> Result<Self, SourcePrintError> {
         match raster::decode(&file.bytes, limits) {
             Ok(picture) => Ok(Self { file, picture }),
             Err(source) => Err(SourcePrintError::Decode { path, source }),

@@ -6,6 +6,8 @@ use mocban_lists::labels::{self, LabelBox, PageFile, ReplacedLabels};
 
 /// Name of the boxes in the messages of the reader of labels.
 const NAME: &str = "the boxes";
+/// What the reader of labels says of boxes that it has left out. Of edited labels nothing is stored instead.
+const LEFT_OUT: [&str; 2] = [" and was left out", " and were left out"];
 
 /// Changes of the boxes that a page has shown. Boxes that are not named stay as they are shown, with their outlines.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -105,7 +107,13 @@ impl BoxEdits {
         let read = labels::read(&bytes, NAME, page);
         let read = read.map_err(|error| BoxEditError::Refused(error.to_string()))?;
         match read.warnings.into_iter().next() {
-            Some(warning) => Err(BoxEditError::Refused(warning)),
+            Some(warning) => {
+                let problem = LEFT_OUT
+                    .iter()
+                    .fold(warning, |text, end| text.replace(end, ""));
+                let text = format!("{problem}; nothing was saved");
+                Err(BoxEditError::Refused(text))
+            }
             None => Ok(Some(bytes)),
         }
     }
@@ -207,15 +215,15 @@ mod tests {
             ),
             (
                 json!({"removed": [], "edited": [{"bounds": [9.5, 9.5, 29.5, 29.5]}]}),
-                "the boxes: 1 box repeats another",
+                "the boxes: 1 box repeats another: box 3 as box 1",
             ),
             (
                 json!({"removed": [], "edited": [{"bounds": [9.5, 9.5, 9.6, 29.5]}]}),
-                "the boxes: 1 box is smaller than a pixel",
+                "the boxes: 1 box is smaller than a pixel, a point or a line: box 3; nothing was saved",
             ),
             (
                 json!({"removed": [], "edited": [{"bounds": [300.0, 9.5, 320.0, 29.5]}]}),
-                "the boxes: 1 of 3 boxes lies outside the page",
+                "the boxes: 1 of 3 boxes lies outside the page: box 3; nothing was saved",
             ),
             (
                 json!({"removed": [], "edited": [{"bounds": [9.5, 9.5, 1e300, 29.5]}]}),

@@ -1,5 +1,7 @@
 //! The image of a page with its boxes, which a person changes.
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
@@ -25,7 +27,7 @@ const LONGEST_SIDE: usize = 3000;
 pub struct EditableBoxes {
     name: BlockName,
     is_aligned: bool,
-    page: Rgb,
+    page: Arc<Rgb>,
     page_path: String,
     page_bytes: u64,
     page_hash: ContentHash,
@@ -46,7 +48,8 @@ struct ReadBoxes {
 }
 
 impl EditableBoxes {
-    /// Reads a block. Labels that cannot be read count as none, with a warning.
+    /// Reads a block. Labels that cannot be read count as none, with a warning. The image of the page is decoded only if it is
+    /// not that of `known`.
     ///
     /// # Errors
     /// Returns an error if the catalog or the page cannot be read.
@@ -55,10 +58,11 @@ impl EditableBoxes {
         project: &Project,
         name: &BlockName,
         limits: ImageLimits,
+        known: Option<Arc<Self>>,
     ) -> Result<Self, BlockViewError> {
         let detail = stored_block(catalog, name).await?;
         let (name, project) = (name.clone(), project.clone());
-        let read = move || Self::read_files(name, &detail, &project, &limits);
+        let read = move || Self::read_files(name, &detail, &project, &limits, known.as_deref());
         tokio::task::spawn_blocking(read).await?
     }
 
@@ -67,18 +71,25 @@ impl EditableBoxes {
         detail: &BlockDetail,
         project: &Project,
         limits: &ImageLimits,
+        known: Option<&Self>,
     ) -> Result<Self, BlockViewError> {
         let attributes = &detail.state.attributes;
         let page_path = attributes.page_path.clone();
-        let source = SourcePrint::read_stored(project, &page_path, None, limits)?;
-        let (page_hash, page_bytes) = (source.hash(), source.size());
+        let file = SourcePrint::read_file(project, &page_path, limits)?;
+        let (page_hash, page_bytes) = (file.version.hash, file.bytes.len() as u64);
+        let page = if let Some(known) = known.filter(|known| known.page_hash == page_hash) {
+            Arc::clone(&known.page)
+        } else {
+            let path = project.input(&page_path).path().to_owned();
+            Arc::new(SourcePrint::decoded(file, path, limits)?.picture.to_rgb8())
+        };
         let mut own = Self {
             name,
             is_aligned: detail
                 .stages
                 .iter()
                 .any(|one| one.stage == BlockStage::Align),
-            page: source.picture.to_rgb8(),
+            page,
             page_path,
             page_bytes,
             page_hash,

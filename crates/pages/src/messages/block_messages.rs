@@ -169,9 +169,66 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "có một khung trùng với khung khác và đã bị bỏ: {0}",
     ),
     (
+        "{} boxes repeat others and were left out: {}",
+        "có {0} khung trùng với khung khác và đã bị bỏ: {1}",
+    ),
+    (
+        "1 box repeats another: {}",
+        "có một khung trùng với khung khác: {0}",
+    ),
+    (
+        "{} boxes repeat others: {}",
+        "có {0} khung trùng với khung khác: {1}",
+    ),
+    (
         "1 box is smaller than a pixel, a point or a line and was left out: {}",
         "có một khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ, và đã bị bỏ: {0}",
     ),
+    (
+        "{} boxes are smaller than a pixel, a point or a line and were left out: {}",
+        "có {0} khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ, và đã bị bỏ: {1}",
+    ),
+    (
+        "1 box is smaller than a pixel, a point or a line: {}",
+        "có một khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ: {0}",
+    ),
+    (
+        "{} boxes are smaller than a pixel, a point or a line: {}",
+        "có {0} khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ: {1}",
+    ),
+    (
+        "{} of {} boxes lies outside the page and was left out: {}",
+        "{0} trong {1} khung nằm ngoài trang in và đã bị bỏ: {2}",
+    ),
+    (
+        "{} of {} boxes lie outside the page and were left out: {}",
+        "{0} trong {1} khung nằm ngoài trang in và đã bị bỏ: {2}",
+    ),
+    (
+        "{} of {} boxes lies outside the page: {}",
+        "{0} trong {1} khung nằm ngoài trang in: {2}",
+    ),
+    (
+        "{} of {} boxes lie outside the page: {}",
+        "{0} trong {1} khung nằm ngoài trang in: {2}",
+    ),
+    (
+        "1 box reaches over an edge of the page and was cut there: {}",
+        "có một khung vượt ra ngoài mép trang in và đã được cắt ở mép: {0}",
+    ),
+    (
+        "{} boxes reach over an edge of the page and were cut there: {}",
+        "có {0} khung vượt ra ngoài mép trang in và đã được cắt ở mép: {1}",
+    ),
+    (
+        "the labels are for an image of {} x {} px, the page is {} x {} px",
+        "nhãn là của hình {0} x {1} px, trang in có {2} x {3} px",
+    ),
+    (
+        "the boxes were scaled",
+        "các khung đã được co giãn theo trang in",
+    ),
+    ("nothing was saved", "chưa lưu gì"),
     (
         "is this the scan of a whole block?",
         "đây có phải bản quét của cả ván không?",

@@ -111,7 +111,7 @@ fn part_text(part: &str) -> String {
         }
         _ => {}
     }
-    if let Some(listed) = with_more(part, "mục khác") {
+    if let Some(listed) = with_more(part, "mục khác").or_else(|| boxes_text(part)) {
         return listed;
     }
     let name = part.strip_prefix("a ").or_else(|| part.strip_prefix("an "));
@@ -123,6 +123,21 @@ fn part_text(part: &str) -> String {
         })
     });
     kind.unwrap_or_else(|| part.to_owned())
+}
+
+/// Returns a list of boxes of labels, such as `box 3 "c" as box 1`, in Vietnamese. `None` if it is something else.
+fn boxes_text(list: &str) -> Option<String> {
+    let one = |text: &str| {
+        let shown = text.strip_prefix("box ")?;
+        let (number, name) = shown.split_once(' ').unwrap_or((shown, ""));
+        let is_box = number.parse::<u64>().is_ok() && (name.is_empty() || name.starts_with('"'));
+        is_box.then(|| format!("khung {shown}"))
+    };
+    let each = list.split(", ").map(|item| match item.split_once(" as ") {
+        Some((repeat, first)) => Some(format!("{} giống {}", one(repeat)?, one(first)?)),
+        None => one(item),
+    });
+    Some(each.collect::<Option<Vec<String>>>()?.join(", "))
 }
 
 #[cfg(test)]
@@ -245,6 +260,35 @@ mod tests {
                 "1.stl: the binary STL is truncated: it holds 1 of 2 triangles",
                 "1.stl: tệp STL nhị phân bị cắt cụt: chỉ có 1 trong số 2 tam giác",
             ),
+        ] {
+            assert_eq!(vietnamese(english).as_deref(), Some(expected));
+        }
+    }
+
+    #[test]
+    fn one_or_several_boxes_are_explained() {
+        for (english, expected) in [
+            (
+                "b.json: 1 box repeats another and was left out: box 3 \"c\" as box 1",
+                "b.json: có một khung trùng với khung khác và đã bị bỏ: khung 3 \"c\" giống khung 1",
+            ),
+            (
+                "b.json: 2 boxes repeat others and were left out: box 3 as box 1, box 4 as box 2",
+                "b.json: có 2 khung trùng với khung khác và đã bị bỏ: khung 3 giống khung 1, khung 4 giống khung 2",
+            ),
+            (
+                "b.json: 2 of 5 boxes lie outside the page and were left out: box 2, box 4",
+                "b.json: 2 trong 5 khung nằm ngoài trang in và đã bị bỏ: khung 2, khung 4",
+            ),
+            (
+                "the boxes: 1 of 3 boxes lies outside the page: box 3; nothing was saved",
+                "các khung chữ: 1 trong 3 khung nằm ngoài trang in: khung 3; chưa lưu gì",
+            ),
+            (
+                "b.json: the labels are for an image of 100 x 50 px, the page is 200 x 100 px; the boxes were scaled",
+                "b.json: nhãn là của hình 100 x 50 px, trang in có 200 x 100 px; các khung đã được co giãn theo trang in",
+            ),
+            ("box 1.ply is not there", "không có tệp box 1.ply"),
         ] {
             assert_eq!(vietnamese(english).as_deref(), Some(expected));
         }

@@ -1,5 +1,7 @@
 //! Reads the boxes of a block for their page, and stores changed ones as labels of the project.
 
+use std::sync::Arc;
+
 use super::block_access::BlockAccess;
 use crate::on_thread::{on_thread, read_on_thread};
 use mocban_catalog::{BlockLabelsChange, Catalog};
@@ -22,10 +24,14 @@ pub(super) enum BoxesSaved {
 }
 
 impl BlockAccess {
-    /// Reads the page and its boxes. Returns a sentence if that fails.
-    pub(super) async fn read_boxes(&self) -> Result<EditableBoxes, String> {
+    /// Reads the page and its boxes. The image of the page that is `known` is not decoded again. Returns a sentence if that
+    /// fails.
+    pub(super) async fn read_boxes(
+        &self,
+        known: Option<Arc<EditableBoxes>>,
+    ) -> Result<EditableBoxes, String> {
         let own = self.clone();
-        let read = read_on_thread(async move || own.stored_boxes().await).await;
+        let read = read_on_thread(async move || own.stored_boxes(known).await).await;
         read.map_err(|error| error.text(&self.location.dir))
     }
 
@@ -33,33 +39,50 @@ impl BlockAccess {
     /// a sentence if that fails.
     pub(super) async fn save_boxes(
         &self,
+        known: Option<Arc<EditableBoxes>>,
         shown: ContentHash,
         edits: Option<BoxEdits>,
     ) -> Result<BoxesSaved, String> {
         let own = self.clone();
-        let stored = on_thread(async move || own.store_boxes(shown, edits.as_ref()).await).await;
+        let stored =
+            on_thread(async move || own.store_boxes(known, shown, edits.as_ref()).await).await;
         stored.map_err(|error| error.text(&self.location.dir))
     }
 
-    async fn stored_boxes(&self) -> ProjectResult<EditableBoxes> {
+    async fn stored_boxes(
+        &self,
+        known: Option<Arc<EditableBoxes>>,
+    ) -> ProjectResult<EditableBoxes> {
         let (project, catalog) = self.location.open_read_only().await?;
-        let read = self.boxes_of(&catalog, &project).await;
+        let read = self.boxes_of(&catalog, &project, known).await;
         catalog.close().await;
         read
     }
 
-    async fn boxes_of(&self, catalog: &Catalog, project: &Project) -> ProjectResult<EditableBoxes> {
+    async fn boxes_of(
+        &self,
+        catalog: &Catalog,
+        project: &Project,
+        known: Option<Arc<EditableBoxes>>,
+    ) -> ProjectResult<EditableBoxes> {
         let limits = self.location.settings()?.config.limits.image;
-        Ok(EditableBoxes::read(catalog, project, &self.block, limits).await?)
+        Ok(EditableBoxes::read(catalog, project, &self.block, limits, known).await?)
     }
 
     async fn store_boxes(
         &self,
+        known: Option<Arc<EditableBoxes>>,
         shown: ContentHash,
         edits: Option<&BoxEdits>,
     ) -> ProjectResult<BoxesSaved> {
         let (project, catalog) = self.location.open().await?;
-        let stored = self.store_boxes_in(&catalog, &project, shown, edits).await;
+        let stored = match self.boxes_of(&catalog, &project, known).await {
+            Ok(boxes) if boxes.shown_hash() == shown => {
+                self.store_boxes_in(&catalog, &project, &boxes, edits).await
+            }
+            Ok(_) => Ok(BoxesSaved::OthersSaved),
+            Err(error) => Err(error),
+        };
         catalog.close().await;
         stored
     }
@@ -68,17 +91,13 @@ impl BlockAccess {
         &self,
         catalog: &Catalog,
         project: &Project,
-        shown: ContentHash,
+        boxes: &EditableBoxes,
         edits: Option<&BoxEdits>,
     ) -> ProjectResult<BoxesSaved> {
         if edits.is_some()
             && let Some(why) = block_labels::unreachable_place(project, catalog.is_shared())?
         {
             return Ok(BoxesSaved::Refused(why));
-        }
-        let boxes = self.boxes_of(catalog, project).await?;
-        if boxes.shown_hash() != shown {
-            return Ok(BoxesSaved::OthersSaved);
         }
         let labels = match edits {
             Some(edits) => match boxes.edited(edits) {

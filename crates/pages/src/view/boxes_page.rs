@@ -15,6 +15,7 @@ use serde_json::json;
 use super::block_access::BlockAccess;
 use super::block_labels::BoxesSaved;
 use super::page;
+use super::read_once::ReadOnce;
 use super::refusal::{refused, unavailable};
 use super::scan_page::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
@@ -30,7 +31,7 @@ struct BoxesState {
     store: BlockAccess,
     work: Arc<WorkThread>,
     /// The page with its boxes, which is read when it is opened.
-    shown: tokio::sync::Mutex<Option<Arc<EditableBoxes>>>,
+    shown: ReadOnce<EditableBoxes>,
 }
 
 /// Changes of the boxes, and the hash of what the page has shown.
@@ -62,7 +63,7 @@ pub(super) fn routes(
         language,
         store,
         work,
-        shown: tokio::sync::Mutex::default(),
+        shown: ReadOnce::default(),
     };
     Router::new()
         .route("/boxes", get(index))
@@ -76,21 +77,15 @@ pub(super) fn routes(
 impl BoxesState {
     /// Returns the page with its boxes, which is read if it was not yet.
     async fn shown(&self) -> Result<Arc<EditableBoxes>, Response> {
-        let mut shown = self.shown.lock().await;
-        if let Some(shown) = &*shown {
-            return Ok(Arc::clone(shown));
-        }
-        let read = self.store.read_boxes().await.map(Arc::new);
-        let read = read.map_err(|why| unavailable(&why))?;
-        *shown = Some(Arc::clone(&read));
-        Ok(read)
+        let shown = self.shown.get(|| self.store.read_boxes(None)).await;
+        shown.map_err(|why| unavailable(&why))
     }
 
     /// Stores boxes, and responds.
     async fn store(&self, shown: ContentHash, edits: Option<BoxEdits>) -> Response {
-        match self.store.save_boxes(shown, edits).await {
+        let known = self.shown.known().await;
+        match self.store.save_boxes(known, shown, edits).await {
             Ok(BoxesSaved::Saved) => {
-                *self.shown.lock().await = None;
                 Json(json!({"is_saved": true, "next": self.store.next_command()})).into_response()
             }
             Ok(BoxesSaved::Unchanged) => Json(json!({"is_saved": false})).into_response(),
@@ -115,8 +110,7 @@ async fn block_json(
     Extension(access): Extension<Arc<AccessControl>>,
 ) -> Response {
     // The block may have run, or its files may have changed, since the page was opened before.
-    *state.shown.lock().await = None;
-    match state.shown().await {
+    match state.shown.again(|known| state.store.read_boxes(known)).await {
         Ok(shown) => {
             let mut value = shown.to_json();
             value["csrf_token"] = json!(access.csrf_token());
@@ -125,7 +119,7 @@ async fn block_json(
             value["warnings_vi"] = warnings.collect();
             Json(value).into_response()
         }
-        Err(failed) => failed,
+        Err(why) => unavailable(&why),
     }
 }
 

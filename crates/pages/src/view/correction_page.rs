@@ -16,6 +16,7 @@ use serde_json::json;
 use super::block_access::BlockAccess;
 use super::block_points::PointsSaved;
 use super::page;
+use super::read_once::ReadOnce;
 use super::refusal::{refused, unavailable};
 use super::scan_page::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
@@ -34,7 +35,7 @@ struct CorrectionState {
     store: BlockAccess,
     work: Arc<WorkThread>,
     /// The block, which is read when the page is opened.
-    shown: tokio::sync::Mutex<Option<Arc<BlockCorrection>>>,
+    shown: ReadOnce<BlockCorrection>,
     /// The last alignment that was tried and accepted, with its number.
     tried: Mutex<(u64, Option<Arc<TriedAlignment>>)>,
 }
@@ -76,7 +77,7 @@ pub(super) fn routes(
         language,
         store,
         work,
-        shown: tokio::sync::Mutex::default(),
+        shown: ReadOnce::default(),
         tried: Mutex::default(),
     };
     Router::new()
@@ -94,14 +95,8 @@ pub(super) fn routes(
 impl CorrectionState {
     /// Returns the block, which is read if it was not yet.
     async fn shown(&self) -> Result<Arc<BlockCorrection>, Response> {
-        let mut shown = self.shown.lock().await;
-        if let Some(shown) = &*shown {
-            return Ok(Arc::clone(shown));
-        }
-        let read = self.store.read_correction().await.map(Arc::new);
-        let read = read.map_err(|why| unavailable(&why))?;
-        *shown = Some(Arc::clone(&read));
-        Ok(read)
+        let shown = self.shown.get(|| self.store.read_correction()).await;
+        shown.map_err(|why| unavailable(&why))
     }
 
     /// Returns the alignment with a number, if no other one was tried since.
@@ -127,7 +122,7 @@ impl CorrectionState {
         let saved_hash = points.as_ref().map(ControlPoints::hash);
         match self.store.save_points(read, points).await {
             Ok(PointsSaved::Saved) => {
-                *self.shown.lock().await = None;
+                self.shown.forget().await;
                 let next = self.store.next_command();
                 Json(json!({"next": next, "saved_hash": saved_hash})).into_response()
             }
@@ -158,14 +153,13 @@ async fn block_json(
     Extension(access): Extension<Arc<AccessControl>>,
 ) -> Response {
     // The block may have run, or its files may have changed, since the page was opened before.
-    *state.shown.lock().await = None;
-    match state.shown().await {
+    match state.shown.again(|_| state.store.read_correction()).await {
         Ok(shown) => {
             let mut value = shown.to_json();
             value["csrf_token"] = json!(access.csrf_token());
             Json(value).into_response()
         }
-        Err(failed) => failed,
+        Err(why) => unavailable(&why),
     }
 }
 

@@ -8,6 +8,7 @@ mod boxes_page;
 mod correction_page;
 mod opened_block;
 pub(crate) mod page;
+mod read_once;
 mod refusal;
 mod scan_page;
 
