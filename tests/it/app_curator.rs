@@ -106,8 +106,26 @@ fn the_report_is_saved_as_the_command_prints_it() {
         let printed = mocban(&project, &["report", "--format", format]);
         assert_eq!(saved, printed.expect(0).out, "{extension}");
     }
-    let whole = html(&page, "/p/p/report/file/report.html");
-    assert!(whole.starts_with("<!DOCTYPE html>"), "{whole}");
+    let whole = html(&page, "/p/p/report/file/report.html?language=en");
+    assert!(
+        whole.starts_with("<!DOCTYPE html><html lang=\"en\">"),
+        "{whole}"
+    );
+    let saved = html(&page, "/p/p/report/file/report.html?language=vi");
+    let args = ["report", "--format", "html", "--lang", "vi"];
+    let printed = mocban(&project, &args).expect(0).out;
+    for vietnamese in [saved, printed] {
+        for part in [
+            "<html lang=\"vi\">",
+            "Báo cáo về các chữ mộc bản đã căn chỉnh",
+            "Acc của Kết hợp là ",
+        ] {
+            assert!(vietnamese.contains(part), "{part}: {vietnamese}");
+        }
+    }
+    let refused = mocban(&project, &["report", "--lang", "vi"]).expect(2);
+    let why = "--lang vi needs the format html, not text";
+    assert!(refused.err.contains(why), "{}", refused.err);
 }
 
 #[test]

@@ -16,3 +16,5 @@ mod messages;
 mod on_thread;
 pub mod review;
 pub mod view;
+
+pub use messages::report_page;

@@ -10,6 +10,8 @@ use crate::cli::output::context::Context;
 use crate::cli::output::streams;
 use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::any_case;
+use mocban_pages::report_page;
+use mocban_pages::review::Language;
 use mocban_project::files;
 use mocban_project::report::{self, RenderedReport, ReportOptions};
 use mocban_project::{ExitCode, ProjectResult, Refusal};
@@ -26,6 +28,9 @@ pub(crate) struct ReportArgs {
     /// Write the report to this file instead of stdout
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+    /// Language of the HTML page, en or vi [default: en]
+    #[arg(long)]
+    pub(crate) lang: Option<Language>,
     /// Confidence intervals of Acc: wilson, or exact (Clopper-Pearson)
     #[arg(long, value_name = "METHOD", default_value = "wilson", value_parser = any_case::<IntervalMethod>)]
     pub(crate) ci: IntervalMethod,
@@ -70,6 +75,14 @@ pub(crate) async fn report(args: ReportArgs, context: &Context) -> ProjectResult
         let text = format!("--compare needs the format text or json, not {format}");
         return Err(Refusal::Usage(text).into());
     }
+    let language = args.lang.unwrap_or(Language::English);
+    if language != Language::English && format != ReportFormat::Html {
+        let text = format!(
+            "--lang {} needs the format html, not {format}",
+            language.name()
+        );
+        return Err(Refusal::Usage(text).into());
+    }
     let options = ReportOptions {
         format,
         interval: args.ci,
@@ -81,6 +94,7 @@ pub(crate) async fn report(args: ReportArgs, context: &Context) -> ProjectResult
         mut text,
         is_complete,
     } = report::report(options, output, location, &terminal).await?;
+    text = report_page(text, language);
     if let Some(other) = &args.compare {
         text = compared(&report, (&text, format), other, context).await?;
     }

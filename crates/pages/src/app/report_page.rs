@@ -13,9 +13,11 @@ use super::report_sentences::{headline, limits};
 use super::run_blocks::failed_blocks_part;
 use super::state::AppState;
 use super::visit::Visit;
+use crate::messages;
 use crate::on_thread::read_in_turn;
 use crate::review::Language;
 use mocban_core::domain::one_line;
+use mocban_project::ProjectError;
 use mocban_project::location::now;
 use mocban_project::report::{ReportOptions, read, report};
 use mocban_report::{MetricRow, Report, ReportFormat};
@@ -53,7 +55,7 @@ pub(super) async fn page(
             @for (_, extension, _, name) in DOWNLOADS {
                 a.button href={ "report/file/report." (extension) } download { (name) }
             }
-            @if visit.language == Language::Vietnamese { span.muted #file-language { "(tệp bằng tiếng Anh)" } " " }
+            @if visit.language == Language::Vietnamese { span.muted #file-language { "(HTML bằng tiếng Việt, các tệp khác bằng tiếng Anh)" } " " }
             // The numbers of the page are loaded first.
             button #print type="button" data-print disabled { (visit.t("Print or save as PDF", "In hoặc lưu thành PDF")) }
         }
@@ -170,6 +172,7 @@ fn reasons(visit: &Visit, report: &Report) -> Markup {
 pub(super) async fn download(
     State(state): State<Arc<AppState>>,
     Path((key, file)): Path<(String, String)>,
+    visit: Visit,
 ) -> AppResult<Response> {
     let open = state.open(&key).await?;
     let known = DOWNLOADS
@@ -182,7 +185,14 @@ pub(super) async fn download(
         with_times: false,
     };
     let location = open.location();
-    let render = async move || report(options, None, &location, &()).await;
+    let language = visit.language;
+    let render = async move || {
+        let mut rendered = report(options, None, &location, &()).await?;
+        if format == ReportFormat::Html {
+            rendered.text = messages::report_page(rendered.text, language);
+        }
+        Ok::<_, ProjectError>(rendered)
+    };
     let rendered = read_in_turn(open.reports(), render).await?;
     let rendered = rendered.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(attachment(&file, kind, rendered.text.into_bytes()))

@@ -55,7 +55,7 @@ fn clause(text: &str) -> Option<String> {
 }
 
 /// Returns what stands in a text in place of the `{}` of a pattern, or `None` if the text does not match.
-fn parts_of<'t>(text: &'t str, pattern: &str) -> Option<Vec<&'t str>> {
+pub(super) fn parts_of<'t>(text: &'t str, pattern: &str) -> Option<Vec<&'t str>> {
     let mut pieces = pattern.split("{}");
     let mut rest = text.strip_prefix(pieces.next()?)?;
     let mut parts = Vec::new();
@@ -78,12 +78,17 @@ fn parts_of<'t>(text: &'t str, pattern: &str) -> Option<Vec<&'t str>> {
 
 /// Returns a pattern with `{0}` replaced by the first part, and so on. Braces in a part stay as they are.
 fn filled(pattern: &str, parts: &[&str]) -> String {
+    filled_by(pattern, |index| parts.get(index).copied().map(part_text))
+}
+
+/// Returns a pattern with `{0}` and so on replaced by texts. Braces without a text stay as they are.
+pub(super) fn filled_by(pattern: &str, text_of: impl Fn(usize) -> Option<String>) -> String {
     let mut pieces = pattern.split('{');
     let mut text = pieces.next().unwrap_or_default().to_owned();
     for piece in pieces {
         let filled = piece.split_once('}').and_then(|(index, rest)| {
-            let part = parts.get(index.parse::<usize>().ok()?)?;
-            Some([part_text(part), rest.to_owned()].concat())
+            let part = text_of(index.parse().ok()?)?;
+            Some([part.as_str(), rest].concat())
         });
         text += &filled.unwrap_or_else(|| format!("{{{piece}"));
     }

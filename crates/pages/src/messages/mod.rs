@@ -3,5 +3,11 @@
 mod block_messages;
 mod message_table;
 mod message_words;
+mod report_answers;
+mod report_captions;
+mod report_html;
+mod report_table;
+mod report_words;
 
 pub(crate) use message_words::{vietnamese, with_more};
+pub use report_html::report_page;
