@@ -207,4 +207,14 @@ fn pairs_are_mended_and_columns_named_in_a_browser() {
     look(&tab, axe.as_deref(), "import_list_vi");
     import(&tab, "named");
     assert_eq!(imported(dir, "named"), 2);
+    // A list with the same header, and the same list again.
+    std::fs::write(dir.join("a/other.csv"), list.replace("n1", "n3")).expect("written");
+    for name in ["other", "list"] {
+        tab.open(&format!("{home}import?list={folder}/{name}.csv"));
+        tab.wait("document.body?.dataset.ready && document.querySelector('#import:enabled')");
+        let kept = tab.eval("document.querySelector('#kept-columns') !== null");
+        assert_eq!(kept, true, "{name}");
+        let id = tab.eval("document.querySelector('[name=id_column]').value");
+        assert_eq!(id, "Nr", "{name}");
+    }
 }

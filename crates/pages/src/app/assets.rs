@@ -10,7 +10,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, content type and text of an asset.
-const ASSETS: [(&str, &str, &str); 8] = [
+const ASSETS: [(&str, &str, &str); 9] = [
     (
         "tokens.css",
         STYLE,
@@ -35,6 +35,11 @@ const ASSETS: [(&str, &str, &str); 8] = [
         "choose.js",
         SCRIPT,
         include_str!("../../../../assets/app/choose.js"),
+    ),
+    (
+        "columns.js",
+        SCRIPT,
+        include_str!("../../../../assets/app/columns.js"),
     ),
     (
         "import-files.js",

@@ -8,6 +8,9 @@ use super::visit::Visit;
 use mocban_core::domain::one_line;
 use mocban_lists::manifest::ListHead;
 
+/// Name in the address of whether the browser has kept the columns.
+pub(super) const KEPT_COLUMNS: &str = "kept_columns";
+
 /// Names of the columns in English and Vietnamese, in the order of [`ImportChoice::columns`].
 const NAMES: [[&str; 2]; 6] = [
     ["Id (needed)", "Mã (cần có)"],
@@ -18,16 +21,25 @@ const NAMES: [[&str; 2]; 6] = [
     ["Unit of the scan", "Đơn vị của bản quét"],
 ];
 
-/// Returns the form that chooses the columns. It is open while a column is missing.
+/// Longest header, as JSON in bytes, for which the browser keeps the chosen columns.
+const MAX_HEADER: usize = 4000;
+
+/// Returns the form that chooses the columns. It is open while a column is missing. The browser keeps what is chosen for lists
+/// with the same header.
 pub(super) fn columns_part(visit: &Visit, chosen: &ImportChoice, head: &ListHead) -> Markup {
     let columns = chosen.columns();
-    let others = columns.iter().fold(visit.query.clone(), |query, column| {
-        query.with(column.1, "")
-    });
+    let own = columns.iter().map(|column| column.1).chain([KEPT_COLUMNS]);
+    let others = own.fold(visit.query.clone(), |query, name| query.with(name, ""));
+    // Texts always have a JSON form.
+    let header = serde_json::to_string(&head.header).unwrap_or_default();
+    let header = Some(header).filter(|header| header.len() <= MAX_HEADER);
     let is_complete = head.is_complete();
     let is_missing = !is_complete && head.refused.is_none();
     html! {
-        details #columns.card open[!is_complete] {
+        @if visit.query.get(KEPT_COLUMNS).is_some() {
+            p.notice #kept-columns role="status" { (visit.t("The columns that you chose for a list with this header are used again.", "Dùng lại các cột bạn đã chọn cho danh sách có cùng dòng tiêu đề.")) }
+        }
+        details #columns.card open[!is_complete] data-header=[&header] {
             summary { h2 { (visit.t("Columns of the list", "Các cột của danh sách")) } }
             @if is_missing {
                 p.notice.bad role="alert" { (visit.t("A list needs an id, a scan and a print, and the names of its columns do not say which these are. Choose them:", "Danh sách cần mã, bản quét và bản in, nhưng tên các cột không cho biết cột nào. Hãy chọn:")) }
@@ -46,6 +58,7 @@ pub(super) fn columns_part(visit: &Visit, chosen: &ImportChoice, head: &ListHead
                 }
             }
         }
+        @if header.is_some() { script type="module" src={ (visit.root) "assets/columns.js" } {} }
     }
 }
 

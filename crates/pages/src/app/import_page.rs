@@ -16,7 +16,7 @@ use super::failure::{AppFailure, AppResult};
 use super::folder_picker::{FileCounts, PickedFolder, PickerRoots};
 use super::import_changes::ColumnChanges;
 use super::import_choice::{ImportChoice, ImportPreview, Planned, with_change};
-use super::import_columns::columns_part;
+use super::import_columns::{KEPT_COLUMNS, columns_part};
 use super::import_partners::{ImportPartners, mending_part};
 use super::import_preview::{changes_part, plan_part};
 use super::plan_cache::PlanCache;
@@ -35,7 +35,14 @@ use mocban_project::location::Location;
 use mocban_project::pair_choices::PairChoices;
 
 /// Values of the address that belong to the files that were chosen, beside the columns of a list.
-const OF_FILES: [&str; 5] = ["matches", "from", "left_out", "whole_block", "changed"];
+const OF_FILES: [&str; 6] = [
+    "matches",
+    "from",
+    "left_out",
+    "whole_block",
+    "changed",
+    KEPT_COLUMNS,
+];
 
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
