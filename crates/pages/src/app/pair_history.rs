@@ -69,7 +69,7 @@ fn manual_line(visit: &Visit, manual: &ManualResult) -> Markup {
     let made = &manual.stored.made;
     html! {
         li {
-            (visit.time(manual.stored.at)) " · " (one_line(&made.reviewer)) " · " (visit.t("aligned by hand", "căn chỉnh bằng tay"))
+            (visit.time(manual.stored.at)) " · " (one_line(&made.reviewer)) " · " (visit.t("aligned by hand", "căn chỉnh thủ công"))
             " (IoU " (score(visit, Some(made.iou)))
             @if let Some(adjustment) = &manual.adjustment {
                 "; " (visit.metric(adjustment.from)) ": " (score(visit, Some(adjustment.from_iou)))

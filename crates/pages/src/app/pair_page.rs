@@ -238,8 +238,11 @@ fn pictures(
         ("print", visit.t("Print", "Bản in"))
     };
     let blink = match other {
-        Some(_) => visit.t("Blink the two metrics", "Nháy hai độ đo"),
-        None => visit.t("Blink print and relief", "Nháy bản in và mặt khắc"),
+        Some(_) => visit.t("Blink the two metrics", "Xem luân phiên hai độ đo"),
+        None => visit.t(
+            "Blink print and relief",
+            "Xem luân phiên bản in và mặt khắc",
+        ),
     };
     let first = metric.unwrap_or(ThresholdMetric::DEFAULT);
     html! {

@@ -92,7 +92,7 @@ fn truth(visit: &Visit, report: &Report) -> Option<String> {
     rows.find_map(|row| {
         let truth = row.truth.as_ref()?;
         Some(format!(
-            "Theo đáp án, {} trên {} kết quả của {} là đúng, {}.",
+            "Theo dữ liệu đối chứng, {} trên {} kết quả của {} là đúng, {}.",
             grouped(truth.passed),
             grouped(truth.n),
             visit.metric(row.metric),
@@ -164,7 +164,7 @@ fn differences(visit: &Visit, report: &Report) -> String {
     };
     let basis = match basis {
         Basis::Verdicts => "đánh giá",
-        Basis::Truth => "đáp án",
+        Basis::Truth => "dữ liệu đối chứng",
     };
     let significant = family.iter().filter_map(|found| {
         let p = found.p_holm.filter(|p| *p < SIGNIFICANCE_LEVEL)?;
@@ -232,7 +232,7 @@ fn vietnamese_limits(visit: &Visit, report: &Report) -> Vec<String> {
         ));
     }
     if let Some(problem) = &report.unusable_truth {
-        limits.push(format!("Không dùng được đáp án của {problem}."));
+        limits.push(format!("Không dùng được dữ liệu đối chứng của {problem}."));
     }
     limits
 }

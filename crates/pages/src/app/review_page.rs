@@ -139,7 +139,7 @@ fn start_form(visit: &Visit, chosen: Option<usize>) -> Markup {
             button name="invite" value="yes" { (visit.t("Invite", "Mời")) }
             p.muted { (visit.t(
                 "\"Invite\" makes a link for another computer, tablet or phone of your network. Whoever opens it can judge and align by hand under this name, and see no other page. The connection is not encrypted.",
-                "\"Mời\" tạo một liên kết cho máy tính, máy tính bảng hoặc điện thoại khác trong mạng của bạn. Ai mở liên kết có thể đánh giá và căn chỉnh bằng tay dưới tên này, và không xem được trang nào khác. Kết nối không được mã hóa.",
+                "\"Mời\" tạo một liên kết cho máy tính, máy tính bảng hoặc điện thoại khác trong mạng của bạn. Ai mở liên kết có thể đánh giá và căn chỉnh thủ công dưới tên này, và không xem được trang nào khác. Kết nối không được mã hóa.",
             )) }
         },
     )

@@ -61,7 +61,7 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "ô {0} của cột {1} có ngắt dòng",
     ),
     ("id {} has a line break", "mã {0} có ngắt dòng"),
-    ("block {} has a line break", "khối {0} có ngắt dòng"),
+    ("block {} has a line break", "ván {0} có ngắt dòng"),
     ("id {} has a tab", "mã {0} có dấu tab"),
     ("its path has a tab", "đường dẫn có dấu tab"),
     ("remove it", "hãy xóa nó"),
