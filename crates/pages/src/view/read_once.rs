@@ -56,18 +56,21 @@ impl<T> ReadOnce<T> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::ReadOnce;
 
     #[tokio::test]
     async fn it_is_read_once_and_then_again_with_what_was_known() {
         let kept = ReadOnce::default();
-        let first = kept.get(async || Ok(1)).await;
+        let first = kept.get(|| async { Ok(1) }).await;
         assert_eq!(first.as_deref(), Ok(&1));
-        let same = kept.get(async || Err("read twice".to_owned())).await;
+        let same = kept.get(|| async { Err("read twice".to_owned()) }).await;
         assert_eq!(same.as_deref(), Ok(&1));
-        let next = kept.again(async |known| Ok(known.map_or(0, |known| *known) + 1));
+        let next =
+            kept.again(|known| async move { Ok(known.map_or(0, |known: Arc<i32>| *known) + 1) });
         assert_eq!(next.await.as_deref(), Ok(&2));
-        let failed = kept.again(async |_| Err("gone".to_owned())).await;
+        let failed = kept.again(|_| async { Err("gone".to_owned()) }).await;
         assert_eq!(failed, Err("gone".to_owned()));
         assert_eq!(kept.known().await, None);
     }
