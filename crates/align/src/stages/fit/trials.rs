@@ -194,7 +194,7 @@ impl<'a> Trials<'a> {
         let masks_from_depth = masks.masks_from_print().after(&relief.print_from_depth);
         let print_from_plane = relief.print_from_depth.after(&map.scale.depth_from_plane);
         Some(TrialPose {
-            confidence: inputs.without_pixel_doubt(),
+            confidence: inputs.of_candidate(),
             plane_from_print: print_from_plane.inverse()?,
             seen_ink: seen_ink(&masks.ink, &map, &masks_from_depth.inverse()?),
             ink: on_print(ink, &masks.print_from_masks()),

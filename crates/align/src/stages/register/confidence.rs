@@ -8,7 +8,7 @@
 //! describes. `MASK` was set manually, because few masks are wrong. It lowers the confidence if the pose is a few
 //! percent off. On generated pairs, the mean confidence is slightly below the fraction that is right.
 
-use super::doubts::{Doubts, of_pixels};
+use super::doubts::{Doubts, of_pixels, of_upright};
 use mocban_core::domain::{MetricOutcome, PoseFeatures};
 
 /// Number of inputs of the pose model: the constant 1, and the logarithms of the first five pose features.
@@ -71,11 +71,15 @@ pub struct ConfidenceInputs {
 impl ConfidenceInputs {
     /// Returns the confidence, 0..=1, under the built-in weights.
     pub fn confidence(&self) -> f64 {
-        self.without_pixel_doubt() * of_pixels(self.pixel_width, self.prior)
+        let mirrored = self.pose[POSE_INPUTS - 1].exp();
+        self.of_candidate()
+            * of_pixels(self.pixel_width, self.prior)
+            * of_upright(mirrored, self.prior)
     }
 
-    /// Returns the confidence apart from the size of the print's pixels, which is the same for all candidates of a fit.
-    pub(crate) fn without_pixel_doubt(&self) -> f64 {
+    /// Returns the confidence of a candidate of a fit. It lacks the doubt about the print's pixels, which is the same for
+    /// all candidates, and that about a mirrored pair, which is for the chosen candidate.
+    pub(crate) fn of_candidate(&self) -> f64 {
         pose_probability(&self.pose, self.prior)
             * logistic(&MASK, &self.mask)
             * logistic(&CHARACTER, &self.character)

@@ -1,5 +1,5 @@
 //! What lowers the confidence of an alignment beside the models of `confidence`: a part of the print that was left out,
-//! strokes of another block, and ink beside the scan.
+//! strokes of another block, ink beside the scan, and a mirrored relief that matches better.
 
 /// Displacement of whole strokes at which it is as probable that print and relief come from two blocks as from one, and its
 /// deviation, both as fractions of the stroke width.
@@ -14,6 +14,10 @@ const PIXEL_WIDTHS: [f64; 2] = [0.88, 1.02];
 /// Factor of the confidence of a print whose pixels are about as wide as its strokes. Prints by another hand or
 /// of a similar character may then agree as well as the right one.
 const COARSE: f64 = 0.5;
+/// Score of the mirrored relief, as a fraction of that of the relief, at which the pair is as probably mirrored as not,
+/// and its deviation. It is above 1, because mirrored pairs are rare. Right pairs of symmetric characters are near 1.
+const MIRRORED: f64 = 1.03;
+const MIRRORED_DEVIATION: f64 = 0.008;
 
 /// What lowers the confidence of an alignment, apart from the three logistic models.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,9 +69,19 @@ pub(super) fn of_pixels(pixel_width: f64, prior: f64) -> f64 {
     1.0 - (1.0 - COARSE) * part
 }
 
+/// Returns the probability, 0..=1, that the pair is not mirrored. `mirrored` is the score of the mirrored relief, as a
+/// fraction of that of the relief. It is 1 if the whole page agrees with the block, by the odds `prior`: then the pair is
+/// known not to be mirrored.
+pub(super) fn of_upright(mirrored: f64, prior: f64) -> f64 {
+    if prior > 0.0 {
+        return 1.0;
+    }
+    1.0 / (1.0 + ((mirrored - MIRRORED) / MIRRORED_DEVIATION).exp())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{COARSE, Doubts, of_pixels, of_same_block, of_seen_ink};
+    use super::{COARSE, Doubts, of_pixels, of_same_block, of_seen_ink, of_upright};
 
     #[test]
     fn little_ink_on_the_scan_lowers_the_confidence() {
@@ -95,6 +109,13 @@ mod tests {
     fn strokes_that_are_displaced_are_evidence_against_the_block() {
         assert!(of_same_block(0.05) > 0.99 && of_same_block(0.068) > 0.9);
         assert!(of_same_block(0.09) < 0.05);
+    }
+
+    #[test]
+    fn a_mirrored_relief_that_matches_better_lowers_the_confidence_of_a_pair_alone() {
+        assert!(of_upright(0.98, 0.0) > 0.99 && of_upright(1.0, 0.0) > 0.95);
+        assert!(of_upright(1.045, 0.0) < 0.2);
+        assert_eq!(of_upright(1.045, 3.0), 1.0);
     }
 
     #[test]
