@@ -162,7 +162,7 @@ pub async fn inspect(
     inspect_files(project, catalog, pairs, false).await
 }
 
-/// Inspects files like [`inspect`]. `with_gone` includes those that the last run did not find.
+/// Inspects files like [`inspect`]. `with_gone` includes the files that the last run did not find.
 async fn inspect_files(
     project: &Project,
     catalog: &Catalog,

@@ -110,7 +110,11 @@ async fn block_json(
     Extension(access): Extension<Arc<AccessControl>>,
 ) -> Response {
     // The block may have run, or its files may have changed, since the page was opened before.
-    match state.shown.again(|known| state.store.read_boxes(known)).await {
+    match state
+        .shown
+        .again(|known| state.store.read_boxes(known))
+        .await
+    {
         Ok(shown) => {
             let mut value = shown.to_json();
             value["csrf_token"] = json!(access.csrf_token());
