@@ -29,7 +29,7 @@ pub fn alignment_files(pair: &AlignedPair, print: &Print) -> [(&'static str, Vec
     let files = [
         png_mask(&pair.normalized.prints[pair.registered.outcome.ink].ink_of_print()),
         png_grey16(&depth.levels),
-        sidecar(&depth.scale, pair.registered.outcome.levelling).into_bytes(),
+        sidecar(&depth.scale, pair.registered.outcome.levelling.as_ref()).into_bytes(),
         png_grey16(&warp_depth(depth, pose, size[0], size[1])),
         png_mask(&aligned),
         compact_rgb8(&view.overlay_on(view.print(image), &aligned, displaced)),

@@ -74,7 +74,7 @@ struct DepthSidecar<'a> {
     mm_per_mesh_unit: Option<f64>,
     /// Heights over the curved surface that were subtracted, if the map was levelled.
     #[serde(skip_serializing_if = "Option::is_none")]
-    levelling: Option<Levelling>,
+    levelling: Option<&'a Levelling>,
 }
 
 /// Encodes the files of a finished pair. Returns the patterns of each selected metric.
@@ -92,7 +92,7 @@ pub(super) fn write_files(
         shared("depth.json"),
         sidecar(
             &pictures.outcomes.depth.scale,
-            pictures.outcomes.register.levelling,
+            pictures.outcomes.register.levelling.as_ref(),
         )
         .into_bytes(),
     );
@@ -209,7 +209,7 @@ fn first_of_each<T>(items: &[T], is_same: impl Fn(&T, &T) -> bool) -> Vec<usize>
 }
 
 /// Returns the text of the file beside a depth map that gives its scale.
-pub(super) fn sidecar(scale: &DepthScale, levelling: Option<Levelling>) -> String {
+pub(super) fn sidecar(scale: &DepthScale, levelling: Option<&Levelling>) -> String {
     let sidecar = DepthSidecar {
         no_data: 0,
         scale,

@@ -266,12 +266,12 @@ impl<'a> PairPictures<'a> {
         scale: DepthScale,
         print: [usize; 2],
     ) -> Result<MeshPlacement, PictureError> {
-        let (map, levelling) = (&self.outcomes.depth, self.outcomes.register.levelling);
+        let (map, levelling) = (&self.outcomes.depth, &self.outcomes.register.levelling);
         let placement = MeshPlacement::new(self.outcomes.fit.clone(), scale, outcome, print);
         let none = || PictureError::Unencodable("the alignment has no inverse".to_owned());
         Ok(placement
             .ok_or_else(none)?
-            .levelled(levelling, [map.width, map.height]))
+            .levelled(levelling.as_ref(), [map.width, map.height]))
     }
 
     /// Reads the mesh file, and checks that it is the one that was aligned.

@@ -112,7 +112,7 @@ mod tests {
         let map = DepthMap::of_levels(levels);
         let mut levelling = Levelling::default();
         for row in &mut levelling.heights {
-            *row = [0.0, 0.1, 0.2, 0.3];
+            *row = std::array::from_fn(|x| 0.05 * x as f64);
         }
         let levelled = map.levelled(&levelling);
         for (x, y) in (0..49).map(|at| (at % 7, at / 7)) {
@@ -122,7 +122,7 @@ mod tests {
                 (found, wanted) => assert_eq!(found, wanted),
             }
         }
-        levelling.heights[0] = [-9.0; 4];
+        levelling.heights[0] = [-9.0; Levelling::NODES];
         assert_eq!(map.levelled(&levelling).levels.at(1, 0), u16::MAX);
     }
 }

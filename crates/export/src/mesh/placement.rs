@@ -73,9 +73,9 @@ impl MeshPlacement {
 
     /// Measures heights over the levelling of the depth map, if there is one. `size` is the map's width and height.
     #[must_use]
-    pub(crate) fn levelled(mut self, levelling: Option<Levelling>, size: [u32; 2]) -> Self {
+    pub(crate) fn levelled(mut self, levelling: Option<&Levelling>, size: [u32; 2]) -> Self {
         let size = size.map(|side| side as usize);
-        self.levelling = levelling.map(|levelling| (levelling, size));
+        self.levelling = levelling.map(|levelling| (*levelling, size));
         self
     }
 
@@ -329,7 +329,7 @@ pub(super) mod tests {
         let levelling = Levelling {
             heights: [[0.25; Levelling::NODES]; Levelling::NODES],
         };
-        let levelled = placement(None).levelled(Some(levelling), [100, 80]);
+        let levelled = placement(None).levelled(Some(&levelling), [100, 80]);
         let point = [1.0, 2.0, 3.0];
         let [plain, levelled] =
             [placement(None), levelled].map(|placed| placed.place(point).height);

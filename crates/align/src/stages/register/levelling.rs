@@ -3,13 +3,18 @@
 //! One threshold below the fitted surface is right for most scans. It is wrong where a scan drifts, was stitched from
 //! views that do not meet, or has rules that are higher than the text. There, whole ridges lie under ink but below the
 //! threshold, or ground above it. The heights of a coarse grid of nodes are then chosen so that the strokes that one
-//! threshold separates cover the most ink and the least background.
+//! threshold separates cover the most ink and the least background, and after them those of a grid with half cells, which
+//! follows shorter waves.
 
 use super::half_canvas::{HalfCanvas, to_half};
 use mocban_core::domain::{Affine2, Levelling, ReliefHeights};
 use mocban_core::raster::DepthMap;
 
-const NODES: usize = Levelling::NODES;
+/// Number of nodes along each side of the grid whose heights are chosen first. Few heights are hardly misled by lost
+/// strokes and heavy ink, so this grid decides whether the map is levelled at all.
+const COARSE: usize = Levelling::COARSE_NODES;
+/// Number of nodes along each side of the grid whose heights are chosen next. Its cells are halves of the coarse ones.
+const FINE: usize = Levelling::NODES;
 /// Heights of a node over the threshold reach this share of the relief up and down.
 const REACH: f64 = 2.0;
 /// Step between the heights that are tried, as a share of the relief.
@@ -29,11 +34,13 @@ const FULL_PX: f64 = 1.0;
 /// A levelling is tried if it increases the agreement with the ink by at least this share of the ink. On scans that need
 /// none, it increases by 0.00 to 0.03, more if the ink is heavy or strokes are lost.
 const LEAST_GAIN: f64 = 0.035;
+/// The fine grid is used if it increases the agreement by at least this share of the ink over the coarse one.
+const FINE_GAIN: f64 = 0.01;
 /// The search ends after the first round if it increases the agreement by less than this.
 const FIRST_GAIN: f64 = 0.015;
 
 /// Heights of the nodes, as shares of the relief.
-type NodeHeights = [[f64; NODES]; NODES];
+type NodeHeights<const N: usize> = [[f64; N]; N];
 
 /// Fits a levelling to a pose. `level` is a threshold that suits a large part of the character, and `spread` the spread
 /// of the ink in pixels of the half canvas. Returns `None` if one threshold suits about as well.
@@ -46,21 +53,29 @@ pub(super) fn fit(
     spread: f64,
 ) -> Option<Levelling> {
     let depth_from_half = to_half(canvas_from_depth).inverse()?;
-    let samples = InkSamples::new(depth, canvas, &depth_from_half, relief, level, spread);
-    let single = samples.best_single_agreement();
-    let mut heights = [[0.0; NODES]; NODES];
-    for round in 0..ROUNDS {
-        for node in 0..NODES * NODES {
-            let [x, y] = [node % NODES, node / NODES];
-            heights[y][x] = samples.best_height(&heights, [x, y]);
-        }
-        if round == 0 && samples.agreement(&heights) - single < FIRST_GAIN {
-            return None;
-        }
+    let coarse: InkSamples<COARSE> =
+        InkSamples::new(depth, canvas, &depth_from_half, relief, level, spread);
+    let single = coarse.best_single_agreement();
+    let mut heights = [[0.0; COARSE]; COARSE];
+    coarse.choose_heights(&mut heights);
+    if coarse.agreement(&heights) - single < FIRST_GAIN {
+        return None;
     }
-    let gain = samples.agreement(&heights) - single;
-    (gain >= LEAST_GAIN).then(|| Levelling {
-        heights: heights.map(|row| row.map(|height| height * relief.depth())),
+    (1..ROUNDS).for_each(|_| coarse.choose_heights(&mut heights));
+    let agreement = coarse.agreement(&heights);
+    if agreement - single < LEAST_GAIN {
+        return None;
+    }
+    let mut best = Levelling::from(heights).heights;
+    let fine: InkSamples<FINE> =
+        InkSamples::new(depth, canvas, &depth_from_half, relief, level, spread);
+    let mut heights = best;
+    (0..ROUNDS).for_each(|_| fine.choose_heights(&mut heights));
+    if fine.agreement(&heights) - agreement >= FINE_GAIN {
+        best = heights;
+    }
+    Some(Levelling {
+        heights: best.map(|row| row.map(|height| height * relief.depth())),
     })
 }
 
@@ -76,14 +91,14 @@ struct InkSample {
 }
 
 /// Pixels of a canvas with data.
-struct InkSamples {
-    /// The samples of each cell between four nodes, row by row.
-    cells: [Vec<InkSample>; (NODES - 1) * (NODES - 1)],
+struct InkSamples<const N: usize> {
+    /// The samples of each cell between four of `N` x `N` nodes, row by row.
+    cells: Vec<Vec<InkSample>>,
     /// Sum of the weights of the ink, at least 1.
     all_ink: f64,
 }
 
-impl InkSamples {
+impl<const N: usize> InkSamples<N> {
     fn new(
         depth: &DepthMap,
         canvas: &HalfCanvas,
@@ -95,18 +110,18 @@ impl InkSamples {
         let size = [depth.levels.width(), depth.levels.height()];
         let per_level = depth.scale.height_per_level / relief.depth();
         let [width, height] = [canvas.levels.width(), canvas.levels.height()];
-        let mut cells: [Vec<InkSample>; (NODES - 1) * (NODES - 1)] = Default::default();
+        let mut cells = vec![Vec::new(); (N - 1) * (N - 1)];
         let mut all_ink = 0.0;
         let along = |side: usize| (0..side).step_by(SAMPLING_PX);
         let pixels = along(height).flat_map(|y| along(width).map(move |x| (x, y)));
         for (x, y) in pixels.filter(|(x, y)| canvas.levels.at(*x, *y) > 0) {
             let px = depth_from_half.apply([x as f64, y as f64]);
             let (found, distance) = (canvas.levels.at(x, y), canvas.edge.grid().at(x, y));
-            let weights = Levelling::weights(px, size);
+            let weights = Levelling::weights::<N>(px, size);
             let [x, y] = weights[0].0;
             let weight = ((f64::from(distance) - spread) / FULL_PX).clamp(-1.0, 1.0);
             all_ink += f64::max(weight, 0.0);
-            cells[y * (NODES - 1) + x].push(InkSample {
+            cells[y * (N - 1) + x].push(InkSample {
                 height: (f64::from(found) - f64::from(level)) * per_level,
                 weight,
                 nodes: weights.map(|(_, weight)| weight),
@@ -115,6 +130,14 @@ impl InkSamples {
         Self {
             cells,
             all_ink: f64::max(all_ink, 1.0),
+        }
+    }
+
+    /// Chooses the height of each node once, given the others.
+    fn choose_heights(&self, heights: &mut NodeHeights<N>) {
+        for node in 0..N * N {
+            let [x, y] = [node % N, node / N];
+            heights[y][x] = self.best_height(heights, [x, y]);
         }
     }
 
@@ -133,7 +156,7 @@ impl InkSamples {
     }
 
     /// Returns the agreement of the samples above the nodes with the ink, as a share of the ink.
-    fn agreement(&self, heights: &NodeHeights) -> f64 {
+    fn agreement(&self, heights: &NodeHeights<N>) -> f64 {
         let mut sum = 0.0;
         for (cell, samples) in self.cells.iter().enumerate() {
             let corners = corners(heights, cell);
@@ -144,22 +167,22 @@ impl InkSamples {
     }
 
     /// Returns the best height of a node, given the heights of the others.
-    fn best_height(&self, heights: &NodeHeights, [x, y]: [usize; 2]) -> f64 {
+    fn best_height(&self, heights: &NodeHeights<N>, [x, y]: [usize; 2]) -> f64 {
         let now = heights[y][x];
         let mut bins = [0.0; BINS];
         for corner in 0..4 {
             let [left, top] = [x.wrapping_sub(corner % 2), y.wrapping_sub(corner / 2)];
-            if left >= NODES - 1 || top >= NODES - 1 {
+            if left >= N - 1 || top >= N - 1 {
                 continue;
             }
-            let cell = top * (NODES - 1) + left;
+            let cell = top * (N - 1) + left;
             let corners = corners(heights, cell);
             for sample in &self.cells[cell] {
                 bins[bin(sample.over(&corners) + now)] += sample.nodes[corner] * sample.weight;
             }
         }
         let around = mean_around(heights, [x, y]);
-        let ink = self.all_ink / (NODES * NODES) as f64;
+        let ink = self.all_ink / (N * N) as f64;
         let (mut above, mut best) = (0.0, (f64::NEG_INFINITY, now));
         for (k, weight) in bins.iter().enumerate().rev() {
             above += weight;
@@ -186,8 +209,8 @@ impl InkSample {
 }
 
 /// Returns the heights of the four nodes around a cell, row by row.
-fn corners(heights: &NodeHeights, cell: usize) -> [f64; 4] {
-    let [x, y] = [cell % (NODES - 1), cell / (NODES - 1)];
+fn corners<const N: usize>(heights: &NodeHeights<N>, cell: usize) -> [f64; 4] {
+    let [x, y] = [cell % (N - 1), cell / (N - 1)];
     [
         heights[y][x],
         heights[y][x + 1],
@@ -197,7 +220,7 @@ fn corners(heights: &NodeHeights, cell: usize) -> [f64; 4] {
 }
 
 /// Returns the mean height of the neighbours of a node.
-fn mean_around(heights: &NodeHeights, [x, y]: [usize; 2]) -> f64 {
+fn mean_around<const N: usize>(heights: &NodeHeights<N>, [x, y]: [usize; 2]) -> f64 {
     let beside = [
         (x.wrapping_sub(1), y),
         (x + 1, y),
@@ -236,10 +259,16 @@ mod tests {
 
     /// Returns a map of the bars whose heights rise by `drift` of the relief from the left to the right.
     fn drifting(drift: f64) -> DepthMap {
-        let level = |x: usize, _| {
+        bars(|x, _| drift * (x - 0.5))
+    }
+
+    /// Returns a map of the bars. `error` returns the error of the heights at a place, 0..=1 along each axis, as a share of
+    /// the relief.
+    fn bars(error: impl Fn(f64, f64) -> f64) -> DepthMap {
+        let level = |x: usize, y: usize| {
             let height = if on_bar(x, 0) { 0.0 } else { -0.4 };
-            let drift = 0.4 * drift * (x as f64 / (SIDE - 1) as f64 - 0.5);
-            (1.0 + (height + drift + 1.0) / 2e-5) as u16
+            let [u, v] = [x, y].map(|at| at as f64 / (SIDE - 1) as f64);
+            (1.0 + (height + 0.4 * error(u, v) + 1.0) / 2e-5) as u16
         };
         DepthMap::of_levels(Grid::from_fn(SIDE, SIDE, level))
     }
@@ -280,6 +309,15 @@ mod tests {
         let found = levelling(&depth, 0).expect("one threshold does not fit");
         let share = right(&depth.levelled(&found));
         assert!(share > 0.97, "{share}");
+    }
+
+    #[test]
+    fn waves_shorter_than_the_coarse_cells_are_levelled_by_the_fine_ones() {
+        let wave = |at: f64| (at * 3.0 * std::f64::consts::PI).sin();
+        let depth = bars(|x, y| 1.4 * (x - 0.5) + 0.7 * wave(x) * wave(y));
+        let found = levelling(&depth, 0).expect("one threshold does not fit");
+        let share = right(&depth.levelled(&found));
+        assert!(share > 0.95, "{share}");
     }
 
     #[test]
