@@ -82,6 +82,19 @@ fn the_headings_of_the_app_are_read() {
 }
 
 #[test]
+fn of_several_headings_the_one_that_names_the_thing_best_is_taken() {
+    let list =
+        "Mã hiện vật,Ván số,Ván,Bản quét,Trang,Trang in,Ảnh trang\n9,8,b1,m.stl,12,x,p.jpg\n";
+    let rows = parse_blocks(list.as_bytes()).expect("valid");
+    assert_eq!(rows[0].name.as_str(), "b1");
+    assert_eq!(rows[0].page.to_str(), Some("p.jpg"));
+    assert_eq!(rows[0].meta.len(), 4);
+    let list = "Ván,Bản quét,Trang,Trang in\nb1,m.stl,12,p.jpg\n";
+    let rows = parse_blocks(list.as_bytes()).expect("valid");
+    assert_eq!(rows[0].page.to_str(), Some("p.jpg"));
+}
+
+#[test]
 fn problems_name_line_and_column() {
     for (text, expected) in [
         (
