@@ -36,8 +36,8 @@ pub struct MissingInputs {
     /// Path of the first missing one.
     pub first: String,
     /// Number of pairs and blocks that they belong to.
-    pub pairs: usize,
-    /// Folders of missing files that are missing, too, each without those in it.
+    pub owners: usize,
+    /// Folders of missing files that are missing, too, each without its own folders.
     pub folders: Vec<String>,
     /// Whether the first one is below a named root.
     #[serde(skip)]
@@ -51,7 +51,7 @@ impl MissingInputs {
             missing,
             looked_at,
             first,
-            pairs,
+            owners,
             folders,
             ..
         } = self;
@@ -61,7 +61,7 @@ impl MissingInputs {
         match folders.as_slice() {
             [] => format!("{found}, first {}", one_line(first)),
             [folder] => format!(
-                "{found}, of {pairs} pairs or blocks, with the folder {}",
+                "{found}, of {owners} pairs or blocks, with the folder {}",
                 one_line(folder)
             ),
             folders => {
@@ -70,12 +70,12 @@ impl MissingInputs {
                     .map(|folder| one_line(folder).to_string())
                     .collect();
                 let names = first_names(&folders, MAX_FOLDERS);
-                format!("{found}, of {pairs} pairs or blocks, with the folders {names}")
+                format!("{found}, of {owners} pairs or blocks, with the folders {names}")
             }
         }
     }
 
-    /// Returns whether a message is that of a missing file in one of the folders.
+    /// Returns whether a message of an export says that a file in one of the folders is missing.
     pub fn explains(&self, message: &str) -> bool {
         let mut folders = self.folders.iter();
         NOT_THERE.iter().any(|end| message.ends_with(end))
@@ -273,7 +273,7 @@ fn among(project: &Project, files: &[SampledInput], until: Instant) -> InputInsp
             missing: missing.len(),
             looked_at,
             first: shown(first),
-            pairs: owners.len(),
+            owners: owners.len(),
             folders: folders.names(),
             is_below_root: project.is_below_root(&first.path),
         }),

@@ -185,13 +185,16 @@ fn print_summary(
     }))?;
     let missing = exported.missing_inputs.as_ref();
     let is_explained = |why: &str| missing.is_some_and(|missing| missing.explains(why));
+    let mut is_all_explained = missing.is_some();
     for (block, why) in &summary.unreadable_blocks {
         if !is_explained(why) {
+            is_all_explained = false;
             context.warn(&format!("the export lacks files of block {block}: {why}"));
         }
     }
     for (pair, why) in &summary.unreadable {
         if !is_explained(why) {
+            is_all_explained = false;
             context.warn(&format!("the export has no files of {pair}: {why}"));
         }
     }
@@ -214,8 +217,8 @@ fn print_summary(
         ));
     }
     if !summary.is_complete() {
-        // A run trusts the catalog, so the check must come first. If most files are missing, it says what to do.
-        if summary.unreadable.len() as u64 > summary.pairs.done {
+        // A run trusts the catalog, so the check must come first. If most files or only inputs are missing, it says what to do.
+        if is_all_explained || summary.unreadable.len() as u64 > summary.pairs.done {
             context.next("check");
         } else {
             context.next("check --repair");

@@ -374,7 +374,7 @@ mod tests {
             missing: 3,
             looked_at: 8,
             first: "d/1.stl".to_owned(),
-            pairs: 2,
+            owners: 2,
             folders: Vec::new(),
             is_below_root: false,
         });
