@@ -13,7 +13,7 @@ const ELEMENT: &str = "mergeCell";
 /// Maximum number of merged areas. Fewer in tests.
 const MAX_AREAS: usize = if cfg!(test) { 1000 } else { 1 << 20 };
 
-/// Merged cells, whose first one is the key of the area.
+/// An area of merged cells. Its first cell is its key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct MergedArea {
     /// The cells as the sheet names them, such as `D2:D4`.
@@ -42,7 +42,7 @@ impl MergedCells {
     /// Reads the merged cells of a sheet, which stand behind its rows.
     ///
     /// # Errors
-    /// Returns an error if the sheet is damaged or has more merged cells than any has.
+    /// Returns an error if the sheet is damaged or has more than [`MAX_AREAS`] areas of merged cells.
     pub(super) fn read(file: &str, sheet: &str) -> Result<Self, WorkbookError> {
         let mut merged = Self::default();
         // Almost no sheet has any.

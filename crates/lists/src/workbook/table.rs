@@ -57,8 +57,8 @@ struct TableWriter<'w> {
 /// Largest number of cells that are named because they cannot be read.
 const MAX_REFUSED: usize = 10;
 
-/// Returns the text of a sheet as CSV, and the values to the right of the header, which are left out. Line breaks in cells that are no ids and
-/// no paths become blanks. Cells that are merged over rows of a column all have the value of the first.
+/// Returns the text of a sheet as CSV, and the values to the right of the header, which are left out. Line breaks in cells
+/// that are no ids and no paths become blanks. Cells that are merged over rows of a column all have the value of the first.
 ///
 /// The header is the first row with a value that is no title: see [`is_header`]. A parser refuses titles above it.
 pub(super) fn csv(
@@ -165,7 +165,7 @@ impl TableWriter<'_> {
         };
         let column = cell.column;
         if self.width > 0 && column >= self.width {
-            let has_value = !cell.value.trim().is_empty();
+            let has_value = !self.shared_or_own(&cell).trim().is_empty();
             self.beside.add(self.row, usize::from(has_value));
             return Ok(());
         }
@@ -195,6 +195,14 @@ impl TableWriter<'_> {
         if self.refused.len() < MAX_REFUSED {
             self.refused.push(error);
         }
+    }
+
+    /// Returns the value of a cell as it is stored, for a shared string its text.
+    fn shared_or_own<'c>(&'c self, cell: &'c OpenCell) -> &'c str {
+        let index = cell.value.trim().parse::<usize>().ok();
+        let index = index.filter(|_| cell.kind == "s");
+        let shared = index.and_then(|index| self.workbook.strings.get(index));
+        shared.unwrap_or(&cell.value)
     }
 
     /// Returns the text of a cell.

@@ -15,14 +15,15 @@ const STYLES: &str = "<styleSheet><numFmts><numFmt numFmtId=\"164\" formatCode=\
     <cellStyleXfs><xf numFmtId=\"14\"/></cellStyleXfs>\
     <cellXfs><xf numFmtId=\"0\"/><xf numFmtId=\"164\"/><xf numFmtId=\"14\"/></cellXfs></styleSheet>";
 
-/// A sheet with all kinds of cells, a gap of rows, and a value beside the table.
+/// A sheet with all kinds of cells, a gap of rows, and a value and an empty string beside the table.
 const ROWS: &str = "<row r=\"2\"><c r=\"A2\" t=\"s\"><v>0</v></c><c r=\"B2\" t=\"s\"><v>1</v></c><c r=\"C2\" t=\"s\"><v>2</v></c>\
     <c r=\"D2\" t=\"str\"><f>A1</f><v>made</v></c><c r=\"E2\" t=\"inlineStr\"><is><t>seen</t></is></c>\
     <c r=\"F2\" t=\"str\"><v>note</v></c></row>\
     <row r=\"3\"/>\
     <row r=\"5\"><c r=\"A5\" s=\"1\"><v>117</v></c><c r=\"B5\" t=\"s\"><v>3</v></c><c r=\"C5\" t=\"str\"><v>p.png&#10;</v></c>\
     <c r=\"D5\" s=\"2\"><v>46347</v></c><c r=\"E5\" t=\"b\"><v>1</v></c><c r=\"F5\" t=\"s\"><v>4</v></c><c r=\"XFD5\"><v>9</v></c></row>\
-    <row r=\"6\"><c r=\"A6\"><v>12</v></c><c r=\"C6\" t=\"s\"><v>5</v></c><c r=\"D6\"><v>0.25</v></c></row>";
+    <row r=\"6\"><c r=\"A6\"><v>12</v></c><c r=\"C6\" t=\"s\"><v>5</v></c><c r=\"D6\"><v>0.25</v></c>\
+    <c r=\"G6\" t=\"s\"><v>5</v></c></row>";
 
 fn csv(bytes: &[u8]) -> String {
     let table = read_sheet(bytes, None).expect("a sheet");
