@@ -211,8 +211,8 @@ fn what_is_said_of_a_scan_is_compared_with_what_was_found() {
     let mut lines = ran.err.lines();
     let warned = lines.any(|line| line.contains("mm deep, but most blocks") && is_warning(line));
     assert!(warned, "{}", ran.err);
-    let shown = mocban(dir.path(), &["-C", "p", "show", "a"]).expect(0);
     assert!(ran.err.contains(surface), "{}", ran.err);
+    let shown = mocban(dir.path(), &["-C", "p", "show", "a"]).expect(0);
     for part in ["scanned_face_down says", surface] {
         assert!(shown.out.contains(part), "{}", shown.out);
     }

@@ -14,7 +14,7 @@ use mocban_catalog::Catalog;
 use mocban_core::domain::UnixMillis;
 use mocban_store::Project;
 
-/// Number of pairs whose files are looked for among the copies.
+/// Largest number of pairs whose files are looked for among the copies.
 const MAX_COMPARED: usize = 100_000;
 /// Most files that are named.
 const MAX_NAMED: usize = 3;
@@ -36,7 +36,8 @@ pub struct BackupContent {
     pub verdicts: u64,
     /// Scans and prints beside it, which a restore copies.
     pub copies: Option<InputCopies>,
-    /// Number of scans and prints that are not among the copies, because they were missing or changed when they were copied.
+    /// Number of inputs of the first pairs and of all blocks that are not among the copies: they were missing or changed when
+    /// the others were copied, or are in an object store.
     pub not_copied: u64,
     /// Paths of the first ones.
     pub first_not_copied: Vec<String>,

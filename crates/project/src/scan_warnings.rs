@@ -28,8 +28,8 @@ pub fn of_fit(fit: &FitOutcome, attributes: &PairAttributes) -> Vec<String> {
     found
 }
 
-/// Returns a warning if the carved surface has no size of a character. The unit of a pair that was cut from a block is that of
-/// the block, which has its own warning.
+/// Returns a warning if the carved surface does not have the size of a character. The unit of a pair that was cut from a block
+/// is that of the block, which has its own warning.
 pub fn of_depth(depth: &DepthOutcome, attributes: &PairAttributes) -> Option<String> {
     if attributes.prior.is_some() {
         return None;

@@ -85,7 +85,7 @@ impl Catalog {
         query_scalar(LAST_ATTEMPT).fetch_optional(&mut conn).await
     }
 
-    /// Returns the attributes of the known ones of some pairs. Pairs with an invalid value are left out.
+    /// Returns the attributes of the pairs with these names. Leaves out unknown names, and pairs with an invalid value.
     pub async fn pair_attributes(&self, names: &[&PairName]) -> Result<Vec<PairAttributes>> {
         let mut conn = self.read_conn().await?;
         let mut found = Vec::new();

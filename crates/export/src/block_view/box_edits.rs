@@ -6,7 +6,7 @@ use mocban_lists::labels::{self, LabelBox, PageFile, ReplacedLabels};
 
 /// Name of the boxes in the messages of the reader of labels.
 const NAME: &str = "the boxes";
-/// What the reader of labels says of boxes that it has left out. Of edited labels nothing is stored instead.
+/// Parts of the reader's warnings that are untrue of edited labels: with such a box, they are not saved at all.
 const LEFT_OUT: [&str; 2] = [" and was left out", " and were left out"];
 
 /// Changes of the boxes that a page has shown. Boxes that are not named stay as they are shown, with their outlines.

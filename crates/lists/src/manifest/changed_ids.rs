@@ -7,15 +7,15 @@ use std::path::Path;
 const SHOWN_LINES: usize = 3;
 /// Number of ids in such a form that are too many for chance.
 const SEVERAL: usize = 2;
-/// Months of dates without a day or year, as spreadsheet programs write them. Capitals, as in `MAR-01`, are of other ids.
+/// Months as spreadsheet programs write them. In capitals, as in `MAR-01`, they are parts of real ids.
 const MONTHS: [&str; 12] = [
     "Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec",
 ];
-/// Years of dates. Smaller numbers of four digits are those of things.
+/// Years of dates. Other numbers of four digits are likely those of an inventory.
 const YEARS: RangeInclusive<u32> = 1900..=2100;
 
-/// Finds ids in the forms in which spreadsheet programs write dates and powers of ten: `1-Nov`, `Nov-01`, `01-Thg11`, `2026-11-01`,
-/// `01.11.2026` and `1.00E+05`.
+/// Finds ids in the forms in which spreadsheet programs write dates and powers of ten: `1-Nov`, `Nov-01`, `01-Thg11`,
+/// `2026-11-01`, `01.11.2026` and `1.00E+05`.
 ///
 /// An id is right if the path of its mesh or print has it, as in `scans/2026-11-01.stl`. Of the others, there is a warning if a
 /// path has what an id was made of, such as `1-11.stl` for `1-Nov`, or if at least two ids have such a form and other ids do
