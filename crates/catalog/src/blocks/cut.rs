@@ -57,9 +57,9 @@ SELECT p.name FROM block_character AS c JOIN pair AS p ON p.id = c.pair WHERE c.
 const PAIRS: &str = "
 SELECT p.id, p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id";
 
-/// Selects the pairs among `?1` that have a job and a verdict that nobody has undone or set apart.
+/// Counts the pairs among `?1` that have a job and a verdict that nobody has undone or set apart.
 const JUDGED: &str = "
-SELECT j.pair FROM job AS j WHERE j.pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) AND EXISTS (
+SELECT count(*) FROM job AS j WHERE j.pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) AND EXISTS (
     SELECT 1 FROM verdict AS v WHERE v.pair = j.pair
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
         AND v.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))";
@@ -108,8 +108,7 @@ async fn count_judged(conn: &mut Conn, pairs: &[PairId]) -> Result<u64> {
         return Ok(0);
     }
     let pairs = json_array(pairs.iter().map(|pair| pair.0));
-    let judged: Vec<PairId> = query_scalar(JUDGED).bind(pairs).fetch_all(conn).await?;
-    Ok(judged.len() as u64)
+    query_scalar(JUDGED).bind(pairs).fetch_one(conn).await
 }
 
 /// Returns the names of the pairs that a block does not have yet.
