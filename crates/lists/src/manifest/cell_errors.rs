@@ -1,12 +1,13 @@
 //! Errors of formulas, which spreadsheet programs write to CSV as text.
 
 /// Texts of failed formulas.
-const ERRORS: [&str; 14] = [
+const ERRORS: [&str; 16] = [
     "#BLOCKED!",
     "#BUSY!",
     "#CALC!",
     "#CONNECT!",
     "#DIV/0!",
+    "#ERROR!",
     "#FIELD!",
     "#GETTING_DATA",
     "#N/A",
@@ -15,6 +16,7 @@ const ERRORS: [&str; 14] = [
     "#NUM!",
     "#REF!",
     "#SPILL!",
+    "#UNKNOWN!",
     "#VALUE!",
 ];
 
@@ -32,7 +34,7 @@ mod tests {
 
     #[test]
     fn errors_of_formulas_are_no_ids() {
-        for error in ["#REF!", "#N/A", "#NAME?", "#n/a"] {
+        for error in ["#REF!", "#N/A", "#NAME?", "#ERROR!", "#n/a"] {
             let upper = error.to_uppercase();
             let why = format!("the id {upper} is the error of a formula");
             let csv = format!("id,mesh,print\na,m,p\n{error},m,p\n");
