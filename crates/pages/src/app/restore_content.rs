@@ -105,8 +105,8 @@ fn content_part(visit: &Visit, folder: &Path, content: &BackupContent, name: &st
             @let named = content.first_not_copied.iter().map(|path| one_line(path).to_string()).collect::<Vec<_>>().join(", ");
             p.notice.warn #not-copied {
                 (visit.t(
-                    "Scans and prints that are not beside the backup, because they were missing or changed when it was made",
-                    "Số bản quét và bản in không có bên cạnh bản sao lưu, vì bị thiếu hoặc đã đổi khi sao lưu",
+                    "Scans and prints that are not beside the backup, because they were missing or changed when it was made, or are in an object store",
+                    "Số bản quét và bản in không có bên cạnh bản sao lưu, vì bị thiếu hoặc đã đổi khi sao lưu, hay nằm ở kho đối tượng",
                 )) ": " b { (grouped(content.not_copied)) } " (" (named)
                 @if content.not_copied > content.first_not_copied.len() as u64 { ", …" }
                 "). "
