@@ -1,0 +1,258 @@
+//! Messages of the program with their Vietnamese texts.
+
+use std::path::Path;
+
+use super::{all_messages, vietnamese};
+
+#[test]
+fn frequent_messages_are_translated_with_their_parts() {
+    for (english, expected) in [
+        (
+            "60 files are missing, nothing was imported:\n  pairs.csv: line 2: mesh m/0.stl of 0 does not exist\n  and 59 more",
+            "thiếu 60 tệp nên chưa nhập gì:\n  pairs.csv: dòng 2: không có bản quét m/0.stl của 0\n  và 59 mục khác",
+        ),
+        (
+            "60 files are missing or a folder, nothing was imported:\n  pairs.csv: line 3: print p/1 of 1 is a folder, not a file",
+            "không dùng được 60 tệp nên chưa nhập gì:\n  pairs.csv: dòng 3: bản in p/1 của 1 là thư mục, không phải tệp",
+        ),
+        (
+            "1 file is missing or a folder, nothing was imported:",
+            "không dùng được 1 tệp nên chưa nhập gì:",
+        ),
+        (
+            "ignored, a glTF scene is not read: m/b.glb and 1 more; open them in MeshLab, Blender or CloudCompare and export them as PLY",
+            "bỏ qua, không đọc được cảnh 3D glTF: m/b.glb và 1 tệp khác; hãy mở chúng bằng MeshLab, Blender hoặc CloudCompare rồi xuất thành PLY",
+        ),
+        (
+            "data/prints/1.png: relief and print do not match: confidence 0.20 in the pose is below register.min_confidence 0.3; is it the print of another character?",
+            "data/prints/1.png: mặt khắc và bản in không khớp: độ tin cậy 0,20 của tư thế thấp hơn register.min_confidence 0,3; đây có phải bản in của chữ khác không?",
+        ),
+        (
+            "data/prints/1.jpg: the file is a BMP image",
+            "data/prints/1.jpg: tệp là hình BMP",
+        ),
+        (
+            "a.jpg: the file is a GIF image; PNG, JPEG and TIFF images are read: convert it, such as with ImageMagick: x FILE, and use the new file",
+            "a.jpg: tệp là hình GIF; chỉ đọc được hình PNG, JPEG và TIFF: hãy chuyển đổi tệp, chẳng hạn bằng ImageMagick: x FILE, rồi dùng tệp mới",
+        ),
+        (
+            "no labels for b04.jpg: the file is about b05.jpg; take the labels of this page, or rename it",
+            "không có nhãn của b04.jpg: tệp này nói về b05.jpg; hãy dùng nhãn của trang này, hoặc đổi tên trang",
+        ),
+        (
+            "there is no pair b4; similar ids: b04",
+            "không có cặp b4; mã gần giống: b04",
+        ),
+        (
+            "pair b 4 was retired on 2026-11-21 11:10:03 +07:00",
+            "cặp b 4 đã được đưa ra khỏi thống kê lúc 2026-11-21 11:10:03 +07:00",
+        ),
+        (
+            "pair b4 was retired on 2026-11-21, because a list that replaced the others does not have it",
+            "cặp b4 đã được đưa ra khỏi thống kê lúc 2026-11-21, vì danh sách thay thế các danh sách khác không có cặp này",
+        ),
+        (
+            "pair b4 is retired, because its box is gone from the labels of its block; its verdicts are kept",
+            "cặp b4 không có trong thống kê, vì khung của nó không còn trong nhãn của ván; các đánh giá của nó vẫn được giữ",
+        ),
+        (
+            "b04 is a block with 2 pairs, and no pair; give the id of a pair, such as b04-1",
+            "b04 là ván, không phải là cặp; hãy nêu mã của một cặp, ví dụ b04-1",
+        ),
+        (
+            "p/mocban.toml: fit.seed = 7 is outside the range 0 to 1; new words",
+            "p/mocban.toml: fit.seed = 7 nằm ngoài khoảng 0 đến 1; new words",
+        ),
+        (
+            "storage.catalog = 2.5 is not text",
+            "storage.catalog = 2,5 không phải là văn bản",
+        ),
+        (
+            "the control points contradict each other: no common position is nearer than 12 mm to all of them; choose them again on the same strokes of both images, or add a fourth one",
+            "các điểm mâu thuẫn với nhau: không có vị trí chung nào gần tất cả các điểm hơn 12 mm; hãy chọn lại trên cùng các nét của hai hình, hoặc thêm điểm thứ tư",
+        ),
+        (
+            "control point 2 contradicts the others, which put it 31 mm away: choose it again on the same stroke of both images",
+            "điểm 2 mâu thuẫn với các điểm khác, vốn cho vị trí cách đó 31 mm: hãy chọn lại điểm đó trên cùng một nét của hai hình",
+        ),
+        (
+            "there is no pair b4; similar ids: b04, b14 and 3 more",
+            "không có cặp b4; mã gần giống: b04, b14 và 3 mục khác",
+        ),
+        (
+            "p/data/meshes/0.ply is not there",
+            "không có tệp p/data/meshes/0.ply",
+        ),
+        (
+            "no labels for x: y is not there",
+            "no labels for x: không có tệp y",
+        ),
+        (
+            "b1: p/1.ply may not be read: permission denied",
+            "b1: không có quyền đọc p/1.ply",
+        ),
+        (
+            "a{1}.csv: line 2: mesh m/{3}.stl of {x{0} does not exist",
+            "a{1}.csv: dòng 2: không có bản quét m/{3}.stl của {x{0}",
+        ),
+    ] {
+        assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    }
+    for other in ["", "a = 7 is too large", " is not there", "line 3: bad"] {
+        assert_eq!(vietnamese(other), None, "{other:?}");
+    }
+}
+
+#[test]
+fn truncated_files_are_explained() {
+    for (english, expected) in [
+        (
+            "1.stl: the ascii STL is truncated: it ends after 0 facets without endsolid",
+            "1.stl: tệp ascii STL bị cắt cụt: hết sau 0 mặt mà chưa có endsolid",
+        ),
+        (
+            "1.ply: the binary PLY is truncated: it holds 3 of 9 vertices",
+            "1.ply: tệp binary PLY bị cắt cụt: chỉ có 3 trong số 9 đỉnh",
+        ),
+        (
+            "1.stl: the binary STL is truncated: it holds 1 of 2 triangles",
+            "1.stl: tệp STL nhị phân bị cắt cụt: chỉ có 1 trong số 2 tam giác",
+        ),
+    ] {
+        assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    }
+}
+
+#[test]
+fn one_or_several_boxes_are_explained() {
+    for (english, expected) in [
+        (
+            "b.json: 1 box repeats another and was left out: box 3 \"c\" as box 1",
+            "b.json: có một khung trùng với khung khác và đã bị bỏ: khung 3 \"c\" giống khung 1",
+        ),
+        (
+            "b.json: 2 boxes repeat others and were left out: box 3 as box 1, box 4 as box 2",
+            "b.json: có 2 khung trùng với khung khác và đã bị bỏ: khung 3 giống khung 1, khung 4 giống khung 2",
+        ),
+        (
+            "b.json: 2 of 5 boxes lie outside the page and were left out: box 2, box 4",
+            "b.json: 2 trong 5 khung nằm ngoài trang in và đã bị bỏ: khung 2, khung 4",
+        ),
+        (
+            "the boxes: 1 of 3 boxes lies outside the page: box 3; nothing was saved",
+            "các khung chữ: 1 trong 3 khung nằm ngoài trang in: khung 3; chưa lưu gì",
+        ),
+        (
+            "b.json: the labels are for an image of 100 x 50 px, the page is 200 x 100 px; the boxes were scaled",
+            "b.json: nhãn là của hình 100 x 50 px, trang in có 200 x 100 px; các khung đã được co giãn theo trang in",
+        ),
+        ("box 1.ply is not there", "không có tệp box 1.ply"),
+    ] {
+        assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    }
+}
+
+#[test]
+fn lists_of_spreadsheets_are_explained() {
+    for (english, expected) in [
+        (
+            "cell B2 of column \"page\" has a line break; write it on one line",
+            "ô B2 của cột \"page\" có ngắt dòng; hãy viết trên một dòng",
+        ),
+        (
+            "id \"a b\" has a line break; write it on one line",
+            "mã \"a b\" có ngắt dòng; hãy viết trên một dòng",
+        ),
+        (
+            "a.csv: line 2: mesh a b of 1 does not exist; its path has a line break: write the cell on one line",
+            "a.csv: dòng 2: không có bản quét a b của 1; đường dẫn có ngắt dòng: hãy viết ô đó trên một dòng",
+        ),
+        (
+            "column \"units\" is kept as metadata; rename it to \"unit\" if it is meant, and import again",
+            "cột \"units\" được giữ làm thông tin thêm; nếu đó là cột \"unit\" thì hãy đổi tên rồi nhập lại",
+        ),
+    ] {
+        assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    }
+}
+
+#[test]
+fn moved_inputs_are_explained() {
+    let english = "4 of 4 input files that were looked at are missing or have moved, of 2 pairs or blocks, with the folder \
+                   q/data; put them back, or import them from their new place";
+    let expected = "4 trong số 4 tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, thuộc 2 cặp hoặc ván, cùng với thư \
+                    mục q/data; hãy đưa chúng về chỗ cũ, hoặc nhập lại từ chỗ mới";
+    assert_eq!(vietnamese(english).as_deref(), Some(expected));
+}
+
+#[test]
+fn ids_that_a_spreadsheet_changed_are_explained() {
+    let english = "3 ids look like dates or powers of ten, such as \"1-Nov\" (lines 2, 4, 5): a spreadsheet program may \
+                   have made them of texts such as 1-11 and 1E5; give the column the format Text, correct the ids and \
+                   save the list again, best as XLSX";
+    let expected = "3 mã trông như ngày tháng hoặc lũy thừa của mười, chẳng hạn \"1-Nov\" (dòng 2, 4, 5): có thể chương \
+                    trình bảng tính đã đổi chúng từ các văn bản như 1-11 và 1E5; hãy đặt định dạng Văn bản cho cột, sửa \
+                    lại các mã rồi lưu lại danh sách, tốt nhất là XLSX";
+    assert_eq!(vietnamese(english).as_deref(), Some(expected));
+}
+
+#[test]
+fn doubts_about_a_scan_are_explained() {
+    for (english, expected) in [
+        (
+            "with the unit mm, its carved surface is 0.50 mm across, but most characters have 6 to 30 mm; is the unit in?",
+            "với đơn vị mm, mặt khắc rộng 0,50 mm, trong khi đa số chữ có 6 đến 30 mm; đơn vị có phải là in không?",
+        ),
+        (
+            "scanned_face_down says that the carved face points towards -z, but carving was found towards +z",
+            "theo scanned_face_down, mặt khắc hướng về -z, nhưng nét khắc được tìm thấy ở phía +z",
+        ),
+        (
+            "faces with fewer than three corners were left out: 12",
+            "số mặt có ít hơn ba góc đã bị bỏ: 12",
+        ),
+    ] {
+        assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    }
+}
+
+/// Returns the sources of all crates and tests as one text, with the strings that go on in the next line joined.
+fn sources() -> String {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut open = vec![crates.join("../tests/it"), crates];
+    let mut all = String::new();
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs")
+                && !path.ends_with("message_words.rs")
+                && !path.ends_with("message_table.rs")
+            {
+                all += &std::fs::read_to_string(path).expect("a source");
+            }
+        }
+    }
+    let mut parts = all.split("\\\n");
+    let mut joined = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        joined += part.trim_start();
+    }
+    joined
+}
+
+#[test]
+fn the_program_still_says_what_is_translated() {
+    let sources = sources();
+    for (english, vietnamese) in all_messages() {
+        let pieces = english.split("{}").map(str::trim);
+        let longest = pieces.max_by_key(|piece| piece.len()).expect("a piece");
+        assert!(sources.contains(longest), "{english:?}: {longest:?}");
+        let count = english.matches("{}").count();
+        for index in count..10 {
+            let part = format!("{{{index}}}");
+            assert!(!vietnamese.contains(&part), "{vietnamese:?}");
+        }
+    }
+}
