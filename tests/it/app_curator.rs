@@ -87,7 +87,7 @@ fn the_report_says_in_both_languages_what_is_not_counted() {
     );
     shows(
         "vi",
-        "Không tính: 1 kết quả có bất đồng, 1 kết quả chưa chắc.",
+        "Không tính: 1 kết quả có bất đồng và 1 kết quả chưa chắc.",
     );
 }
 

@@ -64,7 +64,6 @@ mod received_archive;
 mod received_files;
 mod remedies;
 mod report_page;
-mod report_sentences;
 mod restore_action;
 mod restore_content;
 mod restore_page;

@@ -9,8 +9,8 @@ use maud::{Markup, html};
 use super::attachment::attachment;
 use super::components::{NavSection, empty, frame, grouped, number_table, score, stored_message};
 use super::failure::{AppFailure, AppResult};
-use super::report_sentences::{headline, limits};
 use super::run_blocks::failed_blocks_part;
+use super::sentence::without_commands;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::messages;
@@ -83,7 +83,7 @@ pub(super) async fn numbers(
 
 fn numbers_part(visit: &Visit, report: &Report) -> Markup {
     html! {
-        @for sentence in headline(visit, report) { p { (sentence) } }
+        @for text in &report.headline { p { (shown_sentences(visit, text)) } }
         (failed_blocks_part(visit, "./", report.block_progress.map_or(0, |blocks| blocks.failed)))
         @if report.rows.iter().all(|row| row.n == 0) {
             (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! { a.button href="./" { (visit.t("Run", "Căn chỉnh")) } }))
@@ -95,11 +95,19 @@ fn numbers_part(visit: &Visit, report: &Report) -> Markup {
             )) }
         }
         (reasons(visit, report))
-        @let limits = limits(visit, report);
-        @if !limits.is_empty() {
+        @if !report.warnings.is_empty() {
             h2 { (visit.t("What limits these numbers", "Những giới hạn của các con số này")) }
-            ul { @for limit in limits { li { (limit) } } }
+            ul { @for text in &report.warnings { li { (shown_sentences(visit, text)) } } }
         }
+    }
+}
+
+/// Returns sentences of the report, which are in English, in the language of the page and without commands.
+fn shown_sentences(visit: &Visit, text: &str) -> String {
+    let plain = without_commands(text);
+    match visit.language {
+        Language::English => plain,
+        Language::Vietnamese => messages::report_text(&plain),
     }
 }
 

@@ -162,8 +162,17 @@ impl Visit {
 #[cfg(test)]
 mod tests {
     use super::Visit;
+    use crate::messages::report_text;
     use crate::review::Language;
-    use mocban_core::domain::FailureClass;
+    use mocban_core::domain::{FailureClass, ThresholdMetric};
+
+    #[test]
+    fn the_report_names_metrics_as_the_pages_do() {
+        let visit = Visit::in_language(Language::Vietnamese);
+        for metric in ThresholdMetric::ALL {
+            assert_eq!(report_text(metric.title()), visit.metric(metric));
+        }
+    }
 
     #[test]
     fn reasons_and_remedies_in_both_languages() {

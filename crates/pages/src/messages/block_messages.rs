@@ -1,4 +1,5 @@
-//! The frequent messages of the program on blocks and scans with their Vietnamese texts.
+//! The frequent messages of the program on blocks, scans, moved inputs, changed ids and damaged rows with their Vietnamese
+//! texts.
 
 /// Messages like those on pairs.
 pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
@@ -87,6 +88,39 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     (
         "give the column the format Text, correct the ids and save the list again, best as XLSX",
         "hãy đặt định dạng Văn bản cho cột, sửa lại các mã rồi lưu lại danh sách, tốt nhất là XLSX",
+    ),
+    // Damaged rows of the catalog.
+    (
+        "row {} of the table {} (pair {}) differs from its checksum",
+        "dòng {0} của bảng {1} (cặp {2}) khác với mã kiểm của nó",
+    ),
+    (
+        "row {} of the table {} differs from its checksum",
+        "dòng {0} của bảng {1} khác với mã kiểm của nó",
+    ),
+    (
+        "row {} of the table {} is missing",
+        "thiếu dòng {0} của bảng {1}",
+    ),
+    (
+        "row {} of the table {} (pair {}) has no checksum",
+        "dòng {0} của bảng {1} (cặp {2}) không có mã kiểm",
+    ),
+    (
+        "row {} of the table {} has no checksum",
+        "dòng {0} của bảng {1} không có mã kiểm",
+    ),
+    (
+        "the last rows of the table {}, up to row {}, are missing",
+        "thiếu các dòng cuối của bảng {0}, đến dòng {1}",
+    ),
+    (
+        "row {} of the table {} (pair {}) has a value that this program did not store",
+        "dòng {0} của bảng {1} (cặp {2}) có giá trị không do chương trình này lưu",
+    ),
+    (
+        "row {} of the table {} has a value that this program did not store",
+        "dòng {0} của bảng {1} có giá trị không do chương trình này lưu",
     ),
     ("is the unit {}?", "đơn vị có phải là {0} không?"),
     ("check the unit", "hãy kiểm tra đơn vị"),

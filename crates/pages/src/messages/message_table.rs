@@ -25,6 +25,14 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "không dùng được {0} nên chưa nhập gì:",
     ),
     (
+        "{}: line {}: mesh {} of {} is a link to a file that does not exist",
+        "{0}: dòng {1}: bản quét {2} của {3} là liên kết đến một tệp không tồn tại",
+    ),
+    (
+        "{}: line {}: print {} of {} is a link to a file that does not exist",
+        "{0}: dòng {1}: bản in {2} của {3} là liên kết đến một tệp không tồn tại",
+    ),
+    (
         "{}: line {}: mesh {} of {} does not exist",
         "{0}: dòng {1}: không có bản quét {2} của {3}",
     ),
@@ -39,14 +47,6 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     (
         "{}: line {}: print {} of {} is a folder, not a file",
         "{0}: dòng {1}: bản in {2} của {3} là thư mục, không phải tệp",
-    ),
-    (
-        "{}: line {}: mesh {} of {} is a link to a file that does not exist",
-        "{0}: dòng {1}: bản quét {2} của {3} là liên kết đến một tệp không tồn tại",
-    ),
-    (
-        "{}: line {}: print {} of {} is a link to a file that does not exist",
-        "{0}: dòng {1}: bản in {2} của {3} là liên kết đến một tệp không tồn tại",
     ),
     (
         "it is a path of a Windows computer: write paths relative to the list",

@@ -11,3 +11,4 @@ mod report_words;
 
 pub(crate) use message_words::{vietnamese, with_more};
 pub use report_html::report_page;
+pub(crate) use report_words::report_text;

@@ -1,21 +1,21 @@
-//! Sentences of the answer and of the warnings of the HTML report with their Vietnamese texts.
+//! Sentences of the answer and of the warnings of the report with their Vietnamese texts.
 
-/// Sentences like the messages on pairs.
+/// Sentences like the messages on pairs. `{=0}` is a name, and `{!0}` a message of the program.
 pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
     (
-        "There is nothing to report: all {} pairs of the project are retired;",
-        "Không có gì để báo cáo: cả {0} cặp của dự án đã được đưa ra khỏi thống kê;",
+        "There is nothing to report: all {} pairs of the project are retired.",
+        "Không có gì để báo cáo: cả {0} cặp của dự án đã được đưa ra khỏi thống kê.",
     ),
     (
-        "There is nothing to report: the only pair of the project is retired;",
-        "Không có gì để báo cáo: cặp duy nhất của dự án đã được đưa ra khỏi thống kê;",
+        "There is nothing to report: the only pair of the project is retired.",
+        "Không có gì để báo cáo: cặp duy nhất của dự án đã được đưa ra khỏi thống kê.",
     ),
     ("says why.", "cho biết lý do."),
     (
         "The project has no pairs yet: {}.",
         "Dự án chưa có cặp nào: {0}.",
     ),
-    ("The project has no pairs yet;", "Dự án chưa có cặp nào;"),
+    ("The project has no pairs yet.", "Dự án chưa có cặp nào."),
     ("adds them.", "sẽ thêm các cặp."),
     ("Characters are missing: {}.", "Còn thiếu các chữ: {0}."),
     (
@@ -80,8 +80,8 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
         "{0} trên {1} cặp đã được căn chỉnh.",
     ),
     (
-        "There is no result to judge yet;",
-        "Chưa có kết quả nào để đánh giá;",
+        "There is no result to judge yet.",
+        "Chưa có kết quả nào để đánh giá.",
     ),
     ("continues the work.", "làm tiếp việc này."),
     ("lists the reasons.", "liệt kê các lý do."),
@@ -103,7 +103,7 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
     ),
     (
         "{} noticed only {} of {} attention checks, so this Acc may be wrong.",
-        "{0} chỉ phát hiện {1} trên {2} lỗi cài sẵn, nên Acc này có thể sai.",
+        "{=0} chỉ phát hiện {1} trên {2} lỗi cài sẵn, nên Acc này có thể sai.",
     ),
     (
         "{} reviewers missed most of their attention checks, so this Acc may be wrong.",
@@ -126,8 +126,8 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
         "Chưa có Acc, vì mọi đánh giá đều cho kết quả của lần tính trước.",
     ),
     (
-        "Nobody has judged a result yet, so there is no Acc (",
-        "Chưa ai đánh giá kết quả nào, nên chưa có Acc (",
+        "Nobody has judged a result yet, so there is no Acc.",
+        "Chưa ai đánh giá kết quả nào, nên chưa có Acc.",
     ),
     ("starts judging).", "để bắt đầu đánh giá)."),
     (
@@ -240,7 +240,7 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
     ),
     (
         "{} noticed {} of {} attention checks.",
-        "{0} phát hiện {1} trên {2} lỗi cài sẵn.",
+        "{=0} phát hiện {1} trên {2} lỗi cài sẵn.",
     ),
     (
         "Let another person judge the same results.",
@@ -298,13 +298,14 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
         "{} cannot be used and count nowhere.",
         "{0} không dùng được và không được tính.",
     ),
-    ("The first: {}.", "Đầu tiên: {0}."),
+    ("The first: {}.", "Đầu tiên: {!0}."),
     (
-        "1 stored row that is damaged is set apart and not counted, first: {}; `check` lists them.",
-        "1 dòng dữ liệu bị hỏng hoặc mất được để riêng và không tính, đầu tiên: {0}; `check` liệt kê chúng.",
+        "1 stored row that is damaged is set apart and not counted, first: {}.",
+        "1 dòng dữ liệu bị hỏng hoặc mất được để riêng và không tính, đầu tiên: {!0}.",
     ),
     (
-        "{} stored rows that are damaged or missing are set apart and not counted, first: {}; `check` lists them.",
-        "{0} dòng dữ liệu bị hỏng hoặc mất được để riêng và không tính, đầu tiên: {1}; `check` liệt kê chúng.",
+        "{} stored rows that are damaged or missing are set apart and not counted, first: {}.",
+        "{0} dòng dữ liệu bị hỏng hoặc mất được để riêng và không tính, đầu tiên: {!1}.",
     ),
+    ("lists them.", "liệt kê chúng."),
 ];

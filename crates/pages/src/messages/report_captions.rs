@@ -1,6 +1,6 @@
 //! Captions of tables and plots of the HTML report, and lines on its origin, with their Vietnamese texts.
 
-/// Sentences like the messages on pairs. A pattern that begins with a part comes after the sentences that it would fit.
+/// Sentences like those of the answer. A pattern that begins with a part comes after the sentences that it would fit.
 pub(super) const REPORT_CAPTIONS: &[(&str, &str)] = &[
     (
         "Acc is the share of passed results among the decided ones, which reviewers passed or failed.",
@@ -252,19 +252,18 @@ pub(super) const REPORT_CAPTIONS: &[(&str, &str)] = &[
         "Độ cao tương đối (0 là điểm thấp nhất, 1 là điểm cao nhất của bản đồ độ sâu)",
     ),
     (
-        "Hashes are the first 12 digits;",
-        "Mã băm gồm 12 chữ số đầu;",
+        "Hashes are the first 12 digits.",
+        "Mã băm gồm 12 chữ số đầu.",
     ),
     (
         "has them whole, and all digits of every number.",
         "cho toàn bộ mã băm và mọi chữ số của từng số.",
     ),
-    ("{}, meshes and prints {}", "{0}, bản quét và bản in {1}"),
+    ("{}, meshes and prints {}", "{0}, bản quét và bản in {=1}"),
     ("{} by {} reviewers", "{0} của {1} người đánh giá"),
     ("{} by {} reviewer", "{0} của {1} người đánh giá"),
     ("{} (bootstrap)", "{0} (bootstrap)"),
-    ("{}, {}, all default", "{0}, {1}, tất cả theo mặc định"),
-    ("{}, all default", "{0}, tất cả theo mặc định"),
+    ("{}, {}, all default", "{=0}, {1}, tất cả theo mặc định"),
+    ("{}, all default", "{=0}, tất cả theo mặc định"),
     ("IoU {}, confidence {}", "IoU {0}, độ tin cậy {1}"),
-    ("{} = {} (default {}).", "{0} = {1} (mặc định {2})."),
 ];

@@ -1,7 +1,6 @@
 //! The HTML report in Vietnamese. Its texts are replaced in the English page, whose names, commands and files stay.
 
-use super::message_words::vietnamese;
-use super::report_words::{report_text, verdict_text};
+use super::report_words::{message_text, report_text, verdict_text};
 use crate::review::Language;
 
 /// Beginnings of tags whose text is data: names, commands, styles.
@@ -13,8 +12,10 @@ const DATA: [&str; 6] = [
     "<span class=\"files\"",
     "<span class=\"character\"",
 ];
+/// Descriptions of images, which begin with the id of a pair.
+const ALT: &str = " alt=\"";
 /// Attributes with texts.
-const ATTRIBUTES: [&str; 3] = [" aria-label=\"", " alt=\"", " title=\""];
+const ATTRIBUTES: [&str; 3] = [" aria-label=\"", ALT, " title=\""];
 /// Begins the table whose rows are named by blocks.
 const BLOCKS: &str = "<div class=\"wide\" id=\"table-blocks\"";
 
@@ -49,21 +50,43 @@ fn text_after(tag: &str, text: &str, is_of_blocks: bool) -> String {
         return text.to_owned();
     }
     let known = match tag {
+        "<title>" => plain(text).strip_prefix("Report on ").map(titled),
         "</strong>" => plain(text).strip_prefix(", ").map(failure),
-        "<span class=\"verdict\">" => verdict_text(&plain(text)),
+        "<span class=\"verdict\">" => Some(verdict_or_problem(&plain(text))),
         _ => None,
     };
     known.map_or_else(|| translated(text), |known| escaped(&known))
 }
 
+/// Returns the title of the page of a project.
+fn titled(project: &str) -> String {
+    format!("Báo cáo về {project}")
+}
+
 /// Returns the stage and the message of a failed pair.
 fn failure(text: &str) -> String {
     match text.split_once(": ") {
-        Some((stage, message)) => {
-            let known = vietnamese(message);
-            format!(", {stage}: {}", known.as_deref().unwrap_or(message))
-        }
+        Some((stage, message)) => format!(", {stage}: {}", message_text(message)),
         None => format!(", {text}"),
+    }
+}
+
+/// Returns a verdict, or why a result was not drawn. Notes of reviewers stay as they are.
+fn verdict_or_problem(text: &str) -> String {
+    if let Some(verdict) = verdict_text(text) {
+        return verdict;
+    }
+    match text.strip_prefix("not drawn: ") {
+        Some(message) => format!("không vẽ được: {}", message_text(message)),
+        None => text.to_owned(),
+    }
+}
+
+/// Returns the description of an image.
+fn image_text(text: &str) -> String {
+    match text.rsplit_once(": ") {
+        Some((pair, layer)) => format!("{pair}: {}", report_text(layer)),
+        None => text.to_owned(),
     }
 }
 
@@ -72,13 +95,21 @@ fn translated_tag(tag: &str) -> String {
     if tag == "<html lang=\"en\">" {
         return "<html lang=\"vi\">".to_owned();
     }
-    let Some(start) = (ATTRIBUTES.iter()).find_map(|name| Some(tag.find(name)? + name.len()))
-    else {
+    let found = ATTRIBUTES.into_iter().find_map(|name| {
+        let start = tag.find(name)? + name.len();
+        Some((name, start))
+    });
+    let Some((name, start)) = found else {
         return tag.to_owned();
     };
     let (before, tail) = tag.split_at(start);
     let (text, after) = tail.split_at(tail.find('"').unwrap_or(tail.len()));
-    [before, &translated(text), after].concat()
+    let known = if name == ALT {
+        escaped(&image_text(&plain(text)))
+    } else {
+        translated(text)
+    };
+    [before, &known, after].concat()
 }
 
 /// Returns a text of HTML with the blanks at its ends.
@@ -100,83 +131,4 @@ fn escaped(text: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::report_page;
-    use crate::review::Language;
-
-    /// Pages as the crate `report` makes them, without their styles.
-    const PAGES: [&str; 2] = [
-        include_str!(
-            "../../../report/src/render/snapshots/mocban_report__render__snapshot_tests__full_html.snap"
-        ),
-        include_str!(
-            "../../../report/src/render/snapshots/mocban_report__render__snapshot_tests__judged_html.snap"
-        ),
-    ];
-    /// Words that only English sentences have.
-    const ENGLISH: [&str; 12] = [
-        " the ",
-        "The ",
-        " of ",
-        " and ",
-        " is ",
-        " are ",
-        " by ",
-        "esults",
-        " with ",
-        "eviewer",
-        "erdict",
-        "onfidence",
-    ];
-
-    /// Returns what a page says, a text or a description a line, without the messages of failed pairs and commands.
-    fn said(page: &str) -> Vec<String> {
-        let (_, body) = page.split_once("<!DOCTYPE").expect("a page");
-        let described = body
-            .replace(" aria-label=\"", ">")
-            .replace("\" viewBox", "<");
-        let texts = described
-            .split('>')
-            .filter_map(|part| part.split('<').next());
-        let texts = texts.map(str::trim).filter(|text| !text.is_empty());
-        let is_data = |text: &&str| text.starts_with(", fit: ") || text.starts_with("mocban ");
-        texts
-            .filter(|text| !is_data(text))
-            .map(str::to_owned)
-            .collect()
-    }
-
-    #[test]
-    fn a_vietnamese_report_has_no_english_sentence() {
-        for page in PAGES {
-            assert_eq!(report_page(page.to_owned(), Language::English), page);
-            let vietnamese = report_page(page.to_owned(), Language::Vietnamese);
-            assert_eq!(said(page).len(), said(&vietnamese).len());
-            for text in said(&vietnamese) {
-                let found = ENGLISH.iter().find(|word| text.contains(**word));
-                assert_eq!(found, None, "{text}");
-            }
-            for part in ["<html lang=\"vi\">", "Độ đo", "người đánh giá cho đạt"] {
-                assert!(vietnamese.contains(part), "{part}");
-            }
-            assert_eq!(page.matches('<').count(), vietnamese.matches('<').count());
-        }
-    }
-
-    #[test]
-    fn names_notes_and_files_stay() {
-        let page = concat!(
-            "<h1>all</h1><strong>all</strong>, fit: a.png is not there</li>",
-            "<span class=\"verdict\">lan: fail, angle (“1.5 &lt;b&gt;”)</span><span class=\"files\">all · 1.5</span>",
-            "<div class=\"wide\" id=\"table-blocks\" aria-label=\"Block\"><th scope=\"row\">all</th></table>",
-            "<th scope=\"row\">all</th>",
-        );
-        let expected = concat!(
-            "<h1>all</h1><strong>all</strong>, fit: không có tệp a.png</li>",
-            "<span class=\"verdict\">lan: không đạt, sai góc (“1.5 &lt;b&gt;”)</span><span class=\"files\">all · 1.5</span>",
-            "<div class=\"wide\" id=\"table-blocks\" aria-label=\"Ván\"><th scope=\"row\">all</th></table>",
-            "<th scope=\"row\">tất cả</th>",
-        );
-        assert_eq!(report_page(page.to_owned(), Language::Vietnamese), expected);
-    }
-}
+mod tests;

@@ -1,8 +1,7 @@
 //! Sentences of the HTML report on its images and warnings, and of its frame, with their Vietnamese texts.
 
-/// Sentences like the messages on pairs: headings, and the sentences on images.
+/// Sentences like those of the answer: headings, and the sentences on images.
 pub(super) const REPORT_FRAME: &[(&str, &str)] = &[
-    ("Report on {}", "Báo cáo về {0}"),
     ("Skip to the report", "Đến phần báo cáo"),
     (
         "Report on aligned woodblock characters",
@@ -18,7 +17,7 @@ pub(super) const REPORT_FRAME: &[(&str, &str)] = &[
         "Word opens the file, too, without its plots and pictures.",
         "Word cũng mở được tệp này, nhưng không có biểu đồ và hình.",
     ),
-    ("Made by mocban {}.", "Do mocban {0} tạo."),
+    ("Made by mocban {}.", "Do mocban {=0} tạo."),
     ("Overview", "Tổng quan"),
     ("Notes", "Lưu ý"),
     ("Images", "Hình ảnh"),
@@ -86,16 +85,6 @@ pub(super) const REPORT_FRAME: &[(&str, &str)] = &[
     ),
     ("{} of {} are shown.", "Hiện {0} trên {1} kết quả."),
     ("no image", "không có hình"),
-    ("not drawn: {}", "không vẽ được: {0}"),
-    ("{}: print", "{0}: bản in"),
-    (
-        "{}: relief aligned to the print",
-        "{0}: mặt khắc đã căn chỉnh với bản in",
-    ),
-    (
-        "{}: edges of the relief's strokes over the print",
-        "{0}: đường viền các nét khắc trên bản in",
-    ),
     (
         "{}, IoU with the true stroke tops {}",
         "{0}, IoU với mặt nét đúng {1}",
@@ -106,7 +95,7 @@ pub(super) const REPORT_FRAME: &[(&str, &str)] = &[
     ),
 ];
 
-/// Headers of tables, and names and words in sentences.
+/// Headers of tables, descriptions of images, and names and words in sentences.
 pub(super) const REPORT_TERMS: &[(&str, &str)] = &[
     ("Non-luminous SSIM", "SSIM không độ sáng"),
     ("Pixel density", "Mật độ điểm ảnh"),
@@ -182,6 +171,15 @@ pub(super) const REPORT_TERMS: &[(&str, &str)] = &[
     ("Seed", "Số hạt giống"),
     ("Last result", "Kết quả mới nhất"),
     ("unknown", "chưa biết"),
+    ("print", "bản in"),
+    (
+        "relief aligned to the print",
+        "mặt khắc đã căn chỉnh với bản in",
+    ),
+    (
+        "edges of the relief's strokes over the print",
+        "đường viền các nét khắc trên bản in",
+    ),
 ];
 
 /// What is counted, after its number.

@@ -1,14 +1,23 @@
-//! Sentences of the HTML report in Vietnamese. The report is made in English, so they are recognised by their wording.
+//! Sentences of the report in Vietnamese. The report is made in English, so they are recognised by their wording.
 
-use super::message_words::{filled_by, parts_of};
+use super::message_words::{filled_by, parts_of, vietnamese};
 use super::report_answers::REPORT_ANSWERS;
 use super::report_captions::REPORT_CAPTIONS;
 use super::report_table::{REPORT_COUNTED, REPORT_FRAME, REPORT_TERMS};
 
+/// Ends of texts behind which a command follows. The tables have the sentence with a stop.
+const BEFORE_COMMANDS: [&str; 2] = [";", " ("];
+
 /// Returns a text of the report in Vietnamese: a term, or sentences. Words that are not known stay as they are.
-pub(super) fn report_text(text: &str) -> String {
+pub(crate) fn report_text(text: &str) -> String {
     if let Some(known) = found(REPORT_TERMS, text) {
         return known.to_owned();
+    }
+    for end in BEFORE_COMMANDS {
+        if let Some(start) = text.strip_suffix(end) {
+            let known = report_text(&format!("{start}."));
+            return [known.strip_suffix('.').unwrap_or(&known), end].concat();
+        }
     }
     let is_end = |at: &usize| !text[..*at].ends_with(" v");
     let ends = text.match_indices(". ").map(|(at, _)| at);
@@ -21,6 +30,9 @@ pub(super) fn report_text(text: &str) -> String {
             };
         }
     }
+    if let Some(settings) = settings_text(text) {
+        return settings;
+    }
     match ends.first() {
         Some(end) => format!("{}. {}", part(&text[..*end]), report_text(&text[end + 2..])),
         None => match text.strip_suffix('.') {
@@ -30,28 +42,54 @@ pub(super) fn report_text(text: &str) -> String {
     }
 }
 
+/// Returns a message of the program in Vietnamese if it is known.
+pub(super) fn message_text(message: &str) -> String {
+    vietnamese(message).unwrap_or_else(|| message.to_owned())
+}
+
 /// Returns a verdict of a reviewer, such as `lan: fail, angle (“note”)`, in Vietnamese. `None` if it is none.
 pub(super) fn verdict_text(text: &str) -> Option<String> {
+    // The name of a reviewer may have a colon.
+    let mut colons = text.match_indices(": ");
+    colons.find_map(|(at, colon)| {
+        let given = given_verdict(&text[at + colon.len()..])?;
+        Some(format!("{}: {given}", &text[..at]))
+    })
+}
+
+/// Returns a verdict with its reason and note.
+fn given_verdict(text: &str) -> Option<String> {
     const VERDICTS: [(&str, &str); 3] = [
         ("pass", "đạt"),
         ("fail", "không đạt"),
         ("unsure", "chưa chắc"),
     ];
-    let (reviewer, given) = text.split_once(": ")?;
-    let mut verdicts = VERDICTS.into_iter();
-    let (verdict, rest) = verdicts.find_map(|(english, vietnamese)| {
-        let rest = given.strip_prefix(english)?;
-        Some((vietnamese, rest))
-    })?;
-    let (reason, note) = rest.split_at(rest.find(" (“").unwrap_or(rest.len()));
-    let reason = match reason.strip_prefix(", ") {
-        Some(reason) => format!(", {}", found(REPORT_TERMS, reason)?),
-        None => String::new(),
-    };
-    Some(format!("{reviewer}: {verdict}{reason}{note}"))
+    VERDICTS.into_iter().find_map(|(english, verdict)| {
+        let rest = text.strip_prefix(english)?;
+        let (reason, note) = rest.split_at(rest.find(" (“").unwrap_or(rest.len()));
+        let reason = match reason.strip_prefix(", ") {
+            Some(reason) => format!(", {}", found(REPORT_TERMS, reason)?),
+            None if reason.is_empty() => String::new(),
+            None => return None,
+        };
+        Some(format!("{verdict}{reason}{note}"))
+    })
 }
 
-/// Returns a sentence with its stop in Vietnamese, if it is known.
+/// Returns the fingerprint of settings and those that are not the default ones. Names and values stay as they are typed.
+/// `None` if there are none.
+fn settings_text(text: &str) -> Option<String> {
+    if !text.contains(" (default ") {
+        return None;
+    }
+    let items = text.split(", ").map(|item| {
+        let pairs = counted(item);
+        pairs.unwrap_or_else(|| item.replace(" (default ", " (mặc định "))
+    });
+    Some(items.collect::<Vec<String>>().join(", "))
+}
+
+/// Returns a sentence with its stop, or a phrase, in Vietnamese, if it is known.
 fn sentence(text: &str) -> Option<String> {
     let tables = [REPORT_FRAME, REPORT_ANSWERS, REPORT_CAPTIONS];
     tables
@@ -59,9 +97,21 @@ fn sentence(text: &str) -> Option<String> {
         .flatten()
         .find_map(|(english, vietnamese)| {
             let parts = parts_of(text, english)?;
-            let parts: Vec<String> = parts.into_iter().map(part).collect();
-            Some(filled_by(vietnamese, |index| parts.get(index).cloned()))
+            Some(filled_by(vietnamese, |place| placed(place, &parts)))
         })
+}
+
+/// Returns what stands in a place of a sentence: for `0` the first part in Vietnamese, for `=0` as it is, because it is a name,
+/// for `!0` as a message of the program.
+fn placed(place: &str, parts: &[&str]) -> Option<String> {
+    let part_at = |index: &str| parts.get(index.parse::<usize>().ok()?).copied();
+    if let Some(index) = place.strip_prefix('=') {
+        return part_at(index).map(str::to_owned);
+    }
+    if let Some(index) = place.strip_prefix('!') {
+        return part_at(index).map(message_text);
+    }
+    part_at(place).map(part)
 }
 
 /// Returns a part of a sentence in Vietnamese: a term, a day, a count, a clause, a list, or other text with numbers.
@@ -70,6 +120,9 @@ fn part(text: &str) -> String {
     let known = known.or_else(|| day_first(text)).or_else(|| counted(text));
     if let Some(known) = known {
         return known;
+    }
+    if let Some(phrase) = sentence(text) {
+        return phrase;
     }
     if let Some(clause) = sentence(&format!("{text}.")) {
         return clause.strip_suffix('.').unwrap_or(&clause).to_owned();
@@ -94,8 +147,8 @@ fn part(text: &str) -> String {
     }
     let with_number = REPORT_TERMS.iter().find_map(|(english, vietnamese)| {
         let rest = text.strip_prefix(english)?;
-        rest.starts_with(' ')
-            .then(|| format!("{vietnamese}{}", numbers(rest)))
+        let rest = rest.strip_prefix(' ')?;
+        Some(format!("{vietnamese} {}", part(rest)))
     });
     with_number.unwrap_or_else(|| numbers(text))
 }
@@ -197,6 +250,44 @@ mod tests {
                 "The project has no pairs yet: 2 blocks failed and 1 block is not finished.",
                 "Dự án chưa có cặp nào: 2 ván bị lỗi và 1 ván chưa xong.",
             ),
+            (
+                "There is nothing to report: all 2 pairs of the project are retired;",
+                "Không có gì để báo cáo: cả 2 cặp của dự án đã được đưa ra khỏi thống kê;",
+            ),
+            (
+                "Nobody has judged a result yet, so there is no Acc (",
+                "Chưa ai đánh giá kết quả nào, nên chưa có Acc (",
+            ),
+            (
+                "starts judging). Against ground truth, 1 of 2 results of Relief is right, 50.0 %.",
+                "để bắt đầu đánh giá). Theo dữ liệu đối chứng, 1 trên 2 kết quả của Mặt khắc là đúng, 50,0 %.",
+            ),
+            (
+                "Means have no intervals, and metrics are not compared by score. There are more than 100,000 blocks, and \
+                 sampling error is negligible.",
+                "Trung bình không có khoảng tin cậy, và các độ đo không được so sánh theo điểm số. Có hơn 100\u{202f}000 ván \
+                 nên sai số lấy mẫu không đáng kể.",
+            ),
+            (
+                "all, Dr. 1.5 noticed 1 of 5 attention checks. Let another person judge the same results.",
+                "all, Dr. 1.5 phát hiện 1 trên 5 lỗi cài sẵn. Hãy để người khác đánh giá cùng các kết quả đó.",
+            ),
+            (
+                "1 ground truth record cannot be used and count nowhere. The first: all 1.5: a.png is not there.",
+                "1 bản ghi đối chứng không dùng được và không được tính. Đầu tiên: all 1.5: không có tệp a.png.",
+            ),
+            (
+                "0123456789ab, 4,700 pairs, fit.min_relief = 0.5 (default 0.3), run.x = \"all\" (default null)",
+                "0123456789ab, 4\u{202f}700 cặp, fit.min_relief = 0.5 (mặc định 0.3), run.x = \"all\" (mặc định null)",
+            ),
+            (
+                "Ensemble unknown of all results and 100.0 % of half of them.",
+                "Kết hợp chưa biết của mọi kết quả và 100,0 % của một nửa số đó.",
+            ),
+            (
+                "IoU 0.700, confidence 0.500, off the truth by 1.0° and 2.0 % of the height, IoU with the true stroke tops 0.9",
+                "IoU 0,700, độ tin cậy 0,500, lệch 1,0° và 2,0 % chiều cao so với dữ liệu đối chứng, IoU với mặt nét đúng 0,9",
+            ),
             ("-0.050, 0.050", "-0,050; 0,050"),
             ("2026-11-21 10:00:00 UTC", "21/11/2026 10:00:00 UTC"),
             ("mocban 0.1.0", "mocban 0.1.0"),
@@ -214,6 +305,11 @@ mod tests {
                 Some("lan: không đạt, mất nét (“0.5 of it”)"),
             ),
             ("lan: pass", Some("lan: đạt")),
+            (
+                "dr: lan: pass (“a: fail”)",
+                Some("dr: lan: đạt (“a: fail”)"),
+            ),
+            ("not drawn: failed to read", None),
             ("not drawn: x.png is not there", None),
         ] {
             assert_eq!(verdict_text(english).as_deref(), expected);

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::album::Album;
-use super::markup::{prose, table};
+use super::markup::{prose, sentence, table};
 use super::plots;
 use crate::comparison::Basis;
 use crate::model::{FailureGroup, Report};
@@ -105,7 +105,7 @@ fn result(report: &Report) -> Markup {
 fn notes(report: &Report) -> Option<Markup> {
     let warnings = &report.warnings;
     (!warnings.is_empty())
-        .then(|| html! { ul.notes { @for warning in warnings { li { (warning) } } } })
+        .then(|| html! { ul.notes { @for warning in warnings { li { (sentence(warning)) } } } })
 }
 
 fn verdicts(report: &Report) -> Option<Markup> {
