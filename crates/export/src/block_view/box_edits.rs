@@ -6,8 +6,13 @@ use mocban_lists::labels::{self, LabelBox, PageFile, ReplacedLabels};
 
 /// Name of the boxes in the messages of the reader of labels.
 const NAME: &str = "the boxes";
-/// Parts of the reader's warnings that are untrue of edited labels: with such a box, they are not saved at all.
-const LEFT_OUT: [&str; 2] = [" and was left out", " and were left out"];
+/// What the reader of labels says it did with wrong boxes. Of edited labels nothing is stored instead.
+const DONE_BY_READER: [&str; 4] = [
+    " and was left out",
+    " and were left out",
+    " and was cut there",
+    " and were cut there",
+];
 
 /// Changes of the boxes that a page has shown. Boxes that are not named stay as they are shown, with their outlines.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -108,7 +113,7 @@ impl BoxEdits {
         let read = read.map_err(|error| BoxEditError::Refused(error.to_string()))?;
         match read.warnings.into_iter().next() {
             Some(warning) => {
-                let problem = LEFT_OUT
+                let problem = DONE_BY_READER
                     .iter()
                     .fold(warning, |text, end| text.replace(end, ""));
                 let text = format!("{problem}; nothing was saved");

@@ -255,6 +255,14 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "có {0} khung vượt ra ngoài mép trang in và đã được cắt ở mép: {1}",
     ),
     (
+        "1 box reaches over an edge of the page: {}",
+        "có một khung vượt ra ngoài mép trang in: {0}",
+    ),
+    (
+        "{} boxes reach over an edge of the page: {}",
+        "có {0} khung vượt ra ngoài mép trang in: {1}",
+    ),
+    (
         "the labels are for an image of {} x {} px, the page is {} x {} px",
         "nhãn là của hình {0} x {1} px, trang in có {2} x {3} px",
     ),

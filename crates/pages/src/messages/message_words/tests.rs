@@ -146,6 +146,10 @@ fn one_or_several_boxes_are_explained() {
             "b.json: the labels are for an image of 100 x 50 px, the page is 200 x 100 px; the boxes were scaled",
             "b.json: nhãn là của hình 100 x 50 px, trang in có 200 x 100 px; các khung đã được co giãn theo trang in",
         ),
+        (
+            "the boxes: 1 box reaches over an edge of the page: box 3; nothing was saved",
+            "các khung chữ: có một khung vượt ra ngoài mép trang in: khung 3; chưa lưu gì",
+        ),
         ("box 1.ply is not there", "không có tệp box 1.ply"),
     ] {
         assert_eq!(vietnamese(english).as_deref(), Some(expected));
