@@ -5,10 +5,17 @@ const key = `columns ${part.dataset.header}`;
 const choices = [...part.querySelectorAll("form select")];
 const here = new URL(location.href);
 
+/** Returns whether the form has a column with this name and value. */
+function isOffered([name, value]) {
+  const column = choices.find((choice) => choice.name === name);
+  return [...(column?.options ?? [])].some((option) => option.value === value);
+}
+
 /** Returns names and values of the columns that were chosen; none if the browser keeps nothing. */
 function kept() {
   try {
-    return JSON.parse(localStorage.getItem(key)) ?? [];
+    // Without a value that the form takes, the page would be opened again and again.
+    return JSON.parse(localStorage.getItem(key)).filter(isOffered);
   } catch {
     return [];
   }
