@@ -12,19 +12,28 @@ use super::visit::Visit;
 use mocban_catalog::PairAttributes;
 use mocban_project::import_plan::{PlannedPair, metadata_hash};
 
-/// What may happen to each column, in English and Vietnamese: pairs lose its value, or get another one.
+/// What may happen to each column, in English and Vietnamese: pairs lose its value, or get a first or another one.
 const COLUMNS: [[[&str; 2]; 2]; 5] = [
     [
         ["Pairs that lose their block", "Số cặp mất tên ván"],
-        ["Pairs that get another block", "Số cặp có tên ván khác"],
+        [
+            "Pairs that get a block or another one",
+            "Số cặp được thêm hoặc đổi tên ván",
+        ],
     ],
     [
         ["Pairs that lose their character", "Số cặp mất chữ"],
-        ["Pairs that get another character", "Số cặp có chữ khác"],
+        [
+            "Pairs that get a character or another one",
+            "Số cặp được thêm hoặc đổi chữ",
+        ],
     ],
     [
         ["Pairs that lose their unit", "Số cặp mất đơn vị"],
-        ["Pairs that get another unit", "Số cặp có đơn vị khác"],
+        [
+            "Pairs that get a unit or another one",
+            "Số cặp được thêm hoặc đổi đơn vị",
+        ],
     ],
     [
         [
@@ -32,8 +41,8 @@ const COLUMNS: [[[&str; 2]; 2]; 5] = [
             "Số cặp mất mặt được quét",
         ],
         [
-            "Pairs that get another scanned side",
-            "Số cặp có mặt được quét khác",
+            "Pairs that get a scanned side or another one",
+            "Số cặp được thêm hoặc đổi mặt được quét",
         ],
     ],
     [
@@ -53,7 +62,7 @@ const COLUMNS: [[[&str; 2]; 2]; 5] = [
 pub(super) struct ColumnChanges {
     /// Number of pairs that change.
     pairs: u64,
-    /// For each of [`COLUMNS`], the numbers of pairs that lose its value and that get another one.
+    /// For each of [`COLUMNS`], the numbers of pairs that lose its value and that get a first or another one.
     columns: [[u64; 2]; COLUMNS.len()],
     /// Whether there are further pairs, which were not compared.
     is_cut: bool,
@@ -111,8 +120,8 @@ impl ColumnChanges {
                     ul { @for (number, texts) in lines { li { (texts[visit.index()]) ": " b { (grouped(*number)) } } } }
                     @if loses {
                         p { (visit.t(
-                            "A column that is not chosen is emptied. To keep it, choose it under Columns of the list.",
-                            "Cột không được chọn sẽ bị xóa giá trị. Để giữ, hãy chọn cột đó ở phần Các cột của danh sách.",
+                            "A column that the list lacks is emptied. If the list has it under another name, choose it under Columns of the list.",
+                            "Cột mà danh sách không có sẽ bị xóa giá trị. Nếu danh sách có cột đó với tên khác, hãy chọn nó ở phần Các cột của danh sách.",
                         )) }
                     }
                 }
@@ -121,7 +130,7 @@ impl ColumnChanges {
     }
 }
 
-/// Returns 0 if a value is lost, and 1 if there is another one.
+/// Returns 0 if a value is lost, and 1 if there is a first or another one.
 fn change<T: Copy + PartialEq>(old: Option<T>, new: Option<T>) -> Option<usize> {
     match (old, new) {
         (Some(_), None) => Some(0),
@@ -175,7 +184,7 @@ mod tests {
         for text in [
             "thay đổi: <b>2</b>",
             "mất tên ván: <b>2</b>",
-            "đơn vị khác: <b>1</b>",
+            "đổi đơn vị: <b>1</b>",
         ] {
             assert!(shown.contains(text), "{shown}");
         }
