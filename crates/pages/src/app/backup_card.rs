@@ -187,8 +187,8 @@ fn inputs_lines(saved: &SavedInputs) -> TaskLines {
             named.collect::<Vec<_>>().join(", ")
         });
         lines.push([
-            format!("Scans and prints that were not saved: {left_out}, {english}. Put missing files back, press Look for changed files on the page Run for changed ones, then back up again."),
-            format!("Số bản quét và bản in chưa được sao lưu: {left_out}, {vietnamese}. Hãy đưa tệp thiếu về chỗ cũ, bấm Tìm tệp đã đổi ở trang Căn chỉnh nếu có tệp đã đổi, rồi sao lưu lại."),
+            format!("Scans and prints that were not saved: {left_out}, {english}. Put missing files back; if files have changed, press Look for changed files on the page Run; then back up again."),
+            format!("Số bản quét và bản in chưa được sao lưu: {left_out}, {vietnamese}. Hãy đưa tệp thiếu về chỗ cũ; nếu có tệp đã đổi, hãy bấm Tìm tệp đã đổi ở trang Căn chỉnh; rồi sao lưu lại."),
         ]);
     }
     lines

@@ -207,7 +207,7 @@ fn character_list(visit: &Visit, block: &BlockName, characters: &[StoredCharacte
                 p.muted { (visit.t("A run finds them on the page.", "Lần chạy sẽ tìm chúng trên trang in.")) }
             } @else {
                 p.row {
-                    (grouped(characters.len() as u64)) " " (visit.t("characters", "chữ")) " · "
+                    (grouped(characters.len() as u64)) " " (visit.t(if characters.len() == 1 { "character" } else { "characters" }, "chữ")) " · "
                     a href={ "../../pairs?block=" (encoded(block.as_str())) } { (visit.t("All pairs of this block", "Tất cả các cặp của ván này")) }
                 }
                 div.scroll tabindex="0" role="region" aria-label=(label) {
