@@ -301,7 +301,7 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
     ("The first: {}.", "Đầu tiên: {!0}."),
     (
         "1 stored row that is damaged is set apart and not counted, first: {}.",
-        "1 dòng dữ liệu bị hỏng hoặc mất được để riêng và không tính, đầu tiên: {!0}.",
+        "1 dòng dữ liệu bị hỏng được để riêng và không tính, đầu tiên: {!0}.",
     ),
     (
         "{} stored rows that are damaged or missing are set apart and not counted, first: {}.",
