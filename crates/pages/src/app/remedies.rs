@@ -63,8 +63,8 @@ impl FileOrigin {
                 "Không có tệp này: hãy đặt tệp vào đó, hoặc nhập lại từ chỗ hiện có tệp.",
             ),
             Self::Block => visit.t(
-                "The file is not there. Run the block again, which cuts it anew.",
-                "Không có tệp này. Hãy chạy lại ván để cắt lại.",
+                "The file is not there. Run the block again: it cuts the pair anew.",
+                "Không có tệp này. Hãy chạy lại ván: cặp này sẽ được cắt lại.",
             ),
         }
     }

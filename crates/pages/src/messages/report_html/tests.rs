@@ -171,10 +171,8 @@ fn verdicts_and_comparisons() {
         &[Pass, Pass],
     ];
     let fails_if = |is_failed: bool| KINDS[usize::from(is_failed)];
-    let of_ensemble = |metric: ThresholdMetric, others: usize| match metric {
-        Ensemble => KINDS[0],
-        _ => KINDS[others],
-    };
+    let of_ensemble =
+        |metric: ThresholdMetric, others: usize| KINDS[if metric == Ensemble { 0 } else { others }];
     let reports = [
         judged(3, |_, _| &[Pass]),
         judged(3, |_, _| &[Unsure]),
