@@ -101,8 +101,8 @@ fn sentence(text: &str) -> Option<String> {
         })
 }
 
-/// Returns what stands in a place of a sentence: for `0` the first part in Vietnamese, for `=0` the first part unchanged, because it is a
-/// name, for `!0` its Vietnamese text as a message of the program.
+/// Returns what stands in a place of a sentence: for `0` the first part in Vietnamese, for `=0` the first part unchanged, because
+/// it is a name, for `!0` its Vietnamese text as a message of the program.
 fn placed(place: &str, parts: &[&str]) -> Option<String> {
     let part_at = |index: &str| parts.get(index.parse::<usize>().ok()?).copied();
     if let Some(index) = place.strip_prefix('=') {
