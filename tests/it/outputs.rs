@@ -189,7 +189,11 @@ fn equal_warnings_are_a_few_with_a_count() {
         "-q",
     ];
     mocban(dir.path(), &demo).expect(0);
-    std::fs::remove_dir_all(dir.path().join("p/data/prints")).expect("removed");
+    for print in std::fs::read_dir(dir.path().join("p/data/prints")).expect("prints") {
+        let path = print.expect("a print").path();
+        let bytes = std::fs::read(&path).expect("read");
+        std::fs::write(&path, [&bytes[..], b"x"].concat()).expect("written");
+    }
     let export = ["-C", "p", "--progress", "none", "export", "-o", "out"];
     let lost = mocban(dir.path(), &export).expect(3);
     let warnings: Vec<&str> = lost
