@@ -9,7 +9,7 @@ fn a_moved_folder_is_named_once_and_its_new_place_can_be_imported() {
     let (data, moved) = (project.dir().join("data"), dir.path().join("away"));
     std::fs::rename(&data, &moved).expect("moved");
     let sentence = format!(
-        "4 of 4 input files that were looked at are missing or have moved, of 2 pairs or blocks, with the folder {}; `check --json` \
+        "4 of 4 input files that were looked at are missing or have moved (pairs or blocks: 2), and so is the folder {}; `check --json` \
          lists all; put them back, or import them from their new place (`import LIST --allow-changed-files`)",
         data.display()
     );
@@ -54,6 +54,6 @@ fn a_run_that_finds_no_file_names_the_missing_folder() {
     let on = |args: &[&str]| crate::cli::mocban(dir.path(), &[&["-C", "p"][..], args].concat());
     on(&["import", "pairs.csv", "--allow-missing"]).expect(0);
     let ran = on(&["--progress", "none", "run"]).expect(3);
-    let said = "of 2 pairs or blocks, with the folder ";
+    let said = "(pairs or blocks: 2), and so is the folder ";
     assert_eq!(ran.err.matches(said).count(), 1, "{}", ran.err);
 }

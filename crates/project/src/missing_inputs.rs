@@ -61,7 +61,7 @@ impl MissingInputs {
         match folders.as_slice() {
             [] => format!("{found}, first {}", one_line(first)),
             [folder] => format!(
-                "{found}, of {owners} pairs or blocks, with the folder {}",
+                "{found} (pairs or blocks: {owners}), and so is the folder {}",
                 one_line(folder)
             ),
             folders => {
@@ -70,7 +70,7 @@ impl MissingInputs {
                     .map(|folder| one_line(folder).to_string())
                     .collect();
                 let names = first_names(&folders, MAX_FOLDERS);
-                format!("{found}, of {owners} pairs or blocks, with the folders {names}")
+                format!("{found} (pairs or blocks: {owners}), and so are the folders {names}")
             }
         }
     }

@@ -197,7 +197,7 @@ impl TableWriter<'_> {
         }
     }
 
-    /// Returns the value of a cell as it is stored, for a shared string its text.
+    /// Returns the stored value of a cell, for a shared string its text.
     fn shared_or_own<'c>(&'c self, cell: &'c OpenCell) -> &'c str {
         let index = cell.value.trim().parse::<usize>().ok();
         let index = index.filter(|_| cell.kind == "s");

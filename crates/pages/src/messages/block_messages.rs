@@ -57,12 +57,12 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     // Inputs that are no longer at their places.
     (
-        "{} of {} input files that were looked at are missing or have moved, of {} pairs or blocks, with the folder {}",
-        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, thuộc {2} cặp hoặc ván, cùng với thư mục {3}",
+        "{} of {} input files that were looked at are missing or have moved (pairs or blocks: {}), and so is the folder {}",
+        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ (số cặp hoặc ván: {2}), và cả thư mục {3}",
     ),
     (
-        "{} of {} input files that were looked at are missing or have moved, of {} pairs or blocks, with the folders {}",
-        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, thuộc {2} cặp hoặc ván, cùng với các thư mục {3}",
+        "{} of {} input files that were looked at are missing or have moved (pairs or blocks: {}), and so are the folders {}",
+        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ (số cặp hoặc ván: {2}), và cả các thư mục {3}",
     ),
     (
         "{} of {} input files that were looked at are missing or have moved, first {}",

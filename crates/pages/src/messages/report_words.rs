@@ -76,7 +76,7 @@ fn given_verdict(text: &str) -> Option<String> {
     })
 }
 
-/// Returns the fingerprint of settings and those that are not the default ones. Names and values stay as they are typed.
+/// Returns the fingerprint of settings and the values that differ from the default, with names and values unchanged. Returns
 /// `None` if there are none.
 fn settings_text(text: &str) -> Option<String> {
     if !text.contains(" (default ") {

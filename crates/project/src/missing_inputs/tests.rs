@@ -100,7 +100,7 @@ fn a_missing_folder_is_named_once() {
     ];
     let found = find(&scans).expect("two files");
     let folder = dir.path().join("scans").display().to_string();
-    let end = format!(", of 2 pairs or blocks, with the folder {folder}");
+    let end = format!(" (pairs or blocks: 2), and so is the folder {folder}");
     assert!(found.found().ends_with(&end), "{found}");
     assert!(found.to_string().contains("--allow-changed-files"));
     assert!(found.explains(&format!("{} is not there", scans[1].path)));
@@ -108,7 +108,7 @@ fn a_missing_folder_is_named_once() {
     let both = [scans[0].clone(), file(2, "prints/1.png", false)];
     let found = find(&both).expect("two files");
     assert_eq!(found.folders.len(), 2, "{found}");
-    assert!(found.found().contains("with the folders "), "{found}");
+    assert!(found.found().contains("and so are the folders "), "{found}");
     // A folder that is there is not named.
     let found = find(&[file(0, "1.stl", false)]).expect("a file");
     assert!(found.folders.is_empty() && found.found().contains(", first "));

@@ -1,4 +1,4 @@
-//! Which ids look like those that a spreadsheet program changed.
+//! Which ids look as if a spreadsheet program had changed them.
 
 use std::path::Path;
 

@@ -182,10 +182,10 @@ fn lists_of_spreadsheets_are_explained() {
 
 #[test]
 fn moved_inputs_are_explained() {
-    let english = "4 of 4 input files that were looked at are missing or have moved, of 2 pairs or blocks, with the folder \
-                   q/data; put them back, or import them from their new place";
-    let expected = "4 trong số 4 tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, thuộc 2 cặp hoặc ván, cùng với thư \
-                    mục q/data; hãy đưa chúng về chỗ cũ, hoặc nhập lại từ chỗ mới";
+    let english = "4 of 4 input files that were looked at are missing or have moved (pairs or blocks: 2), and so is the \
+                   folder q/data; put them back, or import them from their new place";
+    let expected = "4 trong số 4 tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ (số cặp hoặc ván: 2), và cả thư mục \
+                    q/data; hãy đưa chúng về chỗ cũ, hoặc nhập lại từ chỗ mới";
     assert_eq!(vietnamese(english).as_deref(), Some(expected));
 }
 
