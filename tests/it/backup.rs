@@ -110,6 +110,7 @@ fn restore_finds_inputs_in_another_directory() {
             text.contains("the depth maps and masks of the results are not here"),
             "{text}"
         );
+        assert!(!text.contains("have another size"), "{text}");
         assert!(
             told.next()[0].ends_with("check --repair --accept-missing"),
             "{text}"

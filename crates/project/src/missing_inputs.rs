@@ -189,7 +189,11 @@ async fn inspect_files(
             owner,
             path,
             was_gone: read.is_gone(),
-            stat: read.stat,
+            stat: if read.has_new_path() {
+                String::new()
+            } else {
+                read.stat
+            },
         }));
     };
     let pairs = known.len();

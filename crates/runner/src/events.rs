@@ -107,7 +107,7 @@ pub enum RunEvent {
         unchanged: u64,
         /// Pairs that were retired because their boxes are gone.
         retired: u64,
-        /// Retired pairs with verdicts.
+        /// Retired and changed pairs with verdicts.
         judged: u64,
         /// Retired pairs that came back with their boxes.
         restored: u64,
@@ -168,7 +168,7 @@ pub struct CutPairs {
     pub changed: u64,
     /// Pairs that were retired because their boxes are gone.
     pub retired: u64,
-    /// Retired pairs with verdicts.
+    /// Retired and changed pairs with verdicts.
     pub judged: u64,
     /// Retired pairs that came back with their boxes.
     pub restored: u64,

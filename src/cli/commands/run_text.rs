@@ -59,7 +59,8 @@ fn headline(summary: &RunSummary) -> String {
     format!("{blocks} done, {failed} failed, {left} left; {pairs}")
 }
 
-/// Says how the pairs of blocks changed, unless all are new: `pairs of blocks: 8 retired (1 judged), 8 added`.
+/// Says how the pairs of blocks changed, unless all are new: `pairs of blocks: 8 retired, 8 added; reviewers
+/// had judged 1 of the retired and changed ones`.
 fn cut_pairs_text(pairs: &CutPairs) -> Option<String> {
     let CutPairs {
         added,
@@ -72,19 +73,19 @@ fn cut_pairs_text(pairs: &CutPairs) -> Option<String> {
         return None;
     }
     let judged = if judged > 0 {
-        format!(" ({judged} judged)")
+        format!("; reviewers had judged {judged} of the retired and changed ones")
     } else {
         String::new()
     };
     let parts = [
-        (retired, format!("{retired} retired{judged}")),
+        (retired, format!("{retired} retired")),
         (changed, format!("{changed} changed")),
         (added, format!("{added} added")),
         (restored, format!("{restored} came back")),
     ];
     let parts = parts.into_iter().filter(|(number, _)| *number > 0);
     let parts: Vec<String> = parts.map(|(_, text)| text).collect();
-    Some(format!("pairs of blocks: {}", parts.join(", ")))
+    Some(format!("pairs of blocks: {}{judged}", parts.join(", ")))
 }
 
 fn pair_headline(summary: &RunSummary) -> String {
@@ -231,7 +232,10 @@ mod tests {
         assert_eq!(cut_pairs_text(&pairs), None);
         (pairs.retired, pairs.judged) = (8, 1);
         let text = cut_pairs_text(&pairs).expect("a text");
-        assert_eq!(text, "pairs of blocks: 8 retired (1 judged), 8 added");
+        assert_eq!(
+            text,
+            "pairs of blocks: 8 retired, 8 added; reviewers had judged 1 of the retired and changed ones"
+        );
         let pairs = CutPairs {
             changed: 2,
             restored: 1,

@@ -30,7 +30,7 @@ pub struct CutSummary {
     pub unchanged: u64,
     /// Pairs that were retired because their boxes are gone.
     pub retired: u64,
-    /// Retired pairs with verdicts.
+    /// Retired and changed pairs with verdicts.
     pub judged: u64,
     /// Retired pairs that came back with their boxes.
     pub restored: u64,
@@ -97,7 +97,7 @@ pub(crate) async fn store_cut(
     deltas.apply(conn).await?;
     Ok(CutSummary {
         retired,
-        judged,
+        judged: summary.judged + judged,
         ..summary
     })
 }
@@ -199,13 +199,15 @@ async fn store_pairs(
     let from_start = again.clone().map(|(id, _)| (*id, Stage::Fit));
     send_back::<PairJob>(conn, from_start, deltas).await?;
     let all = names.len() as u64;
-    let changed = again.count() as u64;
+    let again: Vec<PairId> = again.map(|(id, _)| *id).collect();
+    let judged = count_judged(conn, &again).await?;
+    let changed = again.len() as u64;
     Ok(CutSummary {
         added: summary.added,
         changed,
         unchanged: all - summary.added - changed,
         retired: 0,
-        judged: 0,
+        judged,
         restored: summary.restored,
     })
 }

@@ -111,6 +111,7 @@ async fn only_changed_characters_run_again_and_verdicts_stay() {
     for _ in 0..3 {
         world.finish_one().await;
     }
+    judge(&world, "b_b").await;
     judge(&world, "b_c").await;
     let new_labels = BlockAttributes {
         labels_path: Some("new.json".to_owned()),
@@ -136,7 +137,7 @@ async fn only_changed_characters_run_again_and_verdicts_stay() {
         changed: 1,
         unchanged: 1,
         retired: 1,
-        judged: 1,
+        judged: 2,
         ..CutSummary::default()
     };
     assert_eq!(world.finish_block(second).await, CutReply::Stored(summary));

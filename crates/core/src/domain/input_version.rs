@@ -15,6 +15,8 @@ pub struct InputVersion {
 
 /// The `stat` of a missing file.
 const GONE: &str = "gone";
+/// The `stat` that the catalog writes for a file that was read at another path, before a backup was restored.
+const RESTORED: &str = "restored";
 
 impl InputVersion {
     /// Returns the version of a file that is missing, so that a later run finds out when it is there.
@@ -23,6 +25,11 @@ impl InputVersion {
             hash: ContentHash::of(b""),
             stat: GONE.to_owned(),
         }
+    }
+
+    /// Returns whether the file was read at another path only: the size and time of the file at its new path are unknown.
+    pub fn has_new_path(&self) -> bool {
+        self.stat.is_empty() || self.stat == RESTORED
     }
 
     /// Returns whether the file was missing.

@@ -28,6 +28,18 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "với đơn vị {0}, mặt khắc rộng {1} mm, trong khi đa số chữ có 6 đến 30 mm",
     ),
     (
+        "with the unit {}, the scan is {} long",
+        "với đơn vị {0}, bản quét dài {1}",
+    ),
+    (
+        "correct the unit (perhaps {}) in the list, and import it again",
+        "hãy sửa đơn vị (có lẽ là {0}) trong danh sách rồi nhập lại",
+    ),
+    (
+        "correct the unit in the list, and import it again",
+        "hãy sửa đơn vị trong danh sách rồi nhập lại",
+    ),
+    (
         "its carving is {} mm deep, but most blocks are carved 0.3 to 5 mm deep",
         "nét khắc sâu {0} mm, trong khi đa số ván được khắc sâu 0,3 đến 5 mm",
     ),

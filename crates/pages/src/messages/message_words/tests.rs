@@ -28,6 +28,10 @@ fn frequent_messages_are_translated_with_their_parts() {
             "data/prints/1.png: mặt khắc và bản in không khớp: độ tin cậy 0,20 của tư thế thấp hơn register.min_confidence 0,3; đây có phải bản in của chữ khác không?",
         ),
         (
+            "m/1.stl: with the unit m, the scan is 12.7 m long; correct the unit (perhaps mm) in the list, and import it again",
+            "m/1.stl: với đơn vị m, bản quét dài 12,7 m; hãy sửa đơn vị (có lẽ là mm) trong danh sách rồi nhập lại",
+        ),
+        (
             "data/prints/1.jpg: the file is a BMP image",
             "data/prints/1.jpg: tệp là hình BMP",
         ),
