@@ -324,3 +324,40 @@ fn all_pairs_can_be_looked_at_before_the_import() {
     let past = folders(&page, dir, "&from=60");
     assert!(past.contains(&row(44)), "the last page: {past}");
 }
+
+#[test]
+fn a_list_for_a_known_project_is_compared_before_it_erases_columns() {
+    let (dir, page) = with_project();
+    let list = dir.path().join("short.csv");
+    let data = dir.path().join("p/data");
+    let path = |name: &str| data.join(name).display().to_string();
+    let [mesh, print] = ["meshes/upright-0000.ply", "prints/upright-0000.jpg"].map(path);
+    std::fs::write(
+        &list,
+        format!("id,mesh,print\nupright-0000,{mesh},{print}\n"),
+    )
+    .expect("written");
+    let block = || {
+        let shown = mocban(&dir.path().join("p"), &["show", "upright-0000", "--json"]);
+        shown.expect(0).json()["block"].clone()
+    };
+    assert_eq!(block(), "upright-block-01");
+    let list = list.to_str().expect("UTF-8");
+    let html = text(&page.get(&format!("/import?list={}", encode(list))));
+    let mut chosen = fields(&html);
+    // The page has compared the list with no project; the name is typed below it.
+    chosen["project"] = json!("p");
+    let reply = import(&page, &chosen);
+    let go = reply.json()["go"].clone();
+    let go = go.as_str().expect("an address");
+    assert!(go.starts_with("import?project=p&list="), "{go}");
+    assert_eq!(block(), "upright-block-01");
+    let shown = text(&page.get(&format!("/{go}")));
+    assert!(shown.contains("Nothing was imported yet"), "{shown}");
+    assert!(shown.contains("Pairs that lose their block"), "{shown}");
+    let mut seen = fields(&shown);
+    seen["project"] = json!("p");
+    let reply = import(&page, &seen);
+    assert_eq!(reply.json()["go"], "p/p/", "{}", text(&reply));
+    assert_eq!(block(), Value::Null);
+}

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::address::PageQuery;
+use super::address::{PageQuery, encoded};
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
 use super::plan_cache::{KEPT_PAIRS, PlanCache};
@@ -54,6 +54,8 @@ pub(super) struct ImportChoice {
     pub(super) matches: String,
     /// Hash of the pairs that were shown.
     pub(super) shown: String,
+    /// The project with whose pairs the page has compared those of the list. `None` if no page has shown them.
+    pub(super) compared: Option<String>,
     /// Whether the only scan and the only image are a whole block and its page.
     pub(super) whole_block: String,
     id_column: String,
@@ -130,6 +132,17 @@ impl ImportChoice {
         ];
         let all = others.into_iter().chain(columns);
         all.filter(|(_, value)| !value.is_empty()).collect()
+    }
+
+    /// Returns the address of the page that shows this choice for a project.
+    pub(super) fn address(&self, project: &str) -> String {
+        let fields = self.hidden_fields().into_iter();
+        let others = [("unit", &*self.unit), ("changed", &*self.changed)];
+        let fields = fields.chain(others.into_iter().filter(|(_, value)| !value.is_empty()));
+        let fields: Vec<String> = fields
+            .map(|(name, value)| format!("&{name}={}", encoded(value)))
+            .collect();
+        format!("import?project={}{}", encoded(project), fields.concat())
     }
 
     /// Returns the changes of the pairs.

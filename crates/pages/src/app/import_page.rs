@@ -84,6 +84,9 @@ pub(super) async fn page(
     };
     let mended = visit.query.parsed::<PairName>("mend");
     let body = html! {
+        @if visit.query.get("compare").is_some() {
+            p.notice role="status" { (visit.t("Nothing was imported yet: look first at what the list changes in this project.", "Chưa nhập gì: trước hết hãy xem danh sách thay đổi những gì trong dự án này.")) }
+        }
         @if let Some(pair) = &mended { (mending_part(&visit, pair)) }
         (chosen_part(&visit, &chosen))
         @if let Some(preview) = preview { (preview_part(&visit, &chosen, &preview, &changes)) }
@@ -268,6 +271,9 @@ pub(super) async fn import(
     };
     let read: AppResult<(ListedItems, PairChoices, PathBuf)> = blocking(read).await?;
     let (items, choices, dir) = read?;
+    if let Some(go) = unseen_changes(&state, &chosen, &dir).await? {
+        return Ok(Json(json!({ "go": go })));
+    }
     let allowed = AllowedChanges {
         missing: !chosen.missing.is_empty(),
         files: !chosen.changed.is_empty(),
@@ -285,6 +291,41 @@ pub(super) async fn import(
     let key = found.into_iter().find(|found| found.dir == dir);
     let key = key.map_or_else(|| chosen.project.clone(), |found| found.key);
     Ok(Json(json!({ "go": format!("p/{}/", encoded(&key)) })))
+}
+
+/// Returns the address of the page that shows what a list changes in a known project, if the page showed it for another one: the
+/// name of the project is typed below the pairs.
+async fn unseen_changes(
+    state: &AppState,
+    chosen: &ImportChoice,
+    dir: &Path,
+) -> AppResult<Option<String>> {
+    let folder = state.options.folder.clone();
+    let found = find(&folder).into_iter().find(|found| found.dir == dir);
+    let (Some(compared), Some(found)) = (&chosen.compared, found) else {
+        return Ok(None);
+    };
+    if chosen.list.is_empty() || *compared == found.key {
+        return Ok(None);
+    }
+    let read = {
+        let chosen = chosen.clone();
+        move || {
+            chosen.preview(
+                &folder,
+                &PickerRoots::new(&folder),
+                0,
+                &PlanCache::default(),
+            )
+        }
+    };
+    let Some(preview) = blocking(read).await? else {
+        return Ok(None);
+    };
+    let open = state.open(&found.key).await?;
+    let changes = ColumnChanges::find(&preview, &open).await?;
+    let address = || format!("{}&compare=1", chosen.address(&found.key));
+    Ok((changes != ColumnChanges::default()).then(address))
 }
 
 /// Refuses other pairs than the page showed, in both languages. The import checks it again.

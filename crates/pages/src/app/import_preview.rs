@@ -315,6 +315,7 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
         &html! {
             @for (name, value) in chosen.hidden_fields() { input type="hidden" name=(name) value=(value); }
             @if let Some(plan) = plan { input type="hidden" name="shown" value=(plan.hash); }
+            input type="hidden" name="compared" value=(chosen.project);
             label { span { (visit.t("Project (new or known name)", "Dự án (tên mới hoặc đã có)")) }
                 input #project name="project" value=(chosen.project) required maxlength=(NAME_CHARS);
             }
