@@ -28,8 +28,12 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "với đơn vị {0}, mặt khắc rộng {1} mm, trong khi đa số chữ có 6 đến 30 mm",
     ),
     (
-        "with the unit {}, the scan is {} long",
-        "với đơn vị {0}, bản quét dài {1}",
+        "with the unit {}, the scan is {} m long",
+        "với đơn vị {0}, bản quét dài {1} m",
+    ),
+    (
+        "with the unit {}, the scan is {} mm long",
+        "với đơn vị {0}, bản quét dài {1} mm",
     ),
     (
         "correct the unit (perhaps {}) in the list, and import it again",
