@@ -350,7 +350,7 @@ fn a_list_for_a_known_project_is_compared_before_it_erases_columns() {
     let reply = import(&page, &chosen);
     let go = reply.json()["go"].clone();
     let go = go.as_str().expect("an address");
-    assert!(go.starts_with("import?project=p&list="), "{go}");
+    assert!(go.starts_with("import?project=p&compare=1&list="), "{go}");
     assert_eq!(block(), "upright-block-01");
     let shown = text(&page.get(&format!("/{go}")));
     assert!(shown.contains("Nothing was imported yet"), "{shown}");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::address::{PageQuery, encoded};
+use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
 use super::plan_cache::{KEPT_PAIRS, PlanCache};
@@ -134,15 +134,19 @@ impl ImportChoice {
         all.filter(|(_, value)| !value.is_empty()).collect()
     }
 
-    /// Returns the address of the page that shows this choice for a project.
-    pub(super) fn address(&self, project: &str) -> String {
-        let fields = self.hidden_fields().into_iter();
-        let others = [("unit", &*self.unit), ("changed", &*self.changed)];
-        let fields = fields.chain(others.into_iter().filter(|(_, value)| !value.is_empty()));
-        let fields: Vec<String> = fields
-            .map(|(name, value)| format!("&{name}={}", encoded(value)))
-            .collect();
-        format!("import?project={}{}", encoded(project), fields.concat())
+    /// Returns the address of the page that compares this choice with the pairs of a project before it is imported.
+    pub(super) fn comparison(&self, project: &str) -> String {
+        let others = [
+            ("project", project),
+            ("unit", &*self.unit),
+            ("changed", &*self.changed),
+            ("compare", "1"),
+        ];
+        let fields = others.into_iter().chain(self.hidden_fields());
+        let query = fields.fold(PageQuery::default(), |query, (name, value)| {
+            query.with(name, value)
+        });
+        format!("import{}", query.text())
     }
 
     /// Returns the changes of the pairs.

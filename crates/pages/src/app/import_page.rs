@@ -293,39 +293,36 @@ pub(super) async fn import(
     Ok(Json(json!({ "go": format!("p/{}/", encoded(&key)) })))
 }
 
-/// Returns the address of the page that shows what a list changes in a known project, if the page showed it for another one: the
-/// name of the project is typed below the pairs.
+/// Returns the address of the page that shows what a list changes in a known project, if the page has compared the list with
+/// another one: the name of the project is typed below the pairs.
 async fn unseen_changes(
     state: &AppState,
     chosen: &ImportChoice,
     dir: &Path,
 ) -> AppResult<Option<String>> {
-    let folder = state.options.folder.clone();
-    let found = find(&folder).into_iter().find(|found| found.dir == dir);
-    let (Some(compared), Some(found)) = (&chosen.compared, found) else {
-        return Ok(None);
-    };
-    if chosen.list.is_empty() || *compared == found.key {
+    let is_compared = chosen
+        .compared
+        .as_ref()
+        .is_none_or(|name| *name == chosen.project);
+    if chosen.list.is_empty() || is_compared {
         return Ok(None);
     }
     let read = {
-        let chosen = chosen.clone();
+        let (chosen, dir) = (chosen.clone(), dir.to_owned());
+        let folder = state.options.folder.clone();
         move || {
-            chosen.preview(
-                &folder,
-                &PickerRoots::new(&folder),
-                0,
-                &PlanCache::default(),
-            )
+            let found = find(&folder).into_iter().find(|found| found.dir == dir)?;
+            let roots = PickerRoots::new(&folder);
+            let preview = chosen.preview(&folder, &roots, 0, &PlanCache::default())?;
+            Some((found.key, preview))
         }
     };
-    let Some(preview) = blocking(read).await? else {
+    let Some((key, preview)) = blocking(read).await? else {
         return Ok(None);
     };
-    let open = state.open(&found.key).await?;
+    let open = state.open(&key).await?;
     let changes = ColumnChanges::find(&preview, &open).await?;
-    let address = || format!("{}&compare=1", chosen.address(&found.key));
-    Ok((changes != ColumnChanges::default()).then(address))
+    Ok((changes != ColumnChanges::default()).then(|| chosen.comparison(&key)))
 }
 
 /// Refuses other pairs than the page showed, in both languages. The import checks it again.

@@ -61,7 +61,9 @@ pub(super) fn fit(
     if coarse.agreement(&heights) - single < FIRST_GAIN {
         return None;
     }
-    (1..ROUNDS).for_each(|_| coarse.choose_heights(&mut heights));
+    for _ in 1..ROUNDS {
+        coarse.choose_heights(&mut heights);
+    }
     let agreement = coarse.agreement(&heights);
     if agreement - single < LEAST_GAIN {
         return None;
@@ -70,7 +72,9 @@ pub(super) fn fit(
     let fine: InkSamples<FINE> =
         InkSamples::new(depth, canvas, &depth_from_half, relief, level, spread);
     let mut heights = best;
-    (0..ROUNDS).for_each(|_| fine.choose_heights(&mut heights));
+    for _ in 0..ROUNDS {
+        fine.choose_heights(&mut heights);
+    }
     if fine.agreement(&heights) - agreement >= FINE_GAIN {
         best = heights;
     }

@@ -4,9 +4,16 @@ use std::path::Path;
 
 use super::{all_messages, vietnamese};
 
+/// Checks messages and their Vietnamese texts.
+fn assert_translated(messages: &[(&str, &str)]) {
+    for (english, expected) in messages {
+        assert_eq!(vietnamese(english).as_deref(), Some(*expected));
+    }
+}
+
 #[test]
 fn frequent_messages_are_translated_with_their_parts() {
-    for (english, expected) in [
+    assert_translated(&[
         (
             "60 files are missing, nothing was imported:\n  pairs.csv: line 2: mesh m/0.stl of 0 does not exist\n  and 59 more",
             "thiếu 60 tệp nên chưa nhập gì:\n  pairs.csv: dòng 2: không có bản quét m/0.stl của 0\n  và 59 mục khác",
@@ -99,9 +106,7 @@ fn frequent_messages_are_translated_with_their_parts() {
             "a{1}.csv: line 2: mesh m/{3}.stl of {x{0} does not exist",
             "a{1}.csv: dòng 2: không có bản quét m/{3}.stl của {x{0}",
         ),
-    ] {
-        assert_eq!(vietnamese(english).as_deref(), Some(expected));
-    }
+    ]);
     for other in ["", "a = 7 is too large", " is not there", "line 3: bad"] {
         assert_eq!(vietnamese(other), None, "{other:?}");
     }
@@ -109,7 +114,7 @@ fn frequent_messages_are_translated_with_their_parts() {
 
 #[test]
 fn truncated_files_are_explained() {
-    for (english, expected) in [
+    assert_translated(&[
         (
             "1.stl: the ascii STL is truncated: it ends after 0 facets without endsolid",
             "1.stl: tệp ascii STL bị cắt cụt: hết sau 0 mặt mà chưa có endsolid",
@@ -122,14 +127,12 @@ fn truncated_files_are_explained() {
             "1.stl: the binary STL is truncated: it holds 1 of 2 triangles",
             "1.stl: tệp STL nhị phân bị cắt cụt: chỉ có 1 trong số 2 tam giác",
         ),
-    ] {
-        assert_eq!(vietnamese(english).as_deref(), Some(expected));
-    }
+    ]);
 }
 
 #[test]
 fn one_or_several_boxes_are_explained() {
-    for (english, expected) in [
+    assert_translated(&[
         (
             "b.json: 1 box repeats another and was left out: box 3 \"c\" as box 1",
             "b.json: có một khung trùng với khung khác và đã bị bỏ: khung 3 \"c\" giống khung 1",
@@ -155,14 +158,12 @@ fn one_or_several_boxes_are_explained() {
             "các khung chữ: có một khung vượt ra ngoài mép trang in: khung 3; chưa lưu gì",
         ),
         ("box 1.ply is not there", "không có tệp box 1.ply"),
-    ] {
-        assert_eq!(vietnamese(english).as_deref(), Some(expected));
-    }
+    ]);
 }
 
 #[test]
 fn lists_of_spreadsheets_are_explained() {
-    for (english, expected) in [
+    assert_translated(&[
         (
             "cell B2 of column \"page\" has a line break; write it on one line",
             "ô B2 của cột \"page\" có ngắt dòng; hãy viết trên một dòng",
@@ -179,9 +180,7 @@ fn lists_of_spreadsheets_are_explained() {
             "column \"units\" is kept as metadata; rename it to \"unit\" if it is meant, and import again",
             "cột \"units\" được giữ làm thông tin thêm; nếu đó là cột \"unit\" thì hãy đổi tên rồi nhập lại",
         ),
-    ] {
-        assert_eq!(vietnamese(english).as_deref(), Some(expected));
-    }
+    ]);
 }
 
 #[test]
@@ -190,7 +189,7 @@ fn moved_inputs_are_explained() {
                    folder q/data; put them back, or import them from their new place";
     let expected = "4 trong số 4 tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ (số cặp hoặc ván: 2), và cả thư mục \
                     q/data; hãy đưa chúng về chỗ cũ, hoặc nhập lại từ chỗ mới";
-    assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    assert_translated(&[(english, expected)]);
 }
 
 #[test]
@@ -201,12 +200,12 @@ fn ids_that_a_spreadsheet_changed_are_explained() {
     let expected = "3 mã trông như ngày tháng hoặc lũy thừa của mười, chẳng hạn \"1-Nov\" (dòng 2, 4, 5): có thể chương \
                     trình bảng tính đã đổi chúng từ các văn bản như 1-11 và 1E5; hãy đặt định dạng Văn bản cho cột, sửa \
                     lại các mã rồi lưu lại danh sách, tốt nhất là XLSX";
-    assert_eq!(vietnamese(english).as_deref(), Some(expected));
+    assert_translated(&[(english, expected)]);
 }
 
 #[test]
 fn doubts_about_a_scan_are_explained() {
-    for (english, expected) in [
+    assert_translated(&[
         (
             "with the unit mm, its carved surface is 0.50 mm across, but most characters have 6 to 30 mm; is the unit in?",
             "với đơn vị mm, mặt khắc rộng 0,50 mm, trong khi đa số chữ có 6 đến 30 mm; đơn vị có phải là in không?",
@@ -219,9 +218,7 @@ fn doubts_about_a_scan_are_explained() {
             "faces with fewer than three corners were left out: 12",
             "số mặt có ít hơn ba góc đã bị bỏ: 12",
         ),
-    ] {
-        assert_eq!(vietnamese(english).as_deref(), Some(expected));
-    }
+    ]);
 }
 
 /// Returns the sources of all crates and tests as one text, with the strings that go on in the next line joined.
