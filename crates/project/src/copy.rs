@@ -46,9 +46,7 @@ async fn warn_about_inputs(dir: &str, listener: &dyn Listener) {
         let (storage, _) = Location::new(dir).data_locations()?;
         let project = Project::open(Path::new(dir))?.with_storage(storage);
         let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
-        let pairs: u64 = catalog.counters().await?.values().sum();
-        let pairs = pairs + catalog.retired_count().await?;
-        let found = missing_inputs::missing(&project, &catalog, pairs).await;
+        let found = missing_inputs::missing_of_all(&project, &catalog).await;
         catalog.close().await;
         found
     };

@@ -9,10 +9,8 @@ use crate::location::Location;
 use crate::missing_inputs::{self, MissingInputs};
 use crate::own_files::refuse_project_file;
 use crate::status::{all_retired, warn_about_stale};
-use mocban_catalog::Catalog;
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{ExportFormat, ExportOptions, ExportSummary, export as export_pairs};
-use mocban_store::Project;
 
 /// An export of a project.
 #[derive(Debug)]
@@ -67,7 +65,8 @@ pub async fn export(
         None
     } else {
         // The export is there already, so what cannot be looked up is no error.
-        missing_of(&project, &catalog).await.ok().flatten()
+        let found = missing_inputs::missing_of_all(&project, &catalog).await;
+        found.ok().flatten()
     };
     catalog.close().await;
     if summary.is_nothing_selected {
@@ -87,11 +86,4 @@ pub async fn export(
         summary,
         missing_inputs,
     })
-}
-
-/// Inspects the inputs of all pairs and blocks.
-async fn missing_of(project: &Project, catalog: &Catalog) -> ProjectResult<Option<MissingInputs>> {
-    let pairs: u64 = catalog.counters().await?.values().sum();
-    let pairs = pairs + catalog.retired_count().await?;
-    missing_inputs::missing(project, catalog, pairs).await
 }

@@ -141,6 +141,16 @@ pub async fn missing(
     Ok(inspect(project, catalog, pairs).await?.missing)
 }
 
+/// Inspects files like [`missing`], and counts the pairs of the project before.
+pub async fn missing_of_all(
+    project: &Project,
+    catalog: &Catalog,
+) -> ProjectResult<Option<MissingInputs>> {
+    let pairs: u64 = catalog.counters().await?.values().sum();
+    let pairs = pairs + catalog.retired_count().await?;
+    missing(project, catalog, pairs).await
+}
+
 /// Inspects files like [`missing`], after failures: files that a run did not find count too, if their folder is missing.
 pub async fn missing_after_failures(
     project: &Project,
