@@ -221,7 +221,21 @@ fn doubts_about_a_scan_are_explained() {
     ]);
 }
 
-/// Returns the sources of all crates and tests as one text, with the strings that go on in the next line joined.
+/// Parts of messages that the program joins with the words beside them, so that no source has both.
+const COMPOSED: [&str; 9] = [
+    "in the list, and import it again",
+    "input files that were looked at are missing or have moved",
+    "has a value that this program did not store",
+    "repeat others",
+    "smaller than a pixel, a point or a line",
+    "lies outside the page",
+    "lie outside the page",
+    "reaches over an edge of the page",
+    "reach over an edge of the page",
+];
+
+/// Returns the sources of all crates and tests as one text, without the translated messages and their tests. Strings that go on
+/// in the next line are joined.
 fn sources() -> String {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut open = vec![crates.join("../tests/it"), crates];
@@ -230,11 +244,11 @@ fn sources() -> String {
         for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
             let path = entry.path();
             if path.is_dir() {
-                open.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs")
-                && !path.ends_with("message_words.rs")
-                && !path.ends_with("message_table.rs")
-            {
+                // The tables and their tests have every message, even one that the program does not say any more.
+                if !path.ends_with("pages/src/messages") {
+                    open.push(path);
+                }
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
                 all += &std::fs::read_to_string(path).expect("a source");
             }
         }
@@ -253,7 +267,10 @@ fn the_program_still_says_what_is_translated() {
     for (english, vietnamese) in all_messages() {
         let pieces = english.split("{}").map(str::trim);
         let longest = pieces.max_by_key(|piece| piece.len()).expect("a piece");
-        assert!(sources.contains(longest), "{english:?}: {longest:?}");
+        let mut composed = COMPOSED.into_iter();
+        let said = composed.find(|part| longest.contains(*part));
+        let said = said.unwrap_or(longest);
+        assert!(sources.contains(said), "{english:?}: {said:?}");
         let count = english.matches("{}").count();
         for index in count..10 {
             let part = format!("{{{index}}}");
