@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::components::grouped;
 use super::failure::AppResult;
-use super::import_choice::{ImportPreview, Planned};
+use super::import_choice::Planned;
 use super::projects::OpenProject;
 use super::visit::Visit;
 use mocban_catalog::PairAttributes;
@@ -69,10 +69,10 @@ pub(super) struct ColumnChanges {
 }
 
 impl ColumnChanges {
-    /// Compares the pairs of a preview of a list with those of its project. Folders change no columns.
-    pub(super) async fn find(preview: &ImportPreview, open: &OpenProject) -> AppResult<Self> {
+    /// Compares the pairs that a list would import with those of its project. Folders change no columns.
+    pub(super) async fn find(planned: &Planned, open: &OpenProject) -> AppResult<Self> {
         let mut changes = Self::default();
-        let Ok(Planned::Pairs(plan, _)) = &preview.planned else {
+        let Planned::Pairs(plan, _) = planned else {
             return Ok(changes);
         };
         let names: Vec<_> = plan.shown.iter().map(|pair| &pair.name).collect();

@@ -75,10 +75,11 @@ pub(super) async fn page(
         let open = state.open(&chosen.project).await?;
         partners.add_replacements(&open, preview, &roots).await?;
     }
-    let changes = match &preview {
-        Some(preview) if is_known && !chosen.list.is_empty() => {
+    let planned = preview.as_ref().map(|preview| &preview.planned);
+    let changes = match planned {
+        Some(Ok(planned)) if is_known && !chosen.list.is_empty() => {
             let open = state.open(&chosen.project).await?;
-            ColumnChanges::find(preview, &open).await?
+            ColumnChanges::find(planned, &open).await?
         }
         _ => ColumnChanges::default(),
     };
@@ -258,7 +259,7 @@ pub(super) async fn import(
         move || {
             let roots = PickerRoots::new(&folder);
             let dir = chosen.dir(&folder)?;
-            check_shown(&chosen, &folder, &roots)?;
+            let planned = planned_as_shown(&chosen, &folder, &roots)?;
             let nothing = || {
                 AppFailure::refused(Sentence::new(
                     "choose folders or a list first",
@@ -266,12 +267,13 @@ pub(super) async fn import(
                 ))
             };
             let items = chosen.items(&roots)?.ok_or_else(nothing)?;
-            Ok((items, chosen.choices()?, dir))
+            Ok((items, chosen.choices()?, dir, planned))
         }
     };
-    let read: AppResult<(ListedItems, PairChoices, PathBuf)> = blocking(read).await?;
-    let (items, choices, dir) = read?;
-    if let Some(go) = unseen_changes(&state, &chosen, &dir).await? {
+    let read: AppResult<(ListedItems, PairChoices, PathBuf, Option<Planned>)> =
+        blocking(read).await?;
+    let (items, choices, dir, planned) = read?;
+    if let Some(go) = unseen_changes(&state, &chosen, &dir, planned).await? {
         return Ok(Json(json!({ "go": go })));
     }
     let allowed = AllowedChanges {
@@ -299,46 +301,45 @@ async fn unseen_changes(
     state: &AppState,
     chosen: &ImportChoice,
     dir: &Path,
+    planned: Option<Planned>,
 ) -> AppResult<Option<String>> {
     let is_compared = chosen
         .compared
         .as_ref()
         .is_none_or(|name| *name == chosen.project);
-    if chosen.list.is_empty() || is_compared {
-        return Ok(None);
-    }
-    let read = {
-        let (chosen, dir) = (chosen.clone(), dir.to_owned());
-        let folder = state.options.folder.clone();
-        move || {
-            let found = find(&folder).into_iter().find(|found| found.dir == dir)?;
-            let roots = PickerRoots::new(&folder);
-            let preview = chosen.preview(&folder, &roots, 0, &PlanCache::default())?;
-            Some((found.key, preview))
-        }
-    };
-    let Some((key, preview)) = blocking(read).await? else {
+    let Some(planned) = planned.filter(|_| !chosen.list.is_empty() && !is_compared) else {
         return Ok(None);
     };
-    let open = state.open(&key).await?;
-    let changes = ColumnChanges::find(&preview, &open).await?;
-    Ok((changes != ColumnChanges::default()).then(|| chosen.comparison(&key)))
+    let (folder, dir) = (state.options.folder.clone(), dir.to_owned());
+    let known = move || find(&folder).into_iter().find(|found| found.dir == dir);
+    let Some(found) = blocking(known).await? else {
+        return Ok(None);
+    };
+    let open = state.open(&found.key).await?;
+    let changes = ColumnChanges::find(&planned, &open).await?;
+    Ok((changes != ColumnChanges::default()).then(|| chosen.comparison(&found.key)))
 }
 
-/// Refuses other pairs than the page showed, in both languages. The import checks it again.
-fn check_shown(chosen: &ImportChoice, folder: &Path, roots: &PickerRoots) -> AppResult<()> {
+/// Returns what would be imported, if the page showed pairs. Refuses other pairs than it showed, in both languages. The import
+/// checks it again.
+fn planned_as_shown(
+    chosen: &ImportChoice,
+    folder: &Path,
+    roots: &PickerRoots,
+) -> AppResult<Option<Planned>> {
     let Some(shown) = chosen.choices()?.shown else {
-        return Ok(());
+        return Ok(None);
     };
     let preview = chosen.preview(folder, roots, 0, &PlanCache::default());
-    match preview.map(|preview| preview.planned).transpose()? {
+    let planned = preview.map(|preview| preview.planned).transpose()?;
+    match &planned {
         Some(Planned::Pairs(plan, _)) if plan.hash != shown => {
             Err(AppFailure::refused(Sentence::new(
                 "the files or the list changed after the pairs were shown, so nothing was imported: reload the page and look at the pairs again",
                 "các tệp hoặc danh sách đã thay đổi sau khi hiện các cặp, nên chưa nhập gì: hãy tải lại trang và xem lại các cặp",
             )))
         }
-        _ => Ok(()),
+        _ => Ok(planned),
     }
 }
 
