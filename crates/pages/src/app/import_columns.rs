@@ -8,7 +8,7 @@ use super::visit::Visit;
 use mocban_core::domain::one_line;
 use mocban_lists::manifest::ListHead;
 
-/// Value of the address that says that the columns are those that the browser has kept.
+/// Value of the address that asks for the columns that the browser has kept.
 pub(super) const KEPT_COLUMNS: &str = "kept_columns";
 
 /// Names of the columns in English and Vietnamese, in the order of [`ImportChoice::columns`].
