@@ -157,8 +157,8 @@ pub async fn missing_after_failures(
     catalog: &Catalog,
     pairs: u64,
 ) -> ProjectResult<Option<MissingInputs>> {
-    let inspection = inspect_files(project, catalog, pairs, true).await?;
-    Ok(inspection.missing)
+    let files = sample(project, catalog, pairs).await?;
+    Ok(inspect_files(project, files).await.missing)
 }
 
 /// Inspects the files of some pairs and blocks of a project. `pairs` counts the retired pairs too, because they have ids,
@@ -169,18 +169,21 @@ pub async fn inspect(
     catalog: &Catalog,
     pairs: u64,
 ) -> ProjectResult<InputInspection> {
-    inspect_files(project, catalog, pairs, false).await
+    let mut files = sample(project, catalog, pairs).await?;
+    // A file that was not there is the reason of a failure, which is said elsewhere.
+    files.retain(|file| !file.read.is_gone());
+    Ok(inspect_files(project, files).await)
 }
 
-/// Inspects files like [`inspect`]. `with_gone` includes the files that the last run did not find.
-async fn inspect_files(
+/// Returns the files of some pairs and blocks that a run has looked for, as in [`inspect`].
+async fn sample(
     project: &Project,
     catalog: &Catalog,
     pairs: u64,
-    with_gone: bool,
-) -> ProjectResult<InputInspection> {
+) -> ProjectResult<Vec<SampledInput>> {
+    let mut files = Vec::new();
     if project.has_remote_inputs() {
-        return Ok(InputInspection::default());
+        return Ok(files);
     }
     let sampled = pairs.min(MAX_PAIRS);
     // The ids of pairs are almost without gaps.
@@ -191,20 +194,8 @@ async fn inspect_files(
         .await?;
     let retired = catalog.retired_among(&ids).await?;
     known.retain(|known| !retired.contains(&known.pair));
-    let mut files = Vec::new();
     let mut add = |owner: usize, path: String, read: Option<InputVersion>| {
-        // A file that was not there is the reason of a failure, which is said elsewhere.
-        let read = read.filter(|read| with_gone || !read.is_gone());
-        files.extend(read.map(|read| SampledInput {
-            owner,
-            path,
-            was_gone: read.is_gone(),
-            stat: if read.has_new_path() {
-                String::new()
-            } else {
-                read.stat
-            },
-        }));
+        files.extend(read.map(|read| SampledInput { owner, path, read }));
     };
     let pairs = known.len();
     for (owner, known) in known.into_iter().enumerate() {
@@ -219,11 +210,16 @@ async fn inspect_files(
     }
     // The files of pairs that were cut from a block are artifacts.
     files.retain(|file| ArtifactRef::at_path(&file.path).is_none());
+    Ok(files)
+}
+
+/// Inspects files for a limited time. Finds nothing if the disk hangs.
+async fn inspect_files(project: &Project, files: Vec<SampledInput>) -> InputInspection {
     let project = project.clone();
     let until = Instant::now() + INSPECTION_TIME;
     let inspection = tokio::task::spawn_blocking(move || among(&project, &files, until));
     let inspected = tokio::time::timeout(MAX_TIME, inspection).await;
-    Ok(inspected.ok().and_then(Result::ok).unwrap_or_default())
+    inspected.ok().and_then(Result::ok).unwrap_or_default()
 }
 
 /// A file that is inspected.
@@ -233,10 +229,8 @@ struct SampledInput {
     owner: usize,
     /// Path as stored.
     path: String,
-    /// What was stored about it when it was read.
-    stat: String,
-    /// Whether the last run did not find it.
-    was_gone: bool,
+    /// What was stored when it was read.
+    read: InputVersion,
 }
 
 /// Returns the paths of the files of a block, each with its version when it was read.
@@ -266,16 +260,11 @@ fn among(project: &Project, files: &[SampledInput], until: Instant) -> InputInsp
         match stat_input(&input) {
             Err(InputError::NotThere(_)) => {
                 let is_in_missing_folder = folders.add(input.path());
-                if is_in_missing_folder || !file.was_gone {
+                if is_in_missing_folder || !file.read.is_gone() {
                     missing.push(file);
                 }
             }
-            // A file without a stat has a new path since an import; `other_files` counts it.
-            Ok(now)
-                if !file.stat.is_empty() && !file.was_gone && size(&now) != size(&file.stat) =>
-            {
-                changed.push(file);
-            }
+            Ok(now) if has_other_size(&file.read, &now) => changed.push(file),
             Ok(_) | Err(_) => {}
         }
     }
@@ -299,9 +288,12 @@ fn among(project: &Project, files: &[SampledInput], until: Instant) -> InputInsp
     }
 }
 
-/// Returns the size in what is stored about a file, before its modification time.
-fn size(stat: &str) -> &str {
-    stat.split_once(':').map_or(stat, |(size, _)| size)
+/// Returns whether a file had another size when it was read than it has `now`. One with a new path since an import was not
+/// read there; `other_files` counts it.
+fn has_other_size(read: &InputVersion, now: &str) -> bool {
+    // The size stands before the modification time.
+    let is_other = read.stat.split(':').next() != now.split(':').next();
+    is_other && !read.has_new_path() && !read.is_gone()
 }
 
 #[cfg(test)]

@@ -7,14 +7,16 @@ use mocban_catalog::{BlockAttributes, BlockInputVersions, InputVersion, KnownBlo
 use mocban_core::domain::{BlockId, BlockName, ContentHash};
 use mocban_store::{Project, stat_input};
 
+fn version(stat: &str) -> InputVersion {
+    InputVersion {
+        hash: ContentHash::of(b""),
+        stat: stat.to_owned(),
+    }
+}
+
 #[test]
 fn the_labels_of_a_block_are_inspected_like_its_scan_and_page() {
-    let read = |stat: &str| {
-        Some(InputVersion {
-            hash: ContentHash::of(b""),
-            stat: stat.to_owned(),
-        })
-    };
+    let read = |stat: &str| Some(version(stat));
     let block = KnownBlock {
         block: BlockId(1),
         attributes: BlockAttributes {
@@ -51,8 +53,7 @@ fn changed_and_missing_files_are_counted_and_copies_are_not() {
         SampledInput {
             owner: 0,
             path,
-            stat,
-            was_gone: false,
+            read: version(&stat),
         }
     });
     let later = Instant::now() + Duration::from_hours(1);
@@ -77,7 +78,7 @@ fn changed_and_missing_files_are_counted_and_copies_are_not() {
     assert_eq!((changed.changed, changed.looked_at), (1, 3));
     assert!(changed.first.ends_with("b.stl"), "{changed}");
     let mut unread = files.clone();
-    unread[1].stat.clear();
+    unread[1].read.stat.clear();
     assert_eq!(among(&project, &unread, later).changed, None);
     assert_eq!(among(&project, &files, Instant::now()), none, "it is over");
 }
@@ -86,17 +87,16 @@ fn changed_and_missing_files_are_counted_and_copies_are_not() {
 fn a_missing_folder_is_named_once() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = Project::at(dir.path());
-    let file = |owner, path: &str, was_gone| SampledInput {
+    let file = |owner, path: &str, read| SampledInput {
         owner,
         path: dir.path().join(path).display().to_string(),
-        stat: String::new(),
-        was_gone,
+        read,
     };
     let later = Instant::now() + Duration::from_hours(1);
     let find = |files: &[SampledInput]| among(&project, files, later).missing;
     let scans = [
-        file(0, "scans/a/1.stl", false),
-        file(1, "scans/b/2.stl", true),
+        file(0, "scans/a/1.stl", version("")),
+        file(1, "scans/b/2.stl", InputVersion::gone()),
     ];
     let found = find(&scans).expect("two files");
     let folder = dir.path().join("scans").display().to_string();
@@ -105,12 +105,12 @@ fn a_missing_folder_is_named_once() {
     assert!(found.to_string().contains("--allow-changed-files"));
     assert!(found.explains(&format!("{} is not there", scans[1].path)));
     assert!(!found.explains("other/1.stl is not there"));
-    let both = [scans[0].clone(), file(2, "prints/1.png", false)];
+    let both = [scans[0].clone(), file(2, "prints/1.png", version(""))];
     let found = find(&both).expect("two files");
     assert_eq!(found.folders.len(), 2, "{found}");
     assert!(found.found().contains("and so are the folders "), "{found}");
     // A folder that is there is not named.
-    let found = find(&[file(0, "1.stl", false)]).expect("a file");
+    let found = find(&[file(0, "1.stl", version(""))]).expect("a file");
     assert!(found.folders.is_empty() && found.found().contains(", first "));
-    assert_eq!(find(&[file(0, "1.stl", true)]), None);
+    assert_eq!(find(&[file(0, "1.stl", InputVersion::gone())]), None);
 }
