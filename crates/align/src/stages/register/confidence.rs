@@ -13,6 +13,8 @@ use mocban_core::domain::{MetricOutcome, PoseFeatures};
 
 /// Number of inputs of the pose model: the constant 1, and the logarithms of the first five pose features.
 const POSE_INPUTS: usize = 6;
+/// Index of the logarithm of `mirrored` among the inputs of the pose model, see `pose_inputs`.
+const MIRRORED_INPUT: usize = 5;
 /// Number of inputs of the mask model, see `mask_inputs`.
 const MASK_INPUTS: usize = 4;
 /// Number of inputs of the character model, see `character_inputs`.
@@ -71,7 +73,7 @@ pub struct ConfidenceInputs {
 impl ConfidenceInputs {
     /// Returns the confidence, 0..=1, under the built-in weights.
     pub fn confidence(&self) -> f64 {
-        let mirrored = self.pose[POSE_INPUTS - 1].exp();
+        let mirrored = self.pose[MIRRORED_INPUT].exp();
         self.of_candidate()
             * of_pixels(self.pixel_width, self.prior)
             * of_upright(mirrored, self.prior)
