@@ -53,8 +53,12 @@ pub(super) fn fit(
     spread: f64,
 ) -> Option<Levelling> {
     let depth_from_half = to_half(canvas_from_depth).inverse()?;
-    let coarse: InkSamples<COARSE> =
-        InkSamples::new(depth, canvas, &depth_from_half, relief, level, spread);
+    let size = [depth.levels.width(), depth.levels.height()];
+    let per_level = depth.scale.height_per_level / relief.depth();
+    let pixels = ink_pixels(canvas, &depth_from_half, spread, |found| {
+        (f64::from(found) - f64::from(level)) * per_level
+    });
+    let coarse = InkSamples::<COARSE>::new(&pixels, size);
     let single = coarse.best_single_agreement();
     let mut heights = [[0.0; COARSE]; COARSE];
     coarse.choose_heights(&mut heights);
@@ -69,8 +73,7 @@ pub(super) fn fit(
         return None;
     }
     let mut best = Levelling::from(heights).heights;
-    let fine: InkSamples<FINE> =
-        InkSamples::new(depth, canvas, &depth_from_half, relief, level, spread);
+    let fine = InkSamples::<FINE>::new(&pixels, size);
     let mut heights = best;
     for _ in 0..ROUNDS {
         fine.choose_heights(&mut heights);
@@ -83,7 +86,41 @@ pub(super) fn fit(
     })
 }
 
-/// A pixel with data.
+/// A pixel of a canvas with data.
+struct InkPixel {
+    /// Place in pixels of the depth map.
+    at: [f64; 2],
+    /// Height over the threshold, as a share of the relief.
+    height: f64,
+    /// 1 on ink, -1 on the background.
+    weight: f64,
+}
+
+/// Returns some of the pixels of a canvas with data, row by row. `height` returns the height of a level over the threshold, as
+/// a share of the relief.
+fn ink_pixels(
+    canvas: &HalfCanvas,
+    depth_from_half: &Affine2,
+    spread: f64,
+    height: impl Fn(u16) -> f64,
+) -> Vec<InkPixel> {
+    let along = |side: usize| (0..side).step_by(SAMPLING_PX);
+    let columns = along(canvas.levels.width());
+    let places = along(canvas.levels.height())
+        .flat_map(|y| columns.clone().map(move |x| (x, y)))
+        .filter(|(x, y)| canvas.levels.at(*x, *y) > 0);
+    let pixel = |(x, y): (usize, usize)| {
+        let distance = f64::from(canvas.edge.grid().at(x, y));
+        InkPixel {
+            at: depth_from_half.apply([x as f64, y as f64]),
+            height: height(canvas.levels.at(x, y)),
+            weight: ((distance - spread) / FULL_PX).clamp(-1.0, 1.0),
+        }
+    };
+    places.map(pixel).collect()
+}
+
+/// A pixel between four nodes.
 #[derive(Debug, Clone, Copy)]
 struct InkSample {
     /// Height over the threshold, as a share of the relief.
@@ -103,32 +140,18 @@ struct InkSamples<const N: usize> {
 }
 
 impl<const N: usize> InkSamples<N> {
-    fn new(
-        depth: &DepthMap,
-        canvas: &HalfCanvas,
-        depth_from_half: &Affine2,
-        relief: &ReliefHeights,
-        level: u16,
-        spread: f64,
-    ) -> Self {
-        let size = [depth.levels.width(), depth.levels.height()];
-        let per_level = depth.scale.height_per_level / relief.depth();
-        let [width, height] = [canvas.levels.width(), canvas.levels.height()];
+    /// Sorts pixels into cells. `size` is that of the depth map.
+    fn new(pixels: &[InkPixel], size: [usize; 2]) -> Self {
         let mut cells = vec![Vec::new(); (N - 1) * (N - 1)];
         let mut all_ink = 0.0;
-        let along = |side: usize| (0..side).step_by(SAMPLING_PX);
-        let pixels = along(height).flat_map(|y| along(width).map(move |x| (x, y)));
-        for (x, y) in pixels.filter(|(x, y)| canvas.levels.at(*x, *y) > 0) {
-            let px = depth_from_half.apply([x as f64, y as f64]);
-            let (found, distance) = (canvas.levels.at(x, y), canvas.edge.grid().at(x, y));
-            let weights = Levelling::weights::<N>(px, size);
-            let [x, y] = weights[0].0;
-            let weight = ((f64::from(distance) - spread) / FULL_PX).clamp(-1.0, 1.0);
+        for &InkPixel { at, height, weight } in pixels {
+            let nodes = Levelling::weights::<N>(at, size);
+            let [x, y] = nodes[0].0;
             all_ink += f64::max(weight, 0.0);
             cells[y * (N - 1) + x].push(InkSample {
-                height: (f64::from(found) - f64::from(level)) * per_level,
+                height,
                 weight,
-                nodes: weights.map(|(_, weight)| weight),
+                nodes: nodes.map(|(_, weight)| weight),
             });
         }
         Self {
