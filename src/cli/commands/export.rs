@@ -185,18 +185,17 @@ fn print_summary(
     }))?;
     let missing = exported.missing_inputs.as_ref();
     let is_explained = |why: &str| missing.is_some_and(|missing| missing.explains(why));
-    let mut is_all_explained = missing.is_some();
-    for (block, why) in &summary.unreadable_blocks {
-        if !is_explained(why) {
-            is_all_explained = false;
-            context.warn(&format!("the export lacks files of block {block}: {why}"));
-        }
-    }
-    for (pair, why) in &summary.unreadable {
-        if !is_explained(why) {
-            is_all_explained = false;
-            context.warn(&format!("the export has no files of {pair}: {why}"));
-        }
+    let blocks = summary.unreadable_blocks.iter();
+    let blocks = blocks
+        .filter(|(_, why)| !is_explained(why))
+        .map(|(block, why)| format!("the export lacks files of block {block}: {why}"));
+    let pairs = summary.unreadable.iter();
+    let pairs = pairs
+        .filter(|(_, why)| !is_explained(why))
+        .map(|(pair, why)| format!("the export has no files of {pair}: {why}"));
+    let unexplained: Vec<String> = blocks.chain(pairs).collect();
+    for warning in &unexplained {
+        context.warn(warning);
     }
     if let Some(missing) = missing {
         context.warn(&missing.to_string());
@@ -218,6 +217,7 @@ fn print_summary(
     }
     if !summary.is_complete() {
         // A run trusts the catalog, so the check must come first. If most files or only inputs are missing, it says what to do.
+        let is_all_explained = missing.is_some() && unexplained.is_empty();
         if is_all_explained || summary.unreadable.len() as u64 > summary.pairs.done {
             context.next("check");
         } else {
