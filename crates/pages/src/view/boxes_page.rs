@@ -112,7 +112,7 @@ async fn block_json(
     // The block may have run, or its files may have changed, since the page was opened before.
     match state
         .shown
-        .again(|known| state.store.read_boxes(known))
+        .refresh(|known| state.store.read_boxes(known))
         .await
     {
         Ok(shown) => {

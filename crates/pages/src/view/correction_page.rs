@@ -153,7 +153,7 @@ async fn block_json(
     Extension(access): Extension<Arc<AccessControl>>,
 ) -> Response {
     // The block may have run, or its files may have changed, since the page was opened before.
-    match state.shown.again(|_| state.store.read_correction()).await {
+    match state.shown.refresh(|_| state.store.read_correction()).await {
         Ok(shown) => {
             let mut value = shown.to_json();
             value["csrf_token"] = json!(access.csrf_token());

@@ -35,7 +35,7 @@ impl<T> ReadOnce<T> {
     }
 
     /// Reads it again; `read` gets what was kept. Returns a sentence if that fails, and then keeps nothing.
-    pub(super) async fn again<F>(
+    pub(super) async fn refresh<F>(
         &self,
         read: impl FnOnce(Option<Arc<T>>) -> F,
     ) -> Result<Arc<T>, String>
@@ -68,9 +68,9 @@ mod tests {
         let same = kept.get(|| async { Err("read twice".to_owned()) }).await;
         assert_eq!(same.as_deref(), Ok(&1));
         let next =
-            kept.again(|known| async move { Ok(known.map_or(0, |known: Arc<i32>| *known) + 1) });
+            kept.refresh(|known| async move { Ok(known.map_or(0, |known: Arc<i32>| *known) + 1) });
         assert_eq!(next.await.as_deref(), Ok(&2));
-        let failed = kept.again(|_| async { Err("gone".to_owned()) }).await;
+        let failed = kept.refresh(|_| async { Err("gone".to_owned()) }).await;
         assert_eq!(failed, Err("gone".to_owned()));
         assert_eq!(kept.known().await, None);
     }
