@@ -18,7 +18,10 @@ use crate::queue::fail::{add_records, merged};
 use crate::queue::kind::{JobKind, StoredKind, Template};
 use crate::queue::pair_job::PairJob;
 use crate::{Catalog, Result};
-use mocban_core::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
+use mocban_core::domain::{FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
+
+/// A job is quarantined for killing workers only if its crashes reach this number.
+pub(crate) const CRASH_LIMIT: u32 = 3;
 
 /// A worker that holds leases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,7 +86,12 @@ GROUP BY w.id";
 
 /// Recovers the leases of the workers in `?1`, a list of `[worker, died, blamed]`. `blamed` is 1 if the worker died with
 /// only one lease, so that this pair or block is blamed. The interrupted attempt is not counted. Pairs of a worker that
-/// died must run exclusively from now on. The condition for status 4 (quarantined) is that of `domain::is_poisoned`.
+/// died must run exclusively from now on.
+///
+/// `crashes` counts the workers that died while they leased only this job, or hung on it; a finished stage resets it. `?3`
+/// counts recent worker deaths. If the job is the cause, they exceed its crashes by at most one, for a worker that also
+/// leased other jobs. Each further death suggests an external cause, such as killed processes, and raises the limit `?2` for
+/// status 4 (quarantined) by one.
 pub(crate) static RECOVER: Template = Template::new(
     "
 UPDATE {job} SET
@@ -166,9 +174,8 @@ impl Catalog {
     /// Recovers the leases of dead workers. Each pair or block becomes ready again, or is quarantined if it probably
     /// caused several deaths.
     ///
-    /// A pair or block is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned`
-    /// returns true, which also considers other recent deaths. Therefore, killing processes from outside rarely
-    /// quarantines one.
+    /// A pair or block is blamed for a death if it was the worker's only lease. The limit for its crashes rises with other
+    /// recent deaths. Therefore, killing processes from outside rarely quarantines one.
     pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
         in_transaction!(self, |conn| {
             let workers = mark_dead(conn, &dead).await?;

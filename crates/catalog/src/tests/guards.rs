@@ -2,11 +2,12 @@
 
 use super::{World, done, enter, fingerprints, inputs, name, register, row};
 use crate::db::query::query;
+use crate::lease_recovery::CRASH_LIMIT;
 use crate::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction, FingerprintIds, Lease,
     RerunPolicy, StageFailure,
 };
-use mocban_core::domain::{CRASH_LIMIT, Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
+use mocban_core::domain::{Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
 
 async fn status(world: &World) -> JobStatus {
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");

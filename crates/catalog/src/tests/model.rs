@@ -3,13 +3,31 @@
 use std::collections::BTreeMap;
 
 use super::state_machine::{Event, JobState, transition};
+use crate::lease_recovery::CRASH_LIMIT;
 use crate::{FingerprintIds, Lease, RerunPolicy};
-use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId, is_poisoned};
+use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 
 /// How long a worker counts as alive without a heartbeat.
 pub(super) const LEASE: i64 = 100;
 /// How many of the newest workers are searched for deaths.
 const LOOKED_AT: usize = 32;
+
+/// Returns whether a pair with this number of crashes is quarantined after this number of recent worker deaths.
+const fn is_poisoned(crashes: u32, deaths: u32) -> bool {
+    crashes >= CRASH_LIMIT + deaths.saturating_sub(crashes + 1)
+}
+
+#[test]
+fn the_third_crash_poisons_unless_others_died_too() {
+    assert!(!is_poisoned(2, 2));
+    assert!(is_poisoned(3, 3));
+    // The first death was shared.
+    assert!(is_poisoned(3, 4));
+    // Two deaths the pair had no part in.
+    assert!(!is_poisoned(3, 6));
+    assert!(!is_poisoned(4, 7));
+    assert!(is_poisoned(5, 8));
+}
 
 /// Expected state of a job.
 #[derive(Debug, Clone, Copy, PartialEq)]

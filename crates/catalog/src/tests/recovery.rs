@@ -3,8 +3,9 @@
 use super::blocks::attributes;
 use super::protocol::status;
 use super::{World, name, observed, register};
+use crate::lease_recovery::CRASH_LIMIT;
 use crate::{CheckpointOutcome, ClaimRequest, DeadWorker};
-use mocban_core::domain::{CRASH_LIMIT, FailureClass, JobStatus, Stage};
+use mocban_core::domain::{FailureClass, JobStatus, Stage};
 
 #[tokio::test]
 async fn the_third_crash_quarantines_the_pair_with_a_message() {

@@ -97,7 +97,7 @@ pub(super) enum Event {
     },
     /// The worker is dead, or its lease is overdue.
     Recover {
-        /// Whether the job is quarantined because it probably kills its workers: see `domain::is_poisoned`.
+        /// Whether the job is quarantined because it probably kills its workers: see `model::is_poisoned`.
         poisoned: bool,
     },
     /// Ends a back-off that is due, or whose end is so far away that the clock must have jumped.

@@ -72,7 +72,7 @@ pub use hash::{ContentHash, ContentHashError};
 pub use height_from_mesh::HeightFromMesh;
 pub use ids::{PairId, WorkerId};
 pub use input_version::InputVersion;
-pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
+pub use job::JobStatus;
 pub use levelling::Levelling;
 pub use mask_scale::{MaskReduction, MaskScale};
 pub use mesh_losses::MeshLosses;
