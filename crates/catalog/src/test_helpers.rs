@@ -9,8 +9,8 @@ use tokio::sync::{mpsc, oneshot};
 use crate::db::query::query_scalar;
 use crate::queue::commit::commit_delay::CommitDelay;
 use crate::{
-    Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, ImportTerms, Lease, Result,
-    StageCheckpoint,
+    Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, ImportTerms, Lease,
+    ListedVerdict, NewVerdict, Result, StageCheckpoint,
 };
 use mocban_core::domain::{PairId, PairName, Stage, UnixMillis, WorkerId};
 
@@ -35,6 +35,18 @@ impl Catalog {
         };
         let (_, stored) = self.import_all(chunks, terms, 1).await?;
         Ok(stored)
+    }
+
+    /// Appends verdicts on the current results. Returns the number of verdicts of which a row was appended.
+    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
+        let listed = verdicts.into_iter().map(|verdict| {
+            Ok(ListedVerdict {
+                verdict,
+                judged: None,
+                day: None,
+            })
+        });
+        Ok(self.import_verdicts(listed, now).await?.recorded)
     }
 
     /// Stores a stage without commit delay.

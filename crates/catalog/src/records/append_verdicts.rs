@@ -176,24 +176,9 @@ impl Catalog {
     /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
     /// the metric. Skips a verdict with `at` if a verdict with the same values, which was not undone, was stored before
     /// this call, or if the reviewer's newest verdict on the result is later. Skips a verdict without `at` and context if
-    /// it equals the reviewer's newest one. Returns the number of verdicts of which a row was appended.
-    ///
-    /// # Errors
-    /// As for [`Self::import_verdicts`].
-    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
-        let listed = verdicts.into_iter().map(|verdict| {
-            Ok(ListedVerdict {
-                verdict,
-                judged: None,
-                day: None,
-            })
-        });
-        Ok(self.import_verdicts(listed, now).await?.recorded)
-    }
-
-    /// Appends the verdicts of a list as [`Self::verdict_set`] does. Leaves out a verdict that names another result than the
-    /// current one. Skips a verdict with a day if an equal one of a list or command on this day, which was not undone, was
-    /// stored before this call. Reads the list in parts, so that it need not be in memory.
+    /// it equals the reviewer's newest one. Leaves out a verdict that names another result than the current one. Skips a
+    /// verdict with a day if an equal one of a list or command on this day, which was not undone, was stored before this
+    /// call. Reads the list in parts, so that it need not be in memory.
     ///
     /// # Errors
     /// Returns an error if a pair or the judged result does not exist, or if a database operation fails; also the first
