@@ -53,9 +53,6 @@ pub enum PngError {
         /// Bits per channel expected.
         wanted: u8,
     },
-    /// A mask with a value that is neither 0 nor 255.
-    #[error("the mask holds the value {0}, which is neither 0 nor 255")]
-    NotAMask(u8),
 }
 
 /// Encodes a grid as a 16-bit grey PNG.
@@ -97,12 +94,11 @@ pub fn png_grey8(grid: &Grid<u8>) -> Vec<u8> {
 /// Encodes a mask as an 8-bit grey PNG: 255 where it is set (stroke), 0 elsewhere.
 ///
 /// ```
-/// use mocban_core::raster::{Mask, decode_grey8, decode_mask, png_mask};
+/// use mocban_core::raster::{Mask, decode_grey8, png_mask};
 ///
 /// let mask = Mask::from_fn(4, 4, |x, y| x == y);
 /// let png = png_mask(&mask);
-/// assert_eq!(decode_grey8(&png)?.at(2, 2), 255);
-/// assert_eq!(decode_mask(&png)?, mask);
+/// assert_eq!(decode_grey8(&png)?, mask.map(|set| if *set { 255 } else { 0 }));
 /// # Ok::<(), mocban_core::raster::PngError>(())
 /// ```
 pub fn png_mask(mask: &Mask) -> Vec<u8> {
@@ -221,18 +217,6 @@ pub fn decode_grey8(bytes: &[u8]) -> Result<Grid<u8>, PngError> {
     Ok(Grid::from_vec(width, height, samples).expect("one byte for each pixel"))
 }
 
-/// Decodes a PNG that [`png_mask`] encoded.
-///
-/// # Errors
-/// Returns an error if the bytes are damaged, are not an 8-bit grey PNG, or contain a value other than 0 and 255.
-pub fn decode_mask(bytes: &[u8]) -> Result<Mask, PngError> {
-    let grey = decode_grey8(bytes)?;
-    match grey.data().iter().find(|v| !matches!(**v, 0 | 255)) {
-        Some(value) => Err(PngError::NotAMask(*value)),
-        None => Ok(grey.map(|value| *value == 255)),
-    }
-}
-
 /// Decodes a grey PNG of the given bit depth. Returns its width, height and bytes.
 fn grey_samples(bytes: &[u8], depth: png::BitDepth) -> Result<(usize, usize, Vec<u8>), PngError> {
     let wanted = depth as u8;
@@ -283,8 +267,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{
-        PngError, STREAMED_BYTES, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8,
-        png_grey16, png_mask, png_rgb8,
+        PngError, STREAMED_BYTES, decode_grey8, decode_grey16, jpeg_rgb8, png_grey8, png_grey16,
+        png_mask, png_rgb8,
     };
     use crate::domain::cancel::{CancelToken, Cancelled};
     use crate::raster::{Grid, ImageLimits, Mask, decode};
@@ -293,14 +277,13 @@ mod tests {
     fn mask_is_white_where_stroke_is() {
         let mask = Mask::from_fn(5, 3, |x, y| x == y);
         let bytes = png_mask(&mask);
-        assert_eq!(decode_grey8(&bytes).expect("reads").at(1, 1), 255);
-        assert_eq!(decode_mask(&bytes).expect("reads"), mask);
+        let grey = decode_grey8(&bytes).expect("reads");
+        assert_eq!(grey, mask.map(|set| if *set { 255 } else { 0 }));
     }
 
     #[test]
-    fn grey_image_is_rejected_as_a_mask() {
+    fn an_image_of_another_depth_is_refused() {
         let bytes = png_grey8(&Grid::new(2, 2, 7));
-        assert!(matches!(decode_mask(&bytes), Err(PngError::NotAMask(7))));
         assert!(matches!(decode_grey16(&bytes), Err(PngError::Kind { .. })));
     }
 

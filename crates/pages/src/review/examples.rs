@@ -105,7 +105,7 @@ mod tests {
     use crate::review::Language;
     use crate::review::item_images::ImageLayer;
     use mocban_core::domain::{Reason, Verdict};
-    use mocban_core::raster::{ImageLimits, decode, decode_mask};
+    use mocban_core::raster::{ImageLimits, decode, decode_grey8};
 
     #[test]
     fn every_reason_has_an_example() {
@@ -143,9 +143,10 @@ mod tests {
             let print = decode(bytes(ImageLayer::Print), &ImageLimits::SUGGESTED).expect("JPEG");
             let size = (print.rgb.width(), print.rgb.height());
             for kind in [ImageLayer::PrintMask, ImageLayer::DepthMask] {
-                let mask = decode_mask(bytes(kind)).expect("a mask");
+                let mask = decode_grey8(bytes(kind)).expect("a mask");
                 assert_eq!((mask.width(), mask.height()), size, "{id}");
-                assert!(mask.count() > 0, "{id}");
+                let values: BTreeSet<u8> = mask.data().iter().copied().collect();
+                assert_eq!(values, BTreeSet::from([0, 255]), "{id}");
             }
             assert!(layer(&id, ImageLayer::CanvasMask).is_none());
         }
