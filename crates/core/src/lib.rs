@@ -6,12 +6,14 @@
 //! - [`page_vec`]: vectors on huge pages, with a cache of freed pages
 //! - [`simd`]: dispatch to the widest vector instructions of the processor
 //! - [`zip_records`]: the records of ZIP archives
+//! - [`locked()`]: a value behind a lock
 //!
 //! **Invariant:** no file is opened here, no clock is read and nothing is asynchronous. Readers and decoders take bytes,
 //! so each function returns the same for the same arguments.
 
 pub mod domain;
 mod input_limits;
+mod locked;
 pub mod mesh;
 pub mod page_vec;
 pub mod raster;
@@ -19,3 +21,4 @@ pub mod simd;
 pub mod zip_records;
 
 pub use input_limits::InputLimits;
+pub use locked::locked;

@@ -1,7 +1,7 @@
 //! Imports pairs of meshes and prints into a project, which is created if there is none.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use crate::blocking::blocking;
 use crate::empty_import;
@@ -22,6 +22,7 @@ use crate::truth_file::{self, TruthRow};
 use mocban_catalog::{Catalog, ImportRow, ImportSummary, ImportTerms, SameFiles};
 use mocban_core::domain::cancel::{ThreadToken, poll};
 use mocban_core::domain::{LengthUnit, PairName};
+use mocban_core::locked;
 use mocban_lists::manifest::{ManifestRow, RowIds};
 use mocban_store::Project;
 use mocban_system::failpoint::{self, Point};
@@ -169,7 +170,7 @@ async fn store_in(
     let (sender, chunks) = mpsc::channel(WAITING_CHUNKS);
     let rows = Arc::clone(rows);
     let sent = blocking(move || {
-        let mut rows = rows.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut rows = locked(&rows);
         rows.send(&sender)
     });
     let stored = catalog.import_all(chunks, terms, now()).await;

@@ -2,9 +2,9 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
-use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use crate::failure::raise;
 use crate::log;
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
+use mocban_core::locked;
 
 /// Time between two looks for a signal.
 const SIGNAL_POLL: Duration = Duration::from_millis(50);
@@ -170,7 +171,7 @@ fn start<T: Send + 'static, E: Send + 'static>(
 /// Waits for a message; `None` if it is time to look for a signal.
 fn receive<T: Send, E: Send>(py: Python<'_>, receiver: &SentBy<T, E>) -> Option<Sent<T, E>> {
     let received = py.detach(|| {
-        let receiver = receiver.lock().unwrap_or_else(PoisonError::into_inner);
+        let receiver = locked(receiver);
         receiver.recv_timeout(SIGNAL_POLL)
     });
     match received {

@@ -3,12 +3,14 @@
 use std::collections::VecDeque;
 use std::fmt::{Debug, Write as _};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, Once, PoisonError};
+use std::sync::{Mutex, MutexGuard, Once};
 
 use pyo3::prelude::*;
 use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Level, Metadata, Subscriber};
+
+use mocban_core::locked;
 
 /// Messages that wait for a thread with the GIL; older ones are dropped.
 const MAX_WAITING: usize = 1000;
@@ -19,7 +21,7 @@ static WAITING: Mutex<VecDeque<(u32, String)>> = Mutex::new(VecDeque::new());
 static INSTALL: Once = Once::new();
 
 fn waiting() -> MutexGuard<'static, VecDeque<(u32, String)>> {
-    WAITING.lock().unwrap_or_else(PoisonError::into_inner)
+    locked(&WAITING)
 }
 
 /// Receives the messages of this process from now on. Panics print nothing any more.

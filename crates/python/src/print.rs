@@ -1,7 +1,7 @@
 //! The image of a print, from an array or a file.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -10,6 +10,7 @@ use crate::compute::{NativeCancel, compute};
 use crate::failure::{raise, unreadable};
 use crate::settings::NativeSettings;
 use mocban_align::stages::{Print, normalize};
+use mocban_core::locked;
 use mocban_core::raster::{PrintSamples, SampleSlice};
 use mocban_project::align::{self, ReadPrint};
 
@@ -41,7 +42,7 @@ impl NativePrint {
     pub(crate) fn image(&self) -> impl FnOnce() -> Arc<Print> + Send + use<> {
         let source = Arc::clone(&self.source);
         move || {
-            let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut source = locked(&source);
             let print = match &*source {
                 PrintSource::Image(print) => return Arc::clone(print),
                 PrintSource::Samples(samples) => Arc::new(samples.to_image().into()),

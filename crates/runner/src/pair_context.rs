@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use serde::de::DeserializeOwned;
@@ -13,6 +13,7 @@ use mocban_align::stages::normalize::Normalized;
 use mocban_align::stages::{Print, Scan};
 use mocban_catalog::{InputVersions, PairAttributes, PairWork};
 use mocban_core::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
+use mocban_core::locked;
 use mocban_core::raster::DepthMap;
 use mocban_system::platform::ActiveClock;
 
@@ -32,13 +33,13 @@ pub(super) struct FileInUse(Arc<Mutex<Option<PathBuf>>>);
 impl FileInUse {
     /// Stores the path of the file that is read from now on. `None` means that no file is read.
     pub(super) fn set(&self, path: Option<&Path>) {
-        let mut file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut file = locked(&self.0);
         *file = path.map(Path::to_owned);
     }
 
     /// Returns the file.
     pub(super) fn get(&self) -> Option<PathBuf> {
-        let file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let file = locked(&self.0);
         file.clone()
     }
 }

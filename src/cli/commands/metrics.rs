@@ -1,7 +1,7 @@
 //! `--metrics`: serves the counts and times of a run to Prometheus.
 
 use std::net::{Ipv4Addr, SocketAddr};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use axum::Router;
@@ -13,6 +13,7 @@ use tokio::net::TcpListener;
 use tokio::task::AbortHandle;
 
 use crate::cli::output::context::Context;
+use mocban_core::locked;
 use mocban_pages::local_server::{ConnectionLimits, ServedNames, listen, serve};
 use mocban_project::Refusal;
 use mocban_runner::RunMetrics;
@@ -116,7 +117,7 @@ struct RenderedMetrics(Mutex<Option<(Instant, Bytes)>>);
 impl RenderedMetrics {
     fn at(&self, now: Instant, render: impl FnOnce() -> String) -> Bytes {
         let interval = RENDER_INTERVAL / time_scale("MOCBAN_TIME_SCALE");
-        let mut rendered = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut rendered = locked(&self.0);
         match &*rendered {
             Some((at, text)) if now.duration_since(*at) < interval => text.clone(),
             _ => {

@@ -6,7 +6,7 @@
 
 use std::hash::{BuildHasher as _, RandomState};
 use std::io::Write as _;
-use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Instant;
 
 use clap::ColorChoice;
@@ -14,6 +14,7 @@ use indicatif::{MultiProgress, ProgressBar};
 
 use super::equal_warnings::EqualWarnings;
 use mocban_core::domain::{one_line, visible, visible_json};
+use mocban_core::locked;
 
 /// Beginning of the program's own terminal codes. It contains a random number.
 static OWN_CODE: LazyLock<String> =
@@ -57,7 +58,7 @@ impl Screen {
 
     /// Writes a warning, or counts it if equal ones were written before.
     pub(crate) fn warning(&self, label: &str, text: &str) {
-        let lines = self.warnings().add(label, text, Instant::now());
+        let lines = locked(&self.warnings).add(label, text, Instant::now());
         for line in &lines {
             self.line(line);
         }
@@ -65,14 +66,10 @@ impl Screen {
 
     /// Writes the numbers of warnings that were only counted.
     pub(crate) fn count_warnings(&self) {
-        let lines = self.warnings().take();
+        let lines = locked(&self.warnings).take();
         for line in &lines {
             self.line(line);
         }
-    }
-
-    fn warnings(&self) -> MutexGuard<'_, EqualWarnings> {
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Writes a line, above the bar if there is one. Escapes hidden characters, as [`terminal_text`] does.

@@ -1,11 +1,12 @@
 //! Shows the events of a command on stderr.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use super::busy::Busy;
 use super::context::Context;
 use super::progress::ProgressReporter;
 use crate::cli::input::global::ProgressMode;
+use mocban_core::locked;
 use mocban_project::events::{Listener, ProjectEvent};
 use mocban_runner::RunEvent;
 
@@ -63,8 +64,4 @@ impl Listener for Terminal<'_> {
             }
         }
     }
-}
-
-fn locked<T>(value: &Mutex<T>) -> MutexGuard<'_, T> {
-    value.lock().unwrap_or_else(PoisonError::into_inner)
 }

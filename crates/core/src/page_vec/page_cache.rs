@@ -1,9 +1,11 @@
 //! Cache of memory pages, reused from one vector to the next.
 
 use std::ops::{Deref, DerefMut};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 use memmap2::MmapMut;
+
+use crate::locked::locked;
 
 /// The cache of the process holds at most this many bytes.
 const MAX_CACHED_BYTES: usize = 128 << 20;
@@ -61,9 +63,9 @@ impl PageCache {
     }
 }
 
-/// Returns the cache of the process. A poisoned lock is harmless, because a panic cannot leave the cache inconsistent.
+/// Returns the cache of the process.
 fn cache() -> MutexGuard<'static, PageCache> {
-    PAGE_CACHE.lock().unwrap_or_else(PoisonError::into_inner)
+    locked(&PAGE_CACHE)
 }
 
 /// Pages of memory with arbitrary content.

@@ -1,11 +1,12 @@
 //! The format `mesh`: scans in the frame of their prints.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use super::single_results::{FileOfPair, ShownResult, SingleResultFormat};
 use crate::format_writer::PairView;
 use crate::mesh::{ScanFiles, ScanTitle};
 use crate::pair_pictures::PictureError;
+use mocban_core::locked;
 
 const SCAN: &str = "the scan, binary PLY in millimetres: per vertex the colour of the print, `stroke` (1 on strokes) and \
     `height` over the fitted surface";
@@ -84,7 +85,7 @@ impl SingleResultFormat for PlacedScanFormat {
         };
         let mesh = {
             // The lock guards no data, so a panic of another thread does not matter.
-            let _reading = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
+            let _reading = locked(&self.reading);
             pictures.mesh()?.welded()
         };
         let files = ScanFiles::new(mesh, &placement, &print, &title)

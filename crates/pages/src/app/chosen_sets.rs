@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::SystemTime;
 
 use tokio::task::spawn_blocking;
@@ -13,6 +13,7 @@ use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
 use mocban_core::domain::{ContentHash, PairName, one_line};
+use mocban_core::locked;
 use mocban_store::{create_folders, open_regular, read_up_to, write_atomic};
 
 /// Name of the key in addresses.
@@ -46,7 +47,7 @@ impl ChosenSets {
         let key = key_of(project, &text);
         {
             // Each change leaves the list whole.
-            let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut kept = locked(&self.0);
             kept.retain(|known| known.key != key);
             if kept.len() >= LIMIT {
                 kept.remove(0);
@@ -79,7 +80,7 @@ impl ChosenSets {
             return Ok(None);
         };
         {
-            let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let kept = locked(&self.0);
             if let Some(found) = kept.iter().find(|known| known.key == key) {
                 if found.project != project {
                     return Err(AppFailure::refused(of_another(&found.project)));

@@ -1,6 +1,6 @@
 //! A file of an upload while it arrives.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use tokio::sync::{mpsc, oneshot};
@@ -11,6 +11,7 @@ use super::received_files::FilePiece;
 use super::sentence::Sentence;
 use crate::local_server::WorkFailed;
 use mocban_core::domain::cancel::CancelGuard;
+use mocban_core::locked;
 
 /// When the last piece of a file arrived. `None` if no file is arriving, as while an archive is unpacked.
 #[derive(Debug, Clone, Default)]
@@ -18,12 +19,12 @@ pub(super) struct LastPiece(Arc<Mutex<Option<Instant>>>);
 
 impl LastPiece {
     pub(super) fn get(&self) -> Option<Instant> {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        *locked(&self.0)
     }
 
     pub(super) fn set(&self, at: Option<Instant>) {
         // A single assignment.
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = at;
+        *locked(&self.0) = at;
     }
 }
 

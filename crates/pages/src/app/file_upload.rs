@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use serde::Deserialize;
@@ -17,6 +17,7 @@ use super::sentence::Sentence;
 use super::upload_sentence::{busy, cut, cut_with_rest, ended, incomplete, storing, taken_over};
 use crate::local_server::WorkFailed;
 use mocban_core::domain::cancel::{CancelGuard, CancelToken};
+use mocban_core::locked;
 use mocban_system::failpoint::time_scale;
 
 /// A browser that has sent nothing for this long between two files is closed.
@@ -352,7 +353,7 @@ impl FileUpload {
 
     pub(super) fn lock(&self) -> MutexGuard<'_, UploadState> {
         // Each change is a single assignment.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.state)
     }
 }
 

@@ -1,11 +1,12 @@
 //! The reviews and blocks that are open. Each belongs to one catalog: if the project is made anew, it is opened again.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use axum::Router;
 
 use super::projects::OpenProject;
+use mocban_core::locked;
 
 /// Project, reviewer or block, and what the pages show.
 pub(super) type PagesId = [String; 3];
@@ -36,7 +37,7 @@ impl OpenPages {
 
     /// Returns the pages that are open for this catalog.
     pub(super) fn get(&self, id: &PagesId, project: &Arc<OpenProject>) -> Option<Router> {
-        let mut kept = self.lock();
+        let mut kept = locked(&self.kept);
         let now = next_use(&kept);
         let pages = kept.get_mut(id)?;
         if !Arc::ptr_eq(&pages.project, project) {
@@ -48,13 +49,13 @@ impl OpenPages {
 
     /// Closes pages, so that they are opened again with what the catalog has now.
     pub(super) fn close(&self, id: &PagesId) {
-        self.lock().remove(id);
+        locked(&self.kept).remove(id);
     }
 
     /// Keeps pages, unless they were opened meanwhile, and returns the kept pages. If there are too many, closes the least
     /// recently used.
     pub(super) fn keep(&self, id: PagesId, project: &Arc<OpenProject>, pages: Router) -> Router {
-        let mut kept = self.lock();
+        let mut kept = locked(&self.kept);
         let used = next_use(&kept);
         let same = kept.get(&id);
         let same = same.filter(|same| Arc::ptr_eq(&same.project, project));
@@ -72,11 +73,6 @@ impl OpenPages {
         };
         kept.insert(id, opened);
         pages
-    }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<PagesId, KeptPages>> {
-        // Each change leaves the map whole.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

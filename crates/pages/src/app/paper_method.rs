@@ -1,6 +1,6 @@
 //! A pair aligned by the method of the paper, beside its stored result. It is computed when a page asks for it, and not stored.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use axum::body::Bytes;
@@ -15,6 +15,7 @@ use mocban_align::stages::{AlignmentMethod, Print, Scan, ScanHints, Settings};
 use mocban_catalog::PairResults;
 use mocban_core::InputLimits;
 use mocban_core::domain::{ContentHash, MetricOutcome, ThresholdMetric};
+use mocban_core::locked;
 use mocban_export::pictures::PrintView;
 use mocban_export::{PictureError, SourcePrint, read_mesh};
 use mocban_project::align::align_pair;
@@ -76,7 +77,10 @@ impl PaperMethod {
         let [project, name] = [open.key.as_str(), pair.attributes.name.as_str()];
         let key = format!("{project}\0{name}\0{}\0{text}", stored.result_hash.to_hex());
         let key = ContentHash::of(key.as_bytes());
-        let known = self.lock().iter().find(|(known, _)| *known == key).cloned();
+        let known = locked(&self.kept)
+            .iter()
+            .find(|(known, _)| *known == key)
+            .cloned();
         if let Some((_, known)) = known {
             return Ok(known);
         }
@@ -90,18 +94,13 @@ impl PaperMethod {
         let computed = computed.map_err(|_elapsed| AppFailure::refused(too_long(longest)))??;
         let computed = computed.map_err(|error| AppFailure::of(error, &open.dir))?;
         let computed = Arc::new(computed);
-        let mut kept = self.lock();
+        let mut kept = locked(&self.kept);
         kept.retain(|(known, _)| *known != key);
         if kept.len() >= KEPT {
             kept.remove(0);
         }
         kept.push((key, Arc::clone(&computed)));
         Ok(computed)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Vec<(ContentHash, Arc<PaperOutcome>)>> {
-        // Each change leaves the list whole.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

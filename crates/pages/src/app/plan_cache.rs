@@ -2,9 +2,10 @@
 
 use std::collections::VecDeque;
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use mocban_core::domain::ContentHash;
+use mocban_core::locked;
 use mocban_project::ProjectResult;
 use mocban_project::files::list_below;
 use mocban_project::import_pairs::PairSource;
@@ -48,10 +49,10 @@ impl PlanCache {
         {
             return Ok(same);
         }
-        self.lock().retain(|kept| kept.choices != choices);
+        locked(&self.0).retain(|kept| kept.choices != choices);
         let names = names?;
         let plan = Arc::new(plan(source)?);
-        let mut all = self.lock();
+        let mut all = locked(&self.0);
         // Another request may have made the same plan meanwhile.
         all.retain(|kept| kept.choices != choices);
         all.truncate(KEPT_PLANS - 1);
@@ -69,14 +70,9 @@ impl PlanCache {
     }
 
     fn find(&self, is_wanted: impl Fn(&KeptPlan) -> bool) -> Option<Arc<ImportPlan>> {
-        let all = self.lock();
+        let all = locked(&self.0);
         let found = all.iter().find(|kept| is_wanted(kept));
         found.map(|kept| Arc::clone(&kept.plan))
-    }
-
-    /// Locks the plans. No plan is made meanwhile.
-    fn lock(&self) -> MutexGuard<'_, VecDeque<KeptPlan>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::io::{self, ErrorKind};
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +13,7 @@ use super::read_only::ReadOnlyPlace;
 use super::sentence::Sentence;
 use mocban_core::domain::spelling::fold_case;
 use mocban_core::domain::{is_hidden, one_line};
+use mocban_core::locked;
 use mocban_project::files::small;
 use mocban_project::own_files::VIEWS_FILE;
 use mocban_store::{TargetLock, TargetLockError, write_atomic};
@@ -132,7 +133,7 @@ pub(super) fn read(dir: &Path) -> AppResult<Vec<SavedView>> {
 /// lost.
 pub(super) fn change(dir: &Path, change: ViewChange) -> AppResult<()> {
     let file = dir.join(VIEWS_FILE);
-    let _turn = CHANGES.lock().unwrap_or_else(PoisonError::into_inner);
+    let _turn = locked(&CHANGES);
     let _lock = TargetLock::acquire(&file).map_err(|error| match error {
         TargetLockError::InUse { .. } => AppFailure::conflict(in_use()),
         TargetLockError::Io { source, .. } => not_written(source, dir),

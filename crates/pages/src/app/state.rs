@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use super::chosen_sets::ChosenSets;
 use super::failed_runs::FailedRuns;
@@ -19,6 +19,7 @@ use super::uploads::Uploads;
 use super::zip_sizes::ZipSizes;
 use crate::local_server::WorkThread;
 use crate::review::{Language, PictureWork};
+use mocban_core::locked;
 use mocban_project::blocking::blocking;
 
 /// Options of the app.
@@ -95,42 +96,32 @@ impl AppState {
 
     /// Returns the language that the user or the command has chosen.
     pub(super) fn language(&self) -> Option<Language> {
-        *self.lock_language()
+        *locked(&self.language)
     }
 
     /// Changes the language of all pages.
     pub(super) fn set_language(&self, language: Language) {
-        *self.lock_language() = Some(language);
-    }
-
-    fn lock_language(&self) -> MutexGuard<'_, Option<Language>> {
-        // Each change is a single assignment.
-        self.language.lock().unwrap_or_else(PoisonError::into_inner)
+        *locked(&self.language) = Some(language);
     }
 
     /// Returns an open project by its name. Only projects of the folder have names, so no address leads elsewhere.
     pub(super) async fn open(&self, key: &str) -> AppResult<Arc<OpenProject>> {
-        let known = self.lock_projects().get(key).cloned();
+        let known = locked(&self.projects).get(key).cloned();
         if let Some(open) = known.filter(|open| open.is_current()) {
             return Ok(open);
         }
         let folder = self.options.folder.clone();
         let mut found = blocking(move || find(&folder)).await?.into_iter();
         let Some(found) = found.find(|found| found.key == key) else {
-            self.lock_projects().remove(key);
+            locked(&self.projects).remove(key);
             return Err(AppFailure::not_found());
         };
         // Other projects do not wait for a server that does not answer.
         let open = OpenProject::open(found).await?;
-        let mut projects = self.lock_projects();
+        let mut projects = locked(&self.projects);
         let kept = projects.get(key).filter(|kept| kept.is_same(&open));
         let kept = kept.cloned().unwrap_or(open);
         projects.insert(key.to_owned(), Arc::clone(&kept));
         Ok(kept)
-    }
-
-    fn lock_projects(&self) -> MutexGuard<'_, BTreeMap<String, Arc<OpenProject>>> {
-        // Each change is a single insertion or removal.
-        self.projects.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,12 +1,13 @@
 //! Long work of the app itself, such as exports: one of a kind at a time for each project, and what became of it.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use super::failure::{AppFailure, AppResult};
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use crate::on_thread::on_thread;
+use mocban_core::locked;
 use mocban_project::location::Location;
 use mocban_project::{ProjectError, ProjectResult};
 
@@ -90,7 +91,7 @@ impl AppTasks {
     {
         let id = (name.to_owned(), kind);
         {
-            let mut tasks = self.lock();
+            let mut tasks = locked(&self.0);
             if matches!(tasks.get(&id), Some(TaskState::Running)) {
                 return Err(AppFailure::refused(Sentence::new(
                     "this is already being done",
@@ -105,25 +106,20 @@ impl AppTasks {
                 Ok(done) => TaskState::Done(done),
                 Err(error) => TaskState::Failed(explain(&error)),
             };
-            tasks.lock().insert(id, state);
+            locked(&tasks.0).insert(id, state);
         });
         Ok(())
     }
 
     /// Notes why a task of an earlier process failed, unless another one was started since. Returns the state of the task.
     pub(super) fn note_failure(&self, kind: TaskKind, name: &str, why: Sentence) -> TaskState {
-        let mut tasks = self.lock();
+        let mut tasks = locked(&self.0);
         let state = tasks.entry((name.to_owned(), kind));
         state.or_insert(TaskState::Failed(why)).clone()
     }
 
     /// Returns the state of the last task of a kind for the project with a name.
     pub(super) fn state(&self, kind: TaskKind, name: &str) -> Option<TaskState> {
-        self.lock().get(&(name.to_owned(), kind)).cloned()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<(String, TaskKind), TaskState>> {
-        // Each change is a single insertion.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0).get(&(name.to_owned(), kind)).cloned()
     }
 }

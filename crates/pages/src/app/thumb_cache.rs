@@ -1,9 +1,11 @@
 //! The small pictures that were drawn last, so that a gallery that is shown again needs no file.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use axum::body::Bytes;
+
+use mocban_core::locked;
 
 /// Most bytes that are kept.
 const MAX_BYTES: usize = 32 << 20;
@@ -22,13 +24,13 @@ struct CachedThumbs {
 impl ThumbCache {
     /// Returns a picture that was kept.
     pub(super) fn get(&self, key: &str) -> Option<Bytes> {
-        let cached = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let cached = locked(&self.0);
         cached.by_key.get(key).cloned()
     }
 
     /// Keeps a picture.
     pub(super) fn add(&self, key: String, picture: Bytes) {
-        let mut cached = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut cached = locked(&self.0);
         cached.bytes += picture.len();
         if let Some(earlier) = cached.by_key.insert(key.clone(), picture) {
             cached.bytes -= earlier.len();

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use super::failure::{AppFailure, AppResult};
@@ -14,6 +14,7 @@ use super::upload_sentence::{
     MAX_FILES, ended, left_over, not_written, nothing, same_files, silent, too_many,
     too_many_uploads,
 };
+use mocban_core::locked;
 use mocban_store::NewFolder;
 use mocban_system::platform;
 
@@ -88,7 +89,7 @@ impl Uploads {
         if let Some(resumed) = resumed {
             return Ok(resumed);
         }
-        refuse_same(&self.lock(), files)?;
+        refuse_same(&locked(&self.open), files)?;
         if !self.make_place() {
             return refuse(too_many_uploads());
         }
@@ -96,7 +97,7 @@ impl Uploads {
         let folder = folder.map_err(|error| AppFailure::refused(not_written(&error)))?;
         let received = Box::new(ReceivedFiles::new(folder, Arc::default()));
         let upload = Arc::new(FileUpload::new(files.clone(), received));
-        let mut open = self.lock();
+        let mut open = locked(&self.open);
         // Others may have begun meanwhile. The files are removed after the lock.
         refuse_same(&open, files)?;
         if open.len() >= MAX_OPEN {
@@ -110,7 +111,7 @@ impl Uploads {
     /// Resumes an interrupted upload of the same files under a new number, so that the page that sent them before cannot go on
     /// too.
     fn resume(&self, files: &AnnouncedFiles) -> Option<(u64, Vec<ArrivedFile>)> {
-        let mut open = self.lock();
+        let mut open = locked(&self.open);
         let mut same = open.values().filter(|upload| upload.is_of(files));
         let received = same.find_map(|upload| upload.give_up())?;
         let arrived = received.arrived().to_vec();
@@ -123,7 +124,7 @@ impl Uploads {
     /// Interrupts the upload of the same files by another page, if nothing more of it arrives. Then it can be resumed.
     pub(super) async fn interrupt_silent(&self, files: &AnnouncedFiles) {
         let silent = {
-            let (open, now) = (self.lock(), Instant::now());
+            let (open, now) = (locked(&self.open), Instant::now());
             let mut same = open.values().filter(|upload| upload.is_of(files));
             let silent = same.find(|upload| upload.activity(now) == Some(UploadActivity::Silent));
             silent.cloned()
@@ -137,7 +138,7 @@ impl Uploads {
     /// hour, but evicts the oldest if the limit is reached. Returns whether another upload may begin.
     fn make_place(&self) -> bool {
         let removed: Vec<_> = {
-            let mut open = self.lock();
+            let mut open = locked(&self.open);
             let is_over = |_: &u64, upload: &mut Arc<FileUpload>| upload.is_over();
             let mut removed: Vec<_> = open.extract_if(.., is_over).collect();
             if open.len() >= MAX_OPEN {
@@ -150,7 +151,7 @@ impl Uploads {
         };
         // Their files are removed without the lock.
         drop(removed);
-        self.lock().len() < MAX_OPEN
+        locked(&self.open).len() < MAX_OPEN
     }
 
     /// Returns an upload.
@@ -158,22 +159,17 @@ impl Uploads {
     /// # Errors
     /// Returns an error if there is none any more.
     pub(super) fn find(&self, id: u64) -> AppResult<Arc<FileUpload>> {
-        let found = self.lock().get(&id).cloned();
+        let found = locked(&self.open).get(&id).cloned();
         found.ok_or_else(|| AppFailure::refused(ended()))
     }
 
     /// Says why the last upload failed, until the next one begins.
     pub(super) fn problem(&self) -> Option<Sentence> {
-        let open = self.lock();
+        let open = locked(&self.open);
         let last = open.last_key_value();
         let last = last.and_then(|(_, upload)| upload.problem());
         let is_first = open.is_empty() && self.next.load(Ordering::Relaxed) == 1;
         last.or_else(|| (self.has_left_over && is_first).then(left_over))
-    }
-
-    fn lock(&self) -> MutexGuard<'_, OpenUploads> {
-        // Each change is a single insertion or removal.
-        self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
+use mocban_core::locked;
 use mocban_export::{ExportVersion, zip_size};
 
 /// The sizes of the archives of exports, which are worked out once for each export.
@@ -30,7 +31,7 @@ impl ZipSizes {
         let Some(version) = ExportVersion::of(dir) else {
             return ZipSize::NoArchive;
         };
-        let mut sizes = self.lock();
+        let mut sizes = locked(&self.0);
         if let Some((_, size)) = sizes.get(dir).filter(|(known, _)| *known == version) {
             return *size;
         }
@@ -39,13 +40,8 @@ impl ZipSizes {
         let (sizes, dir, folder) = (self.clone(), dir.to_owned(), folder.to_owned());
         tokio::task::spawn_blocking(move || {
             let size = zip_size(&dir, &folder).map_or(ZipSize::NoArchive, ZipSize::Bytes);
-            sizes.lock().insert(dir, (version, size));
+            locked(&sizes.0).insert(dir, (version, size));
         });
         ZipSize::InWork
-    }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<PathBuf, KnownSize>> {
-        // Each change is a single insertion or removal.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,7 +1,7 @@
 //! Serves one connection within time limits.
 
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -18,6 +18,7 @@ use tokio::net::TcpStream;
 use tokio::sync::{Notify, watch};
 use tokio::time::Instant;
 
+use mocban_core::locked;
 use mocban_system::failpoint::time_scale;
 use mocban_system::platform;
 
@@ -108,18 +109,18 @@ impl Activity {
 
     /// Returns the start of the idle time, or `None` while a request is served or the next part of a response is created.
     pub(super) fn idle_since(&self) -> Option<Instant> {
-        *self.lock()
+        *locked(&self.idle_since)
     }
 
     /// Marks the connection as busy until the returned value is dropped.
     fn begin(self: &Arc<Self>) -> RequestInProgress {
-        *self.lock() = None;
+        *locked(&self.idle_since) = None;
         RequestInProgress(Arc::clone(self))
     }
 
     /// Begins the idle time anew, because a part of a response was sent.
     fn proceed(&self) {
-        let mut idle_since = self.lock();
+        let mut idle_since = locked(&self.idle_since);
         if idle_since.is_some() {
             *idle_since = Some(Instant::now());
         }
@@ -135,13 +136,6 @@ impl Activity {
             }
         }
     }
-
-    /// Locks the state. A poisoned lock is ignored, because each change is a single assignment.
-    fn lock(&self) -> MutexGuard<'_, Option<Instant>> {
-        self.idle_since
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 /// A request that a connection serves.
@@ -150,7 +144,7 @@ struct RequestInProgress(Arc<Activity>);
 
 impl Drop for RequestInProgress {
     fn drop(&mut self) {
-        *self.0.lock() = Some(Instant::now());
+        *locked(&self.0.idle_since) = Some(Instant::now());
         self.0.idle.notify_one();
     }
 }
@@ -283,7 +277,7 @@ mod tests {
     use futures_util::stream;
     use tokio::time::Instant;
 
-    use super::{Activity, SentBody};
+    use super::{Activity, SentBody, locked};
 
     #[test]
     fn a_response_is_idle_only_while_the_client_reads_a_part() {
@@ -317,10 +311,10 @@ mod tests {
         let activity = Arc::new(Activity::new(Arc::default()));
         let minute = Duration::from_mins(1);
         let earlier = Instant::now().checked_sub(minute);
-        *activity.lock() = earlier;
+        *locked(&activity.idle_since) = earlier;
         activity.proceed();
         assert!(activity.idle_since() > earlier);
-        *activity.lock() = None;
+        *locked(&activity.idle_since) = None;
         activity.proceed();
         assert_eq!(activity.idle_since(), None, "a request is served");
     }

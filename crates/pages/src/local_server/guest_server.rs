@@ -1,7 +1,7 @@
 //! A server for people who were invited. Each has a session of their own, which sees only the pages of the invitation.
 
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use axum::extract::{Request, State};
 use axum::http::Uri;
@@ -15,6 +15,7 @@ use super::guarded_pages::{respond, start_token};
 use super::server::{ServerError, bind};
 use super::session::START;
 use mocban_core::domain::ContentHash;
+use mocban_core::locked;
 
 /// Name of the cookies.
 const COOKIE: &str = "guest";
@@ -88,7 +89,7 @@ impl GuestServer {
         let access = Arc::new(access.map_err(ServerError::Token)?);
         let router = access.guarded(pages.layer(Extension(Arc::clone(&access))));
         let guest = (Arc::clone(&access), router);
-        self.sessions.lock().push(guest);
+        locked(&self.sessions.guests).push(guest);
         Ok(Guest {
             access,
             sessions: Arc::clone(&self.sessions),
@@ -117,7 +118,7 @@ impl Guest {
 impl Drop for Guest {
     /// Ends the session.
     fn drop(&mut self) {
-        let mut guests = self.sessions.lock();
+        let mut guests = locked(&self.sessions.guests);
         guests.retain(|(access, _)| !Arc::ptr_eq(access, &self.access));
     }
 }
@@ -125,18 +126,13 @@ impl Drop for Guest {
 impl GuestSessions {
     /// Returns the pages of the guest whose session a request names. The guard of these pages then asks for the cookie.
     fn pages(&self, uri: &Uri) -> Router {
-        let guests = self.lock();
+        let guests = locked(&self.guests);
         let found = guests.iter().find(|(access, _)| {
             let session = &access.session;
             session.page(uri.path()).is_some()
                 || (uri.path() == START && session.has_token(start_token(uri.query())))
         });
         found.map_or_else(|| self.nobody.clone(), |(_, pages)| pages.clone())
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Vec<(Arc<AccessControl>, Router)>> {
-        // Each change leaves the list whole.
-        self.guests.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

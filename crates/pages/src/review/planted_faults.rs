@@ -1,13 +1,14 @@
 //! Plants the faults of a queue, each once. If files of a result cannot be read, another result takes its place.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use super::check_items::{FaultCandidates, plant_fault};
 use super::item::{ItemView, ReviewItem};
 use crate::local_server::{WorkFailed, WorkThread};
 use mocban_catalog::{Catalog, CatalogError};
 use mocban_core::domain::{AttentionCheck, ContentHash, SeededRandom, Stage};
+use mocban_core::locked;
 use mocban_results::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_store::Project;
 
@@ -96,7 +97,7 @@ impl FaultPlanter {
                 Err(error) => drop(failure.get_or_insert((&item.pair, error))),
             }
         }
-        *self.planted.lock().unwrap_or_else(PoisonError::into_inner) = planted;
+        *locked(&self.planted) = planted;
         let shortage = failure.filter(|_| items.len() < wanted);
         Ok(Faults {
             shortage: shortage.map(|(pair, error)| FaultShortage {
@@ -133,8 +134,6 @@ impl FaultPlanter {
     }
 
     fn known(&self, view: &ContentHash) -> Option<(AttentionCheck, ItemView)> {
-        let planted = self.planted.lock();
-        let planted = planted.unwrap_or_else(PoisonError::into_inner);
-        planted.get(view).cloned()
+        locked(&self.planted).get(view).cloned()
     }
 }

@@ -1,7 +1,7 @@
 //! State shared by the request handlers: the catalog, the reviewer's options, and the items served so far.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use super::image_cache::ImageCache;
 use super::item::ReviewItem;
@@ -10,6 +10,7 @@ use super::planted_faults::{FaultPlanter, QueueError};
 use super::review_queue::ReviewQueue;
 use super::unstored::UnstoredEvents;
 use mocban_catalog::Catalog;
+use mocban_core::locked;
 use mocban_store::Project;
 
 /// State of one reviewer's pages.
@@ -32,35 +33,22 @@ impl ServerState {
     /// Reads the queue from the current state of the catalog and remembers its items.
     pub(super) async fn load_queue(&self) -> Result<ReviewQueue, QueueError> {
         let queue = ReviewQueue::read(&self.catalog, &self.planter, &self.options.queue).await?;
-        let mut served = self.lock_served();
+        let mut served = locked(&self.served_items);
         for item in &queue.items {
             served.insert(item.id.clone(), Arc::clone(item));
         }
         drop(served);
-        self.lock_current().clone_from(&queue.items);
+        locked(&self.current_items).clone_from(&queue.items);
         Ok(queue)
     }
 
     /// Returns the items of the queue that was read last.
     pub(super) fn current_items(&self) -> Vec<Arc<ReviewItem>> {
-        self.lock_current().clone()
-    }
-
-    fn lock_current(&self) -> MutexGuard<'_, Vec<Arc<ReviewItem>>> {
-        // Each change is a single assignment.
-        self.current_items
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        locked(&self.current_items).clone()
     }
 
     /// Returns a served item by its id.
     pub(super) fn item(&self, id: &str) -> Option<Arc<ReviewItem>> {
-        self.lock_served().get(id).cloned()
-    }
-
-    /// Locks the served items. A poisoned lock is ignored, because the map is consistent even after a panic.
-    fn lock_served(&self) -> MutexGuard<'_, BTreeMap<String, Arc<ReviewItem>>> {
-        let locked = self.served_items.lock();
-        locked.unwrap_or_else(PoisonError::into_inner)
+        locked(&self.served_items).get(id).cloned()
     }
 }

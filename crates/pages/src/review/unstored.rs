@@ -1,10 +1,11 @@
 //! Requests of the page that the catalog has not confirmed, so that the browser keeps them.
 
 use std::collections::BTreeSet;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 use std::time::Duration;
 
 use mocban_catalog::CatalogError;
+use mocban_core::locked;
 use mocban_system::failpoint::time_scale;
 
 /// Maximum time until the catalog confirms a request. The page then keeps it and sends it again.
@@ -65,7 +66,7 @@ impl UnstoredEvents {
             Ok(stored) => stored.map_err(Unconfirmed::from),
             Err(_elapsed) => Err(Unconfirmed::NoReply),
         };
-        let mut events = self.lock();
+        let mut events = locked(&self.0);
         if stored.as_ref().is_err_and(Unconfirmed::is_temporary) {
             if events.len() < MAX_EVENTS {
                 events.insert(event.to_owned());
@@ -78,12 +79,7 @@ impl UnstoredEvents {
 
     /// Returns the number of events that a browser keeps.
     pub(super) fn count(&self) -> usize {
-        self.lock().len()
-    }
-
-    /// Locks the events. A poisoned lock is ignored, because each change is a single call.
-    fn lock(&self) -> MutexGuard<'_, BTreeSet<String>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0).len()
     }
 }
 

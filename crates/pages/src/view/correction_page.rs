@@ -1,7 +1,7 @@
 //! The page on which a person chooses the same places on the relief and on the page of a block.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use axum::body::Bytes;
 use axum::extract::rejection::JsonRejection;
@@ -22,6 +22,7 @@ use super::scan_page::jpeg;
 use crate::local_server::{AccessControl, WorkThread};
 use crate::review::Language;
 use mocban_core::domain::{BlockName, BlockSide, ContentHash, ControlPoints};
+use mocban_core::locked;
 use mocban_export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
 
 /// Number of the last alignment that was tried on any page: if a block is opened again, a page that was opened before does not
@@ -101,14 +102,14 @@ impl CorrectionState {
 
     /// Returns the alignment with a number, if no other one was tried since.
     fn tried(&self, id: u64) -> Option<Arc<TriedAlignment>> {
-        let tried = self.tried.lock().unwrap_or_else(PoisonError::into_inner);
+        let tried = locked(&self.tried);
         tried.1.clone().filter(|_| tried.0 == id)
     }
 
     /// Keeps an alignment, and returns its number.
     fn set_tried(&self, alignment: Option<TriedAlignment>) -> u64 {
         let id = LAST_TRIED.fetch_add(1, Ordering::Relaxed) + 1;
-        let mut tried = self.tried.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut tried = locked(&self.tried);
         *tried = (id, alignment.map(Arc::new));
         id
     }

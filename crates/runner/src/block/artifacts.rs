@@ -7,6 +7,7 @@ use crate::block_stages::{BlockArtifacts, BlockStageError};
 use mocban_core::domain::{
     ArtifactRef, ArtifactSet, BlockName, BlockStage, BlockStageRecord, Failure, FailureClass,
 };
+use mocban_core::locked;
 use mocban_store::{ArtifactError, NewArtifact, Project};
 use mocban_system::failpoint::{self, Point};
 
@@ -70,7 +71,7 @@ impl<'a> StageArtifacts<'a> {
             on_written();
             return self.project.write_objects(&[file]).map_err(unwritten);
         }
-        let mut packed = self.packed.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut packed = locked(&self.packed);
         packed.push(file);
         Ok(())
     }
@@ -81,7 +82,7 @@ impl BlockArtifacts for StageArtifacts<'_> {
         let file = NewArtifact::new(role, ext, bytes);
         let reference = file.reference().clone();
         self.store(file)?;
-        let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut written = locked(&self.written);
         let earlier = written.insert(role.to_owned(), reference.clone());
         if earlier.is_some_and(|earlier| earlier != reference) {
             let text = format!("the stage {} wrote {role} twice", self.stage);

@@ -17,6 +17,7 @@ use super::bucket_error::BucketError;
 use super::cache_files;
 use crate::create_folders::create_folders;
 use mocban_core::domain::ContentHash;
+use mocban_core::locked;
 use mocban_system::failpoint::time_scale;
 use mocban_system::platform::rename;
 
@@ -238,28 +239,22 @@ impl ObjectCache {
     }
 
     fn is_confirmed(&self, address: &str) -> bool {
-        let state = self.lock();
+        let state = locked(&self.state);
         let confirmed = state.confirmed.get(address);
         confirmed.is_some_and(|at| is_fresh(*at))
     }
 
     fn confirm(&self, address: String) {
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         if state.confirmed.len() > 10_000 {
             state.confirmed.retain(|_, at| is_fresh(*at));
         }
         state.confirmed.insert(address, Instant::now());
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, CacheState> {
-        self.state
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-    }
-
     /// Counts a new copy, and removes the oldest copies if there is no space left for more.
     fn added(&self, bytes: u64) {
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         let total = match state.bytes {
             Some(before) => before + bytes,
             None => cache_files::list(&self.folder)

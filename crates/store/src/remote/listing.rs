@@ -1,11 +1,12 @@
 //! Versions of many objects from lists of their folders, which need one request for a thousand objects.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use super::bucket::Bucket;
 use super::bucket_error::BucketError;
+use mocban_core::locked;
 
 /// Objects of a folder that are asked for one by one before the folder is listed.
 const SINGLE_REQUESTS: usize = 20;
@@ -37,7 +38,7 @@ impl FolderLists {
     pub(super) fn version(&self, bucket: &Bucket, key: &str) -> Result<String, BucketError> {
         let folder = key.rsplit_once('/').map_or("", |(folder, _)| folder);
         let address = bucket.address_of(folder);
-        let mut folders = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut folders = locked(&self.folders);
         folders.retain(|_, list| list.since.elapsed() < VALID);
         if !folders.contains_key(&address) && folders.len() >= MAX_LISTS {
             let oldest = folders.iter().min_by_key(|(_, list)| list.since);

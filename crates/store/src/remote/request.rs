@@ -3,13 +3,14 @@
 use std::future::Future;
 use std::io;
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::{LazyLock, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio::runtime::{Builder, Runtime};
 
 use super::bucket_error::BucketError;
 use super::client::time_scale;
+use mocban_core::locked;
 
 /// While a request lasts, a warning says so at this interval.
 const NOTICE_EVERY: Duration = Duration::from_secs(20);
@@ -71,7 +72,7 @@ impl<T> PendingReply<T> {
 /// Warns that a request has lasted since `begun`, at most once every [`NOTICE_EVERY`] whatever the number of requests.
 fn warn_of_wait(address: &str, begun: Instant) {
     static LAST: Mutex<Option<Instant>> = Mutex::new(None);
-    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut last = locked(&LAST);
     if last.is_some_and(|last| last.elapsed() < NOTICE_EVERY / time_scale()) {
         return;
     }

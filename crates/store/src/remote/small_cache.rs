@@ -1,9 +1,10 @@
 //! A few values that are likely to be needed again: artifacts of a pair are in one pack and are read one after another.
 
 use std::collections::VecDeque;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use super::bucket_error::BucketError;
+use mocban_core::locked;
 
 /// Number of values that are kept.
 const MAX_VALUES: usize = 16;
@@ -25,12 +26,11 @@ impl<T: Clone> SmallCache<T> {
         name: &str,
         compute: impl FnOnce() -> Result<T, BucketError>,
     ) -> Result<T, BucketError> {
-        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, value)) = lock().iter().find(|(known, _)| known == name) {
+        if let Some((_, value)) = locked(&self.0).iter().find(|(known, _)| known == name) {
             return Ok(value.clone());
         }
         let value = compute()?;
-        let mut recent = lock();
+        let mut recent = locked(&self.0);
         recent.push_front((name.to_owned(), value.clone()));
         recent.truncate(MAX_VALUES);
         Ok(value)

@@ -1,12 +1,13 @@
 //! Inputs of a block in memory between its stages: faces by the hash of their stage's result, pages by their content.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use super::context::StageContext;
 use super::failure::failed;
 use crate::block_stages::BlockStageError;
 use mocban_align::block::{CarvedFace, FaceOutcome, PageInk, StoredHeights, heights_role};
 use mocban_core::domain::{BlockSide, BlockStage, ContentHash};
+use mocban_core::locked;
 use mocban_core::raster::{self, PrintImage};
 
 /// What the last stage read.
@@ -41,14 +42,14 @@ pub(crate) struct HeldPage {
 impl HeldInputs {
     /// Forgets the inputs of a block that is finished.
     pub(crate) fn clear(&self) {
-        *self.faces.lock().unwrap_or_else(PoisonError::into_inner) = None;
-        *self.page.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        *locked(&self.faces) = None;
+        *locked(&self.page) = None;
     }
 
     /// Returns the faces of a block, from memory or from the artifacts of `face`.
     pub(crate) fn faces(&self, context: &StageContext<'_>) -> Result<HeldFaces, BlockStageError> {
         let record = context.record(BlockStage::Face)?;
-        let mut held = self.faces.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut held = locked(&self.faces);
         if let Some((hash, faces)) = &*held
             && *hash == record.result_hash
         {
@@ -79,7 +80,7 @@ impl HeldInputs {
         let file = &context.inputs.page;
         let bytes = file.read(context.limits.image.max_bytes, context.stop)?;
         let hash = ContentHash::of(&bytes);
-        let mut held = self.page.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut held = locked(&self.page);
         if let Some(page) = held.as_ref().filter(|page| page.hash == hash) {
             return Ok(Arc::clone(page));
         }
