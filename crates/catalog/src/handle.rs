@@ -12,11 +12,9 @@ use crate::db::left_out::LeftOut;
 use crate::db::open;
 use crate::db::postgres_address::PostgresAddress;
 use crate::db::retry_wait::RetryWait;
-use crate::queue::commit::batch_collector::Message;
-use crate::queue::commit::commit_delay::CommitDelay;
 use crate::queue::commit::group_commit::Reply;
 use crate::queue::commit::write_connection::WriteConnection;
-use crate::queue::commit::writer;
+use crate::queue::commit::writer::{self, CommitDelay, Message};
 
 /// Capacity of the writer's channel.
 const INBOX: usize = 1024;

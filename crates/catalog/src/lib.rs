@@ -86,7 +86,7 @@ pub use lease_recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use mocban_core::domain::InputVersion;
 pub use new_catalog::NewCatalog;
 pub use queue::claim::ClaimRequest;
-pub use queue::commit::commit_delay::Waiting;
+pub use queue::commit::writer::Waiting;
 pub use queue::counters::JobCounts;
 pub use queue::kind::JobKind;
 pub use queue::lease::{CheckpointOutcome, Lease};

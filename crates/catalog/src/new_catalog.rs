@@ -6,7 +6,7 @@ use crate::db::error::{CatalogError, Result};
 use crate::db::network_fs;
 use crate::db::pending_catalog::{self, PendingCatalog};
 use crate::handle::Catalog;
-use crate::queue::commit::commit_delay::CommitDelay;
+use crate::queue::commit::writer::CommitDelay;
 
 /// A new catalog that no other process sees yet. It disappears if this value is dropped.
 #[derive(Debug)]

@@ -7,7 +7,7 @@ use serde_json::Value;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::db::query::query_scalar;
-use crate::queue::commit::commit_delay::CommitDelay;
+use crate::queue::commit::writer::CommitDelay;
 use crate::{
     Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, ImportTerms, Lease,
     ListedVerdict, NewVerdict, Result, StageCheckpoint,

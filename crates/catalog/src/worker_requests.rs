@@ -13,9 +13,8 @@ use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::jobs::workers::{WorkerInfo, WorkerSettings};
 use crate::queue::claim::{ClaimRequest, add_claim, claim_on_server, in_order};
-use crate::queue::commit::batch_collector::Message;
-use crate::queue::commit::commit_delay::Waiting;
 use crate::queue::commit::group_commit::{Reply, Request};
+use crate::queue::commit::writer::{Message, Waiting};
 use crate::queue::fail::LeasedFailure;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::{

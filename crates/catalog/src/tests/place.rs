@@ -7,7 +7,7 @@ use crate::db::conn::{Conn, ConnectionKind};
 use crate::db::open;
 use crate::db::postgres_address::PostgresAddress;
 use crate::postgres_server;
-use crate::queue::commit::commit_delay::CommitDelay;
+use crate::queue::commit::writer::CommitDelay;
 use crate::{Catalog, Result};
 
 /// Where a catalog is.

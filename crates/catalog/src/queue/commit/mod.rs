@@ -1,7 +1,5 @@
 //! The writer task: it collects the requests of callers and commits them in groups over the only write connection.
 
-pub(crate) mod batch_collector;
-pub(crate) mod commit_delay;
 pub(crate) mod group_commit;
 pub(crate) mod server_commit;
 pub(crate) mod write_connection;
