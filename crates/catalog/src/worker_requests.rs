@@ -12,17 +12,16 @@ use crate::db::query::{query, query_as, query_scalar};
 use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::jobs::workers::{WorkerInfo, WorkerSettings};
+use crate::queue::checkpoint::{self, LeasedFailure};
 use crate::queue::claim::{ClaimRequest, add_claim, claim_on_server, in_order};
 use crate::queue::commit::group_commit::{Reply, Request};
 use crate::queue::commit::writer::{Message, Waiting};
-use crate::queue::fail::LeasedFailure;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::{
     CheckpointOutcome, FencedRow, Heartbeat, LEASED, Lease, LeasedCheckpoints, add_release,
     is_end_stored, is_late, leases, stored_before,
 };
 use crate::queue::stage_record::{StageCheckpoint, StageFailure};
-use crate::queue::{checkpoint, fail};
 use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{BlockStage, UnixMillis, WorkerId, WorkerMetrics};
@@ -349,13 +348,13 @@ async fn store_last(
 /// Stores a failed stage of a block. Returns `false`, and stores nothing, if the lease was lost.
 async fn store_failure(conn: &mut Conn, failed: &LeasedFailure<BlockJob>) -> Result<bool> {
     let mut script = Script::default();
-    let statement = fail::add_failures(&mut script, [failed].into_iter())?;
+    let statement = checkpoint::add_failures(&mut script, [failed].into_iter())?;
     let rows = script.run(conn).await?.read_if_any(statement.as_ref())?;
-    let Some(row) = fail::row_of(&failed.0, &rows) else {
+    let Some(row) = checkpoint::failed_row(&failed.0, &rows) else {
         return Ok(false);
     };
     let mut script = Script::default();
-    fail::add_failure_records(&mut script, &[(failed, row)], &mut uncounted())?;
+    checkpoint::add_failure_records(&mut script, &[(failed, row)], &mut uncounted())?;
     script.run(conn).await?;
     Ok(true)
 }

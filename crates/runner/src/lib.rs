@@ -48,11 +48,11 @@
 //! and in `on_thread` of `block/task.rs`. Heartbeats do not show that another worker recovered a job, or that a repair or
 //! a new cut reset it: the stage runs on, and its next write is refused. If the connection to a server breaks, writes are
 //! sent again until a stop ends the waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
-//! If an earlier stage of a block was computed again and the reply to its checkpoint is lost, it is stored twice, with two
-//! rows in `block_attempt`.
 //!
-//! Other files on this path: `run_context.rs`, `block/slot.rs`; in the catalog `src/worker_requests.rs`, `queue/kind.rs`,
-//! `queue/checkpoint.rs`, `queue/server_checkpoint.rs`, `queue/fail.rs`, the group commits and the writer in `queue/commit`.
+//! Read 20 files to follow a lease. Pairs: `run_context.rs`, `worker_session.rs`, `scheduler.rs`, `prefetch.rs`, `pair_task.rs`,
+//! `checkpointer.rs`; in the catalog `src/worker_requests.rs`, `src/lease_recovery.rs`, `queue/kind.rs`, `queue/lease.rs`,
+//! `queue/claim.rs`, `queue/checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL `commit/server_commit.rs`,
+//! `commit/write_connection.rs`, `queue/server_checkpoint.rs`. Blocks: `block/slot.rs`, `block/task.rs`, `block/checkpoint.rs`.
 //!
 //! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled:
 //! inner loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs`

@@ -1,5 +1,5 @@
 //! Leases, with three kinds of statements: some change a job only while its lease is valid, and return a row for each job that
-//! they changed; others end leases or read them. What is stored with a changed job is in `checkpoint.rs` and `fail.rs`.
+//! they changed; others end leases or read them. What is stored with a changed job is in `checkpoint.rs`.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

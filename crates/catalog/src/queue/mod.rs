@@ -7,7 +7,6 @@ pub(crate) mod claim;
 pub(crate) mod claim_tracker;
 pub(crate) mod commit;
 pub(crate) mod counters;
-pub(crate) mod fail;
 pub(crate) mod fragments;
 pub(crate) mod kind;
 pub(crate) mod lease;

@@ -9,10 +9,9 @@ use crate::db::conn::Conn;
 use crate::db::error::{CatalogError, Result};
 use crate::db::script::{Script, ScriptRows, Statement};
 use crate::db::transaction::BEGIN;
-use crate::queue::checkpoint;
+use crate::queue::checkpoint::{self, FailedRow, LeasedFailure};
 use crate::queue::claim::{self, ClaimRequest};
 use crate::queue::counters::Deltas;
-use crate::queue::fail::{self, FailedRow, LeasedFailure};
 use crate::queue::lease::{
     FencedRow, Heartbeat, Lease, LeasedCheckpoints, add_heartbeat, add_release, stored_before,
 };
@@ -145,7 +144,7 @@ impl Batch {
         let failed = rows.read_if_any(statements.failed.as_ref())?;
         let released = rows.read_if_any(statements.released.as_ref())?;
         let failures = self.failures.items().map(|item| &item.0);
-        let failures = failures.filter(|lease| fail::row_of(lease, &failed).is_none());
+        let failures = failures.filter(|lease| checkpoint::failed_row(lease, &failed).is_none());
         let releases = self.releases.items();
         let releases = releases.filter(|lease| !lease.is_in(&released));
         stored_before(conn, [].into_iter(), failures.chain(releases)).await
@@ -161,7 +160,7 @@ impl Batch {
                 script,
                 self.checkpoints.items().map(|item| &**item),
             )?,
-            failed: fail::add_failures(script, self.failures.items().map(|item| &**item))?,
+            failed: checkpoint::add_failures(script, self.failures.items().map(|item| &**item))?,
             released: add_release(script, self.releases.items())?,
             claims: self
                 .claims
@@ -196,8 +195,9 @@ impl Batch {
         let stored: Vec<_> = stored.filter(|(lease, _)| lease.is_in(&advanced)).collect();
         checkpoint::add_results(script, &stored, &mut deltas)?;
         let failures = self.failures.items();
-        let failures = failures.filter_map(|item| Some((&**item, fail::row_of(&item.0, &failed)?)));
-        fail::add_failure_records(script, &failures.collect::<Vec<_>>(), &mut deltas)?;
+        let failures =
+            failures.filter_map(|item| Some((&**item, checkpoint::failed_row(&item.0, &failed)?)));
+        checkpoint::add_failure_records(script, &failures.collect::<Vec<_>>(), &mut deltas)?;
         let releases = self.releases.items();
         claim::count_released(releases.filter(|lease| lease.is_in(&released)), &mut deltas);
         deltas.add_to(script)?;
@@ -207,7 +207,9 @@ impl Batch {
             heartbeats: heartbeats.collect::<Result<_>>()?,
             checkpoints: checkpoints.map(|item| item.0.is_in(&advanced)).collect(),
             failures: failures
-                .map(|item| fail::row_of(&item.0, &failed).is_some() || item.0.is_in(found))
+                .map(|item| {
+                    checkpoint::failed_row(&item.0, &failed).is_some() || item.0.is_in(found)
+                })
                 .collect(),
             releases: releases
                 .map(|lease| lease.is_in(&released) || lease.is_in(found))
