@@ -94,7 +94,7 @@ pub async fn backup(
 }
 
 /// Returns the numbers of pairs and verdicts in the catalog of a directory. Errors name that catalog.
-pub async fn count_rows(dir: &Path) -> ProjectResult<(u64, u64)> {
+pub(crate) async fn count_rows(dir: &Path) -> ProjectResult<(u64, u64)> {
     let count = async {
         let catalog = Catalog::open_read_only(&dir.join(CATALOG_FILE)).await?;
         let counted = rows_of(&catalog).await?;

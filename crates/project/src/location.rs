@@ -203,7 +203,7 @@ impl Location {
 }
 
 /// Returns the settings of the file in a project folder, without those of the environment and of flags.
-pub fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
+pub(crate) fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
     load(&Sources {
         base: BaseLayer::Project(dir.join(SETTINGS_FILE)),
         ..Sources::default()
@@ -211,7 +211,7 @@ pub fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
 }
 
 /// Refuses an address of PostgreSQL with a password, which other users of the machine could read.
-pub fn refuse_password(url: &str) -> Result<(), Refusal> {
+pub(crate) fn refuse_password(url: &str) -> Result<(), Refusal> {
     if has_password(url) {
         let text = "other users of this machine can read a password on the command line; put it into ~/.pgpass or PGPASSWORD";
         return Err(Refusal::Usage(text.to_owned()));

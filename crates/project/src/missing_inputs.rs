@@ -142,7 +142,7 @@ pub async fn missing(
 }
 
 /// Inspects files like [`missing`], and counts the pairs of the project before.
-pub async fn missing_of_all(
+pub(crate) async fn missing_of_all(
     project: &Project,
     catalog: &Catalog,
 ) -> ProjectResult<Option<MissingInputs>> {
@@ -152,7 +152,7 @@ pub async fn missing_of_all(
 }
 
 /// Inspects files like [`missing`], after failures: files that a run did not find count too, if their folder is missing.
-pub async fn missing_after_failures(
+pub(crate) async fn missing_after_failures(
     project: &Project,
     catalog: &Catalog,
     pairs: u64,

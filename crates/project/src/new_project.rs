@@ -19,7 +19,7 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
 
 /// Refuses the folder of a new project among the files of another one, and a new folder whose name begins or ends with
 /// white space, because it looks like another one.
-pub fn check_new_folder(dir: &Path) -> Result<(), Refusal> {
+pub(crate) fn check_new_folder(dir: &Path) -> Result<(), Refusal> {
     if !is_project(dir)
         && let Some(reason) = project_role(dir)
     {
@@ -53,7 +53,7 @@ impl Drop for NewFolders {
 
 /// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded, and not if the future
 /// is dropped before; a new catalog on a server is created before.
-pub async fn import_with<T>(
+pub(crate) async fn import_with<T>(
     project: &Project,
     url: Option<&str>,
     import: impl AsyncFn(&Catalog) -> ProjectResult<T>,

@@ -85,7 +85,7 @@ pub(crate) fn is_project(folder: &Path) -> bool {
 }
 
 /// Refuses to write over a file of a project, or over an input of its pairs and blocks.
-pub async fn refuse_used_file(
+pub(crate) async fn refuse_used_file(
     path: &Path,
     project: &Project,
     catalog: &Catalog,

@@ -21,7 +21,7 @@ use mocban_store::{Project, ProjectStorage};
 pub const TWO_METHODS: &str = "the results of the other method would be replaced; to keep both, import the pairs into a second project, and compare the two with `report --compare`";
 
 /// What a run with another method than before does to the results.
-pub const REPLACES_METHOD: &str = "this run replaces the results of the other method; to keep both, stop it now, import the pairs into a second project, and compare the two with `report --compare`";
+pub(crate) const REPLACES_METHOD: &str = "this run replaces the results of the other method; to keep both, stop it now, import the pairs into a second project, and compare the two with `report --compare`";
 
 /// Longest time for looking at the roots of inputs before a run.
 const ROOT_CHECK: Duration = Duration::from_secs(5);

@@ -60,7 +60,10 @@ pub(crate) fn retired_text(pair: &RetiredPair) -> String {
 }
 
 /// Looks up pairs by their ids, also retired ones.
-pub async fn known_pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
+pub(crate) async fn known_pairs(
+    catalog: &Catalog,
+    typed: &[String],
+) -> ProjectResult<Vec<PairName>> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
     let is_known = |text: &&String| {
@@ -241,7 +244,7 @@ async fn no_such_pair_or_block(
 }
 
 /// Looks up one block.
-pub async fn existing_block(catalog: &Catalog, typed: &str) -> ProjectResult<BlockName> {
+pub(crate) async fn existing_block(catalog: &Catalog, typed: &str) -> ProjectResult<BlockName> {
     let all = catalog.block_names().await?;
     let name = typed.parse::<BlockName>().ok();
     if let Some(name) = name.filter(|name| all.contains(name)) {

@@ -84,7 +84,7 @@ pub fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
 }
 
 /// Returns a warning about fields that are not read.
-pub fn unread_fields(file: &Path, rows: &[TruthRow]) -> Option<String> {
+pub(crate) fn unread_fields(file: &Path, rows: &[TruthRow]) -> Option<String> {
     let mut first_lines = BTreeMap::new();
     for row in rows {
         let fields = row.value.as_object().into_iter().flat_map(|row| row.keys());
@@ -104,7 +104,7 @@ pub fn unread_fields(file: &Path, rows: &[TruthRow]) -> Option<String> {
 }
 
 /// Refuses a row whose pair does not exist, and suggests one of the known pairs.
-pub fn unknown_pair(row: &TruthRow, known: &[PairName]) -> RefusedLine {
+pub(crate) fn unknown_pair(row: &TruthRow, known: &[PairName]) -> RefusedLine {
     let hint = hint(row.name.as_str(), known.iter().map(PairName::as_str));
     RefusedLine::new(row.line, &format!("there is no pair {}{hint}", row.name))
 }
