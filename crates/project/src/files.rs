@@ -79,9 +79,14 @@ pub fn read_list(path: &Path, sheet: Option<&str>) -> Result<ListFile, Refusal> 
 
 /// Lists fields that are not read, with the first line of each: `angle (line 2), who (line 3)`.
 pub(crate) fn fields_with_lines(first_lines: &BTreeMap<String, usize>) -> String {
-    let fields = first_lines
-        .iter()
-        .map(|(field, line)| format!("{} (line {line})", sanitize(field, 100)));
+    let fields = first_lines.iter().map(|(field, line)| {
+        let name = if field.trim().is_empty() {
+            "one without a name".to_owned()
+        } else {
+            sanitize(field, 100)
+        };
+        format!("{name} (line {line})")
+    });
     fields.collect::<Vec<_>>().join(", ")
 }
 

@@ -124,7 +124,7 @@ fn csv_rows(
     let mut lines = LineCounter::new(text.clone());
     let line = lines.at(headers.position());
     let below = later_header(text.as_ref(), (delimiter, line), &COLUMNS, REQUIRED);
-    let positions = positions(headers, line, below)?;
+    let layout = columns_of(headers, line, below)?;
     let columns = headers.len();
     let mut parse = move |record: Result<StringRecord, csv::Error>| {
         let record = record.map_err(|error| csv_error(&error, &text))?;
@@ -138,7 +138,8 @@ fn csv_rows(
             let reason = format!("{cells} cells where the header has {columns}");
             return Err(RefusedLine::new(line, &reason));
         }
-        row(&record, line, &positions).map(Some)
+        layout.refuse_unnamed(&record, line)?;
+        row(&record, line, &layout.positions).map(Some)
     };
     let records = reader.into_records();
     Ok(records.filter_map(move |record| parse(record).transpose()))
@@ -193,19 +194,45 @@ pub fn unread_fields(first_lines: &BTreeMap<String, usize>) -> Option<String> {
     })
 }
 
-/// Returns the position of each of [`COLUMNS`] in the file. The header is on this line, unless it is a title and the line
-/// `below` is the header.
-fn positions(
+/// The columns of a CSV file.
+struct CsvColumns {
+    /// The position of each of [`COLUMNS`].
+    positions: [Option<usize>; 8],
+    /// Positions of columns without a name, which spreadsheet programs append.
+    unnamed: Vec<usize>,
+}
+
+impl CsvColumns {
+    /// Refuses a row with a value in a column without a name.
+    fn refuse_unnamed(&self, record: &StringRecord, line: usize) -> Result<(), RefusedLine> {
+        let is_filled = |position: &&usize| {
+            let cell = record.get(**position);
+            cell.is_some_and(|cell| !trimmed(cell).is_empty())
+        };
+        let Some(position) = self.unnamed.iter().find(is_filled) else {
+            return Ok(());
+        };
+        let column = position + 1;
+        let reason = format!(
+            "column {column} has no heading, but a value here; give it a heading, or clear its cells"
+        );
+        Err(RefusedLine::new(line, &reason))
+    }
+}
+
+/// Returns the columns of a file. The header is on this line, unless it is a title and the line `below` is the header.
+fn columns_of(
     headers: &StringRecord,
     line: usize,
     below: Option<usize>,
-) -> Result<[Option<usize>; 8], RefusedLine> {
+) -> Result<CsvColumns, RefusedLine> {
     let names: Vec<&str> = headers.iter().map(trimmed).collect();
     let refuse = |reason: &str| RefusedLine::new(line, reason);
     let same = |same: SameColumn| refuse(&same.reason(&names));
     let HeaderColumns { columns, .. } = COLUMNS.assign(&names).map_err(same)?;
-    let unknown = (0..names.len()).filter(|k| columns[*k].is_none());
-    let unknown: Vec<&str> = unknown.map(|k| names[k]).collect();
+    let others = (0..names.len()).filter(|k| columns[*k].is_none());
+    let (unnamed, unknown): (Vec<usize>, Vec<usize>) = others.partition(|k| names[*k].is_empty());
+    let unknown: Vec<&str> = unknown.into_iter().map(|k| names[k]).collect();
     let required = COLUMNS.names[..REQUIRED].iter().copied();
     let missing: Vec<&str> = required
         .filter(|name| !columns.contains(&Some(*name)))
@@ -222,7 +249,7 @@ fn positions(
     for (position, name) in positions.iter_mut().zip(COLUMNS.names) {
         *position = columns.iter().position(|column| *column == Some(name));
     }
-    Ok(positions)
+    Ok(CsvColumns { positions, unnamed })
 }
 
 /// Returns which columns are missing and which are unknown: `columns verdict, reviewer are missing; columns result, who
@@ -325,5 +352,7 @@ fn csv_error(error: &csv::Error, text: &ListText) -> RefusedLine {
 
 #[cfg(test)]
 mod array_tests;
+#[cfg(test)]
+mod column_tests;
 #[cfg(test)]
 mod tests;

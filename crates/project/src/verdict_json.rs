@@ -193,12 +193,16 @@ fn json_row(
         judged,
         day: given.day,
     };
-    let fields = fields.into_keys();
-    let unread = fields.filter(|field| !LOG_FIELDS.contains(&field.as_str()));
+    let is_unread = |(field, value): &(String, Value)| {
+        let is_empty =
+            value.is_null() || value.as_str().is_some_and(|text| trimmed(text).is_empty());
+        !LOG_FIELDS.contains(&field.as_str()) && !(is_empty && field.trim().is_empty())
+    };
+    let unread = fields.into_iter().filter(is_unread);
     Ok(undone_at.is_none().then(|| VerdictRow {
         line,
         listed,
-        unread: unread.collect(),
+        unread: unread.map(|(field, _)| field).collect(),
         is_day_first: given.is_day_first,
     }))
 }
