@@ -1,4 +1,4 @@
-//! Merged cells of a sheet. Only the first of them has a value, which is that of all.
+//! Merged cells of a sheet. The value of the first of them is that of all; values below it are hidden.
 
 use std::collections::BTreeMap;
 
@@ -22,11 +22,16 @@ struct MergedArea {
     last_column: usize,
 }
 
-/// A value that the next rows of a column share.
+/// An area with cells in the open row.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct SharedValue {
+struct OpenArea {
+    first_row: usize,
     last_row: usize,
+    last_column: usize,
+    /// The value of its first cell, once that row was passed.
     text: String,
+    /// Whether the next rows of its column have this value.
+    is_shared: bool,
 }
 
 /// The merged cells of a sheet, whose rows are passed in ascending order.
@@ -34,8 +39,10 @@ struct SharedValue {
 pub(super) struct MergedCells {
     /// By row and column of the first cell.
     areas: BTreeMap<(usize, usize), MergedArea>,
-    /// By column.
-    values: BTreeMap<usize, SharedValue>,
+    /// By the first column.
+    open: BTreeMap<usize, OpenArea>,
+    /// The open row, from 1.
+    row: usize,
 }
 
 impl MergedCells {
@@ -80,33 +87,99 @@ impl MergedCells {
         Ok(())
     }
 
-    /// Begins a row of the table with these cells and width: keeps the values that it shares with the next rows. Returns
-    /// errors for values that columns share.
-    pub(super) fn begin_row(
-        &mut self,
-        row: usize,
-        cells: &[String],
-        width: usize,
-    ) -> Vec<WorkbookError> {
-        self.values.retain(|_, value| value.last_row >= row);
+    /// Begins a row, from 1.
+    pub(super) fn begin_row(&mut self, row: usize) {
+        self.open.retain(|_, area| area.last_row >= row);
+        if row <= self.row {
+            return;
+        }
+        let begun = self.areas.range((self.row + 1, 0)..(row + 1, 0));
+        for ((first_row, column), area) in begun.filter(|(_, area)| area.last_row >= row) {
+            let area = OpenArea {
+                first_row: *first_row,
+                last_row: area.last_row,
+                last_column: area.last_column,
+                text: String::new(),
+                is_shared: false,
+            };
+            self.open.insert(*column, area);
+        }
+        self.row = row;
+    }
+
+    /// Returns what a spreadsheet program shows in place of a cell of the open row, if it is merged and not the first of its
+    /// area. `cells` are those before it in the row.
+    pub(super) fn shown_over(&self, column: usize, cells: &[String]) -> Option<String> {
+        let (first, area) = self.open.range(..=column).next_back()?;
+        let is_first = area.first_row == self.row && *first == column;
+        if is_first || column > area.last_column {
+            return None;
+        }
+        if area.first_row == self.row {
+            return Some(cells.get(*first).cloned().unwrap_or_default());
+        }
+        Some(area.text.clone())
+    }
+
+    /// Ends the open row with these cells: keeps the values of areas that begin there. Below the header, which has `width`
+    /// columns, the next rows share them; `width` is 0 before it. Returns errors for values that columns share.
+    pub(super) fn end_row(&mut self, cells: &[String], width: usize) -> Vec<WorkbookError> {
         let mut refused = Vec::new();
-        for ((_, column), area) in self.areas.range((row, 0)..(row, width)) {
+        for (column, area) in &mut self.open {
             let text = cells.get(*column).filter(|text| !text.is_empty());
-            let Some(text) = text.cloned() else { continue };
-            if area.last_column.min(width - 1) > *column {
-                let cells = area.name.clone();
-                refused.push(WorkbookError::MergedColumns { cells });
+            let (Some(text), true) = (text, area.first_row == self.row) else {
+                continue;
+            };
+            area.text.clone_from(text);
+            if *column >= width {
                 continue;
             }
-            let last_row = area.last_row;
-            self.values.insert(*column, SharedValue { last_row, text });
+            area.is_shared = area.last_column.min(width - 1) == *column;
+            if !area.is_shared
+                && let Some(area) = self.areas.get(&(self.row, *column))
+            {
+                let cells = area.name.clone();
+                refused.push(WorkbookError::MergedColumns { cells });
+            }
         }
         refused
     }
 
     /// Returns the columns whose cells in the row share a value, each with the value.
     pub(super) fn values(&self) -> impl Iterator<Item = (usize, &str)> {
-        let values = self.values.iter();
-        values.map(|(column, value)| (*column, value.text.as_str()))
+        let shared = self.open.iter().filter(|(_, area)| area.is_shared);
+        shared.map(|(column, area)| (*column, area.text.as_str()))
+    }
+}
+
+/// Values below merged cells, which a spreadsheet program does not show. They are left out.
+#[derive(Debug, Default)]
+pub(super) struct HiddenValues {
+    count: usize,
+    /// Name of the first cell.
+    first: String,
+}
+
+impl HiddenValues {
+    /// Adds the value of a cell.
+    pub(super) fn add(&mut self, cell: String) {
+        if self.count == 0 {
+            self.first = cell;
+        }
+        self.count += 1;
+    }
+
+    /// Returns a warning, if there are any.
+    pub(super) fn warning(&self) -> Option<String> {
+        let Self { count, first } = self;
+        match count {
+            0 => None,
+            1 => Some(format!(
+                "the value of cell {first} is hidden below merged cells and is left out; unmerge the cells to see it"
+            )),
+            _ => Some(format!(
+                "{count} values are hidden below merged cells and are left out, the first in cell {first}; unmerge the cells to see them"
+            )),
+        }
     }
 }

@@ -25,7 +25,7 @@ const START: &[u8] = b"PK\x03\x04";
 pub struct SheetTable {
     /// The table, separated by commas. Its lines are the rows of the sheet, so an error in a line is one in that row.
     pub csv: Vec<u8>,
-    /// Says which sheet was read if there are others, and how many values stand beside the table.
+    /// Says which sheet was read if there are others, and how many values stand beside the table or below merged cells.
     pub warning: Option<String>,
 }
 
@@ -36,7 +36,7 @@ pub fn is_workbook(bytes: &[u8]) -> bool {
 
 /// Reads the sheet with a name, or else the first one that is not hidden. Numbers and dates become text as a reader sees
 /// them, `0117` with the format `0000` and `2026-11-21`; of formulas, the stored results are taken. Cells that are merged over
-/// rows of a column all have the value of the first.
+/// rows of a column all have the value of the first, and values below it are left out.
 ///
 /// # Errors
 /// Returns an error if the bytes are not those of an XLSX workbook, it is damaged or too large, has no such sheet, or if a
@@ -74,9 +74,9 @@ pub fn read_sheet(bytes: &[u8], name: Option<&str>) -> Result<SheetTable, Workbo
         let (read, others) = (list(std::slice::from_ref(&sheet.name)), list(&others));
         format!("only the sheet {read} is read; name another one with --sheet: {others}")
     };
-    let (csv, beside) = table::csv(&workbook, &sheet.file, &text)?;
+    let (csv, left_out) = table::csv(&workbook, &sheet.file, &text)?;
     let warnings = (!is_chosen).then(warning).into_iter();
-    let warnings: Vec<String> = warnings.chain(beside.warning()).collect();
+    let warnings: Vec<String> = warnings.chain(left_out).collect();
     Ok(SheetTable {
         csv,
         warning: (!warnings.is_empty()).then(|| warnings.join("; ")),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::archive::damaged;
 use super::cell_names::{MAX_COLUMNS, MAX_ROWS, column, letters};
 use super::error::WorkbookError;
-use super::merged::MergedCells;
+use super::merged::{HiddenValues, MergedCells};
 use super::parts::{TextCollector, Workbook, read_part, value};
 use crate::manifest::{UnnamedValues, is_id_or_path_column, is_text_column};
 use crate::xml::{XmlPart, local_name};
@@ -48,6 +48,8 @@ struct TableWriter<'w> {
     cell: Option<OpenCell>,
     /// Cells that share the value of the first of them.
     merged: MergedCells,
+    /// Values that other cells cover.
+    hidden: HiddenValues,
     /// The first cells that cannot be read.
     refused: Vec<WorkbookError>,
     /// Number of these cells.
@@ -57,15 +59,16 @@ struct TableWriter<'w> {
 /// Largest number of cells that are named because they cannot be read.
 const MAX_REFUSED: usize = 10;
 
-/// Returns the text of a sheet as CSV, and the values to the right of the header, which are left out. Line breaks in cells
-/// that are no ids and no paths become blanks. Cells that are merged over rows of a column all have the value of the first.
+/// Returns the text of a sheet as CSV, and warnings about values that are left out: to the right of the header, and below
+/// merged cells. Line breaks in cells that are no ids and no paths become blanks. Cells that are merged over rows of a column
+/// all have the value of the first.
 ///
 /// The header is the first row with a value that is no title: see [`is_header`]. A parser refuses titles above it.
 pub(super) fn csv(
     workbook: &Workbook,
     file: &str,
     text: &str,
-) -> Result<(Vec<u8>, UnnamedValues), WorkbookError> {
+) -> Result<(Vec<u8>, Vec<String>), WorkbookError> {
     let mut writer = TableWriter {
         workbook,
         csv: Vec::new(),
@@ -79,6 +82,7 @@ pub(super) fn csv(
         next_column: 0,
         cell: None,
         merged: MergedCells::read(file, text)?,
+        hidden: HiddenValues::default(),
         refused: Vec::new(),
         refused_count: 0,
     };
@@ -113,7 +117,10 @@ pub(super) fn csv(
         }
     })?;
     match (writer.refused_count, writer.refused.pop()) {
-        (0, _) | (_, None) => Ok((writer.csv, writer.beside)),
+        (0, _) | (_, None) => {
+            let left_out = [writer.beside.warning(), writer.hidden.warning()];
+            Ok((writer.csv, left_out.into_iter().flatten().collect()))
+        }
         (1, Some(alone)) => Err(alone),
         (count, Some(last)) => {
             let mut first = writer.refused;
@@ -132,6 +139,7 @@ impl TableWriter<'_> {
         if self.row <= self.rows || self.row > MAX_ROWS {
             return Err(damaged(&format!("a row has the number {number}")));
         }
+        self.merged.begin_row(self.row);
         self.cells.clear();
         self.row_bytes = 0;
         self.next_column = 0;
@@ -164,20 +172,29 @@ impl TableWriter<'_> {
             return Ok(());
         };
         let column = cell.column;
-        if self.width > 0 && column >= self.width {
+        let shown = self.merged.shown_over(column, &self.cells);
+        if self.width > 0 && column >= self.width && shown.is_none() {
             let has_value = !self.shared_or_own(&cell).trim().is_empty();
             self.beside.add(self.row, usize::from(has_value));
             return Ok(());
         }
         let text = match self.text(cell) {
             Err(error) if error.is_of_cell() => {
-                self.refuse(error);
+                if shown.is_none() {
+                    self.refuse(error);
+                }
                 // The row is not empty.
                 "?".to_owned()
             }
             read => read?,
         };
         if text.trim().is_empty() {
+            return Ok(());
+        }
+        if let Some(shown) = shown {
+            if shown != text {
+                self.hidden.add(self.name(column));
+            }
             return Ok(());
         }
         self.row_bytes += text.len();
@@ -281,9 +298,6 @@ impl TableWriter<'_> {
 
     /// Gives the cells of the open row, which is below the header, the values of those above with which they are merged.
     fn fill_merged(&mut self) -> Result<(), WorkbookError> {
-        for refused in self.merged.begin_row(self.row, &self.cells, self.width) {
-            self.refuse(refused);
-        }
         for (column, text) in self.merged.values() {
             if self.cells.len() <= column {
                 self.cells.resize(column + 1, String::new());
@@ -301,6 +315,9 @@ impl TableWriter<'_> {
     fn end_row(&mut self) -> Result<(), WorkbookError> {
         if self.cells.is_empty() {
             return Ok(());
+        }
+        for refused in self.merged.end_row(&self.cells, self.width) {
+            self.refuse(refused);
         }
         if self.width == 0 && is_header(&self.cells) {
             self.width = self.cells.len();

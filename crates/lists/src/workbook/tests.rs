@@ -185,6 +185,43 @@ fn cells_merged_over_rows_all_have_the_value_of_the_first() {
 }
 
 #[test]
+fn values_below_merged_cells_are_left_out_with_a_warning() {
+    let rows: [&[&str]; 6] = [
+        &["Khối 4", "page", "unit"],
+        &["id", "mesh", "print", "block", "folio"],
+        &["1", "a", "a", "tale 1", "3a"],
+        &["2", "b", "b", "tale 2", "3a"],
+        &["", "", "", "tale 3", ""],
+        &["3", "c", "c", "tale 1", "x", "y"],
+    ];
+    let bytes = with_merged(&rows, &["A1:C1", "D3:D6", "E3:E4", "E5:F6"]);
+    let table = read_sheet(&bytes, None).expect("a sheet");
+    assert_eq!(
+        String::from_utf8(table.csv).expect("UTF-8"),
+        "\"Khối 4\"\n\"id\",\"mesh\",\"print\",\"block\",\"folio\"\n\
+         \"1\",\"a\",\"a\",\"tale 1\",\"3a\"\n\"2\",\"b\",\"b\",\"tale 1\",\"3a\"\n\n\
+         \"3\",\"c\",\"c\",\"tale 1\",\n"
+    );
+    // Equal values are not lost.
+    let warning = "6 values are hidden below merged cells and are left out, the first in cell B1; unmerge the cells to see them";
+    assert_eq!(table.warning.as_deref(), Some(warning));
+    let hidden_error = "<row r=\"1\"><c r=\"A1\"><v>1</v></c></row>\
+        <row r=\"2\"><c r=\"A2\" t=\"e\"><v>#REF!</v></c><c r=\"B2\"><v>5</v></c></row></sheetData>\
+        <mergeCells><mergeCell ref=\"A1:A2\"/></mergeCells><sheetData>";
+    let one = workbook(&[("a", hidden_error)], "", "");
+    let table = read_sheet(&one, None).expect("a sheet");
+    let warning = table.warning.expect("a hidden value");
+    assert!(
+        warning.starts_with("the value of cell A2 is hidden below merged cells"),
+        "{warning}"
+    );
+    // Rows without cells may stand in any order.
+    let odd = "<row r=\"5\"/><row r=\"3\"><c r=\"A3\"><v>1</v></c></row></sheetData>\
+        <mergeCells><mergeCell ref=\"A2:A6\"/></mergeCells><sheetData>";
+    read_sheet(&workbook(&[("a", odd)], "", ""), None).expect("a sheet");
+}
+
+#[test]
 fn cells_merged_over_columns_are_refused_below_the_header() {
     let rows: [&[&str]; 4] = [
         &["Khối 4"],
