@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mocban_core::domain::spelling::plain_form;
+use mocban_core::domain::spelling::{plain_form, quoted};
 
 /// The columns of a kind of table.
 #[derive(Debug, Clone, Copy)]
@@ -37,11 +37,12 @@ impl SameColumn {
     pub fn reason(self, header: &[&str]) -> String {
         let Self { first, second } = self;
         let (one, other) = (header[first - 1], header[second - 1]);
+        let [shown, shown_other] = [one, other].map(quoted);
         if one.eq_ignore_ascii_case(other) {
-            format!("columns {first} and {second} are both named {other:?}")
+            format!("columns {first} and {second} are both named {shown_other}")
         } else {
             format!(
-                "columns {first} and {second}, {one:?} and {other:?}, are the same; rename one of them"
+                "columns {first} and {second}, {shown} and {shown_other}, are the same; rename one of them"
             )
         }
     }

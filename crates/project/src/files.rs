@@ -9,6 +9,7 @@ use super::exit::Refusal;
 use super::input_list::is_inputs_folder;
 use super::input_paths::in_existing_form;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
+use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ErrorCode, FileKind, pointer_of, sanitize};
 use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::relative_path::SYSTEM_FOLDERS;
@@ -71,7 +72,8 @@ pub fn read_list(path: &Path, sheet: Option<&str>) -> Result<ListFile, Refusal> 
             warning: None,
         }),
         Some(sheet) => {
-            let text = format!("{shown} is not an XLSX workbook, so it has no sheet {sheet:?}");
+            let sheet = quoted(sheet);
+            let text = format!("{shown} is not an XLSX workbook, so it has no sheet {sheet}");
             Err(Refusal::Usage(text))
         }
     }

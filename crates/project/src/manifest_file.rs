@@ -12,6 +12,7 @@ use super::repeated_files::RepeatedFiles;
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
 use crate::pair_choices::{PairChoices, RowsHash};
+use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ContentHash, FileKind, LengthUnit, PairName, first_names, sanitize};
 use mocban_lists::manifest::{
     ChangedIds, ChosenColumns, ListedFolder, ManifestError, ManifestRow, MisspeltColumns,
@@ -122,7 +123,7 @@ impl Listing {
         if refused.is_none()
             && let Some(id) = left_out.iter().find(|id| !has(id))
         {
-            let text = format!("there is no pair {id:?} to leave out");
+            let text = format!("there is no pair {} to leave out", quoted(id));
             return Err(refuse(file, &text).into());
         }
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
@@ -281,8 +282,10 @@ fn below(paths: &[PathBuf], root: &Path) -> Vec<String> {
 /// Says which columns were read under other names.
 fn renamed(read: &ReadRows) -> Option<String> {
     let columns = read.renamed.iter();
-    let columns =
-        columns.map(|(written, name)| format!("{:?} as {name}", sanitize(written, MAX_NAME_CHARS)));
+    let columns = columns.map(|(written, name)| {
+        let written = quoted(&sanitize(written, MAX_NAME_CHARS));
+        format!("{written} as {name}")
+    });
     let columns: Vec<String> = columns.collect();
     (!columns.is_empty()).then(|| format!("{RENAMED}: {}", columns.join(", ")))
 }

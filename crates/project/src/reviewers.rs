@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use mocban_catalog::{Catalog, ReviewRights};
-use mocban_core::domain::spelling::plain_form;
+use mocban_core::domain::spelling::{plain_form, quoted};
 
 /// Refuses a new reviewer who has one of [`similar_names`].
 ///
@@ -17,11 +17,14 @@ pub async fn refuse_similar(
     names: &BTreeSet<String>,
 ) -> ProjectResult<()> {
     match similar_names(catalog, rights, names).await? {
-        Some((new, known)) => Err(Refusal::Usage(format!(
-            "the reviewers {known:?} and {new:?} have nearly the same name; if they are one person, write {known:?}, or else \
-             add --new-reviewer"
-        ))
-        .into()),
+        Some((new, known)) => {
+            let [new, known] = [new, known].map(|name| quoted(&name));
+            let text = format!(
+                "the reviewers {known} and {new} have nearly the same name; if they are one person, write {known}, or else \
+                 add --new-reviewer"
+            );
+            Err(Refusal::Usage(text).into())
+        }
         None => Ok(()),
     }
 }

@@ -15,7 +15,7 @@ use super::verdict_json::{array_rows, json_rows};
 use super::verdict_row::{GivenTime, VerdictRow, at_line};
 use super::verdict_words;
 use mocban_catalog::{InvalidVerdict, ListedVerdict, NewVerdict, ReviewContext, person_name};
-use mocban_core::domain::spelling::hint;
+use mocban_core::domain::spelling::{hint, quoted};
 use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{
@@ -329,7 +329,8 @@ fn row(
 fn parsed_angle(text: &str) -> Result<f64, String> {
     let angle = text.replacen(',', ".", 1).parse();
     angle.map_err(|_error| {
-        format!("angle_read_deg is {text:?}, not a number of degrees such as -4.5")
+        let text = quoted(text);
+        format!("angle_read_deg is {text}, not a number of degrees such as -4.5")
     })
 }
 

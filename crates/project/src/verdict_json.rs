@@ -11,6 +11,7 @@ use super::verdict_columns::COLUMNS;
 use super::verdict_row::{GivenTime, VerdictRow, at_line};
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, person_name};
+use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
@@ -153,8 +154,8 @@ fn parsed(row: &[u8], first: usize) -> Result<(VerdictLine, GivenTime), String> 
 fn with_known_names(fields: Map<String, Value>) -> Result<Map<String, Value>, String> {
     let names: Vec<&str> = fields.keys().map(|name| name.trim()).collect();
     let found = COLUMNS.assign(&names).map_err(|same| {
-        let (one, other) = (names[same.first - 1], names[same.second - 1]);
-        format!("the fields {one:?} and {other:?} are the same; leave one of them out")
+        let [one, other] = [same.first, same.second].map(|number| quoted(names[number - 1]));
+        format!("the fields {one} and {other} are the same; leave one of them out")
     })?;
     let named = fields.into_iter().zip(found.columns);
     Ok(named

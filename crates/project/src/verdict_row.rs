@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use super::files::RefusedLine;
 use mocban_catalog::ListedVerdict;
 use mocban_core::domain::UnixMillis;
+use mocban_core::domain::spelling::quoted;
 use mocban_system::time_text::{parse_day_first, parse_utc};
 
 const DAY_MS: UnixMillis = 24 * 60 * 60 * 1000;
@@ -41,8 +42,9 @@ impl GivenTime {
         let day_first = parse_day_first(text);
         let is_day_first = day_first.is_some();
         let at = day_first.or_else(|| parse_utc(text)).ok_or_else(|| {
+            let text = quoted(text);
             format!(
-                "at is {text:?}, not a time such as 2026-11-21, 2026-11-21 04:10:03 or 21/11/2026, with the day first"
+                "at is {text}, not a time such as 2026-11-21, 2026-11-21 04:10:03 or 21/11/2026, with the day first"
             )
         })?;
         if text.contains(['T', 't', ' ', ':']) {

@@ -31,7 +31,10 @@ macro_rules! enum_names {
             fn from_str(text: &str) -> Result<Self, Self::Err> {
                 match text {
                     $($name => Ok(Self::$variant),)+
-                    _ => Err(format!("{text:?} is not {} ({})", $noun, [$($name),+].join(", "))),
+                    _ => {
+                        let found = $crate::domain::spelling::quoted(text);
+                        Err(format!("{found} is not {} ({})", $noun, [$($name),+].join(", ")))
+                    }
                 }
             }
         }

@@ -5,6 +5,8 @@ use std::borrow::Cow;
 use unicode_normalization::char::is_combining_mark;
 use unicode_normalization::{IsNormalized, UnicodeNormalization as _, is_nfc_quick};
 
+use super::sanitize::is_hidden;
+
 /// Returns a text in Unicode's composed form (NFC), in which the same name typed on macOS and on Windows is equal.
 pub fn composed(text: &str) -> Cow<'_, str> {
     // Reading long lists needs the fast paths: almost all ids and paths are ASCII, and most others are composed.
@@ -13,6 +15,28 @@ pub fn composed(text: &str) -> Cow<'_, str> {
     } else {
         Cow::Owned(text.nfc().collect())
     }
+}
+
+/// Returns a text in quotation marks for a message, in composed form. Unlike `{:?}`, it shows combining marks, which some
+/// letters need.
+///
+/// ```
+/// use mocban_core::domain::spelling::quoted;
+///
+/// assert_eq!(quoted("Ba\u{309}n \"in\"\n"), "\"Bản \\\"in\\\"\\n\"");
+/// assert_eq!(quoted("x\u{309}\u{202e}"), "\"x\u{309}\\u{202e}\"");
+/// ```
+pub fn quoted(text: &str) -> String {
+    let mut shown = String::from("\"");
+    for c in composed(text).chars() {
+        if c == '\'' || is_combining_mark(c) && !is_hidden(c) {
+            shown.push(c);
+        } else {
+            shown.extend(c.escape_debug());
+        }
+    }
+    shown.push('"');
+    shown
 }
 
 /// Returns a name as file systems compare it that ignore case, such as those of Windows and macOS.
@@ -88,7 +112,7 @@ pub fn nearest<'a>(
 /// Returns a suggestion such as `; did you mean "workers"?`, or nothing if no name is similar.
 pub fn hint<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     match nearest(typed, known, 1).first() {
-        Some(name) => format!("; did you mean {name:?}?"),
+        Some(name) => format!("; did you mean {}?", quoted(name)),
         None => String::new(),
     }
 }

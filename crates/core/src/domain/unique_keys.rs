@@ -6,6 +6,7 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use serde_json::{Map, Number, Value};
 
 use super::cancel::poll;
+use super::spelling::quoted;
 
 /// End of the message about a key that an object has twice.
 pub const KEY_TWICE: &str = "is given twice";
@@ -77,7 +78,8 @@ impl<'de> Visitor<'de> for ValueVisitor {
         let mut object = Map::new();
         while let Some((key, UniqueKeys(value))) = entries.next_entry::<String, _>()? {
             if object.contains_key(&key) {
-                return Err(A::Error::custom(format!("the key {key:?} {KEY_TWICE}")));
+                let key = quoted(&key);
+                return Err(A::Error::custom(format!("the key {key} {KEY_TWICE}")));
             }
             object.insert(key, value);
         }

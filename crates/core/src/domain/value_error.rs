@@ -1,5 +1,7 @@
 //! Rewords the messages of `serde` about values of another type.
 
+use super::spelling::quoted;
+
 /// Rewords a message of `serde` about a value: `"many" is not a whole number from 0`. Returns other messages unchanged.
 pub fn value_error_text(message: &str) -> String {
     let translated = wrong_type(message)
@@ -60,7 +62,8 @@ fn unknown_name(message: &str) -> Option<String> {
     let rest = message.strip_prefix("unknown variant `")?;
     let (found, expected) = rest.rsplit_once("`, expected ")?;
     let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
-    Some(format!("{found:?} is not one of {}", names.join(", ")))
+    let found = quoted(found);
+    Some(format!("{found} is not one of {}", names.join(", ")))
 }
 
 #[cfg(test)]

@@ -3,6 +3,8 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use mocban_core::domain::spelling::quoted;
+
 /// Number of lines that a warning names.
 const SHOWN_LINES: usize = 3;
 /// Number of ids in such a form that are too many for chance.
@@ -92,17 +94,18 @@ impl ChangedIds {
         let mut first: Vec<_> = found.iter().flat_map(|ids| &ids.first).collect();
         first.sort();
         let (line, id) = first.first()?;
+        let id = quoted(id);
         let advice = "give the column the format Text, correct the ids and save the list again, best as XLSX";
         if count == 1 {
             return Some(format!(
-                "the id {id:?} on line {line} looks like a date or a power of ten: a spreadsheet program may have made it of a text such as 1-11 or 1E5; {advice}"
+                "the id {id} on line {line} looks like a date or a power of ten: a spreadsheet program may have made it of a text such as 1-11 or 1E5; {advice}"
             ));
         }
         let lines = first.iter().take(SHOWN_LINES);
         let lines: Vec<String> = lines.map(|(line, _)| line.to_string()).collect();
         let lines = lines.join(", ");
         Some(format!(
-            "{count} ids look like dates or powers of ten, such as {id:?} (lines {lines}): a spreadsheet program may have made them of texts such as 1-11 and 1E5; {advice}"
+            "{count} ids look like dates or powers of ten, such as {id} (lines {lines}): a spreadsheet program may have made them of texts such as 1-11 and 1E5; {advice}"
         ))
     }
 }

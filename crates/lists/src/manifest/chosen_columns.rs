@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::row::COLUMNS;
 use crate::columns::HeaderColumns;
+use mocban_core::domain::spelling::quoted;
 
 /// Columns of a list by the names in its header. They take the place of columns with known names.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -32,10 +33,10 @@ impl ChosenColumns {
         for (field, name) in &self.0 {
             let found = header.iter().position(|column| column == name);
             let Some(at) = found else {
-                return Err(format!("there is no column {name:?} for {field}"));
+                return Err(format!("there is no column {} for {field}", quoted(name)));
             };
             if others[at].is_empty() {
-                return Err(format!("column {name:?} is chosen for two columns"));
+                return Err(format!("column {} is chosen for two columns", quoted(name)));
             }
             others[at] = "";
             chosen.push((at, *field));

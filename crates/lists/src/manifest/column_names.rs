@@ -1,6 +1,6 @@
 //! Missing columns, and which names are similar.
 
-use mocban_core::domain::spelling::composed;
+use mocban_core::domain::spelling::{composed, quoted};
 
 /// Returns whether a name may be a misspelt or abbreviated name of a column: in short names one letter may be wrong,
 /// missing or swapped with the next, in longer names two.
@@ -66,7 +66,7 @@ pub(super) fn missing_column(
     columns: &[Option<&'static str>],
 ) -> String {
     let found = &header[..header.len().min(MAX_SHOWN)];
-    let shown = found.join(", ");
+    let shown = composed(&found.join(", ")).into_owned();
     let unknown = found
         .iter()
         .zip(columns)
@@ -74,7 +74,7 @@ pub(super) fn missing_column(
     if let [alone] = header
         && columns == [None]
     {
-        let shown: String = alone.chars().take(MAX_SHOWN_CHARS).collect();
+        let shown: String = composed(alone).chars().take(MAX_SHOWN_CHARS).collect();
         let hint = if alone.contains(['|', ',', ';', '\t', ':']) {
             "; put a comma, semicolon or tab between columns"
         } else {
@@ -87,7 +87,7 @@ pub(super) fn missing_column(
     let mut similar = unknown.filter(|(field, _)| similar_column(&field.to_lowercase(), name));
     let hint = similar
         .next()
-        .map(|(field, _)| format!("; rename {field:?} to {name:?} if it is meant"));
+        .map(|(field, _)| format!("; rename {} to {name:?} if it is meant", quoted(field)));
     format!(
         "column {name:?} is missing{}; the header has: {shown}",
         hint.unwrap_or_default()

@@ -11,6 +11,7 @@ use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::first_names;
+use mocban_core::domain::spelling::quoted;
 
 /// Parses a CSV list with a header line. Columns may be in any order, and their names in any case. Blank lines are
 /// ignored.
@@ -265,9 +266,9 @@ pub(super) fn draft_of(
     let mut draft = DraftRow::new(line);
     for ((known, name), cell) in columns.iter().zip(record) {
         let Ok(cell) = std::str::from_utf8(cell) else {
-            let name = known.unwrap_or(name);
+            let name = quoted(known.unwrap_or(name));
             return Err(format!(
-                "the cell of column {name:?} is not UTF-8{encoding_hint}"
+                "the cell of column {name} is not UTF-8{encoding_hint}"
             ));
         };
         let cell = trimmed(cell);

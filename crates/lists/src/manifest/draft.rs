@@ -7,7 +7,7 @@ use super::cell_errors::formula_error;
 use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
-use mocban_core::domain::spelling::plain_form;
+use mocban_core::domain::spelling::{plain_form, quoted};
 use mocban_core::domain::{LengthUnit, PairName, PairNameError, any_case, sanitize, value_text};
 
 /// The cells of one row by lower-case column name, and its other columns.
@@ -131,9 +131,9 @@ fn complete(
     if let Some(block) = draft.cells.get("block")
         && block.contains(['\n', '\r'])
     {
-        let block = sanitize(block, MAX_BLOCK_CHARS);
+        let block = quoted(&sanitize(block, MAX_BLOCK_CHARS));
         reasons.push(format!(
-            "block {block:?} has a line break; write it on one line"
+            "block {block} has a line break; write it on one line"
         ));
     }
     if is_swapped(&draft.cells) {
@@ -217,7 +217,8 @@ fn parse_flag(cell: &str) -> Result<bool, String> {
         "true" | "yes" | "1" | "co" | "dung" => Ok(true),
         "false" | "no" | "0" | "khong" | "sai" => Ok(false),
         _ => Err(format!(
-            "scanned_face_down is {cell:?}, not true, false, yes, no, 1 or 0"
+            "scanned_face_down is {}, not true, false, yes, no, 1 or 0",
+            quoted(cell)
         )),
     }
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::error::{ManifestError, at_file, of_list};
 use super::row::ManifestRow;
 use mocban_core::domain::PairName;
-use mocban_core::domain::spelling::{composed, fold_case, plain_form};
+use mocban_core::domain::spelling::{composed, fold_case, plain_form, quoted};
 
 /// Extensions of meshes.
 pub const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
@@ -230,7 +230,8 @@ impl Matched {
             }
         }
         for id in left_out {
-            problems.add(of_list(&format!("there is no pair {id:?} to leave out")));
+            let id = quoted(id);
+            problems.add(of_list(&format!("there is no pair {id} to leave out")));
         }
         for (mesh, print) in &changes.joined {
             let (mesh, print) = (meshes.join(mesh), prints.join(print));
@@ -277,10 +278,10 @@ fn no_equal_name(meshes: &[FolderFile], prints: &[FolderFile], similar: &[String
     let prints: BTreeMap<String, &FolderFile> = prints.collect();
     let other_folder = meshes.iter().find_map(|mesh| {
         let print = *prints.get(&fold_case(&mesh.stem))?;
-        let [mesh_folder, print_folder] = [mesh, print].map(|file| file.folders.join("/"));
+        let [mesh_folder, print_folder] = [mesh, print].map(|file| quoted(&file.folders.join("/")));
         let (mesh, print) = (mesh.path.display(), print.path.display());
         Some(format!(
-            "{mesh} and {print} have the same name, but their folders {mesh_folder:?} and {print_folder:?} differ; give both one name, or name them scans and prints, or quét and in"
+            "{mesh} and {print} have the same name, but their folders {mesh_folder} and {print_folder} differ; give both one name, or name them scans and prints, or quét and in"
         ))
     });
     other_folder.unwrap_or_else(|| reason.to_owned())
@@ -394,9 +395,9 @@ fn by_id(
                 let reason = if first.get().id() == file.stem {
                     format!("{shown} has the same stem; {kind} are paired by stem")
                 } else {
-                    let id = first.get().id();
+                    let id = quoted(&first.get().id());
                     format!(
-                        "{shown} has the same id {id:?} (upper and lower case are equal); rename one of the {kind}"
+                        "{shown} has the same id {id} (upper and lower case are equal); rename one of the {kind}"
                     )
                 };
                 problems.add(at_file(&path, &reason));

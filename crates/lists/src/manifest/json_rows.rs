@@ -12,6 +12,7 @@ use super::json_array::{ArrayCursor, DamagedArray, is_array, place_in_row};
 use super::text::{as_utf8, trimmed};
 use crate::columns::{HeaderColumns, KnownColumns};
 use crate::json_numbers::{nan_as_null, unknown_number};
+use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{KEY_TWICE, UniqueKeys, sanitize, value_error_text};
 
 /// A row of a list in JSON.
@@ -111,7 +112,7 @@ impl RowKeys {
         if keys.clone().eq(&self.keys) {
             return Ok(());
         }
-        let twice = |k: usize| format!("the key {:?} {KEY_TWICE}", object[k].0);
+        let twice = |k: usize| format!("the key {} {KEY_TWICE}", quoted(&object[k].0));
         let names: Vec<&str> = keys.clone().map(|key| key.trim()).collect();
         let found = self
             .known
@@ -140,8 +141,8 @@ fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, St
         && keys.columns.columns == [None]
     {
         return Err(format!(
-            "the rows are in the list {:?} of an object; save this list alone",
-            sanitize(key, MAX_KEY_CHARS)
+            "the rows are in the list {} of an object; save this list alone",
+            quoted(&sanitize(key, MAX_KEY_CHARS))
         ));
     }
     let mut draft = DraftRow::new(line);

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use super::unnamed_values::UnnamedValues;
 use crate::columns::{KnownColumns, plain_name};
+use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ContentHash, LengthUnit, PairName};
 
 /// One pair of a list. Paths are stored as written; a relative path is relative to the list.
@@ -171,13 +172,13 @@ pub(super) struct EqualId {
 impl EqualId {
     /// Returns why a row with this id is refused. `kind` is the name of the column.
     pub(super) fn reason(self, kind: &str, text: &str) -> String {
-        let line = self.line;
+        let (line, text) = (self.line, quoted(text));
         if self.differs_in_case {
             format!(
-                "{kind} {text:?} differs from that on line {line} only in upper and lower case, {ONE_FILE}"
+                "{kind} {text} differs from that on line {line} only in upper and lower case, {ONE_FILE}"
             )
         } else {
-            format!("{kind} {text:?} is already on line {line}")
+            format!("{kind} {text} is already on line {line}")
         }
     }
 }

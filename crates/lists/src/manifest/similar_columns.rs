@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::column_names::similar_column;
 use mocban_core::domain::sanitize;
+use mocban_core::domain::spelling::quoted;
 
 /// Maximum number of different names of columns that are compared. JSON Lines may have other names in each row.
 const MAX_NAMES: usize = 1000;
@@ -56,9 +57,9 @@ impl SimilarColumns {
         let similar = self.similar.iter();
         let unused = similar.filter(move |(known, _)| !self.is_used(known));
         unused.map(|(known, name)| {
-            let name = sanitize(name, 100);
+            let name = quoted(&sanitize(name, 100));
             format!(
-                "column {name:?} is kept as metadata; rename it to {known:?} if it is meant, and import again"
+                "column {name} is kept as metadata; rename it to {known:?} if it is meant, and import again"
             )
         })
     }

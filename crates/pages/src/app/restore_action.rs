@@ -20,6 +20,7 @@ use super::sentence::Sentence;
 use super::state::AppState;
 use super::tasks::{FinishedTask, TaskKind};
 use crate::review::Language;
+use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ErrorCode, one_line};
 use mocban_project::blocking::blocking;
 use mocban_project::check::check;
@@ -81,9 +82,10 @@ fn request(folder: &Path, name: &str, body: &RestoreBackupBody) -> AppResult<Res
     check_backup_file(&backup)?;
     let dir = new_project_dir(name, folder)?;
     if is_project(&dir) || !is_free(&dir).map_err(|error| AppFailure::of(error, &dir))? {
+        let name = quoted(name);
         return Err(AppFailure::refused(Sentence::new(
-            format!("there is a folder {name:?} already: give the new project another name"),
-            format!("đã có thư mục {name:?}: hãy đặt tên khác cho dự án mới"),
+            format!("there is a folder {name} already: give the new project another name"),
+            format!("đã có thư mục {name}: hãy đặt tên khác cho dự án mới"),
         )));
     }
     let inputs = (!body.inputs.is_empty()).then(|| roots.allowed(Path::new(&body.inputs)));
@@ -173,10 +175,12 @@ pub(super) fn restore_sentence(
         ),
         ErrorCode::OutputInUse => Sentence::new(
             format!(
-                "another program restores to {name:?} now: wait for its end, or give another name"
+                "another program restores to {} now: wait for its end, or give another name",
+                quoted(name)
             ),
             format!(
-                "một chương trình khác đang khôi phục vào {name:?}: hãy chờ, hoặc đặt tên khác"
+                "một chương trình khác đang khôi phục vào {}: hãy chờ, hoặc đặt tên khác",
+                quoted(name)
             ),
         ),
         ErrorCode::NotWritable => Sentence::new(

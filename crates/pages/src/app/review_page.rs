@@ -25,6 +25,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
 use mocban_catalog::reviewer_name;
+use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_project::error::explanation;
 use mocban_project::reviewers::similar_names;
@@ -184,12 +185,13 @@ async fn refuse_similar(open: &OpenProject, reviewer: &str) -> AppResult<()> {
     let Some((new, known)) = similar else {
         return Ok(());
     };
+    let [new, known] = [new, known].map(|name| quoted(&name));
     Err(AppFailure::refused(Sentence::new(
         format!(
-            "{known:?} and {new:?} are nearly the same name: if they are one person, write {known:?}, or else tick \"another person\""
+            "{known} and {new} are nearly the same name: if they are one person, write {known}, or else tick \"another person\""
         ),
         format!(
-            "{known:?} và {new:?} gần như cùng một tên: nếu là một người, hãy viết {known:?}, nếu không hãy chọn \"người khác\""
+            "{known} và {new} gần như cùng một tên: nếu là một người, hãy viết {known}, nếu không hãy chọn \"người khác\""
         ),
     )))
 }

@@ -6,6 +6,7 @@ use super::number_text::{file_size, grouped};
 use super::sentence::Sentence;
 use crate::review::Language;
 use mocban_core::domain::sanitize;
+use mocban_core::domain::spelling::quoted;
 use mocban_lists::relative_path::PathFault;
 use mocban_lists::zip::ZipError;
 
@@ -40,9 +41,10 @@ pub(super) fn refused_path(path: &str, fault: &PathFault) -> Sentence {
             format!("tên chỉ khác {} ở chữ hoa và chữ thường", shown(other))
         }
     };
+    let path = quoted(&path);
     Sentence::new(
-        format!("{path:?} is refused, because {fault}: rename it and choose the files again"),
-        format!("{path:?} bị từ chối vì {why}: hãy đổi tên rồi chọn lại các tệp"),
+        format!("{path} is refused, because {fault}: rename it and choose the files again"),
+        format!("{path} bị từ chối vì {why}: hãy đổi tên rồi chọn lại các tệp"),
     )
 }
 
@@ -113,10 +115,10 @@ pub(super) fn nothing() -> Sentence {
 
 /// Says that a file has an extension that an import does not know.
 pub(super) fn other_file(path: &str) -> Sentence {
-    let path = shown(path);
+    let path = quoted(&shown(path));
     Sentence::new(
-        format!("{path:?} is no scan, image or list: leave it out"),
-        format!("{path:?} không phải là bản quét, hình ảnh hay danh sách: hãy bỏ tệp này ra"),
+        format!("{path} is no scan, image or list: leave it out"),
+        format!("{path} không phải là bản quét, hình ảnh hay danh sách: hãy bỏ tệp này ra"),
     )
 }
 

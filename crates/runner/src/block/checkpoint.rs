@@ -19,6 +19,7 @@ use mocban_catalog::{
     BlockInputVersions, BlockJob, BlockProvenance, BlockWork, CheckpointOutcome, CutPair, CutReply,
     CutSummary, FailureAction, InputVersion, Lease, NewCharacter, StageCheckpoint, StageFailure,
 };
+use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{
     ArtifactRef, ArtifactSet, BlockName, BlockStage, BlockStageRecord, FailureClass,
 };
@@ -313,11 +314,13 @@ fn new_characters(
         .map(|one| {
             let refused = |text: String| BlockStageError::failed(FailureClass::BadInput, text);
             if !labels.insert(one.label.clone()) {
-                let text = format!("two characters have the label {:?}; rename one", one.label);
+                let label = quoted(&one.label);
+                let text = format!("two characters have the label {label}; rename one");
                 return Err(refused(text));
             }
             if let Err(error) = block.pair(&one.label) {
-                let text = format!("label {:?} cannot be part of an id: {error}", one.label);
+                let label = quoted(&one.label);
+                let text = format!("label {label} cannot be part of an id: {error}");
                 return Err(refused(text));
             }
             let cut = match one.cut {

@@ -384,3 +384,33 @@ fn ids_and_blocks_on_several_lines_are_refused_with_their_row() {
         );
     }
 }
+
+#[test]
+fn headings_and_cells_of_macos_are_shown_as_they_are_read() {
+    // Decomposed, as macOS and some Vietnamese keyboards write them.
+    let (print, block) = ("ba\u{309}n in", "Kho\u{302}\u{301}i");
+    for (list, expected) in [
+        (
+            format!("id,mesh,{print},Bản in\n"),
+            "line 1: columns 3 and 4, \"bản in\" and \"Bản in\", are the same; rename one of them",
+        ),
+        (
+            format!("id,mesh,print,{block} x,{block} x\n"),
+            "line 1: columns 4 and 5 are both named \"Khối x\"",
+        ),
+        (
+            format!("id,mesh,print,scanned_face_down\na,m,p,{block}\n"),
+            "line 2: scanned_face_down is \"Khối\", not true, false, yes, no, 1 or 0",
+        ),
+        (
+            format!("id,mesh,print,unit\na,m,p,{block}\n"),
+            "line 2: \"Khối\" is not a unit (mm, cm, m, in)",
+        ),
+        (
+            format!("id,mesh,{block}\n"),
+            "line 1: column \"print\" is missing; the header has: id, mesh, Khối",
+        ),
+    ] {
+        assert_eq!(refusal(&list), expected);
+    }
+}
