@@ -111,6 +111,7 @@ impl Listing {
         let read = parsed.unwrap_or_default();
         let mut warnings = misspelt.warnings();
         warnings.extend(read.unnamed.warning());
+        warnings.extend(read.formula_errors.warning());
         warnings.extend(ids.warning());
         match unread.warnings() {
             Ok(unread) => warnings.extend(unread),

@@ -19,7 +19,7 @@ use mocban_core::domain::spelling::{hint, quoted};
 use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{
-    CsvText, LineCounter, NotText, as_utf8, is_array, later_header, trimmed,
+    CsvText, LineCounter, NotText, as_utf8, cell_error, is_array, later_header, trimmed,
 };
 use mocban_lists::quotes::check_quotes;
 use mocban_system::time_text::day;
@@ -139,6 +139,7 @@ fn csv_rows(
             return Err(RefusedLine::new(line, &reason));
         }
         layout.refuse_unnamed(&record, line)?;
+        layout.refuse_errors(&record, line)?;
         row(&record, line, &layout.positions).map(Some)
     };
     let records = reader.into_records();
@@ -217,6 +218,16 @@ impl CsvColumns {
             "column {column} has no heading, but a value here; give it a heading, or clear its cells"
         );
         Err(RefusedLine::new(line, &reason))
+    }
+
+    /// Refuses a row with the error of a formula.
+    fn refuse_errors(&self, record: &StringRecord, line: usize) -> Result<(), RefusedLine> {
+        let mut cells = COLUMNS.names.iter().zip(self.positions);
+        let error = cells.find_map(|(name, position)| {
+            let cell = record.get(position?)?;
+            cell_error(name, trimmed(cell))
+        });
+        error.map_or(Ok(()), |reason| Err(RefusedLine::new(line, &reason)))
     }
 }
 

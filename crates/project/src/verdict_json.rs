@@ -16,7 +16,7 @@ use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
 use mocban_lists::json_numbers::nan_as_null;
-use mocban_lists::manifest::{ArrayCursor, place_in_row, trimmed};
+use mocban_lists::manifest::{ArrayCursor, cell_error, place_in_row, trimmed};
 
 /// The fields of the log of verdicts, which JSON Lines may have.
 const LOG_FIELDS: [&str; 17] = [
@@ -129,7 +129,14 @@ fn parsed(row: &[u8], first: usize) -> Result<(VerdictLine, GivenTime), String> 
     }
     for (field, stored) in TEXTS {
         match text_of(&fields, field)? {
-            Some(text) => fields.insert(field.to_owned(), stored(&text)?.into()),
+            Some(text) => {
+                // Notes are stored as they were given.
+                let error = cell_error(field, &text).filter(|_| field != "note");
+                if let Some(error) = error {
+                    return Err(error);
+                }
+                fields.insert(field.to_owned(), stored(&text)?.into())
+            }
             None if REQUIRED.contains(&field) => {
                 let is_there = fields.contains_key(field);
                 let what = if is_there { "empty" } else { "missing" };

@@ -7,11 +7,13 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
-use super::cell_errors::formula_error;
+use super::cell_errors::{FormulaErrors, id_error};
 use super::changed_ids::ChangedIds;
 use super::column_names::missing_column;
 use super::csv::{ListedColumn, column_names, draft_of, row_reader};
-use super::draft::{DraftRow, MAX_PATH_BYTES, check_length, check_meta, record};
+use super::draft::{
+    DraftRow, MAX_PATH_BYTES, check_length, check_meta, record, refuse_cell_errors,
+};
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::{first_keys, json_rows};
 use super::row::RowIds;
@@ -179,15 +181,17 @@ struct BlockRows {
     rows: Vec<BlockRow>,
     ids: RowIds,
     unnamed: UnnamedValues,
+    formula_errors: FormulaErrors,
     problems: ManifestError,
 }
 
 impl BlockRows {
     /// Checks a row and keeps it if it is valid. Records its problems otherwise.
-    fn push(&mut self, line: usize, draft: Result<DraftRow, String>) {
+    fn push(&mut self, line: usize, mut draft: Result<DraftRow, String>) {
         let mut reasons = Vec::new();
-        if let Ok(draft) = &draft {
+        if let Ok(draft) = &mut draft {
             self.unnamed.add(line, draft.unnamed);
+            self.formula_errors.leave_out(line, &mut draft.meta);
         }
         match draft.map(|draft| row(draft, &mut reasons)) {
             Ok(Some(row)) => {
@@ -209,6 +213,7 @@ impl BlockRows {
         let Self {
             rows,
             unnamed,
+            formula_errors,
             problems,
             ..
         } = self;
@@ -220,7 +225,8 @@ impl BlockRows {
         for row in &rows {
             ids.add(row.line, row.name.as_str(), [&row.mesh, &row.page]);
         }
-        let of_cells = unnamed.warning().into_iter().chain(ids.warning());
+        let of_cells = [unnamed.warning(), formula_errors.warning(), ids.warning()];
+        let of_cells = of_cells.into_iter().flatten();
         let warnings = of_cells.chain(similar_columns(&rows)).collect();
         Ok(ReadBlocks { rows, warnings })
     }
@@ -267,8 +273,7 @@ fn columns_of(
 /// Returns a row, or records why it is not valid.
 fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
     draft.cells.retain(|_, cell| !cell.is_empty());
-    let cells = &draft.cells;
-    for (column, cell) in cells {
+    for (column, cell) in &draft.cells {
         check_length(column, cell.len(), MAX_PATH_BYTES, reasons);
     }
     if !reasons.is_empty() {
@@ -276,12 +281,14 @@ fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
     }
     check_meta(&draft.meta, reasons);
     for column in &COLUMNS.names[1..REQUIRED] {
-        if !cells.contains_key(column) {
+        if !draft.cells.contains_key(column) {
             reasons.push(format!("{column} is empty"));
         }
     }
+    refuse_cell_errors(&mut draft.cells, "block", reasons);
+    let cells = &draft.cells;
     let name = cells.get("block").map_or("", String::as_str);
-    let name = match formula_error(name) {
+    let name = match id_error(name) {
         Some(reason) => Err(reason),
         None => BlockName::new(name).map_err(|error| error.to_string()),
     };

@@ -1,5 +1,15 @@
 //! Errors of formulas, which spreadsheet programs write to CSV as text.
 
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use mocban_core::domain::sanitize;
+use mocban_core::domain::spelling::quoted;
+
+/// Longest name of a column in a message, in characters.
+const MAX_COLUMN_CHARS: usize = 60;
+
 /// Texts of failed formulas.
 const ERRORS: [&str; 16] = [
     "#BLOCKED!",
@@ -20,17 +30,81 @@ const ERRORS: [&str; 16] = [
     "#VALUE!",
 ];
 
+/// Begins the errors of LibreOffice that have a number, such as `Err:502`.
+const NUMBERED: &str = "Err:";
+
+/// Returns the error of a formula that a text is, such as `#REF!`.
+fn formula_error(text: &str) -> Option<&str> {
+    let number = text.strip_prefix(NUMBERED);
+    let is_number =
+        |number: &str| number.len() == 3 && number.bytes().all(|byte| byte.is_ascii_digit());
+    if number.is_some_and(is_number) {
+        return Some(text);
+    }
+    let mut errors = ERRORS.iter();
+    errors
+        .find(|error| error.eq_ignore_ascii_case(text))
+        .copied()
+}
+
 /// Returns why a text is no id, if it is the error of a formula.
-pub(super) fn formula_error(id: &str) -> Option<String> {
-    let error = ERRORS.iter().find(|error| error.eq_ignore_ascii_case(id))?;
+pub(super) fn id_error(id: &str) -> Option<String> {
+    let error = formula_error(id)?;
     Some(format!(
         "the id {error} is the error of a formula; correct it in the spreadsheet program"
     ))
 }
 
+/// Returns why the cell of a column is refused, if it is the error of a formula.
+pub fn cell_error(column: &str, cell: &str) -> Option<String> {
+    let error = formula_error(cell)?;
+    Some(format!(
+        "column {column} has the error {error} of a formula; correct it in the spreadsheet program, or clear the cell"
+    ))
+}
+
+/// Values of other columns that are errors of formulas. They are left out.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct FormulaErrors {
+    count: usize,
+    /// The first one, its column and its line, as a message shows them.
+    first: String,
+}
+
+impl FormulaErrors {
+    /// Removes such values from the other columns of a row on a line.
+    pub(super) fn leave_out(&mut self, line: usize, meta: &mut BTreeMap<String, Value>) {
+        meta.retain(|column, value| {
+            let Some(error) = value.as_str().and_then(formula_error) else {
+                return true;
+            };
+            if self.count == 0 {
+                let column = quoted(&sanitize(column, MAX_COLUMN_CHARS));
+                self.first = format!("{error} in column {column} on line {line}");
+            }
+            self.count += 1;
+            false
+        });
+    }
+
+    /// Returns a warning, if there are any.
+    pub fn warning(&self) -> Option<String> {
+        let Self { count, first } = self;
+        match count {
+            0 => None,
+            1 => Some(format!(
+                "an error of a formula is left out, {first}; correct it in the spreadsheet program, and import again"
+            )),
+            _ => Some(format!(
+                "{count} errors of formulas are left out, the first {first}; correct them in the spreadsheet program, and import again"
+            )),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::{parse_blocks, parse_csv, parse_jsonl};
+    use super::super::{parse_blocks, parse_csv, parse_jsonl, read_blocks, read_csv};
 
     #[test]
     fn errors_of_formulas_are_no_ids() {
@@ -49,5 +123,65 @@ mod tests {
         }
         let other = parse_csv(b"id,mesh,print\n#12,m,p\n").expect("a list");
         assert_eq!(other[0].name.as_str(), "#12");
+    }
+    #[test]
+    fn errors_of_formulas_are_refused_in_known_columns() {
+        for (column, error) in [
+            ("mesh", "#REF!"),
+            ("print", "#N/A"),
+            ("character", "#VALUE!"),
+            ("block", "#n/a"),
+            ("unit", "Err:502"),
+            ("scanned_face_down", "#NAME?"),
+        ] {
+            let cells = ["mesh", "print"].map(|name| if name == column { error } else { "a" });
+            let mut list = format!("id,mesh,print\nx,{}\n", cells.join(","));
+            if !["mesh", "print"].contains(&column) {
+                list = format!("id,mesh,print,{column}\nx,m,p,{error}\n");
+            }
+            let refused = parse_csv(list.as_bytes()).expect_err(column).to_string();
+            let shown = error.replace("#n/a", "#N/A");
+            assert_eq!(
+                refused,
+                format!(
+                    "line 2: column {column} has the error {shown} of a formula; correct it in the spreadsheet program, or clear the cell"
+                )
+            );
+        }
+        let blocks = "block,mesh,page,labels,side\nb,m,#REF!,#N/A,#N/A\n";
+        let refused = parse_blocks(blocks.as_bytes()).expect_err("errors");
+        let refused = refused.to_string();
+        let lines: Vec<&str> = refused.lines().collect();
+        assert_eq!(lines.len(), 3, "{refused}");
+        for (line, column) in lines.iter().zip(["labels", "page", "side"]) {
+            let start = format!("line 2: column {column} has the error #");
+            assert!(line.starts_with(&start), "{refused}");
+        }
+        parse_csv(b"id,mesh,print,block\nErr:5,m,p,#1\n").expect("no errors");
+    }
+
+    #[test]
+    fn errors_of_formulas_are_left_out_of_other_columns_with_a_warning() {
+        let list = "id,mesh,print,folio,Năm\na,m,p,3,#N/A\nb,m,p,#REF!,1872\n";
+        let mut rows = Vec::new();
+        let read = read_csv(list.as_bytes(), &mut |row| rows.push(row)).expect("a list");
+        let metadata: Vec<usize> = rows.iter().map(|row| row.meta.len()).collect();
+        assert_eq!(metadata, [1, 1]);
+        assert_eq!(
+            read.formula_errors.warning().as_deref(),
+            Some(
+                "2 errors of formulas are left out, the first #N/A in column \"Năm\" on line 2; correct them in the spreadsheet program, and import again"
+            )
+        );
+        let read = read_blocks(b"block,mesh,page,year\nb,m,p,#DIV/0!\n").expect("a list");
+        assert_eq!(
+            read.warnings,
+            [
+                "an error of a formula is left out, #DIV/0! in column \"year\" on line 2; correct it in the spreadsheet program, and import again"
+            ]
+        );
+        assert!(read.rows[0].meta.is_empty());
+        let none = read_csv(b"id,mesh,print,x\na,m,p,#12\n", &mut drop).expect("a list");
+        assert_eq!(none.formula_errors.warning(), None);
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::cell_errors::formula_error;
+use super::cell_errors::{cell_error, id_error};
 use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
@@ -74,8 +74,9 @@ impl<'e> RowCollector<'e> {
     pub(super) fn push(&mut self, line: usize, draft: Result<Option<DraftRow>, String>) {
         let mut reasons = Vec::new();
         let row = match draft {
-            Ok(Some(draft)) => {
+            Ok(Some(mut draft)) => {
                 self.read.unnamed.add(line, draft.unnamed);
+                self.read.formula_errors.leave_out(line, &mut draft.meta);
                 let name = self.name(&draft, &mut reasons);
                 complete(draft, name, &mut reasons)
             }
@@ -95,7 +96,7 @@ impl<'e> RowCollector<'e> {
     /// Returns the row's id if it is valid and new.
     fn name(&mut self, draft: &DraftRow, reasons: &mut Vec<String>) -> Option<PairName> {
         let text = draft.cells.get("id").map_or("", String::as_str);
-        if let Some(reason) = formula_error(text) {
+        if let Some(reason) = id_error(text) {
             reasons.push(reason);
             return None;
         }
@@ -128,6 +129,7 @@ fn complete(
         }
     }
     check_lengths(&draft, reasons);
+    refuse_cell_errors(&mut draft.cells, "id", reasons);
     if let Some(block) = draft.cells.get("block")
         && block.contains(['\n', '\r'])
     {
@@ -160,6 +162,20 @@ fn complete(
         scanned_face_down: face_down,
         meta: draft.meta,
     })
+}
+
+/// Records cells that are errors of formulas, except for the id, which has its own sentence, and removes them.
+pub(super) fn refuse_cell_errors(
+    cells: &mut BTreeMap<&'static str, String>,
+    id: &str,
+    reasons: &mut Vec<String>,
+) {
+    cells.retain(|column, cell| {
+        let reason = cell_error(column, cell).filter(|_| *column != id);
+        let is_kept = reason.is_none();
+        reasons.extend(reason);
+        is_kept
+    });
 }
 
 /// Returns whether the mesh has the extension of an image, and the print that of a mesh.

@@ -26,6 +26,7 @@ pub use self::csv::{parse_csv, read_csv, read_csv_as};
 pub use block_list::{
     BlockRow, ReadBlocks, is_block_json, is_block_list, parse_blocks, read_block_json, read_blocks,
 };
+pub use cell_errors::{FormulaErrors, cell_error};
 pub use changed_ids::ChangedIds;
 pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 
+use super::cell_errors::FormulaErrors;
 use super::unnamed_values::UnnamedValues;
 use crate::columns::{KnownColumns, plain_name};
 use mocban_core::domain::spelling::quoted;
@@ -140,6 +141,8 @@ pub struct ReadRows {
     pub renamed: BTreeMap<String, &'static str>,
     /// Values in columns without a name.
     pub unnamed: UnnamedValues,
+    /// Values of other columns that are errors of formulas.
+    pub formula_errors: FormulaErrors,
 }
 
 /// Why ids that differ only in case are refused.

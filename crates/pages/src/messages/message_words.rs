@@ -2,11 +2,13 @@
 //! by their wording.
 
 use super::block_messages::BLOCK_MESSAGES;
+use super::list_messages::LIST_MESSAGES;
 use super::message_table::{KINDS, MESSAGES};
 
 /// Returns the messages with their Vietnamese texts. An earlier one is preferred.
 fn all_messages() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
-    MESSAGES.iter().chain(BLOCK_MESSAGES)
+    let others = BLOCK_MESSAGES.iter().chain(LIST_MESSAGES);
+    MESSAGES.iter().chain(others)
 }
 
 /// Returns a message of the program in Vietnamese if its beginning is known. Parts that are not known stay as they are.

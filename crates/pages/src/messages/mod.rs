@@ -1,6 +1,7 @@
 //! Messages of the program in Vietnamese, for all pages.
 
 mod block_messages;
+mod list_messages;
 mod message_table;
 mod message_words;
 mod report_answers;

@@ -42,3 +42,28 @@ fn fields_of_json_without_a_name_are_reported_only_with_a_value() {
     }
     assert_eq!(row("3"), [""]);
 }
+
+#[test]
+fn errors_of_formulas_are_refused_with_their_line_and_column() {
+    let good = "1,pass,lan,,\n";
+    for (row, column) in [
+        ("#REF!,pass,lan,,", "pair"),
+        ("1,#N/A,lan,,", "verdict"),
+        ("1,pass,#n/a,,", "reviewer"),
+        ("1,pass,lan,#VALUE!,", "note"),
+        ("1,pass,lan,,#NAME?", "at"),
+    ] {
+        let text = format!("pair,verdict,reviewer,note,at\n{good}{row}\n");
+        let refused = parse(text.as_bytes(), false).expect_err(row).to_string();
+        let start = format!("line 3: column {column} has the error #");
+        assert!(refused.starts_with(&start), "{refused}");
+    }
+    let json = r##"{"pair":"1","verdict":"pass","reviewer":"#N/A"}"##;
+    let refused = parse(json.as_bytes(), true).expect_err("an error");
+    let refused = refused.to_string();
+    let start = "line 1: column reviewer has the error #N/A of a formula";
+    assert!(refused.starts_with(start), "{refused}");
+    // The app takes any note, and its log is read back.
+    let json = r##"{"pair":"1","verdict":"pass","reviewer":"lan","note":"#N/A"}"##;
+    parse(json.as_bytes(), true).expect("a note");
+}
