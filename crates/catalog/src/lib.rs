@@ -112,7 +112,9 @@ pub use records::review_rights::ReviewRights;
 pub use records::reviewer_names::person_name;
 pub use records::same_files::{SameContents, SameFiles};
 pub use records::set_apart::SetApart;
-pub use records::verdict_rules::{InvalidVerdict, NOTE_CHARS, check_event, reviewer_name};
+pub use records::verdict_rules::{
+    CLOCK_SKEW_MS, InvalidVerdict, NOTE_CHARS, check_event, reviewer_name,
+};
 pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};
 pub use transfer::rows::CopiedTable;
 pub use transfer::{CatalogCopy, CopyProgress};

@@ -12,9 +12,11 @@ use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use super::location::now;
 use super::verdict_columns::{COLUMNS, REQUIRED};
 use super::verdict_json::{array_rows, json_rows};
-use super::verdict_row::{GivenTime, VerdictRow, at_line};
+use super::verdict_row::{DAY_MS, GivenTime, VerdictRow, at_line};
 use super::verdict_words;
-use mocban_catalog::{InvalidVerdict, ListedVerdict, NewVerdict, ReviewContext, person_name};
+use mocban_catalog::{
+    CLOCK_SKEW_MS, InvalidVerdict, ListedVerdict, NewVerdict, ReviewContext, person_name,
+};
 use mocban_core::domain::spelling::{hint, quoted};
 use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
@@ -22,7 +24,7 @@ use mocban_lists::manifest::{
     CsvText, LineCounter, NotText, as_utf8, cell_error, is_array, later_header, trimmed,
 };
 use mocban_lists::quotes::check_quotes;
-use mocban_system::time_text::day;
+use mocban_system::time_text::{day, duration};
 
 /// The text of a verdict file. Its rows are parsed whenever they are needed, so that a long file takes little memory.
 #[derive(Debug, Clone)]
@@ -148,17 +150,33 @@ fn csv_rows(
 
 /// Refuses a row with values that no verdict has.
 pub fn check_values(row: &VerdictRow, now: UnixMillis) -> Result<(), RefusedLine> {
+    let is_ahead = |at: UnixMillis| at > now + CLOCK_SKEW_MS && !row.is_zone_unknown;
     let checked = row.listed.verdict.check(now);
+    let checked = checked.and_then(|()| match row.listed.verdict.at {
+        Some(at) if is_ahead(at) => Err(InvalidVerdict::At),
+        _ => Ok(()),
+    });
     checked.map_err(|error| {
         let mut reason = error.to_string();
         if let (InvalidVerdict::At, Some(at)) = (error, row.listed.verdict.at) {
-            reason = format!(
-                "{reason}, and this is {} in UTC; a date such as 3/4/2026 has the day first",
-                day(at)
-            );
+            reason = format!("{reason}, and this is {}", time_reason(at, now));
         }
         RefusedLine::new(row.line, &reason)
     })
+}
+
+/// Says what a time is that cannot be that of a verdict. One that is a little ahead is more likely that of a wrong clock than
+/// another date.
+fn time_reason(at: UnixMillis, now: UnixMillis) -> String {
+    let ahead = u64::try_from(at.saturating_sub(now)).unwrap_or_default();
+    if (1..=DAY_MS as u64).contains(&ahead) {
+        let ahead = duration(ahead);
+        return format!(
+            "{ahead} ahead of the clock of this computer; correct the time or the clock"
+        );
+    }
+    let day = day(at);
+    format!("{day} in UTC; a date such as 3/4/2026 has the day first")
 }
 
 /// Returns why a list with unknown pairs is refused, one line for each pair. `first_lines` has the first line of each pair,
@@ -307,6 +325,7 @@ fn row(
         at,
         day,
         is_day_first,
+        is_zone_unknown,
     } = cell(6).map(time).transpose()?.unwrap_or_default();
     let angle = |text| at_line(line, parsed_angle(text));
     let context = ReviewContext {
@@ -333,6 +352,7 @@ fn row(
         listed,
         unread: Vec::new(),
         is_day_first,
+        is_zone_unknown,
     })
 }
 
@@ -368,3 +388,5 @@ mod array_tests;
 mod column_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod time_tests;

@@ -212,6 +212,7 @@ fn json_row(
         listed,
         unread: unread.map(|(field, _)| field).collect(),
         is_day_first: given.is_day_first,
+        is_zone_unknown: given.is_zone_unknown,
     }))
 }
 

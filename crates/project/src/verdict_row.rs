@@ -6,9 +6,9 @@ use super::files::RefusedLine;
 use mocban_catalog::ListedVerdict;
 use mocban_core::domain::UnixMillis;
 use mocban_core::domain::spelling::quoted;
-use mocban_system::time_text::{parse_day_first, parse_utc};
+use mocban_system::time_text::{has_offset, parse_day_first, parse_utc};
 
-const DAY_MS: UnixMillis = 24 * 60 * 60 * 1000;
+pub(crate) const DAY_MS: UnixMillis = 24 * 60 * 60 * 1000;
 
 /// One verdict and its line number.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +21,8 @@ pub struct VerdictRow {
     pub unread: Vec<String>,
     /// Whether its time is written with the day first.
     pub is_day_first: bool,
+    /// Whether its time is in no known time zone, and was read as UTC.
+    pub is_zone_unknown: bool,
 }
 
 /// The time of a verdict.
@@ -32,6 +34,8 @@ pub(crate) struct GivenTime {
     pub(crate) day: Option<RangeInclusive<UnixMillis>>,
     /// Whether it is written with the day first.
     pub(crate) is_day_first: bool,
+    /// Whether it has no time zone, and was read as UTC.
+    pub(crate) is_zone_unknown: bool,
 }
 
 impl GivenTime {
@@ -52,6 +56,7 @@ impl GivenTime {
                 at: Some(at),
                 day: None,
                 is_day_first,
+                is_zone_unknown: !has_offset(text),
             });
         }
         let day = at..=at + DAY_MS - 1;
@@ -59,6 +64,7 @@ impl GivenTime {
             at: (!day.contains(&now)).then_some(if now < at { at } else { *day.end() }),
             day: Some(day),
             is_day_first,
+            is_zone_unknown: true,
         })
     }
 }
@@ -91,6 +97,7 @@ mod tests {
                     at,
                     day: day.clone(),
                     is_day_first,
+                    is_zone_unknown: true,
                 };
                 assert_eq!(GivenTime::parse(text, now), Ok(expected), "{text} {now}");
             }
@@ -102,6 +109,7 @@ mod tests {
         ] {
             let given = GivenTime::parse(text, begin + 1000).expect("a time");
             assert_eq!((given.at, given.day), (Some(begin), None), "{text}");
+            assert_eq!(given.is_zone_unknown, !text.ends_with('Z'), "{text}");
         }
         let refused = GivenTime::parse("11/21/2026", begin).expect_err("the month is first");
         assert!(

@@ -258,6 +258,7 @@ impl NamesInList {
                     listed,
                     unread,
                     is_day_first,
+                    ..
                 }) => {
                     if is_day_first {
                         names.day_first.get_or_insert(line);

@@ -49,6 +49,11 @@ pub fn parse_utc(text: &str) -> Option<i64> {
     time.map(Timestamp::as_millisecond).ok()
 }
 
+/// Returns whether a time has an offset from UTC, or `Z`, so that it is the same everywhere.
+pub fn has_offset(text: &str) -> bool {
+    text.parse::<Timestamp>().is_ok()
+}
+
 /// Parses a time with the day first, such as `21/11/2026` or `21.11.2026 04:10:03`. `None`
 /// for other forms. The time is in UTC.
 pub fn parse_day_first(text: &str) -> Option<i64> {
@@ -95,7 +100,10 @@ pub fn rough_duration(ms: u64) -> String {
 mod tests {
     use jiff::tz::{Offset, TimeZone};
 
-    use super::{day, day_first_in_zone, duration, file_time, in_zone, parse_day_first, parse_utc};
+    use super::{
+        day, day_first_in_zone, duration, file_time, has_offset, in_zone, parse_day_first,
+        parse_utc,
+    };
 
     #[test]
     fn known_times_are_formatted_with_their_zone() {
@@ -154,6 +162,10 @@ mod tests {
         assert_eq!(parse_utc("2000-02-29"), Some(951_782_400_000));
         for text in ["2026-11-21T04:10:03Z", "2026-11-21T11:10:03+07:00"] {
             assert_eq!(parse_utc(text), Some(1_795_234_203_000), "{text}");
+            assert!(has_offset(text), "{text}");
+        }
+        for text in ["2026-11-21T04:10:03", "2026-11-21", "21/11/2026 04:10"] {
+            assert!(!has_offset(text), "{text}");
         }
         for text in [
             "2026-02-29",

@@ -10,8 +10,11 @@ const REVIEWER_CHARS: usize = 100;
 pub const NOTE_CHARS: usize = 2000;
 /// Maximum length of an event id in characters.
 const EVENT_CHARS: usize = 64;
-/// How far a time may lie ahead of the clock, which may be wrong on the computer where the verdict was given.
-const MAX_AHEAD_MS: UnixMillis = 24 * 60 * 60 * 1000;
+/// How far the clock of the computer where a verdict was given may be ahead.
+pub const CLOCK_SKEW_MS: UnixMillis = 5 * 60 * 1000;
+/// How far a time may lie ahead of the clock: one without a time zone is read as UTC, and clocks are up to 14 hours ahead of
+/// UTC.
+const MAX_AHEAD_MS: UnixMillis = 14 * 60 * 60 * 1000 + CLOCK_SKEW_MS;
 
 /// Why a verdict is not stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
