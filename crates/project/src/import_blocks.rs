@@ -14,15 +14,14 @@ use crate::files::{self, HEAD_BYTES, ListFile};
 use crate::import_pairs::{AllowedChanges, PairSource};
 use crate::input_paths::{SimilarFiles, in_existing_form};
 use crate::location::{Location, now};
-use crate::manifest_file::refuse;
+use crate::manifest_file::{refuse, renamed_columns};
 use crate::missing_files::{MissingFiles, locate_file};
 use crate::new_project::import_with;
 use crate::repeated_files::RepeatedFiles;
 use mocban_catalog::{BlockAttributes, BlockImportSummary, SameFiles};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
 use mocban_lists::manifest::{
-    BlockRow, ReadBlocks, is_block_json, is_block_list, is_named_like_mesh, read_block_json,
-    read_blocks,
+    BlockRow, ListKind, ReadBlocks, is_named_like_mesh, read_block_json, read_blocks,
 };
 use mocban_store::Project;
 
@@ -35,6 +34,8 @@ pub struct BlockImportOutcome {
     pub missing: MissingFiles,
     /// Warnings about the list, one line each.
     pub warnings: Vec<String>,
+    /// Which columns of the list were read under other names.
+    pub renamed: Option<String>,
 }
 
 /// Blocks to import.
@@ -45,6 +46,8 @@ struct BlockListing {
     /// Label of row numbers in messages: `blocks.csv: line`, or `block` for a single one.
     label: String,
     warnings: Vec<String>,
+    /// Which columns were read under other names.
+    renamed: Option<String>,
 }
 
 /// Where the blocks of an import are named.
@@ -88,8 +91,8 @@ pub enum ListedItems {
 }
 
 impl ListedItems {
-    /// Reads a list, or a sheet of a workbook, and decides from its header what it names. Returns a warning about other
-    /// sheets, too.
+    /// Reads a list, or a sheet of a workbook, and decides from its columns and rows what it names. Returns a warning about
+    /// other sheets, values that are left out, and a decision that the columns alone do not say, too.
     pub fn of(file: &Path, sheet: Option<&str>) -> ProjectResult<(Self, Option<String>)> {
         let file = &*in_existing_form(file);
         let pairs = |bytes| PairSource::List {
@@ -101,12 +104,12 @@ impl ListedItems {
         }
         let ListFile { bytes, warning } = files::read_list(file, sheet)?;
         refuse_input(file, &bytes)?;
-        let is_of_blocks = if files::is_jsonl(file, &bytes) {
-            is_block_json(&bytes)
+        let kind = if files::is_jsonl(file, &bytes) {
+            ListKind::of_json(&bytes)
         } else {
-            is_block_list(&bytes)
+            ListKind::of_csv(&bytes)
         };
-        let items = if is_of_blocks {
+        let items = if kind.is_of_blocks {
             Self::Blocks(BlockSource::List {
                 file: file.to_owned(),
                 bytes,
@@ -114,6 +117,8 @@ impl ListedItems {
         } else {
             Self::Pairs(pairs(Some(bytes)))
         };
+        let warnings: Vec<String> = [warning, kind.note].into_iter().flatten().collect();
+        let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
         Ok((items, warning))
     }
 }
@@ -182,6 +187,7 @@ pub async fn import_blocks(
         summary,
         missing,
         warnings: listing.warnings,
+        renamed: listing.renamed,
     })
 }
 
@@ -223,10 +229,15 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
                 has_metadata: false,
                 label: "block".to_owned(),
                 warnings: Vec::new(),
+                renamed: None,
             });
         }
     };
-    let ReadBlocks { mut rows, warnings } = listed_blocks(file, bytes)?;
+    let ReadBlocks {
+        mut rows,
+        renamed,
+        warnings,
+    } = listed_blocks(file, bytes)?;
     let folder = file.parent().unwrap_or(Path::new(""));
     for row in &mut rows {
         let paths = [&mut row.mesh, &mut row.page].into_iter();
@@ -239,6 +250,7 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
         has_metadata: true,
         label: format!("{}: line", file.display()),
         warnings,
+        renamed: renamed_columns(&renamed),
     })
 }
 
@@ -302,6 +314,37 @@ mod tests {
             "blocks with the same scan and page as an earlier one: 1, first b, as on line 2";
         assert_eq!(warnings("a,a.stl,a.png\nb,./a.stl,a.png\n"), [sentence]);
         assert_eq!(warnings("a,a.stl,a.png\nb,a.stl,b.png\n"), [""; 0]);
+    }
+
+    #[test]
+    fn a_decision_between_pairs_and_blocks_is_said() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let file = dir.path().join("list.csv");
+        for (list, is_of_blocks, expected) in [
+            (
+                "Nr,Ván,Bản quét,Bản in,Trang in\n1,b,1.stl,1.png,b.jpg\n",
+                false,
+                "a list of pairs",
+            ),
+            (
+                "id,block,mesh,page\n1,b,1.stl,b.jpg\n",
+                true,
+                "a list of blocks",
+            ),
+        ] {
+            std::fs::write(&file, list).expect("written");
+            let (items, warning) = ListedItems::of(&file, None).expect("a list");
+            assert_eq!(
+                matches!(items, ListedItems::Blocks(_)),
+                is_of_blocks,
+                "{list}"
+            );
+            let warning = warning.expect("a note");
+            assert!(
+                warning.starts_with(&format!("this is read as {expected}")),
+                "{warning}"
+            );
+        }
     }
 
     #[test]

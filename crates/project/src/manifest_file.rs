@@ -1,6 +1,6 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -119,7 +119,7 @@ impl Listing {
             Err(_) => {}
         }
         warnings.extend(repeated.warning("pairs with the same mesh and print"));
-        let renamed = renamed(&read);
+        let renamed = renamed_columns(&read.renamed);
         let has = |id: &&String| PairName::new(id).is_ok_and(|name| read.ids.contains(&name));
         if refused.is_none()
             && let Some(id) = left_out.iter().find(|id| !has(id))
@@ -280,9 +280,9 @@ fn below(paths: &[PathBuf], root: &Path) -> Vec<String> {
         .collect()
 }
 
-/// Says which columns were read under other names.
-fn renamed(read: &ReadRows) -> Option<String> {
-    let columns = read.renamed.iter();
+/// Says which columns were read under other names. They are given as written, each with its name.
+pub fn renamed_columns(renamed: &BTreeMap<String, &'static str>) -> Option<String> {
+    let columns = renamed.iter();
     let columns = columns.map(|(written, name)| {
         let written = quoted(&sanitize(written, MAX_NAME_CHARS));
         format!("{written} as {name}")

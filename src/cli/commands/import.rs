@@ -65,7 +65,12 @@ pub(crate) struct ImportArgs {
 pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (items, warning) = items(&args)?;
     if matches!(items, ListedItems::Blocks(_)) {
-        refuse_options_of_pairs(&args)?;
+        let refused = refuse_options_of_pairs(&args);
+        if let (Err(_), Some(warning)) = (&refused, &warning) {
+            // It may say why this is a list of blocks.
+            context.warn(warning);
+        }
+        refused?;
     }
     let allowed = AllowedChanges {
         missing: args.allow_missing,
@@ -76,11 +81,12 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult
     match items {
         ListedItems::Blocks(source) => {
             let outcome = import_blocks(&source, allowed, location, &terminal).await;
-            // The table may be on another sheet.
-            if let Some(warning) = warning {
-                context.warn(&warning);
+            if let (Err(_), Some(warning)) = (&outcome, &warning) {
+                // The table may be on another sheet.
+                context.warn(warning);
             }
-            let outcome = outcome?;
+            let mut outcome = outcome?;
+            outcome.warnings.extend(warning);
             context.print_json(&import_blocks::as_json(&outcome))?;
             import_blocks::print_outcome(&outcome, context);
         }

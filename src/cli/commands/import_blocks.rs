@@ -61,6 +61,9 @@ pub(crate) fn print_outcome(outcome: &BlockImportOutcome, context: &Context) {
     for line in &outcome.warnings {
         context.warn(line);
     }
+    if let Some(renamed) = &outcome.renamed {
+        context.info(renamed);
+    }
     let summary = &outcome.summary;
     context.info(&format!(
         "{} added, {} changed, {} unchanged",
@@ -93,5 +96,6 @@ pub(crate) fn as_json(outcome: &BlockImportOutcome) -> Value {
         },
         "missing_files": outcome.missing.lines,
         "warnings": outcome.warnings,
+        "renamed_columns": outcome.renamed,
     })
 }

@@ -15,12 +15,12 @@ use super::draft::{
     DraftRow, MAX_PATH_BYTES, check_length, check_meta, record, refuse_cell_errors,
 };
 use super::error::{ManifestError, at_line, of_list};
-use super::json_rows::{first_keys, json_rows};
+use super::json_rows::json_rows;
 use super::row::RowIds;
 use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter, encoding_hint};
 use super::unnamed_values::UnnamedValues;
-use crate::columns::KnownColumns;
+use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit, any_case};
@@ -51,44 +51,11 @@ pub struct BlockRow {
 pub struct ReadBlocks {
     /// The blocks.
     pub rows: Vec<BlockRow>,
+    /// Columns that were read under other names, as written, each with its name.
+    pub renamed: BTreeMap<String, &'static str>,
     /// Warnings about ids that seem to be changed, values that are left out, and columns that are kept as metadata although
     /// their names are similar to those of others.
     pub warnings: Vec<String>,
-}
-
-/// Returns whether a list is one of blocks, by its header: it has the column `page`, or the column `block` with `labels`
-/// or `side`, and not the columns of a list of pairs.
-pub fn is_block_list(bytes: &[u8]) -> bool {
-    let Ok(text) = CsvText::new(bytes) else {
-        return false;
-    };
-    let mut record = ::csv::ByteRecord::new();
-    if !matches!(
-        row_reader(&text.bytes, text.delimiter).read_byte_record(&mut record),
-        Ok(true)
-    ) {
-        return false;
-    }
-    column_names(1, &record, "").is_ok_and(|names| has_block_columns(&names))
-}
-
-/// Returns whether a list in JSON is one of blocks, by the keys of its first row that can be read, as
-/// [`is_block_list`] does.
-pub fn is_block_json(bytes: &[u8]) -> bool {
-    first_keys(bytes).is_some_and(|keys| {
-        let names: Vec<&str> = keys.iter().map(|key| key.trim()).collect();
-        has_block_columns(&names)
-    })
-}
-
-fn has_block_columns(names: &[&str]) -> bool {
-    let of = |known: &KnownColumns| known.assign(names).unwrap_or_default().columns;
-    let (blocks, pairs) = (of(&COLUMNS), of(&super::row::COLUMNS));
-    let has = |columns: &[Option<&str>], name: &str| columns.contains(&Some(name));
-    let [id, print] = ["id", "print"].map(|name| has(&pairs, name));
-    let [block, page, labels, side] =
-        ["block", "page", "labels", "side"].map(|name| has(&blocks, name));
-    page && !(id && print) || block && (labels || side) && !id && !print
 }
 
 /// Parses a list of blocks. Columns may be in any order, and their names in any case. Blank lines are ignored.
@@ -135,7 +102,9 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
         }
         let line = lines.at(Some(record.position().unwrap_or(&start)));
         let Some(columns) = &header else {
-            header = Some(columns_of(line, &record, &hint)?);
+            let (columns, renamed) = columns_of(line, &record, &hint)?;
+            rows.renamed.extend(renamed);
+            header = Some(columns);
             continue;
         };
         if record.iter().all(<[u8]>::is_empty) {
@@ -157,6 +126,7 @@ pub fn read_block_json(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             Ok(draft) if is_exported(&draft) => Err(EXPORTED.to_owned()),
             draft => draft,
         };
+        rows.renamed.extend(row.renamed);
         rows.push(row.line, draft);
     });
     if let Err(refused) = read {
@@ -179,6 +149,7 @@ fn is_exported(draft: &DraftRow) -> bool {
 #[derive(Default)]
 struct BlockRows {
     rows: Vec<BlockRow>,
+    renamed: BTreeMap<String, &'static str>,
     ids: RowIds,
     unnamed: UnnamedValues,
     formula_errors: FormulaErrors,
@@ -212,6 +183,7 @@ impl BlockRows {
     fn finish(self) -> Result<ReadBlocks, ManifestError> {
         let Self {
             rows,
+            renamed,
             unnamed,
             formula_errors,
             problems,
@@ -228,7 +200,11 @@ impl BlockRows {
         let of_cells = [unnamed.warning(), formula_errors.warning(), ids.warning()];
         let of_cells = of_cells.into_iter().flatten();
         let warnings = of_cells.chain(similar_columns(&rows)).collect();
-        Ok(ReadBlocks { rows, warnings })
+        Ok(ReadBlocks {
+            rows,
+            renamed,
+            warnings,
+        })
     }
 }
 
@@ -247,12 +223,12 @@ fn similar_columns(rows: &[BlockRow]) -> Vec<String> {
     similar.warnings().collect()
 }
 
-/// Returns the columns of a header.
+/// Returns the columns of a header, and those with other names.
 fn columns_of(
     line: usize,
     record: &::csv::ByteRecord,
     encoding_hint: &str,
-) -> Result<Vec<ListedColumn>, ManifestError> {
+) -> Result<(Vec<ListedColumn>, Vec<(String, &'static str)>), ManifestError> {
     let names = column_names(line, record, encoding_hint)?;
     let found = COLUMNS
         .assign(&names)
@@ -260,14 +236,14 @@ fn columns_of(
     if let Some(same) = found.same_others(&names) {
         return Err(at_line(line, &same.reason(&names)).into());
     }
-    let columns = found.columns;
+    let HeaderColumns { columns, renamed } = found;
     let mut problems = ManifestError::default();
     let required = COLUMNS.names[..REQUIRED].iter();
     let missing = required.filter(|name| !columns.contains(&Some(**name)));
     problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
     problems.check(false)?;
     let names = names.into_iter().map(str::to_owned);
-    Ok(columns.into_iter().zip(names).collect())
+    Ok((columns.into_iter().zip(names).collect(), renamed))
 }
 
 /// Returns a row, or records why it is not valid.

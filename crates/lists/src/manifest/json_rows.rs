@@ -59,11 +59,17 @@ pub(super) fn json_rows(
     Ok(())
 }
 
-/// Returns the keys of the first row of a list in JSON that can be read.
-pub(super) fn first_keys(bytes: &[u8]) -> Option<Vec<String>> {
-    let bytes = &*as_utf8(bytes).ok()?;
-    let mut rows = row_contents(bytes).map_while(Result::ok);
-    rows.find_map(|(_, content)| row_keys(content))
+/// Passes the keys and values of the rows of a list in JSON that can be read to `each`, until it returns `false`.
+pub(super) fn rows_while(bytes: &[u8], each: &mut dyn FnMut(&[(String, Value)]) -> bool) {
+    let Ok(bytes) = as_utf8(bytes) else {
+        return;
+    };
+    let rows = row_contents(&bytes).map_while(Result::ok);
+    for row in rows.filter_map(|(_, content)| row_entries(content)) {
+        if !each(&row) {
+            break;
+        }
+    }
 }
 
 /// A row with its line, or where an array is damaged.
@@ -80,13 +86,13 @@ fn row_contents(bytes: &[u8]) -> Box<dyn Iterator<Item = RowContent<'_>> + '_> {
     Box::new(lines.filter(|(_, content)| !content.is_empty()).map(Ok))
 }
 
-/// Returns the keys of a row, if it can be read.
-fn row_keys(row: &[u8]) -> Option<Vec<String>> {
+/// Returns the keys and values of a row, if it can be read.
+fn row_entries(row: &[u8]) -> Option<Vec<(String, Value)>> {
     if row.len() > MAX_ROW_BYTES {
         return None;
     }
     let JsonEntries(entries) = parsed(std::str::from_utf8(row).ok()?).ok()?;
-    Some(entries.into_iter().map(|(key, _)| key).collect())
+    Some(entries)
 }
 
 /// The keys of the row before, and what they are: most rows of a list have the same keys.

@@ -16,6 +16,7 @@ mod json_rows;
 mod jsonl;
 mod later_header;
 mod list_head;
+mod list_kind;
 mod misspelt_columns;
 mod row;
 mod similar_columns;
@@ -23,9 +24,7 @@ mod text;
 mod unnamed_values;
 
 pub use self::csv::{parse_csv, read_csv, read_csv_as};
-pub use block_list::{
-    BlockRow, ReadBlocks, is_block_json, is_block_list, parse_blocks, read_block_json, read_blocks,
-};
+pub use block_list::{BlockRow, ReadBlocks, parse_blocks, read_block_json, read_blocks};
 pub use cell_errors::{FormulaErrors, cell_error};
 pub use changed_ids::ChangedIds;
 pub use chosen_columns::ChosenColumns;
@@ -38,6 +37,7 @@ pub use json_array::{ArrayCursor, DamagedArray, is_array, place_in_row};
 pub use jsonl::{parse_jsonl, read_jsonl};
 pub use later_header::later_header;
 pub use list_head::{ListHead, read_head};
+pub use list_kind::ListKind;
 pub use misspelt_columns::MisspeltColumns;
 pub use row::{ManifestRow, ReadRows, RowIds};
 pub(crate) use row::{is_id_or_path_column, is_text_column};

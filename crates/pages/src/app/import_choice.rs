@@ -1,6 +1,5 @@
 //! What a person has chosen to import, as the address and the form of the page of imports have it.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,18 +8,19 @@ use serde::Deserialize;
 use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
+use super::named_blocks::named_blocks;
 use super::plan_cache::{KEPT_PAIRS, PlanCache};
 use super::project_name::new_project_dir;
 use super::projects::find;
 use super::sentence::Sentence;
-use mocban_core::domain::{BlockName, LengthUnit};
+use mocban_core::domain::LengthUnit;
 use mocban_lists::manifest::{
-    BlockRow, ChosenColumns, ListHead, PairingChanges, ReadBlocks, is_named_like_mesh,
-    is_named_like_print, read_head,
+    ChosenColumns, ListHead, PairingChanges, ReadBlocks, is_named_like_mesh, is_named_like_print,
+    read_head,
 };
 use mocban_project::ProjectError;
 use mocban_project::files::{is_jsonl, list_below};
-use mocban_project::import_blocks::{BlockSource, ImportedBlock, ListedItems, listed_blocks};
+use mocban_project::import_blocks::{BlockSource, ImportedBlock, ListedItems};
 use mocban_project::import_pairs::PairSource;
 use mocban_project::import_plan::{ImportPlan, plan_import};
 use mocban_project::location::Location;
@@ -71,8 +71,8 @@ pub(super) struct ImportChoice {
 pub(super) enum Planned {
     /// Pairs. The page shows some from a position in the plan.
     Pairs(Arc<ImportPlan>, usize),
-    /// Whole blocks, whose pairs a run finds, with warnings about their list.
-    Blocks(Vec<BlockRow>, Vec<String>),
+    /// Whole blocks, whose pairs a run finds.
+    Blocks(ReadBlocks),
 }
 
 /// What the page shows of a choice.
@@ -80,6 +80,8 @@ pub(super) enum Planned {
 pub(super) struct ImportPreview {
     /// The header of a list of pairs.
     pub(super) head: Option<ListHead>,
+    /// A warning about how the list was read.
+    pub(super) note: Option<String>,
     pub(super) planned: AppResult<Planned>,
     /// Position of the first pair that is shown.
     pub(super) from: u64,
@@ -174,11 +176,14 @@ impl ImportChoice {
         })
     }
 
-    /// Returns what is imported, once enough is chosen.
-    pub(super) fn items(&self, roots: &PickerRoots) -> AppResult<Option<ListedItems>> {
+    /// Returns what is imported, once enough is chosen, and a warning about how a list was read.
+    pub(super) fn items(
+        &self,
+        roots: &PickerRoots,
+    ) -> AppResult<Option<(ListedItems, Option<String>)>> {
         if !self.list.is_empty() {
             let list = roots.allowed(Path::new(&self.list))?;
-            let (items, _) = ListedItems::of(&list, None).map_err(AppFailure::from)?;
+            let items = ListedItems::of(&list, None).map_err(AppFailure::from)?;
             return Ok(Some(items));
         }
         if self.meshes.is_empty() || self.prints.is_empty() {
@@ -186,13 +191,15 @@ impl ImportChoice {
         }
         if !self.whole_block.is_empty() {
             let block = self.only_block(roots)?;
-            return Ok(Some(ListedItems::Blocks(BlockSource::One(block))));
+            let block = ListedItems::Blocks(BlockSource::One(block));
+            return Ok(Some((block, None)));
         }
-        Ok(Some(ListedItems::Pairs(PairSource::Folders {
+        let folders = PairSource::Folders {
             meshes: roots.allowed(Path::new(&self.meshes))?,
             prints: roots.allowed(Path::new(&self.prints))?,
             unit: self.unit.parse::<LengthUnit>().ok(),
-        })))
+        };
+        Ok(Some((ListedItems::Pairs(folders), None)))
     }
 
     /// Returns the only scan of its folder with the only image of the other one, as a block with its page.
@@ -269,29 +276,28 @@ impl ImportChoice {
         from: u64,
         plans: &PlanCache,
     ) -> Option<ImportPreview> {
-        let (mut head, items) = (None, self.items(roots).transpose()?);
-        let planned = items.and_then(|items| match items {
-            ListedItems::Blocks(source) => {
-                let ReadBlocks { rows, warnings } = read_source(&source)?;
-                Ok(Planned::Blocks(rows, warnings))
+        let (mut head, mut note, items) = (None, None, self.items(roots).transpose()?);
+        let planned = items.and_then(|(items, warning)| {
+            note = warning;
+            let source = match items {
+                ListedItems::Blocks(source) => return named_blocks(&source).map(Planned::Blocks),
+                ListedItems::Pairs(source) => source,
+            };
+            let choices = self.choices()?;
+            if let PairSource::List { file, bytes } = &source {
+                let table = bytes.as_ref().filter(|bytes| !is_jsonl(file, bytes));
+                head = table.and_then(|bytes| read_head(bytes, &choices.columns, SHOWN_ROWS));
             }
-            ListedItems::Pairs(source) => {
-                let choices = self.choices()?;
-                if let PairSource::List { file, bytes } = &source {
-                    let table = bytes.as_ref().filter(|bytes| !is_jsonl(file, bytes));
-                    head = table.and_then(|bytes| read_head(bytes, &choices.columns, SHOWN_ROWS));
-                }
-                let dir = self.dir_or_new(folder);
-                let start = kept_start(from);
-                let shown = start..start.saturating_add(KEPT_PAIRS);
-                let key = self.plan_key(&dir, start);
-                let location = Location::new(dir);
-                let plan = plans.plan(source, &key, |source| {
-                    plan_import(source, &choices, &location, &shown)
-                });
-                let plan = plan.map_err(AppFailure::from)?;
-                Ok(Planned::Pairs(plan, (from - start) as usize))
-            }
+            let dir = self.dir_or_new(folder);
+            let start = kept_start(from);
+            let shown = start..start.saturating_add(KEPT_PAIRS);
+            let key = self.plan_key(&dir, start);
+            let location = Location::new(dir);
+            let plan = plans.plan(source, &key, |source| {
+                plan_import(source, &choices, &location, &shown)
+            });
+            let plan = plan.map_err(AppFailure::from)?;
+            Ok(Planned::Pairs(plan, (from - start) as usize))
         });
         let last = match &planned {
             Ok(Planned::Pairs(plan, _)) => plan.pairs.saturating_sub(1) / SHOWN_PAIRS * SHOWN_PAIRS,
@@ -302,6 +308,7 @@ impl ImportChoice {
         }
         Some(ImportPreview {
             head,
+            note,
             planned,
             from,
         })
@@ -311,37 +318,6 @@ impl ImportChoice {
 /// Returns the position of the first pair of the plan that is kept for a position.
 const fn kept_start(from: u64) -> u64 {
     if from < KEPT_PAIRS { 0 } else { from }
-}
-
-/// Returns the blocks of a source, as their list has them, with warnings about the list.
-///
-/// # Errors
-/// Refuses a list with problems, and a scan whose name cannot be that of a block.
-fn read_source(source: &BlockSource) -> AppResult<ReadBlocks> {
-    let refused = |why: String| AppFailure::refused(Sentence::of_program(&why));
-    match source {
-        BlockSource::List { file, bytes } => listed_blocks(file, bytes).map_err(AppFailure::from),
-        BlockSource::One(block) => {
-            let shown = block.mesh.display();
-            let stem = block.mesh.file_stem().unwrap_or_default().to_string_lossy();
-            let name = BlockName::new(&stem)
-                .map_err(|error| refused(format!("{shown}: {error}; rename the file")))?;
-            let row = BlockRow {
-                line: 1,
-                name,
-                mesh: block.mesh.clone(),
-                page: block.page.clone(),
-                labels: block.labels.clone(),
-                unit: block.unit,
-                side: block.side,
-                meta: BTreeMap::new(),
-            };
-            Ok(ReadBlocks {
-                rows: vec![row],
-                warnings: Vec::new(),
-            })
-        }
-    }
 }
 
 fn not_of_page() -> AppFailure {

@@ -125,10 +125,10 @@ impl ImportChoice {
                 });
                 (files.collect(), plan.pairs)
             }
-            Planned::Blocks(rows, _) => {
-                let total = rows.len() as u64;
+            Planned::Blocks(read) => {
+                let total = read.rows.len() as u64;
                 let folder = Path::new(&self.list).parent().unwrap_or(Path::new(""));
-                let rows = rows.into_iter().skip(start as usize).take(most);
+                let rows = read.rows.into_iter().skip(start as usize).take(most);
                 let files = rows.map(|row| PlannedFiles {
                     name: row.name.to_string(),
                     kind: ScanKind::Block,

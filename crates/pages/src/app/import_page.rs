@@ -18,7 +18,7 @@ use super::import_changes::ColumnChanges;
 use super::import_choice::{ImportChoice, ImportPreview, Planned, with_change};
 use super::import_columns::{KEPT_COLUMNS, columns_part};
 use super::import_partners::{ImportPartners, mending_part};
-use super::import_preview::{changes_part, plan_part};
+use super::import_preview::{changes_part, plan_part, warning};
 use super::plan_cache::PlanCache;
 use super::projects::find;
 use super::sentence::Sentence;
@@ -119,6 +119,7 @@ fn preview_part(
     // The form says what is missing, in both languages.
     let asks_for_columns = head.is_some_and(|head| !head.is_complete() && head.refused.is_none());
     html! {
+        @if let Some(note) = &preview.note { p.notice { (one_line(&warning(visit, note))) } }
         @match &preview.planned {
             Err(_) if asks_for_columns => {},
             Err(failure) => {
@@ -266,7 +267,7 @@ pub(super) async fn import(
                     "trước hết hãy chọn thư mục hoặc danh sách",
                 ))
             };
-            let items = chosen.items(&roots)?.ok_or_else(nothing)?;
+            let (items, _) = chosen.items(&roots)?.ok_or_else(nothing)?;
             Ok((items, chosen.choices()?, dir, planned))
         }
     };

@@ -15,7 +15,7 @@ use crate::review::Language;
 use mocban_core::domain::{LengthUnit, one_line};
 use mocban_lists::manifest::{BlockRow, PairingChanges};
 use mocban_project::import_plan::{ImportPlan, PlannedPair};
-use mocban_project::manifest_file::{IGNORED, RENAMED};
+use mocban_project::manifest_file::{IGNORED, RENAMED, renamed_columns};
 
 /// Number of warnings and missing files that are shown.
 const SHOWN_LINES: usize = 12;
@@ -23,7 +23,7 @@ const SHOWN_LINES: usize = 12;
 const SHOWN_FILES: usize = 500;
 
 /// The columns of a list, and what the page calls them in Vietnamese.
-const COLUMN_NAMES: [[&str; 2]; 7] = [
+const COLUMN_NAMES: [[&str; 2]; 10] = [
     ["id", "Mã"],
     ["mesh", "Bản quét"],
     ["print", "Bản in"],
@@ -31,6 +31,9 @@ const COLUMN_NAMES: [[&str; 2]; 7] = [
     ["block", "Ván"],
     ["unit", "Đơn vị"],
     ["scanned_face_down", "Quét úp"],
+    ["page", "Trang in"],
+    ["labels", "Nhãn"],
+    ["side", "Mặt"],
 ];
 
 /// Returns what would be imported, with the form that imports it. `from` is the position of the first pair that is shown,
@@ -46,11 +49,12 @@ pub(super) fn plan_part(
         section.card {
             h2 { (visit.t("What would be imported", "Sẽ nhập những gì")) }
             @match planned {
-                Planned::Blocks(rows, warnings) => {
-                    p { b { (grouped(rows.len() as u64)) } " " (visit.t("whole blocks", "ván nguyên")) }
+                Planned::Blocks(read) => {
+                    p { b { (grouped(read.rows.len() as u64)) } " " (visit.t("whole blocks", "ván nguyên")) }
                     p { (visit.t("Scans of whole blocks with their pages. A run finds the characters and makes the pairs.", "Bản quét ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) }
-                    @for line in warnings { p.notice { (one_line(&warning(visit, line))) } }
-                    (block_table(visit, rows))
+                    @for line in &read.warnings { p.notice { (one_line(&warning(visit, line))) } }
+                    @if let Some(renamed) = renamed_columns(&read.renamed) { p.muted { (one_line(&warning(visit, &renamed))) } }
+                    (block_table(visit, &read.rows))
                 },
                 Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
             }
@@ -65,7 +69,7 @@ pub(super) fn plan_part(
 fn has_files(planned: &Planned) -> bool {
     match planned {
         Planned::Pairs(plan, _) => plan.pairs > 0,
-        Planned::Blocks(rows, _) => !rows.is_empty(),
+        Planned::Blocks(read) => !read.rows.is_empty(),
     }
 }
 
@@ -148,7 +152,7 @@ fn block_table(visit: &Visit, rows: &[BlockRow]) -> Markup {
 }
 
 /// Returns a warning of an import, which is translated if its beginning is known, or else quoted.
-fn warning(visit: &Visit, line: &str) -> String {
+pub(super) fn warning(visit: &Visit, line: &str) -> String {
     let line = &without_commands(line);
     let [mesh_alone, print_alone, other] = IGNORED;
     let beginnings = [
@@ -350,6 +354,11 @@ mod tests {
         assert_eq!(
             of(Language::Vietnamese),
             "Đã hiểu các cột có tên khác: \"Khối\" là Ván, \"Ký hiệu\" là Mã"
+        );
+        let line = "columns with other names were read: \"Trang\" as page, \"Tệp nhãn\" as labels";
+        assert_eq!(
+            warning(&Visit::in_language(Language::Vietnamese), line),
+            "Đã hiểu các cột có tên khác: \"Trang\" là Trang in, \"Tệp nhãn\" là Nhãn"
         );
     }
 }

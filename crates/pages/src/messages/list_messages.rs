@@ -31,6 +31,31 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "correct them in the spreadsheet program, and import again",
         "hãy sửa trong chương trình bảng tính rồi nhập lại",
     ),
+    // Lists of pairs and of blocks.
+    (
+        "this is read as a list of pairs, because several rows have the block {}",
+        "tệp này được đọc là danh sách cặp, vì nhiều dòng có cùng ván {0}",
+    ),
+    (
+        "this is read as a list of pairs, because its prints have names of images",
+        "tệp này được đọc là danh sách cặp, vì các bản in có tên tệp hình",
+    ),
+    (
+        "this is read as a list of pairs, because its pages have no names of images",
+        "tệp này được đọc là danh sách cặp, vì các trang in không có tên tệp hình",
+    ),
+    (
+        "a list of blocks has one row for each block, with the columns block, mesh and page",
+        "danh sách ván có một dòng cho mỗi ván, với các cột ván, bản quét và trang in",
+    ),
+    (
+        "this is read as a list of blocks, because it has the column page and no column {}",
+        "tệp này được đọc là danh sách ván, vì có cột trang in và không có cột {0}",
+    ),
+    (
+        "columns {} are kept as metadata",
+        "các cột {0} được giữ làm thông tin thêm",
+    ),
     // Merged cells.
     (
         "the value of cell {} is hidden below merged cells and is left out",

@@ -2,8 +2,17 @@
 
 use serde_json::json;
 
-use super::{is_block_json, is_block_list, parse_blocks, read_block_json, read_blocks};
+use super::{parse_blocks, read_block_json, read_blocks};
+use crate::manifest::ListKind;
 use mocban_core::domain::{BlockSide, LengthUnit};
+
+fn is_block_list(bytes: &[u8]) -> bool {
+    ListKind::of_csv(bytes).is_of_blocks
+}
+
+fn is_block_json(bytes: &[u8]) -> bool {
+    ListKind::of_json(bytes).is_of_blocks
+}
 
 fn refusal(text: &str) -> String {
     parse_blocks(text.as_bytes()).expect_err(text).to_string()
@@ -259,4 +268,23 @@ fn lists_in_json_have_the_rows_of_csv() {
         "{lines:?}"
     );
     assert_eq!(lines.len(), 2);
+}
+
+#[test]
+fn columns_with_other_names_are_named() {
+    let csv = "Ván;Bản quét;Trang in;Năm\nb1;m.stl;p.jpg;1872\n";
+    let json = r#"{"Ván":"b1","Bản quét":"m.stl","Trang in":"p.jpg","Năm":"1872"}"#;
+    let expected = [("Bản quét", "mesh"), ("Trang in", "page"), ("Ván", "block")];
+    for read in [
+        read_blocks(csv.as_bytes()),
+        read_block_json(json.as_bytes()),
+    ] {
+        let renamed = read.expect("valid").renamed;
+        let renamed = renamed
+            .iter()
+            .map(|(written, name)| (written.as_str(), *name));
+        assert_eq!(renamed.collect::<Vec<_>>(), expected);
+    }
+    let plain = read_blocks(b"Block,mesh,page\nb1,m.stl,p.jpg\n").expect("valid");
+    assert!(plain.renamed.is_empty());
 }
