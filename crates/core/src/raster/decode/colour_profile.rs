@@ -13,22 +13,50 @@ const TOLERANCE: f64 = 3.0 / 255.0;
 /// Levels of red, green and blue for which a profile is compared with sRGB.
 const PROBES: [f32; 5] = [0.0, 0.12, 0.35, 0.67, 1.0];
 
+/// The ICC profile of a file.
+pub(super) struct FileProfile {
+    /// Bytes of the profile; empty if the file does not have all of them.
+    pub(super) bytes: Vec<u8>,
+    /// Whether the pixels are stored as inks, such as CMYK. They are decoded to RGB without a profile.
+    pub(super) is_of_inks: bool,
+}
+
+impl FileProfile {
+    /// Converts all decoded colours to sRGB.
+    ///
+    /// # Errors
+    /// Returns the name of a profile that cannot be read or applied, or is for colours of another kind.
+    pub(super) fn apply(&self, rgb: &mut Grid<[u16; 3]>) -> Result<(), String> {
+        if self.is_of_inks {
+            return Err(with_colours(&read(&self.bytes)?, &self.bytes));
+        }
+        apply(&self.bytes, rgb)
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<ColorProfile, String> {
+    let profile = ColorProfile::new_from_slice(bytes).ok();
+    profile.ok_or_else(|| "an ICC profile that cannot be read".to_owned())
+}
+
+/// Returns the name of a profile and the kind of its colours.
+fn with_colours(profile: &ColorProfile, bytes: &[u8]) -> String {
+    let space = bytes.get(16..20).unwrap_or_default();
+    let space = sanitize(String::from_utf8_lossy(space).trim_end(), 4);
+    format!("{}, for {space} colours", name(profile))
+}
+
 /// Converts all colours from a profile to sRGB. Does nothing if the profile nearly is sRGB.
 ///
 /// # Errors
 /// Returns the name of a profile that cannot be read or applied, or is for colours of another kind than the image has.
-pub(super) fn apply(bytes: &[u8], rgb: &mut Grid<[u16; 3]>) -> Result<(), String> {
-    let profile = ColorProfile::new_from_slice(bytes).ok();
-    let profile = profile.ok_or_else(|| "an ICC profile that cannot be read".to_owned())?;
+fn apply(bytes: &[u8], rgb: &mut Grid<[u16; 3]>) -> Result<(), String> {
+    let profile = read(bytes)?;
     let is_grey = |rgb: &Grid<[u16; 3]>| rgb.data().iter().all(|[r, g, b]| r == g && g == b);
     let layout = match profile.color_space {
         DataColorSpace::Rgb => Layout::Rgb,
         DataColorSpace::Gray if is_grey(rgb) => Layout::Gray,
-        _ => {
-            let space = bytes.get(16..20).unwrap_or_default();
-            let space = sanitize(String::from_utf8_lossy(space).trim_end(), 4);
-            return Err(format!("{}, for {space} colours", name(&profile)));
-        }
+        _ => return Err(with_colours(&profile, bytes)),
     };
     if is_nearly_srgb(&profile, layout) {
         return Ok(());
@@ -118,7 +146,7 @@ fn name(profile: &ColorProfile) -> String {
 mod tests {
     use proptest::prelude::*;
 
-    use super::apply;
+    use super::{FileProfile, apply};
     use crate::raster::Grid;
     use crate::raster::test_profiles::TestProfile;
 
@@ -183,6 +211,25 @@ mod tests {
         ] {
             let mut image = picture();
             assert_eq!(apply(&profile, &mut image), Err(named.to_owned()));
+            assert_eq!(image, picture());
+        }
+    }
+
+    #[test]
+    fn a_profile_of_inks_is_named_whatever_its_colours() {
+        let of_inks = |bytes: Vec<u8>| FileProfile {
+            bytes,
+            is_of_inks: true,
+        };
+        let mut of_cmyk = TestProfile::WIDE.icc();
+        of_cmyk[16..20].copy_from_slice(b"CMYK");
+        for (bytes, named) in [
+            (of_cmyk, "test, for CMYK colours"),
+            (TestProfile::WIDE.icc(), "test, for RGB colours"),
+            (Vec::new(), "an ICC profile that cannot be read"),
+        ] {
+            let mut image = picture();
+            assert_eq!(of_inks(bytes).apply(&mut image), Err(named.to_owned()));
             assert_eq!(image, picture());
         }
     }

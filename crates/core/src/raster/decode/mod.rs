@@ -19,6 +19,7 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
 
+use colour_profile::FileProfile;
 use error::broken;
 use print_image::colours_on_white;
 use tags::TagFileWindow;
@@ -79,7 +80,7 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
         print_image::widen_narrow(&mut image.rgb);
     }
     if let Some(profile) = profile {
-        image.ignored_profile = colour_profile::apply(&profile, &mut image.rgb).err();
+        image.ignored_profile = profile.apply(&mut image.rgb).err();
     }
     Ok(image)
 }
@@ -108,7 +109,7 @@ fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeErro
 fn decode_png(
     bytes: &[u8],
     limits: &ImageLimits,
-) -> Result<(DynamicImage, Option<Vec<u8>>), DecodeError> {
+) -> Result<(DynamicImage, Option<FileProfile>), DecodeError> {
     check_png_header(bytes, limits)?;
     let source = PolledReader(Cursor::new(bytes));
     let mut reader = ImageReader::with_format(source, ImageFormat::Png);
@@ -117,7 +118,13 @@ fn decode_png(
     reader.limits(memory);
     let mut decoder = reader.into_decoder().map_err(|error| png_error(&error))?;
     let profile = decoder.icc_profile().ok().flatten();
+    // The decoder skips a profile that it cannot decompress.
+    let profile = profile.or_else(|| orientation::png_chunk(bytes, *b"iCCP").map(|_| Vec::new()));
     let pixels = DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error))?;
+    let profile = profile.map(|bytes| FileProfile {
+        bytes,
+        is_of_inks: false,
+    });
     Ok((pixels, profile))
 }
 
@@ -186,6 +193,20 @@ mod tests {
                 (c >> 1) ^ (0xedb8_8320 & (c & 1).wrapping_neg())
             })
         })
+    }
+
+    #[test]
+    fn a_damaged_profile_of_a_png_is_named() {
+        let plain = file(&DynamicImage::ImageLuma8(grey_ramp()), ImageFormat::Png);
+        let body = b"iCCPname\0\0no profile";
+        let len = (body.len() as u32 - 4).to_be_bytes();
+        let chunk = [&len[..], body, &crc32(body).to_be_bytes()].concat();
+        // The first chunk, with the size, ends here.
+        let (head, rest) = plain.split_at(33);
+        let read = decode(&[head, &chunk, rest].concat(), &LIMITS).expect("decodes");
+        let wanted = "an ICC profile that cannot be read";
+        assert_eq!(read.ignored_profile.as_deref(), Some(wanted));
+        assert_eq!(read.rgb, decode(&plain, &LIMITS).expect("decodes").rgb);
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod segments;
 #[cfg(test)]
 mod tests;
 
+use super::colour_profile::FileProfile;
 use super::error::{DecodeError, broken};
 use super::limits::ImageLimits;
 use super::print_image::widened;
@@ -20,8 +21,7 @@ use segments::{JpegFrame, JpegSegments};
 pub(super) struct JpegImage<'b> {
     pub(super) rgb: Grid<[u16; 3]>,
     pub(super) exif: Option<&'b [u8]>,
-    /// ICC profile, if the colours are grey or RGB.
-    pub(super) profile: Option<Vec<u8>>,
+    pub(super) profile: Option<FileProfile>,
 }
 
 const CMYK_COMPONENTS: usize = 4;
@@ -41,9 +41,10 @@ pub(super) fn decode<'b>(
     Ok(JpegImage {
         rgb: widened(image.width, image.height, image.channels, &image.samples),
         exif: segments.exif,
-        profile: segments
-            .profile()
-            .filter(|_| frame.components.len() < CMYK_COMPONENTS),
+        profile: segments.profile().map(|bytes| FileProfile {
+            bytes,
+            is_of_inks: frame.components.len() >= CMYK_COMPONENTS,
+        }),
     })
 }
 

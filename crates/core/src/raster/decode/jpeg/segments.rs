@@ -136,14 +136,14 @@ impl<'b> JpegSegments<'b> {
         Ok(())
     }
 
-    /// Returns the ICC profile, whose parts are numbered from 1.
+    /// Returns the ICC profile, whose parts are numbered from 1. It is empty if one of the parts is missing.
     pub(super) fn profile(&self) -> Option<Vec<u8>> {
         let mut parts = self.profile.clone();
         parts.sort_by_key(|(number, _)| *number);
         let mut numbers = (1..).zip(&parts);
         let is_whole = numbers.all(|(wanted, (number, _))| wanted == usize::from(*number));
-        (is_whole && !parts.is_empty())
-            .then(|| parts.iter().flat_map(|(_, part)| *part).copied().collect())
+        let whole = parts.iter().filter(|_| is_whole);
+        (!parts.is_empty()).then(|| whole.flat_map(|(_, part)| *part).copied().collect())
     }
 
     /// Returns whether the scans have all bits of all coefficients.

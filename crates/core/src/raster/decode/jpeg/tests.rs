@@ -248,6 +248,32 @@ fn a_colour_profile_in_several_segments_is_applied() {
 }
 
 #[test]
+fn a_colour_profile_of_inks_is_named() {
+    let plain = cmyk([128, 255, 64, 255]);
+    let mut of_inks = TestProfile::WIDE.icc();
+    of_inks[16..20].copy_from_slice(b"CMYK");
+    let profile = segment(0xe2, &[b"ICC_PROFILE\0", &[1, 1], &of_inks]);
+    let named = read(&[&plain[..2], &profile, &plain[2..]].concat()).expect("reads");
+    assert_eq!(
+        named.ignored_profile.as_deref(),
+        Some("test, for CMYK colours")
+    );
+    assert_eq!(named.rgb, read(&plain).expect("reads").rgb);
+}
+
+#[test]
+fn a_colour_profile_without_its_first_part_is_named() {
+    let test = TestJpeg {
+        shared: [1, 1],
+        scans: TestScans::Interleaved,
+    };
+    let second = segment(0xe2, &[b"ICC_PROFILE\0", &[2, 2], b"rest"]);
+    let named = read(&test.encode(&picture(), &[second])).expect("reads");
+    let wanted = "an ICC profile that cannot be read";
+    assert_eq!(named.ignored_profile.as_deref(), Some(wanted));
+}
+
+#[test]
 fn codings_that_are_not_read_are_named() {
     let file = TestJpeg {
         shared: [1, 1],

@@ -12,6 +12,7 @@ mod tag_numbers;
 #[cfg(test)]
 mod tests;
 
+use super::colour_profile::FileProfile;
 use super::error::{DecodeError, broken};
 use super::limits::ImageLimits;
 use super::print_image::{on_white, widen};
@@ -32,8 +33,7 @@ pub(super) struct TiffImage {
     pub(super) rgb: Grid<[u16; 3]>,
     /// EXIF orientation, if the page has one.
     pub(super) orientation: Option<u64>,
-    /// ICC profile, if the colours are grey or RGB.
-    pub(super) profile: Option<Vec<u8>>,
+    pub(super) profile: Option<FileProfile>,
     pub(super) has_16_bits: bool,
 }
 
@@ -47,14 +47,14 @@ pub(super) struct TiffImage {
 pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, DecodeError> {
     let print = pages::find_print_page(&bytes)?;
     let layout = TiffLayout::read(&print.page, limits)?;
-    let has_profile = !matches!(layout.photometric, Photometric::Cmyk);
+    let is_of_inks = matches!(layout.photometric, Photometric::Cmyk);
     Ok(TiffImage {
         rgb: pixels(&layout, bytes)?,
         orientation: print.inherited(ORIENTATION),
-        profile: print
-            .inherited_bytes(ICC_PROFILE)
-            .filter(|_| has_profile)
-            .map(<[u8]>::to_vec),
+        profile: print.inherited_bytes(ICC_PROFILE).map(|bytes| FileProfile {
+            bytes: bytes.to_vec(),
+            is_of_inks,
+        }),
         has_16_bits: layout.used_bits == 16 && !layout.is_float,
     })
 }

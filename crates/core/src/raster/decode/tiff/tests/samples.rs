@@ -1,8 +1,11 @@
 //! Samples of all sizes, and what they mean.
 
-use super::{BLACK_IS_ZERO, RGB, bilevel, colours, levels, picture, plain_page, widened};
+use super::{
+    BLACK_IS_ZERO, ImageLimits, RGB, bilevel, colours, decode, levels, picture, plain_page, widened,
+};
 use crate::raster::Grid;
 use crate::raster::test_images::{TestPage, TestTiff, TestValues, packed, ycbcr};
+use crate::raster::test_profiles::TestProfile;
 
 #[test]
 fn grey_of_every_size_spans_black_to_white() {
@@ -157,4 +160,23 @@ fn cmyk_leaves_the_light_that_its_inks_do_not_take() {
     let page = TestPage::new([2, 1], 5, 8, 4).strips(1, vec![vec![0, 255, 51, 0, 0, 0, 0, 204]]);
     let read = colours(&TestTiff::default().encode(&[page])).expect("reads");
     assert_eq!(read.data(), [[65535, 0, 52428], [13107; 3]]);
+}
+
+#[test]
+fn a_colour_profile_of_inks_is_named() {
+    let mut of_inks = TestProfile::WIDE.icc();
+    of_inks[16..20].copy_from_slice(b"CMYK");
+    let page = TestPage::new([2, 1], 5, 8, 4)
+        .with(34675, TestValues::Bytes(of_inks))
+        .strips(1, vec![vec![0, 255, 51, 0, 0, 0, 0, 204]]);
+    let read = decode(
+        &TestTiff::default().encode(&[page]),
+        &ImageLimits::SUGGESTED,
+    );
+    let read = read.expect("reads");
+    assert_eq!(
+        read.ignored_profile.as_deref(),
+        Some("test, for CMYK colours")
+    );
+    assert_eq!(read.rgb.data(), [[65535, 0, 52428], [13107; 3]]);
 }
