@@ -7,7 +7,7 @@
 //!   [`file_headers`]: what the files say of themselves
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
 //! - [`retire`]: takes pairs out of every count, and brings them back
-//! - [`status`], [`pair_table`], [`hosts`], [`details`], [`scan_warnings`], [`check`]: the state of all pairs, of workers and of one
+//! - [`status`], [`pair_table`], [`hosts`], [`details`], [`input_warnings`], [`check`]: the state of all pairs, of workers and of one
 //!   pair or block, and whether scans, files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`change_setting`]: changes a setting, after saying what that costs
@@ -65,6 +65,7 @@ mod input_finder;
 pub mod input_list;
 mod input_names;
 pub mod input_paths;
+pub mod input_warnings;
 pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
@@ -84,7 +85,6 @@ pub mod retry;
 pub mod reviewers;
 mod row_spool;
 pub mod run;
-pub mod scan_warnings;
 pub mod selection;
 pub mod sheets;
 pub mod shell;

@@ -14,8 +14,8 @@ use mocban_catalog::{Catalog, PairDetail};
 use mocban_core::domain::{JobStatus, MetricOutcome, PairName, ThresholdMetric};
 use mocban_project::details::{self, Details, PairOverview};
 use mocban_project::failures::may_succeed_unchanged;
+use mocban_project::input_warnings;
 use mocban_project::pair_table::{self, PairChoice};
-use mocban_project::scan_warnings;
 use mocban_project::shell::quoted_id;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_store::Project;
@@ -187,7 +187,7 @@ fn as_json(pair: &PairOverview, project: &Project) -> ProjectResult<Value> {
     value["manual_alignments"] = serde_json::to_value(&pair.manual)?;
     value["next_run"] = serde_json::to_value(&pair.next_run)?;
     value["changed_inputs"] = json!(pair.changed_inputs);
-    value["warnings"] = json!(scan_warnings::of_pair(&pair.detail.results));
+    value["warnings"] = json!(input_warnings::of_pair(&pair.detail.results));
     value["schema"] = json!(1);
     Ok(value)
 }

@@ -11,7 +11,7 @@ use mocban_core::domain::{
     RegisterOutcome, Stage, Verdict, one_line, value_text,
 };
 use mocban_project::details::{Adjustment, ManualResult};
-use mocban_project::scan_warnings;
+use mocban_project::input_warnings;
 use mocban_results::ManualCorrection;
 use mocban_store::Project;
 use mocban_system::time_text::{duration, local};
@@ -191,13 +191,13 @@ fn numbers(record: &StageRecord, attributes: &PairAttributes) -> String {
         Stage::Fit => record.parse().map(|fit| {
             fit_numbers(
                 &fit,
-                &scan_warnings::of_fit(&fit, attributes),
+                &input_warnings::of_fit(&fit, attributes),
                 attributes.unit,
             )
         }),
         Stage::Depth => record.parse().map(|depth| {
             let numbers = depth_numbers(&depth, attributes.unit);
-            let warning = scan_warnings::of_depth(&depth, attributes);
+            let warning = input_warnings::of_depth(&depth, attributes);
             std::iter::once(numbers)
                 .chain(warning)
                 .collect::<Vec<_>>()

@@ -21,7 +21,7 @@ use crate::view::{page as scan_page, scan_asset};
 use mocban_catalog::PairDetail;
 use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage, ThresholdMetric, one_line};
 use mocban_project::details::{self, Details, PairOverview};
-use mocban_project::scan_warnings;
+use mocban_project::input_warnings;
 
 /// A picture: its key, and its name in both languages.
 type Layer = (&'static str, [&'static str; 2]);
@@ -156,7 +156,7 @@ fn state_line(visit: &Visit, key: &str, overview: &PairOverview) -> Markup {
                 (pair_remedy(visit, key, stored.failure.class, &[results]))
             }
         }
-        @for warning in scan_warnings::of_pair(results) {
+        @for warning in input_warnings::of_pair(results) {
             div.notice.warn { p { (one_line(Sentence::of_program(&warning).text(visit.language))) } }
         }
     }
