@@ -307,7 +307,7 @@ fn replaced_labels_give_the_results_of_a_new_import() {
 }
 
 #[test]
-fn characters_of_an_unusual_size_raise_a_doubt_about_the_unit() {
+fn doubts_about_the_unit_and_the_colours_of_a_block_are_told_by_run_and_kept() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let dir = dir.path();
     demo_block(dir);
@@ -322,14 +322,24 @@ fn characters_of_an_unusual_size_raise_a_doubt_about_the_unit() {
         MeshFormat::PlyLittleEndian.encode(&mesh),
     )
     .expect("written");
-    let files = ["--block", "block.ply", "--page", "d/data/page.jpg"];
+    let page = fs::read(dir.join("d/data/page.jpg")).expect("the page");
+    let profile = b"\xff\xe2\0\x1aICC_PROFILE\0\x01\x01no profile";
+    let (start, rest) = page.split_at(2);
+    fs::write(dir.join("page.jpg"), [start, profile, rest].concat()).expect("written");
+    let files = ["--block", "block.ply", "--page", "page.jpg"];
     let labels = ["--labels", "few.json", "--name", "b1", "--unit", "mm"];
     project(dir, &[&["import"], &files[..], &labels].concat()).expect(0);
     let run = project(dir, &["--progress", "none", "run", "--stage", "fit"]).expect(0);
     let doubt = " mm, but most have 6 to 30 mm; is the unit cm?";
-    assert_eq!(run.err.matches(doubt).count(), 1, "{}", run.err);
+    let profile =
+        "the image's colour profile (an ICC profile that cannot be read) cannot be applied";
     let shown = project(dir, &["show", "b1", "--json"]).expect(0).json();
-    assert!(shown["warnings"].to_string().contains(doubt), "{shown}");
+    for warning in [doubt, profile] {
+        assert_eq!(run.err.matches(warning).count(), 1, "{}", run.err);
+        assert!(shown["warnings"].to_string().contains(warning), "{shown}");
+    }
+    let status = project(dir, &["status", "--json"]).expect(0).json();
+    assert_eq!(status["ignored_profiles"]["blocks"]["id"], "b1", "{status}");
 }
 
 /// A scan of a block is read without its vertices that have no position and its faces that have two corners, and says so.
@@ -366,6 +376,8 @@ fn what_is_left_out_of_the_scan_of_a_block_is_told_by_run_and_kept() {
         "faces with fewer than three corners were left out: 2",
     ] {
         assert_eq!(run.err.matches(sentence).count(), 1, "{}", run.err);
+        let shown = project(dir, &["show", "b1"]).expect(0).out;
+        assert!(shown.contains(sentence), "{shown}");
     }
     let shown = project(dir, &["show", "b1", "--json"]).expect(0).json();
     let outcome = &shown["stages"][0]["outcome"];

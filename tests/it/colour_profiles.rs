@@ -1,4 +1,5 @@
-//! Prints in other colour spaces, and of cameras, have the mask and the scores of their twins in sRGB.
+//! Prints in other colour spaces, and of cameras, have the mask and the scores of their twins in sRGB. A profile that cannot
+//! be applied is named.
 
 use std::io::Cursor;
 
@@ -9,6 +10,10 @@ use mocban::demo::{PairGenerator, Tier};
 use mocban::raster::test_profiles::TestProfile;
 use mocban::raster::{Grid, ImageLimits, PrintImage, decode};
 use mocban::stages::{AlignedPair, Scan, Settings};
+use serde_json::json;
+
+use crate::cli::{call, mocban};
+use crate::resume::{project, run};
 
 /// Encodes colours of 16 bits, or their red as grey, with an ICC profile.
 fn png(rgb: &Grid<[u16; 3]>, is_grey: bool, profile: Option<TestProfile>) -> PrintImage {
@@ -86,4 +91,37 @@ fn a_print_has_the_results_of_its_srgb_twin() {
     let narrow = grey.map(|colour| colour.map(|level| level >> 6));
     let both = [png(&grey, true, None), png(&narrow, true, None)];
     assert_same_results(&scan, &settings, both, "10 bits in 16");
+}
+
+#[test]
+fn a_profile_that_cannot_be_applied_is_told_by_run_and_kept() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "1");
+    let data = project.dir().join("data");
+    let print = image::open(data.join("prints/upright-0000.jpg")).expect("a print");
+    let print = print.into_rgb8();
+    let mut profile = TestProfile::WIDE.icc();
+    profile[16..20].copy_from_slice(b"Lab ");
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = PngEncoder::new(&mut file);
+    encoder.set_icc_profile(profile).expect("a profile");
+    let (width, height) = print.dimensions();
+    encoder
+        .write_image(&print, width, height, ExtendedColorType::Rgb8)
+        .expect("encodes");
+    std::fs::write(data.join("a.png"), file.into_inner()).expect("written");
+    let list = "id,mesh,print\na,meshes/upright-0000.ply,a.png\n";
+    std::fs::write(data.join("one.csv"), list).expect("written");
+    mocban(project.dir(), &["import", "data/one.csv"]).expect(0);
+    let said = "the image's colour profile (test, for Lab colours) cannot be applied";
+    let told = call(&mut run(&project, &["a"])).expect(0).err;
+    assert!(told.contains(said), "{told}");
+    let shown = mocban(project.dir(), &["show", "a"]).expect(0).out;
+    assert!(shown.contains(said), "{shown}");
+    let shown = mocban(project.dir(), &["show", "a", "--json"]).expect(0);
+    let warnings = &shown.json()["warnings"];
+    assert!(warnings.to_string().contains(said), "{warnings}");
+    let status = mocban(project.dir(), &["status", "--json"]).expect(0);
+    let counted = json!({"pairs": {"id": "a", "count": 1}});
+    assert_eq!(status.json()["ignored_profiles"], counted);
 }

@@ -96,6 +96,7 @@ pub use queue::selection::PairSelection;
 pub use queue::stage_record::{FailureAction, MetricResult, StageCheckpoint, StageFailure};
 pub use records::append_verdicts::{ImportedVerdicts, ListedVerdict};
 pub use records::faulty_rows::{FaultyRow, RowFault};
+pub use records::ignored_profiles::{IgnoredProfiles, ProfileCount};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, ImportTerms, PairChange};
 pub use records::listed_names::ListedNames;
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};

@@ -9,13 +9,16 @@ use crate::events::{Listener, warn};
 use crate::failures::Failures;
 use crate::location::{Location, now};
 use crate::missing_inputs::{self, ChangedInputs, InputInspection, MissingInputs};
-use mocban_catalog::{Catalog, SameContents, StatusCounts};
+use mocban_catalog::{Catalog, IgnoredProfiles, SameContents, StatusCounts};
 use mocban_core::domain::JobStatus;
 use mocban_runner::{fingerprints, is_running};
 use mocban_store::Project;
 
 /// Most pairs that are compared to find those with the contents of others. `check` compares all.
 const MAX_COMPARED: u64 = 20_000;
+
+/// Most pairs whose results are searched for colour profiles that could not be applied.
+const MAX_SEARCHED: u64 = 5_000;
 
 /// The state of a project.
 #[derive(Debug)]
@@ -34,6 +37,16 @@ pub struct ProjectStatus {
     pub changed_inputs: Option<ChangedInputs>,
     /// Pairs and blocks with the contents of others. They are not compared during a run, nor in a very large project.
     pub same_contents: SameContents,
+    /// Images whose colour profile could not be applied. They are not counted during a run, nor in a very large project.
+    pub ignored_profiles: IgnoredProfiles,
+}
+
+/// What takes longer to find out than the counts.
+#[derive(Default)]
+struct InspectedInputs {
+    inspection: InputInspection,
+    same_contents: SameContents,
+    ignored_profiles: IgnoredProfiles,
 }
 
 impl ProjectStatus {
@@ -51,23 +64,29 @@ impl ProjectStatus {
         let running = is_running(project, catalog, now()).await?;
         let failures = Failures::read(catalog, all_failures).await?;
         let counts = catalog.status(&fingerprints).await?;
-        let (inspection, same_contents) = match known.filter(|known| !known.running) {
-            _ if running => (InputInspection::default(), SameContents::default()),
+        let inputs = match known.filter(|known| !known.running) {
+            _ if running => InspectedInputs::default(),
             Some(known) => known.inputs(),
             None => {
                 let pairs = counts.pairs + counts.retired;
-                let inspection = missing_inputs::inspect(project, catalog, pairs).await?;
-                let same = match counts.pairs {
-                    0..=MAX_COMPARED => catalog.same_contents().await?,
-                    _ => SameContents::default(),
+                let mut inputs = InspectedInputs {
+                    inspection: missing_inputs::inspect(project, catalog, pairs).await?,
+                    ..InspectedInputs::default()
                 };
-                (inspection, same)
+                if counts.pairs <= MAX_COMPARED {
+                    inputs.same_contents = catalog.same_contents().await?;
+                }
+                if counts.pairs <= MAX_SEARCHED {
+                    inputs.ignored_profiles = catalog.ignored_profiles().await?;
+                }
+                inputs
             }
         };
         Ok(Self {
-            same_contents,
-            missing_inputs: inspection.missing,
-            changed_inputs: inspection.changed,
+            same_contents: inputs.same_contents,
+            ignored_profiles: inputs.ignored_profiles,
+            missing_inputs: inputs.inspection.missing,
+            changed_inputs: inputs.inspection.changed,
             are_results_missing: are_results_missing(project, &counts.jobs),
             counts,
             running,
@@ -76,13 +95,16 @@ impl ProjectStatus {
     }
 
     /// Returns what was found out about the inputs.
-    fn inputs(&self) -> (InputInspection, SameContents) {
-        let inspection = InputInspection {
-            missing: self.missing_inputs.clone(),
-            changed: self.changed_inputs.clone(),
-            ..InputInspection::default()
-        };
-        (inspection, self.same_contents.clone())
+    fn inputs(&self) -> InspectedInputs {
+        InspectedInputs {
+            inspection: InputInspection {
+                missing: self.missing_inputs.clone(),
+                changed: self.changed_inputs.clone(),
+                ..InputInspection::default()
+            },
+            same_contents: self.same_contents.clone(),
+            ignored_profiles: self.ignored_profiles.clone(),
+        }
     }
 
     /// Returns the number of pairs with a status.
@@ -122,6 +144,9 @@ impl ProjectStatus {
         }
         if !self.same_contents.is_empty() {
             json["same_contents"] = serde_json::to_value(&self.same_contents)?;
+        }
+        if !self.ignored_profiles.is_empty() {
+            json["ignored_profiles"] = serde_json::to_value(&self.ignored_profiles)?;
         }
         if !self.failures.blocks.is_empty() {
             json["blocks"] = self.failures.blocks.json();

@@ -11,8 +11,8 @@ use crate::cli::output::show_text::state_name;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, BlockStage, JobStatus, one_line, value_text};
-use mocban_project::ProjectResult;
 use mocban_project::shell::quoted_id;
+use mocban_project::{ProjectResult, input_warnings};
 use mocban_store::Project;
 use mocban_system::time_text::{duration, local};
 
@@ -57,7 +57,7 @@ fn as_json(
 ) -> ProjectResult<Value> {
     let mut value = serde_json::to_value(detail)?;
     value["schema"] = json!(1);
-    value["warnings"] = warnings(detail).collect();
+    value["warnings"] = json!(input_warnings::of_block(detail));
     value["character_list"] = serde_json::to_value(characters)?;
     value["artifacts_dir"] = json!(project.artifacts_dir().to_string_lossy());
     Ok(value)
@@ -135,15 +135,9 @@ fn stages_text(detail: &BlockDetail, palette: Palette) -> String {
     format!("{head}\n{}", columns(rows, "<><"))
 }
 
-/// Returns what the stages assumed or left out.
-fn warnings(detail: &BlockDetail) -> impl Iterator<Item = &str> {
-    let lists = detail.stages.iter();
-    let lists = lists.filter_map(|stage| stage.outcome.get("warnings")?.as_array());
-    lists.flatten().filter_map(Value::as_str)
-}
-
 fn warnings_text(detail: &BlockDetail, palette: Palette) -> String {
-    let rows: Vec<_> = warnings(detail)
+    let rows: Vec<_> = input_warnings::of_block(detail)
+        .iter()
         .map(|text| vec![format!("  {}", one_line(text))])
         .collect();
     if rows.is_empty() {

@@ -202,7 +202,8 @@ mod tests {
     use super::{ProjectStatus, next_steps, screen};
     use crate::cli::output::screen::Palette;
     use mocban_catalog::{
-        FailedPair, SameContents, SameFiles, StageCounts, StatusCounts, StoredFailure,
+        FailedPair, IgnoredProfiles, ProfileCount, SameContents, SameFiles, StageCounts,
+        StatusCounts, StoredFailure,
     };
     use mocban_core::domain::{Failure, FailureClass, JobStatus, Stage, Verdict};
     use mocban_project::failures::Failures;
@@ -232,6 +233,7 @@ mod tests {
             missing_inputs: None,
             changed_inputs: None,
             same_contents: SameContents::default(),
+            ignored_profiles: IgnoredProfiles::default(),
         }
     }
 
@@ -322,6 +324,21 @@ mod tests {
         let json = status.json(false).expect("JSON");
         assert_eq!(json["changed_inputs"]["changed"], 1);
         assert_eq!(json["same_contents"]["pairs"]["count"], 2);
+    }
+
+    #[test]
+    fn images_with_a_profile_that_cannot_be_applied_are_counted() {
+        let mut status = status(3, 0);
+        status.ignored_profiles.pairs = Some(ProfileCount {
+            id: "b".to_owned(),
+            count: 2,
+        });
+        let text = screen(&status, "demo", false, Palette::PLAIN);
+        let line = "colours      prints with a colour profile that cannot be applied: 2, first of b; `show` names the profile\n";
+        assert!(text.contains(line), "{text}");
+        let json = status.json(false).expect("JSON");
+        assert_eq!(json["ignored_profiles"]["pairs"]["count"], 2);
+        assert!(json["ignored_profiles"]["blocks"].is_null());
     }
 
     #[test]

@@ -246,7 +246,9 @@ fn ink_numbers(found: &NormalizeOutcome) -> String {
         .map_or_else(String::new, |orientation| {
             format!("; turned upright by its EXIF orientation {orientation}")
         });
-    format!("{}{turned}", texts.join("; or "))
+    let warning = input_warnings::of_normalize(found);
+    let warning = warning.map_or_else(String::new, |warning| format!("; {warning}"));
+    format!("{}{turned}{warning}", texts.join("; or "))
 }
 
 fn displaced_text(found: &RegisterOutcome) -> String {

@@ -67,6 +67,8 @@ pub(crate) fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Pale
     }
     let same = status.same_contents.sentences();
     parts.extend(same.iter().map(|text| line("copies", text)));
+    let profiles = status.ignored_profiles.sentences();
+    parts.extend(profiles.iter().map(|text| line("colours", text)));
     parts.extend(low_confidence_line(&status.counts).map(|text| line("confidence", &text)));
     parts.extend(verdict_line(&status.counts).map(|text| line("verdicts", &text)));
     parts.concat()

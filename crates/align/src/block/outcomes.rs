@@ -43,6 +43,9 @@ pub struct FoundFace {
 pub struct AlignOutcome {
     /// The side that the page shows.
     pub side: BlockSide,
+    /// What may be wrong with the image of the page.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// Width and height of the page, pixels.
     pub page_size: [usize; 2],
     /// Pixels of the page per mm.

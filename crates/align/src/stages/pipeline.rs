@@ -107,6 +107,7 @@ pub fn normalize(
         }
     }?;
     normalized.outcome.print_orientation = print.image().turned;
+    normalized.outcome.ignored_profile = print.image().ignored_profile.clone();
     Ok(normalized)
 }
 

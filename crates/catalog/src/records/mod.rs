@@ -5,6 +5,7 @@ pub(crate) mod checksums;
 pub(crate) mod faulty_rows;
 pub(crate) mod ground_truth;
 pub(crate) mod identity;
+pub(crate) mod ignored_profiles;
 pub(crate) mod import;
 pub(crate) mod input_paths;
 pub(crate) mod judged_results;

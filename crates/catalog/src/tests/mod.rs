@@ -12,6 +12,7 @@ mod control_points;
 mod guards;
 mod histories;
 mod identity;
+mod ignored_profiles;
 mod import;
 mod model;
 mod pair_list;

@@ -247,6 +247,9 @@ pub struct NormalizeOutcome {
         skip_serializing_if = "Option::is_none"
     )]
     pub print_orientation: Option<u8>,
+    /// Name of the colour profile of the print, if it could not be applied.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ignored_profile: Option<String>,
     /// How many times the masks of a small print are larger than the print, on each side. `None` if they are not larger.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub print_enlargement: Option<NonZeroU32>,

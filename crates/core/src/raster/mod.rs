@@ -23,7 +23,7 @@ mod warp_rgb;
 
 pub use decode::{
     DecodeError, ImageLimits, PrintImage, PrintSamples, SampleSlice, decode, file_dpi,
-    header_pixel_count, header_size, stated_dpi,
+    header_pixel_count, header_size, profile_warning, stated_dpi,
 };
 pub use depth_map::DepthMap;
 pub use encode::{

@@ -26,7 +26,7 @@ use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockStage, FailureClass, JobStatus, one_line,
 };
-use serde_json::Value;
+use mocban_project::input_warnings;
 
 /// Most characters that are listed.
 const SHOWN_CHARACTERS: usize = 1000;
@@ -131,17 +131,10 @@ fn state_part(visit: &Visit, key: &str, detail: &BlockDetail) -> Markup {
                 }
             }
         }
-        @for warning in warnings(detail) {
-            div.notice.warn { p { (one_line(Sentence::of_program(warning).text(visit.language))) } }
+        @for warning in input_warnings::of_block(detail) {
+            div.notice.warn { p { (one_line(Sentence::of_program(&warning).text(visit.language))) } }
         }
     }
-}
-
-/// Returns what the stages assumed or left out.
-fn warnings(detail: &BlockDetail) -> impl Iterator<Item = &str> {
-    let lists = detail.stages.iter();
-    let lists = lists.filter_map(|stage| stage.outcome.get("warnings")?.as_array());
-    lists.flatten().filter_map(Value::as_str)
 }
 
 /// Returns what a person can do with the block.

@@ -56,6 +56,18 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "theo scanned_face_down, mặt khắc hướng về {0}, nhưng nét khắc được tìm thấy ở phía {1}",
     ),
     (
+        "the image's colour profile ({}, for {} colours) cannot be applied, so its colours are read as sRGB",
+        "không áp dụng được hồ sơ màu của hình ({0}, dành cho màu {1}) nên màu được đọc theo sRGB",
+    ),
+    (
+        "the image's colour profile ({}) cannot be applied, so its colours are read as sRGB",
+        "không áp dụng được hồ sơ màu của hình ({0}) nên màu được đọc theo sRGB",
+    ),
+    (
+        "if they look wrong, convert the image to sRGB",
+        "nếu màu trông không đúng, hãy chuyển hình sang sRGB",
+    ),
+    (
         "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces: {}",
         "số đỉnh không có vị trí (NaN, vô hạn hoặc 0 0 0 lặp lại) đã bị bỏ cùng các mặt của chúng: {0}",
     ),

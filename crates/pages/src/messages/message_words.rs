@@ -117,6 +117,8 @@ fn part_text(part: &str) -> String {
     match part {
         "text" | "a string" => return "văn bản".to_owned(),
         "a pointer of Git LFS" => return "con trỏ của Git LFS".to_owned(),
+        "an ICC profile that cannot be read" => return "hồ sơ ICC không đọc được".to_owned(),
+        "without a name" => return "không có tên".to_owned(),
         "MeshLab, Blender or CloudCompare" => {
             return "MeshLab, Blender hoặc CloudCompare".to_owned();
         }

@@ -141,6 +141,7 @@ impl Normalized {
                 relief,
                 thresholds: Vec::new(),
                 print_orientation: None,
+                ignored_profile: None,
                 print_enlargement: scale.enlargement(),
                 print_reduction: scale.reduction(),
             },

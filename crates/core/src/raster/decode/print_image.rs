@@ -19,12 +19,16 @@ pub struct PrintImage {
 impl PrintImage {
     /// Returns a warning if the colours may differ from what the file means.
     pub fn profile_warning(&self) -> Option<String> {
-        let profile = self.ignored_profile.as_ref()?;
-        Some(format!(
-            "its colour profile ({profile}) cannot be applied, so its colours are read as sRGB; if they look wrong, \
-             convert the image to sRGB"
-        ))
+        self.ignored_profile.as_deref().map(profile_warning)
     }
+}
+
+/// Returns the warning about an image whose colour profile could not be applied.
+pub fn profile_warning(profile: &str) -> String {
+    format!(
+        "the image's colour profile ({profile}) cannot be applied, so its colours are read as sRGB; if they look wrong, \
+         convert the image to sRGB"
+    )
 }
 
 impl From<Grid<[u16; 3]>> for PrintImage {

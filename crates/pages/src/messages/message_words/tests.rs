@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use mocban_core::raster::profile_warning;
+
 use super::{all_messages, vietnamese};
 
 /// Checks messages and their Vietnamese texts.
@@ -233,8 +235,28 @@ fn doubts_about_a_scan_are_explained() {
     ]);
 }
 
+#[test]
+fn colour_profiles_that_cannot_be_applied_are_explained() {
+    for (profile, expected) in [
+        ("Coated, for CMYK colours", "Coated, dành cho màu CMYK"),
+        ("Old, of a scanner", "Old, of a scanner"),
+        (
+            "an ICC profile that cannot be read",
+            "hồ sơ ICC không đọc được",
+        ),
+    ] {
+        let expected = format!(
+            "a.png: không áp dụng được hồ sơ màu của hình ({expected}) nên màu được đọc theo sRGB; nếu màu trông không đúng, \
+             hãy chuyển hình sang sRGB"
+        );
+        let said = format!("a.png: {}", profile_warning(profile));
+        assert_eq!(vietnamese(&said), Some(expected));
+    }
+}
+
 /// Parts of messages that the program joins with the words beside them, so that no source has both.
-const COMPOSED: [&str; 9] = [
+const COMPOSED: [&str; 10] = [
+    "cannot be applied, so its colours are read as sRGB",
     "in the list, and import it again",
     "input files that were looked at are missing or have moved",
     "has a value that this program did not store",

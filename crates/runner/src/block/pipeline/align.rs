@@ -2,7 +2,7 @@
 
 use super::context::StageContext;
 use super::failure::{failed, output};
-use super::stage_cache::{HeldFaces, HeldInputs};
+use super::stage_cache::{HeldFaces, HeldInputs, log_warning};
 use crate::block_stages::{BlockStageError, BlockStageOutput};
 use mocban_align::block::{
     self, AlignOutcome, BlockError, CarvedFace, PageAlignment, PageInk, StoredPageMap,
@@ -16,15 +16,19 @@ pub(crate) fn align(
 ) -> Result<BlockStageOutput, BlockStageError> {
     let page = held.page(context)?;
     let faces = held.faces(context)?;
-    let (side, found) = match &context.inputs.control_points {
-        Some(points) => (
-            points.side,
-            from_points(context, &faces, &page.ink, points)?,
-        ),
-        None => by_search(context, &faces, &page.ink)?,
+    let found = match &context.inputs.control_points {
+        Some(points) => {
+            from_points(context, &faces, &page.ink, points).map(|found| (points.side, found))
+        }
+        None => by_search(context, &faces, &page.ink),
     };
+    if found.is_err() {
+        log_warning(&context.inputs.page, &page.image);
+    }
+    let (side, found) = found?;
     output(&AlignOutcome {
         side,
+        warnings: page.image.profile_warning().into_iter().collect(),
         page_size: page.ink.size(),
         px_per_mm: found.map.scale(),
         angle_deg: found.map.angle_rad().to_degrees(),

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use super::context::StageContext;
 use super::failure::failed;
-use crate::block_stages::BlockStageError;
+use crate::block_stages::{BlockFile, BlockStageError};
 use mocban_align::block::{CarvedFace, FaceOutcome, PageInk, StoredHeights, heights_role};
 use mocban_core::domain::{BlockSide, BlockStage, ContentHash};
 use mocban_core::locked;
@@ -88,13 +88,20 @@ impl HeldInputs {
         *held = None;
         let image = raster::decode(&bytes, &context.limits.image)
             .map_err(|error| file.failed(error.class(), error))?;
-        if let Some(warning) = image.profile_warning() {
-            tracing::warn!("{}: {warning}", file.name());
-        }
         drop(bytes);
-        let ink = PageInk::of(&image).map_err(|error| failed(file, error))?;
+        let ink = PageInk::of(&image).map_err(|error| {
+            log_warning(file, &image);
+            failed(file, error)
+        })?;
         let page = Arc::new(HeldPage { hash, image, ink });
         *held = Some(Arc::clone(&page));
         Ok(page)
+    }
+}
+
+/// Logs what may be wrong with the image of a page. The result of `align` keeps it; a failure does not.
+pub(super) fn log_warning(file: &BlockFile, image: &PrintImage) {
+    if let Some(warning) = image.profile_warning() {
+        tracing::warn!("{}: {warning}", file.name());
     }
 }
