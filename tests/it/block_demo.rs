@@ -100,13 +100,12 @@ fn the_report_has_the_accuracy_of_found_boxes() {
     assert_eq!(r50, matched / whole as f64);
     let text = mocban(dir.path(), &["-C", "d", "report"]).expect(0).out;
     assert!(text.contains("Block  true  found  right %"), "{text}");
-    check_round_trip(dir.path(), truth["page"].as_str().expect("a name"));
+    let page = truth["page"].as_str().expect("a name");
+    check_round_trip(dir.path(), page);
+    check_wider_boxes(dir.path(), page, right);
 }
 
-/// Checks that found boxes that are exported, and imported as labels without a change, leave all pairs as they are.
-fn check_round_trip(dir: &Path, page: &str) {
-    let export = ["-C", "d", "export", "--to", "annotations", "-o", "boxes"];
-    mocban(dir, &export).expect(0);
+fn import_boxes(dir: &Path, page: &str) {
     let page = format!("d/data/{page}");
     let import = [
         "-C",
@@ -122,6 +121,46 @@ fn check_round_trip(dir: &Path, page: &str) {
         "block",
     ];
     mocban(dir, &import).expect(0);
+}
+
+/// Checks that results of wider boxes are measured against the truth of their new crops.
+fn check_wider_boxes(dir: &Path, page: &str, right: f64) {
+    let file = dir.join("boxes/pages/block.json");
+    let labels = std::fs::read(&file).expect("the labels");
+    let mut labels: serde_json::Value = serde_json::from_slice(&labels).expect("JSON");
+    let files = labels["_via_img_metadata"].as_object_mut().expect("files");
+    let of_page = files.values_mut().next().expect("a file");
+    let regions = of_page["regions"].as_array_mut().expect("regions");
+    let wide = regions.iter_mut().filter_map(|region| {
+        let shape = &mut region["shape_attributes"];
+        let is_inside = shape["x"].as_f64()? > 100.0;
+        is_inside.then_some(shape)
+    });
+    // Each crop begins 15 px farther left, which is more than 5 % of a character.
+    for shape in wide.take(3) {
+        let [x, width] = ["x", "width"].map(|side| shape[side].as_f64().expect("a number"));
+        shape["x"] = (x - 15.0).into();
+        shape["width"] = (width + 15.0).into();
+    }
+    std::fs::write(&file, labels.to_string()).expect("written");
+    import_boxes(dir, page);
+    let run = mocban(dir, &["-C", "d", "run"]).err;
+    assert!(run.contains("block block: 0 pairs added, "), "{run}");
+    let report = mocban(dir, &["-C", "d", "report", "--json"])
+        .expect(0)
+        .json();
+    let block = &report["blocks"][0];
+    // All three would be wrong by the truth of the narrower boxes.
+    let now = block["right"].as_f64().expect("a number");
+    assert!(now > right - 3.0, "{right}, {block}");
+    assert!(report["unusable_truth"].is_null(), "{report}");
+}
+
+/// Checks that found boxes that are exported, and imported as labels without a change, leave all pairs as they are.
+fn check_round_trip(dir: &Path, page: &str) {
+    let export = ["-C", "d", "export", "--to", "annotations", "-o", "boxes"];
+    mocban(dir, &export).expect(0);
+    import_boxes(dir, page);
     let run = mocban(dir, &["-C", "d", "run"]).expect(0).err;
     let unchanged = "block block: 0 pairs added, 0 changed, 0 retired";
     assert!(run.contains(unchanged), "{run}");

@@ -101,8 +101,8 @@ pub use records::import::{ImportChunk, ImportRow, ImportSummary, ImportTerms, Pa
 pub use records::listed_names::ListedNames;
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
-    AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageCounts,
-    StageRecord, StatusCounts, StoredFailure, all_retired,
+    AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, PrintPlace,
+    StageCounts, StageRecord, StatusCounts, StoredFailure, all_retired,
 };
 pub use records::pair_list::{MetricDifference, PairCursor, PairFilter, PairListPage, PairOrder};
 pub use records::pair_work::{KnownInputs, PairWork};

@@ -16,6 +16,7 @@ use crate::queue::checkpoint;
 use crate::queue::claim;
 use crate::queue::lease;
 use crate::queue::pair_job::PairJob;
+use crate::records::ground_truth;
 use crate::records::manual_alignments;
 use crate::records::pair_lookups;
 use crate::records::pair_results;
@@ -202,6 +203,8 @@ async fn pages_of_results_are_searched_by_key() {
         audited_pairs::RESULTS,
         stage_results::METRIC_HASHES,
         verdicts::COUNTED,
+        ground_truth::PLACES,
+        ground_truth::PLACES_OF_NAMES,
     ] {
         let plan = plan(sql).await;
         assert_only(&plan, &["VIRTUAL TABLE"]);

@@ -28,6 +28,10 @@ pub struct TruthRecord {
     /// Path of the mask of the true stroke tops, an image in the print's frame. `None` if there is no mask.
     #[serde(default)]
     pub tops_mask: Option<String>,
+    /// Map (3 x 3) from the print's pixels to the page of its block. The catalog sets it when it stores the record of a pair
+    /// that was cut from a block.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub page_from_crop: Option<[[f64; 3]; 3]>,
 }
 
 /// A plane `n . x + d = 0`.
@@ -60,6 +64,15 @@ pub enum TruthError {
     /// A tops mask that cannot be read.
     #[error("the tops mask {0}")]
     Mask(String),
+    /// A pair that was cut from a block, and a record that does not say for which crop it is.
+    #[error("the truth does not name the crop of the page that it is for; store it again")]
+    UnknownCrop,
+    /// A box that was moved away from the character.
+    #[error("the box was moved away from the character of the truth")]
+    OtherCharacter,
+    /// A tops mask of another crop of the page.
+    #[error("the box was moved, but the mask of its true stroke tops was not")]
+    OtherCrop,
     /// A tops mask of another size than the print.
     #[error("the tops mask is {found:?} px, the print {wanted:?} px")]
     MaskSize {

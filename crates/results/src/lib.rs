@@ -3,8 +3,8 @@
 //! - `pair_artifacts.rs` reads the outcomes and artifacts of a pair, and groups results that look the same
 //! - `consensus.rs` decides which verdict counts for a result; `reviewer_agreement.rs` and `attention_checks.rs` say how
 //!   far reviewers can be trusted
-//! - `ground_truth.rs` and `truth_evaluation.rs` measure results against true alignments, `manual_alignment.rs` against
-//!   manual ones
+//! - `ground_truth.rs` and `truth_evaluation.rs` measure results against true alignments, which follow a moved box in
+//!   `truth_crop.rs`; `manual_alignment.rs` measures them against manual ones
 //! - `gallery.rs` holds chosen results with their images
 //! - [`stats`] has intervals and tests on plain numbers, [`number_format`] how numbers are shown
 //!
@@ -22,6 +22,7 @@ mod reviewer_agreement;
 pub mod stats;
 #[cfg(any(test, feature = "test-helpers"))]
 pub mod test_fixtures;
+mod truth_crop;
 mod truth_evaluation;
 
 pub use attention_checks::{AttentionCheckRates, is_inattentive};

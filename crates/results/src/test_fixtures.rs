@@ -114,6 +114,7 @@ pub fn pending(name: &str) -> PairResults {
         stages: Vec::new(),
         metrics: Vec::new(),
         truth: None,
+        print_place: None,
     }
 }
 

@@ -80,6 +80,10 @@ fn errors_by_metric(
     truth: &serde_json::Value,
 ) -> Result<BTreeMap<ThresholdMetric, TruthErrors>, EvaluationError> {
     let (record, artifacts) = (TruthRecord::read(truth)?, PairArtifacts::new(project, pair));
+    let record = match &pair.print_place {
+        Some(place) => record.in_crop(place)?,
+        None => record,
+    };
     let tops = match &record.tops_mask {
         Some(path) => Some(read_tops_and_depth(project, path, &artifacts)?),
         None => None,

@@ -84,16 +84,8 @@ impl CharacterMap {
 
     /// Returns the same map to the pixels of a crop of the page; `None` if the crop has no inverse.
     pub fn print_from_mesh(&self, page_from_crop: &Affine2) -> Option<PrintFromMesh> {
-        let crop_from_page = page_from_crop.inverse()?.0;
-        let page = self.page_from_mesh.0;
-        let mut rows = page;
-        for (row, [a, b, c]) in rows.iter_mut().zip(crop_from_page) {
-            for axis in 0..4 {
-                row[axis] = a * page[0][axis] + b * page[1][axis];
-            }
-            row[3] += c;
-        }
-        Some(PrintFromMesh(rows))
+        let crop_from_page = page_from_crop.inverse()?;
+        Some(self.page_from_mesh.in_image(&crop_from_page))
     }
 }
 

@@ -177,6 +177,15 @@ pub struct PairAttributes {
 
 from_row! { PairAttributes { name, mesh_path, print_path, unit, scanned_face_down, character, block, meta as Json, prior } }
 
+/// Where the print of a pair lies on the page of its block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PrintPlace {
+    /// Map (3 x 3) from pixels of the print to pixels of the page.
+    pub page_from_crop: [[f64; 3]; 3],
+    /// Edges of its box on the page in pixels: left, top, right, bottom.
+    pub bounds: [f64; 4],
+}
+
 /// One pair with its current results, for report and export.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairResults {
@@ -193,8 +202,11 @@ pub struct PairResults {
     pub stages: Vec<StageRecord>,
     /// Results of the computed metrics, in the order of [`ThresholdMetric::ALL`]. Empty if the pair is not done.
     pub metrics: Vec<MetricRecord>,
-    /// The true alignment as given, if any.
+    /// The true alignment as given, if any, with the crop of the page that it is for, if the pair was cut from a block.
     pub truth: Option<Value>,
+    /// Where its print lies on the page now, if it was cut from a block and has a true alignment.
+    #[serde(skip)]
+    pub print_place: Option<PrintPlace>,
 }
 
 impl PairResults {

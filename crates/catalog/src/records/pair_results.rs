@@ -13,7 +13,7 @@ use crate::queue::counters::Cursor;
 use crate::records::model::{
     FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord, stored_failure,
 };
-use crate::records::{stage_results, verdicts};
+use crate::records::{ground_truth, stage_results, verdicts};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{
     ContentHash, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
@@ -160,6 +160,13 @@ async fn assemble(conn: &mut Conn, found: &[Row], left_out: &LeftOut) -> Result<
     let mut stages = stage_results::of_pairs(conn, &ids).await?;
     let hashes = stage_results::metric_hashes(conn, &ids).await?;
     let verdicts = verdicts::of_pairs(conn, &ids, left_out).await?;
+    let mut with_truth = Vec::new();
+    for (row, id) in found.iter().zip(&ids) {
+        if row.get::<Option<String>>("truth")?.is_some() {
+            with_truth.push(*id);
+        }
+    }
+    let mut places = ground_truth::print_places(conn, &with_truth).await?;
     let mut assemble_pair = |row: &Row, id: i64| {
         let cursor: Cursor = row.get("stage")?;
         let mut records = stages.remove(&id).unwrap_or_default();
@@ -173,6 +180,7 @@ async fn assemble(conn: &mut Conn, found: &[Row], left_out: &LeftOut) -> Result<
             metrics: metrics(id, &records, &hashes, &verdicts)?,
             stages: records,
             truth: truth.map(|Json(body)| body),
+            print_place: places.remove(&id),
         })
     };
     let pairs = found.iter().zip(ids);

@@ -6,7 +6,7 @@ use super::blocks::{attributes, block, character, stored, version, world};
 use super::{World, name};
 use crate::{
     BlockAttributes, BlockInputVersions, BlockReason, CharacterMaps, CheckpointOutcome, CutOrigin,
-    CutReply, CutSummary, NewCharacter, NewVerdict, RetiredPair, ReviewContext,
+    CutReply, CutSummary, NewCharacter, NewVerdict, PrintPlace, RetiredPair, ReviewContext,
 };
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockStage, JobStatus, PairName, PrintFromMesh, RetireCause,
@@ -100,6 +100,59 @@ async fn true_boxes_stay_until_the_block_gets_another_page() {
     world.import_block(other_page).await;
     assert_eq!(stored().await, []);
     assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
+}
+
+#[tokio::test]
+async fn the_truth_of_a_cut_pair_keeps_the_crop_that_it_is_for() {
+    let world = world().await;
+    let crop = |x: f64| [[1.0, 0.0, x], [0.0, 1.0, 9.0], [0.0, 0.0, 1.0]];
+    let cut = |x: f64, content: &str| NewCharacter {
+        maps: Some(json!({ "page_from_crop": crop(x) })),
+        bounds: [x, 2.0, 30.5, 40.25],
+        ..character("a", content)
+    };
+    world.finish_block(vec![cut(7.0, "1")]).await;
+    let imported = world.catalog.import(vec![super::row("other")], 1).await;
+    imported.expect("imported");
+    let truth = |id: &str| (name(id), json!({ "id": id }));
+    let given = vec![truth("b_a"), truth("other")];
+    assert_eq!(world.catalog.set_truth(given).await.expect("stored"), 2);
+    let results = async |pair: &str| {
+        let detail = world.catalog.pair(&name(pair)).await.expect("a read");
+        detail.expect("the pair").results
+    };
+    let other = results("other").await;
+    assert_eq!(
+        (other.truth, other.print_place),
+        (Some(json!({ "id": "other" })), None)
+    );
+    let body = json!({ "id": "b_a", "page_from_crop": crop(7.0) });
+    let known = world.catalog.known_blocks().await.expect("a read");
+    let changed = BlockInputVersions {
+        labels: Some(version("moved boxes")),
+        ..BlockInputVersions::default()
+    };
+    for (x, is_moved) in [(7.0, false), (5.5, true)] {
+        if is_moved {
+            let labels = BlockAttributes {
+                labels_path: Some("moved.json".to_owned()),
+                ..attributes("b")
+            };
+            world.import_block(labels).await;
+            let seen = vec![(known[0].block, changed.clone())];
+            let stored = world.catalog.store_block_inputs(seen).await;
+            stored.expect("stored");
+            assert_eq!(world.requeue_blocks([1; 4]).await.len(), 1);
+            world.finish_block(vec![cut(x, "2")]).await;
+        }
+        let found = results("b_a").await;
+        assert_eq!(found.truth.as_ref(), Some(&body), "{x}");
+        let place = PrintPlace {
+            page_from_crop: crop(x),
+            bounds: [x, 2.0, 30.5, 40.25],
+        };
+        assert_eq!(found.print_place, Some(place), "{x}");
+    }
 }
 
 #[tokio::test]

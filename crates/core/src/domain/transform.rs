@@ -217,6 +217,27 @@ impl PrintFromMesh {
         Some(Affine2([row(0), row(1)]))
     }
 
+    /// Returns the same map to another image, to whose pixels `other_from_print` maps those of the print. Heights stay.
+    ///
+    /// ```
+    /// use mocban_core::domain::{Affine2, PrintFromMesh};
+    ///
+    /// let map = PrintFromMesh([[2.0, 0.0, 0.0, 5.0], [0.0, 2.0, 0.0, 7.0], [0.0, 0.0, 1.0, 0.0]]);
+    /// let moved = map.in_image(&Affine2::scale_shift(1.0, [-3.0, 4.0]));
+    /// assert_eq!(moved.apply([1.0, 1.0, 9.0]), [4.0, 13.0, 9.0]);
+    /// ```
+    #[must_use]
+    pub fn in_image(&self, other_from_print: &Affine2) -> Self {
+        let [x, y, height] = self.0;
+        let row = |[a, b, c]: [f64; 3]| {
+            let mut row = [0, 1, 2, 3].map(|k: usize| a * x[k] + b * y[k]);
+            row[3] += c;
+            row
+        };
+        let [first, second] = other_from_print.0;
+        Self([row(first), row(second), height])
+    }
+
     /// Maps a mesh point to `[x, y, height]`: x and y in print pixels, the height over the plane in mesh units.
     pub fn apply(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let dot = |r: [f64; 4]| r[0] * x + r[1] * y + r[2] * z + r[3];

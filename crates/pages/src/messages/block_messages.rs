@@ -64,6 +64,19 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "không áp dụng được hồ sơ màu của hình ({0}) nên màu được đọc theo sRGB",
     ),
     (
+        "the box was moved away from the character of the truth",
+        "khung đã được chuyển ra khỏi chữ của dữ liệu đối chứng",
+    ),
+    (
+        "the box was moved, but the mask of its true stroke tops was not",
+        "khung đã được chuyển, nhưng mặt nạ đúng của đỉnh nét thì không",
+    ),
+    (
+        "the truth does not name the crop of the page that it is for",
+        "dữ liệu đối chứng không nêu phần trang in mà nó thuộc về",
+    ),
+    ("store it again", "hãy lưu lại"),
+    (
         "if they look wrong, convert the image to sRGB",
         "nếu màu trông không đúng, hãy chuyển hình sang sRGB",
     ),
