@@ -257,3 +257,31 @@ fn a_run_that_fails_later_says_why_on_its_page() {
         "{vietnamese}"
     );
 }
+
+#[test]
+fn an_export_says_why_it_leaves_out_pairs() {
+    let (dir, page) = with_project();
+    let set = [
+        "verdict",
+        "set",
+        "upright-0001",
+        "pass",
+        "--reviewer",
+        "lan",
+    ];
+    mocban(&dir.path().join("p"), &set).expect(0);
+    let passed = json!({"purpose": "excel", "only": "passed", "metric": "relief"});
+    act(&page, "/p/p/actions/export", &passed, |_| {});
+    for (language, left_out) in [
+        (
+            "vi",
+            "Số cặp bị bỏ qua theo lựa chọn của bạn: 14 chưa có đánh giá.",
+        ),
+        (
+            "en",
+            "Pairs that your choice leaves out: 14 without a verdict.",
+        ),
+    ] {
+        wait_for(&page, &format!("/p/p/export?language={language}"), left_out);
+    }
+}

@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 use mocban::export::ExportFormat;
 use mocban::raster::{Grid, decode_grey8, decode_grey16};
 use mocban::store::Project;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tiff::decoder::{Decoder, DecodingResult};
 
 use crate::check::at;
@@ -350,9 +350,20 @@ fn an_export_without_a_selected_result_keeps_the_earlier_one() {
     let none = ["export", "-o", path, "--min-confidence", "1"];
     let refused = at(&project, &none).expect(4);
     assert!(
-        refused.err.contains("no result is selected"),
+        refused
+            .err
+            .contains("no result is selected: 1 without a result, 10 below confidence 1;"),
         "{}",
         refused.err
     );
     assert_eq!(lines(&out.join("jsonl")), before);
+    let passed = ["export", "-o", path, "--only", "passed"];
+    let said = at(&project, &passed).expect(0).err;
+    let reasons = "9 left out (1 without a result, 6 without a verdict, 1 unsure or in conflict, 1 failed by reviewers)";
+    assert!(said.contains(reasons), "{said}");
+    let json = at(&project, &[&passed[..], &["--json"]].concat())
+        .expect(0)
+        .json();
+    let counts = json!({"without_result": 1, "without_verdict": 6, "unsure": 1, "failed": 1});
+    assert_eq!(json["left_out_by"], counts);
 }

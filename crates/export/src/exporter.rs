@@ -16,6 +16,7 @@ use super::exporter_error::ExportError;
 use super::format::ExportFormat;
 use super::format_writer::{ExportContext, FormatFolder};
 use super::formats;
+use super::left_out::{LeftOutCounts, LeftOutReason};
 use super::manifest::{ExportManifest, MANIFEST, PairCounts};
 use super::options::ExportOptions;
 use super::page_labels::write_page_labels;
@@ -39,6 +40,8 @@ const ENCODED_PER_CORE: usize = 2;
 pub struct ExportSummary {
     /// Numbers of pairs.
     pub pairs: PairCounts,
+    /// Why pairs were left out.
+    pub left_out: LeftOutCounts,
     /// Damaged rows that the export does not include.
     pub set_apart: SetApart,
     /// How the exported pairs were divided, if a split was requested.
@@ -224,7 +227,7 @@ impl ExportRun {
                 context: &self.context,
                 plan: self.plan.as_ref(),
             };
-            let written: Result<Vec<Option<WrittenPair>>, FolderError> = pairs
+            let written: Result<Vec<Result<WrittenPair, LeftOutReason>>, FolderError> = pairs
                 .par_iter()
                 .map(|(pair, alignment, origin)| {
                     writer.write(pair, alignment.as_ref(), origin.as_ref())
@@ -232,8 +235,11 @@ impl ExportRun {
                 .collect();
             for pair in written? {
                 match pair {
-                    None => self.summary.pairs.left_out += 1,
-                    Some(pair) => {
+                    Err(reason) => {
+                        self.summary.pairs.left_out += 1;
+                        self.summary.left_out.add(reason);
+                    }
+                    Ok(pair) => {
                         let name = pair.record.pair.id.clone();
                         self.append(pair)?;
                         failpoint::hit("export", Point::Written, Some(&name));

@@ -6,10 +6,11 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::format::ExportFormat;
+use super::left_out::LeftOutReason;
 use super::split::SplitSettings;
-use mocban_catalog::MetricRecord;
+use mocban_catalog::{MetricRecord, PairResults};
 use mocban_core::InputLimits;
-use mocban_core::domain::{MetricOutcome, PairName, ThresholdMetric, Verdict, enum_names};
+use mocban_core::domain::{MetricOutcome, PairName, ThresholdMetric, enum_names};
 use mocban_results::Consensus;
 
 /// Default size of shards in MiB.
@@ -180,22 +181,128 @@ impl ExportOptions {
         self.only != ResultFilter::All || self.min_confidence.is_some()
     }
 
-    /// Returns whether a pair with these selected results is exported.
-    pub(super) fn keeps_pair(&self, name: &PairName, kept: &[&MetricRecord]) -> bool {
-        let is_chosen = self.pairs.as_ref().is_none_or(|pairs| pairs.contains(name));
-        is_chosen && !(self.selects_results() && kept.is_empty())
+    /// Returns the lowest confidence of exported results, if there is one.
+    pub fn least_confidence(&self) -> Option<f64> {
+        let of_filter = match self.only {
+            ResultFilter::Confident => Some(MetricOutcome::LOW_CONFIDENCE),
+            ResultFilter::All | ResultFilter::Passed => None,
+        };
+        let limits = of_filter.into_iter().chain(self.min_confidence);
+        limits.reduce(f64::max)
+    }
+
+    /// Returns why a pair is left out, or `None` if it is exported. `is_kept` says whether one of its results is exported.
+    pub(super) fn reason_to_leave_out(
+        &self,
+        pair: &PairResults,
+        is_kept: bool,
+    ) -> Option<LeftOutReason> {
+        let chosen = self.pairs.as_ref();
+        if chosen.is_some_and(|pairs| !pairs.contains(&pair.attributes.name)) {
+            return Some(LeftOutReason::NotChosen);
+        }
+        if is_kept || !self.selects_results() {
+            return None;
+        }
+        let selected = pair.metrics.iter();
+        let selected = selected.filter(|record| self.metrics.contains(&record.outcome.metric));
+        let reasons = selected.filter_map(|record| self.refusal(record));
+        Some(reasons.max().unwrap_or(LeftOutReason::WithoutResult))
     }
 
     /// Returns whether a result is exported.
     pub(super) fn keeps(&self, record: &MetricRecord) -> bool {
-        let confidence = record.outcome.confidence;
-        let reaches = |least: f64| confidence.is_some_and(|found| found >= least);
-        let is_wanted = match self.only {
-            ResultFilter::All => true,
-            ResultFilter::Confident => reaches(MetricOutcome::LOW_CONFIDENCE),
-            ResultFilter::Passed => Consensus::of(record).verdict() == Some(Verdict::Pass),
+        self.metrics.contains(&record.outcome.metric) && self.refusal(record).is_none()
+    }
+
+    /// Returns why the result of a selected metric is left out.
+    fn refusal(&self, record: &MetricRecord) -> Option<LeftOutReason> {
+        if self.only == ResultFilter::Passed {
+            match Consensus::of(record) {
+                Consensus::Passed => {}
+                Consensus::Unjudged => return Some(LeftOutReason::WithoutVerdict),
+                Consensus::Stale => return Some(LeftOutReason::EarlierVerdict),
+                Consensus::Unsure | Consensus::Conflict => return Some(LeftOutReason::Unsure),
+                Consensus::Failed => return Some(LeftOutReason::Failed),
+            }
+        }
+        let least = self.least_confidence()?;
+        match record.outcome.confidence {
+            Some(confidence) if confidence >= least => None,
+            Some(_) => Some(LeftOutReason::LowConfidence),
+            None => Some(LeftOutReason::WithoutConfidence),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ExportOptions, LeftOutReason, ResultFilter};
+    use mocban_catalog::PairResults;
+    use mocban_core::InputLimits;
+    use mocban_core::domain::ThresholdMetric;
+    use mocban_core::domain::Verdict::{Fail, Pass, Unsure};
+    use mocban_results::test_fixtures::{done, pending, with_confidence};
+
+    fn options(only: ResultFilter, min_confidence: Option<f64>) -> ExportOptions {
+        ExportOptions {
+            only,
+            min_confidence,
+            ..ExportOptions::all_of(&ThresholdMetric::ALL, InputLimits::SUGGESTED)
+        }
+    }
+
+    fn reason(pair: &PairResults, options: &ExportOptions) -> Option<LeftOutReason> {
+        let is_kept = pair.metrics.iter().any(|record| options.keeps(record));
+        options.reason_to_leave_out(pair, is_kept)
+    }
+
+    #[test]
+    fn a_pair_is_left_out_for_the_reason_of_the_filter() {
+        let passed = options(ResultFilter::Passed, None);
+        let mut stale = done("a", 0.8, &[]);
+        for record in &mut stale.metrics {
+            record.older_verdicts = 1;
+        }
+        for (pair, expected) in [
+            (done("a", 0.8, &[Pass]), None),
+            (done("a", 0.8, &[]), Some(LeftOutReason::WithoutVerdict)),
+            (stale, Some(LeftOutReason::EarlierVerdict)),
+            (done("a", 0.8, &[Unsure]), Some(LeftOutReason::Unsure)),
+            (done("a", 0.8, &[Pass, Fail]), Some(LeftOutReason::Unsure)),
+            (done("a", 0.8, &[Fail]), Some(LeftOutReason::Failed)),
+            (pending("a"), Some(LeftOutReason::WithoutResult)),
+        ] {
+            assert_eq!(reason(&pair, &passed), expected);
+        }
+        let mut unknown = with_confidence("a", 0.6);
+        for record in &mut unknown.metrics {
+            record.outcome.confidence = None;
+        }
+        let confident = options(ResultFilter::Confident, None);
+        let surer = options(ResultFilter::Confident, Some(0.7));
+        assert_eq!(surer.least_confidence(), Some(0.7));
+        for (pair, options, expected) in [
+            (with_confidence("a", 0.6), &confident, None),
+            (
+                with_confidence("a", 0.6),
+                &surer,
+                Some(LeftOutReason::LowConfidence),
+            ),
+            (unknown, &confident, Some(LeftOutReason::WithoutConfidence)),
+        ] {
+            assert_eq!(reason(&pair, options), expected);
+        }
+        let all = options(ResultFilter::All, None);
+        assert_eq!(reason(&pending("a"), &all), None);
+        let chosen = ExportOptions {
+            pairs: Some([pending("b").attributes.name].into()),
+            ..all
         };
-        let is_selected = self.metrics.contains(&record.outcome.metric);
-        is_selected && is_wanted && self.min_confidence.is_none_or(reaches)
+        assert_eq!(reason(&pending("b"), &chosen), None);
+        assert_eq!(
+            reason(&done("a", 0.8, &[Pass]), &chosen),
+            Some(LeftOutReason::NotChosen)
+        );
     }
 }

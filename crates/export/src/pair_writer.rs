@@ -6,6 +6,7 @@ use std::path::Path;
 use super::export_folder::{FolderError, remove_below, write_below};
 use super::format::ExportFormat;
 use super::format_writer::{EncodedFile, EncodedPair, ExportContext, FormatWriter, PairView};
+use super::left_out::LeftOutReason;
 use super::pair_pictures::{PairPictures, PictureError, canvas_from_print};
 use super::record::{ManualAlignmentFields, PairRecord};
 use super::split::SplitPlan;
@@ -72,21 +73,21 @@ pub(super) struct PairWriter<'a> {
 }
 
 impl PairWriter<'_> {
-    /// Encodes a pair in every format and writes its own files. Returns `None` if the pair is left out.
+    /// Encodes a pair in every format and writes its own files. The inner error says why the pair is left out.
     pub(super) fn write(
         &self,
         pair: &PairResults,
         alignment: Option<&ManualAlignmentFields>,
         origin: Option<&CutOrigin>,
-    ) -> Result<Option<WrittenPair>, FolderError> {
+    ) -> Result<Result<WrittenPair, LeftOutReason>, FolderError> {
         let options = &self.context.options;
         let kept: Vec<_> = pair
             .metrics
             .iter()
             .filter(|record| options.keeps(record))
             .collect();
-        if !options.keeps_pair(&pair.attributes.name, &kept) {
-            return Ok(None);
+        if let Some(reason) = options.reason_to_leave_out(pair, !kept.is_empty()) {
+            return Ok(Err(reason));
         }
         let complete = |mut record: PairRecord| {
             record.pair.manual_alignment = alignment.cloned();
@@ -109,7 +110,7 @@ impl PairWriter<'_> {
                 (record, output, Some(failure.message))
             }
         };
-        Ok(Some(WrittenPair {
+        Ok(Ok(WrittenPair {
             record,
             shared: output.shared,
             files: output.files,

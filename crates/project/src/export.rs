@@ -10,13 +10,17 @@ use crate::missing_inputs::{self, MissingInputs};
 use crate::own_files::refuse_project_file;
 use crate::status::{all_retired, warn_about_stale};
 use mocban_core::domain::ThresholdMetric;
-use mocban_export::{ExportFormat, ExportOptions, ExportSummary, export as export_pairs};
+use mocban_export::{
+    ExportFormat, ExportOptions, ExportSummary, LeftOutCounts, export as export_pairs,
+};
 
 /// An export of a project.
 #[derive(Debug)]
 pub struct ExportedProject {
     /// What was written.
     pub summary: ExportSummary,
+    /// Lowest confidence that was exported, if results were selected by it.
+    pub least_confidence: Option<f64>,
     /// Inputs that are no longer at their places, if files could not be read.
     pub missing_inputs: Option<MissingInputs>,
 }
@@ -53,6 +57,7 @@ pub async fn export(
     options.metrics = computed.iter().filter(is_chosen).copied().collect();
     options.settings = config.that_change_results()?;
     let are_pairs_chosen = options.pairs.is_some();
+    let least_confidence = options.least_confidence();
     let checked = options.check(formats);
     checked.map_err(|unused| Refusal::Usage(unused.to_string()))?;
     warn_about_stale(&catalog, location, listener).await?;
@@ -70,11 +75,9 @@ pub async fn export(
     };
     catalog.close().await;
     if summary.is_nothing_selected {
-        let nothing = match &retired {
-            Some(retired) => retired,
-            None if are_pairs_chosen => "none of the chosen pairs has a result to export",
-            None => "no result is selected by --only or --min-confidence",
-        };
+        let nothing = retired.unwrap_or_else(|| {
+            nothing_selected(&summary.left_out, are_pairs_chosen, least_confidence)
+        });
         let text = format!("{nothing}; nothing was written to {}", output.display());
         return Err(Refusal::NothingSelected(text).into());
     }
@@ -84,6 +87,25 @@ pub async fn export(
     }
     Ok(ExportedProject {
         summary,
+        least_confidence,
         missing_inputs,
     })
+}
+
+/// Returns why no pair has a selected result.
+fn nothing_selected(
+    left_out: &LeftOutCounts,
+    are_pairs_chosen: bool,
+    least_confidence: Option<f64>,
+) -> String {
+    let (nothing, advice) = if are_pairs_chosen {
+        ("none of the chosen pairs has a result to export", "")
+    } else {
+        let advice = "; other values of --only and --min-confidence select more";
+        ("no result is selected", advice)
+    };
+    match left_out.refused() {
+        0 => nothing.to_owned(),
+        _ => format!("{nothing}: {}{advice}", left_out.text(least_confidence)),
+    }
 }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
@@ -170,12 +170,16 @@ fn print_summary(
     let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
     let blocks = summary.unreadable_blocks.iter();
     let blocks = blocks.map(|(block, why)| json!({"block": block, "error": why}));
+    let left_out_by = summary.left_out.iter();
+    let left_out_by = left_out_by.map(|(reason, number)| (reason.name().to_owned(), number.into()));
+    let left_out_by: serde_json::Map<String, Value> = left_out_by.collect();
     context.print_json(&json!({
         "schema": 1,
         "set_apart": summary.set_apart,
         "done": summary.pairs.done,
         "without_result": summary.pairs.without_result,
         "left_out": summary.pairs.left_out,
+        "left_out_by": left_out_by,
         "split": summary.split.map(|SplitCounts { pairs: [train, validation, test], .. }| {
             json!({"train": train, "validation": validation, "test": test})
         }),
@@ -207,7 +211,7 @@ fn print_summary(
             "the earlier export in {shown} was kept, because the new one would lack the files of {lost}; repair them, or export to a new directory"
         ));
     } else {
-        print_done(summary, args, context);
+        print_done(exported, args, context);
     }
     if let Some((path, why)) = &summary.leftover {
         context.warn(&format!(
@@ -270,14 +274,18 @@ fn explanation(args: &ExportArgs) -> String {
     readme + tables + excel
 }
 
-fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
+fn print_done(exported: &ExportedProject, args: &ExportArgs, context: &Context) {
+    let summary = &exported.summary;
     let unreadable = match summary.unreadable.len() {
         0 => String::new(),
         lost => format!(", {lost} with missing or changed files"),
     };
     let left_out = match summary.pairs.left_out {
         0 => String::new(),
-        left_out => format!(", {left_out} left out"),
+        left_out => {
+            let reasons = summary.left_out.text(exported.least_confidence);
+            format!(", {left_out} left out ({reasons})")
+        }
     };
     context.info(&format!(
         "{} exported to {}, {} without a result{left_out}{unreadable}",

@@ -28,7 +28,7 @@ use super::state::AppState;
 use super::task_part::task_part;
 use super::tasks::{FinishedTask, TaskKind};
 use super::visit::Visit;
-use crate::messages::vietnamese;
+use crate::messages::{left_out_reasons, vietnamese};
 use crate::review::Language;
 use mocban_core::domain::{PairName, ThresholdMetric, one_line};
 use mocban_export::{ExportFormat, ExportOptions, ResultFilter};
@@ -248,6 +248,7 @@ async fn run(
     let output = exports_dir(&location.dir).join(format!("{name}{of_chosen}"));
     let ExportedProject {
         summary,
+        least_confidence,
         missing_inputs,
     } = export(&output, &[format], options, &location, &()).await?;
     let done = grouped(summary.pairs.done);
@@ -272,6 +273,14 @@ async fn run(
         lines.push([
             format!("Pairs without a result, which are left out: {number}."),
             format!("Số cặp chưa có kết quả nên bị bỏ qua: {number}."),
+        ]);
+    }
+    if summary.left_out.refused() > 0 {
+        let reasons = summary.left_out.text(least_confidence);
+        let in_vietnamese = left_out_reasons(&reasons).unwrap_or_else(|| reasons.clone());
+        lines.push([
+            format!("Pairs that your choice leaves out: {reasons}."),
+            format!("Số cặp bị bỏ qua theo lựa chọn của bạn: {in_vietnamese}."),
         ]);
     }
     if summary.kept_earlier {

@@ -238,6 +238,15 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     ("choose from {}", "hãy chọn trong: {0}"),
     (
+        "no result is selected: {}",
+        "không có kết quả nào được chọn: {0}",
+    ),
+    ("no result is selected", "không có kết quả nào được chọn"),
+    (
+        "none of the chosen pairs has a result to export: {}",
+        "không có cặp nào đã chọn có kết quả để xuất: {0}",
+    ),
+    (
         "none of the chosen pairs has a result to export",
         "không có cặp nào đã chọn có kết quả để xuất",
     ),

@@ -2,6 +2,7 @@
 //! by their wording.
 
 use super::block_messages::BLOCK_MESSAGES;
+use super::left_out_words::left_out_reasons;
 use super::list_messages::LIST_MESSAGES;
 use super::message_table::{KINDS, MESSAGES};
 
@@ -124,7 +125,8 @@ fn part_text(part: &str) -> String {
         }
         _ => {}
     }
-    if let Some(listed) = with_more(part, "mục khác").or_else(|| boxes_text(part)) {
+    let listed = with_more(part, "mục khác").or_else(|| boxes_text(part));
+    if let Some(listed) = listed.or_else(|| left_out_reasons(part)) {
         return listed;
     }
     let name = part.strip_prefix("a ").or_else(|| part.strip_prefix("an "));

@@ -254,8 +254,20 @@ fn colour_profiles_that_cannot_be_applied_are_explained() {
     }
 }
 
+#[test]
+fn an_export_of_nothing_is_explained() {
+    let said = "no result is selected: 12 without a verdict, 3 below confidence 0.5; nothing was written to out";
+    let wanted = "không có kết quả nào được chọn: 12 chưa có đánh giá, 3 có độ tin cậy dưới 0,5; chưa ghi gì vào out";
+    assert_eq!(vietnamese(said).as_deref(), Some(wanted));
+    let said = "none of the chosen pairs has a result to export: 1 without a result";
+    let wanted = "không có cặp nào đã chọn có kết quả để xuất: 1 chưa có kết quả";
+    assert_eq!(vietnamese(said).as_deref(), Some(wanted));
+}
+
 /// Parts of messages that the program joins with the words beside them, so that no source has both.
-const COMPOSED: [&str; 10] = [
+const COMPOSED: [&str; 12] = [
+    "no result is selected",
+    "none of the chosen pairs has a result to export",
     "cannot be applied, so its colours are read as sRGB",
     "in the list, and import it again",
     "input files that were looked at are missing or have moved",
