@@ -69,7 +69,7 @@ class BoxesPage {
       this.camera.reset();
     }
     this.update();
-    const hint = block.boxes.length === 0 ? "no_boxes" : block.has_labels ? "how" : "found";
+    const hint = block.is_unread ? "unread" : block.boxes.length === 0 ? "no_boxes" : block.has_labels ? "how" : "found";
     const warnings = block[`warnings_${language}`] ?? block.warnings;
     this.tell([...warnings, text(hint)].join(" "), warnings.length > 0);
   }
@@ -147,7 +147,8 @@ class BoxesPage {
       input.disabled = !box || this.isBusy;
       if (input.value.trim() !== (value ?? "")) input.value = value ?? "";
     }
-    this.counts.textContent = text("counts", { n: this.edits.list.length, changed: this.edits.count() });
+    const counts = this.block?.is_unread ? "counts_unread" : "counts";
+    this.counts.textContent = text(counts, { n: this.edits.list.length, changed: this.edits.count() });
     for (const one of this.choices) one.disabled = this.edits.list.length === 0;
     this.removeButton.disabled = !box;
     this.undoButton.disabled = this.edits.past.length === 0;

@@ -27,6 +27,11 @@ const BOX_MESSAGES = {
     vi: "Dùng lại nhãn mà các khung này đã thay? Nhãn hiện tại vẫn còn trong một tệp, các thay đổi chưa lưu sẽ mất.",
   },
   counts: { en: "boxes: {n} · changed: {changed}", vi: "số khung: {n} · đã đổi: {changed}" },
+  counts_unread: { en: "boxes of the labels: unknown · new: {n}", vi: "số khung của nhãn: không rõ · khung mới: {n}" },
+  unread: {
+    en: "The labels cannot be read, so their boxes are not shown. Put the file back and reload the page. Boxes that are saved here take its place.",
+    vi: "Không đọc được nhãn nên không hiện khung của chúng. Hãy đưa tệp về chỗ cũ rồi tải lại trang. Khung được lưu ở đây sẽ thay tệp đó.",
+  },
   how: {
     en: "Choose a box to move, resize, name or delete it; drag its corners to resize it.",
     vi: "Chọn một khung để di chuyển, đổi cỡ, đặt tên hoặc xóa; kéo các góc để đổi cỡ.",

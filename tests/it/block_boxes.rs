@@ -80,6 +80,20 @@ fn boxes_are_checked_before_they_are_stored() {
     assert_eq!(earlier.status, 409, "{}", text(&earlier));
     assert!(!dir.path().join("p/labels").exists(), "nothing was written");
     assert_eq!(shown(&page)["shown"], *hash);
+    assert_eq!(shown(&page)["is_unread"], false);
+    assert!(!html(&page, "/p/p/block/b1/").contains(">missing<"));
+
+    // Missing labels are not labels without boxes.
+    fs::rename(dir.path().join("few.json"), dir.path().join("away.json")).expect("moved");
+    let unread = shown(&page);
+    assert_eq!(unread["is_unread"], true, "{unread}");
+    assert!(unread["warnings"].to_string().contains("few.json"));
+    let block = html(&page, "/p/p/block/b1/");
+    assert!(block.contains(">missing<"), "{block}");
+    let stored = stored_block(dir.path());
+    assert_eq!(stored["missing_files"], json!(["labels"]));
+    let text = mocban(dir.path(), &["-C", "p", "show", "b1"]).expect(0).out;
+    assert!(text.contains("few.json  missing"), "{text}");
 }
 
 /// Returns where a place of the page is on the screen, once the page has its final layout.

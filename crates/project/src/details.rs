@@ -10,8 +10,8 @@ use crate::location::Location;
 use crate::pair_table::{self, PairRow};
 use crate::selection;
 use mocban_catalog::{
-    BlockDetail, Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment,
-    StoredCharacter,
+    BlockAttributes, BlockDetail, Catalog, CatalogError, PairDetail, PairResults, PlanEntry,
+    StoredAlignment, StoredCharacter,
 };
 use mocban_core::domain::{
     BlockName, DepthOutcome, InputVersion, MetricOutcome, PairName, Stage, ThresholdMetric,
@@ -20,7 +20,7 @@ use mocban_results::ManualCorrection;
 use mocban_runner::{NamedWork, fingerprints};
 use mocban_store::{Project, hash_input, stat_input};
 
-/// Longest time for looking at the files of a pair. A disk may hang.
+/// Longest time for looking at the files of a pair or block. A disk may hang.
 const MAX_LOOK: Duration = Duration::from_secs(10);
 
 /// A pair or a block.
@@ -135,6 +135,29 @@ async fn changed_inputs(
     });
     let looked = tokio::time::timeout(MAX_LOOK, look).await;
     Ok(looked.ok().and_then(Result::ok).unwrap_or_default())
+}
+
+/// Returns which files of a block are not at their places: `mesh`, `page` or `labels`; none if the disk does not answer in time.
+pub async fn missing_block_files(
+    project: &Project,
+    attributes: &BlockAttributes,
+) -> Vec<&'static str> {
+    let labels = attributes.labels_path.as_ref();
+    let files = [
+        ("mesh", Some(attributes.mesh_path.clone())),
+        ("page", Some(attributes.page_path.clone())),
+        ("labels", labels.cloned()),
+    ];
+    let project = project.clone();
+    let look = tokio::task::spawn_blocking(move || {
+        let missing = files.into_iter().filter(|(_, path)| {
+            let path = path.as_ref();
+            path.is_some_and(|path| !project.input(path).exists())
+        });
+        missing.map(|(kind, _)| kind).collect()
+    });
+    let looked = tokio::time::timeout(MAX_LOOK, look).await;
+    looked.ok().and_then(Result::ok).unwrap_or_default()
 }
 
 /// Returns the names of all blocks and of all pairs that are not retired.

@@ -44,7 +44,8 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<Exi
     let pair = match details {
         Details::Pair(pair) => pair,
         Details::Block(block, characters) => {
-            show_block(&block, &characters, &project, context)?;
+            let missing = details::missing_block_files(&project, &block.state.attributes).await;
+            show_block(&block, &characters, &missing, &project, context)?;
             return Ok(ExitCode::Done);
         }
         Details::ListedBlock(rows) => {

@@ -26,15 +26,17 @@ const SMALL_PX: f64 = 16.0;
 /// Significant digits of numbers that are not whole.
 const DIGITS: i32 = 4;
 
-/// Shows a block.
+/// Shows a block. `missing` names its files that are not at their places.
 pub(crate) fn show_block(
     detail: &BlockDetail,
     characters: &[StoredCharacter],
+    missing: &[&str],
     project: &Project,
     context: &Context,
 ) -> ProjectResult<()> {
-    let json = as_json(detail, characters, project)?;
-    context.print(&json, || text(detail, characters, context.stdout))?;
+    let mut json = as_json(detail, characters, project)?;
+    json["missing_files"] = json!(missing);
+    context.print(&json, || text(detail, characters, missing, context.stdout))?;
     let quoted = quoted_id(detail.state.attributes.name.as_str());
     let failure = detail.state.failure.as_ref();
     match detail.state.status {
@@ -63,7 +65,12 @@ fn as_json(
     Ok(value)
 }
 
-fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) -> String {
+fn text(
+    detail: &BlockDetail,
+    characters: &[StoredCharacter],
+    missing: &[&str],
+    palette: Palette,
+) -> String {
     let state = &detail.state;
     let attributes = &state.attributes;
     let tone = match state.status {
@@ -102,7 +109,14 @@ fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) 
         ("control points", format!("{points} on the {}", chosen.side))
     });
     let rows = rows.into_iter().chain(points);
-    let rows = rows.map(|(word, value)| vec![format!("  {word}"), value]);
+    let rows = rows.map(|(word, value)| {
+        let note = if missing.contains(&word) {
+            palette.paint(Tone::Bad, "  missing")
+        } else {
+            String::new()
+        };
+        vec![format!("  {word}"), value + &note]
+    });
     let meta = attributes.meta.iter().flatten();
     let meta = meta.map(|(name, value)| vec![format!("  {name}"), value_text(value).into_owned()]);
     parts.push(columns(rows.chain(meta), "<<"));

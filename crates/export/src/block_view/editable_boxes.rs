@@ -33,6 +33,8 @@ pub struct EditableBoxes {
     page_hash: ContentHash,
     labels_path: Option<String>,
     boxes: Vec<LabelBox>,
+    /// Whether the labels cannot be read, so that their boxes are not known.
+    is_unread: bool,
     /// Warnings of the reader of labels, or why the labels cannot be read.
     warnings: Vec<String>,
     /// What the labels have replaced, if they were made on this page.
@@ -43,12 +45,13 @@ pub struct EditableBoxes {
 #[derive(Debug, Default)]
 struct ReadBoxes {
     boxes: Vec<LabelBox>,
+    is_unread: bool,
     warnings: Vec<String>,
     earlier: Option<ReplacedLabels>,
 }
 
 impl EditableBoxes {
-    /// Reads a block. Labels that cannot be read count as none, with a warning. The image of the page is decoded only if it is
+    /// Reads a block. Labels that cannot be read have no boxes, with a warning. The image of the page is decoded only if it is
     /// not that of `known`.
     ///
     /// # Errors
@@ -95,6 +98,7 @@ impl EditableBoxes {
             page_hash,
             labels_path: attributes.labels_path.clone(),
             boxes: Vec::new(),
+            is_unread: false,
             warnings: Vec::new(),
             earlier: None,
         };
@@ -102,13 +106,15 @@ impl EditableBoxes {
             Some(path) => own.of_labels(project, path),
             None => found(detail)?,
         };
-        (own.boxes, own.warnings, own.earlier) = (read.boxes, read.warnings, read.earlier);
+        (own.boxes, own.is_unread) = (read.boxes, read.is_unread);
+        (own.warnings, own.earlier) = (read.warnings, read.earlier);
         Ok(own)
     }
 
     /// Reads the boxes of labels. Boxes without a name get that of their place, so that the pairs of the others keep theirs.
     fn of_labels(&self, project: &Project, path: &str) -> ReadBoxes {
         let failed = |why: String| ReadBoxes {
+            is_unread: true,
             warnings: vec![why],
             ..ReadBoxes::default()
         };
@@ -134,6 +140,7 @@ impl EditableBoxes {
         }
         ReadBoxes {
             boxes: read.boxes,
+            is_unread: false,
             warnings: read.warnings,
             earlier,
         }
@@ -147,6 +154,7 @@ impl EditableBoxes {
             "boxes": self.boxes_json(),
             "has_labels": self.labels_path.is_some(),
             "has_earlier": self.earlier.is_some(),
+            "is_unread": self.is_unread,
             "warnings": self.warnings,
             "is_aligned": self.is_aligned,
             "shown": self.shown_hash(),

@@ -26,7 +26,7 @@ use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockStage, FailureClass, JobStatus, one_line,
 };
-use mocban_project::input_warnings;
+use mocban_project::{details, input_warnings};
 
 /// Most characters that are listed.
 const SHOWN_CHARACTERS: usize = 1000;
@@ -44,13 +44,14 @@ pub(super) async fn page(
     let detail = open.catalog.block(&name).await?;
     let detail = detail.ok_or_else(AppFailure::not_found)?;
     let characters = open.catalog.block_characters(&name).await?;
+    let missing = details::missing_block_files(&open.project, &detail.state.attributes).await;
     let body = html! {
         nav.pager { a href="../../blocks" { (visit.t("All blocks", "Tất cả các ván")) } }
         (state_part(&visit, &key, &detail))
         (ways(&visit, &detail))
         (stages(&visit, &detail))
-        (character_list(&visit, &name, &characters))
-        (files(&visit, &detail))
+        (character_list(&visit, &name, &characters, &missing))
+        (files(&visit, &detail, &missing))
         (history(&visit, &detail))
     };
     let title = one_line(name.as_str());
@@ -191,12 +192,19 @@ fn stages(visit: &Visit, detail: &BlockDetail) -> Markup {
     }
 }
 
-fn character_list(visit: &Visit, block: &BlockName, characters: &[StoredCharacter]) -> Markup {
+fn character_list(
+    visit: &Visit,
+    block: &BlockName,
+    characters: &[StoredCharacter],
+    missing: &[&str],
+) -> Markup {
     let label = visit.t("Characters", "Các chữ");
     html! {
         section {
             h2 { (label) }
-            @if characters.is_empty() {
+            @if characters.is_empty() && missing.contains(&"labels") {
+                p.bad { (visit.t("The file of the labels is missing, so the characters are not known.", "Không có tệp nhãn nên chưa biết các chữ.")) }
+            } @else if characters.is_empty() {
                 p.muted { (visit.t("A run finds them on the page.", "Lần chạy sẽ tìm chúng trên trang in.")) }
             } @else {
                 p.row {
@@ -243,17 +251,20 @@ fn character_row(visit: &Visit, one: &StoredCharacter) -> Markup {
     }
 }
 
-fn files(visit: &Visit, detail: &BlockDetail) -> Markup {
+fn files(visit: &Visit, detail: &BlockDetail, missing: &[&str]) -> Markup {
     let attributes = &detail.state.attributes;
+    let is_missing = html! { span.bad { (visit.t("missing", "không có tệp này")) } };
+    let note = |kind: &str| html! { @if missing.contains(&kind) { " " (is_missing) } };
     html! {
         section {
             h2 { (visit.t("Files", "Các tệp")) }
             dl {
                 (scan_file(visit, &attributes.mesh_path, attributes.unit))
-                dt { (visit.t("Page", "Trang in")) } dd { code { (one_line(&attributes.page_path)) } }
+                @if missing.contains(&"mesh") { dd { (is_missing) } }
+                dt { (visit.t("Page", "Trang in")) } dd { code { (one_line(&attributes.page_path)) } (note("page")) }
                 dt { (visit.t("Labels", "Nhãn")) } dd {
                     @match &attributes.labels_path {
-                        Some(labels) => code { (one_line(labels)) },
+                        Some(labels) => { code { (one_line(labels)) } (note("labels")) },
                         None => { (visit.t("none: the characters are found", "không có: chữ được tự tìm")) },
                     }
                 }

@@ -132,10 +132,20 @@ fn row(visit: &Visit, block: &BlockState) -> Markup {
             }
             td.number { @if block.characters > 0 {
                 a href={ "pairs?block=" (encoded(name)) } { (grouped(block.characters)) }
-            } @else { "0" } }
-            td.number { (grouped(block.low_confidence)) }
-            td.number { (grouped(block.left_out)) }
+            } @else { (counted(block, 0)) } }
+            td.number { (counted(block, block.low_confidence)) }
+            td.number { (counted(block, block.left_out)) }
         }
+    }
+}
+
+/// Returns a number of characters of a block. Before they are cut, it is not known.
+fn counted(block: &BlockState, number: u64) -> String {
+    let is_known = number > 0 || block.characters > 0 || block.next_stage.is_none();
+    if is_known {
+        grouped(number)
+    } else {
+        "–".to_owned()
     }
 }
 
