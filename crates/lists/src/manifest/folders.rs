@@ -154,7 +154,8 @@ pub fn pair_folders(
         let is_swapped = is_swapped && meshes_alone.is_empty();
         let without = without_files(roots, are_empty);
         let reason = if is_swapped {
-            "--meshes holds images and --prints holds meshes; swap the two".to_owned()
+            "the folder of meshes holds images, and that of prints holds meshes; swap the two"
+                .to_owned()
         } else if let Some(without) = without {
             without
         } else if changes.left_out.is_empty() {

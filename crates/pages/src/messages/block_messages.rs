@@ -237,7 +237,6 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     ("rename one of them", "hãy đổi tên một khung"),
     ("the boxes", "các khung chữ"),
-    ("the name of box {}: {}", "tên của khung {0}: {1}"),
     ("correct or remove it", "hãy sửa hoặc bỏ đi"),
     (
         "1 box repeats another and was left out: {}",

@@ -1,7 +1,259 @@
-//! The messages of the program on the cells and columns of lists with their Vietnamese texts.
+//! Refusals and warnings of lists and of their rows with their Vietnamese texts.
 
 /// Messages like those on pairs.
 pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
+    // Text and header of a list.
+    (
+        "the text is UTF-16 and truncated or damaged",
+        "văn bản UTF-16 bị cắt cụt hoặc bị hỏng",
+    ),
+    ("save it as UTF-8", "hãy lưu lại ở dạng UTF-8"),
+    (
+        "this is a workbook of an old format or with a password, or an archive",
+        "đây là bảng tính định dạng cũ hoặc có mật khẩu, hoặc là tệp nén",
+    ),
+    (
+        "save the table as XLSX or as \"CSV UTF-8\" in the spreadsheet program",
+        "hãy dùng chương trình bảng tính lưu bảng thành XLSX hoặc \"CSV UTF-8\"",
+    ),
+    (
+        "it seems to be GB 18030 (Chinese)",
+        "có vẻ là GB 18030 (tiếng Trung)",
+    ),
+    (
+        "it seems to be Windows-1258 (Vietnamese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+        "có vẻ là Windows-1258 (tiếng Việt): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+    ),
+    (
+        "it seems to be Windows-1252 (Western European): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+        "có vẻ là Windows-1252 (Tây Âu): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+    ),
+    (
+        "it seems to be GB 18030 (Chinese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+        "có vẻ là GB 18030 (tiếng Trung): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+    ),
+    ("the list is not UTF-8", "danh sách không phải là UTF-8"),
+    (
+        "the name of column {} is not UTF-8",
+        "tên cột {0} không phải là UTF-8",
+    ),
+    (
+        "the names of columns {} are not UTF-8",
+        "tên các cột {0} không phải là UTF-8",
+    ),
+    (
+        "the cell of column {} is not UTF-8",
+        "ô của cột {0} không phải là UTF-8",
+    ),
+    ("byte {} is not UTF-8", "byte {0} không phải là UTF-8"),
+    (
+        "a quote is opened here and never closed",
+        "dấu ngoặc kép mở ở đây mà không được đóng",
+    ),
+    (
+        "a quote is opened here, and the next one, on line {}, is followed by text",
+        "dấu ngoặc kép mở ở đây, và ngay sau dấu ngoặc kép tiếp theo, ở dòng {0}, có chữ",
+    ),
+    (
+        "close the quote on its line, and write a quote inside a quoted cell twice",
+        "hãy đóng dấu ngoặc kép trên cùng dòng, và viết hai lần dấu ngoặc kép nằm trong ô",
+    ),
+    (
+        "a quote is opened here and closed only on line {}",
+        "dấu ngoặc kép mở ở đây mà đến dòng {0} mới đóng",
+    ),
+    (
+        "a cell has at most {} lines",
+        "một ô có nhiều nhất {0} dòng",
+    ),
+    ("the row has more than {} bytes", "dòng dài hơn {0} byte"),
+    (
+        "a closing quotation mark may be missing",
+        "có thể thiếu dấu ngoặc kép đóng",
+    ),
+    (
+        "the row has {} bytes, over the limit of {}",
+        "dòng dài {0} byte, vượt giới hạn {1}",
+    ),
+    (
+        "the name of column {} has {} bytes, over the limit of {}",
+        "tên cột {0} dài {1} byte, vượt giới hạn {2}",
+    ),
+    (
+        "{} has {} bytes, over the limit of {} ({})",
+        "tệp {0} có {1} byte, vượt giới hạn {2} ({3})",
+    ),
+    (
+        "{} has {} bytes, over the limit of {}",
+        "giá trị của cột {0} dài {1} byte, vượt giới hạn {2}",
+    ),
+    ("this is no header", "đây không phải dòng tiêu đề"),
+    ("line {} has these columns", "dòng {0} có các cột này"),
+    (
+        "line {} has the columns of a list of blocks",
+        "dòng {0} có các cột của danh sách ván",
+    ),
+    ("remove the lines above it", "hãy xóa các dòng phía trên nó"),
+    (
+        "columns {} and {} are both named {}",
+        "cột {0} và cột {1} cùng có tên {2}",
+    ),
+    (
+        "columns {} and {}, {} and {}, are the same",
+        "cột {0} và cột {1}, {2} và {3}, là một",
+    ),
+    ("column \"id\" is missing", "thiếu cột \"id\" (mã)"),
+    (
+        "column \"mesh\" is missing",
+        "thiếu cột \"mesh\" (bản quét)",
+    ),
+    (
+        "column \"print\" is missing",
+        "thiếu cột \"print\" (bản in)",
+    ),
+    (
+        "column \"page\" is missing",
+        "thiếu cột \"page\" (trang in)",
+    ),
+    ("column \"block\" is missing", "thiếu cột \"block\" (ván)"),
+    ("column {} is missing", "thiếu cột {0}"),
+    (
+        "the header has one column only, {}",
+        "dòng tiêu đề chỉ có một cột: {0}",
+    ),
+    (
+        "put a comma, semicolon or tab between columns",
+        "hãy đặt dấu phẩy, dấu chấm phẩy hoặc dấu tab giữa các cột",
+    ),
+    (
+        "rename {} to {} if it is meant",
+        "nếu {0} là cột đó thì hãy đổi tên thành {1}",
+    ),
+    ("there is no column {} for {}", "không có cột {0} cho {1}"),
+    (
+        "column {} is chosen for two columns",
+        "cột {0} được chọn cho hai cột",
+    ),
+    // Rows of a list.
+    (
+        "the row has {} cells, the header has {}",
+        "dòng có {0} ô, dòng tiêu đề có {1}",
+    ),
+    ("id is empty", "ô mã (id) trống"),
+    ("the id is empty", "mã trống"),
+    ("mesh is empty", "ô bản quét (mesh) trống"),
+    ("print is empty", "ô bản in (print) trống"),
+    ("page is empty", "ô trang in (page) trống"),
+    ("id names a file", "ô mã (id) ghi tên một tệp"),
+    (
+        "give each pair an id, or swap the columns if they are mixed up",
+        "hãy đặt mã cho từng cặp, hoặc đổi chỗ các cột nếu bị nhầm",
+    ),
+    ("id {} is already on line {}", "mã {0} đã có ở dòng {1}"),
+    ("block {} is already on line {}", "ván {0} đã có ở dòng {1}"),
+    (
+        "id {} differs from that on line {} only in upper and lower case, so their files would be one on Windows and macOS",
+        "mã {0} chỉ khác mã ở dòng {1} ở chữ hoa và chữ thường, nên trên Windows và macOS tệp của chúng sẽ là một",
+    ),
+    (
+        "block {} differs from that on line {} only in upper and lower case, so their files would be one on Windows and macOS",
+        "ván {0} chỉ khác ván ở dòng {1} ở chữ hoa và chữ thường, nên trên Windows và macOS tệp của chúng sẽ là một",
+    ),
+    ("id {} holds {}", "mã {0} có ký tự {1}"),
+    (
+        "an id has no slashes, control or invisible characters",
+        "mã không được có dấu gạch chéo, ký tự điều khiển hay ký tự ẩn",
+    ),
+    ("id {} begins with a dot", "mã {0} bắt đầu bằng dấu chấm"),
+    (
+        "id {} begins or ends with a space",
+        "mã {0} bắt đầu hoặc kết thúc bằng dấu cách",
+    ),
+    (
+        "an id of {} bytes is too long",
+        "mã dài {0} byte là quá dài",
+    ),
+    ("the limit is {}", "giới hạn là {0}"),
+    (
+        "the id {} is the error of a formula",
+        "mã {0} là lỗi của một công thức",
+    ),
+    (
+        "correct it in the spreadsheet program",
+        "hãy sửa trong chương trình bảng tính",
+    ),
+    (
+        "mesh names an image and print names a mesh",
+        "ô bản quét (mesh) ghi hình và ô bản in (print) ghi bản quét",
+    ),
+    (
+        "mesh names an image and page names a mesh",
+        "ô bản quét (mesh) ghi hình và ô trang in (page) ghi bản quét",
+    ),
+    ("swap the two", "hãy đổi chỗ hai mục này"),
+    (
+        "scanned_face_down is {}, not true, false, yes, no, 1 or 0",
+        "scanned_face_down là {0}, không phải true, false, có, không, 1 hay 0",
+    ),
+    ("{} is not a unit ({})", "{0} không phải là đơn vị ({1})"),
+    (
+        "{} is not a side ({})",
+        "{0} không phải là mặt của ván ({1}; hoặc mặt trước, mặt sau)",
+    ),
+    (
+        "this is a line of an export with results",
+        "đây là dòng của một bản xuất có kết quả",
+    ),
+    (
+        "import your own list of blocks",
+        "hãy nhập danh sách ván của bạn",
+    ),
+    ("the list contains no blocks", "danh sách không có ván nào"),
+    (
+        "column \"block\" has single characters and column \"character\" has none",
+        "cột \"block\" có các chữ đơn còn cột \"character\" không có chữ nào",
+    ),
+    (
+        "swap their names if they are mixed up, and import again",
+        "nếu bị nhầm thì hãy đổi tên hai cột cho nhau rồi nhập lại",
+    ),
+    (
+        "a value in a column without a name is left out, on line {}",
+        "một giá trị trong cột không có tên bị bỏ qua, ở dòng {0}",
+    ),
+    ("name the column to keep it", "hãy đặt tên cột để giữ lại"),
+    (
+        "{} values in columns without a name are left out, the first on line {}",
+        "{0} giá trị trong các cột không có tên bị bỏ qua, giá trị đầu tiên ở dòng {1}",
+    ),
+    (
+        "name the columns to keep them",
+        "hãy đặt tên các cột để giữ lại",
+    ),
+    // Rows in JSON.
+    (
+        "a comma is missing before this row",
+        "thiếu dấu phẩy trước dòng này",
+    ),
+    (
+        "text follows the end of the list",
+        "có văn bản sau chỗ kết thúc danh sách",
+    ),
+    ("the list ends early", "danh sách kết thúc sớm"),
+    ("save or copy it again", "hãy lưu hoặc chép lại"),
+    ("the key {} is given twice", "khóa {0} được ghi hai lần"),
+    (
+        "the rows are in the list {} of an object",
+        "các dòng nằm trong danh sách {0} của một đối tượng",
+    ),
+    ("save this list alone", "hãy lưu riêng danh sách này"),
+    (
+        "{} is not a number of JSON",
+        "{0} không phải là số của JSON",
+    ),
+    ("write null or leave it out", "hãy viết null hoặc bỏ đi"),
+    ("{} is not an object", "{0} không phải là đối tượng"),
+    ("{} is {}, not text", "{0} là {1}, không phải là văn bản"),
     // Errors of formulas.
     (
         "line {}: column {} has the error {} of a formula",

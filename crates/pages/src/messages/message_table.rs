@@ -25,30 +25,6 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "không dùng được {0} nên chưa nhập gì:",
     ),
     (
-        "{}: line {}: mesh {} of {} is a link to a file that does not exist",
-        "{0}: dòng {1}: bản quét {2} của {3} là liên kết đến một tệp không tồn tại",
-    ),
-    (
-        "{}: line {}: print {} of {} is a link to a file that does not exist",
-        "{0}: dòng {1}: bản in {2} của {3} là liên kết đến một tệp không tồn tại",
-    ),
-    (
-        "{}: line {}: mesh {} of {} does not exist",
-        "{0}: dòng {1}: không có bản quét {2} của {3}",
-    ),
-    (
-        "{}: line {}: print {} of {} does not exist",
-        "{0}: dòng {1}: không có bản in {2} của {3}",
-    ),
-    (
-        "{}: line {}: mesh {} of {} is a folder, not a file",
-        "{0}: dòng {1}: bản quét {2} của {3} là thư mục, không phải tệp",
-    ),
-    (
-        "{}: line {}: print {} of {} is a folder, not a file",
-        "{0}: dòng {1}: bản in {2} của {3} là thư mục, không phải tệp",
-    ),
-    (
         "it is a path of a Windows computer: write paths relative to the list",
         "đây là đường dẫn của máy Windows: hãy viết đường dẫn tính từ danh sách",
     ),
@@ -75,8 +51,6 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "nếu đó là cột {0} thì hãy đổi tên rồi nhập lại",
     ),
     ("and {} more", "và {0} mục khác"),
-    ("line {}: column {} is missing", "dòng {0}: thiếu cột {1}"),
-    ("column {} is missing", "thiếu cột {0}"),
     ("the header has: {}", "dòng tiêu đề có: {0}"),
     ("the list contains no pairs", "danh sách không có cặp nào"),
     ("the list is empty", "danh sách trống"),
@@ -139,6 +113,10 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ("for many files: {}", "nếu có nhiều tệp: {0}"),
     // Ids.
     ("there is no pair or block {}", "không có cặp hay ván {0}"),
+    (
+        "there is no pair {} to leave out",
+        "không có cặp {0} để bỏ qua",
+    ),
     ("there is no pair {}", "không có cặp {0}"),
     ("there is no block {}", "không có ván {0}"),
     ("there is {}/{}", "có tệp {0}/{1}"),
@@ -386,16 +364,4 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "scan or photograph it at a higher resolution",
         "hãy quét hoặc chụp với độ phân giải cao hơn",
     ),
-];
-
-/// Kinds of files as messages name them, by the last words of the English name.
-pub(super) const KINDS: [(&str, &str); 8] = [
-    (" image", "hình "),
-    (" mesh", "lưới "),
-    (" scene", "cảnh 3D "),
-    (" model", "mô hình "),
-    (" point cloud", "đám mây điểm "),
-    (" document", "tài liệu "),
-    (" archive", "tệp nén "),
-    (" database", "cơ sở dữ liệu "),
 ];

@@ -1,10 +1,17 @@
 //! Messages of the program in Vietnamese, for all pages.
 
 mod block_messages;
+mod foreign_messages;
+mod held_messages;
+mod import_messages;
+mod label_messages;
 mod left_out_words;
 mod list_messages;
+mod message_parts;
+mod message_patterns;
 mod message_table;
 mod message_words;
+mod parser_messages;
 mod report_answers;
 mod report_captions;
 mod report_html;
@@ -12,6 +19,7 @@ mod report_table;
 mod report_words;
 
 pub(crate) use left_out_words::left_out_reasons;
-pub(crate) use message_words::{vietnamese, with_more};
+pub(crate) use message_parts::with_more;
+pub(crate) use message_words::vietnamese;
 pub use report_html::report_page;
 pub(crate) use report_words::report_text;

@@ -1,6 +1,7 @@
 //! Sentences of the report in Vietnamese. The report is made in English, so they are recognised by their wording.
 
-use super::message_words::{filled_by, parts_of, vietnamese};
+use super::message_patterns::{filled_by, parts_of};
+use super::message_words::vietnamese;
 use super::report_answers::REPORT_ANSWERS;
 use super::report_captions::REPORT_CAPTIONS;
 use super::report_table::{REPORT_COUNTED, REPORT_FRAME, REPORT_TERMS};

@@ -1,0 +1,236 @@
+//! Sentences of sources and snapshots of other crates: all of those that a page shows have a Vietnamese text.
+
+use std::path::{Path, PathBuf};
+
+use super::fragments::{FRAGMENTS, SENTENCES};
+use super::vietnamese;
+
+/// Sources whose sentences reach pages of imports and of blocks, below `crates`.
+const SOURCES: [&str; 15] = [
+    "lists/src/columns.rs",
+    "lists/src/labels",
+    "lists/src/manifest",
+    "lists/src/quotes.rs",
+    "lists/src/workbook",
+    "lists/src/xml.rs",
+    "core/src/domain/pair_name.rs",
+    "export/src/block_view/block_correction.rs",
+    "export/src/block_view/block_error.rs",
+    "export/src/block_view/box_edits.rs",
+    "project/src/block_files.rs",
+    "project/src/import_blocks.rs",
+    "project/src/manifest_file.rs",
+    "project/src/missing_files.rs",
+    "store/src/lock.rs",
+];
+
+/// English words that no Vietnamese sentence has.
+const ENGLISH: [&str; 32] = [
+    "an", "and", "are", "be", "box", "boxes", "column", "files", "has", "have", "is", "it", "its",
+    "line", "lines", "not", "of", "or", "row", "rows", "that", "the", "their", "them", "this",
+    "to", "was", "were", "will", "with", "would", "you",
+];
+
+/// Returns the English words of a text outside quotation marks.
+fn english_words(text: &str) -> Vec<&str> {
+    let unquoted = text.split('"').step_by(2);
+    let words = unquoted.flat_map(str::split_whitespace);
+    let words = words.map(|word| word.trim_matches(|c: char| c.is_ascii_punctuation()));
+    words.filter(|word| ENGLISH.contains(word)).collect()
+}
+
+/// Returns what stays in English of a sentence: all of it if it is not known.
+fn untranslated(sentence: &str) -> Option<String> {
+    match vietnamese(sentence) {
+        None => Some(sentence.to_owned()),
+        Some(text) => (!english_words(&text).is_empty()).then_some(text),
+    }
+}
+
+fn crates() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Returns the files of a kind below a folder, or the file itself.
+fn files(path: PathBuf, extension: &str) -> Vec<PathBuf> {
+    let (mut open, mut found) = (vec![path], Vec::new());
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            let entries = std::fs::read_dir(path).expect("a folder");
+            open.extend(entries.flatten().map(|entry| entry.path()));
+        } else if path.extension().is_some_and(|known| known == extension) {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// Returns the content of the literal after an opening quotation mark, and its length in the source.
+fn literal(rest: &[char], is_raw: bool) -> (String, usize) {
+    let (mut text, mut at) = (String::new(), 0);
+    while let Some(c) = rest.get(at) {
+        match (c, rest.get(at + 1)) {
+            ('"', _) => break,
+            // The text goes on in the next line, without the blanks at its beginning.
+            ('\\', Some('\n')) if !is_raw => {
+                let blanks = rest[at + 1..].iter().take_while(|c| c.is_whitespace());
+                at += 1 + blanks.count();
+            }
+            ('\\', Some(escaped)) if !is_raw => {
+                text.push(if *escaped == 'n' { '\n' } else { *escaped });
+                at += 2;
+            }
+            _ => {
+                text.push(*c);
+                at += 1;
+            }
+        }
+    }
+    (text, at + 1)
+}
+
+/// Returns the texts in quotation marks of a source, without its comments and its tests.
+fn literals(source: &str) -> Vec<String> {
+    let code = source.split("#[cfg(test)]\nmod ").next();
+    let chars: Vec<char> = code.unwrap_or_default().chars().collect();
+    let (mut found, mut at) = (Vec::new(), 0);
+    while at < chars.len() {
+        let rest = &chars[at..];
+        at += match rest {
+            ['/', '/', ..] => rest.iter().take_while(|c| **c != '\n').count(),
+            ['\'', '\\', _, ..] => {
+                let inside = rest[3..].iter().take_while(|c| **c != '\'');
+                4 + inside.count()
+            }
+            ['\'', _, '\'', ..] => 3,
+            ['"', inside @ ..] => {
+                let is_raw = at > 0 && matches!(chars[at - 1], 'r' | '#');
+                let (text, length) = literal(inside, is_raw);
+                found.push(text);
+                1 + length
+            }
+            _ => 1,
+        };
+    }
+    found
+}
+
+/// Returns a literal with a number in place of each part that varies, and without clauses that name commands or options.
+/// What follows a colon at the end of a line is on lines of its own.
+fn sample(literal: &str) -> String {
+    let (mut text, mut rest) = (String::new(), literal);
+    while let Some((before, after)) = rest.split_once('{') {
+        text += before;
+        if !before.ends_with(':') {
+            text.push('7');
+        }
+        rest = after.split_once('}').map_or("", |(_, behind)| behind);
+    }
+    text += rest;
+    let clauses = text.trim_start_matches("; ").split("; ");
+    let shown = clauses.filter(|clause| !clause.contains('`') && !clause.contains("--"));
+    shown.collect::<Vec<_>>().join("; ")
+}
+
+/// Returns whether a text has words of a sentence.
+fn is_sentence(text: &str) -> bool {
+    let is_word = |word: &&str| word.len() > 1 && word.bytes().all(|b| b.is_ascii_lowercase());
+    let words = text.split(' ');
+    let words = words.map(|word| word.trim_matches(|c: char| c.is_ascii_punctuation()));
+    words.filter(is_word).count() > 1
+}
+
+/// Returns the sentences of the sources, and the literals that they are made of.
+fn sentences() -> Vec<(String, String)> {
+    let files = SOURCES
+        .into_iter()
+        .flat_map(|path| files(crates().join(path), "rs"));
+    let is_of_tests = |path: &Path| {
+        let mut parts = path.components().rev().take(2);
+        parts.any(|part| {
+            let name = part.as_os_str().to_string_lossy();
+            matches!(&*name, "tests" | "tests.rs" | "test_helpers.rs")
+        })
+    };
+    let mut found = Vec::new();
+    for path in files.filter(|path| !is_of_tests(path)) {
+        for literal in literals(&std::fs::read_to_string(&path).expect("a source")) {
+            let text = sample(&literal);
+            if is_sentence(&text) {
+                found.push((text, literal));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn every_sentence_of_a_list_a_label_and_a_block_is_translated() {
+    let found = sentences();
+    assert!(found.len() > 200, "{}", found.len());
+    for (text, literal) in &found {
+        // Reasons of labels are parts of a sentence that ends like this.
+        let ended = format!("{text}; correct or remove it");
+        let is_known = untranslated(text).is_none() || untranslated(&ended).is_none();
+        let is_fragment = FRAGMENTS.contains(&literal.as_str());
+        assert!(
+            is_known || is_fragment,
+            "{literal:?} is not in the tables of messages: {:?}",
+            vietnamese(text)
+        );
+    }
+    for fragment in FRAGMENTS {
+        let mut literals = found.iter().map(|(_, literal)| literal);
+        assert!(literals.any(|literal| literal == fragment), "{fragment:?}");
+    }
+}
+
+#[test]
+fn sentences_that_are_made_of_fragments_are_translated() {
+    for sentence in SENTENCES {
+        assert_eq!(untranslated(sentence), None, "{sentence:?}");
+    }
+}
+
+#[test]
+fn refusals_in_the_snapshots_of_lists_are_translated() {
+    let mut count = 0;
+    for path in files(crates().join("lists/src"), "snap") {
+        let snapshot = std::fs::read_to_string(path).expect("a snapshot");
+        // Messages are indented below the names of their cases.
+        let messages = snapshot
+            .lines()
+            .filter_map(|line| line.strip_prefix("    "));
+        for message in messages {
+            assert_eq!(untranslated(message), None, "{message:?}");
+            count += 1;
+        }
+    }
+    assert!(count > 50, "{count}");
+}
+
+#[test]
+fn faults_of_json_are_translated() {
+    for text in [
+        "{\"a\": }",
+        "{\"a\" 1}",
+        "{\"a\": 1 2}",
+        "[1 2]",
+        "[1,]",
+        "{1: 2}",
+        "[1] x",
+        "[tru]",
+        "[01]",
+        "[1e999]",
+        "[\"\\x\"]",
+        "[\"\n\"]",
+    ] {
+        let fault = serde_json::from_str::<serde_json::Value>(text).expect_err("a fault");
+        for message in [fault.to_string(), fault.to_string().replace('`', "")] {
+            let sentence = format!("b.json: the JSON is damaged: {message}; save the labels again");
+            assert_eq!(untranslated(&sentence), None, "{text:?}");
+            let translated = vietnamese(&sentence).unwrap_or_default();
+            assert!(!translated.contains("at line"), "{translated:?}");
+        }
+    }
+}
