@@ -113,10 +113,12 @@ pub(super) fn without_commands(text: &str) -> String {
     // The pages send settings as the program takes them with this option.
     let text = text.strip_prefix("--set: ").unwrap_or(text);
     let lines: Vec<String> = text.lines().filter_map(line_without_commands).collect();
-    if lines.is_empty() {
-        return text.replace('`', "");
-    }
-    lines.join("\n")
+    let plain = if lines.is_empty() {
+        text.to_owned()
+    } else {
+        lines.join("\n")
+    };
+    plain.replace('`', "")
 }
 
 fn line_without_commands(line: &str) -> Option<String> {
@@ -136,10 +138,13 @@ fn line_without_commands(line: &str) -> Option<String> {
 fn names_command(clause: &str) -> bool {
     // A path may also contain the name of the program.
     let is_command = |word: &str| {
-        let word = word.trim_start_matches('(');
+        let word = word.trim_start_matches(['(', '`']);
         word == "mocban" || word.len() > 2 && word.starts_with("--")
     };
-    clause.contains('`') || clause.split(' ').any(is_command)
+    // Parsers quote signs and values in the same way.
+    let is_quoted = |text: &str| text.starts_with(|c: char| c.is_ascii_alphabetic());
+    let mut quoted = clause.split('`').skip(1).step_by(2);
+    quoted.any(is_quoted) || clause.split(' ').any(is_command)
 }
 
 /// Removes the remarks in brackets that name commands.
@@ -198,6 +203,14 @@ mod tests {
                 "run.workers = -3: invalid value: integer -3, expected usize",
             ),
             ("use `x`", "use x"),
+            (
+                "the XML is damaged: expected `</Word>`, but `</Line>` was found; save the labels again",
+                "the XML is damaged: expected </Word>, but </Line> was found; save the labels again",
+            ),
+            (
+                "line 3: expected `,` or `}`; `show` says more",
+                "line 3: expected , or }",
+            ),
             (
                 "2 files are missing, nothing was imported:\n  line 2: a.stl\nuse --allow-missing",
                 "2 files are missing, nothing was imported:\n  line 2: a.stl",

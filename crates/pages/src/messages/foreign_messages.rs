@@ -128,4 +128,28 @@ pub(super) const FOREIGN_MESSAGES: &[(&str, &str)] = &[
         "ill-formed document: start tag not closed: `</{}>` not found before end of input",
         "thẻ `{0}` không được đóng",
     ),
+    (
+        "ill-formed document: expected </{}>, but </{}> was found at line {}",
+        "cần `</{0}>` nhưng thấy `</{1}>`, dòng {2}",
+    ),
+    (
+        "ill-formed document: close tag </{}> does not match any open tag at line {}",
+        "thẻ đóng `</{0}>` không khớp với thẻ mở nào, dòng {1}",
+    ),
+    (
+        "ill-formed document: start tag not closed: </{}> not found before end of input at line {}",
+        "thẻ `{0}` không được đóng, dòng {1}",
+    ),
+    (
+        "ill-formed document: expected </{}>, but </{}> was found",
+        "cần `</{0}>` nhưng thấy `</{1}>`",
+    ),
+    (
+        "ill-formed document: close tag </{}> does not match any open tag",
+        "thẻ đóng `</{0}>` không khớp với thẻ mở nào",
+    ),
+    (
+        "ill-formed document: start tag not closed: </{}> not found before end of input",
+        "thẻ `{0}` không được đóng",
+    ),
 ];
