@@ -97,6 +97,7 @@ impl ImportChoice {
             prints: get("prints"),
             list: get("list"),
             unit: get("unit"),
+            missing: get("missing"),
             changed: get("changed"),
             matches: get("matches"),
             whole_block: get("whole_block"),
@@ -141,6 +142,7 @@ impl ImportChoice {
         let others = [
             ("project", project),
             ("unit", &*self.unit),
+            ("missing", &*self.missing),
             ("changed", &*self.changed),
             ("compare", "1"),
         ];

@@ -35,11 +35,12 @@ use mocban_project::location::Location;
 use mocban_project::pair_choices::PairChoices;
 
 /// Values of the address that belong to the files that were chosen, beside the columns of a list.
-const OF_FILES: [&str; 6] = [
+const OF_FILES: [&str; 7] = [
     "matches",
     "from",
     "left_out",
     "whole_block",
+    "missing",
     "changed",
     KEPT_COLUMNS,
 ];

@@ -332,7 +332,7 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
                 }
             }
             @if missing {
-                label.check { input type="checkbox" name="missing" value="yes"; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
+                label.check { input type="checkbox" name="missing" value="yes" checked[!chosen.missing.is_empty()]; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
             }
             label.check { input type="checkbox" name="changed" value="yes" checked[!chosen.changed.is_empty()]; " " (visit.t("Known pairs may get other files", "Cho phép đổi tệp của các cặp đã có")) }
             button.primary #import disabled[is_nothing] { (visit.t("Import", "Nhập")) }
