@@ -1,6 +1,6 @@
 //! What a person has chosen to import, as the address and the form of the page of imports have it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use serde::Deserialize;
@@ -10,8 +10,6 @@ use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
 use super::named_blocks::named_blocks;
 use super::plan_cache::{KEPT_PAIRS, PlanCache};
-use super::project_name::new_project_dir;
-use super::projects::find;
 use super::sentence::Sentence;
 use mocban_core::domain::LengthUnit;
 use mocban_lists::manifest::{
@@ -231,20 +229,6 @@ impl ImportChoice {
         })
     }
 
-    /// Returns the folder of the project, which need not exist.
-    pub(super) fn dir(&self, folder: &Path) -> AppResult<PathBuf> {
-        let found = find(folder).into_iter();
-        if let Some(found) = found.into_iter().find(|found| found.key == self.project) {
-            return Ok(found.dir);
-        }
-        new_project_dir(&self.project, folder)
-    }
-
-    /// Returns the folder of the project, or a new one if its name is not valid.
-    pub(super) fn dir_or_new(&self, folder: &Path) -> PathBuf {
-        self.dir(folder).unwrap_or_else(|_| folder.join("new"))
-    }
-
     /// Returns what decides about a plan that begins at a position, beside the files.
     fn plan_key(&self, dir: &Path, start: u64) -> String {
         let source = [
@@ -257,23 +241,23 @@ impl ImportChoice {
         format!("{:?}", (dir, start, source, self.columns()))
     }
 
-    /// Returns the plan that a preview has kept for these choices, and the place of a position in it.
+    /// Returns the plan that a preview has kept for these choices and the project in `dir`, and the place of a position in it.
     pub(super) fn kept_plan(
         &self,
-        folder: &Path,
+        dir: &Path,
         from: u64,
         plans: &PlanCache,
     ) -> Option<(Arc<ImportPlan>, usize)> {
         let start = kept_start(from);
-        let plan = plans.kept(&self.plan_key(&self.dir_or_new(folder), start))?;
+        let plan = plans.kept(&self.plan_key(dir, start))?;
         Some((plan, (from - start) as usize))
     }
 
-    /// Returns what an import would store; `None` if not enough is chosen. Pairs are shown from the position `from`, or from
-    /// the last page if there are fewer.
+    /// Returns what an import to the project in `dir` would store; `None` if not enough is chosen. Pairs are shown from the
+    /// position `from`, or from the last page if there are fewer.
     pub(super) fn preview(
         &self,
-        folder: &Path,
+        dir: &Path,
         roots: &PickerRoots,
         from: u64,
         plans: &PlanCache,
@@ -290,10 +274,9 @@ impl ImportChoice {
                 let table = bytes.as_ref().filter(|bytes| !is_jsonl(file, bytes));
                 head = table.and_then(|bytes| read_head(bytes, &choices.columns, SHOWN_ROWS));
             }
-            let dir = self.dir_or_new(folder);
             let start = kept_start(from);
             let shown = start..start.saturating_add(KEPT_PAIRS);
-            let key = self.plan_key(&dir, start);
+            let key = self.plan_key(dir, start);
             let location = Location::new(dir);
             let plan = plans.plan(source, &key, |source| {
                 plan_import(source, &choices, &location, &shown)
@@ -306,7 +289,7 @@ impl ImportChoice {
             Ok(Planned::Blocks(..)) | Err(_) => from,
         };
         if from > last {
-            return self.preview(folder, roots, last, plans);
+            return self.preview(dir, roots, last, plans);
         }
         Some(ImportPreview {
             head,
@@ -420,5 +403,20 @@ mod tests {
             fields,
             [("meshes", "/a"), ("prints", "/b"), ("id_column", "Nr")]
         );
+    }
+
+    #[test]
+    fn the_page_that_compares_a_list_keeps_what_the_form_allows() {
+        let chosen = ImportChoice {
+            list: "/a/list.csv".to_owned(),
+            missing: "yes".to_owned(),
+            changed: "yes".to_owned(),
+            ..ImportChoice::default()
+        };
+        let address = chosen.comparison("p 1");
+        let (page, query) = address.split_once('?').expect("a query");
+        let kept = ImportChoice::of(&PageQuery::parse(query));
+        let project = "p 1".to_owned();
+        assert_eq!((page, kept), ("import", ImportChoice { project, ..chosen }));
     }
 }

@@ -8,6 +8,7 @@ use super::failure::AppResult;
 use super::folder_picker::PickerRoots;
 use super::import_choice::{ImportChoice, Planned, SHOWN_PAIRS};
 use super::plan_cache::KEPT_PAIRS;
+use super::project_places::ProjectPlaces;
 use super::sentence::Sentence;
 use super::state::AppState;
 use mocban_core::InputLimits;
@@ -97,13 +98,13 @@ impl ImportChoice {
         // A page of the preview starts with whole groups.
         let from = start / SHOWN_PAIRS * SHOWN_PAIRS;
         let known = (start - from) as usize;
-        let folder = &state.options.folder;
+        let dir = &places.dir;
         // Past the end, a preview has the last ones.
         let mut is_there = true;
-        let planned = if let Some((plan, at)) = self.kept_plan(folder, from, &state.plans) {
+        let planned = if let Some((plan, at)) = self.kept_plan(dir, from, &state.plans) {
             Planned::Pairs(plan, at)
         } else {
-            let preview = self.preview(folder, &places.roots, from, &state.plans)?;
+            let preview = self.preview(dir, &places.roots, from, &state.plans)?;
             is_there = preview.from == from;
             preview.planned.ok()?
         };
@@ -162,33 +163,37 @@ impl ImportChoice {
         let found = part.files.into_iter().next()?;
         (found.kind == ScanKind::Block).then_some(found)
     }
-
-    /// Returns the limits that the files of this import will have.
-    pub(super) fn limits(&self, folder: &Path) -> InputLimits {
-        let settings = Location::new(self.dir_or_new(folder)).settings();
-        settings.map_or(InputLimits::SUGGESTED, |settings| settings.config.limits)
-    }
 }
 
 /// Where the files of an import are, and which of them may be opened.
 #[derive(Debug)]
 pub(super) struct FilePlaces {
     roots: PickerRoots,
+    /// The folder of the project of the import.
+    dir: PathBuf,
     /// The project of the import, which need not exist. Its settings may name folders and object stores.
     project: Project,
 }
 
 impl FilePlaces {
     pub(super) fn new(chosen: &ImportChoice, folder: &Path) -> Self {
-        let location = Location::new(chosen.dir_or_new(folder));
+        let dir = ProjectPlaces::find(folder).dir_or_new(&chosen.project);
+        let location = Location::new(&dir);
         let storage = location
             .data_locations()
             .ok()
             .and_then(|(storage, _)| storage);
         Self {
             roots: PickerRoots::new(folder),
+            dir,
             project: Project::at(&location.dir).with_storage(storage),
         }
+    }
+
+    /// Returns the limits that the files of this import will have.
+    pub(super) fn limits(&self) -> InputLimits {
+        let settings = Location::new(&self.dir).settings();
+        settings.map_or(InputLimits::SUGGESTED, |settings| settings.config.limits)
     }
 
     /// Returns the stored path of a file below a folder or an object store of the settings.
@@ -277,9 +282,8 @@ fn inspected(
     (from, most): (u64, usize),
     time: Duration,
 ) -> InspectedFiles {
-    let folder = &state.options.folder;
-    let places = FilePlaces::new(chosen, folder);
-    let limits = chosen.limits(folder);
+    let places = FilePlaces::new(chosen, &state.options.folder);
+    let limits = places.limits();
     let Some(part) = chosen.planned_files(state, &places, from, most) else {
         return InspectedFiles::default();
     };

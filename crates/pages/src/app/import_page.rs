@@ -20,7 +20,8 @@ use super::import_columns::{KEPT_COLUMNS, columns_part};
 use super::import_partners::{ImportPartners, mending_part};
 use super::import_preview::{changes_part, plan_part, warning};
 use super::plan_cache::PlanCache;
-use super::projects::find;
+use super::project_places::ProjectPlaces;
+use super::projects::FoundProject;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::upload_form::upload_part;
@@ -61,25 +62,26 @@ pub(super) async fn page(
             let roots = PickerRoots::new(&folder);
             let path = path.unwrap_or_else(|| folder.clone());
             let picked = roots.read(&path);
-            let found = find(&folder).into_iter();
-            let is_known = found.into_iter().any(|found| found.key == chosen.project);
-            let preview = chosen.preview(&folder, &roots, from, &state.plans);
+            let places = ProjectPlaces::find(&folder);
+            let known = places.named(&chosen.project).cloned();
+            let dir = places.dir_or_new(&chosen.project);
+            let preview = chosen.preview(&dir, &roots, from, &state.plans);
             let uploads = state.uploads.folder();
             let partners = preview.as_ref().and_then(|preview| {
                 ImportPartners::find(preview, Path::new(&chosen.meshes), &roots, uploads)
             });
-            (picked, preview, partners, roots, is_known)
+            (picked, preview, partners, roots, known)
         }
     };
-    let (picked, preview, mut partners, roots, is_known) = blocking(read).await?;
-    if let (true, Some(partners), Some(preview)) = (is_known, &mut partners, &preview) {
-        let open = state.open(&chosen.project).await?;
+    let (picked, preview, mut partners, roots, known) = blocking(read).await?;
+    if let (Some(known), Some(partners), Some(preview)) = (&known, &mut partners, &preview) {
+        let open = state.open_found(known.clone()).await?;
         partners.add_replacements(&open, preview, &roots).await?;
     }
     let planned = preview.as_ref().map(|preview| &preview.planned);
-    let changes = match planned {
-        Some(Ok(planned)) if is_known && !chosen.list.is_empty() => {
-            let open = state.open(&chosen.project).await?;
+    let changes = match (planned, &known) {
+        (Some(Ok(planned)), Some(known)) if !chosen.list.is_empty() => {
+            let open = state.open_found(known.clone()).await?;
             ColumnChanges::find(planned, &open).await?
         }
         _ => ColumnChanges::default(),
@@ -94,7 +96,7 @@ pub(super) async fn page(
         @if let Some(preview) = preview { (preview_part(&visit, &chosen, &preview, &changes)) }
         @if let Some(partners) = partners { (partners.part(&visit)) }
         (upload_part(&visit, &state.uploads, &chosen.project))
-        @if is_known {
+        @if known.is_some() {
             div data-load={ "p/" (encoded(&chosen.project)) "/last-import" } aria-live="polite" {}
         }
         h2 { (visit.t("Folders of this computer", "Thư mục trên máy này")) }
@@ -250,18 +252,27 @@ pub(super) fn root_links(visit: &Visit, roots: &PickerRoots) -> Markup {
     }
 }
 
+/// What an import stores, with which choices and in which folder, the project there, and what the page has shown of it.
+type ReadImport = (
+    ListedItems,
+    PairChoices,
+    PathBuf,
+    Option<FoundProject>,
+    Option<Planned>,
+);
+
 /// Imports what was chosen, if it is what the page showed.
 pub(super) async fn import(
     State(state): State<Arc<AppState>>,
     ActionBody(chosen): ActionBody<ImportChoice>,
 ) -> AppResult<Json<Value>> {
-    let folder = state.options.folder.clone();
     let read = {
-        let (chosen, folder) = (chosen.clone(), folder.clone());
+        let (chosen, folder) = (chosen.clone(), state.options.folder.clone());
         move || {
             let roots = PickerRoots::new(&folder);
-            let dir = chosen.dir(&folder)?;
-            let planned = planned_as_shown(&chosen, &folder, &roots)?;
+            let places = ProjectPlaces::find(&folder);
+            let dir = places.dir(&chosen.project)?;
+            let planned = planned_as_shown(&chosen, &dir, &roots)?;
             let nothing = || {
                 AppFailure::refused(Sentence::new(
                     "choose folders or a list first",
@@ -269,13 +280,13 @@ pub(super) async fn import(
                 ))
             };
             let (items, _) = chosen.items(&roots)?.ok_or_else(nothing)?;
-            Ok((items, chosen.choices()?, dir, planned))
+            let known = places.at(&dir).cloned();
+            Ok((items, chosen.choices()?, dir, known, planned))
         }
     };
-    let read: AppResult<(ListedItems, PairChoices, PathBuf, Option<Planned>)> =
-        blocking(read).await?;
-    let (items, choices, dir, planned) = read?;
-    if let Some(go) = unseen_changes(&state, &chosen, &dir, planned).await? {
+    let read: AppResult<ReadImport> = blocking(read).await?;
+    let (items, choices, dir, known, planned) = read?;
+    if let Some(go) = unseen_changes(&state, &chosen, known.as_ref(), planned).await? {
         return Ok(Json(json!({ "go": go })));
     }
     let allowed = AllowedChanges {
@@ -291,9 +302,8 @@ pub(super) async fn import(
             "chưa nhập gì: tất cả các cặp này đã được đưa ra khỏi mọi thống kê, và vẫn ở ngoài cho đến khi được đưa trở lại",
         )));
     }
-    let found = find(&folder).into_iter();
-    let key = found.into_iter().find(|found| found.dir == dir);
-    let key = key.map_or_else(|| chosen.project.clone(), |found| found.key);
+    // A new project has the name of its folder.
+    let key = known.map_or_else(|| chosen.project.trim().to_owned(), |known| known.key);
     Ok(Json(json!({ "go": format!("p/{}/", encoded(&key)) })))
 }
 
@@ -302,37 +312,33 @@ pub(super) async fn import(
 async fn unseen_changes(
     state: &AppState,
     chosen: &ImportChoice,
-    dir: &Path,
+    known: Option<&FoundProject>,
     planned: Option<Planned>,
 ) -> AppResult<Option<String>> {
     let is_compared = chosen
         .compared
         .as_ref()
         .is_none_or(|name| *name == chosen.project);
-    let Some(planned) = planned.filter(|_| !chosen.list.is_empty() && !is_compared) else {
+    let planned = planned.filter(|_| !chosen.list.is_empty() && !is_compared);
+    let (Some(planned), Some(known)) = (planned, known) else {
         return Ok(None);
     };
-    let (folder, dir) = (state.options.folder.clone(), dir.to_owned());
-    let known = move || find(&folder).into_iter().find(|found| found.dir == dir);
-    let Some(found) = blocking(known).await? else {
-        return Ok(None);
-    };
-    let open = state.open(&found.key).await?;
+    let open = state.open_found(known.clone()).await?;
     let changes = ColumnChanges::find(&planned, &open).await?;
-    Ok((changes != ColumnChanges::default()).then(|| chosen.comparison(&found.key)))
+    Ok((changes != ColumnChanges::default()).then(|| chosen.comparison(&known.key)))
 }
 
-/// Returns what would be imported, if the page showed pairs. Refuses other pairs than it showed, in both languages. The import
-/// checks it again.
+/// Returns what would be imported to the project in `dir`, if the page showed pairs. Refuses other pairs than it showed, in
+/// both languages. The import checks it again.
 fn planned_as_shown(
     chosen: &ImportChoice,
-    folder: &Path,
+    dir: &Path,
     roots: &PickerRoots,
 ) -> AppResult<Option<Planned>> {
     let Some(shown) = chosen.choices()?.shown else {
         return Ok(None);
     };
-    let preview = chosen.preview(folder, roots, 0, &PlanCache::default());
+    let preview = chosen.preview(dir, roots, 0, &PlanCache::default());
     let planned = preview.map(|preview| preview.planned).transpose()?;
     match &planned {
         Some(Planned::Pairs(plan, _)) if plan.hash != shown => {

@@ -117,8 +117,7 @@ fn drawn(
     picture: ImportPicture,
     place: u64,
 ) -> AppResult<Bytes> {
-    let folder = &state.options.folder;
-    let places = FilePlaces::new(chosen, folder);
+    let places = FilePlaces::new(chosen, &state.options.folder);
     let files = chosen.planned_block(state, &places, place);
     let files = files.ok_or_else(AppFailure::not_found)?;
     let used: Vec<&Path> = match picture {
@@ -132,7 +131,7 @@ fn drawn(
     if let Some(kept) = key.as_deref().and_then(|key| state.thumbs.get(key)) {
         return Ok(kept);
     }
-    let limits = chosen.limits(folder);
+    let limits = places.limits();
     let drawn = match picture {
         ImportPicture::Page => draw_page(&files, &places, &limits),
         ImportPicture::Scan => draw_scan(&files, &places, &limits),

@@ -58,6 +58,7 @@ mod pass_on;
 mod pictures;
 mod plan_cache;
 mod project_name;
+mod project_places;
 mod projects;
 mod qr_code;
 mod read_only;

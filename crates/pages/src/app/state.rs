@@ -12,7 +12,7 @@ use super::invitations::Invitations;
 use super::open_pages::OpenPages;
 use super::paper_method::PaperMethod;
 use super::plan_cache::PlanCache;
-use super::projects::{OpenProject, find};
+use super::projects::{FoundProject, OpenProject, find};
 use super::tasks::AppTasks;
 use super::thumb_cache::ThumbCache;
 use super::uploads::Uploads;
@@ -106,8 +106,7 @@ impl AppState {
 
     /// Returns an open project by its name. Only projects of the folder have names, so no address leads elsewhere.
     pub(super) async fn open(&self, key: &str) -> AppResult<Arc<OpenProject>> {
-        let known = locked(&self.projects).get(key).cloned();
-        if let Some(open) = known.filter(|open| open.is_current()) {
+        if let Some(open) = self.known(key) {
             return Ok(open);
         }
         let folder = self.options.folder.clone();
@@ -116,12 +115,27 @@ impl AppState {
             locked(&self.projects).remove(key);
             return Err(AppFailure::not_found());
         };
+        self.open_found(found).await
+    }
+
+    /// Returns an open project that was found in the folder.
+    pub(super) async fn open_found(&self, found: FoundProject) -> AppResult<Arc<OpenProject>> {
+        if let Some(open) = self.known(&found.key) {
+            return Ok(open);
+        }
+        let key = found.key.clone();
         // Other projects do not wait for a server that does not answer.
         let open = OpenProject::open(found).await?;
         let mut projects = locked(&self.projects);
-        let kept = projects.get(key).filter(|kept| kept.is_same(&open));
+        let kept = projects.get(&key).filter(|kept| kept.is_same(&open));
         let kept = kept.cloned().unwrap_or(open);
-        projects.insert(key.to_owned(), Arc::clone(&kept));
+        projects.insert(key, Arc::clone(&kept));
         Ok(kept)
+    }
+
+    /// Returns a project that is open already and still has the catalog that was opened.
+    fn known(&self, key: &str) -> Option<Arc<OpenProject>> {
+        let known = locked(&self.projects).get(key).cloned();
+        known.filter(|open| open.is_current())
     }
 }

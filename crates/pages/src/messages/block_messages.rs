@@ -235,7 +235,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "box {} and box {} are both named {} (upper and lower case are equal)",
         "khung {0} và khung {1} cùng có tên {2} (không phân biệt chữ hoa và chữ thường)",
     ),
-    ("rename one of them", "hãy đổi tên một khung"),
+    ("rename one of them", "hãy đổi tên một trong hai"),
     ("the boxes", "các khung chữ"),
     ("correct or remove it", "hãy sửa hoặc bỏ đi"),
     (
