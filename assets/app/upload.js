@@ -98,7 +98,8 @@ async function contentOf(files) {
 /** Begins an upload, or resumes an interrupted one of the same files. */
 async function begin(files, bytes, takesOver) {
   const [name, content] = [nameOf(files), await contentOf(files)];
-  const begun = await act("actions/upload", { name, content, files: files.length, bytes, take_over: takesOver });
+  const about = { name, content, files: files.length, bytes, project: texts.project, take_over: takesOver };
+  const begun = await act("actions/upload", about);
   return { id: begun.upload, arrived: new Set(begun.arrived.map(({ path }) => path)), isCancelled: false };
 }
 

@@ -411,3 +411,21 @@ fn only_the_page_itself_may_send_files() {
     assert_eq!(stored(dir.path()), ["x/1.stl"]);
     assert_eq!(put(&page, &json!(99), "1.stl", b"x").status, 422);
 }
+
+#[test]
+fn a_failed_upload_is_named_only_on_the_page_of_its_project() {
+    let (_dir, page) = empty_app();
+    let body = json!({"name": "x", "files": 1, "bytes": 10, "project": "a"});
+    let upload = act(&page, "/actions/upload", &body, |_| {}).json()["upload"].clone();
+    refusal(&put(&page, &upload, "../1.stl", b"solid"));
+    for (project, is_said) in [("a", true), ("b", false), ("", false)] {
+        for (language, part) in [
+            ("en", "The last upload did not end well"),
+            ("vi", "Lần gửi trước không thành công"),
+        ] {
+            let path = format!("/import?project={project}&language={language}");
+            let html = text(&page.get(&path));
+            assert_eq!(html.contains(part), is_said, "{project}: {html}");
+        }
+    }
+}

@@ -44,6 +44,9 @@ pub(super) struct AnnouncedFiles {
     pub(super) files: u64,
     /// Total size of the files and archives, bytes.
     pub(super) bytes: u64,
+    /// The project for which the page sends them; empty for a new one.
+    #[serde(default)]
+    pub(super) project: String,
     /// Whether the upload of the same files by another page is interrupted first, if nothing more of it arrives.
     #[serde(default)]
     pub(super) take_over: bool,
@@ -244,6 +247,11 @@ impl FileUpload {
             token.cancel();
         }
         Ok(())
+    }
+
+    /// Returns whether the page of a project has begun the upload.
+    pub(super) fn is_for(&self, project: &str) -> bool {
+        self.announced.project == project
     }
 
     /// Says why the upload failed.

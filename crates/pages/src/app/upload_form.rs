@@ -22,7 +22,7 @@ pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Ma
         @if visit.read_only != Some(ReadOnlyPlace::Folder) && !uploads.may_write() {
             p.notice.warn { (ReadOnlyPlace::Folder.sentence().text(visit.language)) }
         }
-        @if let Some(problem) = uploads.problem() {
+        @if let Some(problem) = uploads.problem(project) {
             p #upload-last.notice.bad role="status" { (visit.t("The last upload did not end well: ", "Lần gửi trước không thành công: ")) (problem.text(visit.language)) }
         }
         form #upload.card.upload

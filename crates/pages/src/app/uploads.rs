@@ -90,7 +90,7 @@ impl Uploads {
             return Ok(resumed);
         }
         refuse_same(&locked(&self.open), files)?;
-        if !self.make_place() {
+        if !self.make_place(&files.project) {
             return refuse(too_many_uploads());
         }
         let folder = NewFolder::begin(&self.folder);
@@ -134,13 +134,19 @@ impl Uploads {
         }
     }
 
-    /// Removes uploads that ended, and those of closed browsers of which nothing has arrived. Keeps interrupted ones for an
-    /// hour, but evicts the oldest if the limit is reached. Returns whether another upload may begin.
-    fn make_place(&self) -> bool {
+    /// Removes uploads that ended, and those of closed browsers of which nothing has arrived, but keeps those of other projects
+    /// that say why they failed while there is room. Keeps interrupted ones for an hour, but evicts the oldest if the limit is
+    /// reached. Returns whether another upload may begin.
+    fn make_place(&self, project: &str) -> bool {
         let removed: Vec<_> = {
             let mut open = locked(&self.open);
-            let is_over = |_: &u64, upload: &mut Arc<FileUpload>| upload.is_over();
-            let mut removed: Vec<_> = open.extract_if(.., is_over).collect();
+            let is_useless = |_: &u64, upload: &mut Arc<FileUpload>| {
+                upload.is_over() && (upload.is_for(project) || upload.problem().is_none())
+            };
+            let mut removed: Vec<_> = open.extract_if(.., is_useless).collect();
+            if open.len() >= MAX_OPEN {
+                removed.extend(open.extract_if(.., |_, upload| upload.is_over()));
+            }
             if open.len() >= MAX_OPEN {
                 let paused = open.iter();
                 let paused = paused.filter_map(|(id, upload)| Some((upload.paused_since()?, *id)));
@@ -163,13 +169,13 @@ impl Uploads {
         found.ok_or_else(|| AppFailure::refused(ended()))
     }
 
-    /// Says why the last upload failed, until the next one begins.
-    pub(super) fn problem(&self) -> Option<Sentence> {
+    /// Says why the last upload of a project failed, until the next one of the project begins.
+    pub(super) fn problem(&self, project: &str) -> Option<Sentence> {
         let open = locked(&self.open);
-        let last = open.last_key_value();
-        let last = last.and_then(|(_, upload)| upload.problem());
+        let last = open.values().rfind(|upload| upload.is_for(project));
+        let problem = last.and_then(|upload| upload.problem());
         let is_first = open.is_empty() && self.next.load(Ordering::Relaxed) == 1;
-        last.or_else(|| (self.has_left_over && is_first).then(left_over))
+        problem.or_else(|| (self.has_left_over && is_first).then(left_over))
     }
 }
 

@@ -20,6 +20,7 @@ fn files(content: &str) -> AnnouncedFiles {
         content: content.to_owned(),
         files: 1,
         bytes: 1,
+        project: String::new(),
         take_over: false,
     }
 }
@@ -198,4 +199,38 @@ fn files_of_an_interrupted_upload_are_removed_after_their_time() {
     assert!(upload.end_if_left(now + MAX_KEPT * 2));
     assert!(matches!(*upload.lock(), UploadState::Ended(None)));
     assert!(upload.end_if_left(now), "nothing is left to remove");
+}
+
+/// Begins an upload for a project, which fails.
+fn failed_for(uploads: &Uploads, project: &str) -> u64 {
+    let files = AnnouncedFiles {
+        project: project.to_owned(),
+        ..files("")
+    };
+    let (id, _) = uploads.begin(&files).expect("a place");
+    let upload = uploads.find(id).expect("an upload");
+    *upload.lock() = UploadState::Ended(Some(cut()));
+    id
+}
+
+#[test]
+fn a_failed_upload_is_said_only_where_it_was_begun() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let uploads = Uploads::new(dir.path());
+    let first = failed_for(&uploads, "a");
+    assert_eq!(uploads.problem("a"), Some(cut()));
+    for other in ["", "b"] {
+        assert_eq!(uploads.problem(other), None, "{other:?}");
+    }
+    // An upload of another project keeps the reason, and the next one of the project removes it.
+    failed_for(&uploads, "b");
+    assert_eq!(uploads.problem("a"), Some(cut()));
+    uploads.find(first).expect("its reason");
+    failed_for(&uploads, "a");
+    assert!(uploads.find(first).is_err());
+    // Reasons take no place.
+    for number in 0..MAX_OPEN {
+        failed_for(&uploads, &number.to_string());
+    }
+    assert_eq!(uploads.problem("3"), Some(cut()));
 }
