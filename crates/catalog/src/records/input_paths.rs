@@ -8,7 +8,7 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as};
 use crate::records::checksums;
 use crate::{Catalog, Result};
-use mocban_core::domain::ArtifactRef;
+use mocban_core::domain::{ArtifactRef, InputVersion};
 
 /// Number of pairs that are read at a time.
 const PAGE: i64 = 2_000;
@@ -17,9 +17,9 @@ const SELECT: &str =
     "SELECT id, mesh_path, print_path FROM pair WHERE id > ?1 ORDER BY id LIMIT ?2";
 
 /// Returns a `stat` that no file has, so that the next run reads the file again. What is known of a file that an import
-/// changed (`''`) or that is missing stays.
+/// changed (`''`) or that is missing stays. The second argument is the parameter with [`InputVersion::RESTORED`].
 macro_rules! unread {
-    ($stat:literal) => {
+    ($stat:literal, $restored:literal) => {
         concat!(
             "CASE WHEN ",
             $stat,
@@ -27,7 +27,9 @@ macro_rules! unread {
             $stat,
             " WHEN ",
             $stat,
-            " IS NOT NULL THEN 'restored' END"
+            " IS NOT NULL THEN ",
+            $restored,
+            " END"
         )
     };
 }
@@ -35,9 +37,9 @@ macro_rules! unread {
 const UPDATE: &str = concat!(
     "
 UPDATE pair SET mesh_path = item.value ->> 1, mesh_stat = ",
-    unread!("mesh_stat"),
+    unread!("mesh_stat", "?2"),
     ", print_path = item.value ->> 2, print_stat = ",
-    unread!("print_stat"),
+    unread!("print_stat", "?2"),
     "
 FROM json_each(?1) AS item WHERE pair.id = CAST(item.value ->> 0 AS bigint)"
 );
@@ -47,11 +49,11 @@ const SELECT_BLOCKS: &str = "SELECT id, mesh_path, page_path, labels_path FROM b
 const UPDATE_BLOCK: &str = concat!(
     "
 UPDATE block SET mesh_path = ?2, mesh_stat = ",
-    unread!("mesh_stat"),
+    unread!("mesh_stat", "?5"),
     ", page_path = ?3, page_stat = ",
-    unread!("page_stat"),
+    unread!("page_stat", "?5"),
     ", labels_path = ?4, labels_stat = ",
-    unread!("labels_stat"),
+    unread!("labels_stat", "?5"),
     " WHERE id = ?1"
 );
 
@@ -131,7 +133,8 @@ async fn replace(
             .into_iter()
             .map(|(id, mesh, print)| json!([id, new_path(mesh), new_path(print)]));
         let items = items.collect::<Value>().to_string();
-        query(UPDATE).bind(items).execute(&mut *conn).await?;
+        let update = query(UPDATE).bind(items).bind(InputVersion::RESTORED);
+        update.execute(&mut *conn).await?;
         checksums::store(conn, ChecksummedTable::Pair, &ids).await?;
     }
 }
@@ -148,7 +151,8 @@ async fn replace_in_blocks(
         let mut new_path = |stored| found_or_kept(stored, &mut find, kept);
         let (mesh, page, labels) = (new_path(mesh), new_path(page), labels.map(new_path));
         let update = query(UPDATE_BLOCK).bind(id).bind(mesh).bind(page);
-        update.bind(labels).execute(&mut *conn).await?;
+        let update = update.bind(labels).bind(InputVersion::RESTORED);
+        update.execute(&mut *conn).await?;
         checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
     }
     Ok(())

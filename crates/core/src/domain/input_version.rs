@@ -15,10 +15,11 @@ pub struct InputVersion {
 
 /// The `stat` of a missing file.
 const GONE: &str = "gone";
-/// The `stat` that the catalog writes for a file that was read at another path, before a backup was restored.
-const RESTORED: &str = "restored";
 
 impl InputVersion {
+    /// The `stat` that the catalog writes for a file that was read at another path, before a backup was restored.
+    pub const RESTORED: &str = "restored";
+
     /// Returns the version of a file that is missing, so that a later run finds out when it is there.
     pub fn gone() -> Self {
         Self {
@@ -29,7 +30,7 @@ impl InputVersion {
 
     /// Returns whether the file was read at another path only: the size and time of the file at its new path are unknown.
     pub fn has_new_path(&self) -> bool {
-        self.stat.is_empty() || self.stat == RESTORED
+        self.stat.is_empty() || self.stat == Self::RESTORED
     }
 
     /// Returns whether the file was missing.
