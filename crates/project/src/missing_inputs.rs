@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::error::ProjectResult;
 use crate::missing_folders::MissingFolders;
 use mocban_catalog::{Catalog, InputVersion, KnownBlock, PairSelection};
-use mocban_core::domain::{ArtifactRef, PairId, first_names, one_line};
+use mocban_core::domain::{ArtifactRef, NOT_THERE, PairId, first_names, one_line};
 use mocban_store::{InputError, Project, stat_input};
 
 /// Largest number of pairs whose files are inspected. They are spread over the project.
@@ -23,8 +23,8 @@ const INSPECTION_TIME: Duration = Duration::from_secs(4);
 const MAX_TIME: Duration = Duration::from_secs(5);
 /// Largest number of missing folders that a sentence names.
 const MAX_FOLDERS: usize = 3;
-/// Ends of the message of a file that is missing.
-const NOT_THERE: [&str; 2] = [" is not there", " is missing"];
+/// Ends of the message of an input or an artifact that is missing.
+const MISSING: [&str; 2] = [NOT_THERE, " is missing"];
 
 /// Input files that were read before and are no longer at their places.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -78,7 +78,7 @@ impl MissingInputs {
     /// Returns whether a message of an export says that a file in one of the folders is missing.
     pub fn explains(&self, message: &str) -> bool {
         let mut folders = self.folders.iter();
-        NOT_THERE.iter().any(|end| message.ends_with(end))
+        MISSING.iter().any(|end| message.ends_with(end))
             && folders.any(|folder| message.contains(&format!("{folder}{MAIN_SEPARATOR}")))
     }
 }

@@ -4,14 +4,14 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::remote::BucketError;
-use mocban_core::domain::{Explained, FailureClass};
+use mocban_core::domain::{Explained, FailureClass, NOT_THERE};
 use mocban_system::platform::{is_out_of_files, is_system_out_of_files};
 
 /// Why an input file could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// There is no such file.
-    #[error("{0} is not there")]
+    #[error("{0}{end}", end = NOT_THERE)]
     NotThere(PathBuf),
     /// The path is a directory or anything else that is not a regular file.
     #[error("{path} is {kind}, not a file")]

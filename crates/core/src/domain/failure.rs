@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::enum_names;
 
+/// Ends the message of an input file that does not exist, behind its path.
+pub const NOT_THERE: &str = " is not there";
+
 /// Class of a failure. It decides between retry and quarantine.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,

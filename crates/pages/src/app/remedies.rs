@@ -7,10 +7,7 @@ use maud::{Markup, html};
 use super::address::encoded;
 use super::visit::Visit;
 use mocban_catalog::{BlockAttributes, PairAttributes, PairResults};
-use mocban_core::domain::{BlockStage, FailureClass, Stage};
-
-/// The end of the message of a file that does not exist.
-const NOT_THERE: &str = " is not there";
+use mocban_core::domain::{BlockStage, FailureClass, NOT_THERE, Stage};
 
 /// Where the files of pairs or blocks were named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,11 +3,13 @@
 use std::error::Error;
 use std::io;
 
+use mocban_core::domain::NOT_THERE;
+
 /// Why a request to an object store failed.
 #[derive(Debug, thiserror::Error)]
 pub enum BucketError {
     /// There is no such object.
-    #[error("{0} is not there")]
+    #[error("{0}{end}", end = NOT_THERE)]
     NotThere(String),
     /// There is no such bucket.
     #[error("{0}: there is no such bucket; create it, or correct the setting that names it")]
