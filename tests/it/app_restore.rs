@@ -99,6 +99,12 @@ fn a_backup_is_shown_and_becomes_a_project() {
         }
     }
     page.get("/?language=en");
+    // The new project would look for the files of the shared project in its own folder.
+    let html = content(&page, &backup);
+    for part in ["of them in its own folder", "(data/"] {
+        assert!(html.contains(part), "{part}: {html}");
+    }
+    assert!(!html.contains("p 2/data"), "{html}");
     let mut form = body(&backup, "again");
     form["inputs"] = json!(root.join("p").to_str().expect("UTF-8"));
     let reply = start(&page, &form);

@@ -285,3 +285,33 @@ fn an_export_says_why_it_leaves_out_pairs() {
         wait_for(&page, &format!("/p/p/export?language={language}"), left_out);
     }
 }
+
+#[test]
+fn a_deleted_scan_is_named_where_changed_files_are_looked_for() {
+    let (dir, page) = with_project();
+    let scan = "data/meshes/upright-0000.ply";
+    // Files are looked at anew for each press of the button, of which this is the time.
+    let shown = |pressed: u64, language: &str| {
+        let path = format!("/p/p/?looked={pressed}&language={language}");
+        text(&page.get(&path))
+    };
+    let [before, after] = [9_999_999_999_998, 9_999_999_999_999];
+    for (language, part) in [
+        ("en", "No file has changed, and none is missing."),
+        ("vi", "Không có tệp nào thay đổi hay bị thiếu."),
+    ] {
+        let html = shown(before, language);
+        assert!(html.contains(part), "{part}: {html}");
+    }
+    std::fs::remove_file(dir.path().join("p").join(scan)).expect("removed");
+    for (language, parts) in [
+        ("en", ["Missing files", "No other file has changed."]),
+        ("vi", ["Số tệp bị thiếu", "Không có tệp nào khác thay đổi."]),
+    ] {
+        let html = shown(after, language);
+        let named = format!("{}: <b>1</b> ({scan}). ", parts[0]);
+        for part in [named.as_str(), parts[1]] {
+            assert!(html.contains(part), "{part}: {html}");
+        }
+    }
+}

@@ -7,7 +7,7 @@ use std::time::UNIX_EPOCH;
 use crate::backup::rows_of;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::input_list::{InputCopies, InputList, inputs_folder};
-use crate::missing_inputs::{self, InputInspection};
+use crate::input_places::InputPlaces;
 use crate::restore::check_backup;
 use crate::wanted_inputs::first_wanted_inputs;
 use mocban_catalog::Catalog;
@@ -43,8 +43,8 @@ pub struct BackupContent {
     pub first_not_copied: Vec<String>,
     /// What is wrong with their list, if it cannot be read. They are then found by their paths, and not copied.
     pub list_problem: Option<String>,
-    /// Without copies, scans and prints that a project in the new folder would not find, among a few.
-    pub inputs: InputInspection,
+    /// Without copies, the scans and prints that a project in the new folder would find. With copies, none is looked at.
+    pub inputs: InputPlaces,
 }
 
 /// Reads what a backup holds for a project in the folder `dir`, which need not exist. Writes nothing.
@@ -68,8 +68,8 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
         let blocks = catalog.count_blocks().await?;
         let last_activity = catalog.last_activity().await?;
         let inputs = match copies {
-            Some(_) => InputInspection::default(),
-            None => missing_inputs::inspect(&Project::at(dir), &catalog, pairs).await?,
+            Some(_) => InputPlaces::default(),
+            None => InputPlaces::of_backup(&Project::at(dir), &catalog).await?,
         };
         let (not_copied, first_not_copied) = match &list {
             Some(list) => missing_copies(list, &catalog).await?,

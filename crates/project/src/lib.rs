@@ -14,6 +14,7 @@
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database;
 //!   [`backup_content`]: what such a file holds; [`backup_inputs`], [`input_list`]: scans and prints beside it
+//! - [`missing_inputs`], [`input_places`]: inputs that are no longer where they were
 //! - [`block_labels`]: labels that were made on the page of a block
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`], [`generated_folder`]: what may be replaced
@@ -65,6 +66,7 @@ mod input_finder;
 pub mod input_list;
 mod input_names;
 pub mod input_paths;
+pub mod input_places;
 pub mod input_warnings;
 pub mod location;
 pub mod manifest_file;

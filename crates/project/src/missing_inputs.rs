@@ -18,9 +18,9 @@ const MAX_PAIRS: u64 = 300;
 /// Largest number of blocks whose files are inspected.
 const MAX_BLOCKS: usize = 50;
 /// Time after which no further file is inspected, as on a slow network drive.
-const INSPECTION_TIME: Duration = Duration::from_secs(4);
+pub(crate) const INSPECTION_TIME: Duration = Duration::from_secs(4);
 /// Longest wait for the inspection. A disk may hang.
-const MAX_TIME: Duration = Duration::from_secs(5);
+pub(crate) const MAX_TIME: Duration = Duration::from_secs(5);
 /// Largest number of missing folders that a sentence names.
 const MAX_FOLDERS: usize = 3;
 /// Ends of the message of an input or an artifact that is missing.

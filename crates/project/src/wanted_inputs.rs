@@ -1,10 +1,10 @@
 //! The inputs that a catalog names, each once, with what the catalog knows of their content.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::error::ProjectResult;
-use mocban_catalog::{Catalog, InputVersion};
-use mocban_core::domain::{ArtifactRef, ContentHash};
+use mocban_catalog::{Catalog, InputVersion, PairSelection};
+use mocban_core::domain::{ArtifactRef, ContentHash, PairId};
 use mocban_store::{Input, stat_input};
 
 /// Number of pairs that are read at a time.
@@ -65,6 +65,22 @@ pub(crate) async fn first_wanted_inputs(
     catalog: &Catalog,
     most_pairs: usize,
 ) -> ProjectResult<(Vec<WantedInput>, bool)> {
+    first_inputs(catalog, most_pairs, true).await
+}
+
+/// Returns the inputs like [`first_wanted_inputs`], without those of retired pairs.
+pub(crate) async fn first_counted_inputs(
+    catalog: &Catalog,
+    most_pairs: usize,
+) -> ProjectResult<(Vec<WantedInput>, bool)> {
+    first_inputs(catalog, most_pairs, false).await
+}
+
+async fn first_inputs(
+    catalog: &Catalog,
+    most_pairs: usize,
+    with_retired: bool,
+) -> ProjectResult<(Vec<WantedInput>, bool)> {
     let mut wanted = WantedInputs::default();
     let (mut after, mut pairs, mut is_cut) = (None, 0, false);
     loop {
@@ -74,7 +90,16 @@ pub(crate) async fn first_wanted_inputs(
         };
         after = Some(last.pair);
         pairs += page.len();
+        let retired = if with_retired {
+            HashSet::new()
+        } else {
+            let ids: Vec<PairId> = page.iter().map(|known| known.pair).collect();
+            catalog.retired_among(&PairSelection::of(&ids)).await?
+        };
         for pair in page {
+            if retired.contains(&pair.pair) {
+                continue;
+            }
             wanted.add(pair.mesh_path, pair.mesh);
             wanted.add(pair.print_path, pair.print);
         }

@@ -42,6 +42,7 @@ mod invitation_cards;
 mod invitations;
 mod last_import;
 mod latest_results;
+mod looked_inputs;
 mod named_blocks;
 mod number_text;
 mod open_pages;

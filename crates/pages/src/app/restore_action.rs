@@ -245,17 +245,16 @@ fn finished(
         ]);
     }
     let missing = match (&restored.not_in_place, restored.missing.first()) {
-        (Some(found), _) => Some((found.missing as u64, found.first.as_str())),
-        (None, Some(first)) => Some((restored.missing.len() as u64, first.as_str())),
+        (Some(found), _) => Some(missing_line(
+            found.missing,
+            Some(found.looked_at),
+            &found.first,
+        )),
+        (None, Some(first)) => Some(missing_line(restored.missing.len(), None, first)),
         (None, None) => None,
     };
-    if let Some((count, first)) = missing {
-        let (count, first) = (grouped(count), one_line(first));
-        lines.push([
-            format!("Scans and prints that were not found: {count}, first {first}. Put them at their places, or restore the backup again with their folder."),
-            format!("Số bản quét và bản in không tìm thấy: {count}, đầu tiên là {first}. Hãy đưa chúng về chỗ cũ, hoặc khôi phục lại và chọn thư mục của chúng."),
-        ]);
-    }
+    let is_complete = missing.is_none();
+    lines.extend(missing);
     let removed = restored.settings.as_ref().map(|settings| &settings.removed);
     if let Some(removed) = removed.filter(|removed| !removed.is_empty()) {
         let removed = removed.join(", ");
@@ -271,8 +270,28 @@ fn finished(
                 .map(|language| failure.text(language).to_owned()),
         );
     }
-    let is_warning = missing.is_some() || failure.is_some() || restored.elsewhere > 0;
+    let is_warning = !is_complete || failure.is_some() || restored.elsewhere > 0;
     FinishedTask::new(lines, is_warning)
+}
+
+/// Says how many files are not where the new project reads them, of those that were looked at, if that was not all of them.
+fn missing_line(missing: usize, looked_at: Option<usize>, first: &str) -> [String; 2] {
+    let (missing, first) = (grouped(missing as u64), one_line(first));
+    let [of, of_vi] = match looked_at.map(|number| grouped(number as u64)) {
+        Some(number) => [
+            format!(" of {number} that were looked at"),
+            format!(" trên {number} tệp đã kiểm tra"),
+        ],
+        None => [String::new(), String::new()],
+    };
+    [
+        format!(
+            "Scans and prints that were not found: {missing}{of}, first {first}. Put them at their places, or restore the backup again with their folder."
+        ),
+        format!(
+            "Số bản quét và bản in không tìm thấy: {missing}{of_vi}, đầu tiên là {first}. Hãy đặt chúng vào đúng chỗ, hoặc khôi phục lại và chọn thư mục của chúng."
+        ),
+    ]
 }
 
 /// Says how much was copied into the project, and whether it needs no other folder.
@@ -298,7 +317,7 @@ fn copied_line(copied: &InputCopies, is_all: bool) -> [String; 2] {
 mod tests {
     use std::path::PathBuf;
 
-    use super::{RestoreBackupBody, check_room, copied_line, request};
+    use super::{RestoreBackupBody, check_room, copied_line, missing_line, request};
     use crate::review::Language;
     use mocban_project::input_list::InputCopies;
 
@@ -315,6 +334,24 @@ mod tests {
         ] {
             let line = copied_line(&copied, is_all);
             for (text, part) in line.iter().zip(parts) {
+                assert!(text.contains(part), "{part}: {text}");
+            }
+        }
+    }
+
+    #[test]
+    fn missing_files_are_counted_of_those_that_were_looked_at() {
+        for (looked_at, parts) in [
+            (
+                Some(30),
+                [
+                    ": 4 of 30 that were looked at, first p/1.stl.",
+                    ": 4 trên 30 tệp đã kiểm tra",
+                ],
+            ),
+            (None, [": 4, first p/1.stl.", ": 4, đầu tiên là p/1.stl."]),
+        ] {
+            for (text, part) in missing_line(4, looked_at, "p/1.stl").iter().zip(parts) {
                 assert!(text.contains(part), "{part}: {text}");
             }
         }

@@ -12,6 +12,7 @@ use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
 use super::home::free_space;
+use super::looked_inputs::{first_missing, looked_at_text};
 use super::project_name::{NAME_CHARS, new_project_dir};
 use super::restore_action::{check_backup_file, check_room, restore_sentence};
 use super::restore_page::chosen_path;
@@ -22,6 +23,7 @@ use crate::on_thread::read_on_thread;
 use mocban_core::domain::one_line;
 use mocban_project::backup_content::{BackupContent, backup_content};
 use mocban_project::input_list::inputs_folder;
+use mocban_project::input_places::InputPlaces;
 use mocban_project::{ProjectError, ProjectResult};
 use mocban_system::platform;
 
@@ -160,54 +162,78 @@ fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> 
         );
         return said.text(visit.language).to_owned();
     }
-    let found = &content.inputs;
-    let said = match (inputs, &found.missing) {
-        (Some(inputs), _) => {
+    let said = match inputs {
+        Some(inputs) => {
             let inputs = one_line(inputs);
             Sentence::new(
                 format!(
-                    "Not in a backup. Files that are not at their old places are looked for in {inputs}."
+                    "Not in a backup. Files that are not at their places are looked for in {inputs}."
                 ),
                 format!(
-                    "Không có trong bản sao lưu. Các tệp không còn ở chỗ cũ sẽ được tìm trong {inputs}."
+                    "Không có trong bản sao lưu. Các tệp không có ở đúng chỗ sẽ được tìm trong {inputs}."
                 ),
             )
         }
-        (None, None) if found.looked_at == 0 => Sentence::new(
-            "Not in a backup. They are read from their old places. It is not known whether they are there: none was looked at.",
-            "Không có trong bản sao lưu. Chúng được đọc từ chỗ cũ. Không rõ chúng có còn ở đó không: chưa kiểm tra tệp nào.",
-        ),
-        (None, None) => {
-            let looked_at = grouped(found.looked_at as u64);
-            Sentence::new(
-                format!(
-                    "Not in a backup. They are read from their old places. {looked_at} files were looked at, and all are there."
-                ),
-                format!(
-                    "Không có trong bản sao lưu. Chúng được đọc từ chỗ cũ. Đã kiểm tra {looked_at} tệp và tất cả đều có."
-                ),
-            )
-        }
-        (None, Some(found)) => {
-            let [missing, looked_at] = [found.missing, found.looked_at].map(|n| grouped(n as u64));
-            let first = one_line(&found.first);
-            Sentence::new(
-                format!(
-                    "Not in a backup, and {missing} of {looked_at} files that were looked at are not at their old places, first {first}. Choose their folder below."
-                ),
-                format!(
-                    "Không có trong bản sao lưu, và {missing} trên {looked_at} tệp đã kiểm tra không còn ở chỗ cũ, tệp đầu tiên là {first}. Hãy chọn thư mục của chúng ở bên dưới."
-                ),
-            )
-        }
+        None => places_sentence(&content.inputs),
     };
     said.text(visit.language).to_owned()
 }
 
+/// Says how many scans and prints the new project would find, of those that were looked at.
+fn places_sentence(places: &InputPlaces) -> Sentence {
+    let [looked_at, looked_at_vi] = looked_at_text(places);
+    let (not, not_vi) = ("Not in a backup.", "Không có trong bản sao lưu.");
+    if places.looked_at == 0 {
+        return Sentence::new(
+            format!(
+                "{not} The new project reads them from their places. It is not known whether they are there. {looked_at}."
+            ),
+            format!(
+                "{not_vi} Dự án mới sẽ đọc chúng từ chỗ của chúng. Không rõ chúng có ở đó không. {looked_at_vi}."
+            ),
+        );
+    }
+    if places.missing == 0 {
+        return Sentence::new(
+            format!(
+                "{not} {looked_at}. These are at their places, from which the new project reads them."
+            ),
+            format!(
+                "{not_vi} {looked_at_vi}. Các tệp này đều có ở đúng chỗ, và dự án mới sẽ đọc chúng từ đó."
+            ),
+        );
+    }
+    let [missing, inside] = [places.missing, places.missing_inside].map(|n| grouped(n as u64));
+    let first = first_missing(places);
+    let [of_project, of_project_vi] = if places.missing_inside > 0 {
+        [
+            format!(
+                " The old project had {inside} of them in its own folder, and the new one looks for them in its own."
+            ),
+            format!(
+                " Trong đó {inside} tệp nằm trong thư mục của dự án cũ, còn dự án mới sẽ tìm chúng trong thư mục của chính nó."
+            ),
+        ]
+    } else {
+        [String::new(), String::new()]
+    };
+    Sentence::new(
+        format!(
+            "{not} {looked_at}. Missing: {missing} ({first}).{of_project} Choose their folder below."
+        ),
+        format!(
+            "{not_vi} {looked_at_vi}. Số tệp thiếu: {missing} ({first}).{of_project_vi} Hãy chọn thư mục của chúng ở bên dưới."
+        ),
+    )
+}
+
 #[cfg(test)]
 mod tests {
-    use super::free_name;
     use std::path::Path;
+
+    use super::{free_name, places_sentence};
+    use crate::review::Language;
+    use mocban_project::input_places::InputPlaces;
 
     #[test]
     fn a_new_project_is_named_like_the_one_that_was_backed_up() {
@@ -219,5 +245,55 @@ mod tests {
         assert_eq!(name("/x/ván 04/backups/backup.sqlite"), "ván 04 2");
         assert_eq!(name("/x/uploads.sqlite"), "restored");
         assert_eq!(name("/x/a:b.sqlite"), "restored");
+    }
+
+    #[test]
+    fn only_files_that_were_looked_at_are_said_to_be_there() {
+        let of = |looked_at: usize, missing: usize, missing_inside: usize| {
+            let places = InputPlaces {
+                known: 9,
+                has_more: looked_at > 8,
+                looked_at,
+                missing,
+                missing_inside,
+                first: (0..missing).map(|i| format!("scans/{i}.stl")).collect(),
+            };
+            let sentence = places_sentence(&places);
+            Language::ALL.map(|language| sentence.text(language).to_owned())
+        };
+        for (said, parts) in [
+            (
+                of(0, 0, 0),
+                [
+                    "not known whether they are there. Files that were looked at: 0 of 9.",
+                    "Không rõ chúng có ở đó không. Số tệp đã kiểm tra: 0 trên 9.",
+                ],
+            ),
+            (
+                of(8, 0, 0),
+                [
+                    "Files that were looked at: 8 of 9. These are at their places",
+                    "Số tệp đã kiểm tra: 8 trên 9. Các tệp này đều có ở đúng chỗ",
+                ],
+            ),
+            (
+                of(9, 2, 1),
+                [
+                    "9 of more than 9. Missing: 2 (scans/0.stl, scans/1.stl). The old project had 1 of them",
+                    "9 trên hơn 9. Số tệp thiếu: 2 (scans/0.stl, scans/1.stl). Trong đó 1 tệp nằm trong thư mục của dự án cũ",
+                ],
+            ),
+            (
+                of(8, 1, 0),
+                [
+                    "Missing: 1 (scans/0.stl). Choose their folder below.",
+                    "Số tệp thiếu: 1 (scans/0.stl). Hãy chọn thư mục của chúng",
+                ],
+            ),
+        ] {
+            for (text, part) in said.iter().zip(parts) {
+                assert!(text.contains(part), "{part}: {text}");
+            }
+        }
     }
 }

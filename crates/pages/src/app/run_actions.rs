@@ -32,7 +32,7 @@ pub(super) struct RunBody {
     /// Pairs at the same time, as the field has it.
     #[serde(default)]
     jobs: String,
-    /// `all`, `failed`, or `look` for files that changed although everything is aligned.
+    /// `all`, `failed`, or `look` for files that changed or are missing although everything is aligned.
     which: String,
 }
 
@@ -77,7 +77,7 @@ pub(super) async fn run(
     let started = now();
     child_run::start(&state, &open.dir, &args, &[]).await?;
     if body.which == "look" {
-        // The page then says whether a file has changed.
+        // The page then says whether a file has changed or is missing.
         return Ok(Json(json!({ "go": format!("?looked={started}") })));
     }
     Ok(reload())

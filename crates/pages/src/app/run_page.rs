@@ -10,6 +10,7 @@ use super::components::{NavSection, action_form, figure, frame, grouped, stored_
 use super::failure::AppResult;
 use super::home::free_space;
 use super::latest_results::latest_results;
+use super::looked_inputs::looked_part;
 use super::projects::OpenProject;
 use super::remedies::pair_remedy;
 use super::run_blocks::{
@@ -37,10 +38,13 @@ pub(super) async fn page(
         read.map_err(|error: ProjectError| super::failure::AppFailure::of(error, &open.dir))?;
     let looked = visit.query.parsed::<UnixMillis>("looked");
     let last = open.catalog.last_activity().await?;
+    let looked = looked.filter(|_| !run.is_running && run.failed_run.is_none());
     let is_unchanged = looked.is_some_and(|looked| last.is_none_or(|last| last < looked))
-        && !run.is_running
-        && run.failed_run.is_none()
         && run.to_align() + run.open_blocks() == 0;
+    let places = match looked {
+        Some(looked) => Some(state.looked_inputs.look(&open, looked).await?),
+        None => None,
+    };
     let body = html! {
         div #live data-live="2000" {
             (figures(&visit, &run))
@@ -48,7 +52,7 @@ pub(super) async fn page(
                 p.notice.bad #failed-run role="alert" { (one_line(sentence.text(visit.language))) }
             }
             (progress(&visit, &run))
-            @if is_unchanged { p.good #no-change role="status" { (visit.t("No file has changed.", "Không có tệp nào thay đổi.")) } }
+            @if let Some(places) = &places { (looked_part(&visit, &key, places, is_unchanged)) }
             (controls(&visit, &run))
             (disk(&visit, &open))
             (latest_results(&visit, &run.latest))

@@ -9,6 +9,7 @@ use super::chosen_sets::ChosenSets;
 use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
 use super::invitations::Invitations;
+use super::looked_inputs::LookedInputs;
 use super::open_pages::OpenPages;
 use super::paper_method::PaperMethod;
 use super::plan_cache::PlanCache;
@@ -57,6 +58,8 @@ pub(super) struct AppState {
     pub(super) tasks: AppTasks,
     /// Why runs that the app started failed.
     pub(super) failed_runs: FailedRuns,
+    /// What was found when files were looked for.
+    pub(super) looked_inputs: LookedInputs,
     pub(super) thumbs: ThumbCache,
     /// Pairs aligned by the method of the paper.
     pub(super) paper: PaperMethod,
@@ -85,6 +88,7 @@ impl AppState {
             blocks: OpenPages::new(2),
             tasks: AppTasks::default(),
             failed_runs: FailedRuns::default(),
+            looked_inputs: LookedInputs::default(),
             thumbs: ThumbCache::default(),
             paper: PaperMethod::default(),
             zip_sizes: ZipSizes::default(),

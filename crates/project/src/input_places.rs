@@ -1,0 +1,153 @@
+//! Finds out which inputs are at their places: those of all pairs and blocks, as far as a limited time allows.
+
+use std::path::Path;
+use std::time::Instant;
+
+use crate::error::ProjectResult;
+use crate::missing_inputs::{INSPECTION_TIME, MAX_TIME};
+use crate::wanted_inputs::{WantedInput, first_counted_inputs, first_wanted_inputs};
+use mocban_catalog::Catalog;
+use mocban_store::Project;
+
+/// Number of pairs, about, whose files are looked at.
+const MAX_PAIRS: usize = 100_000;
+/// Most missing files that are named.
+const MAX_NAMED: usize = 3;
+
+/// Which inputs are at their places.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct InputPlaces {
+    /// Number of files that the first pairs and all blocks have.
+    pub known: usize,
+    /// Whether further pairs may have files.
+    pub has_more: bool,
+    /// Number of files that were looked at: not those in object stores, nor those after the time was over.
+    pub looked_at: usize,
+    /// Number of files among them that are not there.
+    pub missing: usize,
+    /// Number of missing files whose place is in the folder of the project.
+    pub missing_inside: usize,
+    /// The first missing files. The path of a file in the folder of the project is relative to it.
+    pub first: Vec<String>,
+}
+
+impl InputPlaces {
+    /// Looks at the files of a project that are not of retired pairs alone.
+    pub async fn of_project(project: &Project, catalog: &Catalog) -> ProjectResult<Self> {
+        let (inputs, has_more) = first_counted_inputs(catalog, MAX_PAIRS).await?;
+        Ok(Self::of_inputs(project, inputs, has_more).await)
+    }
+
+    /// Looks at all files of a catalog where a restored project would read them.
+    pub(crate) async fn of_backup(project: &Project, catalog: &Catalog) -> ProjectResult<Self> {
+        let (inputs, has_more) = first_wanted_inputs(catalog, MAX_PAIRS).await?;
+        Ok(Self::of_inputs(project, inputs, has_more).await)
+    }
+
+    /// Returns whether every file was looked at.
+    pub const fn is_of_all(&self) -> bool {
+        self.looked_at == self.known && !self.has_more
+    }
+
+    async fn of_inputs(project: &Project, inputs: Vec<WantedInput>, has_more: bool) -> Self {
+        let known = inputs.len();
+        let (project, until) = (project.clone(), Instant::now() + INSPECTION_TIME);
+        let look = tokio::task::spawn_blocking(move || looked_at(&project, &inputs, until));
+        // A disk may hang.
+        let looked = tokio::time::timeout(MAX_TIME, look).await;
+        let places = looked.ok().and_then(Result::ok).unwrap_or_default();
+        Self {
+            known,
+            has_more,
+            ..places
+        }
+    }
+}
+
+/// Looks at files until a time.
+fn looked_at(project: &Project, inputs: &[WantedInput], until: Instant) -> InputPlaces {
+    let mut places = InputPlaces {
+        known: inputs.len(),
+        ..InputPlaces::default()
+    };
+    for WantedInput { stored, .. } in inputs {
+        if Instant::now() >= until {
+            break;
+        }
+        let input = project.input(stored);
+        if input.is_remote() || is_below_unknown_root(project, stored) {
+            continue;
+        }
+        places.looked_at += 1;
+        if input.exists() {
+            continue;
+        }
+        let is_inside = Path::new(stored).is_relative() && !project.is_below_root(stored);
+        places.missing += 1;
+        places.missing_inside += usize::from(is_inside);
+        if places.first.len() < MAX_NAMED {
+            let path = input.path().display();
+            let shown = if is_inside {
+                stored.clone()
+            } else {
+                path.to_string()
+            };
+            places.first.push(shown);
+        }
+    }
+    places
+}
+
+/// Returns whether a path may be relative to a root of settings that are not known, as those of a backup.
+fn is_below_unknown_root(project: &Project, stored: &str) -> bool {
+    let first = stored.split('/').next().unwrap_or_default();
+    project.storage().is_none() && Path::new(stored).is_relative() && first.contains(':')
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use super::{InputPlaces, MAX_NAMED, looked_at};
+    use crate::wanted_inputs::WantedInput;
+    use mocban_store::Project;
+
+    #[test]
+    fn files_are_counted_by_what_was_found_out_about_them() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::at(&dir.path().join("p"));
+        let outside = |name: &str| dir.path().join(name).display().to_string();
+        std::fs::create_dir(project.dir()).expect("a folder");
+        for file in [project.dir().join("1.stl"), dir.path().join("2.stl")] {
+            std::fs::write(file, "scan").expect("written");
+        }
+        let stored = [
+            "1.stl".to_owned(),
+            outside("2.stl"),
+            "scans/3.stl".to_owned(),
+            outside("4.stl"),
+            "disk:5.stl".to_owned(),
+        ];
+        let inputs = stored.each_ref().map(|stored| WantedInput::unread(stored));
+        let later = Instant::now() + Duration::from_hours(1);
+        let places = looked_at(&project, &inputs, later);
+        let expected = InputPlaces {
+            known: 5,
+            has_more: false,
+            looked_at: 4,
+            missing: 2,
+            missing_inside: 1,
+            first: vec!["scans/3.stl".to_owned(), outside("4.stl")],
+        };
+        assert_eq!(places, expected);
+        assert!(!places.is_of_all(), "a root is not known");
+        assert!(looked_at(&project, &inputs[..4], later).is_of_all());
+        let late = looked_at(&project, &inputs, Instant::now());
+        assert_eq!((late.known, late.looked_at, late.missing), (5, 0, 0));
+        let many: Vec<_> = (0..9)
+            .map(|i| WantedInput::unread(&format!("{i}.ply")))
+            .collect();
+        let places = looked_at(&project, &many, later);
+        assert_eq!((places.missing, places.first.len()), (9, MAX_NAMED));
+    }
+}
