@@ -40,7 +40,9 @@ pub use model::{
     BlockCounts, FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA,
 };
 pub use provenance::{ChangedSetting, Provenance, UsedSettings};
-pub use render::{Cover, MAX_PAGE_BYTES, ReportFormat, agreement_text, page, render, summary};
+pub use render::{
+    Cover, MAX_PAGE_BYTES, RESERVED_BYTES, ReportFormat, agreement_text, page, render, summary,
+};
 pub use report_error::ReportError;
 pub use risk_coverage::{
     COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT, RiskCoverageCurve, RiskCoveragePoint,

@@ -131,4 +131,6 @@ fn escaped(text: &str) -> String {
 }
 
 #[cfg(test)]
+mod size_tests;
+#[cfg(test)]
 mod tests;

@@ -24,7 +24,8 @@ pub(super) struct Album<'a> {
 }
 
 impl<'a> Album<'a> {
-    /// Chooses the results whose images fit into `max_bytes`, taking one result from each group in turn.
+    /// Chooses the results whose images and captions fit into `max_bytes` in any language, taking one result from each group
+    /// in turn.
     pub(super) fn new(gallery: &'a Gallery, max_bytes: usize) -> Self {
         let mut figures = vec![Vec::new(); gallery.groups.len()];
         let mut left = max_bytes;
@@ -35,7 +36,7 @@ impl<'a> Album<'a> {
                     continue;
                 };
                 let figure = figure(item).into_string();
-                if let Some(rest) = left.checked_sub(figure.len()) {
+                if let Some(rest) = left.checked_sub(translated_size(item, figure.len())) {
                     left = rest;
                     shown.push(figure);
                 }
@@ -111,6 +112,14 @@ const fn texts(reason: GalleryReason) -> (&'static str, &'static str, &'static s
 fn size(item: &GalleryItem) -> usize {
     let images = item.images.iter().flatten();
     images.map(|image| image.len().div_ceil(3) * 4).sum()
+}
+
+/// Returns the most bytes that a figure with this length has in another language, with its list item. Its texts are up to half
+/// as long again.
+fn translated_size(item: &GalleryItem, len: usize) -> usize {
+    const ITEM: usize = "<li></li>".len();
+    let texts = len.saturating_sub(size(item));
+    len.saturating_add(texts / 2).saturating_add(ITEM)
 }
 
 fn figure(item: &GalleryItem) -> Markup {

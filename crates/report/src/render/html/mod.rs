@@ -15,8 +15,9 @@ use mocban_results::gallery::Gallery;
 
 /// Maximum size of a page in bytes.
 pub const MAX_PAGE_BYTES: usize = 10_000_000;
-/// Bytes reserved for the sentences on how many images are shown, and because a translated page is longer.
-const RESERVED_BYTES: usize = 200_000;
+/// Bytes reserved for the sentences on how many images are shown, and because a translated page is longer. A test of the
+/// translation measures that.
+pub const RESERVED_BYTES: usize = 200_000;
 const STYLE: &str = include_str!("../../../../../assets/report/report.css");
 /// Forbids the page to load or run anything.
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'";
