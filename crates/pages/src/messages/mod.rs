@@ -15,6 +15,8 @@ mod parser_messages;
 mod report_answers;
 mod report_captions;
 mod report_html;
+#[cfg(test)]
+mod report_source_tests;
 mod report_table;
 mod report_words;
 
