@@ -1,5 +1,6 @@
 //! The pairs that would be imported, and what a person can change in them.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use maud::{Markup, html};
@@ -19,6 +20,8 @@ use mocban_project::manifest_file::{IGNORED, RENAMED, renamed_columns};
 
 /// Number of warnings and missing files that are shown.
 const SHOWN_LINES: usize = 12;
+/// Number of columns of a list of blocks that are named.
+const SHOWN_COLUMNS: usize = 40;
 /// Number of files without a partner from which one is chosen.
 const SHOWN_FILES: usize = 500;
 
@@ -55,6 +58,7 @@ pub(super) fn plan_part(
                     @for line in &read.warnings { p.notice { (one_line(&warning(visit, line))) } }
                     @if let Some(renamed) = renamed_columns(&read.renamed) { p.muted { (one_line(&warning(visit, &renamed))) } }
                     (block_table(visit, &read.rows))
+                    (other_columns(visit, &read.rows))
                 },
                 Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
             }
@@ -147,6 +151,22 @@ fn block_table(visit: &Visit, rows: &[BlockRow]) -> Markup {
         }
         @if rows.len() > SHOWN_PAIRS as usize {
             p.muted { (visit.t("Only the first are listed:", "Chỉ liệt kê các ván đầu tiên:")) " " (grouped(SHOWN_PAIRS)) }
+        }
+    }
+}
+
+/// Names the columns of a list of blocks that are only kept, as a misspelt one is.
+fn other_columns(visit: &Visit, rows: &[BlockRow]) -> Markup {
+    let names: BTreeSet<&String> = rows.iter().flat_map(|row| row.meta.keys()).collect();
+    let shown = names.iter().take(SHOWN_COLUMNS);
+    let shown: Vec<_> = shown.map(|name| one_line(name)).collect();
+    html! {
+        @if !names.is_empty() {
+            p.muted #other-columns {
+                (visit.t("Other columns, which are kept and shown but not used", "Các cột khác, được giữ lại và hiển thị nhưng không dùng đến")) ": "
+                (shown.join(", "))
+                @if names.len() > shown.len() { ", …" }
+            }
         }
     }
 }
@@ -342,9 +362,14 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
 
 #[cfg(test)]
 mod tests {
-    use super::warning;
+    use std::collections::BTreeMap;
+
+    use super::{SHOWN_COLUMNS, other_columns, warning};
     use crate::app::visit::Visit;
     use crate::review::Language;
+    use mocban_core::domain::BlockName;
+    use mocban_lists::manifest::BlockRow;
+    use serde_json::Value;
 
     #[test]
     fn columns_have_the_names_of_the_page() {
@@ -360,5 +385,42 @@ mod tests {
             warning(&Visit::in_language(Language::Vietnamese), line),
             "Đã hiểu các cột có tên khác: \"Trang\" là Trang in, \"Tệp nhãn\" là Nhãn"
         );
+    }
+
+    /// Returns a block with these columns beside the known ones.
+    fn block(columns: &[String]) -> BlockRow {
+        let meta = columns.iter().map(|name| (name.clone(), Value::from("x")));
+        BlockRow {
+            line: 2,
+            name: BlockName::new("b").expect("an id"),
+            mesh: "b.stl".into(),
+            page: "b.png".into(),
+            labels: None,
+            unit: None,
+            side: None,
+            meta: meta.collect::<BTreeMap<_, _>>(),
+        }
+    }
+
+    #[test]
+    fn columns_of_blocks_that_are_not_used_are_named_once() {
+        let columns = ["Ghi chú", "lables"].map(str::to_owned);
+        let rows = [block(&columns), block(&columns[..1])];
+        for (language, part) in [
+            (Language::English, "but not used: Ghi chú, lables</p>"),
+            (
+                Language::Vietnamese,
+                "nhưng không dùng đến: Ghi chú, lables</p>",
+            ),
+        ] {
+            let visit = Visit::in_language(language);
+            let shown = other_columns(&visit, &rows).into_string();
+            assert!(shown.contains(part), "{shown}");
+            assert_eq!(other_columns(&visit, &[block(&[])]).into_string(), "");
+        }
+        let many: Vec<String> = (0..=SHOWN_COLUMNS).map(|i| format!("c{i:02}")).collect();
+        let visit = Visit::in_language(Language::English);
+        let shown = other_columns(&visit, &[block(&many)]).into_string();
+        assert!(shown.contains("c39, …</p>"), "{shown}");
     }
 }
