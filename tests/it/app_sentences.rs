@@ -315,3 +315,14 @@ fn a_deleted_scan_is_named_where_changed_files_are_looked_for() {
         }
     }
 }
+
+#[test]
+fn a_page_that_fails_is_tried_again_with_its_whole_address() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let page = open_app(dir.path());
+    for language in ["en", "vi"] {
+        let path = format!("/p/nowhere/pairs?state=failed&language={language}");
+        let html = text(&page.get(&path));
+        assert!(html.contains("href=\"pairs?state=failed\""), "{html}");
+    }
+}

@@ -38,9 +38,13 @@ impl PageQuery {
 
     /// Returns a value that is not empty.
     pub(super) fn get(&self, name: &str) -> Option<&str> {
+        self.given(name).filter(|value| !value.is_empty())
+    }
+
+    /// Returns a value, which is empty if a field of a form was left empty.
+    pub(super) fn given(&self, name: &str) -> Option<&str> {
         let mut values = self.0.iter().filter(|(known, _)| known == name);
-        let value = values.next().map(|(_, value)| value.as_str());
-        value.filter(|value| !value.is_empty())
+        values.next().map(|(_, value)| value.as_str())
     }
 
     /// Parses a value. `None` if it is missing or not valid.
@@ -84,7 +88,7 @@ mod tests {
     fn queries_are_read_and_written() {
         let query = PageQuery::parse("block=b%2004&state=&character=%E6%98%8E&a+b=c&bad=%FF");
         assert_eq!(query.get("block"), Some("b 04"));
-        assert_eq!(query.get("state"), None);
+        assert_eq!((query.get("state"), query.given("state")), (None, Some("")));
         assert_eq!(query.get("character"), Some("明"));
         assert_eq!(query.get("bad"), None);
         let other = query.with("block", "").with("page", "1/2");

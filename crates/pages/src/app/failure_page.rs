@@ -38,7 +38,7 @@ pub(super) async fn explain(
     let body = html! {
         p.notice.bad role="alert" { (text) }
         p {
-            a.button href=(visit.here) { (visit.t("Try again", "Thử lại")) } " "
+            a.button href={ (visit.here) (visit.query.text()) } { (visit.t("Try again", "Thử lại")) } " "
             a.button href=(visit.root) { (visit.t("All projects", "Tất cả dự án")) }
         }
     };

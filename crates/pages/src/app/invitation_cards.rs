@@ -106,7 +106,16 @@ async fn judge(
         let body = Json(json!({ "error": format!("{english} / {vietnamese}") }));
         return (StatusCode::SERVICE_UNAVAILABLE, body).into_response();
     }
-    let body = html! { body { main { p { (english) } p lang="vi" { (vietnamese) } } } };
+    let body = html! {
+        body { main {
+            h1 { "The project is not there" }
+            p { (english) }
+            div lang="vi" {
+                h1 { "Không thấy dự án" }
+                p { (vietnamese) }
+            }
+        } }
+    };
     let page = document("en", "mocban", &html! {}, &body);
     (StatusCode::SERVICE_UNAVAILABLE, Html(page.into_string())).into_response()
 }

@@ -31,6 +31,8 @@ const NAMED_REVIEWERS: usize = 3;
 const NAME_CHARS: usize = 24;
 /// Most ids that are suggested for one that does not exist.
 const SUGGESTED_IDS: usize = 20;
+/// Name of the sentence that an id does not exist.
+const NO_SUCH_ID: &str = "no-such-id";
 
 pub(super) async fn page(
     State(state): State<Arc<AppState>>,
@@ -121,7 +123,7 @@ async fn jump(visit: &Visit, open: &OpenProject, typed: &str) -> AppResult<Respo
         .await?;
     let body = html! {
         (jump_form(visit))
-        p.notice role="alert" { (visit.t("There is no pair with this id: ", "Không có cặp nào có mã này: ")) b { (one_line(typed)) } }
+        p.notice id=(NO_SUCH_ID) role="alert" { (visit.t("There is no pair with this id: ", "Không có cặp nào có mã này: ")) b { (one_line(typed)) } }
         @if !similar.is_empty() {
             p { (visit.t("Ids that begin like this:", "Các mã bắt đầu như vậy:")) }
             ul { @for name in &similar {
@@ -134,11 +136,14 @@ async fn jump(visit: &Visit, open: &OpenProject, typed: &str) -> AppResult<Respo
     Ok(frame(visit, title, Some(&open.key), NavSection::Pairs, &body).into_response())
 }
 
+/// Returns the form that opens the page of a pair. An id that does not exist stays in it, to be corrected.
 fn jump_form(visit: &Visit) -> Markup {
+    let unknown = visit.query.get("id");
+    let why = unknown.map(|_| NO_SUCH_ID);
     html! {
         form.inline method="get" action=(visit.here) role="search" {
             label for="jump-id" { (visit.t("Go to id", "Đến mã")) }
-            input #jump-id name="id" autocomplete="off" required;
+            input #jump-id name="id" value=[unknown] autofocus[why.is_some()] aria-describedby=[why] autocomplete="off" required;
             button { (visit.t("Go", "Đến")) }
         }
     }
@@ -293,11 +298,25 @@ fn pager(visit: &Visit, query: &PairQuery, list: &PairListPage) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use super::verdict_marks;
+    use super::{jump_form, verdict_marks};
+    use crate::app::address::PageQuery;
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_core::domain::{ThresholdMetric, Verdict};
     use mocban_results::test_fixtures;
+
+    #[test]
+    fn an_id_that_does_not_exist_stays_in_its_field() {
+        for language in Language::ALL {
+            let mut visit = Visit::in_language(language);
+            let empty = jump_form(&visit).into_string();
+            assert!(!empty.contains(" value=") && !empty.contains("autofocus"));
+            visit.query = PageQuery::parse("id=b4%22");
+            let typed = jump_form(&visit).into_string();
+            let part = " value=\"b4&quot;\" autofocus aria-describedby=\"no-such-id\"";
+            assert!(typed.contains(part), "{typed}");
+        }
+    }
 
     #[test]
     fn verdicts_of_several_reviewers_are_named_once_with_who_gave_them() {

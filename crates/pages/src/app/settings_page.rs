@@ -24,6 +24,9 @@ use mocban_project::ProjectResult;
 use mocban_project::change_setting::{SettingChange, preview, save};
 use mocban_project::location::Location;
 
+/// Name of the sentence that says why a value is refused.
+const REFUSED: &str = "refused";
+
 /// A change, as the form sends it.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -42,7 +45,7 @@ pub(super) async fn page(
     let settings = location.settings();
     let settings = settings.map_err(|error| AppFailure::of(error, &open.dir))?;
     let current = settings.tree.settings();
-    let change = match (visit.query.get("key"), visit.query.get("value")) {
+    let change = match (visit.query.get("key"), visit.query.given("value")) {
         (Some(name), Some(_)) if is_hidden(name) => return Err(AppFailure::not_found()),
         (Some(name), Some(value)) => {
             let body = SettingBody {
@@ -61,10 +64,10 @@ pub(super) async fn page(
         @match &change {
             None => {},
             Some(Ok(change)) => (change_part(&visit, change)),
-            Some(Err(error)) => p.notice.bad role="alert" { (Sentence::of_error(error, &open.dir).text(visit.language)) },
+            Some(Err(error)) => p.notice.bad id=(REFUSED) role="alert" { (Sentence::of_error(error, &open.dir).text(visit.language)) },
         }
         (saved_part(&visit, &current))
-        (sections(&visit, &current, &defaults(&current)))
+        (sections(&visit, &current, &defaults(&current), matches!(change, Some(Err(_)))))
     };
     let title = visit.t("Settings", "Thiết lập");
     Ok(frame(
@@ -141,8 +144,9 @@ pub(super) const fn two_methods(visit: &Visit) -> &'static str {
     )
 }
 
-/// Returns the settings by section. Those with a value of their own are open.
-fn sections(visit: &Visit, settings: &[Setting], defaults: &[Setting]) -> Markup {
+/// Returns the settings by section. Those with a value of their own are open. `is_refused` says that the value in the address
+/// is.
+fn sections(visit: &Visit, settings: &[Setting], defaults: &[Setting], is_refused: bool) -> Markup {
     let default_of = |setting: &Setting| defaults.iter().find(|default| default.key == setting.key);
     let section = |setting: &Setting| {
         let (section, _) = setting.key.rsplit_once('.').unwrap_or(("", ""));
@@ -162,23 +166,32 @@ fn sections(visit: &Visit, settings: &[Setting], defaults: &[Setting]) -> Markup
             @let is_open = of_section.iter().any(|setting| setting.origin != Origin::Default || asked == Some(&setting.key));
             details.card open[is_open] {
                 summary { h2 { (visit.setting_section(name)) } " " code { (name) } }
-                @for setting in of_section { (setting_part(visit, setting, default_of(setting))) }
+                @for setting in of_section { (setting_part(visit, setting, default_of(setting), is_refused)) }
             }
         }
     }
 }
 
-fn setting_part(visit: &Visit, setting: &Setting, default: Option<&Setting>) -> Markup {
+/// Returns the form of a setting. A value in the address stays in it, and has the focus if it is refused.
+fn setting_part(
+    visit: &Visit,
+    setting: &Setting,
+    default: Option<&Setting>,
+    is_refused: bool,
+) -> Markup {
     let (text, language) = visit.setting(&setting.key);
     let text_of = |setting: &Setting| setting.value.to_string().trim_matches('"').to_owned();
-    let value = text_of(setting);
+    let is_asked = visit.query.get("key") == Some(&*setting.key);
+    let typed = visit.query.given("value").filter(|_| is_asked);
+    let value = typed.map_or_else(|| text_of(setting), str::to_owned);
+    let why = (typed.is_some() && is_refused).then_some(REFUSED);
     let default = default.filter(|default| default.value != setting.value);
     let id = format!("setting-{}", setting.key);
     html! {
         form.setting method="get" action=(visit.here) {
             input type="hidden" name="key" value=(setting.key);
             label for=(id) { (setting.key) }
-            input id=(id) name="value" value=(value) autocomplete="off" spellcheck="false";
+            input id=(id) name="value" value=(value) autofocus[why.is_some()] aria-invalid=[why.map(|_| "true")] aria-describedby=[why] autocomplete="off" spellcheck="false";
             button { (visit.t("Look at the change", "Xem thay đổi")) }
             p.muted lang=(language.name()) {
                 (text)
@@ -215,4 +228,36 @@ pub(super) async fn store(
     let stored = stored.await;
     stored.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(Json(json!({ "go": format!("settings{go}") })))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{defaults, sections};
+    use crate::app::address::PageQuery;
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+
+    #[test]
+    fn a_value_that_is_not_saved_stays_in_its_field() {
+        let settings = defaults(&[]);
+        for (value, is_refused, part) in [
+            (
+                "x%22",
+                true,
+                "value=\"x&quot;\" autofocus aria-invalid=\"true\" aria-describedby=\"refused\"",
+            ),
+            ("", true, "value=\"\" autofocus"),
+            ("3", false, "value=\"3\" autocomplete"),
+        ] {
+            for language in Language::ALL {
+                let mut visit = Visit::in_language(language);
+                visit.query = PageQuery::parse(&format!("key=run.workers&value={value}"));
+                let shown = sections(&visit, &settings, &settings, is_refused).into_string();
+                let part = format!("id=\"setting-run.workers\" name=\"value\" {part}");
+                assert!(shown.contains(&part), "{part}: {shown}");
+                let focused = shown.matches("autofocus").count();
+                assert_eq!(focused, usize::from(is_refused));
+            }
+        }
+    }
 }

@@ -29,6 +29,7 @@ pub(super) fn forward_page(path: &str) -> Markup {
     with_script(&html! {
         body data-session=(address) {
             main {
+                h1 { "mocban" }
                 p { a href=(address) { "Open the page" } }
                 p lang="vi" { a href=(address) { "Mở trang" } }
             }
