@@ -34,6 +34,7 @@ mod import_choice;
 mod import_columns;
 mod import_files;
 mod import_headers;
+mod import_matches;
 mod import_page;
 mod import_partners;
 mod import_pictures;
