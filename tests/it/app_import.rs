@@ -361,3 +361,21 @@ fn a_list_for_a_known_project_is_compared_before_it_erases_columns() {
     assert_eq!(reply.json()["go"], "p/p/", "{}", text(&reply));
     assert_eq!(block(), Value::Null);
 }
+
+#[test]
+fn a_change_that_is_refused_leaves_what_was_chosen() {
+    let (dir, page) = with_project();
+    let meshes = dir.path().join("p/data/meshes");
+    let meshes = encode(meshes.to_str().expect("UTF-8"));
+    let leave = "x".repeat(5000);
+    for (language, part) in [
+        ("en", "too many pairs are changed for one import"),
+        ("vi", "quá nhiều cặp được thay đổi trong một lần nhập"),
+    ] {
+        let path = format!("/import?meshes={meshes}&leave={leave}&language={language}");
+        let html = text(&page.get(&path));
+        for part in [part, "p/data/meshes</code>"] {
+            assert!(html.contains(part), "{part}: {html}");
+        }
+    }
+}

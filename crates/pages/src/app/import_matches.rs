@@ -65,15 +65,18 @@ pub(super) fn with_change(query: &PageQuery) -> AppResult<PageQuery> {
             "quá nhiều cặp được thay đổi trong một lần nhập: hãy nhập các cặp này trước, hoặc đổi tên các tệp",
         )));
     }
-    let plain = ["scan", "print", "leave", "take", "split"]
-        .iter()
-        .fold(query.clone(), |query, name| query.with(name, ""));
-    Ok(plain.with("matches", &text))
+    Ok(without_change(query).with("matches", &text))
+}
+
+/// Returns the address without the change that a link or a form has added to it.
+pub(super) fn without_change(query: &PageQuery) -> PageQuery {
+    let names = ["scan", "print", "leave", "take", "split"].iter();
+    names.fold(query.clone(), |query, name| query.with(name, ""))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::with_change;
+    use super::{with_change, without_change};
     use crate::app::address::PageQuery;
 
     fn changed(query: &str) -> String {
@@ -99,6 +102,8 @@ mod tests {
         assert_eq!(changed("scan=a.stl"), "");
         with_change(&PageQuery::parse("matches=x")).expect_err("not of the page");
         let many = "x".repeat(5000);
-        with_change(&PageQuery::parse(&format!("leave={many}"))).expect_err("too many");
+        let refused = PageQuery::parse(&format!("list=a&leave={many}"));
+        with_change(&refused).expect_err("too many");
+        assert_eq!(without_change(&refused).text(), "?list=a");
     }
 }

@@ -17,7 +17,7 @@ use super::folder_picker::{FileCounts, PickedFolder, PickerRoots};
 use super::import_changes::ColumnChanges;
 use super::import_choice::{ImportChoice, ImportPreview, Planned};
 use super::import_columns::{KEPT_COLUMNS, columns_part};
-use super::import_matches::with_change;
+use super::import_matches::{with_change, without_change};
 use super::import_partners::{ImportPartners, mending_part};
 use super::import_preview::{changes_part, plan_part, warning};
 use super::plan_cache::PlanCache;
@@ -51,7 +51,11 @@ pub(super) async fn page(
     State(state): State<Arc<AppState>>,
     visit: Visit,
 ) -> AppResult<Html<String>> {
-    let query = with_change(&visit.query)?;
+    // What was chosen before a refused change stays.
+    let (query, refused) = match with_change(&visit.query) {
+        Ok(query) => (query, None),
+        Err(failure) => (without_change(&visit.query), Some(failure)),
+    };
     let visit = Visit { query, ..visit };
     let chosen = ImportChoice::of(&visit.query);
     let folder = state.options.folder.clone();
@@ -89,6 +93,7 @@ pub(super) async fn page(
     };
     let mended = visit.query.parsed::<PairName>("mend");
     let body = html! {
+        @if let Some(failure) = &refused { p.notice.bad role="alert" { (failure.text(visit.language)) } }
         @if visit.query.get("compare").is_some() {
             p.notice role="status" { (visit.t("Nothing was imported yet: look first at what the list changes in this project.", "Chưa nhập gì: trước hết hãy xem danh sách thay đổi những gì trong dự án này.")) }
         }
