@@ -72,6 +72,19 @@ function withFocus(part, change) {
   if (index >= 0) all(part)[index]?.focus({ preventScroll: true });
 }
 
+/** Keeps what the user has typed in fields of forms that are still there. */
+function keepTyped(part, fresh) {
+  const of = (field) => `${field.form?.dataset.post} ${field.name}`;
+  const fields = (root) => [...root.querySelectorAll("input:not([type=hidden], [readonly])")];
+  for (const field of fields(part)) {
+    if (field.value === field.defaultValue && field.checked === field.defaultChecked) continue;
+    const same = fields(fresh).find((other) => of(other) === of(field));
+    if (!same) continue;
+    same.value = field.value;
+    same.checked = field.checked;
+  }
+}
+
 /** Keeps the pictures that are shown, so that they do not flicker. */
 function update(part, fresh) {
   // Two lists may show the same picture.
@@ -106,6 +119,8 @@ async function refresh(mustReload) {
   const fresh = page.querySelector("[data-live]");
   if (!fresh || fresh.innerHTML === part.dataset.html) return;
   part.dataset.html = fresh.innerHTML;
+  // After an action its form is empty again.
+  if (!mustReload) keepTyped(part, fresh);
   update(part, fresh);
 }
 

@@ -246,3 +246,23 @@ fn a_run_survives_the_app_and_is_stopped_from_the_next_one() {
     assert!(stopped["jobs"]["ready"].as_u64() > Some(0), "{stopped}");
     mocban(&dir.path().join("p"), &["check"]).expect(0);
 }
+
+#[test]
+fn a_number_that_was_typed_stays_when_the_page_is_renewed() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1280, 800]);
+    tab.open(&format!("{home}p/p/"));
+    tab.wait(&on_page("/p/p/"));
+    tab.eval("document.querySelector('[name=jobs]').value = '7', null");
+    let verdict = ["verdict", "set", "upright-0001", "pass"];
+    let verdict = [&verdict[..], &["--reviewer", "lan"]].concat();
+    mocban(&dir.path().join("p"), &verdict).expect(0);
+    tab.wait("document.querySelector('a.figure[href=review]')");
+    let typed = tab.eval("document.querySelector('[name=jobs]').value");
+    assert_eq!(typed, "7");
+}
