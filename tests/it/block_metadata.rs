@@ -103,3 +103,32 @@ fn folders_keep_the_columns_of_a_list_of_pairs() {
     let columns = ["character", "block", "scanned_face_down"].map(|column| shown[column].clone());
     assert_eq!(columns, [json!("天"), json!("k1"), json!(true)]);
 }
+
+#[test]
+fn a_list_that_lacks_a_known_column_says_what_is_lost() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    write_blocks(dir, &["b1", "b2"]);
+    fs::write(dir.join("l.json"), "{}").expect("written");
+    let import = |list: &str| {
+        fs::write(dir.join("list.csv"), list).expect("written");
+        project(dir, &["import", "list.csv"]).expect(0).err
+    };
+    let labels =
+        "block,mesh,page,labels,unit\nb1,b1.stl,b1.png,l.json,mm\nb2,b2.stl,b2.png,l.json,mm\n";
+    let first = import(labels);
+    assert!(!first.contains("does not name"), "{first}");
+    let again = import("block,mesh,page,unit\nb1,b1.stl,b1.png,mm\nb2,b2.stl,b2.png,\n");
+    for sentence in [
+        "2 known blocks lose their labels, which this import does not name, first b1; if the column was forgotten, add it and import again",
+        "1 known block loses its unit, which this import does not name: b2; ",
+    ] {
+        assert!(again.contains(sentence), "{again}");
+    }
+    let pairs = "id,mesh,print,character,block\na,b1.stl,b1.png,天,k1\n";
+    import(pairs);
+    let again = import("id,mesh,print,character\na,b1.stl,b1.png,天\n");
+    let sentence = "1 known pair loses its block, which this import does not name: a; ";
+    assert!(again.contains(sentence), "{again}");
+    assert!(!again.contains("its character"), "{again}");
+}

@@ -14,6 +14,7 @@ use crate::files::{self, HEAD_BYTES, ListFile};
 use crate::import_pairs::{AllowedChanges, PairSource};
 use crate::input_paths::{SimilarFiles, in_existing_form};
 use crate::location::{Location, now};
+use crate::lost_values::lost_values;
 use crate::manifest_file::{refuse, renamed_columns};
 use crate::missing_files::{MissingFiles, locate_file};
 use crate::new_project::import_with;
@@ -181,6 +182,8 @@ pub async fn import_blocks(
         },
     );
     listing.warnings.extend(same_files);
+    let lost = lost_values(&summary.lost, "block");
+    listing.warnings.extend(lost);
     // Pairs are cut from blocks by a run.
     listing.warnings.extend(empty_import::note(&project, now()));
     Ok(BlockImportOutcome {

@@ -13,6 +13,7 @@ use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files;
 use crate::location::{Location, now};
+use crate::lost_values::lost_values;
 use crate::manifest_file::{Listing, list_content};
 use crate::missing_files::MissingFiles;
 use crate::new_project::import_with;
@@ -149,6 +150,7 @@ pub async fn import_pairs(
         },
     );
     warnings.extend(same_files);
+    warnings.extend(lost_values(&summary.lost, "pair"));
     if summary.added == 0 {
         warnings.extend(empty_import::note(&project, now()));
     }

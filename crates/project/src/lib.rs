@@ -69,6 +69,7 @@ pub mod input_paths;
 pub mod input_places;
 pub mod input_warnings;
 pub mod location;
+mod lost_values;
 pub mod manifest_file;
 pub mod missing_files;
 mod missing_folders;

@@ -17,6 +17,7 @@ use crate::db::value::Json;
 use crate::jobs::requeue::{self, RetrySelection};
 use crate::records::checksums;
 use crate::records::import::is_same_file;
+use crate::records::lost_values::LostValues;
 use crate::records::same_files::{self, SameFiles};
 use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};
@@ -35,6 +36,8 @@ pub struct BlockImportSummary {
     pub unchanged: u64,
     /// New blocks with the scan and page of earlier ones.
     pub same_files: Option<SameFiles>,
+    /// Values of existing blocks that the import does not name.
+    pub lost: LostValues,
 }
 
 const LAST: &str = "SELECT coalesce(max(id), 0) FROM block";
@@ -169,6 +172,9 @@ async fn import_block(
     match stored {
         None => summary.added += 1,
         Some(old) => {
+            if let Some(old) = &old {
+                summary.lost.add(row.name.as_str(), &kept_values(old, row));
+            }
             let changed = old
                 .as_ref()
                 .map_or_else(|| vec!["a damaged value"], |old| differing(old, row));
@@ -197,6 +203,22 @@ async fn import_block(
         .await?;
     checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
     query(NEW_JOB).bind(id).execute(conn).await
+}
+
+/// Returns columns, each with whether the known block has a value and whether the new row has one.
+fn kept_values(old: &BlockAttributes, new: &BlockAttributes) -> [(&'static str, bool, bool); 4] {
+    let has_meta = |row: &BlockAttributes| row.meta.as_ref().is_some_and(|meta| !meta.is_empty());
+    let keeps_meta = new.meta.is_none() || has_meta(new);
+    [
+        (
+            "labels",
+            old.labels_path.is_some(),
+            new.labels_path.is_some(),
+        ),
+        ("unit", old.unit.is_some(), new.unit.is_some()),
+        ("side", old.side.is_some(), new.side.is_some()),
+        ("metadata", has_meta(old), keeps_meta),
+    ]
 }
 
 /// Returns whether the paths of a block are written in the same way.

@@ -20,6 +20,7 @@ use crate::queue::pair_job::PairJob;
 use crate::queue::selection::{PairSelection, select, unknown_names};
 use crate::records::checksums;
 use crate::records::ground_truth;
+use crate::records::lost_values::LostValues;
 use crate::records::model::PairAttributes;
 use crate::records::same_files::{self, SameFiles};
 use crate::records::similar_names;
@@ -73,6 +74,8 @@ pub struct ImportSummary {
     pub still_retired: u64,
     /// New pairs with the mesh and print of earlier ones, which are counted twice.
     pub same_files: Option<SameFiles>,
+    /// Values of existing pairs that the import does not name.
+    pub lost: LostValues,
 }
 
 /// A pair whose values an import changed.
@@ -321,7 +324,10 @@ pub(crate) async fn import_chunk(
                 deltas.add(CounterKey::NEW, 1);
                 continue;
             }
-            Some(Some(old)) => differing(&old, row),
+            Some(Some(old)) => {
+                summary.lost.add(row.name.as_str(), &kept_values(&old, row));
+                differing(&old, row)
+            }
             Some(None) => vec!["a damaged value"],
         };
         if fields.is_empty() {
@@ -402,6 +408,27 @@ fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
     .into_iter()
     .filter_map(|(name, differs)| differs.then_some(name))
     .collect()
+}
+
+/// Returns columns, each with whether the known pair has a value and whether the new row has one.
+fn kept_values(old: &ImportRow, new: &ImportRow) -> [(&'static str, bool, bool); 5] {
+    let [old, new] = [old, new].map(|row| {
+        [
+            row.character.is_some(),
+            row.block.is_some(),
+            row.unit.is_some(),
+            row.scanned_face_down.is_some(),
+            !row.meta.is_empty(),
+        ]
+    });
+    let names = [
+        "character",
+        "block",
+        "unit",
+        "scanned_face_down",
+        "metadata",
+    ];
+    std::array::from_fn(|k| (names[k], old[k], new[k]))
 }
 
 /// Returns whether two stored paths are those of one file. If a folder before `..` is a link, they may not be; a run finds

@@ -10,6 +10,7 @@ pub(crate) mod import;
 pub(crate) mod input_paths;
 pub(crate) mod judged_results;
 pub(crate) mod listed_names;
+pub(crate) mod lost_values;
 pub(crate) mod manual_alignments;
 pub(crate) mod model;
 pub(crate) mod pair_groups;

@@ -32,6 +32,15 @@ async fn metadata_of_a_block_is_stored_updated_and_makes_nothing_stale() {
     for meta in [&first, &second, &Value::Null] {
         let changed = import(meta).await;
         assert_eq!(changed.changed, [(block("b"), vec!["metadata"])]);
+        let lost = changed
+            .lost
+            .columns()
+            .map(|(column, lost)| (column, lost.count));
+        let expected = meta.is_null().then_some(("metadata", 1));
+        assert_eq!(
+            lost.collect::<Vec<_>>(),
+            expected.into_iter().collect::<Vec<_>>()
+        );
         assert_eq!(changed.other_files, 0);
         assert_eq!(import(meta).await.unchanged, 1);
         let expected = meta.as_object().cloned().unwrap_or_default();

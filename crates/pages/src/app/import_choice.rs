@@ -158,6 +158,11 @@ impl ImportChoice {
         changes(&self.matches)
     }
 
+    /// Returns whether the import changes columns of known pairs or blocks: that of folders of pairs does not.
+    pub(super) fn has_columns(&self) -> bool {
+        !self.list.is_empty() || !self.whole_block.is_empty()
+    }
+
     /// Returns the choices for an import or its plan.
     ///
     /// # Errors

@@ -85,7 +85,7 @@ pub(super) async fn page(
     }
     let planned = preview.as_ref().map(|preview| &preview.planned);
     let changes = match (planned, &known) {
-        (Some(Ok(planned)), Some(known)) if !chosen.list.is_empty() => {
+        (Some(Ok(planned)), Some(known)) if chosen.has_columns() => {
             let open = state.open_found(known.clone()).await?;
             ColumnChanges::find(planned, &open).await?
         }
@@ -325,29 +325,31 @@ async fn unseen_changes(
         .compared
         .as_ref()
         .is_none_or(|name| *name == chosen.project);
-    let planned = planned.filter(|_| !chosen.list.is_empty() && !is_compared);
+    let planned = planned.filter(|_| chosen.has_columns() && !is_compared);
     let (Some(planned), Some(known)) = (planned, known) else {
         return Ok(None);
     };
     let open = state.open_found(known.clone()).await?;
     let changes = ColumnChanges::find(&planned, &open).await?;
-    Ok((changes != ColumnChanges::default()).then(|| chosen.comparison(&known.key)))
+    Ok(changes.may_change().then(|| chosen.comparison(&known.key)))
 }
 
-/// Returns what would be imported to the project in `dir`, if the page showed pairs. Refuses other pairs than it showed, in
-/// both languages. The import checks it again.
+/// Returns what would be imported to the project in `dir`, if the page showed it. Refuses other pairs than it showed, in both
+/// languages. The import checks it again.
 fn planned_as_shown(
     chosen: &ImportChoice,
     dir: &Path,
     roots: &PickerRoots,
 ) -> AppResult<Option<Planned>> {
-    let Some(shown) = chosen.choices()?.shown else {
+    let shown = chosen.choices()?.shown;
+    // Blocks have no hash.
+    if shown.is_none() && chosen.compared.is_none() {
         return Ok(None);
-    };
+    }
     let preview = chosen.preview(dir, roots, 0, &PlanCache::default());
     let planned = preview.map(|preview| preview.planned).transpose()?;
     match &planned {
-        Some(Planned::Pairs(plan, _)) if plan.hash != shown => {
+        Some(Planned::Pairs(plan, _)) if shown.is_some_and(|shown| plan.hash != shown) => {
             Err(AppFailure::refused(Sentence::new(
                 "the files or the list changed after the pairs were shown, so nothing was imported: reload the page and look at the pairs again",
                 "các tệp hoặc danh sách đã thay đổi sau khi hiện các cặp, nên chưa nhập gì: hãy tải lại trang và xem lại các cặp",
