@@ -1,6 +1,7 @@
 //! Names of states, classes and metrics, and what helps after a failure, in both languages.
 
 use super::visit::Visit;
+use crate::messages::stage_in_vietnamese;
 use mocban_core::domain::{
     BlockCharacterState, BlockStage, FailureClass, JobStatus, Reason, Stage, ThresholdMetric,
     Verdict,
@@ -58,12 +59,13 @@ impl Visit {
 
     /// Returns the name of a stage.
     pub(super) const fn stage(&self, stage: Stage) -> &'static str {
-        match stage {
-            Stage::Fit => self.t("fit of the carved face", "khớp mặt khắc"),
-            Stage::Depth => self.t("depth map", "bản đồ độ sâu"),
-            Stage::Normalize => self.t("separation of the strokes", "tách nét"),
-            Stage::Register => self.t("registration with the print", "căn chỉnh với bản in"),
-        }
+        let english = match stage {
+            Stage::Fit => "fit of the carved face",
+            Stage::Depth => "depth map",
+            Stage::Normalize => "separation of the strokes",
+            Stage::Register => "registration with the print",
+        };
+        self.t(english, stage_in_vietnamese(stage))
     }
 
     /// Returns the name of a stage of a block.

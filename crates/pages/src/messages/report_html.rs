@@ -1,6 +1,7 @@
 //! The HTML report in Vietnamese. Its texts are replaced in the English page, whose names, commands and files stay.
 
 use super::report_words::{message_text, report_text, verdict_text};
+use super::stage_words::stage_text;
 use crate::review::Language;
 
 /// Beginnings of tags whose text is data: names, commands, styles.
@@ -66,7 +67,10 @@ fn titled(project: &str) -> String {
 /// Returns the stage and the message of a failed pair.
 fn failure(text: &str) -> String {
     match text.split_once(": ") {
-        Some((stage, message)) => format!(", {stage}: {}", message_text(message)),
+        Some((stage, message)) => {
+            let stage = stage_text(stage).unwrap_or(stage);
+            format!(", {stage}: {}", message_text(message))
+        }
         None => format!(", {text}"),
     }
 }

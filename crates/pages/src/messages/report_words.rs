@@ -5,13 +5,14 @@ use super::message_words::vietnamese;
 use super::report_answers::REPORT_ANSWERS;
 use super::report_captions::REPORT_CAPTIONS;
 use super::report_table::{REPORT_COUNTED, REPORT_FRAME, REPORT_TERMS};
+use super::stage_words::stage_text;
 
 /// Ends of texts behind which a command follows. The tables have the sentence with a stop.
 const BEFORE_COMMANDS: [&str; 2] = [";", " ("];
 
 /// Returns a text of the report in Vietnamese: a term, or sentences. Words that are not known stay as they are.
 pub(crate) fn report_text(text: &str) -> String {
-    if let Some(known) = found(REPORT_TERMS, text) {
+    if let Some(known) = found(REPORT_TERMS, text).or_else(|| stage_text(text)) {
         return known.to_owned();
     }
     for end in BEFORE_COMMANDS {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::report_page;
+use crate::messages::stage_words::stage_in_vietnamese;
 use crate::review::Language;
 use mocban_catalog::{PairResults, SetApart};
 use mocban_core::domain::Verdict::{Fail, Pass, Unsure};
@@ -281,6 +282,31 @@ fn ground_truth_manual_alignments_and_scores() {
 }
 
 #[test]
+fn stages_have_the_names_of_the_pages() {
+    let mut pair = test_fixtures::done("p", 0.8, &[]);
+    pair.stages = Stage::ALL
+        .map(|stage| test_fixtures::stage(stage, 10))
+        .to_vec();
+    let failed = Stage::ALL.into_iter().map(|stage| {
+        let mut pair = test_fixtures::failed(stage.name(), FailureClass::Io, "x.png is not there");
+        if let Some(stored) = &mut pair.failure {
+            stored.stage = stage;
+        }
+        pair
+    });
+    let report = of_pairs([pair].into_iter().chain(failed)).finish();
+    let page = mocban_report::page(&report, &Gallery::default(), &Cover::default());
+    let vietnamese = report_page(page, Language::Vietnamese);
+    for stage in Stage::ALL {
+        let known = stage_in_vietnamese(stage);
+        let row = format!("<th scope=\"row\">{known}</th>");
+        assert!(vietnamese.contains(&row), "{row}: {vietnamese}");
+        let failure = format!("<strong>{stage}</strong>, {known}: ");
+        assert!(vietnamese.contains(&failure), "{failure}: {vietnamese}");
+    }
+}
+
+#[test]
 fn attention_checks_and_damaged_rows() {
     for reviewers in [&["lan"][..], &["lan", "minh"]] {
         let mut report = of_pairs([test_fixtures::done("p", 0.8, &[Pass])]);
@@ -368,7 +394,7 @@ fn names_notes_and_files_stay() {
         "<span class=\"files\">angle · 1.5.png</span>",
         "<span class=\"verdict\">true: không đạt, mất nét (“all, 1.5”)</span>",
         "<span class=\"verdict\">không vẽ được: không có tệp x.png</span>",
-        "<strong>angle</strong>, fit: không có tệp 1.5.png</li>",
+        "<strong>angle</strong>, khớp mặt khắc: không có tệp 1.5.png</li>",
         "<th scope=\"row\">all</th>",
         "<th scope=\"row\">Kết hợp</th>",
         "người đánh giá cho đạt",
