@@ -55,7 +55,7 @@ const BOX_MESSAGES = {
   saving: { en: "Saving …", vi: "Đang lưu …" },
   saved: { en: "Saved. Cut the block again with: {command}", vi: "Đã lưu. Cắt lại ván bằng lệnh: {command}" },
   saved_run: { en: "Saved. The next run cuts the block again.", vi: "Đã lưu. Lần chạy sau sẽ cắt lại ván." },
-  to_run: { en: "Go to the run", vi: "Đến trang chạy" },
+  to_run: { en: "Cut the block again on the page Run", vi: "Cắt lại ván ở trang Căn chỉnh" },
   keys: {
     en: "Page Up, Page Down: previous, next box · arrow keys: move the box, or the page without one · Shift: resize · Alt: 10 px · A, Enter: add · Delete: delete · Escape: no box · Ctrl + Z, Ctrl + Y: undo, redo · wheel, + −: zoom · 0: whole page",
     vi: "Page Up, Page Down: khung trước, sau · phím mũi tên: di chuyển khung, hoặc trang nếu chưa chọn · Shift: đổi cỡ · Alt: 10 px · A, Enter: thêm · Delete: xóa · Escape: bỏ chọn · Ctrl + Z, Ctrl + Y: hoàn tác, làm lại · con lăn, + −: phóng · 0: cả trang",

@@ -11,6 +11,7 @@
 //! **Invariant:** a request changes nothing unless it comes from a page of this server in a session of this server.
 
 pub mod app;
+mod digit_groups;
 pub mod local_server;
 mod messages;
 mod on_thread;

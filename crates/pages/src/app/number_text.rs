@@ -1,21 +1,9 @@
 //! Numbers, sizes, times and durations as text, as they are written in the language of a page.
 
+pub(super) use crate::digit_groups::grouped;
 use crate::review::Language;
 use mocban_core::domain::{UnixMillis, fixed};
 use mocban_system::time_text;
-
-/// Returns a number with a thin space between groups of three digits, which both languages use.
-pub(super) fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push('\u{202f}');
-        }
-        text.push(digit);
-    }
-    text
-}
 
 /// Returns a text with numbers, such as `0.95 (0.90 to 0.98)`, with the decimal sign of a language.
 pub(super) fn with_decimal_sign(language: Language, text: String) -> String {

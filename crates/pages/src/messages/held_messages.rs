@@ -93,12 +93,12 @@ pub(super) const HELD_MESSAGES: &[(&str, &str)] = &[
     // Blocks that cannot be aligned.
     (
         "the scan is a point set ({} points without faces): a block needs a triangle mesh",
-        "bản quét là đám mây điểm ({0} điểm, không có mặt): ván cần lưới tam giác",
+        "bản quét là đám mây điểm ({0#} điểm, không có mặt): ván cần lưới tam giác",
     ),
     ("export it with faces", "hãy xuất kèm các mặt"),
     (
         "the scan has no surface ({} triangles with an area of zero, or with coordinates that are too large to compute with): a block needs a triangle mesh",
-        "bản quét không có bề mặt ({0} tam giác có diện tích bằng không, hoặc có tọa độ quá lớn để tính): ván cần lưới tam giác",
+        "bản quét không có bề mặt ({0#} tam giác có diện tích bằng không, hoặc có tọa độ quá lớn để tính): ván cần lưới tam giác",
     ),
     (
         "export it with faces, not as points",
@@ -106,7 +106,7 @@ pub(super) const HELD_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "its {} triangles overlap more than {} times, or most are slivers across the scan",
-        "{0} tam giác của nó chồng lên nhau hơn {1} lần, hoặc phần lớn là tam giác rất mảnh chạy ngang bản quét",
+        "{0#} tam giác của nó chồng lên nhau hơn {1} lần, hoặc phần lớn là tam giác rất mảnh chạy ngang bản quét",
     ),
     (
         "remove repeated faces or remesh the scan",

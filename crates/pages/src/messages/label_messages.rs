@@ -9,10 +9,10 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
         "hãy tải nội dung bằng `git lfs pull`",
     ),
     ("save or copy the file again", "hãy lưu hoặc chép lại tệp"),
-    ("the file has {} bytes", "tệp có {0} byte"),
+    ("the file has {} bytes", "tệp có {0#} byte"),
     (
         "labels of at most {} bytes are read",
-        "chỉ đọc được nhãn dài nhất {0} byte",
+        "chỉ đọc được nhãn dài nhất {0#} byte",
     ),
     ("labels are {}, in UTF-8", "nhãn phải là {0}, mã UTF-8"),
     ("labels are {}", "nhãn phải là {0}"),
@@ -52,7 +52,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ("draw at least one", "hãy vẽ ít nhất một khung"),
     (
         "the page has more than {} boxes",
-        "trang in có hơn {0} khung",
+        "trang in có hơn {0#} khung",
     ),
     (
         "keep only the boxes of its characters",
@@ -281,7 +281,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the labels were made for a file of {} bytes, the page has {}",
-        "nhãn được tạo cho tệp {0} byte, trang in có {1} byte",
+        "nhãn được tạo cho tệp {0#} byte, trang in có {1#} byte",
     ),
     (
         "the labels were drawn on the mirrored image: the outlines have {} % of the ink inside them, mirrored {} %",

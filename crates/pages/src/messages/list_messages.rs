@@ -66,26 +66,26 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "a cell has at most {} lines",
         "một ô có nhiều nhất {0} dòng",
     ),
-    ("the row has more than {} bytes", "dòng dài hơn {0} byte"),
+    ("the row has more than {} bytes", "dòng dài hơn {0#} byte"),
     (
         "a closing quotation mark may be missing",
         "có thể thiếu dấu ngoặc kép đóng",
     ),
     (
         "the row has {} bytes, over the limit of {}",
-        "dòng dài {0} byte, vượt giới hạn {1}",
+        "dòng dài {0#} byte, vượt giới hạn {1#}",
     ),
     (
         "the name of column {} has {} bytes, over the limit of {}",
-        "tên cột {0} dài {1} byte, vượt giới hạn {2}",
+        "tên cột {0} dài {1#} byte, vượt giới hạn {2#}",
     ),
     (
         "{} has {} bytes, over the limit of {} ({})",
-        "tệp {0} có {1} byte, vượt giới hạn {2} ({3})",
+        "tệp {0} có {1#} byte, vượt giới hạn {2#} ({3})",
     ),
     (
         "{} has {} bytes, over the limit of {}",
-        "giá trị của cột {0} dài {1} byte, vượt giới hạn {2}",
+        "giá trị của cột {0} dài {1#} byte, vượt giới hạn {2#}",
     ),
     ("this is no header", "đây không phải dòng tiêu đề"),
     ("line {} has these columns", "dòng {0} có các cột này"),

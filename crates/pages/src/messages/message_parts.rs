@@ -2,6 +2,7 @@
 
 use super::left_out_words::left_out_reasons;
 use super::message_patterns::{filled_by, parts_of};
+use crate::digit_groups::grouped;
 
 /// Places before a message with their Vietnamese texts. What stands for `{}` is a number, a list of lines, one word or a
 /// quoted name.
@@ -52,6 +53,8 @@ const KINDS: [(&str, &str); 8] = [
 const PARTS: &[(&str, &str)] = &[
     ("text", "văn bản"),
     ("a string", "văn bản"),
+    ("triangles", "tam giác"),
+    ("vertices", "đỉnh"),
     ("a list", "danh sách"),
     ("an object", "một đối tượng"),
     ("a mesh", "bản quét"),
@@ -93,11 +96,15 @@ const PARTS: &[(&str, &str)] = &[
     ("No space left on device", "đĩa đã đầy"),
 ];
 
-/// Returns a pattern with `{0}` replaced by the first part, and so on. Braces in a part stay as they are.
+/// Returns a pattern with `{0}` replaced by the first part, and so on. `{0#}` is the same for a count, whose digits are
+/// grouped. Braces in a part stay as they are.
 pub(super) fn filled(pattern: &str, parts: &[&str]) -> String {
-    filled_by(pattern, |index| {
-        let part = parts.get(index.parse::<usize>().ok()?)?;
-        Some(part_text(part))
+    filled_by(pattern, |place| {
+        let counted = place.strip_suffix('#');
+        let index = counted.unwrap_or(place).parse::<usize>().ok()?;
+        let part = parts.get(index)?;
+        let count = counted.and_then(|_| part.parse::<u64>().ok());
+        Some(count.map_or_else(|| part_text(part), grouped))
     })
 }
 
@@ -132,6 +139,9 @@ fn part_text(part: &str) -> String {
     if let Some((_, vietnamese)) = known.find(|(english, _)| *english == part) {
         return (*vietnamese).to_owned();
     }
+    if let Some(time) = day_first(part) {
+        return time;
+    }
     let number = part.strip_prefix("a list of ");
     if let Some(number) = number.filter(|number| number.parse::<u64>().is_ok()) {
         return format!("danh sách {number} phần tử");
@@ -145,6 +155,22 @@ fn part_text(part: &str) -> String {
     }
     let listed = kind_text(part).or_else(|| left_out_reasons(part));
     listed.unwrap_or_else(|| names_text(part))
+}
+
+/// Returns a time such as `2026-11-21 11:10:03 +07:00` with the day first, as pages write times. `None` if it is something
+/// else.
+fn day_first(part: &str) -> Option<String> {
+    let (date, time) = part.split_once(' ')?;
+    let numbers: Vec<&str> = date.split('-').collect();
+    let [year, month, day] = numbers[..] else {
+        return None;
+    };
+    let is_number = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    let is_date = [(year, 4), (month, 2), (day, 2)]
+        .into_iter()
+        .all(|(text, digits)| text.len() == digits && is_number(text));
+    let is_time = time.len() >= 5 && time.as_bytes()[2] == b':';
+    (is_date && is_time).then(|| format!("{day}/{month}/{year} {time}"))
 }
 
 /// Returns a kind of files, such as `a GIF image`, in Vietnamese. `None` if it is something else.

@@ -267,23 +267,23 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the binary STL is truncated: it holds {} of {} triangles",
-        "tệp STL nhị phân bị cắt cụt: chỉ có {0} trong số {1} tam giác",
+        "tệp STL nhị phân bị cắt cụt: chỉ có {0#} trong số {1#} tam giác",
     ),
     (
         "the {} is truncated: it holds {} of {} triangles",
-        "tệp {0} bị cắt cụt: chỉ có {1} trong số {2} tam giác",
+        "tệp {0} bị cắt cụt: chỉ có {1#} trong số {2#} tam giác",
     ),
     (
         "the {} is truncated: it holds {} of {} vertices",
-        "tệp {0} bị cắt cụt: chỉ có {1} trong số {2} đỉnh",
+        "tệp {0} bị cắt cụt: chỉ có {1#} trong số {2#} đỉnh",
     ),
     (
         "the {} is truncated: it holds {} of {} {}",
-        "tệp {0} bị cắt cụt: chỉ có {1} trong số {2} phần tử",
+        "tệp {0} bị cắt cụt: chỉ có {1#} trong số {2#} phần tử",
     ),
     (
         "the {} is truncated: it ends after {} facets without {}",
-        "tệp {0} bị cắt cụt: hết sau {1} mặt mà chưa có {2}",
+        "tệp {0} bị cắt cụt: hết sau {1#} mặt mà chưa có {2}",
     ),
     (
         "the {} is truncated: it ends before the image does",
@@ -291,13 +291,13 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "face {} refers to vertex {}, but the file has {} vertices",
-        "mặt {0} dùng đỉnh {1}, nhưng tệp chỉ có {2} đỉnh",
+        "mặt {0#} dùng đỉnh {1#}, nhưng tệp chỉ có {2#} đỉnh",
     ),
     ("the mesh has no faces", "bản quét không có mặt tam giác"),
     ("the mesh has no vertices", "bản quét không có đỉnh"),
     (
         "the file has {} {}; limits.mesh.max_{} is {}",
-        "tệp vượt giới hạn: có {0}, limits.mesh.max_{2} là {3}",
+        "tệp vượt giới hạn: có {0#} {1}, limits.mesh.max_{2} là {3#}",
     ),
     // Pairs that do not match.
     (

@@ -77,7 +77,7 @@ pub(super) const PARSER_MESSAGES: &[(&str, &str)] = &[
     ("it has more than {} styles", "có hơn {0} kiểu"),
     (
         "it has more than {} shared strings",
-        "có hơn {0} chuỗi dùng chung",
+        "có hơn {0#} chuỗi dùng chung",
     ),
     ("a row has the number {}", "có dòng mang số {0}"),
     ("a row has more than {} cells", "có dòng nhiều hơn {0} ô"),
