@@ -157,6 +157,24 @@ fn damage_is_mended_by_a_button() {
 }
 
 #[test]
+fn a_missing_input_is_said_although_all_results_are_sound() {
+    let (dir, page) = with_project();
+    let print = "p/data/prints/upright-0000.jpg";
+    std::fs::remove_file(dir.path().join(print)).expect("removed");
+    let check = json!({"what": "check"});
+    act(&page, "/p/p/actions/check", &check, |_| {});
+    let found = wait_for(&page, "/p/p/health", "1 missing input files");
+    assert!(found.contains("The results are sound, but"), "{found}");
+    assert!(!found.contains("All are sound"), "{found}");
+    let vietnamese = text(&page.get("/p/p/health?language=vi"));
+    assert!(
+        vietnamese.contains("upright-0000.jpg của upright-0000"),
+        "{vietnamese}"
+    );
+    assert!(!vietnamese.contains("Tất cả đều tốt"), "{vietnamese}");
+}
+
+#[test]
 fn lost_files_of_results_are_computed_again_after_a_button() {
     let (dir, page) = with_project();
     let project = dir.path().join("p");

@@ -21,14 +21,15 @@ use super::restore_page::restore_address;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::task_part::task_part;
-use super::tasks::{FinishedTask, TaskKind, TaskState};
+use super::tasks::{FinishedTask, TaskKind, TaskLines, TaskState};
 use super::visit::Visit;
+use crate::messages;
 use mocban_core::domain::one_line;
 use mocban_project::ProjectResult;
 use mocban_project::check::check;
 use mocban_project::input_list::unfinished_copies;
 use mocban_project::location::Location;
-use mocban_runner::check::{CheckOptions, CheckSummary, Kind};
+use mocban_runner::check::{CheckOptions, CheckSummary, Kind, Notes};
 use mocban_store::StagingFolder;
 use mocban_system::platform;
 
@@ -150,7 +151,23 @@ async fn check_lines(location: Location, options: CheckOptions) -> ProjectResult
             [kind.heading(), vietnamese_heading(*kind)].map(|what| format!("{what}: {number}")),
         );
     }
-    for (what, notes) in [
+    lines.extend(input_lines(&summary));
+    let is_damaged = summary.left() > 0;
+    Ok(FinishedTask {
+        lacks_most_files: is_damaged && summary.lacks_most_files(),
+        ..FinishedTask::new(lines, is_damaged || has_other_inputs(&summary))
+    })
+}
+
+/// Returns whether input files are not as they were when they were read.
+const fn has_other_inputs(summary: &CheckSummary) -> bool {
+    summary.inputs_missing.count + summary.inputs_changed.count + summary.inputs_unreadable.count
+        > 0
+}
+
+/// Returns a line for missing, for changed and for unreadable input files, if there are any.
+fn input_lines(summary: &CheckSummary) -> TaskLines {
+    let kinds = [
         (
             ["missing input files", "tệp đầu vào bị thiếu"],
             &summary.inputs_missing,
@@ -163,23 +180,36 @@ async fn check_lines(location: Location, options: CheckOptions) -> ProjectResult
             ["unreadable input files", "tệp đầu vào không đọc được"],
             &summary.inputs_unreadable,
         ),
-    ] {
-        if notes.count > 0 {
-            let first: Vec<String> = notes
-                .first
-                .iter()
-                .take(SHOWN)
-                .map(ToString::to_string)
-                .collect();
-            let first = first.join(", ");
-            lines.push(what.map(|what| format!("{} {what}: {first}", grouped(notes.count))));
-        }
+    ];
+    let found = kinds.into_iter().filter(|(_, notes)| notes.count > 0);
+    found.map(|(what, notes)| note_line(what, notes)).collect()
+}
+
+/// Returns how many files have a note, and the first notes.
+fn note_line([english, vietnamese]: [&str; 2], notes: &Notes) -> [String; 2] {
+    let number = grouped(notes.count);
+    let first = notes.first.iter().take(SHOWN);
+    let translated: Vec<String> = first.clone().map(|note| vietnamese_note(note)).collect();
+    let first: Vec<&str> = first.map(String::as_str).collect();
+    [
+        format!("{number} {english}: {}", first.join(", ")),
+        format!("{number} {vietnamese}: {}", translated.join(", ")),
+    ]
+}
+
+/// Returns a note in Vietnamese: a file of a pair, or why it cannot be read.
+fn vietnamese_note(note: &str) -> String {
+    let why = note.strip_suffix(')');
+    let why = why.and_then(|note| note.rsplit_once(" ("));
+    if let Some((message, pair)) = why
+        && let Some(known) = messages::vietnamese(message)
+    {
+        return format!("{known} ({pair})");
     }
-    let is_damaged = summary.left() > 0;
-    Ok(FinishedTask {
-        lacks_most_files: is_damaged && summary.lacks_most_files(),
-        ..FinishedTask::new(lines, is_damaged)
-    })
+    match note.rsplit_once(" of ") {
+        Some((file, pair)) => format!("{file} của {pair}"),
+        None => note.to_owned(),
+    }
 }
 
 /// Returns what the findings of a check or a repair mean, and what to do.
@@ -196,6 +226,10 @@ fn conclusion(summary: &CheckSummary, repair: bool) -> [&'static str; 2] {
             .iter()
             .any(is_left);
     match (summary.found(), summary.left()) {
+        (0, _) if has_other_inputs(summary) => [
+            "The results are sound, but not all input files are as they were when they were read:",
+            "Các kết quả đều tốt, nhưng có tệp đầu vào không còn như lúc được đọc:",
+        ],
         (0, _) => ["All are sound.", "Tất cả đều tốt."],
         (_, 0) if summary.repaired.requeued + summary.repaired.requeued_blocks == 0 => [
             "All damage was mended. The damage was:",
@@ -249,5 +283,29 @@ const fn vietnamese_heading(kind: Kind) -> &'static str {
         Kind::FileMissing => "tệp bị thiếu",
         Kind::FileChanged => "tệp bị đổi",
         Kind::FileUnreadable => "tệp không đọc được",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Notes, note_line};
+
+    #[test]
+    fn files_of_pairs_are_named_in_both_languages() {
+        let notes = Notes {
+            count: 4,
+            first: vec![
+                "scans/list of/3.ply of a3".to_owned(),
+                "prints/4.jpg may not be read: permission denied (a4)".to_owned(),
+                "odd".to_owned(),
+                "not shown".to_owned(),
+            ],
+        };
+        let lines = note_line(["missing input files", "tệp đầu vào bị thiếu"], &notes);
+        let expected = [
+            "4 missing input files: scans/list of/3.ply of a3, prints/4.jpg may not be read: permission denied (a4), odd",
+            "4 tệp đầu vào bị thiếu: scans/list of/3.ply của a3, không có quyền đọc prints/4.jpg (a4), odd",
+        ];
+        assert_eq!(lines, expected);
     }
 }
