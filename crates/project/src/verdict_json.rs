@@ -204,7 +204,7 @@ fn json_row(
     let is_unread = |(field, value): &(String, Value)| {
         let is_empty =
             value.is_null() || value.as_str().is_some_and(|text| trimmed(text).is_empty());
-        !LOG_FIELDS.contains(&field.as_str()) && !(is_empty && field.trim().is_empty())
+        !LOG_FIELDS.contains(&field.as_str()) && (!is_empty || !field.trim().is_empty())
     };
     let unread = fields.into_iter().filter(is_unread);
     Ok(undone_at.is_none().then(|| VerdictRow {

@@ -107,7 +107,8 @@ pub fn normalize(
         }
     }?;
     normalized.outcome.print_orientation = print.image().turned;
-    normalized.outcome.ignored_profile = print.image().ignored_profile.clone();
+    let ignored = &print.image().ignored_profile;
+    normalized.outcome.ignored_profile.clone_from(ignored);
     Ok(normalized)
 }
 

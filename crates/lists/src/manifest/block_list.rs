@@ -223,12 +223,15 @@ fn similar_columns(rows: &[BlockRow]) -> Vec<String> {
     similar.warnings().collect()
 }
 
+/// The columns of a header, and those with other names with what they are.
+type BlockColumns = (Vec<ListedColumn>, Vec<(String, &'static str)>);
+
 /// Returns the columns of a header, and those with other names.
 fn columns_of(
     line: usize,
     record: &::csv::ByteRecord,
     encoding_hint: &str,
-) -> Result<(Vec<ListedColumn>, Vec<(String, &'static str)>), ManifestError> {
+) -> Result<BlockColumns, ManifestError> {
     let names = column_names(line, record, encoding_hint)?;
     let found = COLUMNS
         .assign(&names)

@@ -30,7 +30,7 @@ const ERRORS: [&str; 16] = [
     "#VALUE!",
 ];
 
-/// Begins the errors of LibreOffice that have a number, such as `Err:502`.
+/// Begins the errors of `LibreOffice` that have a number, such as `Err:502`.
 const NUMBERED: &str = "Err:";
 
 /// Returns the error of a formula that a text is, such as `#REF!`.

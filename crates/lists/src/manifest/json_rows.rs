@@ -60,7 +60,7 @@ pub(super) fn json_rows(
 }
 
 /// Passes the keys and values of the rows of a list in JSON that can be read to `each`, until it returns `false`.
-pub(super) fn rows_while(bytes: &[u8], each: &mut dyn FnMut(&[(String, Value)]) -> bool) {
+pub(super) fn rows_while(bytes: &[u8], mut each: impl FnMut(&[(String, Value)]) -> bool) {
     let Ok(bytes) = as_utf8(bytes) else {
         return;
     };

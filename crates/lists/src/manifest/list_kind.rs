@@ -63,7 +63,7 @@ impl ListKind {
     pub fn of_json(bytes: &[u8]) -> Self {
         let mut first: Option<(KindColumns, Vec<String>)> = None;
         let (mut signs, mut count) = (PairSigns::default(), 0);
-        rows_while(bytes, &mut |row| {
+        rows_while(bytes, |row| {
             let (columns, keys) = first.get_or_insert_with(|| {
                 let keys: Vec<String> = row.iter().map(|(key, _)| key.clone()).collect();
                 let names: Vec<&str> = keys.iter().map(|key| key.trim()).collect();
