@@ -44,6 +44,7 @@ mod invitations;
 mod last_import;
 mod latest_results;
 mod looked_inputs;
+mod looked_part;
 mod named_blocks;
 mod number_text;
 mod open_pages;

@@ -12,7 +12,7 @@ use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
 use super::home::free_space;
-use super::looked_inputs::{first_missing, looked_at_text};
+use super::looked_part::{first_missing, looked_at_text};
 use super::project_name::{NAME_CHARS, new_project_dir};
 use super::restore_action::{check_backup_file, check_room, restore_sentence};
 use super::restore_page::chosen_path;

@@ -10,7 +10,7 @@ use super::components::{NavSection, action_form, figure, frame, grouped, stored_
 use super::failure::AppResult;
 use super::home::free_space;
 use super::latest_results::latest_results;
-use super::looked_inputs::looked_part;
+use super::looked_part::looked_part;
 use super::projects::OpenProject;
 use super::remedies::pair_remedy;
 use super::run_blocks::{
