@@ -274,7 +274,7 @@ fn finished(
     FinishedTask::new(lines, is_warning)
 }
 
-/// Says how many files are not where the new project reads them, of those that were looked at, if that was not all of them.
+/// Says how many files are not where the new project reads them, and of how many if only some were looked at.
 fn missing_line(missing: usize, looked_at: Option<usize>, first: &str) -> [String; 2] {
     let (missing, first) = (grouped(missing as u64), one_line(first));
     let [of, of_vi] = match looked_at.map(|number| grouped(number as u64)) {

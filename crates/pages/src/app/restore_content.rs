@@ -179,7 +179,7 @@ fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> 
     said.text(visit.language).to_owned()
 }
 
-/// Says how many scans and prints the new project would find, of those that were looked at.
+/// Says how many scans and prints were looked at, and which of these the new project would not find.
 fn places_sentence(places: &InputPlaces) -> Sentence {
     let [looked_at, looked_at_vi] = looked_at_text(places);
     let (not, not_vi) = ("Not in a backup.", "Không có trong bản sao lưu.");
