@@ -54,7 +54,7 @@ pub(super) async fn page(
     // What was chosen before a refused change stays.
     let (query, refused) = match with_change(&visit.query) {
         Ok(query) => (query, None),
-        Err(failure) => (without_change(&visit.query), Some(failure)),
+        Err(failure) => (with_change(&without_change(&visit.query))?, Some(failure)),
     };
     let visit = Visit { query, ..visit };
     let chosen = ImportChoice::of(&visit.query);
