@@ -145,8 +145,9 @@ const loads = [...document.querySelectorAll("[data-load]")].map(async (part) => 
   if (!response) offline.hidden = false;
   const text = await response?.text();
   const page = new DOMParser().parseFromString(text ?? "", "text/html");
-  const shown = response?.ok ? page.body : page.querySelector("main") ?? page.body;
-  part.replaceChildren(...shown.childNodes);
+  // The heading and the links of a page that fails are not those of this page.
+  const failure = response?.ok ? null : page.querySelector("main .notice.bad");
+  part.replaceChildren(...(failure ? [failure] : page.body.childNodes));
   part.dataset.loaded = "true";
 });
 await Promise.all(loads);
