@@ -19,6 +19,19 @@ function keptName(form) {
   return form.closest("[data-chosen]")?.dataset.chosen;
 }
 
+/** Keeps fields of a refused form in the address, so that they stay if the page is loaded again, as a refusal may ask. */
+function keepInAddress(form) {
+  const kept = [...form.querySelectorAll("[data-in-address]")];
+  if (kept.length === 0) return;
+  const here = new URL(location.href);
+  for (const field of kept) {
+    const value = field.type === "checkbox" && !field.checked ? "" : field.value;
+    if (value) here.searchParams.set(field.name, value);
+    else here.searchParams.delete(field.name);
+  }
+  history.replaceState(null, "", here);
+}
+
 document.addEventListener("submit", async (event) => {
   const form = event.target;
   if (!form.dataset.post) return;
@@ -38,6 +51,7 @@ document.addEventListener("submit", async (event) => {
     else if (reply.reload) await refresh(true);
   } catch (error) {
     showProblem(problem, error.message);
+    keepInAddress(form);
     if (keptName(form)) document.dispatchEvent(new CustomEvent("refused", { detail: error.retired ?? [] }));
   } finally {
     form.removeAttribute("aria-busy");

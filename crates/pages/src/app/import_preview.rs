@@ -341,20 +341,20 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
             @if let Some(plan) = plan { input type="hidden" name="shown" value=(plan.hash); }
             input type="hidden" name="compared" value=(chosen.project);
             label { span { (visit.t("Project (new or known name)", "Dự án (tên mới hoặc đã có)")) }
-                input #project name="project" value=(chosen.project) required maxlength=(NAME_CHARS);
+                input #project name="project" value=(chosen.project) required maxlength=(NAME_CHARS) data-in-address;
             }
             @if chosen.list.is_empty() {
                 label { span { (visit.t("Unit of the scans", "Đơn vị của bản quét")) }
-                    select name="unit" {
+                    select name="unit" data-in-address {
                         (choice("", visit.t("not known", "không rõ"), Some(&chosen.unit)))
                         @for unit in LengthUnit::ALL { (choice(unit.name(), unit.name(), Some(&chosen.unit))) }
                     }
                 }
             }
             @if missing {
-                label.check { input type="checkbox" name="missing" value="yes" checked[!chosen.missing.is_empty()]; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
+                label.check { input type="checkbox" name="missing" value="yes" checked[!chosen.missing.is_empty()] data-in-address; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
             }
-            label.check { input type="checkbox" name="changed" value="yes" checked[!chosen.changed.is_empty()]; " " (visit.t("Known pairs may get other files", "Cho phép đổi tệp của các cặp đã có")) }
+            label.check { input type="checkbox" name="changed" value="yes" checked[!chosen.changed.is_empty()] data-in-address; " " (visit.t("Known pairs may get other files", "Cho phép đổi tệp của các cặp đã có")) }
             button.primary #import disabled[is_nothing] { (visit.t("Import", "Nhập")) }
         },
     )
@@ -364,7 +364,9 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
 mod tests {
     use std::collections::BTreeMap;
 
-    use super::{SHOWN_COLUMNS, other_columns, warning};
+    use super::{SHOWN_COLUMNS, import_form, other_columns, warning};
+    use crate::app::address::PageQuery;
+    use crate::app::import_choice::{ImportChoice, Planned};
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_core::domain::BlockName;
@@ -422,5 +424,16 @@ mod tests {
         let visit = Visit::in_language(Language::English);
         let shown = other_columns(&visit, &[block(&many)]).into_string();
         assert!(shown.contains("c39, …</p>"), "{shown}");
+    }
+
+    #[test]
+    fn what_the_form_of_an_import_has_is_kept_in_the_address_of_its_page() {
+        let chosen = ImportChoice::of(&PageQuery::parse("project=p&unit=cm&changed=yes"));
+        let planned = Planned::Blocks(Vec::new(), Vec::new());
+        let visit = Visit::in_language(Language::English);
+        let shown = import_form(&visit, &chosen, &planned).into_string();
+        assert_eq!(shown.matches(" data-in-address>").count(), 3, "{shown}");
+        let part = "name=\"changed\" value=\"yes\" checked data-in-address>";
+        assert!(shown.contains(part), "{shown}");
     }
 }
