@@ -57,3 +57,20 @@ fn a_run_that_finds_no_file_names_the_missing_folder() {
     let said = "(pairs or blocks: 2), and so is the folder ";
     assert_eq!(ran.err.matches(said).count(), 1, "{}", ran.err);
 }
+
+#[test]
+fn files_of_a_project_without_a_list_are_imported_as_before() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let on = |args: &[&str]| crate::cli::mocban(dir.path(), &[&["-C", "p"][..], args].concat());
+    let data = dir.path().join("data");
+    std::fs::create_dir(&data).expect("a folder");
+    for name in ["1.stl", "1.png"] {
+        std::fs::write(data.join(name), "no scan").expect("written");
+    }
+    on(&["import", "--meshes", "data", "--prints", "data"]).expect(0);
+    on(&["--progress", "none", "run"]).expect(3);
+    std::fs::rename(&data, dir.path().join("away")).expect("moved");
+    let status = on(&["status"]).expect(0).out;
+    let advice = "(`import --meshes DIR --prints DIR --allow-changed-files`)";
+    assert!(status.contains(advice), "{status}");
+}

@@ -59,6 +59,7 @@ pub mod generated_folder;
 mod growing_list;
 pub mod hosts;
 pub mod import_blocks;
+pub mod import_command;
 pub mod import_pairs;
 pub mod import_plan;
 mod input_copy;

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use crate::error::ProjectResult;
+use crate::import_command::ImportCommand;
 use crate::missing_folders::MissingFolders;
 use mocban_catalog::{Catalog, InputVersion, KnownBlock, PairSelection};
 use mocban_core::domain::{ArtifactRef, NOT_THERE, PairId, first_names, one_line};
@@ -42,6 +43,12 @@ pub struct MissingInputs {
     /// Whether the first one is below a named root.
     #[serde(skip)]
     pub is_below_root: bool,
+    /// Number of the pair or block of the first one among those that were inspected.
+    #[serde(skip)]
+    pub first_owner: usize,
+    /// How the first one is imported again from another place.
+    #[serde(skip)]
+    pub command: ImportCommand,
 }
 
 impl MissingInputs {
@@ -86,12 +93,18 @@ impl MissingInputs {
 impl fmt::Display for MissingInputs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let found = self.found();
-        let advice = if self.is_below_root {
-            "put them back, or write their new place below [storage.roots] in the settings"
+        write!(f, "{found}; `check --json` lists all; ")?;
+        if self.is_below_root {
+            f.write_str(
+                "put them back, or write their new place below [storage.roots] in the settings",
+            )
         } else {
-            "put them back, or import them from their new place (`import LIST --allow-changed-files`)"
-        };
-        write!(f, "{found}; `check --json` lists all; {advice}")
+            let command = self.command;
+            write!(
+                f,
+                "put them back, or import them from their new place (`{command}`)"
+            )
+        }
     }
 }
 
@@ -157,8 +170,9 @@ pub(crate) async fn missing_after_failures(
     catalog: &Catalog,
     pairs: u64,
 ) -> ProjectResult<Option<MissingInputs>> {
-    let files = sample(project, catalog, pairs).await?;
-    Ok(inspect_files(project, files).await.missing)
+    let sample = sample(project, catalog, pairs).await?;
+    let inspection = inspect_files(project, catalog, sample).await?;
+    Ok(inspection.missing)
 }
 
 /// Inspects the files of some pairs and blocks of a project. `pairs` counts the retired pairs too, because they have ids,
@@ -169,21 +183,16 @@ pub async fn inspect(
     catalog: &Catalog,
     pairs: u64,
 ) -> ProjectResult<InputInspection> {
-    let mut files = sample(project, catalog, pairs).await?;
+    let mut sample = sample(project, catalog, pairs).await?;
     // A file that was not there is the reason of a failure, which is said elsewhere.
-    files.retain(|file| !file.read.is_gone());
-    Ok(inspect_files(project, files).await)
+    sample.files.retain(|file| !file.read.is_gone());
+    inspect_files(project, catalog, sample).await
 }
 
 /// Returns the files of some pairs and blocks that a run has looked for, as in [`inspect`].
-async fn sample(
-    project: &Project,
-    catalog: &Catalog,
-    pairs: u64,
-) -> ProjectResult<Vec<SampledInput>> {
-    let mut files = Vec::new();
+async fn sample(project: &Project, catalog: &Catalog, pairs: u64) -> ProjectResult<InputSample> {
     if project.has_remote_inputs() {
-        return Ok(files);
+        return Ok(InputSample::default());
     }
     let sampled = pairs.min(MAX_PAIRS);
     // The ids of pairs are almost without gaps.
@@ -194,32 +203,69 @@ async fn sample(
         .await?;
     let retired = catalog.retired_among(&ids).await?;
     known.retain(|known| !retired.contains(&known.pair));
+    let mut files = Vec::new();
     let mut add = |owner: usize, path: String, read: Option<InputVersion>| {
         files.extend(read.map(|read| SampledInput { owner, path, read }));
     };
-    let pairs = known.len();
+    let pairs: Vec<PairId> = known.iter().map(|known| known.pair).collect();
+    let mut commands = Vec::new();
     for (owner, known) in known.into_iter().enumerate() {
         add(owner, known.mesh_path, known.mesh);
         add(owner, known.print_path, known.print);
     }
     let blocks = catalog.known_blocks().await?.into_iter().take(MAX_BLOCKS);
-    for (owner, block) in (pairs..).zip(blocks) {
+    for (owner, block) in (pairs.len()..).zip(blocks) {
+        commands.push(ImportCommand::of_block(&block.attributes));
         for (path, read) in block_files(block) {
             add(owner, path, read);
         }
     }
     // The files of pairs that were cut from a block are artifacts.
     files.retain(|file| ArtifactRef::at_path(&file.path).is_none());
-    Ok(files)
+    Ok(InputSample {
+        files,
+        pairs,
+        blocks: commands,
+    })
 }
 
 /// Inspects files for a limited time. Finds nothing if the disk hangs.
-async fn inspect_files(project: &Project, files: Vec<SampledInput>) -> InputInspection {
+async fn inspect_files(
+    project: &Project,
+    catalog: &Catalog,
+    sample: InputSample,
+) -> ProjectResult<InputInspection> {
     let project = project.clone();
     let until = Instant::now() + INSPECTION_TIME;
+    let InputSample {
+        files,
+        pairs,
+        blocks,
+    } = sample;
     let inspection = tokio::task::spawn_blocking(move || among(&project, &files, until));
     let inspected = tokio::time::timeout(MAX_TIME, inspection).await;
-    inspected.ok().and_then(Result::ok).unwrap_or_default()
+    let mut inspection = inspected.ok().and_then(Result::ok).unwrap_or_default();
+    if let Some(missing) = &mut inspection.missing {
+        missing.command = match pairs.get(missing.first_owner) {
+            Some(pair) => {
+                let attributes = catalog.attributes_of(*pair).await?;
+                attributes.map(|pair| ImportCommand::of_pair(&pair))
+            }
+            None => blocks.get(missing.first_owner - pairs.len()).copied(),
+        }
+        .unwrap_or_default();
+    }
+    Ok(inspection)
+}
+
+/// The files of some pairs and blocks.
+#[derive(Debug, Default)]
+struct InputSample {
+    files: Vec<SampledInput>,
+    /// The pairs, which are the first owners.
+    pairs: Vec<PairId>,
+    /// How the blocks, which are the other owners, are imported again.
+    blocks: Vec<ImportCommand>,
 }
 
 /// A file that is inspected.
@@ -279,6 +325,8 @@ fn among(project: &Project, files: &[SampledInput], until: Instant) -> InputInsp
             owners: owners.len(),
             folders: folders.names(),
             is_below_root: project.is_below_root(&first.path),
+            first_owner: first.owner,
+            command: ImportCommand::default(),
         }),
         changed: changed.first().map(|first| ChangedInputs {
             changed: changed.len(),

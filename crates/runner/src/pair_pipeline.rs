@@ -69,10 +69,12 @@ impl PairPipeline {
         }
         let length = scan_size::length_of(&scan.mesh().vertices);
         if let Some(reason) = scan_size::wrong_unit(length, pair.attributes.unit) {
-            let text = format!(
-                "{}: {reason} in the list, and import it again",
-                pair.attributes.mesh_path
-            );
+            let path = &pair.attributes.mesh_path;
+            let text = if pair.attributes.is_listed() {
+                format!("{path}: {reason} in the list, and import it again")
+            } else {
+                format!("{path}: {reason}, and import it again")
+            };
             return Err(PairStageError::failed(FailureClass::BadInput, text));
         }
         // A fit that does not read the print stays valid when the print changes.

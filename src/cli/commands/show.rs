@@ -135,7 +135,12 @@ fn tail(pair: &PairOverview, palette: Palette) -> String {
             format!("  {changed} changed since the last run; `run` computes the pair again")
         }
         (None, JobStatus::Quarantined) if !may_retry(detail) => {
-            "  nothing; correct the file or a setting, or the list and import it again, and `run` computes the pair again".to_owned()
+            let import = if detail.results.attributes.is_listed() {
+                "or the list and import it again"
+            } else {
+                "or import another file"
+            };
+            format!("  nothing; correct the file or a setting, {import}, and `run` computes the pair again")
         }
         (None, JobStatus::Quarantined) => {
             "  nothing until `retry`, or until a missing file is there".to_owned()

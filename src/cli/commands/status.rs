@@ -207,6 +207,7 @@ mod tests {
     };
     use mocban_core::domain::{Failure, FailureClass, JobStatus, Stage, Verdict};
     use mocban_project::failures::Failures;
+    use mocban_project::import_command::ImportCommand;
     use mocban_project::missing_inputs::{ChangedInputs, MissingInputs};
 
     fn status(done: u64, ready: u64) -> ProjectStatus {
@@ -394,6 +395,8 @@ mod tests {
             owners: 2,
             folders: Vec::new(),
             is_below_root: false,
+            first_owner: 0,
+            command: ImportCommand::List,
         });
         done.are_results_missing = true;
         done.running = false;

@@ -175,6 +175,20 @@ pub struct PairAttributes {
     pub prior: Option<String>,
 }
 
+impl PairAttributes {
+    /// Returns whether a list named the pair: folders give no columns but a block with which the id begins.
+    pub fn is_listed(&self) -> bool {
+        let is_of_folder = |block: &str| self.name.as_str().starts_with(block);
+        self.character.is_some()
+            || self.scanned_face_down.is_some()
+            || !self.meta.is_empty()
+            || self
+                .block
+                .as_deref()
+                .is_some_and(|block| !is_of_folder(block))
+    }
+}
+
 from_row! { PairAttributes { name, mesh_path, print_path, unit, scanned_face_down, character, block, meta as Json, prior } }
 
 /// Where the print of a pair lies on the page of its block.

@@ -6,7 +6,7 @@ use crate::db::rows::json_array;
 use crate::records::import::SELECT;
 use crate::records::model::{PairAttributes, PairResults};
 use crate::{Catalog, Result};
-use mocban_core::domain::{PairName, ThresholdMetric, UnixMillis};
+use mocban_core::domain::{PairId, PairName, ThresholdMetric, UnixMillis};
 
 /// Number of names in one statement.
 const LOOKED_UP: usize = 2_000;
@@ -35,6 +35,9 @@ WHERE a.stage = 3 AND a.class IS NULL AND a.at >= ?2 AND (SELECT j.status FROM j
 ORDER BY confidence, a.pair LIMIT ?4";
 
 const LAST_ATTEMPT: &str = "SELECT at FROM attempt ORDER BY id DESC LIMIT 1";
+
+const BY_ID: &str = "
+SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior FROM pair WHERE id = ?1";
 
 /// The pairs before and after a name.
 const NEIGHBOURS: [&str; 2] = [
@@ -96,6 +99,13 @@ impl Catalog {
             found.extend(pairs.filter_map(|row| PairAttributes::from_row(row).ok()));
         }
         Ok(found)
+    }
+
+    /// Returns the attributes of a pair by its number, or `None` if there are none that can be read.
+    pub async fn attributes_of(&self, pair: PairId) -> Result<Option<PairAttributes>> {
+        let mut conn = self.read_conn().await?;
+        let row = query(BY_ID).bind(pair.0).fetch_optional(&mut conn).await?;
+        Ok(row.and_then(|row| PairAttributes::from_row(&row).ok()))
     }
 
     /// Returns the names of the pairs before and after a pair, by name.

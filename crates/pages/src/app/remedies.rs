@@ -22,11 +22,7 @@ enum FileOrigin {
 
 impl FileOrigin {
     fn of_pair(pair: &PairAttributes) -> Self {
-        let is_listed = pair.character.is_some()
-            || pair.block.is_some()
-            || pair.scanned_face_down.is_some()
-            || !pair.meta.is_empty();
-        match (&pair.prior, is_listed) {
+        match (&pair.prior, pair.is_listed()) {
             (Some(_), _) => Self::Block,
             (None, true) => Self::List,
             (None, false) => Self::Unknown,

@@ -44,6 +44,14 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "hãy sửa đơn vị trong danh sách rồi nhập lại",
     ),
     (
+        "correct the unit (perhaps {}), and import it again",
+        "hãy sửa đơn vị (có lẽ là {0}) rồi nhập lại",
+    ),
+    (
+        "correct the unit, and import it again",
+        "hãy sửa đơn vị rồi nhập lại",
+    ),
+    (
         "its carving is {} mm deep, but most blocks are carved 0.3 to 5 mm deep",
         "nét khắc sâu {0} mm, trong khi đa số ván được khắc sâu 0,3 đến 5 mm",
     ),

@@ -258,7 +258,7 @@ fn an_export_of_nothing_is_explained() {
 }
 
 /// Parts of messages that the program joins with the words beside them, so that no source has both.
-const COMPOSED: [&str; 35] = [
+const COMPOSED: [&str; 36] = [
     "no result is selected",
     "none of the chosen pairs has a result to export",
     "cannot be applied, so its colours are read as sRGB",
@@ -294,6 +294,7 @@ const COMPOSED: [&str; 35] = [
     "of the block shows no face",
     "the page image shows no ink",
     "is missing",
+    ", and import it again",
 ];
 
 /// Returns the sources of all crates and tests as one text, without the translated messages and their tests. Strings that go on
