@@ -61,14 +61,14 @@ fn a_run_that_finds_no_file_names_the_missing_folder() {
 #[test]
 fn files_of_a_project_without_a_list_are_imported_as_before() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let on = |args: &[&str]| crate::cli::mocban(dir.path(), &[&["-C", "p"][..], args].concat());
-    let data = dir.path().join("data");
-    std::fs::create_dir(&data).expect("a folder");
-    for name in ["1.stl", "1.png"] {
-        std::fs::write(data.join(name), "no scan").expect("written");
-    }
-    on(&["import", "--meshes", "data", "--prints", "data"]).expect(0);
-    on(&["--progress", "none", "run"]).expect(3);
+    let data = done(dir.path()).dir().join("data");
+    let on = |args: &[&str]| crate::cli::mocban(dir.path(), &[&["-C", "q"][..], args].concat());
+    let folders = ["meshes", "prints"].map(|name| data.join(name));
+    let [meshes, prints] = folders
+        .each_ref()
+        .map(|folder| folder.to_str().expect("UTF-8"));
+    on(&["import", "--meshes", meshes, "--prints", prints]).expect(0);
+    on(&["run", "upright-0000", "--set", "depth.longest_px=96"]).expect(0);
     std::fs::rename(&data, dir.path().join("away")).expect("moved");
     let status = on(&["status"]).expect(0).out;
     let advice = "(`import --meshes DIR --prints DIR --allow-changed-files`)";
