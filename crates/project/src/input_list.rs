@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::byte_size::byte_size;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::exit::Refusal;
+use crate::shell::shell_quoted;
 use mocban_core::domain::spelling::fold_case;
 use mocban_core::domain::{ContentHash, ErrorCode};
 use mocban_store::{InputError, StagingFolder, open_regular, read_up_to, write_atomic};
@@ -73,9 +74,9 @@ impl InputList {
             if error.code() != ErrorCode::Usage {
                 return error;
             }
+            let folder = shell_quoted(&folder.to_string_lossy());
             let text = format!(
-                "{error}; make the backup again, or find its files by their paths with --inputs {}",
-                folder.display()
+                "{error}; make the backup again, or find its files by their paths with --inputs {folder}"
             );
             ProjectError::from(Refusal::Usage(text))
         })
@@ -286,6 +287,12 @@ mod tests {
             let plain = InputList::read_plainly(dir.path()).expect_err(&text);
             assert!(!plain.to_string().contains("--inputs"), "{plain}");
         }
+        let folder = dir.path().join("ván 4.inputs");
+        std::fs::create_dir(&folder).expect("a folder");
+        std::fs::write(folder.join(INPUT_LIST), "{").expect("written");
+        let refused = InputList::read(&folder).expect_err("damaged").to_string();
+        let option = format!("--inputs '{}'", folder.display());
+        assert!(refused.ends_with(&option), "{refused}");
         assert_eq!(
             InputList::read(Path::new("/none")).expect("looked up"),
             None

@@ -6,7 +6,7 @@ use mocban_catalog::{ChecksummedTable, CounterDrift, FaultyFingerprint, FaultyRo
 use mocban_core::domain::{PairId, PairName, Stage};
 
 /// What the user can do about a damaged pair.
-const IMPORT: &str = "import its list again, or restore a backup";
+const IMPORT: &str = "import its list or its folders again, or restore a backup";
 
 /// Kind of damage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
