@@ -14,9 +14,9 @@ use super::commands::{
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
 use super::input::name_request::takes_names;
+use mocban_core::domain::shell::{quoted_id, shell_quoted};
 use mocban_core::domain::spelling::nearest;
 use mocban_project::ExitCode;
-use mocban_project::shell::{quoted_id, shell_quoted};
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
 ///

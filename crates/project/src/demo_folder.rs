@@ -8,7 +8,7 @@ use crate::error::{ProjectResult, WithContext as _};
 use crate::exit::Refusal;
 use crate::files;
 use crate::new_project::check_new_folder;
-use crate::shell::shell_quoted;
+use mocban_core::domain::shell::shell_quoted;
 use mocban_demo::block::{BlockOptions, block_options};
 use mocban_demo::{DatasetError, DemoOptions};
 use mocban_runner::Stop;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::byte_size::byte_size;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::exit::Refusal;
-use crate::shell::shell_quoted;
+use mocban_core::domain::shell::shell_quoted;
 use mocban_core::domain::spelling::fold_case;
 use mocban_core::domain::{ContentHash, ErrorCode};
 use mocban_store::{InputError, StagingFolder, open_regular, read_up_to, write_atomic};

@@ -91,7 +91,6 @@ mod row_spool;
 pub mod run;
 pub mod selection;
 pub mod sheets;
-pub mod shell;
 pub mod status;
 pub mod truth_file;
 mod unread_files;

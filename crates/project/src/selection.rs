@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use crate::shell::quoted_id;
 use mocban_catalog::{Catalog, RetiredPair};
+use mocban_core::domain::shell::quoted_id;
 use mocban_core::domain::spelling::nearest;
 use mocban_core::domain::{BlockName, PairName, RetireCause};
 use mocban_runner::NamedWork;

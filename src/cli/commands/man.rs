@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Command};
 
 use crate::cli::output::context::Context;
+use mocban_core::domain::shell::shell_quoted;
 use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::own_files::refuse_project_file;
-use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_store::{StagingFolder, create_folders, rename_into_place};
 

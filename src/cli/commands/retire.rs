@@ -5,8 +5,8 @@ use serde_json::json;
 
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
+use mocban_core::domain::shell::quoted_id;
 use mocban_project::retire::{self, RetireChoice, RetireOutcome};
-use mocban_project::shell::quoted_id;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_system::time_text::local;
 

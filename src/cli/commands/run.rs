@@ -13,10 +13,10 @@ use crate::cli::output::missing_results;
 use crate::cli::output::terminal::Terminal;
 use mocban_catalog::RerunPolicy;
 use mocban_config::Config;
+use mocban_core::domain::shell::shell_quoted;
 use mocban_core::domain::{Stage, any_case};
 use mocban_project::files;
 use mocban_project::run::{self, PlannedRun, PreparedRun, RunOutcome, TWO_METHODS};
-use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{RunOptions, RunPart, RunSummary, Stop};
 

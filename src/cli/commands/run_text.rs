@@ -7,9 +7,9 @@ use crate::cli::output::failures::failures_text;
 use crate::cli::output::table::{columns, count, pairs_and_blocks};
 use mocban_catalog::{BlockPlanEntry, Plan, StatusCounts};
 use mocban_core::domain::JobStatus;
+use mocban_core::domain::shell::quoted_id;
 use mocban_project::failures::Failures;
 use mocban_project::run::RunOutcome;
-use mocban_project::shell::quoted_id;
 use mocban_runner::{BlockSummary, CutPairs, RunSummary};
 use mocban_system::time_text::duration;
 

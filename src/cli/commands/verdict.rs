@@ -12,8 +12,8 @@ use crate::cli::output::table::{columns, count};
 use mocban_catalog::{
     FaultyRow, ImportedVerdicts, NewVerdict, ReviewContext, SetApart, VerdictEvent, reviewer_name,
 };
+use mocban_core::domain::shell::shell_quoted;
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
-use mocban_project::shell::shell_quoted;
 use mocban_project::verdict_words;
 use mocban_project::verdicts::{self, VerdictFileImport, VerdictLog};
 use mocban_project::{ExitCode, ProjectResult};

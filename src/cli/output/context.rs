@@ -11,8 +11,8 @@ use super::screen::{Palette, Screen, Tone, warning_label};
 use super::streams;
 use crate::cli::input::global::Global;
 use mocban_catalog::SetApart;
+use mocban_core::domain::shell::shell_quoted;
 use mocban_project::location::Location;
-use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult};
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).

@@ -36,6 +36,7 @@ mod retire_cause;
 mod review_order;
 mod sanitize;
 mod seeded_random;
+pub mod shell;
 mod significant;
 pub mod spelling;
 mod stage;

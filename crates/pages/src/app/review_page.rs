@@ -25,11 +25,11 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
 use mocban_catalog::reviewer_name;
+use mocban_core::domain::shell::shell_quoted;
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_project::error::explanation;
 use mocban_project::reviewers::similar_names;
-use mocban_project::shell::shell_quoted;
 
 /// Size of the sample that the page suggests.
 const SAMPLE: usize = 50;

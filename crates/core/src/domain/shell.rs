@@ -1,6 +1,6 @@
 //! Words of a command that can be copied into a shell.
 
-use mocban_core::domain::is_hidden;
+use super::sanitize::is_hidden;
 
 /// Quotes a word for a POSIX shell if it needs quotes. A word with characters that a terminal does not show is quoted
 /// as `$'..'`, and each byte of such a character is escaped.
