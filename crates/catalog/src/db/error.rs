@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use sqlx::postgres::PgDatabaseError;
 
+use mocban_core::domain::shell::shell_quoted;
 use mocban_core::domain::{PairName, ThresholdMetric, UnixMillis};
 
 /// An error of the catalog.
@@ -133,7 +134,8 @@ pub enum CatalogError {
     MayNotReview(String),
     /// The user of the database may not store verdicts under another name.
     #[error(
-        "the database user {user} stores verdicts only under the name {user}, not {reviewer}; give `--reviewer {user}`"
+        "the database user {user} stores verdicts only under the name {user}, not {reviewer}; give `--reviewer {}`",
+        shell_quoted(.user)
     )]
     OtherReviewer {
         /// The user of the database.
@@ -329,3 +331,18 @@ impl CatalogError {
 
 /// Result of a catalog call.
 pub type Result<T, E = CatalogError> = std::result::Result<T, E>;
+
+#[cfg(test)]
+mod tests {
+    use super::CatalogError;
+
+    #[test]
+    fn names_in_commands_are_quoted_for_a_shell() {
+        let error = CatalogError::OtherReviewer {
+            user: "Lê Lan".to_owned(),
+            reviewer: "minh".to_owned(),
+        };
+        let text = error.to_string();
+        assert!(text.ends_with("give `--reviewer 'Lê Lan'`"), "{text}");
+    }
+}
