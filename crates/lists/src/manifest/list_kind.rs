@@ -122,12 +122,12 @@ impl KindColumns {
         }
     }
 
-    /// Returns whether the columns fit one kind only: every pair has an id and a print, every block a page.
+    /// Returns whether the columns fit one kind only: every pair has an id and a print, every block an id and a page.
     const fn is_clear(&self) -> bool {
         let is_pair = self.id.is_some() && self.print.is_some();
         let is_like_pair =
             self.own_id.is_some() || self.print.is_some() || self.character.is_some();
-        self.page.is_none() || is_pair || !is_like_pair
+        self.page.is_none() || is_pair || !is_like_pair && self.block.is_some()
     }
 
     fn kind(&self, names: &[&str], signs: &PairSigns) -> ListKind {
@@ -238,6 +238,11 @@ mod tests {
             ),
             (
                 "block,mesh,page,character\nb1,1.stl,3a,天\n",
+                false,
+                "this is read as a list of pairs, because its pages have no names of images",
+            ),
+            (
+                "Nr,Model,Image,Page\n1,1.stl,1.png,3a\n",
                 false,
                 "this is read as a list of pairs, because its pages have no names of images",
             ),
