@@ -241,7 +241,7 @@ fn character_row(visit: &Visit, one: &StoredCharacter) -> Markup {
             td { (one.character.as_deref().map(one_line).unwrap_or_default()) }
             td {
                 (visit.character_state(one.state))
-                @if let Some(reason) = &one.reason { ": " (one_line(reason)) }
+                @if let Some(reason) = &one.reason { ": " (one_line(Sentence::of_program(reason).text(visit.language))) }
             }
             td.number.warn[is_uncertain] { (score(visit, one.confidence)) }
             td { @if let Some(pair) = one.pair.as_ref().filter(|_| one.state != BlockCharacterState::Left) {

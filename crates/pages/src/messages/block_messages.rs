@@ -175,7 +175,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ("check the unit", "hãy kiểm tra đơn vị"),
     (
         "the scan shows no carved face: {}",
-        "bản quét không có mặt khắc: {0}",
+        "bản quét không có mặt khắc: {!0}",
     ),
     (
         "{} control points are too few: choose at least {}",

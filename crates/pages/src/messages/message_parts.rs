@@ -2,6 +2,7 @@
 
 use super::left_out_words::left_out_reasons;
 use super::message_patterns::{filled_by, parts_of};
+use super::stage_words::stage_text;
 use crate::digit_groups::grouped;
 
 /// Places before a message with their Vietnamese texts. What stands for `{}` is a number, a list of lines, one word or a
@@ -96,15 +97,22 @@ const PARTS: &[(&str, &str)] = &[
     ("No space left on device", "đĩa đã đầy"),
 ];
 
-/// Returns a pattern with `{0}` replaced by the first part, and so on. `{0#}` is the same for a count, whose digits are
-/// grouped. Braces in a part stay as they are.
-pub(super) fn filled(pattern: &str, parts: &[&str]) -> String {
+/// Returns a pattern with `{0}` replaced by the first part, and so on. `{0#}` is the same for a count, whose digits are grouped,
+/// and `{!0}` for a message of its own, which `message` translates, or the name of a stage. Braces in a part stay as they are.
+pub(super) fn filled(
+    pattern: &str,
+    parts: &[&str],
+    message: impl Fn(&str) -> Option<String>,
+) -> String {
     filled_by(pattern, |place| {
-        let counted = place.strip_suffix('#');
-        let index = counted.unwrap_or(place).parse::<usize>().ok()?;
+        let (counted, inner) = (place.strip_suffix('#'), place.strip_prefix('!'));
+        let index = counted.or(inner).unwrap_or(place).parse::<usize>().ok()?;
         let part = parts.get(index)?;
         let count = counted.and_then(|_| part.parse::<u64>().ok());
-        Some(count.map_or_else(|| part_text(part), grouped))
+        let stage = || stage_text(part).map(str::to_owned);
+        let known = inner.and_then(|_| message(part).or_else(stage));
+        let known = known.or_else(|| count.map(grouped));
+        Some(known.unwrap_or_else(|| part_text(part)))
     })
 }
 
@@ -113,7 +121,7 @@ pub(super) fn place_text(place: &str) -> Option<String> {
     let of_row = PLACES.iter().find_map(|(english, vietnamese)| {
         let parts = parts_of(place, english)?;
         let are_short = parts.iter().all(|part| is_of_place(part));
-        are_short.then(|| filled(vietnamese, &parts))
+        are_short.then(|| filled(vietnamese, &parts, |_| None))
     });
     of_row.or_else(|| with_more(place, "mục khác"))
 }

@@ -2,6 +2,7 @@
 //! by their wording.
 
 use super::block_messages::BLOCK_MESSAGES;
+use super::block_refusals::BLOCK_REFUSALS;
 use super::foreign_messages::FOREIGN_MESSAGES;
 use super::held_messages::HELD_MESSAGES;
 use super::import_messages::IMPORT_MESSAGES;
@@ -10,13 +11,14 @@ use super::list_messages::LIST_MESSAGES;
 use super::message_parts::{filled, place_text};
 use super::message_patterns::parts_of;
 use super::message_table::MESSAGES;
+use super::pair_refusals::PAIR_REFUSALS;
 use super::parser_messages::PARSER_MESSAGES;
 
 /// A message with its Vietnamese text.
 type MessageRow = (&'static str, &'static str);
 
 /// The tables of messages. A row of an earlier one is preferred.
-const TABLES: [&[MessageRow]; 8] = [
+const TABLES: [&[MessageRow]; 10] = [
     MESSAGES,
     BLOCK_MESSAGES,
     LIST_MESSAGES,
@@ -25,6 +27,8 @@ const TABLES: [&[MessageRow]; 8] = [
     IMPORT_MESSAGES,
     HELD_MESSAGES,
     FOREIGN_MESSAGES,
+    PAIR_REFUSALS,
+    BLOCK_REFUSALS,
 ];
 
 /// Messages that end with a reason that no table has.
@@ -88,7 +92,7 @@ fn clause_among(text: &str, tables: &[&[MessageRow]]) -> Option<String> {
             let is_clean = parts.iter().all(|part| !part.contains("; "));
             // The first part of these may begin behind a colon, but not before it.
             let begins_here = !english.starts_with("{} ") || !parts[0].contains(": ");
-            (is_clean && begins_here).then(|| filled(vietnamese, &parts))
+            (is_clean && begins_here).then(|| filled(vietnamese, &parts, clause))
         })?;
         Some(match before.strip_suffix(": ") {
             Some(before) => format!("{}: {found}", before_text(before)),
@@ -108,6 +112,8 @@ fn before_text(before: &str) -> String {
 
 #[cfg(test)]
 mod fragments;
+#[cfg(test)]
+mod refusal_tests;
 #[cfg(test)]
 mod source_sentences;
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Messages of the program in Vietnamese, for all pages.
 
 mod block_messages;
+mod block_refusals;
 mod foreign_messages;
 mod held_messages;
 mod import_messages;
@@ -11,6 +12,7 @@ mod message_parts;
 mod message_patterns;
 mod message_table;
 mod message_words;
+mod pair_refusals;
 mod parser_messages;
 mod report_answers;
 mod report_captions;

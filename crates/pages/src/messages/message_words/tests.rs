@@ -8,7 +8,7 @@ use super::super::foreign_messages::FOREIGN_MESSAGES;
 use super::{TABLES, vietnamese};
 
 /// Checks messages and their Vietnamese texts.
-fn assert_translated(messages: &[(&str, &str)]) {
+pub(super) fn assert_translated(messages: &[(&str, &str)]) {
     for (english, expected) in messages {
         assert_eq!(vietnamese(english).as_deref(), Some(*expected));
     }
@@ -258,7 +258,10 @@ fn an_export_of_nothing_is_explained() {
 }
 
 /// Parts of messages that the program joins with the words beside them, so that no source has both.
-const COMPOSED: [&str; 36] = [
+const COMPOSED: [&str; 39] = [
+    "half of the print only: is the sheet folded, torn or covered there?",
+    "has no large flat part",
+    "which is the size of a single character",
     "no result is selected",
     "none of the chosen pairs has a result to export",
     "cannot be applied, so its colours are read as sRGB",
@@ -297,8 +300,7 @@ const COMPOSED: [&str; 36] = [
     ", and import it again",
 ];
 
-/// Returns the sources of all crates and tests as one text, without the translated messages and their tests. Strings that go on
-/// in the next line are joined.
+/// Returns the sources of all crates and tests as one text, without the translated messages and their tests.
 fn sources() -> String {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut open = vec![crates.join("../tests/it"), crates];
@@ -316,7 +318,12 @@ fn sources() -> String {
             }
         }
     }
-    let mut parts = all.split("\\\n");
+    joined(&all)
+}
+
+/// Returns sources in which strings that go on in the next line are joined.
+pub(super) fn joined(sources: &str) -> String {
+    let mut parts = sources.split("\\\n");
     let mut joined = parts.next().unwrap_or_default().to_owned();
     for part in parts {
         joined += part.trim_start();
@@ -339,9 +346,13 @@ fn the_program_still_says_what_is_translated() {
         assert!(sources.contains(said), "{english:?}: {said:?}");
         let count = english.matches("{}").count();
         for index in count..10 {
-            let parts = [format!("{{{index}}}"), format!("{{{index}#}}")];
-            let is_missing = |part: &String| !vietnamese.contains(part);
-            assert!(parts.iter().all(is_missing), "{vietnamese:?}");
+            for part in [
+                format!("{{{index}}}"),
+                format!("{{{index}#}}"),
+                format!("{{!{index}}}"),
+            ] {
+                assert!(!vietnamese.contains(&part), "{vietnamese:?}");
+            }
         }
     }
 }

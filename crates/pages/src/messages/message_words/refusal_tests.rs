@@ -1,0 +1,172 @@
+//! Every refusal of a stage has a Vietnamese text.
+
+use std::path::Path;
+
+use super::tests::{assert_translated, joined};
+use super::{TABLES, parts_of, vietnamese};
+
+/// Sources with the errors that become failures of pairs and blocks, or say why ground truth is not used.
+const SOURCES: [&str; 16] = [
+    "align/src/block/control_start.rs",
+    "align/src/block/cut.rs",
+    "align/src/block/error.rs",
+    "align/src/block/label_fit.rs",
+    "align/src/stages/binarize/ink.rs",
+    "align/src/stages/depth.rs",
+    "align/src/stages/fit/params.rs",
+    "align/src/stages/normalize/params.rs",
+    "align/src/stages/register/params.rs",
+    "core/src/mesh/arrays.rs",
+    "core/src/mesh/error.rs",
+    "core/src/raster/decode/error.rs",
+    "lists/src/labels/error.rs",
+    "results/src/ground_truth.rs",
+    "store/src/artifact_error.rs",
+    "store/src/input_error.rs",
+];
+
+/// Errors that are put together of parts with words, which [`refusals_that_are_put_together_are_translated`] has.
+const PUT_TOGETHER: [&str; 2] = ["the file 7", "7 of 7 7 outside the page of 7 x 7 px: 7?"];
+
+/// Returns the texts of the errors in a source, as `thiserror` has them.
+fn error_texts(source: &str) -> Vec<String> {
+    let source = joined(source);
+    let attributes = source.split("#[error(").skip(1);
+    attributes
+        .filter_map(|rest| string(rest.trim_start()))
+        .collect()
+}
+
+/// Returns the string at the beginning of a source.
+fn string(source: &str) -> Option<String> {
+    let mut chars = source.strip_prefix('"')?.chars();
+    let mut said = String::new();
+    loop {
+        match chars.next()? {
+            '"' => return Some(said),
+            '\\' => said.push(chars.next()?),
+            other => said.push(other),
+        }
+    }
+}
+
+/// Returns a text with a number in each place. A place behind a letter or a number may be empty, and is.
+fn filled_in(text: &str) -> String {
+    let (mut said, mut rest) = (String::new(), text);
+    while let Some((before, place)) = rest.split_once('{') {
+        said += before;
+        let (_, after) = place.split_once('}').expect("the end of a place");
+        if !said.ends_with(char::is_alphanumeric) {
+            said.push('7');
+        }
+        rest = after;
+    }
+    said + rest
+}
+
+/// Returns whether all clauses of a message with words have a Vietnamese text.
+fn is_translated(message: &str) -> bool {
+    let is_row = TABLES
+        .iter()
+        .copied()
+        .flatten()
+        .any(|(english, _)| parts_of(message, english).is_some());
+    let mut clauses = message.split("; ");
+    let is_known =
+        |clause: &str| !clause.contains(char::is_alphabetic) || vietnamese(clause).is_some();
+    is_row || clauses.all(is_known)
+}
+
+#[test]
+fn every_error_of_a_stage_is_translated() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    for path in SOURCES {
+        let source = std::fs::read_to_string(crates.join(path)).expect("a source");
+        let texts = error_texts(&source);
+        assert!(!texts.is_empty(), "{path}");
+        for text in texts {
+            let message = filled_in(&text);
+            let is_put_together = PUT_TOGETHER.contains(&message.as_str());
+            assert!(
+                is_put_together || is_translated(&message),
+                "{path}: {message}"
+            );
+        }
+    }
+}
+
+#[test]
+fn refusals_that_are_put_together_are_translated() {
+    assert_translated(&[
+        (
+            "a.json: the file is a pointer of Git LFS and does not hold the labels",
+            "a.json: tệp là con trỏ của Git LFS và không chứa nội dung thật",
+        ),
+        (
+            "a.json: 3 of 5 boxes lie outside the page of 100 x 50 px: labels of another page?",
+            "a.json: 3 trong 5 khung nằm ngoài trang in 100 x 50 px: có phải nhãn của trang khác không?",
+        ),
+        (
+            "a.json: the file has no boxes for \"b.jpg\"; draw at least one",
+            "a.json: tệp không có khung nào của \"b.jpg\"; hãy vẽ ít nhất một khung",
+        ),
+        (
+            "m.ply: line 6: 2 of 3 coordinates; it is the last line, so the file seems to be cut off",
+            "m.ply: dòng 6: chỉ có 2 trong 3 tọa độ; đây là dòng cuối nên tệp có vẻ bị cắt cụt",
+        ),
+        (
+            "m.ply: the PLY header is wrong: the file ends before end_header",
+            "m.ply: phần đầu tệp PLY sai: tệp hết trước end_header",
+        ),
+        (
+            "b.ply: the scan shows no carved face: its front has no large flat part; is this the scan of a whole block?",
+            "b.ply: bản quét không có mặt khắc: mặt trước không có phần phẳng lớn; đây có phải bản quét của cả ván không?",
+        ),
+        (
+            "b.png: the page image shows no ink: its darkest parts take 3 % of the light",
+            "b.png: hình trang in không có mực: chỗ tối nhất chỉ hấp thụ 3 % ánh sáng",
+        ),
+        (
+            "a.stl: no carving found: the likeliest side has a relief of 0.1 on an extent of 9.5 (mesh units), a share below \
+             fit.min_relief 0.02; no other side or part resembles the print",
+            "a.stl: không tìm thấy nét khắc: phía khả dĩ nhất có độ nổi 0,1 trên chiều dài 9,5 (đơn vị của bản quét), tỉ lệ thấp \
+             hơn fit.min_relief 0,02; không có phía hay phần nào khác giống bản in",
+        ),
+    ]);
+}
+
+#[test]
+fn failures_of_a_run_are_translated() {
+    assert_translated(&[
+        (
+            "register took longer than 600 s",
+            "bước căn chỉnh với bản in mất hơn 600 giây",
+        ),
+        (
+            "fit took longer than 600 s while it read m/a.stl; its disk or network may hang",
+            "bước khớp mặt khắc mất hơn 600 giây khi đọc m/a.stl; ổ đĩa hoặc mạng có thể bị treo",
+        ),
+        (
+            "the stage took longer than 600 s (run.stage_timeout_s)",
+            "bước này mất hơn 600 giây (run.stage_timeout_s)",
+        ),
+        (
+            "3 workers died or hung over it at depth",
+            "3 tiến trình đã chết hoặc treo vì nó ở bước bản đồ độ sâu",
+        ),
+        (
+            "its box lies outside the page",
+            "khung của chữ nằm ngoài trang in",
+        ),
+        (
+            "the scan shows no surface at its box",
+            "bản quét không có bề mặt ở khung của chữ",
+        ),
+        (
+            "page.jpg: no columns of characters were found; draw boxes around the characters, for example in the VGG Image \
+             Annotator, and give the file as labels",
+            "page.jpg: không tìm thấy cột chữ nào; hãy vẽ khung quanh các chữ, chẳng hạn bằng VGG Image Annotator, rồi dùng tệp \
+             đó làm nhãn",
+        ),
+    ]);
+}

@@ -1,0 +1,287 @@
+//! Why stages of pairs refuse scans and prints, with the Vietnamese texts.
+
+/// Messages like those of the table of messages. An earlier row is preferred.
+pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
+    (
+        "mesh has {} vertices, a plane needs 3",
+        "bản quét có {0} đỉnh, cần ít nhất 3 đỉnh để có mặt phẳng",
+    ),
+    (
+        "the coordinates of the {} vertices are too large to compute with",
+        "tọa độ của {0} đỉnh quá lớn để tính",
+    ),
+    (
+        "all {} vertices lie at one point",
+        "cả {0} đỉnh nằm tại một điểm",
+    ),
+    (
+        "all {} vertices lie on one line",
+        "cả {0} đỉnh nằm trên một đường thẳng",
+    ),
+    (
+        "mesh has no faces, and {} points are too few to show a surface",
+        "bản quét không có mặt tam giác, và {0} điểm là quá ít để thấy bề mặt",
+    ),
+    (
+        "mesh of {} vertices shows no surface from either side",
+        "bản quét {0} đỉnh không có bề mặt nhìn từ cả hai phía",
+    ),
+    (
+        "no carving found: the likeliest side has a relief of {} on an extent of {} (mesh units), a share below fit.min_relief {}",
+        "không tìm thấy nét khắc: phía khả dĩ nhất có độ nổi {0} trên chiều dài {1} (đơn vị của bản quét), tỉ lệ thấp hơn fit.min_relief {2}",
+    ),
+    (
+        "no other side or part resembles the print",
+        "không có phía hay phần nào khác giống bản in",
+    ),
+    (
+        "plane fit found {} inliers of {} selected points, needs {}",
+        "khớp mặt phẳng chỉ được {0} trong {1} điểm đã chọn, cần {2}",
+    ),
+    (
+        "depth.resolution_by is px_per_mm but the unit of the mesh is not known",
+        "depth.resolution_by là px_per_mm nhưng không biết đơn vị của bản quét",
+    ),
+    ("give it in the manifest", "hãy ghi đơn vị trong danh sách"),
+    (
+        "depth map would be {} px long, more than {}",
+        "bản đồ độ sâu sẽ dài {0} điểm ảnh, hơn {1}",
+    ),
+    (
+        "lower depth.px_per_mm or check the unit",
+        "hãy giảm depth.px_per_mm hoặc kiểm tra đơn vị",
+    ),
+    (
+        "no ray along the plane's normal meets the mesh",
+        "không có tia nào vuông góc với mặt phẳng gặp bản quét",
+    ),
+    (
+        "print has no ink: {} of it is beyond the grey threshold {}",
+        "bản in không có mực: {0} của hình vượt ngưỡng xám {1}",
+    ),
+    (
+        "print is ink all over: its lightest grey is {} of full white",
+        "bản in toàn là mực: mức xám sáng nhất chỉ bằng {0} của trắng hoàn toàn",
+    ),
+    (
+        "normalize chose no threshold for {}",
+        "bước tách nét không chọn được ngưỡng cho {0}",
+    ),
+    (
+        "the depth map has no strokes at the threshold of {}",
+        "bản đồ độ sâu không có nét ở ngưỡng của {0}",
+    ),
+    (
+        "they agree in the left half of the print only: is the sheet folded, torn or covered there?",
+        "chỉ khớp ở nửa trái của bản in: tờ giấy có bị gấp, rách hoặc bị che không?",
+    ),
+    (
+        "they agree in the right half of the print only: is the sheet folded, torn or covered there?",
+        "chỉ khớp ở nửa phải của bản in: tờ giấy có bị gấp, rách hoặc bị che không?",
+    ),
+    (
+        "they agree in the upper half of the print only: is the sheet folded, torn or covered there?",
+        "chỉ khớp ở nửa trên của bản in: tờ giấy có bị gấp, rách hoặc bị che không?",
+    ),
+    (
+        "they agree in the lower half of the print only: is the sheet folded, torn or covered there?",
+        "chỉ khớp ở nửa dưới của bản in: tờ giấy có bị gấp, rách hoặc bị che không?",
+    ),
+    (
+        "this looks like a whole block ({} mm): import it with its page by {}",
+        "trông như cả ván ({0} mm): hãy nhập cùng trang in của nó bằng {1}",
+    ),
+    (
+        "the stage took longer than {} s (run.stage_timeout_s)",
+        "bước này mất hơn {0} giây (run.stage_timeout_s)",
+    ),
+    (
+        "{} took longer than {} s while it read {}",
+        "bước {!0} mất hơn {1} giây khi đọc {2}",
+    ),
+    (
+        "its disk or network may hang",
+        "ổ đĩa hoặc mạng có thể bị treo",
+    ),
+    ("{} took longer than {} s", "bước {!0} mất hơn {1} giây"),
+    (
+        "{} workers died or hung over it at {}",
+        "{0} tiến trình đã chết hoặc treo vì nó ở bước {!1}",
+    ),
+    (
+        "the stage returned a number that is not finite",
+        "bước này trả về một số không hữu hạn",
+    ),
+    (
+        "a stage finished before the mesh was read",
+        "một bước kết thúc trước khi đọc bản quét",
+    ),
+    ("there are no vertices", "không có đỉnh nào"),
+    ("there are {} vertices", "có {0} đỉnh"),
+    (
+        "at most 4294967295 can be used",
+        "chỉ dùng được nhiều nhất 4294967295 đỉnh",
+    ),
+    (
+        "vertex {} (counted from 0) has the coordinate {}, which is not a finite number",
+        "đỉnh {0} (đếm từ 0) có tọa độ {1}, không phải số hữu hạn",
+    ),
+    (
+        "remove such vertices and their faces",
+        "hãy bỏ các đỉnh đó và các mặt của chúng",
+    ),
+    (
+        "face {} refers to vertex {}, but there are {} vertices",
+        "mặt {0} dùng đỉnh {1}, nhưng chỉ có {2} đỉnh",
+    ),
+    ("both count from 0", "cả hai đếm từ 0"),
+    (
+        "the {} holds {}, but its header says {}",
+        "tệp {0} chứa {1}, nhưng phần đầu tệp ghi {2}",
+    ),
+    (
+        "save it again with the right count",
+        "hãy lưu lại với số lượng đúng",
+    ),
+    (
+        "save it again with the right counts",
+        "hãy lưu lại với các số lượng đúng",
+    ),
+    (
+        "the binary STL has {} bytes a triangle instead of 50",
+        "tệp STL nhị phân có {0} byte mỗi tam giác thay vì 50",
+    ),
+    (
+        "save it again without attributes, or as PLY",
+        "hãy lưu lại không kèm thuộc tính, hoặc thành PLY",
+    ),
+    (
+        "the {} has {} bytes after the rows that its header counts",
+        "tệp {0} còn {1} byte sau các dòng mà phần đầu tệp ghi",
+    ),
+    (
+        "{} of {} vertices have no position (NaN, infinite or repeated 0 0 0), and without them nothing is left",
+        "{0} trong {1} đỉnh không có vị trí (NaN, vô hạn hoặc 0 0 0 lặp lại), bỏ chúng đi thì không còn gì",
+    ),
+    (
+        "a face refers to a vertex that the file does not have",
+        "có mặt dùng một đỉnh mà tệp không có",
+    ),
+    ("line {}", "dòng {0}"),
+    ("the PLY header is wrong: {}", "phần đầu tệp PLY sai: {!0}"),
+    ("{} of 3 coordinates", "chỉ có {0} trong 3 tọa độ"),
+    (
+        "a coordinate is missing or not a number",
+        "thiếu tọa độ hoặc tọa độ không phải là số",
+    ),
+    (
+        "a corner is not the number of a vertex",
+        "một góc không phải là số thứ tự của đỉnh",
+    ),
+    (
+        "a corner refers to a vertex that the file does not have",
+        "một góc dùng đỉnh mà tệp không có",
+    ),
+    (
+        "the last line is a face with {}",
+        "dòng cuối là một mặt chỉ có {0}",
+    ),
+    ("the file seems to be cut off", "tệp có vẻ bị cắt cụt"),
+    (
+        "it is the last line, so the file seems to be cut off",
+        "đây là dòng cuối nên tệp có vẻ bị cắt cụt",
+    ),
+    ("it has more than {} bytes", "dòng có hơn {0} byte"),
+    ("a vertex outside of a facet", "có đỉnh nằm ngoài mặt"),
+    (
+        "{} is not a word of ascii STL",
+        "{0} không phải là từ của STL dạng văn bản",
+    ),
+    ("{} stands where it must not", "{0} nằm sai chỗ"),
+    (
+        "its commas may separate numbers or be part of them",
+        "dấu phẩy có thể ngăn cách các số hoặc thuộc về số",
+    ),
+    (
+        "write spaces between numbers",
+        "hãy viết dấu cách giữa các số",
+    ),
+    (
+        "it names {} columns, but the first point has {}",
+        "dòng này nêu {0} cột, nhưng điểm đầu tiên có {1}",
+    ),
+    ("no format line", "thiếu dòng format"),
+    (
+        "the file ends before end_header",
+        "tệp hết trước end_header",
+    ),
+    ("it is longer than 1 MiB", "dài hơn 1 MiB"),
+    (
+        "limits.image.max_bytes is {}",
+        "limits.image.max_bytes là {0}",
+    ),
+    (
+        "the image is {} x {} pixels: it has no pixels",
+        "hình có cỡ {0} x {1}: không có điểm ảnh nào",
+    ),
+    ("the image is {} x {} pixels", "hình có {0} x {1} điểm ảnh"),
+    (
+        "limits.image.max_pixels is {}",
+        "limits.image.max_pixels là {0}",
+    ),
+    (
+        "the TIFF image has {} pages, {} of them of full size",
+        "hình TIFF có {0} trang, trong đó {1} trang đủ cỡ",
+    ),
+    (
+        "a print is one page: save it as its own file",
+        "bản in là một trang: hãy lưu trang đó thành tệp riêng",
+    ),
+    (
+        "the {} cannot be decoded: {}",
+        "không giải mã được {0}: {!1}",
+    ),
+    ("it has no image", "tệp không có hình"),
+    ("one of its colours is missing", "thiếu một thành phần màu"),
+    (
+        "its colours are coded in several scans of different sizes",
+        "màu được mã hóa trong nhiều lượt quét khác cỡ",
+    ),
+    (
+        "save it as a usual JPEG or as PNG",
+        "hãy lưu thành JPEG thông thường hoặc PNG",
+    ),
+    (
+        "its chroma samples are shared by pixels in an unusual way",
+        "các điểm ảnh dùng chung mẫu màu theo cách không thông dụng",
+    ),
+    ("save it as RGB", "hãy lưu thành RGB"),
+    ("its {} data are damaged", "dữ liệu {0} bị hỏng"),
+    ("artifact {} is missing", "thiếu tệp kết quả {0}"),
+    (
+        "artifact {} was changed: its bytes do not match its name",
+        "tệp kết quả {0} đã bị thay đổi: nội dung không khớp với tên",
+    ),
+    (
+        "artifact {} is in an object store",
+        "tệp kết quả {0} nằm trong kho đối tượng",
+    ),
+    (
+        "set storage.artifacts to its address",
+        "hãy đặt storage.artifacts thành địa chỉ của kho",
+    ),
+    ("artifact {}: {}", "tệp kết quả {0}: {1}"),
+    (
+        "{} is {}, where this program keeps {} of its own",
+        "{0} là {1}, trong khi chương trình này giữ {2} ở đó",
+    ),
+    ("move it away", "hãy chuyển nó đi"),
+    (
+        "{} was renamed, moved or removed during this command, so nothing more was written there",
+        "{0} đã bị đổi tên, chuyển hoặc xóa trong lúc chạy nên không ghi thêm gì vào đó",
+    ),
+    (
+        "run the command again with the new path",
+        "hãy chạy lại với đường dẫn mới",
+    ),
+];
