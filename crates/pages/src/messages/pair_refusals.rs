@@ -167,7 +167,6 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "a face refers to a vertex that the file does not have",
         "có mặt dùng một đỉnh mà tệp không có",
     ),
-    ("line {}", "dòng {0}"),
     ("the PLY header is wrong: {}", "phần đầu tệp PLY sai: {!0}"),
     ("{} of 3 coordinates", "chỉ có {0} trong 3 tọa độ"),
     (

@@ -26,7 +26,11 @@ const SOURCES: [&str; 16] = [
 ];
 
 /// Errors that are put together of parts with words, which [`refusals_that_are_put_together_are_translated`] has.
-const PUT_TOGETHER: [&str; 2] = ["the file 7", "7 of 7 7 outside the page of 7 x 7 px: 7?"];
+const PUT_TOGETHER: [&str; 3] = [
+    "line 7: 7",
+    "the file 7",
+    "7 of 7 7 outside the page of 7 x 7 px: 7?",
+];
 
 /// Returns the texts of the errors in a source, as `thiserror` has them.
 fn error_texts(source: &str) -> Vec<String> {
