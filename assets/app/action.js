@@ -27,7 +27,9 @@ export function read(status, text) {
   try {
     reply = JSON.parse(text);
   } catch {
-    reply = { error: text };
+    // A request that reached no page of the app is refused in English and, on the next line, in Vietnamese.
+    const lines = text.split("\n");
+    reply = { error: document.documentElement.lang === "vi" ? (lines[1] ?? text) : lines[0] };
   }
   if (status !== 200) {
     throw Object.assign(new Error(reply.error || text || String(status)), { status, retired: reply.retired ?? [] });

@@ -2,12 +2,22 @@
 
 import { blockText } from "./block-messages.js";
 
+/** Parses a reply. A request that reached no page is refused in English and, on the next line, in Vietnamese. */
+function parsed(text) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    const [error, vietnamese] = text.split("\n");
+    return { error, error_vi: vietnamese };
+  }
+}
+
 /** Returns the JSON of a reply; throws the sentence of a refusal in the language of the page. */
 export async function request(language, path, options) {
   const response = await fetch(path, options).catch(() => null);
   if (!response) throw new Error(blockText(language, "no_answer"));
-  const answer = await response.json().catch(() => ({ error: response.statusText }));
-  if (!response.ok) throw new Error(answer[`error_${language}`] ?? answer.error);
+  const answer = parsed(await response.text());
+  if (!response.ok) throw new Error(answer[`error_${language}`] ?? (answer.error || response.statusText));
   return answer;
 }
 

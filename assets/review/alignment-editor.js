@@ -1,6 +1,6 @@
 // Manual alignment: move, rotate and scale the relief on the print, with live scores of the masks.
 
-import { translate } from "./config.js";
+import { refusalOf, translate } from "./config.js";
 import { alignmentImages } from "./image-cache.js";
 import { bits, edges, overlap, warpMask, RELIEF } from "./masks.js";
 import { localNumber } from "./scan-messages.js";
@@ -25,7 +25,7 @@ export class AlignmentEditor {
   /** Loads the additional images and opens the editor. `onChange` is called after each change. */
   static async open(item, layers, viewer, onChange) {
     const response = await fetch(`api/alignment/${item.id}`);
-    if (!response.ok) throw new Error((await response.json()).error);
+    if (!response.ok) throw new Error(await refusalOf(response));
     const [start, extra] = await Promise.all([response.json(), alignmentImages(item.id)]);
     return new AlignmentEditor(item, layers, viewer, onChange, start, extra);
   }

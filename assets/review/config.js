@@ -26,3 +26,17 @@ export const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scal
 export function translate(key, values = {}) {
   return withValues(config.messages[language]?.[key] ?? key, values);
 }
+
+/** Returns why a request was refused, in the language of the page if the server says it. */
+export async function refusalOf(response) {
+  const text = await response.text();
+  let reply;
+  try {
+    reply = JSON.parse(text);
+  } catch {
+    // A request that reached no page is refused in English and, on the next line, in Vietnamese.
+    const [error, vietnamese] = text.split("\n");
+    reply = { error, error_vi: vietnamese };
+  }
+  return reply[`error_${language}`] ?? (reply.error || String(response.status));
+}

@@ -1,6 +1,6 @@
 // The items in order, the reviewer's answers, and the log of events for undo.
 
-import { translate } from "./config.js";
+import { refusalOf, translate } from "./config.js";
 
 export class ReviewQueue {
   constructor() {
@@ -19,7 +19,7 @@ export class ReviewQueue {
   /** Loads the queue; `pending` requests that are not stored yet are applied on top. */
   async load(pending) {
     const response = await fetch("api/queue");
-    if (!response.ok) throw new Error((await response.json()).error);
+    if (!response.ok) throw new Error(await refusalOf(response));
     const { items, pairs, opens_guide: opensGuide, fault_shortage: faultShortage } = await response.json();
     this.opensGuide = opensGuide;
     this.faultShortage = faultShortage;

@@ -1,6 +1,6 @@
 // Requests to store: sent in order, and retried until the server confirms that they are on the disk.
 
-import { csrfToken, sendLimitMs } from "./config.js";
+import { csrfToken, refusalOf, sendLimitMs } from "./config.js";
 
 const STORAGE_KEY = "mocban-pending";
 /** Number of unsaved requests at which the page accepts no more answers. */
@@ -89,8 +89,7 @@ export class RetryQueue {
       return { retry: GUEST ? "invitation_ended" : "restarted" };
     }
     if (response.status >= 500) return { retry: "disconnected" };
-    const { error } = await response.json().catch(() => ({}));
-    return { why: error ?? String(response.status) };
+    return { why: await refusalOf(response) };
   }
 
   /**

@@ -1,6 +1,6 @@
 // The 3D view of an item in a dialog over the page.
 
-import { language, translate } from "./config.js";
+import { language, refusalOf, translate } from "./config.js";
 
 const dialog = document.getElementById("scan");
 let mounted = null;
@@ -17,7 +17,7 @@ export async function openScan(item) {
   dialog.showModal();
   try {
     const [{ mountScanViewer }, response] = await Promise.all([import("./scan-viewer.js"), fetch(`scan/${item.id}`)]);
-    if (!response.ok) throw new Error((await response.json()).error);
+    if (!response.ok) throw new Error(await refusalOf(response));
     const data = await response.arrayBuffer();
     // The dialog may have been closed, and even opened again, while the data arrived.
     if (!container.isConnected) return;

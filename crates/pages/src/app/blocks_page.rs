@@ -17,10 +17,15 @@ use mocban_core::domain::{BlockStage, JobStatus, one_line};
 /// Most blocks that are listed.
 const SHOWN: usize = 1000;
 
-/// A list of blocks, as an example.
-const SAMPLE: &str = "block,mesh,page,labels,unit
+/// A list of blocks, as an example, with headings in English and in Vietnamese.
+const SAMPLES: [&str; 2] = [
+    "block,mesh,page,labels,unit
 b04,scans/b04.ply,pages/b04.jpg,labels/b04.json,mm
-b05,scans/b05.stl,pages/b05.png,,mm";
+b05,scans/b05.stl,pages/b05.png,,mm",
+    "ván,bản quét,trang in,nhãn,đơn vị
+b04,scans/b04.ply,pages/b04.jpg,labels/b04.json,mm
+b05,scans/b05.stl,pages/b05.png,,mm",
+];
 
 /// What the list can show, by the name in its address.
 const STATES: [(&str, &[JobStatus]); 3] = [
@@ -69,9 +74,9 @@ fn none(visit: &Visit, key: &str) -> Markup {
         &html! {
             p { (visit.t(
                 "The columns of such a list are block, mesh (the scan) and page (the image); labels (boxes of the characters), unit and side may follow. Other columns are kept with the block. Paths are relative to the list.",
-                "Các cột của danh sách là block (mã ván), mesh (bản quét) và page (hình trang in); có thể thêm labels (khung các chữ), unit và side. Các cột khác được giữ cùng với ván. Đường dẫn tính từ danh sách.",
+                "Các cột của danh sách là ván (mã ván), bản quét và trang in (hình trang in); có thể thêm nhãn (khung các chữ), đơn vị và mặt (trước hoặc sau). Các cột khác được giữ cùng với ván. Đường dẫn tính từ danh sách.",
             )) }
-            pre.scroll #block-sample tabindex="0" role="region" aria-label=(visit.t("Example of a list", "Ví dụ về danh sách")) { (SAMPLE) }
+            pre.scroll #block-sample tabindex="0" role="region" aria-label=(visit.t("Example of a list", "Ví dụ về danh sách")) { (SAMPLES[visit.index()]) }
             p { (visit.t(
                 "One block alone needs no list: choose its scan and the image of its page on the page Import.",
                 "Chỉ một ván thì không cần danh sách: hãy chọn bản quét và hình trang in của nó ở trang Nhập dữ liệu.",
@@ -160,5 +165,30 @@ pub(super) fn state_badge(visit: &Visit, block: &BlockState) -> Markup {
         @if let Some(stage) = block.next_stage.filter(|_| block.status != JobStatus::Quarantined) {
             " · " (visit.block_stage(stage)) " (" (stage as usize + 1) "/" (BlockStage::ALL.len()) ")"
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SAMPLES, none};
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+    use mocban_lists::manifest::parse_blocks;
+
+    #[test]
+    fn the_examples_of_a_list_are_read_and_equal() {
+        let [english, vietnamese] =
+            SAMPLES.map(|sample| parse_blocks(sample.as_bytes()).expect("a list"));
+        assert_eq!(english, vietnamese);
+        assert_eq!(english.len(), 2);
+    }
+
+    #[test]
+    fn a_page_names_the_columns_in_its_language() {
+        let shown = none(&Visit::in_language(Language::Vietnamese), "p").into_string();
+        for english in ["block,", "mesh", "labels,", "unit"] {
+            assert!(!shown.contains(english), "{shown}");
+        }
+        assert!(shown.contains("ván,bản quét,trang in"), "{shown}");
     }
 }

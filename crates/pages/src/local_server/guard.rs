@@ -50,51 +50,64 @@ const HEADERS: [(HeaderName, &str); 7] = [
     ),
 ];
 
-/// Why a request is rejected: the status and the body of the response.
+/// Why a request is rejected: the status and the body of the response, a line in English and one in Vietnamese, because no
+/// handler has chosen a language. Scripts show the line of their page.
 type Rejection = (StatusCode, &'static str);
 
 /// `Host` is not an address of this server, for example after DNS rebinding.
 const WRONG_HOST: Rejection = (
     StatusCode::MISDIRECTED_REQUEST,
-    "this host name is not served; open the address that the command printed",
+    "this host name is not served; open the address that the command printed\n\
+     tên máy này không được phục vụ; hãy mở địa chỉ mà lệnh đã in ra",
 );
 /// The path or the cookie of the session is missing or of an earlier start.
 const NO_SESSION: Rejection = (
     StatusCode::UNAUTHORIZED,
-    "open the address that you were given; it works once",
+    "open the address that you were given; it works once\n\
+     hãy mở địa chỉ bạn đã nhận; địa chỉ chỉ dùng được một lần",
 );
 /// `Origin` is missing or of another site.
-const WRONG_ORIGIN: Rejection = (StatusCode::FORBIDDEN, "only the page itself may write here");
+const WRONG_ORIGIN: Rejection = (
+    StatusCode::FORBIDDEN,
+    "only the page itself may write here\n\
+     chỉ chính trang này được ghi vào đây",
+);
 /// The body is not JSON. A form on another site could send such a body.
 const NO_JSON: Rejection = (
     StatusCode::UNSUPPORTED_MEDIA_TYPE,
-    "only application/json is accepted",
+    "only application/json is accepted\n\
+     chỉ nhận application/json",
 );
 /// The body is not marked as a file. A form on another site could send such a body.
 const NO_FILE: Rejection = (
     StatusCode::UNSUPPORTED_MEDIA_TYPE,
-    "only application/octet-stream is accepted",
+    "only application/octet-stream is accepted\n\
+     chỉ nhận application/octet-stream",
 );
 /// The CSRF token is missing or wrong.
 const WRONG_TOKEN: Rejection = (
     StatusCode::FORBIDDEN,
-    "the server was restarted; reload the page",
+    "the server was restarted; reload the page\n\
+     chương trình đã được mở lại; hãy tải lại trang",
 );
 
 /// The body of a guest is larger than [`GUEST_BODY_LIMIT`].
 const GUEST_TOO_LARGE: Rejection = (
     StatusCode::PAYLOAD_TOO_LARGE,
-    "the request is too large: at most 16 KiB are accepted",
+    "the request is too large: at most 16 KiB are accepted\n\
+     yêu cầu quá lớn: chỉ nhận nhiều nhất 16 KiB",
 );
 /// The body of the user is larger than [`BODY_LIMIT`].
 const TOO_LARGE: Rejection = (
     StatusCode::PAYLOAD_TOO_LARGE,
-    "the request is too large: at most 256 KiB are accepted",
+    "the request is too large: at most 256 KiB are accepted\n\
+     yêu cầu quá lớn: chỉ nhận nhiều nhất 256 KiB",
 );
 /// The body did not arrive in time.
 const TOO_SLOW: Rejection = (
     StatusCode::REQUEST_TIMEOUT,
-    "the request took too long to arrive",
+    "the request took too long to arrive\n\
+     yêu cầu đến quá chậm",
 );
 
 /// Rejects unauthorised requests and adds the security headers to every response. A request that is passed on has the

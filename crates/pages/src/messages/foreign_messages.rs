@@ -1,4 +1,5 @@
-//! Messages of the parsers of JSON and XML, which are other programs, with their Vietnamese texts.
+//! Messages of the parsers of JSON and XML and of the server of pages, which are other programs, with their Vietnamese
+//! texts.
 
 /// Messages without and with a place. Pages that leave out commands leave out the marks around signs, too.
 pub(super) const FOREIGN_MESSAGES: &[(&str, &str)] = &[
@@ -151,5 +152,18 @@ pub(super) const FOREIGN_MESSAGES: &[(&str, &str)] = &[
     (
         "ill-formed document: start tag not closed: </{}> not found before end of input",
         "thẻ `{0}` không được đóng",
+    ),
+    // Requests.
+    (
+        "Failed to buffer the request body: {}",
+        "không nhận được yêu cầu: {0}",
+    ),
+    (
+        "Failed to deserialize the JSON body into the target type: {}",
+        "trang gửi dữ liệu không hợp lệ: {0}",
+    ),
+    (
+        "Failed to parse the request body as JSON: {}",
+        "trang gửi dữ liệu không hợp lệ: {0}",
     ),
 ];

@@ -63,11 +63,6 @@ pub(super) const HELD_MESSAGES: &[(&str, &str)] = &[
         "the stored result of {} cannot be read: {}",
         "không đọc được kết quả đã lưu của bước {0}: {1}",
     ),
-    (
-        "the stored heights of the face: {}",
-        "độ cao đã lưu của mặt khắc: {0}",
-    ),
-    ("drawing stopped: {}", "việc vẽ bị dừng: {0}"),
     ("a new box has no edges", "khung mới không có cạnh"),
     // Chosen points.
     (

@@ -127,8 +127,6 @@ pub(super) const IMPORT_MESSAGES: &[(&str, &str)] = &[
     ("{} is not a directory", "{0} không phải là thư mục"),
     ("there is no directory {}", "không có thư mục {0}"),
     ("there is no file {}", "không có tệp {0}"),
-    ("cannot read {}: {}", "không đọc được {0}: {1}"),
-    ("cannot list {}: {}", "không liệt kê được {0}: {1}"),
     // Files of folders.
     (
         "the folder of meshes holds images, and that of prints holds meshes",

@@ -18,6 +18,14 @@ const PLACES: &[(&str, &str)] = &[
     ("the coordinates of {} {}", "tọa độ của {0} {1}"),
     ("the element {}", "phần tử {0}"),
     ("the image of the page", "hình của trang in"),
+    (
+        "cannot read the review queue",
+        "không đọc được danh sách cần đánh giá",
+    ),
+    (
+        "cannot plant an attention check",
+        "không tạo được hình kiểm tra",
+    ),
     ("the {} is damaged", "tệp {0} bị hỏng"),
     ("the workbook is damaged", "bảng tính bị hỏng"),
     (

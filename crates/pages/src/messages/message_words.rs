@@ -13,17 +13,19 @@ use super::message_patterns::parts_of;
 use super::message_table::MESSAGES;
 use super::pair_refusals::PAIR_REFUSALS;
 use super::parser_messages::PARSER_MESSAGES;
+use super::review_messages::REVIEW_MESSAGES;
 
 /// A message with its Vietnamese text.
 type MessageRow = (&'static str, &'static str);
 
 /// The tables of messages. A row of an earlier one is preferred.
-const TABLES: [&[MessageRow]; 10] = [
+const TABLES: [&[MessageRow]; 11] = [
     MESSAGES,
     BLOCK_MESSAGES,
     LIST_MESSAGES,
     LABEL_MESSAGES,
     PARSER_MESSAGES,
+    REVIEW_MESSAGES,
     IMPORT_MESSAGES,
     HELD_MESSAGES,
     FOREIGN_MESSAGES,
@@ -46,6 +48,21 @@ const OPEN_ENDED: &[MessageRow] = &[
     (
         "not a JSON object, line {}: {}",
         "không phải đối tượng JSON, dòng {0}: {1}",
+    ),
+    (
+        "cannot read the review queue: {}",
+        "không đọc được danh sách cần đánh giá: {0}",
+    ),
+    (
+        "cannot plant an attention check: {}",
+        "không tạo được hình kiểm tra: {0}",
+    ),
+    ("cannot read {}: {}", "không đọc được {0}: {1}"),
+    ("cannot list {}: {}", "không liệt kê được {0}: {1}"),
+    ("drawing stopped: {}", "việc vẽ bị dừng: {0}"),
+    (
+        "the stored heights of the face: {}",
+        "độ cao đã lưu của mặt khắc: {0}",
     ),
 ];
 

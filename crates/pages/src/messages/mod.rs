@@ -21,6 +21,7 @@ mod report_html;
 mod report_source_tests;
 mod report_table;
 mod report_words;
+mod review_messages;
 mod stage_words;
 
 pub(crate) use left_out_words::left_out_reasons;

@@ -14,6 +14,7 @@ use super::image_error::ImageError;
 use super::planted_faults::QueueError;
 use super::state::ServerState;
 use super::unstored::Unconfirmed;
+use crate::messages::vietnamese;
 use mocban_catalog::{CatalogError, CatalogErrorKind};
 use mocban_results::pair_artifacts::PairArtifactsError;
 
@@ -113,5 +114,11 @@ pub(super) async fn explain(
     if status.is_server_error() {
         tracing::warn!(%error, "a request of the review page failed");
     }
-    (status, Json(json!({ "error": error.text(&state) }))).into_response()
+    let text = error.text(&state);
+    let vietnamese = vietnamese(&text);
+    (
+        status,
+        Json(json!({ "error": text, "error_vi": vietnamese })),
+    )
+        .into_response()
 }

@@ -18,6 +18,16 @@ fn back_link(name: &str, back: Option<&str>) -> Markup {
     html! { @if let Some(back) = back { nav.scan-back { a href=(back) { "← " (name) } } } }
 }
 
+/// Says that the page needs its script, which also chooses the language.
+fn no_script() -> Markup {
+    html! {
+        noscript {
+            p { "This page needs JavaScript. All of it is served by your own computer." }
+            p lang="vi" { "Trang này cần JavaScript. Mọi thứ đều do máy tính của bạn cung cấp." }
+        }
+    }
+}
+
 /// Returns the page of a pair, with a link to `back`. Its script loads the data and creates the controls.
 pub(crate) fn view(pair: &str, language: Option<Language>, back: Option<&str>) -> String {
     let head = html! {
@@ -29,7 +39,7 @@ pub(crate) fn view(pair: &str, language: Option<Language>, back: Option<&str>) -
         body.scan-page {
             (back_link(pair, back))
             main #scan-viewer {}
-            noscript { p { "This page needs JavaScript. All of it is served by your own computer." } }
+            (no_script())
         }
     };
     let language = language.unwrap_or(DEFAULT_LANGUAGE);
@@ -63,7 +73,7 @@ fn block_page(name: &str, language: Option<Language>, back: Option<&str>, script
             (back_link(name, back))
             main #block-view { p.block-line.block-busy { "…" } }
             dialog #scan .scan-dialog {}
-            noscript { p { "This page needs JavaScript. All of it is served by your own computer." } }
+            (no_script())
         }
     };
     let language = language.unwrap_or(DEFAULT_LANGUAGE);

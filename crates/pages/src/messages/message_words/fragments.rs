@@ -92,6 +92,7 @@ pub(super) const FRAGMENTS: &[&str] = &[
     " and was cut there",
     " and were cut there",
     "{problem}; nothing was saved",
+    "a request of the review page failed",
     "{column} {path} of {} is {what}",
     "blocks with the same scan and page",
     "ignored, mesh without print",
@@ -203,5 +204,7 @@ pub(super) const SENTENCES: &[&str] = &[
     "nothing was repaired: the project is in use",
     "p/catalog.sqlite was locked by another process for too long; try again",
     "export is being written by another process (pid 7); wait until that process has ended, or choose another name",
+    "cannot read the review queue: p/catalog.sqlite was locked by another process for too long; try again",
+    "there is no verdict by lan to undo",
     "the run in progress has other settings (fit.seed: 1 -> 2); use the same settings, or wait until it has ended",
 ];

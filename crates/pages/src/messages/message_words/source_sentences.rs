@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use super::fragments::{FRAGMENTS, SENTENCES};
 use super::vietnamese;
 
-/// Sources whose sentences reach pages of imports and of blocks, below `crates`.
-const SOURCES: [&str; 15] = [
+/// Sources whose sentences reach pages of imports, blocks and reviews, below `crates`.
+const SOURCES: [&str; 27] = [
     "lists/src/columns.rs",
     "lists/src/labels",
     "lists/src/manifest",
@@ -14,9 +14,21 @@ const SOURCES: [&str; 15] = [
     "lists/src/workbook",
     "lists/src/xml.rs",
     "core/src/domain/pair_name.rs",
+    "catalog/src/records/verdict_rules.rs",
     "export/src/block_view/block_correction.rs",
     "export/src/block_view/block_error.rs",
     "export/src/block_view/box_edits.rs",
+    "pages/src/local_server/work_thread.rs",
+    "pages/src/review/answer.rs",
+    "pages/src/review/api_error.rs",
+    "pages/src/review/image_error.rs",
+    "pages/src/review/planted_faults.rs",
+    "pages/src/review/review_pages.rs",
+    "pages/src/review/unstored.rs",
+    "pages/src/view/block_labels.rs",
+    "pages/src/view/block_points.rs",
+    "pages/src/view/boxes_page.rs",
+    "pages/src/view/correction_page.rs",
     "project/src/block_files.rs",
     "project/src/import_blocks.rs",
     "project/src/manifest_file.rs",

@@ -258,7 +258,7 @@ fn an_export_of_nothing_is_explained() {
 }
 
 /// Parts of messages that the program joins with the words beside them, so that no source has both.
-const COMPOSED: [&str; 39] = [
+const COMPOSED: [&str; 40] = [
     "half of the print only: is the sheet folded, torn or covered there?",
     "has no large flat part",
     "which is the size of a single character",
@@ -298,6 +298,7 @@ const COMPOSED: [&str; 39] = [
     "the page image shows no ink",
     "is missing",
     ", and import it again",
+    "there is no verdict",
 ];
 
 /// Returns the sources of all crates and tests as one text, without the translated messages and their tests.
