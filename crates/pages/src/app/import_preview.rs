@@ -14,6 +14,7 @@ use super::visit::Visit;
 use crate::messages;
 use crate::review::Language;
 use mocban_core::domain::{LengthUnit, one_line};
+use mocban_lists::columns::plain_name;
 use mocban_lists::manifest::{BlockRow, PairingChanges};
 use mocban_project::import_plan::{ImportPlan, PlannedPair};
 use mocban_project::manifest_file::{IGNORED, RENAMED, renamed_columns};
@@ -56,7 +57,7 @@ pub(super) fn plan_part(
                     p { b { (grouped(read.rows.len() as u64)) } " " (visit.t("whole blocks", "ván nguyên")) }
                     p { (visit.t("Scans of whole blocks with their pages. A run finds the characters and makes the pairs.", "Bản quét ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) }
                     @for line in &read.warnings { p.notice { (one_line(&warning(visit, line))) } }
-                    @if let Some(renamed) = renamed_columns(&read.renamed) { p.muted { (one_line(&warning(visit, &renamed))) } }
+                    @if let Some(renamed) = renamed_columns(&read.renamed).and_then(|line| renamed_text(visit, &line)) { p.muted { (one_line(&renamed)) } }
                     (block_table(visit, &read.rows))
                     (other_columns(visit, &read.rows))
                 },
@@ -94,7 +95,7 @@ fn pairs_part(
         @if let Some(why) = no_pair { p.notice.bad { (why.text(visit.language)) } }
         @for line in plan.missing.lines.iter().take(SHOWN_LINES) { p.notice.bad { (one_line(Sentence::of_program(line).text(visit.language))) } }
         @for line in plan.warnings.iter().take(SHOWN_LINES) { p.notice { (one_line(&warning(visit, line))) } }
-        @if let Some(renamed) = &plan.renamed { p.muted { (one_line(&warning(visit, renamed))) } }
+        @if let Some(renamed) = plan.renamed.as_deref().and_then(|line| renamed_text(visit, line)) { p.muted { (one_line(&renamed)) } }
         @if shown.len() > 0 {
             div.scroll tabindex="0" role="region" aria-label=(visit.t("Pairs", "Các cặp")) {
                 table {
@@ -189,7 +190,6 @@ pub(super) fn warning(visit: &Visit, line: &str) -> String {
                 "Bỏ qua, không phải bản quét trong thư mục bản quét, hoặc không phải hình trong thư mục bản in",
             ],
         ),
-        (RENAMED, [RENAMED, "Đã hiểu các cột có tên khác"]),
     ];
     let found = beginnings
         .into_iter()
@@ -197,7 +197,10 @@ pub(super) fn warning(visit: &Visit, line: &str) -> String {
             let rest = line.strip_prefix(known)?;
             Some(match visit.language {
                 Language::English => format!("{english}{rest}"),
-                Language::Vietnamese => format!("{vietnamese}{}", with_vietnamese_rest(rest)),
+                Language::Vietnamese => {
+                    let more = messages::with_more(rest, "tệp khác");
+                    format!("{vietnamese}{}", more.unwrap_or_else(|| rest.to_owned()))
+                }
             })
         });
     found.unwrap_or_else(|| match visit.language {
@@ -209,13 +212,24 @@ pub(super) fn warning(visit: &Visit, line: &str) -> String {
     })
 }
 
-/// Returns the end of a list of names or columns in Vietnamese.
-fn with_vietnamese_rest(rest: &str) -> String {
-    let columns = COLUMN_NAMES.iter();
-    let rest = columns.fold(rest.to_owned(), |rest, [name, vietnamese]| {
-        rest.replace(&format!("\" as {name}"), &format!("\" là {vietnamese}"))
+/// Says which columns were read under other names than the page has for them. `None` if there are none.
+fn renamed_text(visit: &Visit, line: &str) -> Option<String> {
+    let columns = line.strip_prefix(RENAMED)?.strip_prefix(": ")?;
+    if visit.language == Language::English {
+        return Some(line.to_owned());
+    }
+    // A comma within a heading is followed by no quotation mark, unless the heading has one.
+    let columns = columns.split(", \"").filter_map(|column| {
+        let (written, name) = column.rsplit_once("\" as ")?;
+        let written = written.trim_start_matches('"');
+        let mut names = COLUMN_NAMES.iter();
+        let known = names.find(|[english, _]| *english == name);
+        let name = known.map_or(name, |[_, vietnamese]| *vietnamese);
+        let is_same = plain_name(written) == plain_name(name);
+        (!is_same).then(|| format!("\"{written}\" là {name}"))
     });
-    messages::with_more(&rest, "tệp khác").unwrap_or(rest)
+    let columns: Vec<String> = columns.collect();
+    (!columns.is_empty()).then(|| format!("Đã hiểu các cột có tên khác: {}", columns.join(", ")))
 }
 
 fn pair_row(
@@ -364,28 +378,31 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
 mod tests {
     use std::collections::BTreeMap;
 
-    use super::{SHOWN_COLUMNS, import_form, other_columns, warning};
+    use super::{SHOWN_COLUMNS, import_form, other_columns, renamed_text};
     use crate::app::address::PageQuery;
     use crate::app::import_choice::{ImportChoice, Planned};
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_core::domain::BlockName;
-    use mocban_lists::manifest::BlockRow;
+    use mocban_lists::manifest::{BlockRow, ReadBlocks};
     use serde_json::Value;
 
     #[test]
     fn columns_have_the_names_of_the_page() {
-        let line = "columns with other names were read: \"Khối\" as block, \"Ký hiệu\" as id";
-        let of = |language| warning(&Visit::in_language(language), line);
-        assert_eq!(of(Language::English), line);
+        let line = "columns with other names were read: \"Khối\" as block, \"Ký hiệu, số\" as id, \"Bản quét\" as mesh";
+        let of = |language, line| renamed_text(&Visit::in_language(language), line);
+        assert_eq!(of(Language::English, line).as_deref(), Some(line));
         assert_eq!(
-            of(Language::Vietnamese),
-            "Đã hiểu các cột có tên khác: \"Khối\" là Ván, \"Ký hiệu\" là Mã"
+            of(Language::Vietnamese, line).as_deref(),
+            Some("Đã hiểu các cột có tên khác: \"Khối\" là Ván, \"Ký hiệu, số\" là Mã")
         );
+        let same = "columns with other names were read: \"bản quét\" as mesh, \"Mã\" as id";
+        assert_eq!(of(Language::Vietnamese, same), None);
+        assert_eq!(of(Language::English, same).as_deref(), Some(same));
         let line = "columns with other names were read: \"Trang\" as page, \"Tệp nhãn\" as labels";
         assert_eq!(
-            warning(&Visit::in_language(Language::Vietnamese), line),
-            "Đã hiểu các cột có tên khác: \"Trang\" là Trang in, \"Tệp nhãn\" là Nhãn"
+            of(Language::Vietnamese, line).as_deref(),
+            Some("Đã hiểu các cột có tên khác: \"Trang\" là Trang in, \"Tệp nhãn\" là Nhãn")
         );
     }
 
@@ -429,7 +446,7 @@ mod tests {
     #[test]
     fn what_the_form_of_an_import_has_is_kept_in_the_address_of_its_page() {
         let chosen = ImportChoice::of(&PageQuery::parse("project=p&unit=cm&changed=yes"));
-        let planned = Planned::Blocks(Vec::new(), Vec::new());
+        let planned = Planned::Blocks(ReadBlocks::default());
         let visit = Visit::in_language(Language::English);
         let shown = import_form(&visit, &chosen, &planned).into_string();
         assert_eq!(shown.matches(" data-in-address>").count(), 3, "{shown}");
