@@ -112,6 +112,23 @@ fn a_refused_action_is_explained_in_the_language_of_the_page() {
 }
 
 #[test]
+fn an_address_without_a_page_is_explained_in_the_language_of_the_page() {
+    let (_dir, page) = with_project();
+    for (language, expected) in [
+        ("en", "There is no such page."),
+        ("vi", "Không có trang này."),
+    ] {
+        page.get(&format!("/?language={language}"));
+        for path in ["/nowhere", "/p/p/nowhere/"] {
+            let reply = page.get(path);
+            let shown = text(&reply);
+            assert_eq!(reply.status, 404, "{path}: {shown}");
+            assert!(shown.contains(expected), "{path}: {shown}");
+        }
+    }
+}
+
+#[test]
 fn damage_is_mended_by_a_button() {
     let (dir, page) = with_project();
     let project = Project::open(&dir.path().join("p")).expect("a project");

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use maud::{Markup, html};
 
-use super::components::{action_form, choice, grouped};
+use super::components::{action_form, choice, grouped, unit_name};
 use super::import_choice::{ImportChoice, Planned, SHOWN_PAIRS};
 use super::import_files::files_part;
 use super::project_name::NAME_CHARS;
@@ -361,7 +361,7 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
                 label { span { (visit.t("Unit of the scans", "Đơn vị của bản quét")) }
                     select name="unit" data-in-address {
                         (choice("", visit.t("not known", "không rõ"), Some(&chosen.unit)))
-                        @for unit in LengthUnit::ALL { (choice(unit.name(), unit.name(), Some(&chosen.unit))) }
+                        @for unit in LengthUnit::ALL { (choice(unit.name(), unit_name(visit, unit), Some(&chosen.unit))) }
                     }
                 }
             }

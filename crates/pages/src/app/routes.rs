@@ -5,6 +5,7 @@ use std::sync::Arc;
 use axum::routing::{any, get, post};
 use axum::{Router, middleware};
 
+use super::failure::AppFailure;
 use super::state::{AppOptions, AppState};
 use super::{
     assets, backup_card, block_page, blocks_page, chosen_pairs, export_page, export_zip,
@@ -98,6 +99,7 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route(&format!("{block}/view/{{*rest}}"), any(block_page::pages))
         .route(&format!("{review}/"), any(review_page::pages))
         .route(&format!("{review}/{{*rest}}"), any(review_page::pages))
+        .fallback(async || AppFailure::not_found())
         // Replies of the pages of a review or a block pass unchanged.
         .layer(middleware::from_fn_with_state(
             Arc::clone(&state),
