@@ -103,7 +103,7 @@ async fn judge(
     }
     let [english, vietnamese] = PROJECT_GONE;
     if !asks_for_page(request.headers()) {
-        let body = Json(json!({ "error": format!("{english} / {vietnamese}") }));
+        let body = Json(json!({ "error": english, "error_vi": vietnamese }));
         return (StatusCode::SERVICE_UNAVAILABLE, body).into_response();
     }
     let body = html! {

@@ -236,3 +236,31 @@ async fn with_whole_body(
 fn text(headers: &HeaderMap, name: impl AsHeaderName) -> Option<&str> {
     headers.get(name)?.to_str().ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        GUEST_TOO_LARGE, NO_FILE, NO_JSON, NO_SESSION, TOO_LARGE, TOO_SLOW, WRONG_HOST,
+        WRONG_ORIGIN, WRONG_TOKEN,
+    };
+
+    #[test]
+    fn rejections_have_a_line_in_each_language() {
+        for (status, text) in [
+            WRONG_HOST,
+            NO_SESSION,
+            WRONG_ORIGIN,
+            NO_JSON,
+            NO_FILE,
+            WRONG_TOKEN,
+            GUEST_TOO_LARGE,
+            TOO_LARGE,
+            TOO_SLOW,
+        ] {
+            let lines: Vec<&str> = text.lines().collect();
+            assert_eq!(lines.len(), 2, "{status}: {text}");
+            let [english, vietnamese] = [lines[0], lines[1]].map(str::is_ascii);
+            assert!(english && !vietnamese, "{status}: {text}");
+        }
+    }
+}
