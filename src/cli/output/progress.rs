@@ -10,7 +10,7 @@ use super::run_progress::RunProgress;
 use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
 use super::table::count;
 use crate::cli::input::global::{Global, ProgressMode};
-use mocban_core::domain::one_line;
+use mocban_core::domain::{Failure, one_line};
 use mocban_runner::{RunEvent, StopLevel};
 use mocban_system::time_text::duration;
 
@@ -175,23 +175,13 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<(String, String)> {
             stage,
             failure,
             ..
-        } => Some((failed, format!(
-            "{} at {stage}: {} ({})",
-            palette.paint(Tone::Strong, pair),
-            one_line(&failure.message),
-            failure.class
-        ))),
+        } => Some((failed, at_stage(palette.paint(Tone::Strong, pair), stage, failure))),
         RunEvent::PairBackingOff {
             pair,
             stage,
             failure,
             wait_ms,
-        } => Some((waiting, format!(
-            "{pair} at {stage}: {} ({}), retrying in {}",
-            one_line(&failure.message),
-            failure.class,
-            duration(*wait_ms)
-        ))),
+        } => Some((waiting, format!("{}, retrying in {}", at_stage(pair, stage, failure), duration(*wait_ms)))),
         RunEvent::Recovered { pairs } => {
             let pairs = count(*pairs, "pair");
             plain(format!("{pairs} recovered from a worker that died"))
@@ -213,23 +203,16 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<(String, String)> {
             block,
             stage,
             failure,
-        } => Some((failed, format!(
-            "block {} at {stage}: {} ({})",
-            palette.paint(Tone::Strong, block),
-            one_line(&failure.message),
-            failure.class
-        ))),
+        } => {
+            let block = format!("block {}", palette.paint(Tone::Strong, block));
+            Some((failed, at_stage(block, stage, failure)))
+        }
         RunEvent::BlockBackingOff {
             block,
             stage,
             failure,
             wait_ms,
-        } => Some((waiting, format!(
-            "block {block} at {stage}: {} ({}), retrying in {}",
-            one_line(&failure.message),
-            failure.class,
-            duration(*wait_ms)
-        ))),
+        } => Some((waiting, format!("block {}, retrying in {}", at_stage(block, stage, failure), duration(*wait_ms)))),
         RunEvent::Started { .. }
         | RunEvent::BlockStageStarted { .. }
         | RunEvent::BlockStageFinished { .. }
@@ -239,6 +222,16 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<(String, String)> {
         | RunEvent::StageFinished { .. }
         | RunEvent::PairDone { .. } => None,
     }
+}
+
+/// Returns what happened to a pair or block at a stage.
+fn at_stage(
+    what: impl std::fmt::Display,
+    stage: impl std::fmt::Display,
+    failure: &Failure,
+) -> String {
+    let message = one_line(&failure.message);
+    format!("{what} at {stage}: {message} ({})", failure.class)
 }
 
 fn stopping_line(level: StopLevel, reason: &str) -> String {
