@@ -188,16 +188,7 @@ fn print_summary(
         "kept_earlier": summary.kept_earlier,
     }))?;
     let missing = exported.missing_inputs.as_ref();
-    let is_explained = |why: &str| missing.is_some_and(|missing| missing.explains(why));
-    let blocks = summary.unreadable_blocks.iter();
-    let blocks = blocks
-        .filter(|(_, why)| !is_explained(why))
-        .map(|(block, why)| format!("the export lacks files of block {block}: {why}"));
-    let pairs = summary.unreadable.iter();
-    let pairs = pairs
-        .filter(|(_, why)| !is_explained(why))
-        .map(|(pair, why)| format!("the export has no files of {pair}: {why}"));
-    let unexplained: Vec<String> = blocks.chain(pairs).collect();
+    let unexplained = unexplained(exported);
     for warning in &unexplained {
         context.warn(warning);
     }
@@ -230,6 +221,21 @@ fn print_summary(
         }
     }
     Ok(())
+}
+
+/// Returns a warning for each pair and block whose files cannot be read for another reason than a missing folder.
+fn unexplained(exported: &ExportedProject) -> Vec<String> {
+    let (summary, missing) = (&exported.summary, exported.missing_inputs.as_ref());
+    let is_explained = |why: &str| missing.is_some_and(|missing| missing.explains(why));
+    let blocks = summary.unreadable_blocks.iter();
+    let blocks = blocks
+        .filter(|(_, why)| !is_explained(why))
+        .map(|(block, why)| format!("the export lacks files of block {block}: {why}"));
+    let pairs = summary.unreadable.iter();
+    let pairs = pairs
+        .filter(|(_, why)| !is_explained(why))
+        .map(|(pair, why)| format!("the export has no files of {pair}: {why}"));
+    blocks.chain(pairs).collect()
 }
 
 /// Returns how many pairs and blocks have files that cannot be read.

@@ -315,7 +315,43 @@ pub(crate) async fn import_chunk(
         }
     }
     let chunk = &*chunk;
-    // Pairs with another mesh or print. What failed is tried again, also if the earlier file was never read.
+    let moved = count_changes(chunk, stored, summary, deltas);
+    // Of rows with the same name, only the last: PostgreSQL changes a row only once in a statement.
+    let last: BTreeMap<_, _> = chunk
+        .iter()
+        .enumerate()
+        .map(|(at, row)| (&row.name, at))
+        .collect();
+    let rows = chunk
+        .iter()
+        .enumerate()
+        .filter(|(at, row)| last[&row.name] == *at);
+    let items = json_array(rows.map(|(_, row)| item(row)));
+    let upsert = query(UPSERT).bind(items).bind(now);
+    let rows = upsert.fetch_all(&mut *conn).await?;
+    checksums::store_of_rows(conn, ChecksummedTable::Pair, &rows).await?;
+    let ids: Vec<i64> = rows.iter().map(|row| row.get(0)).collect::<Result<_>>()?;
+    if !moved.is_empty() {
+        let names = json_array(moved.iter().map(PairName::as_str));
+        query(MARK).bind(names).execute(&mut *conn).await?;
+    }
+    requeue::retry::<PairJob>(conn, &RetrySelection::Names(moved), deltas).await?;
+    query(NEW_JOBS)
+        .bind(json_array(ids.iter().copied()))
+        .execute(&mut *conn)
+        .await?;
+    summary.still_retired += retired::count_retired(conn, &ids).await?;
+    Ok(ids)
+}
+
+/// Counts new, changed and unchanged rows against the stored ones. Returns the pairs with another mesh or print: what failed
+/// of them is tried again, also if the earlier file was never read.
+fn count_changes(
+    chunk: &[ImportRow],
+    mut stored: BTreeMap<PairName, Option<PairAttributes>>,
+    summary: &mut ImportSummary,
+    deltas: &mut Deltas,
+) -> Vec<PairName> {
     let mut moved = Vec::new();
     for row in chunk {
         let fields = match stored.insert(row.name.clone(), Some(row.clone())) {
@@ -346,32 +382,7 @@ pub(crate) async fn import_chunk(
             fields,
         });
     }
-    // Of rows with the same name, only the last: PostgreSQL changes a row only once in a statement.
-    let last: BTreeMap<_, _> = chunk
-        .iter()
-        .enumerate()
-        .map(|(at, row)| (&row.name, at))
-        .collect();
-    let rows = chunk
-        .iter()
-        .enumerate()
-        .filter(|(at, row)| last[&row.name] == *at);
-    let items = json_array(rows.map(|(_, row)| item(row)));
-    let upsert = query(UPSERT).bind(items).bind(now);
-    let rows = upsert.fetch_all(&mut *conn).await?;
-    checksums::store_of_rows(conn, ChecksummedTable::Pair, &rows).await?;
-    let ids: Vec<i64> = rows.iter().map(|row| row.get(0)).collect::<Result<_>>()?;
-    if !moved.is_empty() {
-        let names = json_array(moved.iter().map(PairName::as_str));
-        query(MARK).bind(names).execute(&mut *conn).await?;
-    }
-    requeue::retry::<PairJob>(conn, &RetrySelection::Names(moved), deltas).await?;
-    query(NEW_JOBS)
-        .bind(json_array(ids.iter().copied()))
-        .execute(&mut *conn)
-        .await?;
-    summary.still_retired += retired::count_retired(conn, &ids).await?;
-    Ok(ids)
+    moved
 }
 
 fn item(row: &ImportRow) -> Value {
