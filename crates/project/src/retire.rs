@@ -106,7 +106,7 @@ impl RetireChoice {
     ) -> ProjectResult<ChosenPairs> {
         let mut chosen = self.chosen(project, catalog).await?;
         if let Some(block) = chosen.blocks.first() {
-            return Err(selection::no_pairs(block, false).into());
+            return Err(selection::no_pairs(block).into());
         }
         if !matches!(self, Self::LastImport(_) | Self::NthImport(_)) {
             return Ok(chosen);

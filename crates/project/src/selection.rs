@@ -110,7 +110,14 @@ pub(crate) async fn some_or_all(
         let of_block = catalog.pairs_of_listed_block(block.as_str()).await?;
         if of_block.is_empty() {
             let known = catalog.pairs_of_block_with_retired(block.as_str()).await?;
-            return Err(no_pairs(&block, !known.is_empty()).into());
+            let refusal = if known.is_empty() {
+                no_pairs(&block)
+            } else {
+                Refusal::NothingSelected(format!(
+                    "all pairs of block {block} are retired; `status --retired` lists them"
+                ))
+            };
+            return Err(refusal.into());
         }
         pairs.extend(of_block);
     }
@@ -124,13 +131,9 @@ fn keep_each_once(pairs: &mut Vec<PairName>) {
     pairs.retain(|pair| seen.insert(pair.clone()));
 }
 
-/// Refuses a block without pairs.
-pub(crate) fn no_pairs(block: &BlockName, are_retired: bool) -> Refusal {
-    Refusal::NothingSelected(if are_retired {
-        format!("all pairs of block {block} are retired; `status --retired` lists them")
-    } else {
-        format!("block {block} has no pairs yet; `run` cuts them")
-    })
+/// Refuses a block from which no pair was cut.
+pub(crate) fn no_pairs(block: &BlockName) -> Refusal {
+    Refusal::NothingSelected(format!("block {block} has no pairs yet; `run` cuts them"))
 }
 
 /// Looks up one pair.
