@@ -21,7 +21,7 @@ const ROWS: usize = 10_000;
 
 /// Returns a table of pairs per second. A pair is claimed, and its four stages are stored in one commit.
 pub(super) async fn table(options: &Options, url: &str) -> anyhow::Result<String> {
-    let catalog = Catalog::connect(url, true).await?;
+    let catalog = Catalog::connect_or_create(url).await?;
     let pairs = options.sizes()[0];
     let begin = Instant::now();
     import(&catalog, pairs).await?;
@@ -33,7 +33,7 @@ pub(super) async fn table(options: &Options, url: &str) -> anyhow::Result<String
     for (connections, batch) in LOADS {
         let mut tasks = tokio::task::JoinSet::new();
         for _ in 0..connections {
-            let catalog = Catalog::connect(url, false).await?;
+            let catalog = Catalog::connect(url).await?;
             let fake = Arc::new(fake.another_worker(&catalog).await?);
             tasks.spawn(load(catalog, fake, batch));
         }

@@ -95,7 +95,7 @@ async fn lines(
     sqlx::raw_sql(drop()).execute(&mut conn).await?;
     let separator = if url.contains('?') { '&' } else { '?' };
     let url = format!("{url}{separator}options=-c%20search_path%3D{SCHEMA}");
-    let catalog = Catalog::connect(&url, true).await?;
+    let catalog = Catalog::connect_or_create(&url).await?;
     let begin = Instant::now();
     import(&catalog, pairs).await?;
     let imported = begin.elapsed();
@@ -116,7 +116,7 @@ async fn lines(
         let mut tasks = tokio::task::JoinSet::new();
         let begin = Instant::now();
         for _ in 0..options.connections {
-            let catalog = Catalog::connect(&url, false).await?;
+            let catalog = Catalog::connect(&url).await?;
             let conn = PgConnectOptions::from_str(&url)?.connect().await?;
             let fake = Arc::new(fake.another_worker(&catalog).await?);
             tasks.spawn(work(catalog, conn, fake, load, begin + limit));

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use sqlx::{PgPool, SqlitePool};
+use sqlx::{PgConnection, PgPool, SqlitePool};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::db::conn::{Conn, ConnectionKind, Work};
@@ -92,26 +92,32 @@ impl Catalog {
         Ok(Self::start(readers, writer, delay, Arc::default()))
     }
 
-    /// Opens the catalog at a URL of PostgreSQL. If `may_create` is set, creates it if it is missing.
+    /// Opens the catalog at a URL of PostgreSQL.
     ///
     /// # Errors
-    /// Returns an error if the URL is invalid, the server does not answer or refuses the connection, or the database
-    /// fails.
-    pub async fn connect(url: &str, may_create: bool) -> Result<Self> {
-        Self::connect_with(url, may_create, CommitDelay::new()).await
+    /// Returns an error if the URL is invalid, the server does not answer or refuses the connection, there is no catalog, or
+    /// the database fails.
+    pub async fn connect(url: &str) -> Result<Self> {
+        let address = PostgresAddress::parse(url)?;
+        let conn = address.connect().await?;
+        Self::on_server(address, conn).await
     }
 
-    pub(crate) async fn connect_with(
-        url: &str,
-        may_create: bool,
-        delay: Arc<CommitDelay>,
-    ) -> Result<Self> {
+    /// Opens the catalog at a URL of PostgreSQL. Creates it if it is missing.
+    ///
+    /// # Errors
+    /// As for [`Self::connect`].
+    pub async fn connect_or_create(url: &str) -> Result<Self> {
         let address = PostgresAddress::parse(url)?;
-        let conn = address.connect(may_create).await?;
+        let conn = address.connect_or_create().await?;
+        Self::on_server(address, conn).await
+    }
+
+    async fn on_server(address: PostgresAddress, conn: PgConnection) -> Result<Self> {
         let readers = ReaderPool::Postgres(address.reader_pool(false).await?);
         let retry_wait: Arc<RetryWait> = Arc::default();
         let writer = WriteConnection::to_server(conn, address, Arc::clone(&retry_wait));
-        Ok(Self::start(readers, writer, delay, retry_wait))
+        Ok(Self::start(readers, writer, CommitDelay::new(), retry_wait))
     }
 
     /// Opens the catalog at a URL of PostgreSQL read-only.

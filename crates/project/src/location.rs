@@ -73,7 +73,7 @@ impl Location {
     pub async fn open(&self) -> ProjectResult<(Project, Catalog)> {
         let (project, url) = self.project()?;
         let catalog = match url {
-            Some(url) => Catalog::connect(&url, false).await?,
+            Some(url) => Catalog::connect(&url).await?,
             None => Catalog::open(&project.catalog_path()).await?,
         };
         Ok((project, catalog))

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::own_files::{is_project, project_role};
-use mocban_catalog::{Catalog, CatalogError, NewCatalog};
+use mocban_catalog::{Catalog, NewCatalog};
 use mocban_store::Project;
 
 /// Returns the missing directories of a path, the deepest first.
@@ -72,10 +72,7 @@ async fn store<T>(
 ) -> ProjectResult<T> {
     if let Some(url) = url {
         Project::create(project.dir())?;
-        let catalog = match Catalog::connect(url, false).await {
-            Err(CatalogError::NoSchema(_)) => Catalog::connect(url, true).await?,
-            catalog => catalog?,
-        };
+        let catalog = Catalog::connect_or_create(url).await?;
         let stored = import(&catalog).await;
         catalog.close().await;
         return stored;

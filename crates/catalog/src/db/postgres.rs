@@ -46,18 +46,26 @@ const SERVER_PROCESS: &str = "SELECT pg_backend_pid()";
 const CREATE: &str = include_str!("../../../../migrations/postgres/0001_initial.sql");
 
 impl PostgresAddress {
-    /// Opens a connection for writing. If `may_create` is set, creates a missing schema.
+    /// Opens a connection for writing.
     ///
     /// # Errors
     /// Returns an error if the server does not answer or refuses, if a connection pooler pools by transaction, or if the
     /// schema is missing or has another version.
-    pub(crate) async fn connect(&self, may_create: bool) -> Result<PgConnection> {
+    pub(crate) async fn connect(&self) -> Result<PgConnection> {
+        let mut conn = self.connect_to_own_process().await?;
+        self.configure(&mut conn, BY_INDEX).await?;
+        self.require_current(&mut conn).await?;
+        Ok(conn)
+    }
+
+    /// Opens a connection for writing. Creates a missing schema.
+    ///
+    /// # Errors
+    /// As for [`Self::connect`].
+    pub(crate) async fn connect_or_create(&self) -> Result<PgConnection> {
         let mut conn = self.connect_to_own_process().await?;
         self.configure(&mut conn, BY_INDEX).await?;
         if self.version(&mut conn).await?.is_none() {
-            if !may_create {
-                return Err(CatalogError::NoSchema(self.text()));
-            }
             self.create_schema(&mut conn).await?;
         }
         self.require_current(&mut conn).await?;

@@ -49,7 +49,7 @@ impl CatalogPlace {
     pub(super) async fn create(&self) -> Result<Catalog> {
         match self {
             Self::File { path, .. } => Catalog::create(path).await,
-            Self::Url(url) => Catalog::connect(url, true).await,
+            Self::Url(url) => Catalog::connect_or_create(url).await,
         }
     }
 
@@ -57,7 +57,7 @@ impl CatalogPlace {
     pub(super) async fn open(&self) -> Result<Catalog> {
         match self {
             Self::File { path, .. } => Catalog::with_writer(path, false, CommitDelay::new()).await,
-            Self::Url(url) => Catalog::connect(url, false).await,
+            Self::Url(url) => Catalog::connect(url).await,
         }
     }
 
@@ -77,7 +77,7 @@ impl CatalogPlace {
             }
             Self::Url(url) => {
                 let place = PostgresAddress::parse(url).expect("a place");
-                let conn = place.connect(false).await;
+                let conn = place.connect().await;
                 Conn::Postgres(ConnectionKind::Owned(conn.expect("a connection")))
             }
         }
