@@ -31,7 +31,7 @@ pub(super) fn begin(
         ExportFormat::Csv => Box::new(csv::CsvWriter::begin(folder)?),
         ExportFormat::Parquet => Box::new(parquet::ParquetWriter::begin(folder)?),
         ExportFormat::HuggingFace => Box::new(huggingface::HuggingFaceWriter::begin(folder)?),
-        ExportFormat::WebDataset => Box::new(webdataset::WebDatasetWriter::begin(folder)?),
+        ExportFormat::WebDataset => Box::new(webdataset::WebDatasetWriter::begin(folder)),
         ExportFormat::Mesh => single_result::<mesh::PlacedScanFormat>(&folder)?,
         ExportFormat::Fiji => single_result::<fiji::FijiFormat>(&folder)?,
         ExportFormat::Viewer => Box::new(viewer::ViewerWriter::begin(&folder)?),

@@ -38,12 +38,11 @@ struct TarShard {
 }
 
 impl WebDatasetWriter {
-    #[expect(clippy::unnecessary_wraps, reason = "the other formats create files")]
-    pub(super) fn begin(folder: FormatFolder) -> Result<Self, FolderError> {
-        Ok(Self {
+    pub(super) fn begin(folder: FormatFolder) -> Self {
+        Self {
             folder,
             parts: BTreeMap::new(),
-        })
+        }
     }
 }
 
