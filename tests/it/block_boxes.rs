@@ -83,7 +83,11 @@ fn boxes_are_checked_before_they_are_stored() {
     assert_eq!(shown(&page)["is_unread"], false);
     assert!(!html(&page, "/p/p/block/b1/").contains(">missing<"));
 
-    // Missing labels are not labels without boxes.
+    // Missing labels are not labels without boxes. The project was made in another folder, where its labels are.
+    let mut import = vec!["-C", "p", "import", "--name", "b1", "--allow-changed-files"];
+    import.extend(["--block", "d/data/block.ply", "--page", "d/data/page.jpg"]);
+    import.extend(["--labels", "few.json"]);
+    mocban(dir.path(), &import).expect(0);
     fs::rename(dir.path().join("few.json"), dir.path().join("away.json")).expect("moved");
     let unread = shown(&page);
     assert_eq!(unread["is_unread"], true, "{unread}");
