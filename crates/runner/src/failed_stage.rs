@@ -57,6 +57,7 @@ impl PairSummary {
 const MAX_REREAD: Duration = Duration::from_secs(30);
 
 /// How a stage failed.
+#[derive(Debug)]
 pub(super) struct FailedStage {
     pub(super) failure: Failure,
     /// Whether a retry may succeed.

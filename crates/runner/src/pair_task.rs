@@ -20,7 +20,7 @@ use super::stage_output::PairStageError;
 use super::stop::{Stop, StopLevel};
 use mocban_catalog::{InputVersions, Lease, PairWork};
 use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
-use mocban_core::domain::{Failure, FailureClass, Stage, WaitReason};
+use mocban_core::domain::{FailureClass, Stage, WaitReason};
 use mocban_store::ArtifactError;
 use mocban_system::failpoint::{self, Point};
 use mocban_system::platform::sleep_active;
@@ -40,19 +40,10 @@ enum ComputeEvent {
     Started(Stage, InputVersions),
     /// A stage is computed. The stage that follows, if any.
     Finished(Box<ComputedStage>, Option<Stage>),
-    /// A stage failed; this is the last event.
-    Failed {
-        failure: Failure,
-        /// Whether a retry may succeed.
-        is_transient: bool,
-        /// The input files as read.
-        inputs: InputVersions,
-        ms: u64,
-    },
+    /// A stage failed or panicked; this is the last event.
+    Failed(FailedStage),
     /// An object store failed; this is the last event.
     StoreFailed(ArtifactError),
-    /// A stage panicked; the pair's data is lost.
-    Panicked(String),
     /// A stage took too long.
     TimedOut,
     /// The run is to stop at once.
@@ -107,7 +98,7 @@ impl ComputeThread {
         tokio::select! {
             biased;
             event = self.events.recv() => event.unwrap_or_else(|| {
-                ComputeEvent::Panicked("the pair's thread ended without an event".to_owned())
+                panicked("the pair's thread ended without an event".to_owned())
             }),
             () = stop.reached(StopLevel::Now) => ComputeEvent::Stopped,
             () = sleep_active(timeout) => ComputeEvent::TimedOut,
@@ -132,12 +123,12 @@ fn run_stages(
         let begun = Instant::now();
         let work = || token.run(|| run_stage(context, stage, &mut pair));
         let outcome = match catch_unwind(AssertUnwindSafe(work)) {
-            Ok(Ok(outcome)) => Ok(outcome),
+            Ok(Ok(outcome)) => outcome,
             Ok(Err(Cancelled)) => return,
-            Err(payload) => Err(payload),
+            Err(payload) => break panicked(panic_text(&*payload)),
         };
         match outcome {
-            Ok(Ok(computed)) => match context.next_stage(stage) {
+            Ok(computed) => match context.next_stage(stage) {
                 Some(next) => {
                     // A closed channel is noticed when the next stage starts.
                     let _ = events.send(ComputeEvent::Finished(Box::new(computed), Some(next)));
@@ -145,25 +136,29 @@ fn run_stages(
                 }
                 None => break ComputeEvent::Finished(Box::new(computed), None),
             },
-            Ok(Err(PairStageError::RerunFrom(earlier))) => stage = earlier,
-            Ok(Err(PairStageError::Store(error))) => break ComputeEvent::StoreFailed(error),
-            Ok(Err(PairStageError::Failed {
+            Err(PairStageError::RerunFrom(earlier)) => stage = earlier,
+            Err(PairStageError::Store(error)) => break ComputeEvent::StoreFailed(error),
+            Err(PairStageError::Failed {
                 failure,
                 is_transient,
-            })) => {
-                break ComputeEvent::Failed {
+            }) => {
+                break ComputeEvent::Failed(FailedStage {
                     failure,
                     is_transient,
-                    inputs: pair.inputs.clone(),
-                    ms: begun.elapsed().as_millis() as u64,
-                };
+                    inputs: Some(pair.inputs.clone()),
+                    ms: Some(begun.elapsed().as_millis() as u64),
+                });
             }
-            Err(payload) => break ComputeEvent::Panicked(panic_text(&*payload)),
         }
     };
     // Free the pair's memory before the scheduler gives it to another pair.
     drop(pair);
     let _ = events.send(last);
+}
+
+/// Describes a panic, after which the pair's data is lost.
+fn panicked(text: String) -> ComputeEvent {
+    ComputeEvent::Failed(FailedStage::without_pair(FailureClass::Bug, text))
 }
 
 /// Computes the remaining stages of a leased pair. Earlier stages are stored while later stages are computed.
@@ -222,24 +217,9 @@ async fn compute(
                     None => return PairOutcome::Storing(checkpointer),
                 }
             }
-            ComputeEvent::Failed {
-                failure,
-                is_transient,
-                inputs,
-                ms,
-            } => {
-                break FailedStage {
-                    failure,
-                    is_transient,
-                    inputs: Some(inputs),
-                    ms: Some(ms),
-                };
-            }
+            ComputeEvent::Failed(failed) => break failed,
             ComputeEvent::StoreFailed(error) => {
                 return PairOutcome::Ended(end_without_store(checkpointer, error).await);
-            }
-            ComputeEvent::Panicked(text) => {
-                break FailedStage::without_pair(FailureClass::Bug, text);
             }
             ComputeEvent::TimedOut => {
                 let text = timeout_text(stage, timeout, pair.file_in_use.get());
