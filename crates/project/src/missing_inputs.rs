@@ -43,7 +43,7 @@ pub struct MissingInputs {
     /// Whether the first one is below a named root.
     #[serde(skip)]
     pub is_below_root: bool,
-    /// Number of the pair or block of the first one among those that were inspected.
+    /// Number of the pair or block of the first one among the inspected ones.
     #[serde(skip)]
     pub first_owner: usize,
     /// How the first one is imported again from another place.

@@ -88,8 +88,8 @@ const BLOCK_COLUMNS: [[[&str; 2]; 2]; 3] = [
 pub(super) struct ColumnChanges {
     /// Number of pairs or blocks that change.
     count: u64,
-    /// For each of [`COLUMNS`] or [`BLOCK_COLUMNS`], the numbers of those that lose its value and that get a first or another
-    /// one.
+    /// For each of [`COLUMNS`] or [`BLOCK_COLUMNS`], the numbers of pairs or blocks that lose its value and that get a first or
+    /// another one.
     columns: [[u64; 2]; COLUMNS.len()],
     /// Whether there are further pairs, which were not compared.
     is_cut: bool,
