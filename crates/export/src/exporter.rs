@@ -16,7 +16,7 @@ use super::exporter_error::ExportError;
 use super::format::ExportFormat;
 use super::format_writer::{ExportContext, FormatFolder};
 use super::formats;
-use super::left_out::{LeftOutCounts, LeftOutReason};
+use super::left_out::{OmissionCounts, OmissionReason};
 use super::manifest::{ExportManifest, MANIFEST, PairCounts};
 use super::options::ExportOptions;
 use super::page_labels::write_page_labels;
@@ -41,7 +41,7 @@ pub struct ExportSummary {
     /// Numbers of pairs.
     pub pairs: PairCounts,
     /// Why pairs were left out.
-    pub left_out: LeftOutCounts,
+    pub left_out: OmissionCounts,
     /// Damaged rows that the export does not include.
     pub set_apart: SetApart,
     /// How the exported pairs were divided, if a split was requested.
@@ -227,7 +227,7 @@ impl ExportRun {
                 context: &self.context,
                 plan: self.plan.as_ref(),
             };
-            let written: Result<Vec<Result<WrittenPair, LeftOutReason>>, FolderError> = pairs
+            let written: Result<Vec<Result<WrittenPair, OmissionReason>>, FolderError> = pairs
                 .par_iter()
                 .map(|(pair, alignment, origin)| {
                     writer.write(pair, alignment.as_ref(), origin.as_ref())

@@ -7,7 +7,7 @@ use mocban_core::domain::enum_names;
 /// Why the options of an export leave out a pair. The order is that of how near a pair came to the export: of the reasons of
 /// several metrics, the last one counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum LeftOutReason {
+pub enum OmissionReason {
     /// Other pairs were chosen.
     NotChosen,
     /// It has no result of the exported metrics.
@@ -27,7 +27,7 @@ pub enum LeftOutReason {
 }
 
 enum_names! {
-    pub LeftOutReason, "a reason to leave out a pair":
+    pub OmissionReason, "a reason to leave out a pair":
     NotChosen = "not_chosen", WithoutResult = "without_result", WithoutVerdict = "without_verdict",
     EarlierVerdict = "earlier_verdict", Unsure = "unsure", Failed = "failed",
     WithoutConfidence = "without_confidence", LowConfidence = "low_confidence",
@@ -35,23 +35,23 @@ enum_names! {
 
 /// How many pairs were left out, by reason.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct LeftOutCounts(BTreeMap<LeftOutReason, u64>);
+pub struct OmissionCounts(BTreeMap<OmissionReason, u64>);
 
-impl LeftOutCounts {
+impl OmissionCounts {
     /// Counts a pair.
-    pub fn add(&mut self, reason: LeftOutReason) {
+    pub fn add(&mut self, reason: OmissionReason) {
         *self.0.entry(reason).or_default() += 1;
     }
 
     /// Returns each reason with the number of its pairs, which is not 0.
-    pub fn iter(&self) -> impl Iterator<Item = (LeftOutReason, u64)> {
+    pub fn iter(&self) -> impl Iterator<Item = (OmissionReason, u64)> {
         self.0.iter().map(|(reason, number)| (*reason, *number))
     }
 
     /// Returns the reasons other than that other pairs were chosen.
-    fn refusals(&self) -> impl Iterator<Item = (LeftOutReason, u64)> {
+    fn refusals(&self) -> impl Iterator<Item = (OmissionReason, u64)> {
         self.iter()
-            .filter(|(reason, _)| *reason != LeftOutReason::NotChosen)
+            .filter(|(reason, _)| *reason != OmissionReason::NotChosen)
     }
 
     /// Returns the number of chosen pairs that were left out.
@@ -64,16 +64,16 @@ impl LeftOutCounts {
     pub fn text(&self, least: Option<f64>) -> String {
         let reasons = self.refusals().map(|(reason, number)| {
             let why = match reason {
-                LeftOutReason::NotChosen => "not chosen",
-                LeftOutReason::WithoutResult => "without a result",
-                LeftOutReason::WithoutVerdict => "without a verdict",
-                LeftOutReason::EarlierVerdict => "judged only on an earlier result",
-                LeftOutReason::Unsure => "unsure or in conflict",
-                LeftOutReason::Failed => "failed by reviewers",
-                LeftOutReason::WithoutConfidence => "without a confidence",
-                LeftOutReason::LowConfidence => "below confidence",
+                OmissionReason::NotChosen => "not chosen",
+                OmissionReason::WithoutResult => "without a result",
+                OmissionReason::WithoutVerdict => "without a verdict",
+                OmissionReason::EarlierVerdict => "judged only on an earlier result",
+                OmissionReason::Unsure => "unsure or in conflict",
+                OmissionReason::Failed => "failed by reviewers",
+                OmissionReason::WithoutConfidence => "without a confidence",
+                OmissionReason::LowConfidence => "below confidence",
             };
-            match least.filter(|_| reason == LeftOutReason::LowConfidence) {
+            match least.filter(|_| reason == OmissionReason::LowConfidence) {
                 Some(least) => format!("{number} {why} {least}"),
                 None => format!("{number} {why}"),
             }
@@ -84,17 +84,17 @@ impl LeftOutCounts {
 
 #[cfg(test)]
 mod tests {
-    use super::{LeftOutCounts, LeftOutReason};
+    use super::{OmissionCounts, OmissionReason};
 
     #[test]
     fn reasons_are_listed_with_their_numbers() {
-        let mut counts = LeftOutCounts::default();
+        let mut counts = OmissionCounts::default();
         assert_eq!((counts.text(None), counts.refused()), (String::new(), 0));
         for reason in [
-            LeftOutReason::LowConfidence,
-            LeftOutReason::WithoutVerdict,
-            LeftOutReason::NotChosen,
-            LeftOutReason::WithoutVerdict,
+            OmissionReason::LowConfidence,
+            OmissionReason::WithoutVerdict,
+            OmissionReason::NotChosen,
+            OmissionReason::WithoutVerdict,
         ] {
             counts.add(reason);
         }

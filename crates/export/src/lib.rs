@@ -67,7 +67,7 @@ pub use exporter::{ExportSummary, export};
 pub use exporter_error::ExportError;
 pub use format::ExportFormat;
 pub use gallery_selection::{GallerySelection, draw_gallery};
-pub use left_out::{LeftOutCounts, LeftOutReason};
+pub use left_out::{OmissionCounts, OmissionReason};
 pub use manifest::{MANIFEST as EXPORT_MANIFEST, PairCounts};
 pub use options::{ExportOptions, ResultFilter, UnusedOption};
 pub use pair_pictures::{PictureError, read_mesh};

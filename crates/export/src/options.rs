@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::format::ExportFormat;
-use super::left_out::LeftOutReason;
+use super::left_out::OmissionReason;
 use super::split::SplitSettings;
 use mocban_catalog::{MetricRecord, PairResults};
 use mocban_core::InputLimits;
@@ -196,10 +196,10 @@ impl ExportOptions {
         &self,
         pair: &PairResults,
         is_kept: bool,
-    ) -> Option<LeftOutReason> {
+    ) -> Option<OmissionReason> {
         let chosen = self.pairs.as_ref();
         if chosen.is_some_and(|pairs| !pairs.contains(&pair.attributes.name)) {
-            return Some(LeftOutReason::NotChosen);
+            return Some(OmissionReason::NotChosen);
         }
         if is_kept || !self.selects_results() {
             return None;
@@ -207,7 +207,7 @@ impl ExportOptions {
         let selected = pair.metrics.iter();
         let selected = selected.filter(|record| self.metrics.contains(&record.outcome.metric));
         let reasons = selected.filter_map(|record| self.refusal(record));
-        Some(reasons.max().unwrap_or(LeftOutReason::WithoutResult))
+        Some(reasons.max().unwrap_or(OmissionReason::WithoutResult))
     }
 
     /// Returns whether a result is exported.
@@ -216,28 +216,28 @@ impl ExportOptions {
     }
 
     /// Returns why the result of a selected metric is left out.
-    fn refusal(&self, record: &MetricRecord) -> Option<LeftOutReason> {
+    fn refusal(&self, record: &MetricRecord) -> Option<OmissionReason> {
         if self.only == ResultFilter::Passed {
             match Consensus::of(record) {
                 Consensus::Passed => {}
-                Consensus::Unjudged => return Some(LeftOutReason::WithoutVerdict),
-                Consensus::Stale => return Some(LeftOutReason::EarlierVerdict),
-                Consensus::Unsure | Consensus::Conflict => return Some(LeftOutReason::Unsure),
-                Consensus::Failed => return Some(LeftOutReason::Failed),
+                Consensus::Unjudged => return Some(OmissionReason::WithoutVerdict),
+                Consensus::Stale => return Some(OmissionReason::EarlierVerdict),
+                Consensus::Unsure | Consensus::Conflict => return Some(OmissionReason::Unsure),
+                Consensus::Failed => return Some(OmissionReason::Failed),
             }
         }
         let least = self.least_confidence()?;
         match record.outcome.confidence {
             Some(confidence) if confidence >= least => None,
-            Some(_) => Some(LeftOutReason::LowConfidence),
-            None => Some(LeftOutReason::WithoutConfidence),
+            Some(_) => Some(OmissionReason::LowConfidence),
+            None => Some(OmissionReason::WithoutConfidence),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ExportOptions, LeftOutReason, ResultFilter};
+    use super::{ExportOptions, OmissionReason, ResultFilter};
     use mocban_catalog::PairResults;
     use mocban_core::InputLimits;
     use mocban_core::domain::ThresholdMetric;
@@ -252,7 +252,7 @@ mod tests {
         }
     }
 
-    fn reason(pair: &PairResults, options: &ExportOptions) -> Option<LeftOutReason> {
+    fn reason(pair: &PairResults, options: &ExportOptions) -> Option<OmissionReason> {
         let is_kept = pair.metrics.iter().any(|record| options.keeps(record));
         options.reason_to_leave_out(pair, is_kept)
     }
@@ -266,12 +266,12 @@ mod tests {
         }
         for (pair, expected) in [
             (done("a", 0.8, &[Pass]), None),
-            (done("a", 0.8, &[]), Some(LeftOutReason::WithoutVerdict)),
-            (stale, Some(LeftOutReason::EarlierVerdict)),
-            (done("a", 0.8, &[Unsure]), Some(LeftOutReason::Unsure)),
-            (done("a", 0.8, &[Pass, Fail]), Some(LeftOutReason::Unsure)),
-            (done("a", 0.8, &[Fail]), Some(LeftOutReason::Failed)),
-            (pending("a"), Some(LeftOutReason::WithoutResult)),
+            (done("a", 0.8, &[]), Some(OmissionReason::WithoutVerdict)),
+            (stale, Some(OmissionReason::EarlierVerdict)),
+            (done("a", 0.8, &[Unsure]), Some(OmissionReason::Unsure)),
+            (done("a", 0.8, &[Pass, Fail]), Some(OmissionReason::Unsure)),
+            (done("a", 0.8, &[Fail]), Some(OmissionReason::Failed)),
+            (pending("a"), Some(OmissionReason::WithoutResult)),
         ] {
             assert_eq!(reason(&pair, &passed), expected);
         }
@@ -287,9 +287,9 @@ mod tests {
             (
                 with_confidence("a", 0.6),
                 &surer,
-                Some(LeftOutReason::LowConfidence),
+                Some(OmissionReason::LowConfidence),
             ),
-            (unknown, &confident, Some(LeftOutReason::WithoutConfidence)),
+            (unknown, &confident, Some(OmissionReason::WithoutConfidence)),
         ] {
             assert_eq!(reason(&pair, options), expected);
         }
@@ -302,7 +302,7 @@ mod tests {
         assert_eq!(reason(&pending("b"), &chosen), None);
         assert_eq!(
             reason(&done("a", 0.8, &[Pass]), &chosen),
-            Some(LeftOutReason::NotChosen)
+            Some(OmissionReason::NotChosen)
         );
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::export_folder::{FolderError, remove_below, write_below};
 use super::format::ExportFormat;
 use super::format_writer::{EncodedFile, EncodedPair, ExportContext, FormatWriter, PairView};
-use super::left_out::LeftOutReason;
+use super::left_out::OmissionReason;
 use super::pair_pictures::{PairPictures, PictureError, canvas_from_print};
 use super::record::{ManualAlignmentFields, PairRecord};
 use super::split::SplitPlan;
@@ -79,7 +79,7 @@ impl PairWriter<'_> {
         pair: &PairResults,
         alignment: Option<&ManualAlignmentFields>,
         origin: Option<&CutOrigin>,
-    ) -> Result<Result<WrittenPair, LeftOutReason>, FolderError> {
+    ) -> Result<Result<WrittenPair, OmissionReason>, FolderError> {
         let options = &self.context.options;
         let kept: Vec<_> = pair
             .metrics

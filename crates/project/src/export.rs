@@ -11,7 +11,7 @@ use crate::own_files::refuse_project_file;
 use crate::status::{all_retired, warn_about_stale};
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{
-    ExportFormat, ExportOptions, ExportSummary, LeftOutCounts, export as export_pairs,
+    ExportFormat, ExportOptions, ExportSummary, OmissionCounts, export as export_pairs,
 };
 
 /// An export of a project.
@@ -94,7 +94,7 @@ pub async fn export(
 
 /// Returns why no pair has a selected result.
 fn nothing_selected(
-    left_out: &LeftOutCounts,
+    left_out: &OmissionCounts,
     are_pairs_chosen: bool,
     least_confidence: Option<f64>,
 ) -> String {

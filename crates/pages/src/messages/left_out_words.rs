@@ -1,6 +1,6 @@
 //! Why an export leaves out pairs, in Vietnamese.
 
-/// Reasons as `LeftOutCounts::text` writes them, without that of a low confidence.
+/// Reasons as `OmissionCounts::text` writes them, without that of a low confidence.
 const REASONS: [(&str, &str); 6] = [
     ("without a result", "chưa có kết quả"),
     ("without a verdict", "chưa có đánh giá"),
@@ -32,21 +32,21 @@ pub(crate) fn left_out_reasons(list: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use mocban_export::{LeftOutCounts, LeftOutReason};
+    use mocban_export::{OmissionCounts, OmissionReason};
 
     use super::{REASONS, left_out_reasons};
 
     #[test]
     fn every_reason_of_an_export_is_translated() {
-        for reason in LeftOutReason::ALL {
-            let mut counts = LeftOutCounts::default();
+        for reason in OmissionReason::ALL {
+            let mut counts = OmissionCounts::default();
             counts.add(reason);
             counts.add(reason);
             let english = counts.text(Some(0.5));
             let translated = left_out_reasons(&english);
             match reason {
-                LeftOutReason::NotChosen => assert_eq!((english.as_str(), translated), ("", None)),
-                LeftOutReason::LowConfidence => {
+                OmissionReason::NotChosen => assert_eq!((english.as_str(), translated), ("", None)),
+                OmissionReason::LowConfidence => {
                     let wanted = "2 có độ tin cậy dưới 0,5".to_owned();
                     assert_eq!(translated, Some(wanted));
                 }
