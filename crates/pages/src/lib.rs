@@ -12,6 +12,7 @@
 
 pub mod app;
 mod digit_groups;
+mod embedded;
 pub mod local_server;
 mod messages;
 mod on_thread;

@@ -1,80 +1,41 @@
 //! Styles and scripts of the app, embedded in the program.
 
 use axum::extract::Path;
-use axum::http::{StatusCode, header};
-use axum::response::{IntoResponse as _, Response};
+use axum::response::Response;
 
-use mocban_export::scan_view;
+use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE};
 
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-const STYLE: &str = "text/css; charset=utf-8";
+/// Builds an asset from its name and content type.
+macro_rules! asset {
+    ($name:literal, $kind:ident) => {
+        (
+            $name,
+            $kind,
+            include_str!(concat!("../../../../assets/app/", $name)),
+        )
+    };
+}
 
-/// Name, content type and text of an asset.
-const ASSETS: [(&str, &str, &str); 9] = [
-    (
-        "tokens.css",
-        STYLE,
-        include_str!("../../../../assets/app/tokens.css"),
-    ),
-    (
-        "app.css",
-        STYLE,
-        include_str!("../../../../assets/app/app.css"),
-    ),
-    (
-        "action.js",
-        SCRIPT,
-        include_str!("../../../../assets/app/action.js"),
-    ),
-    (
-        "app.js",
-        SCRIPT,
-        include_str!("../../../../assets/app/app.js"),
-    ),
-    (
-        "choose.js",
-        SCRIPT,
-        include_str!("../../../../assets/app/choose.js"),
-    ),
-    (
-        "columns.js",
-        SCRIPT,
-        include_str!("../../../../assets/app/columns.js"),
-    ),
-    (
-        "import-files.js",
-        SCRIPT,
-        include_str!("../../../../assets/app/import-files.js"),
-    ),
-    (
-        "pair.js",
-        SCRIPT,
-        include_str!("../../../../assets/app/pair.js"),
-    ),
-    (
-        "upload.js",
-        SCRIPT,
-        include_str!("../../../../assets/app/upload.js"),
-    ),
+const ASSETS: [EmbeddedAsset; 9] = [
+    asset!("tokens.css", STYLE),
+    asset!("app.css", STYLE),
+    asset!("action.js", SCRIPT),
+    asset!("app.js", SCRIPT),
+    asset!("choose.js", SCRIPT),
+    asset!("columns.js", SCRIPT),
+    asset!("import-files.js", SCRIPT),
+    asset!("pair.js", SCRIPT),
+    asset!("upload.js", SCRIPT),
 ];
 
 pub(super) async fn asset(Path(name): Path<String>) -> Response {
-    match find(&name) {
-        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
-        None => StatusCode::NOT_FOUND.into_response(),
-    }
-}
-
-/// Returns content type and text of an asset of the app or of the 3D view.
-fn find(name: &str) -> Option<(&'static str, &'static str)> {
-    let own = ASSETS.iter().find(|(asset, ..)| *asset == name);
-    let own = own.map(|(_, kind, text)| (*kind, *text));
-    own.or_else(|| scan_view::assets::find(name))
+    embedded::asset(&ASSETS, &name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::ASSETS;
+    use crate::embedded::find;
     use crate::local_server::assert_loads_nothing;
 
     #[test]
@@ -89,7 +50,7 @@ mod tests {
         for (name, _, text) in ASSETS {
             for after in text.split(" from \"./").skip(1) {
                 let module = after.split('"').next().unwrap_or_default();
-                assert!(super::find(module).is_some(), "{name} imports {module}");
+                assert!(find(&ASSETS, module).is_some(), "{name} imports {module}");
             }
         }
     }

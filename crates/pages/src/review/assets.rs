@@ -1,9 +1,6 @@
 //! Scripts and styles of the page, embedded in the program. The page loads nothing from other hosts.
 
-use mocban_export::scan_view;
-
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-const STYLE: &str = "text/css; charset=utf-8";
+use crate::embedded::{EmbeddedAsset, SCRIPT, STYLE};
 
 /// Name, content type and text of an asset.
 macro_rules! asset {
@@ -16,7 +13,7 @@ macro_rules! asset {
     };
 }
 
-const ASSETS: [(&str, &str, &str); 18] = [
+pub(super) const ASSETS: [EmbeddedAsset; 18] = [
     (
         "review.css",
         STYLE,
@@ -45,13 +42,6 @@ const ASSETS: [(&str, &str, &str); 18] = [
     asset!("ui.js", SCRIPT),
 ];
 
-/// Returns content type and text of an asset of the page or of the 3D view.
-pub(super) fn find(name: &str) -> Option<(&'static str, &'static str)> {
-    let found = ASSETS.iter().find(|(asset, ..)| *asset == name);
-    let found = found.map(|(_, kind, text)| (*kind, *text));
-    found.or_else(|| scan_view::assets::find(name))
-}
-
 /// Returns the text of every script.
 #[cfg(test)]
 pub(super) fn scripts() -> impl Iterator<Item = &'static str> {
@@ -62,6 +52,7 @@ pub(super) fn scripts() -> impl Iterator<Item = &'static str> {
 #[cfg(test)]
 mod tests {
     use super::ASSETS;
+    use crate::embedded::find;
     use crate::local_server::assert_loads_nothing;
 
     #[test]
@@ -77,7 +68,7 @@ mod tests {
             let with_id = ["from \"./", "import(\"./", "Worker(\"assets/"].into_iter();
             for after in with_id.flat_map(|start| text.split(start).skip(1)) {
                 let module = after.split('"').next().unwrap_or_default();
-                assert!(super::find(module).is_some(), "{name} imports {module}");
+                assert!(find(&ASSETS, module).is_some(), "{name} imports {module}");
             }
         }
     }

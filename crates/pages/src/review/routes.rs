@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, RawQuery, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Extension, Json, Router, middleware};
@@ -23,6 +23,7 @@ use super::state::ServerState;
 use super::summary::ReviewSummary;
 use super::unstored::confirmation_limit;
 use super::{assets, examples};
+use crate::embedded;
 use crate::local_server::AccessControl;
 use mocban_catalog::{CatalogError, ManualAlignment};
 use mocban_core::domain::{PairName, ReviewOrder, one_line};
@@ -72,10 +73,7 @@ fn language(state: &ServerState, headers: &HeaderMap) -> Language {
 }
 
 async fn asset(Path(name): Path<String>) -> Response {
-    match assets::find(&name) {
-        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
-        None => StatusCode::NOT_FOUND.into_response(),
-    }
+    embedded::asset(&assets::ASSETS, &name)
 }
 
 /// Returns the values that the script needs at the start, such as the CSRF token, the key bindings and the messages.

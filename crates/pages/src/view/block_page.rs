@@ -14,66 +14,35 @@ use super::boxes_page;
 use super::correction_page;
 use super::page;
 use super::scan_page::jpeg;
+use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE};
 use crate::local_server::WorkThread;
 use crate::review::Language;
 use mocban_core::domain::BlockName;
 use mocban_export::block_view::{BlockView, PageLayer, PageRegion};
-use mocban_export::scan_view::assets;
 
-const SCRIPT_KIND: &str = "text/javascript; charset=utf-8";
-const STYLE_KIND: &str = "text/css; charset=utf-8";
-/// Name, content type and text of the assets of this page.
-const ASSETS: [(&str, &str, &str); 10] = [
-    (
-        "block-view.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/block-view.js"),
-    ),
-    (
-        "block-correct.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/block-correct.js"),
-    ),
-    (
-        "block-boxes.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/block-boxes.js"),
-    ),
-    (
-        "box-edits.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/box-edits.js"),
-    ),
-    (
-        "box-messages.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/box-messages.js"),
-    ),
-    (
-        "block-messages.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/block-messages.js"),
-    ),
-    (
-        "block-request.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/block-request.js"),
-    ),
-    (
-        "block-shapes.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/block-shapes.js"),
-    ),
-    (
-        "block-camera.js",
-        SCRIPT_KIND,
-        include_str!("../../../../assets/block-view/block-camera.js"),
-    ),
-    (
-        "block-view.css",
-        STYLE_KIND,
-        include_str!("../../../../assets/block-view/block-view.css"),
-    ),
+/// Builds an asset from its name and content type.
+macro_rules! asset {
+    ($name:literal, $kind:ident) => {
+        (
+            $name,
+            $kind,
+            include_str!(concat!("../../../../assets/block-view/", $name)),
+        )
+    };
+}
+
+/// The assets of this page.
+const ASSETS: [EmbeddedAsset; 10] = [
+    asset!("block-view.js", SCRIPT),
+    asset!("block-correct.js", SCRIPT),
+    asset!("block-boxes.js", SCRIPT),
+    asset!("box-edits.js", SCRIPT),
+    asset!("box-messages.js", SCRIPT),
+    asset!("block-messages.js", SCRIPT),
+    asset!("block-request.js", SCRIPT),
+    asset!("block-shapes.js", SCRIPT),
+    asset!("block-camera.js", SCRIPT),
+    asset!("block-view.css", STYLE),
 ];
 /// Longer side of the image of a whole layer or of a region, pixels. Closer views ask for regions, which show a smaller
 /// part and so never have fewer pixels.
@@ -166,14 +135,7 @@ async fn index(State(shown): State<Arc<ShownBlock>>, RawQuery(query): RawQuery) 
 }
 
 async fn asset(Path(name): Path<String>) -> Response {
-    let own = ASSETS.iter().find(|(asset, ..)| *asset == name);
-    match own
-        .map(|(_, kind, text)| (*kind, *text))
-        .or_else(|| assets::find(&name))
-    {
-        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
-        None => StatusCode::NOT_FOUND.into_response(),
-    }
+    embedded::asset(&ASSETS, &name)
 }
 
 async fn block_json(State(shown): State<Arc<ShownBlock>>) -> Response {

@@ -10,12 +10,17 @@ use axum::response::{Html, IntoResponse as _, Response};
 use axum::routing::get;
 
 use super::page;
+use crate::embedded::{self, EmbeddedAsset, SCRIPT};
 use crate::local_server::WorkThread;
 use crate::review::Language;
-use mocban_export::scan_view::{ScanView, assets};
+use mocban_export::scan_view::ScanView;
 
 /// The script of the page.
-const SCRIPT: &str = include_str!("../../../../assets/scan-viewer/view.js");
+const VIEW: EmbeddedAsset = (
+    "view.js",
+    SCRIPT,
+    include_str!("../../../../assets/scan-viewer/view.js"),
+);
 
 /// The scan of a page.
 #[derive(Debug)]
@@ -45,11 +50,7 @@ async fn index(State(shown): State<Arc<ShownScan>>) -> Html<String> {
 
 /// Responds with a script or style of the page.
 pub(crate) async fn asset(Path(name): Path<String>) -> Response {
-    let own = (name == "view.js").then_some(("text/javascript; charset=utf-8", SCRIPT));
-    match own.or_else(|| assets::find(&name)) {
-        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
-        None => StatusCode::NOT_FOUND.into_response(),
-    }
+    embedded::asset(&[VIEW], &name)
 }
 
 async fn scan(State(shown): State<Arc<ShownScan>>) -> Response {

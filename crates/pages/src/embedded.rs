@@ -1,0 +1,29 @@
+//! Scripts and styles that are embedded in the program. The pages load nothing from other hosts.
+
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+
+use mocban_export::scan_view;
+
+/// Content type of a script.
+pub(crate) const SCRIPT: &str = "text/javascript; charset=utf-8";
+/// Content type of a style.
+pub(crate) const STYLE: &str = "text/css; charset=utf-8";
+
+/// Name, content type and text of a script or style.
+pub(crate) type EmbeddedAsset = (&'static str, &'static str, &'static str);
+
+/// Returns content type and text of an asset of a page or of the 3D view.
+pub(crate) fn find(own: &[EmbeddedAsset], name: &str) -> Option<(&'static str, &'static str)> {
+    let found = own.iter().find(|(asset, ..)| *asset == name);
+    let found = found.map(|(_, kind, text)| (*kind, *text));
+    found.or_else(|| scan_view::assets::find(name))
+}
+
+/// Responds with an asset of a page or of the 3D view.
+pub(crate) fn asset(own: &[EmbeddedAsset], name: &str) -> Response {
+    match find(own, name) {
+        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
+        None => StatusCode::NOT_FOUND.into_response(),
+    }
+}
