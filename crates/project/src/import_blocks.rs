@@ -118,8 +118,11 @@ impl ListedItems {
         } else {
             Self::Pairs(pairs(Some(bytes)))
         };
-        let warnings: Vec<String> = [warning, kind.note].into_iter().flatten().collect();
-        let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
+        let warning = match (warning, kind.note) {
+            (Some(warning), Some(note)) => Some(format!("{warning}; {note}")),
+            (None, Some(note)) => Some(format!("{}: {note}", file.display())),
+            (warning, None) => warning,
+        };
         Ok((items, warning))
     }
 }
@@ -344,7 +347,7 @@ mod tests {
             );
             let warning = warning.expect("a note");
             assert!(
-                warning.starts_with(&format!("this is read as {expected}")),
+                warning.contains(&format!("list.csv: this is read as {expected}")),
                 "{warning}"
             );
         }

@@ -187,6 +187,22 @@ fn lists_of_spreadsheets_are_explained() {
             "column \"units\" is kept as metadata; rename it to \"unit\" if it is meant, and import again",
             "cột \"units\" được giữ làm thông tin thêm; nếu đó là cột \"unit\" thì hãy đổi tên rồi nhập lại",
         ),
+        (
+            "line 2: column mesh has the error #REF! of a formula; correct it in the spreadsheet program, or clear the cell",
+            "dòng 2: cột mesh có lỗi công thức #REF!; hãy sửa trong chương trình bảng tính, hoặc xóa nội dung ô",
+        ),
+        (
+            "an error of a formula is left out, #N/A in column \"year\" on line 2; correct it in the spreadsheet program, and import again",
+            "một lỗi công thức bị bỏ qua: #N/A ở cột \"year\", dòng 2; hãy sửa trong chương trình bảng tính rồi nhập lại",
+        ),
+        (
+            "x.csv: this is read as a list of blocks, because it has the column page and no column print; column \"id\" is kept as metadata",
+            "x.csv: tệp này được đọc là danh sách ván, vì có cột trang in và không có cột print; cột \"id\" được giữ làm thông tin thêm",
+        ),
+        (
+            "6 values are hidden below merged cells and are left out, the first in cell B1; unmerge the cells to see them",
+            "6 giá trị bị che dưới các ô gộp nên bị bỏ qua, giá trị đầu tiên ở ô B1; hãy bỏ gộp các ô để thấy các giá trị đó",
+        ),
     ]);
 }
 
