@@ -143,8 +143,8 @@ impl ColumnChanges {
     /// Adds a block. Its labels may be the same file under another path, so other labels are not counted.
     fn add_block(&mut self, old: &BlockAttributes, new: &BlockRow) {
         let labels = change(
-            old.labels_path.is_some().then_some(()),
-            new.labels.is_some().then_some(()),
+            old.labels_path.is_some().then_some(true),
+            new.labels.is_some().then_some(true),
         );
         self.count_changes(&[
             labels,
