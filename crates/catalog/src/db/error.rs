@@ -191,7 +191,7 @@ pub enum CatalogError {
     },
     /// Most known pairs or blocks of an import would get other files.
     #[error(
-        "{changed} of the {known} {kind} in it that the project has would get another {files}, such as {example}: their ids may be those of others; nothing was imported, give other ids (of folders, import the one above, so that ids begin with the name of the folder), or add --allow-changed-files if the files have moved"
+        "{changed} of the {known} {kind} in it that the project has would get another {files}, such as {example}: their ids may be those of others; nothing was imported, give other ids (of folders, import the one above, so that ids begin with the name of the folder); add --allow-changed-files if the files have moved"
     )]
     ChangedFiles {
         /// Number of pairs or blocks that would get other files.

@@ -26,8 +26,8 @@ const PLACES: &[(&str, &str)] = &[
         "cannot plant an attention check",
         "không tạo được hình kiểm tra",
     ),
-    ("the {} is damaged", "tệp {0} bị hỏng"),
     ("the workbook is damaged", "bảng tính bị hỏng"),
+    ("the {} is damaged", "tệp {0} bị hỏng"),
     (
         "the JSON in column {} is damaged",
         "JSON trong cột {0} bị hỏng",

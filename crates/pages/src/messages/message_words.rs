@@ -35,8 +35,8 @@ const TABLES: [&[MessageRow]; 11] = [
 
 /// Messages that end with a reason that no table has.
 const OPEN_ENDED: &[MessageRow] = &[
-    ("the {} is damaged: {}", "tệp {0} bị hỏng: {1}"),
     ("the workbook is damaged: {}", "bảng tính bị hỏng: {0}"),
+    ("the {} is damaged: {}", "tệp {0} bị hỏng: {1}"),
     (
         "the JSON in column {} is damaged: {}",
         "JSON trong cột {0} bị hỏng: {1}",
