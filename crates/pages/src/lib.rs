@@ -16,7 +16,8 @@ mod embedded;
 pub mod local_server;
 mod messages;
 mod on_thread;
+mod report_language;
 pub mod review;
 pub mod view;
 
-pub use messages::report_page;
+pub use report_language::report_page;

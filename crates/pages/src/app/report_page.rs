@@ -15,6 +15,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::messages;
 use crate::on_thread::read_in_turn;
+use crate::report_language::report_page;
 use crate::review::Language;
 use mocban_core::domain::one_line;
 use mocban_project::ProjectError;
@@ -197,7 +198,7 @@ pub(super) async fn download(
     let render = async move || {
         let mut rendered = report(options, None, &location, &()).await?;
         if format == ReportFormat::Html {
-            rendered.text = messages::report_page(rendered.text, language);
+            rendered.text = report_page(rendered.text, language);
         }
         Ok::<_, ProjectError>(rendered)
     };

@@ -27,6 +27,6 @@ mod stage_words;
 pub(crate) use left_out_words::left_out_reasons;
 pub(crate) use message_parts::with_more;
 pub(crate) use message_words::vietnamese;
-pub use report_html::report_page;
+pub(crate) use report_html::vietnamese_report;
 pub(crate) use report_words::report_text;
 pub(crate) use stage_words::stage_in_vietnamese;

@@ -2,7 +2,6 @@
 
 use super::report_words::{message_text, report_text, verdict_text};
 use super::stage_words::stage_text;
-use crate::review::Language;
 
 /// Beginnings of tags whose text is data: names, commands, styles.
 const DATA: [&str; 6] = [
@@ -20,15 +19,8 @@ const ATTRIBUTES: [&str; 3] = [" aria-label=\"", ALT, " title=\""];
 /// Begins the table whose rows are named by blocks.
 const BLOCKS: &str = "<div class=\"wide\" id=\"table-blocks\"";
 
-/// Returns an HTML report in a language. It is made in English, and what is not known stays so.
-pub fn report_page(page: String, language: Language) -> String {
-    match language {
-        Language::English => page,
-        Language::Vietnamese => in_vietnamese(&page),
-    }
-}
-
-fn in_vietnamese(page: &str) -> String {
+/// Returns an HTML report, which is made in English, in Vietnamese. What is not known stays as it is.
+pub(crate) fn vietnamese_report(page: &str) -> String {
     let (mut said, mut rest) = (String::with_capacity(page.len() + page.len() / 4), page);
     let (mut tag, mut is_of_blocks) = ("", false);
     while let Some(start) = rest.find('<') {
