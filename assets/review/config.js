@@ -29,7 +29,7 @@ export function translate(key, values = {}) {
 
 /** Returns why a request was refused, in the language of the page if the server says it. */
 export async function refusalOf(response) {
-  const text = await response.text();
+  const text = await response.text().catch(() => "");
   let reply;
   try {
     reply = JSON.parse(text);
