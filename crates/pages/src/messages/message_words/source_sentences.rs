@@ -1,4 +1,4 @@
-//! Sentences of sources and snapshots of other crates: all of those that a page shows have a Vietnamese text.
+//! Sentences of sources and snapshots of other crates: every one that a page shows has a Vietnamese text.
 
 use std::path::{Path, PathBuf};
 
