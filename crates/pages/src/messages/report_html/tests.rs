@@ -294,7 +294,7 @@ fn stages_have_the_names_of_the_pages() {
     });
     let report = of_pairs([pair].into_iter().chain(failed)).finish();
     let page = mocban_report::page(&report, &Gallery::default(), &Cover::default());
-    let vietnamese = report_page(page, Language::Vietnamese);
+    let vietnamese = vietnamese_report(&page);
     for stage in Stage::ALL {
         let known = stage_in_vietnamese(stage);
         let row = format!("<th scope=\"row\">{known}</th>");
