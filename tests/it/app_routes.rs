@@ -175,7 +175,7 @@ fn all_routes_of_the_app_are_in_one_file() {
     let names: Vec<String> = with_routes.map(|file| file.name).collect();
     assert_eq!(names, ["crates/pages/src/app/routes.rs"]);
     // What other pages and services are passed on to cannot be seen in the file.
-    for other in [".nest", ".merge(", "_service(", ".fallback("] {
+    for other in [".nest", ".merge(", "_service("] {
         assert!(!ROUTES.contains(other), "{other}: test its routes, too");
     }
     assert_eq!(functions("get(a(b)).post(c))"), ["get", "post"]);
@@ -188,13 +188,18 @@ fn every_route_refuses_other_hosts_other_pages_and_a_missing_token() {
     let (dir, page) = with_project();
     let (site, token) = (&*page, token(&page));
     let before = changeable(dir.path());
-    for RouteRequest { method, path } in requests(ROUTES) {
+    let unknown = RouteRequest {
+        method: "GET",
+        path: "/no-such-page".to_owned(),
+    };
+    for RouteRequest { method, path } in requests(ROUTES).into_iter().chain([unknown]) {
         let address = format!("{}{path}", site.session);
         let own = own_headers(site, &path, &token);
         // The path is that of a route: only the method is refused.
         if !path.contains("/view/") && !path.contains("/lan/") {
             let found = status(site, "PUT", &address, &own);
-            assert_eq!(found, Some(405), "{path}");
+            let refused = if path == "/no-such-page" { 404 } else { 405 };
+            assert_eq!(found, Some(refused), "{path}");
         }
         for (name, value, expected, is_of_writes) in CHANGES {
             if is_of_writes && method == "GET" {
