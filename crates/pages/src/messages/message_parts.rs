@@ -1,7 +1,7 @@
 //! The parts of messages that vary, and the places that stand before them, in Vietnamese.
 
 use super::left_out_words::left_out_reasons;
-use super::message_patterns::{filled_by, parts_of};
+use super::message_patterns::{day_first, filled_by, parts_of};
 use super::stage_words::stage_text;
 use crate::digit_groups::grouped;
 
@@ -155,7 +155,8 @@ fn part_text(part: &str) -> String {
     if let Some((_, vietnamese)) = known.find(|(english, _)| *english == part) {
         return (*vietnamese).to_owned();
     }
-    if let Some(time) = day_first(part) {
+    // A day without a time may be the id of a pair.
+    if let Some(time) = day_first(part).filter(|_| part.contains(' ')) {
         return time;
     }
     let number = part.strip_prefix("a list of ");
@@ -171,22 +172,6 @@ fn part_text(part: &str) -> String {
     }
     let listed = kind_text(part).or_else(|| left_out_reasons(part));
     listed.unwrap_or_else(|| names_text(part))
-}
-
-/// Returns a time such as `2026-11-21 11:10:03 +07:00` with the day first, as pages write times. `None` if it is something
-/// else.
-fn day_first(part: &str) -> Option<String> {
-    let (date, time) = part.split_once(' ')?;
-    let numbers: Vec<&str> = date.split('-').collect();
-    let [year, month, day] = numbers[..] else {
-        return None;
-    };
-    let is_number = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
-    let is_date = [(year, 4), (month, 2), (day, 2)]
-        .into_iter()
-        .all(|(text, digits)| text.len() == digits && is_number(text));
-    let is_time = time.len() >= 5 && time.as_bytes()[2] == b':';
-    (is_date && is_time).then(|| format!("{day}/{month}/{year} {time}"))
 }
 
 /// Returns a kind of files, such as `a GIF image`, in Vietnamese. `None` if it is something else.

@@ -1,6 +1,6 @@
 //! Sentences of the report in Vietnamese. The report is made in English, so they are recognised by their wording.
 
-use super::message_patterns::{filled_by, parts_of};
+use super::message_patterns::{day_first, filled_by, parts_of};
 use super::message_words::vietnamese;
 use super::report_answers::REPORT_ANSWERS;
 use super::report_captions::REPORT_CAPTIONS;
@@ -158,21 +158,6 @@ fn part(text: &str) -> String {
 fn found(table: &[(&str, &'static str)], text: &str) -> Option<&'static str> {
     let mut rows = table.iter();
     rows.find_map(|(english, vietnamese)| (*english == text).then_some(*vietnamese))
-}
-
-/// Returns a day, perhaps with a time, with the day before the month.
-fn day_first(text: &str) -> Option<String> {
-    let (day, time) = text.split_at_checked("2026-11-21".len())?;
-    let numbers: Vec<&str> = day.split('-').collect();
-    let [year, month, of_month] = numbers[..] else {
-        return None;
-    };
-    let are_digits = numbers
-        .iter()
-        .all(|number| number.bytes().all(|byte| byte.is_ascii_digit()));
-    let is_day = are_digits && [year, month, of_month].map(str::len) == [4, 2, 2];
-    let is_alone = time.is_empty() || time.starts_with(' ');
-    (is_day && is_alone).then(|| format!("{of_month}/{month}/{year}{time}"))
 }
 
 /// Returns a number with what it counts, such as `about 4,700 judged pairs`.
