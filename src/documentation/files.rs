@@ -55,6 +55,7 @@ const PICTURES: &[(&str, &[u8])] = of_docs! {
     "pictures/guide.jpg",
     "pictures/practice-vi.jpg",
     "pictures/practice.jpg",
+    "pictures/report-vi.png",
     "pictures/report.png",
     "pictures/review.jpg",
     "pictures/stages.png",
