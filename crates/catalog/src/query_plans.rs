@@ -17,6 +17,7 @@ use crate::queue::claim;
 use crate::queue::lease;
 use crate::queue::pair_job::PairJob;
 use crate::records::ground_truth;
+use crate::records::ignored_profiles;
 use crate::records::manual_alignments;
 use crate::records::pair_lookups;
 use crate::records::pair_results;
@@ -209,6 +210,13 @@ async fn pages_of_results_are_searched_by_key() {
         let plan = plan(sql).await;
         assert_only(&plan, &["VIRTUAL TABLE"]);
     }
+}
+
+#[tokio::test]
+async fn ignored_profiles_are_searched_by_the_keys_of_results() {
+    let plan = plan(ignored_profiles::PRINTS).await;
+    let key = "SEARCH r USING INDEX sqlite_autoindex_stage_result_1 (pair=? AND stage=?)";
+    assert!(plan.iter().any(|line| line == key), "{plan:?}");
 }
 
 #[tokio::test]

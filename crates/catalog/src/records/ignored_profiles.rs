@@ -6,11 +6,12 @@ use crate::db::query::query_as;
 use crate::db::row::from_row;
 use crate::{Catalog, Result};
 
-/// Pairs in the counts whose stage `normalize` names a profile that it ignored: how many, and the first one.
-const PRINTS: &str = "
-SELECT p.name AS id, count(*) OVER () AS count FROM stage_result AS r JOIN pair AS p ON p.id = r.pair
-JOIN job AS j ON j.pair = r.pair
-WHERE r.stage = 2 AND r.outcome LIKE '%\"ignored_profile\":%' ORDER BY r.pair LIMIT 1";
+/// Pairs in the counts whose stage `normalize` names a profile that it ignored: how many, and the first one. Results of other
+/// stages, which are longer, and of retired pairs are not read.
+pub(crate) const PRINTS: &str = "
+SELECT p.name AS id, count(*) OVER () AS count FROM job AS j CROSS JOIN stage_result AS r ON r.pair = j.pair
+CROSS JOIN pair AS p ON p.id = j.pair
+WHERE r.stage = 2 AND r.outcome LIKE '%\"ignored_profile\":%' ORDER BY j.pair LIMIT 1";
 
 /// Blocks whose stage `align` has a warning, which is about the profile of the page: how many, and the first one.
 const PAGES: &str = "
@@ -60,7 +61,8 @@ impl IgnoredProfiles {
 }
 
 impl Catalog {
-    /// Returns the images whose colour profile could not be applied when their results were computed. Reads all results.
+    /// Returns the images whose colour profile could not be applied when their results were computed. Reads a result of each
+    /// pair and block.
     pub async fn ignored_profiles(&self) -> Result<IgnoredProfiles> {
         let mut conn = self.read_conn().await?;
         let pairs = query_as(PRINTS).fetch_optional(&mut conn).await?;
