@@ -90,12 +90,15 @@ mod tests {
         let mut with_column = folders.clone();
         with_column.meta.insert("folio".to_owned(), json!("3a"));
         let other = pair("b4_A1", ["stl/1.stl", "print/1.png"]);
+        let mut of_short_block = pair("b4-1", ["stl/b4-1.stl", "print/b4-1.png"]);
+        of_short_block.block = Some("b4".to_owned());
         for (pair, expected) in [
             (folders, ImportCommand::Folders),
             (of_folder, ImportCommand::Folders),
             (of_list, ImportCommand::List),
             (with_column, ImportCommand::List),
             (other, ImportCommand::List),
+            (of_short_block, ImportCommand::List),
         ] {
             assert_eq!(ImportCommand::of_pair(&pair), expected, "{pair:?}");
         }

@@ -176,9 +176,12 @@ pub struct PairAttributes {
 }
 
 impl PairAttributes {
-    /// Returns whether a list named the pair: folders give no columns but a block with which the id begins.
+    /// Returns whether a list named the pair: folders give no columns but a block, whose pairs are named `BLOCK_STEM`.
     pub fn is_listed(&self) -> bool {
-        let is_of_folder = |block: &str| self.name.as_str().starts_with(block);
+        let is_of_folder = |block: &str| {
+            let stem = self.name.as_str().strip_prefix(block);
+            stem.is_some_and(|stem| stem.starts_with('_'))
+        };
         self.character.is_some()
             || self.scanned_face_down.is_some()
             || !self.meta.is_empty()
