@@ -234,7 +234,13 @@ fn id_tip<'a>(option: &str, words: impl Iterator<Item = &'a str> + Clone) -> Opt
     }
     // In a word such as `-va1`, the letter that no option has stands behind others.
     let letter = option.trim_start_matches('-');
-    let is_id = |word: &&str| word.starts_with('-') && word.contains(letter);
+    let is_id = |word: &&str| {
+        if word.starts_with("--") {
+            word.starts_with(option)
+        } else {
+            word.starts_with('-') && word.contains(letter)
+        }
+    };
     let id = words.take_while(|word| *word != "--").find(is_id)?;
     let is_named = !command.has_subcommands() && takes_names(&command);
     is_named.then(|| {
@@ -389,6 +395,8 @@ mod tests {
         );
         let id = error("mocban verdict set -a1 pass --reviewer lan");
         assert!(id.contains("as in: mocban verdict set -- -a1\n"), "{id}");
+        let id = error("mocban show --json -o1");
+        assert!(id.contains("if -o1 is an id"), "{id}");
         for other in ["mocban report -a1", "mocban show --jsn", "mocban status -x"] {
             let text = error(other);
             assert!(!text.contains("is an id"), "{text}");
