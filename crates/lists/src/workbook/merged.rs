@@ -1,6 +1,6 @@
 //! Merged cells of a sheet. The value of the first of them is that of all; values below it are hidden.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::archive::damaged;
 use super::cell_names::{MAX_COLUMNS, MAX_ROWS, place};
@@ -41,6 +41,8 @@ pub(super) struct MergedCells {
     areas: BTreeMap<(usize, usize), MergedArea>,
     /// By the first column.
     open: BTreeMap<usize, OpenArea>,
+    /// The last row and the first column of each open area.
+    ends: BTreeSet<(usize, usize)>,
     /// The open row, from 1.
     row: usize,
 }
@@ -89,7 +91,12 @@ impl MergedCells {
 
     /// Begins a row, from 1.
     pub(super) fn begin_row(&mut self, row: usize) {
-        self.open.retain(|_, area| area.last_row >= row);
+        while let Some((last_row, column)) = self.ends.first().copied()
+            && last_row < row
+        {
+            self.ends.pop_first();
+            self.open.remove(&column);
+        }
         if row <= self.row {
             return;
         }
@@ -102,42 +109,46 @@ impl MergedCells {
                 text: String::new(),
                 is_shared: false,
             };
-            self.open.insert(*column, area);
+            let end = (area.last_row, *column);
+            if let Some(covered) = self.open.insert(*column, area) {
+                self.ends.remove(&(covered.last_row, *column));
+            }
+            self.ends.insert(end);
         }
         self.row = row;
     }
 
     /// Returns what a spreadsheet program shows in place of a cell of the open row, if it is merged and not the first of its
     /// area. `cells` are those before it in the row.
-    pub(super) fn shown_over(&self, column: usize, cells: &[String]) -> Option<String> {
+    pub(super) fn shown_over<'c>(&'c self, column: usize, cells: &'c [String]) -> Option<&'c str> {
         let (first, area) = self.open.range(..=column).next_back()?;
         let is_first = area.first_row == self.row && *first == column;
         if is_first || column > area.last_column {
             return None;
         }
         if area.first_row == self.row {
-            return Some(cells.get(*first).cloned().unwrap_or_default());
+            return Some(cells.get(*first).map_or("", String::as_str));
         }
-        Some(area.text.clone())
+        Some(&area.text)
     }
 
     /// Ends the open row with these cells: keeps the values of areas that begin there. Below the header, which has `width`
     /// columns, the next rows share them; `width` is 0 before it. Returns errors for values that columns share.
     pub(super) fn end_row(&mut self, cells: &[String], width: usize) -> Vec<WorkbookError> {
         let mut refused = Vec::new();
-        for (column, area) in &mut self.open {
+        for ((_, column), area) in self.areas.range((self.row, 0)..(self.row + 1, 0)) {
             let text = cells.get(*column).filter(|text| !text.is_empty());
-            let (Some(text), true) = (text, area.first_row == self.row) else {
+            let open = self.open.get_mut(column);
+            let open = open.filter(|open| open.first_row == self.row);
+            let (Some(text), Some(open)) = (text, open) else {
                 continue;
             };
-            area.text.clone_from(text);
+            open.text.clone_from(text);
             if *column >= width {
                 continue;
             }
-            area.is_shared = area.last_column.min(width - 1) == *column;
-            if !area.is_shared
-                && let Some(area) = self.areas.get(&(self.row, *column))
-            {
+            open.is_shared = area.last_column.min(width - 1) == *column;
+            if !open.is_shared {
                 let cells = area.name.clone();
                 refused.push(WorkbookError::MergedColumns { cells });
             }
@@ -145,9 +156,10 @@ impl MergedCells {
         refused
     }
 
-    /// Returns the columns whose cells in the row share a value, each with the value.
-    pub(super) fn values(&self) -> impl Iterator<Item = (usize, &str)> {
-        let shared = self.open.iter().filter(|(_, area)| area.is_shared);
+    /// Returns the columns before `width` whose cells in the row share a value, each with the value.
+    pub(super) fn values(&self, width: usize) -> impl Iterator<Item = (usize, &str)> {
+        let shared = self.open.range(..width);
+        let shared = shared.filter(|(_, area)| area.is_shared);
         shared.map(|(column, area)| (*column, area.text.as_str()))
     }
 }

@@ -172,15 +172,15 @@ impl TableWriter<'_> {
             return Ok(());
         };
         let column = cell.column;
-        let shown = self.merged.shown_over(column, &self.cells);
-        if self.width > 0 && column >= self.width && shown.is_none() {
+        let is_covered = self.merged.shown_over(column, &self.cells).is_some();
+        if self.width > 0 && column >= self.width && !is_covered {
             let has_value = !self.shared_or_own(&cell).trim().is_empty();
             self.beside.add(self.row, usize::from(has_value));
             return Ok(());
         }
         let text = match self.text(cell) {
             Err(error) if error.is_of_cell() => {
-                if shown.is_none() {
+                if !is_covered {
                     self.refuse(error);
                 }
                 // The row is not empty.
@@ -191,7 +191,7 @@ impl TableWriter<'_> {
         if text.trim().is_empty() {
             return Ok(());
         }
-        if let Some(shown) = shown {
+        if let Some(shown) = self.merged.shown_over(column, &self.cells) {
             if shown != text {
                 self.hidden.add(self.name(column));
             }
@@ -298,7 +298,7 @@ impl TableWriter<'_> {
 
     /// Gives the cells of the open row, which is below the header, the values of those above with which they are merged.
     fn fill_merged(&mut self) -> Result<(), WorkbookError> {
-        for (column, text) in self.merged.values() {
+        for (column, text) in self.merged.values(self.width) {
             if self.cells.len() <= column {
                 self.cells.resize(column + 1, String::new());
             }

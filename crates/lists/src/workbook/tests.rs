@@ -215,6 +215,18 @@ fn values_below_merged_cells_are_left_out_with_a_warning() {
         warning.starts_with("the value of cell A2 is hidden below merged cells"),
         "{warning}"
     );
+    // Areas may lie over each other.
+    let rows: [&[&str]; 5] = [
+        &["id", "mesh", "print", "block"],
+        &["1", "a", "a", "b1"],
+        &["2", "b", "b", "b2"],
+        &["3", "c", "c", "b3"],
+        &["4", "d", "d", "b4"],
+    ];
+    let table = read_sheet(&with_merged(&rows, &["D2:D4", "D3:D4"]), None).expect("a sheet");
+    let csv = String::from_utf8(table.csv).expect("UTF-8");
+    assert!(csv.ends_with("\"4\",\"d\",\"d\",\"b4\"\n"), "{csv}");
+    assert!(table.warning.is_some(), "{csv}");
     // Rows without cells may stand in any order.
     let odd = "<row r=\"5\"/><row r=\"3\"><c r=\"A3\"><v>1</v></c></row></sheetData>\
         <mergeCells><mergeCell ref=\"A2:A6\"/></mergeCells><sheetData>";
