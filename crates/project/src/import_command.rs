@@ -13,27 +13,33 @@ pub enum ImportCommand {
     #[default]
     List,
     /// Of two folders.
-    Folders,
-    /// Of one block.
+    Folders {
+        /// Whether the pair has a unit, which an import without it would remove.
+        has_unit: bool,
+    },
+    /// Of one block. An import without what it has would remove it.
     Block {
-        /// Whether it has labels, which an import without them would remove.
+        /// Whether it has labels.
         has_labels: bool,
+        /// Whether its id is not the name of its mesh.
+        has_name: bool,
+        /// Whether it has a side.
+        has_side: bool,
+        /// Whether it has a unit.
+        has_unit: bool,
     },
 }
 
 impl ImportCommand {
     /// Returns the import that fits a pair: folders give files of one name, which is that of the pair, and no columns.
     pub(crate) fn of_pair(pair: &PairAttributes) -> Self {
-        let stem = |path: &str| {
-            let path = path.replace('\\', "/");
-            let stem = Path::new(&path).file_stem();
-            fold_case(&stem.unwrap_or_default().to_string_lossy())
-        };
         let (mesh, print) = (stem(&pair.mesh_path), stem(&pair.print_path));
         let id = pair.name.folded();
         let is_paired = mesh == print && (id == mesh || id.ends_with(&format!("_{mesh}")));
         if is_paired && !pair.is_listed() {
-            Self::Folders
+            Self::Folders {
+                has_unit: pair.unit.is_some(),
+            }
         } else {
             Self::List
         }
@@ -46,19 +52,46 @@ impl ImportCommand {
         }
         Self::Block {
             has_labels: block.labels_path.is_some(),
+            has_name: fold_case(block.name.as_str()) != stem(&block.mesh_path),
+            has_side: block.side.is_some(),
+            has_unit: block.unit.is_some(),
         }
     }
 }
 
+/// Returns the name of a file without folders and extension, in lower case.
+fn stem(path: &str) -> String {
+    let path = path.replace('\\', "/");
+    let stem = Path::new(&path).file_stem();
+    fold_case(&stem.unwrap_or_default().to_string_lossy())
+}
+
 impl fmt::Display for ImportCommand {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let files = match self {
-            Self::List => "LIST",
-            Self::Folders => "--meshes DIR --prints DIR",
-            Self::Block { has_labels: false } => "--block MESH --page IMAGE",
-            Self::Block { has_labels: true } => "--block MESH --page IMAGE --labels FILE",
+        let (files, options) = match *self {
+            Self::List => ("LIST", Vec::new()),
+            Self::Folders { has_unit } => (
+                "--meshes DIR --prints DIR",
+                vec![(has_unit, " --unit UNIT")],
+            ),
+            Self::Block {
+                has_labels,
+                has_name,
+                has_side,
+                has_unit,
+            } => {
+                let options = vec![
+                    (has_labels, " --labels FILE"),
+                    (has_name, " --name ID"),
+                    (has_side, " --side SIDE"),
+                    (has_unit, " --unit UNIT"),
+                ];
+                ("--block MESH --page IMAGE", options)
+            }
         };
-        write!(f, "import {files} --allow-changed-files")
+        let options = options.into_iter().filter(|(is_given, _)| *is_given);
+        let options: String = options.map(|(_, option)| option).collect();
+        write!(f, "import {files}{options} --allow-changed-files")
     }
 }
 
@@ -66,7 +99,7 @@ impl fmt::Display for ImportCommand {
 mod tests {
     use super::ImportCommand;
     use mocban_catalog::{BlockAttributes, PairAttributes};
-    use mocban_core::domain::{BlockName, PairName};
+    use mocban_core::domain::{BlockName, BlockSide, LengthUnit, PairName};
     use serde_json::{Map, json};
 
     #[test]
@@ -89,12 +122,15 @@ mod tests {
         of_list.block = Some("Ván 4".to_owned());
         let mut with_column = folders.clone();
         with_column.meta.insert("folio".to_owned(), json!("3a"));
+        let mut with_unit = folders.clone();
+        with_unit.unit = Some(LengthUnit::Cm);
         let other = pair("b4_A1", ["stl/1.stl", "print/1.png"]);
         let mut of_short_block = pair("b4-1", ["stl/b4-1.stl", "print/b4-1.png"]);
         of_short_block.block = Some("b4".to_owned());
         for (pair, expected) in [
-            (folders, ImportCommand::Folders),
-            (of_folder, ImportCommand::Folders),
+            (folders, ImportCommand::Folders { has_unit: false }),
+            (of_folder, ImportCommand::Folders { has_unit: false }),
+            (with_unit, ImportCommand::Folders { has_unit: true }),
             (of_list, ImportCommand::List),
             (with_column, ImportCommand::List),
             (other, ImportCommand::List),
@@ -119,6 +155,12 @@ mod tests {
         assert_eq!(
             ImportCommand::of_block(&block).to_string(),
             "import --block MESH --page IMAGE --labels FILE --allow-changed-files"
+        );
+        block.name = BlockName::new("tale 4").expect("an id");
+        (block.side, block.unit) = (Some(BlockSide::Front), Some(LengthUnit::Cm));
+        assert_eq!(
+            ImportCommand::of_block(&block).to_string(),
+            "import --block MESH --page IMAGE --labels FILE --name ID --side SIDE --unit UNIT --allow-changed-files"
         );
         block.meta = json!({"shelfmark": "R.4"}).as_object().cloned();
         assert_eq!(ImportCommand::of_block(&block), ImportCommand::List);
