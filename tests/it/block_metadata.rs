@@ -120,7 +120,7 @@ fn a_list_that_lacks_a_known_column_says_what_is_lost() {
     assert!(!first.contains("does not name"), "{first}");
     let again = import("block,mesh,page,unit\nb1,b1.stl,b1.png,mm\nb2,b2.stl,b2.png,\n");
     for sentence in [
-        "2 known blocks lose their labels, which this import does not name, first b1; if the column was forgotten, add it and import again",
+        "2 known blocks lose their labels, which this import does not name, first b1; if that was not meant, import again with this column or option",
         "1 known block loses its unit, which this import does not name: b2; ",
     ] {
         assert!(again.contains(sentence), "{again}");

@@ -9,7 +9,7 @@ pub(crate) fn lost_values<'l>(
 ) -> impl Iterator<Item = String> + use<'l> {
     lost.columns().map(move |(column, lost)| {
         let LostColumn { count, first } = lost;
-        let advice = "if the column was forgotten, add it and import again";
+        let advice = "if that was not meant, import again with this column or option";
         match count {
             1 => format!(
                 "1 known {kind} loses its {column}, which this import does not name: {first}; {advice}"

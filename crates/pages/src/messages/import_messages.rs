@@ -246,4 +246,25 @@ pub(super) const IMPORT_MESSAGES: &[(&str, &str)] = &[
         "blocks with the same scan and page as an earlier one: {}, first {}, as {}",
         "số ván có cùng bản quét và trang in với một ván trước: {0}, ván đầu tiên là {1}, giống {2}",
     ),
+    // Values that the import empties.
+    (
+        "1 known pair loses its {}, which this import does not name: {}",
+        "1 cặp đã có trong dự án bị mất giá trị ở cột {0} vì lần nhập này không có: {1}",
+    ),
+    (
+        "{} known pairs lose their {}, which this import does not name, first {}",
+        "{0#} cặp đã có trong dự án bị mất giá trị ở cột {1} vì lần nhập này không có, cặp đầu tiên là {2}",
+    ),
+    (
+        "1 known block loses its {}, which this import does not name: {}",
+        "1 ván đã có trong dự án bị mất giá trị ở cột {0} vì lần nhập này không có: {1}",
+    ),
+    (
+        "{} known blocks lose their {}, which this import does not name, first {}",
+        "{0#} ván đã có trong dự án bị mất giá trị ở cột {1} vì lần nhập này không có, ván đầu tiên là {2}",
+    ),
+    (
+        "if that was not meant, import again with this column or option",
+        "nếu không chủ ý thì hãy nhập lại với cột hoặc tùy chọn này",
+    ),
 ];

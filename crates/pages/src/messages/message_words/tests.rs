@@ -207,6 +207,20 @@ fn lists_of_spreadsheets_are_explained() {
 }
 
 #[test]
+fn values_that_an_import_empties_are_explained() {
+    assert_translated(&[
+        (
+            "1 known block loses its unit, which this import does not name: b2; if that was not meant, import again with this column or option",
+            "1 ván đã có trong dự án bị mất giá trị ở cột unit vì lần nhập này không có: b2; nếu không chủ ý thì hãy nhập lại với cột hoặc tùy chọn này",
+        ),
+        (
+            "12 known pairs lose their character, which this import does not name, first a1; if that was not meant, import again with this column or option",
+            "12 cặp đã có trong dự án bị mất giá trị ở cột character vì lần nhập này không có, cặp đầu tiên là a1; nếu không chủ ý thì hãy nhập lại với cột hoặc tùy chọn này",
+        ),
+    ]);
+}
+
+#[test]
 fn moved_inputs_are_explained() {
     let english = "4 of 4 input files that were looked at are missing or have moved (pairs or blocks: 2), and so is the \
                    folder q/data; put them back, or import them from their new place";
