@@ -91,27 +91,6 @@ pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
         "the system gave no thread: {}",
         "hệ thống không cấp luồng: {0}",
     ),
-    ("the {} is damaged: {}", "tệp {0} bị hỏng: {1}"),
-    (
-        "{} of {} boxes lie outside the page of {} x {} px: {}",
-        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: {!4}",
-    ),
-    (
-        "{} of {} boxes lies outside the page of {} x {} px: {}",
-        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: {!4}",
-    ),
-    (
-        "{} of 1 box lies outside the page of {} x {} px: {}",
-        "khung duy nhất nằm ngoài trang in {1} x {2} px: {!3}",
-    ),
-    (
-        "labels of another page?",
-        "có phải nhãn của trang khác không?",
-    ),
-    (
-        "as two corners, their numbers fit the page",
-        "nếu là hai góc thì các số khớp với trang in",
-    ),
     (
         "truth is not of the form of truth.jsonl: {}",
         "dữ liệu đối chứng không đúng dạng của truth.jsonl: {0}",
@@ -137,4 +116,6 @@ pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
         "mặt nạ đỉnh nét có cỡ {0} px, bản in {1} px",
     ),
     ("the tops mask {}", "mặt nạ đỉnh nét {!0}"),
+    // The path of a file. It is the last row, because other messages with paths begin like it.
+    ("there is {}/{}", "có tệp {0}/{1}"),
 ];

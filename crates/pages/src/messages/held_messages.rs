@@ -111,8 +111,4 @@ pub(super) const HELD_MESSAGES: &[(&str, &str)] = &[
         "check the unit, or remove what does not belong to the block",
         "hãy kiểm tra đơn vị, hoặc bỏ những gì không thuộc ván",
     ),
-    (
-        "the page image shows no ink: its darkest parts take {} % of the light",
-        "hình trang in không có mực: chỗ tối nhất chỉ che {0} % ánh sáng",
-    ),
 ];

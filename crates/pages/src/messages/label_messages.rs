@@ -92,28 +92,24 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
         "hãy dùng hình đã được gán nhãn",
     ),
     (
-        "{} of {} boxes lies outside the page of {} x {} px: labels of another page?",
-        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: có phải nhãn của trang khác không?",
+        "{} of {} boxes lie outside the page of {} x {} px: {}",
+        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: {!4}",
     ),
     (
-        "{} of {} boxes lie outside the page of {} x {} px: labels of another page?",
-        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: có phải nhãn của trang khác không?",
+        "{} of {} boxes lies outside the page of {} x {} px: {}",
+        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: {!4}",
     ),
     (
-        "1 of 1 box lies outside the page of {} x {} px: labels of another page?",
-        "khung duy nhất nằm ngoài trang in {0} x {1} px: có phải nhãn của trang khác không?",
+        "{} of 1 box lies outside the page of {} x {} px: {}",
+        "khung duy nhất nằm ngoài trang in {1} x {2} px: {!3}",
     ),
     (
-        "{} of {} boxes lies outside the page of {} x {} px: as two corners, their numbers fit the page",
-        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: nếu là hai góc thì các số này vừa với trang in",
+        "labels of another page?",
+        "có phải nhãn của trang khác không?",
     ),
     (
-        "{} of {} boxes lie outside the page of {} x {} px: as two corners, their numbers fit the page",
-        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: nếu là hai góc thì các số này vừa với trang in",
-    ),
-    (
-        "1 of 1 box lies outside the page of {} x {} px: as two corners, their numbers fit the page",
-        "khung duy nhất nằm ngoài trang in {0} x {1} px: nếu là hai góc thì các số này vừa với trang in",
+        "as two corners, their numbers fit the page",
+        "nếu là hai góc thì các số này vừa với trang in",
     ),
     (
         "are they corners where this format has width and height?",

@@ -18,28 +18,6 @@ const PLACES: &[(&str, &str)] = &[
     ("the coordinates of {} {}", "tọa độ của {0} {1}"),
     ("the element {}", "phần tử {0}"),
     ("the image of the page", "hình của trang in"),
-    (
-        "cannot read the review queue",
-        "không đọc được danh sách cần đánh giá",
-    ),
-    (
-        "cannot plant an attention check",
-        "không tạo được hình kiểm tra",
-    ),
-    ("the workbook is damaged", "bảng tính bị hỏng"),
-    ("the {} is damaged", "tệp {0} bị hỏng"),
-    (
-        "the JSON in column {} is damaged",
-        "JSON trong cột {0} bị hỏng",
-    ),
-    (
-        "not a JSON object, column {}",
-        "không phải đối tượng JSON, cột {0}",
-    ),
-    (
-        "not a JSON object, line {}",
-        "không phải đối tượng JSON, dòng {0}",
-    ),
     ("face failed", "bước tìm mặt khắc bị lỗi"),
     ("align failed", "bước căn chỉnh với trang in bị lỗi"),
     ("boxes failed", "bước tìm vị trí các chữ bị lỗi"),
@@ -68,10 +46,6 @@ const PARTS: &[(&str, &str)] = &[
     ("an object", "một đối tượng"),
     ("a mesh", "bản quét"),
     ("a directory", "thư mục"),
-    (
-        "no side has a large flat part",
-        "không mặt nào có phần phẳng lớn",
-    ),
     ("an archive", "tệp nén"),
     ("a binary workbook (XLSB)", "bảng tính nhị phân (XLSB)"),
     (

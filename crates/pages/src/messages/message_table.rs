@@ -119,7 +119,6 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     ("there is no pair {}", "không có cặp {0}"),
     ("there is no block {}", "không có ván {0}"),
-    ("there is {}/{}", "có tệp {0}/{1}"),
     ("similar ids: {}", "mã gần giống: {0}"),
     (
         "pair {} has no box any more in the labels of its block",

@@ -35,28 +35,6 @@ const TABLES: [&[MessageRow]; 11] = [
 
 /// Messages that end with a reason that no table has.
 const OPEN_ENDED: &[MessageRow] = &[
-    ("the workbook is damaged: {}", "bảng tính bị hỏng: {0}"),
-    ("the {} is damaged: {}", "tệp {0} bị hỏng: {1}"),
-    (
-        "the JSON in column {} is damaged: {}",
-        "JSON trong cột {0} bị hỏng: {1}",
-    ),
-    (
-        "not a JSON object, column {}: {}",
-        "không phải đối tượng JSON, cột {0}: {1}",
-    ),
-    (
-        "not a JSON object, line {}: {}",
-        "không phải đối tượng JSON, dòng {0}: {1}",
-    ),
-    (
-        "cannot read the review queue: {}",
-        "không đọc được danh sách cần đánh giá: {0}",
-    ),
-    (
-        "cannot plant an attention check: {}",
-        "không tạo được hình kiểm tra: {0}",
-    ),
     ("cannot read {}: {}", "không đọc được {0}: {1}"),
     ("cannot list {}: {}", "không liệt kê được {0}: {1}"),
     ("drawing stopped: {}", "việc vẽ bị dừng: {0}"),

@@ -2,6 +2,21 @@
 
 /// Messages like those on pairs.
 pub(super) const PARSER_MESSAGES: &[(&str, &str)] = &[
+    // Damaged files, with a reason that may have a row of its own.
+    ("the workbook is damaged: {}", "bảng tính bị hỏng: {!0}"),
+    (
+        "the JSON in column {} is damaged: {}",
+        "JSON trong cột {0} bị hỏng: {!1}",
+    ),
+    ("the {} is damaged: {}", "tệp {0} bị hỏng: {!1}"),
+    (
+        "not a JSON object, column {}: {}",
+        "không phải đối tượng JSON, cột {0}: {!1}",
+    ),
+    (
+        "not a JSON object, line {}: {}",
+        "không phải đối tượng JSON, dòng {0}: {!1}",
+    ),
     // Workbooks.
     (
         "this is {}, not an XLSX workbook",

@@ -3,6 +3,14 @@
 /// Messages like those on pairs.
 pub(super) const REVIEW_MESSAGES: &[(&str, &str)] = &[
     // Requests of reviews.
+    (
+        "cannot read the review queue: {}",
+        "không đọc được danh sách cần đánh giá: {!0}",
+    ),
+    (
+        "cannot plant an attention check: {}",
+        "không tạo được hình kiểm tra: {!0}",
+    ),
     ("there is no such item", "không có hình này"),
     ("answer it first", "hãy trả lời hình này trước"),
     ("answer every image first", "hãy trả lời mọi hình trước"),

@@ -5,7 +5,7 @@ use std::path::Path;
 use mocban_core::raster::profile_warning;
 
 use super::super::foreign_messages::FOREIGN_MESSAGES;
-use super::{TABLES, vietnamese};
+use super::{TABLES, parts_of, vietnamese};
 
 /// Checks messages and their Vietnamese texts.
 pub(super) fn assert_translated(messages: &[(&str, &str)]) {
@@ -285,6 +285,41 @@ fn an_export_of_nothing_is_explained() {
     let said = "none of the chosen pairs has a result to export: 1 without a result";
     let wanted = "không có cặp nào đã chọn có kết quả để xuất: 1 chưa có kết quả";
     assert_eq!(vietnamese(said).as_deref(), Some(wanted));
+}
+
+#[test]
+fn reasons_and_paths_of_messages_are_translated() {
+    assert_translated(&[
+        (
+            "there is no directory data/scans",
+            "không có thư mục data/scans",
+        ),
+        ("there is no file a/b.csv", "không có tệp a/b.csv"),
+        (
+            "a.csv: line 2: mesh c.stl of 1 does not exist; there is m/c.STL",
+            "a.csv: dòng 2: không có bản quét c.stl của 1; có tệp m/c.STL",
+        ),
+        (
+            "a.xlsx: the workbook is damaged: xl/workbook.xml ends early; save it again",
+            "a.xlsx: bảng tính bị hỏng: xl/workbook.xml kết thúc sớm; hãy lưu lại",
+        ),
+        (
+            "a.xlsx: the workbook is damaged: new words; save it again",
+            "a.xlsx: bảng tính bị hỏng: new words; hãy lưu lại",
+        ),
+    ]);
+}
+
+#[test]
+fn no_row_is_hidden_by_an_earlier_one() {
+    for row in TABLES.into_iter().flatten() {
+        for part in ["7", "a/b"] {
+            let message = row.0.replace("{}", part);
+            let mut rows = TABLES.into_iter().flatten();
+            let first = rows.find(|(english, _)| parts_of(&message, english).is_some());
+            assert_eq!(first, Some(row), "{message:?}");
+        }
+    }
 }
 
 /// Parts of messages that the program joins with the words beside them, so that no source has both.
