@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::failure::{AppFailure, AppResult};
 use super::projects::OpenProject;
 use crate::on_thread::read_on_thread;
 use mocban_core::domain::UnixMillis;
+use mocban_core::locked;
 use mocban_project::input_places::InputPlaces;
 
 /// How long a page that is read again and again shows what was found. The button looks anew.
@@ -46,7 +47,7 @@ impl LookedInputs {
     }
 
     fn kept(&self, dir: &Path, pressed: UnixMillis, now: Instant) -> Option<Arc<InputPlaces>> {
-        let last = self.lock().get(dir).cloned()?;
+        let last = locked(&self.0).get(dir).cloned()?;
         let is_new = last.pressed == pressed && now.duration_since(last.ended) < MAX_AGE;
         is_new.then_some(last.places)
     }
@@ -57,12 +58,7 @@ impl LookedInputs {
             ended,
             places,
         };
-        self.lock().insert(dir.to_owned(), look);
-    }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<PathBuf, LastLook>> {
-        // Each change is a single insertion.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0).insert(dir.to_owned(), look);
     }
 }
 
