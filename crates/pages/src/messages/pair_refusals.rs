@@ -4,27 +4,27 @@
 pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     (
         "mesh has {} vertices, a plane needs 3",
-        "bản quét có {0} đỉnh, cần ít nhất 3 đỉnh để có mặt phẳng",
+        "bản quét có {0#} đỉnh, cần ít nhất 3 đỉnh để có mặt phẳng",
     ),
     (
         "the coordinates of the {} vertices are too large to compute with",
-        "tọa độ của {0} đỉnh quá lớn để tính",
+        "tọa độ của {0#} đỉnh quá lớn để tính",
     ),
     (
         "all {} vertices lie at one point",
-        "cả {0} đỉnh nằm tại một điểm",
+        "cả {0#} đỉnh nằm tại một điểm",
     ),
     (
         "all {} vertices lie on one line",
-        "cả {0} đỉnh nằm trên một đường thẳng",
+        "cả {0#} đỉnh nằm trên một đường thẳng",
     ),
     (
         "mesh has no faces, and {} points are too few to show a surface",
-        "bản quét không có mặt tam giác, và {0} điểm là quá ít để thấy bề mặt",
+        "bản quét không có mặt tam giác, và {0#} điểm là quá ít để thấy bề mặt",
     ),
     (
         "mesh of {} vertices shows no surface from either side",
-        "bản quét {0} đỉnh không có bề mặt nhìn từ cả hai phía",
+        "bản quét {0#} đỉnh không có bề mặt nhìn từ cả hai phía",
     ),
     (
         "no carving found: the likeliest side has a relief of {} on an extent of {} (mesh units), a share below fit.min_relief {}",
@@ -36,7 +36,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "plane fit found {} inliers of {} selected points, needs {}",
-        "khớp mặt phẳng chỉ được {0} trong {1} điểm đã chọn, cần {2}",
+        "khớp mặt phẳng chỉ được {0#} trong {1#} điểm đã chọn, cần {2#}",
     ),
     (
         "depth.resolution_by is px_per_mm but the unit of the mesh is not known",
@@ -117,14 +117,14 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "một bước kết thúc trước khi đọc bản quét",
     ),
     ("there are no vertices", "không có đỉnh nào"),
-    ("there are {} vertices", "có {0} đỉnh"),
+    ("there are {} vertices", "có {0#} đỉnh"),
     (
         "at most 4294967295 can be used",
         "chỉ dùng được nhiều nhất 4294967295 đỉnh",
     ),
     (
         "vertex {} (counted from 0) has the coordinate {}, which is not a finite number",
-        "đỉnh {0} (đếm từ 0) có tọa độ {1}, không phải số hữu hạn",
+        "đỉnh {0#} (đếm từ 0) có tọa độ {1}, không phải số hữu hạn",
     ),
     (
         "remove such vertices and their faces",
@@ -132,7 +132,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "face {} refers to vertex {}, but there are {} vertices",
-        "mặt {0} dùng đỉnh {1}, nhưng chỉ có {2} đỉnh",
+        "mặt {0#} dùng đỉnh {1#}, nhưng chỉ có {2#} đỉnh",
     ),
     ("both count from 0", "cả hai đếm từ 0"),
     (
@@ -157,11 +157,11 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "the {} has {} bytes after the rows that its header counts",
-        "tệp {0} còn {1} byte sau các dòng mà phần đầu tệp ghi",
+        "tệp {0} còn {1#} byte sau các dòng mà phần đầu tệp ghi",
     ),
     (
         "{} of {} vertices have no position (NaN, infinite or repeated 0 0 0), and without them nothing is left",
-        "{0} trong {1} đỉnh không có vị trí (NaN, vô hạn hoặc 0 0 0 lặp lại), bỏ chúng đi thì không còn gì",
+        "{0#} trong {1#} đỉnh không có vị trí (NaN, vô hạn hoặc 0 0 0 lặp lại), bỏ chúng đi thì không còn gì",
     ),
     (
         "a face refers to a vertex that the file does not have",
@@ -190,7 +190,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "it is the last line, so the file seems to be cut off",
         "đây là dòng cuối nên tệp có vẻ bị cắt cụt",
     ),
-    ("it has more than {} bytes", "dòng có hơn {0} byte"),
+    ("it has more than {} bytes", "dòng có hơn {0#} byte"),
     ("a vertex outside of a facet", "có đỉnh nằm ngoài mặt"),
     (
         "{} is not a word of ascii STL",
@@ -217,7 +217,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ("it is longer than 1 MiB", "dài hơn 1 MiB"),
     (
         "limits.image.max_bytes is {}",
-        "limits.image.max_bytes là {0}",
+        "limits.image.max_bytes là {0#}",
     ),
     (
         "the image is {} x {} pixels: it has no pixels",
@@ -226,7 +226,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ("the image is {} x {} pixels", "hình có {0} x {1} điểm ảnh"),
     (
         "limits.image.max_pixels is {}",
-        "limits.image.max_pixels là {0}",
+        "limits.image.max_pixels là {0#}",
     ),
     (
         "the TIFF image has {} pages, {} of them of full size",
