@@ -39,7 +39,7 @@ const COLUMNS: [[[&str; 2]; 2]; 5] = [
     [
         [
             "Pairs that lose their scanned side",
-            "Số cặp mất mặt được quét",
+            "Số cặp không còn ghi mặt được quét",
         ],
         [
             "Pairs that get a scanned side or another one",
@@ -75,10 +75,13 @@ const BLOCK_COLUMNS: [[[&str; 2]; 2]; 3] = [
         ],
     ],
     [
-        ["Blocks that lose their side", "Số ván mất mặt"],
+        [
+            "Blocks that lose their side",
+            "Số ván không còn ghi mặt trước hay mặt sau",
+        ],
         [
             "Blocks that get a side or another one",
-            "Số ván được thêm hoặc đổi mặt",
+            "Số ván được ghi thêm hoặc đổi mặt trước, mặt sau",
         ],
     ],
 ];

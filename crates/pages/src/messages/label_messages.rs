@@ -231,7 +231,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} is not a fraction of the page from 0 to 1",
-        "{0} không phải là phần của trang in từ 0 đến 1",
+        "{0} không phải là tỉ lệ của trang in, từ 0 đến 1",
     ),
     (
         "the class is {}, not a whole number",

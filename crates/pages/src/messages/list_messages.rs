@@ -184,11 +184,11 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "mesh names an image and print names a mesh",
-        "ô bản quét (mesh) ghi hình và ô bản in (print) ghi bản quét",
+        "ô bản quét (mesh) ghi tệp hình, còn ô bản in (print) ghi tệp bản quét",
     ),
     (
         "mesh names an image and page names a mesh",
-        "ô bản quét (mesh) ghi hình và ô trang in (page) ghi bản quét",
+        "ô bản quét (mesh) ghi tệp hình, còn ô trang in (page) ghi tệp bản quét",
     ),
     ("swap the two", "hãy đổi chỗ hai mục này"),
     (

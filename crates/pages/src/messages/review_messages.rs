@@ -100,7 +100,7 @@ pub(super) const REVIEW_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "an angle is from -180 to 180 degrees",
-        "góc từ -180 đến 180 độ",
+        "góc phải từ -180 đến 180 độ",
     ),
     (
         "the display time is too long",
@@ -108,7 +108,7 @@ pub(super) const REVIEW_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the time of a verdict is from 1970 to now",
-        "thời điểm đánh giá từ năm 1970 đến nay",
+        "thời điểm đánh giá phải từ năm 1970 đến nay",
     ),
     // Work of the server.
     (
