@@ -256,12 +256,8 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ("{} is {}, not text", "{0} là {1}, không phải là văn bản"),
     // Errors of formulas.
     (
-        "line {}: column {} has the error {} of a formula",
-        "dòng {0}: cột {1} có lỗi công thức {2}",
-    ),
-    (
-        "lines {}: column {} has the error {} of a formula",
-        "các dòng {0}: cột {1} có lỗi công thức {2}",
+        "column {} has the error {} of a formula",
+        "cột {0} có lỗi công thức {1}",
     ),
     (
         "correct it in the spreadsheet program, or clear the cell",

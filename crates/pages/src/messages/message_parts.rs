@@ -67,6 +67,7 @@ const PARTS: &[(&str, &str)] = &[
         "hồ sơ ICC không đọc được",
     ),
     ("without a name", "không có tên"),
+    ("id or print", "id hoặc print"),
     (
         "MeshLab, Blender or CloudCompare",
         "MeshLab, Blender hoặc CloudCompare",

@@ -384,7 +384,7 @@ fn sources() -> String {
             }
         }
     }
-    joined(&all)
+    joined(&all).replace("\\\"", "\"")
 }
 
 /// Returns sources in which strings that go on in the next line are joined.
@@ -394,7 +394,7 @@ pub(super) fn joined(sources: &str) -> String {
     for part in parts {
         joined += part.trim_start();
     }
-    joined.replace("\\\"", "\"")
+    joined
 }
 
 #[test]
