@@ -1,3 +1,5 @@
+//! What the preview of an import says of columns and choices.
+
 use std::collections::BTreeMap;
 
 use super::{SHOWN_COLUMNS, import_form, other_columns, renamed_text};
