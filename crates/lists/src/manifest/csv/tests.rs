@@ -88,7 +88,7 @@ fn ids_that_differ_in_case_or_unicode_form_only_are_refused() {
         refusal(&format!(
             "id,mesh,print\n{composed},m,p\n{decomposed},m,p\n"
         )),
-        format!("line 3: id {decomposed:?} is already on line 2")
+        format!("line 3: id \"{composed}\" is already on line 2")
     );
     assert!(refusal("id,mesh,print\nĐĩa,m,p\nđĩa,m,p\n").contains("only in upper and lower case"));
     assert!(parse("id,mesh,print\ndia,m,p\nđĩa,m,p\n").is_ok());
