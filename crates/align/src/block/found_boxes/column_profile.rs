@@ -5,6 +5,13 @@ use super::layout::{CELL, Layout};
 
 /// Pitches of rows that are tried, in pitches of columns.
 const ROW_PITCHES: [f64; 2] = [0.5, 1.2];
+/// Largest fraction of lines with strokes on a page with few characters, and the sum of the cells of a line that counts as
+/// strokes.
+const FEW_LINES: f64 = 0.4;
+const INKED_LINE: f64 = 0.5;
+/// Position of the usual height of a character among the heights of all, and the fewest heights that say what is usual.
+const USUAL_HEIGHT: f64 = 0.75;
+const MIN_HEIGHTS: usize = 4;
 /// Middles that are tried, in widths of the column on both sides.
 const MIDDLE_REACH: f64 = 0.09;
 /// Ink of a line that counts as a stroke, in the usual ink of a line.
@@ -181,9 +188,36 @@ pub(super) fn usual_ink(profiles: &[ColumnProfile]) -> f64 {
     lines.get(lines.len() / 2).copied().unwrap_or(1.0)
 }
 
+/// Returns the usual height of a character on a page with few of them, cells; `None` on other pages.
+///
+/// There, most characters have no neighbour above or below, so that a column is most like itself at a lag within a
+/// character.
+fn height_of_few(profiles: &[ColumnProfile], column_pitch: f64) -> Option<usize> {
+    let [shortest, longest] = ROW_PITCHES.map(|share| share * column_pitch);
+    let (mut inked, mut all) = (0, 0);
+    let mut heights = Vec::new();
+    for profile in profiles.iter().filter(|profile| !profile.is_strip) {
+        all += profile.lines.len();
+        for run in profile.lines.split(|line| *line < INKED_LINE) {
+            inked += run.len();
+            if (shortest..=longest).contains(&(run.len() as f64)) {
+                heights.push(run.len());
+            }
+        }
+    }
+    if inked as f64 > FEW_LINES * all as f64 || heights.len() < MIN_HEIGHTS {
+        return None;
+    }
+    heights.sort_unstable();
+    Some(heights[(USUAL_HEIGHT * heights.len() as f64) as usize])
+}
+
 /// Returns the lag at which the columns are most like themselves.
 pub(super) fn row_pitch(profiles: &[ColumnProfile], column_pitch: f64) -> f64 {
-    let lags = ROW_PITCHES.map(|share| (share * column_pitch) as usize);
+    let mut lags = ROW_PITCHES.map(|share| (share * column_pitch) as usize);
+    if let Some(height) = height_of_few(profiles, column_pitch) {
+        lags[0] = lags[0].max(height);
+    }
     let mut sums = vec![0.0; lags[1] + 2];
     for profile in profiles.iter().filter(|profile| !profile.is_strip) {
         let lines = &profile.lines;

@@ -74,6 +74,18 @@ fn a_page_with_few_characters_has_the_columns_of_its_rules() {
 }
 
 #[test]
+fn characters_without_neighbours_are_whole() {
+    let mut drawing = Drawing::ruled();
+    for (column, top) in (1..).zip([5.0, 57.0, 20.0, 40.0, 30.0]) {
+        let [left, _, right, _] = cell(column, 1);
+        let name = format!("c{column:02}-r01");
+        drawing.character(name, [left, top, right, top + 13.0], 0.0);
+    }
+    let (map, size) = upright();
+    drawing.check(&map, size);
+}
+
+#[test]
 fn a_tear_divides_no_character() {
     let mut drawing = Drawing::full(|_, _| false);
     let [left, _, right, _] = cell(3, 1);
