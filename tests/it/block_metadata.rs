@@ -117,18 +117,49 @@ fn a_list_that_lacks_a_known_column_says_what_is_lost() {
     let labels =
         "block,mesh,page,labels,unit\nb1,b1.stl,b1.png,l.json,mm\nb2,b2.stl,b2.png,l.json,mm\n";
     let first = import(labels);
-    assert!(!first.contains("does not name"), "{first}");
+    assert!(!first.contains("missing in this import"), "{first}");
     let again = import("block,mesh,page,unit\nb1,b1.stl,b1.png,mm\nb2,b2.stl,b2.png,\n");
     for sentence in [
-        "2 known blocks lose their labels, which this import does not name, first b1; if that was not meant, import again with this column or option",
-        "1 known block loses its unit, which this import does not name: b2; ",
+        "2 known blocks lose their labels, empty or missing in this import, first b1; if that was not meant, import again with these values",
+        "1 known block loses its unit, empty or missing in this import: b2; ",
     ] {
         assert!(again.contains(sentence), "{again}");
     }
     let pairs = "id,mesh,print,character,block\na,b1.stl,b1.png,天,k1\n";
     import(pairs);
     let again = import("id,mesh,print,character\na,b1.stl,b1.png,天\n");
-    let sentence = "1 known pair loses its block, which this import does not name: a; ";
+    let sentence = "1 known pair loses its block, empty or missing in this import: a; ";
     assert!(again.contains(sentence), "{again}");
     assert!(!again.contains("its character"), "{again}");
+}
+
+#[test]
+fn metadata_that_an_import_empties_is_named_by_column() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    write_blocks(dir, &["b1"]);
+    let import = |list: &str| {
+        fs::write(dir.join("list.csv"), list).expect("written");
+        project(dir, &["import", "list.csv"]).expect(0).err
+    };
+    import("block,mesh,page,shelf,room\nb1,b1.stl,b1.png,R.1,2\n");
+    import("id,mesh,print,shelf,room\na,b1.stl,b1.png,R.1,2\n");
+    for (list, sentence) in [
+        (
+            "block,mesh,page,room\nb1,b1.stl,b1.png,2\n",
+            "1 known block loses its \"shelf\", empty or missing in this import: b1; ",
+        ),
+        (
+            "id,mesh,print,room\na,b1.stl,b1.png,2\n",
+            "1 known pair loses its \"shelf\", empty or missing in this import: a; ",
+        ),
+        (
+            "id,mesh,print,shelf,room\na,b1.stl,b1.png,R.1,\n",
+            "1 known pair loses its \"room\", empty or missing in this import: a; ",
+        ),
+    ] {
+        let again = import(list);
+        assert!(again.contains(sentence), "{again}");
+        assert_eq!(again.matches("empty or missing").count(), 1, "{again}");
+    }
 }

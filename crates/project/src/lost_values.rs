@@ -1,4 +1,4 @@
-//! Sentences about values of known pairs and blocks that an import empties, such as by a forgotten column.
+//! Sentences about values of known pairs and blocks that an import empties, such as by a forgotten column or an empty cell.
 
 use mocban_catalog::{LostColumn, LostValues};
 
@@ -9,13 +9,13 @@ pub(crate) fn lost_values<'l>(
 ) -> impl Iterator<Item = String> + use<'l> {
     lost.columns().map(move |(column, lost)| {
         let LostColumn { count, first } = lost;
-        let advice = "if that was not meant, import again with this column or option";
+        let advice = "if that was not meant, import again with these values";
         match count {
             1 => format!(
-                "1 known {kind} loses its {column}, which this import does not name: {first}; {advice}"
+                "1 known {kind} loses its {column}, empty or missing in this import: {first}; {advice}"
             ),
             _ => format!(
-                "{count} known {kind}s lose their {column}, which this import does not name, first {first}; {advice}"
+                "{count} known {kind}s lose their {column}, empty or missing in this import, first {first}; {advice}"
             ),
         }
     })

@@ -36,7 +36,7 @@ pub struct BlockImportSummary {
     pub unchanged: u64,
     /// New blocks with the scan and page of earlier ones.
     pub same_files: Option<SameFiles>,
-    /// Values of existing blocks that the import does not name.
+    /// Values of existing blocks that the import empties.
     pub lost: LostValues,
 }
 
@@ -173,7 +173,11 @@ async fn import_block(
         None => summary.added += 1,
         Some(old) => {
             if let Some(old) = &old {
-                summary.lost.add(row.name.as_str(), &kept_values(old, row));
+                let name = row.name.as_str();
+                summary.lost.add(name, &kept_values(old, row));
+                if let (Some(old), Some(new)) = (&old.meta, &row.meta) {
+                    summary.lost.add_metadata(name, old, new);
+                }
             }
             let changed = old
                 .as_ref()
@@ -205,10 +209,8 @@ async fn import_block(
     query(NEW_JOB).bind(id).execute(conn).await
 }
 
-/// Returns columns, each with whether the known block has a value and whether the new row has one.
-fn kept_values(old: &BlockAttributes, new: &BlockAttributes) -> [(&'static str, bool, bool); 4] {
-    let has_meta = |row: &BlockAttributes| row.meta.as_ref().is_some_and(|meta| !meta.is_empty());
-    let keeps_meta = new.meta.is_none() || has_meta(new);
+/// Returns columns other than metadata, each with whether the known block has a value and whether the new row has one.
+fn kept_values(old: &BlockAttributes, new: &BlockAttributes) -> [(&'static str, bool, bool); 3] {
     [
         (
             "labels",
@@ -217,7 +219,6 @@ fn kept_values(old: &BlockAttributes, new: &BlockAttributes) -> [(&'static str, 
         ),
         ("unit", old.unit.is_some(), new.unit.is_some()),
         ("side", old.side.is_some(), new.side.is_some()),
-        ("metadata", has_meta(old), keeps_meta),
     ]
 }
 

@@ -74,7 +74,7 @@ pub struct ImportSummary {
     pub still_retired: u64,
     /// New pairs with the mesh and print of earlier ones, which are counted twice.
     pub same_files: Option<SameFiles>,
-    /// Values of existing pairs that the import does not name.
+    /// Values of existing pairs that the import empties.
     pub lost: LostValues,
 }
 
@@ -361,7 +361,9 @@ fn count_changes(
                 continue;
             }
             Some(Some(old)) => {
-                summary.lost.add(row.name.as_str(), &kept_values(&old, row));
+                let name = row.name.as_str();
+                summary.lost.add(name, &kept_values(&old, row));
+                summary.lost.add_metadata(name, &old.meta, &row.meta);
                 differing(&old, row)
             }
             Some(None) => vec!["a damaged value"],
@@ -421,24 +423,17 @@ fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
     .collect()
 }
 
-/// Returns columns, each with whether the known pair has a value and whether the new row has one.
-fn kept_values(old: &ImportRow, new: &ImportRow) -> [(&'static str, bool, bool); 5] {
+/// Returns columns other than metadata, each with whether the known pair has a value and whether the new row has one.
+fn kept_values(old: &ImportRow, new: &ImportRow) -> [(&'static str, bool, bool); 4] {
     let [old, new] = [old, new].map(|row| {
         [
             row.character.is_some(),
             row.block.is_some(),
             row.unit.is_some(),
             row.scanned_face_down.is_some(),
-            !row.meta.is_empty(),
         ]
     });
-    let names = [
-        "character",
-        "block",
-        "unit",
-        "scanned_face_down",
-        "metadata",
-    ];
+    let names = ["character", "block", "unit", "scanned_face_down"];
     std::array::from_fn(|k| (names[k], old[k], new[k]))
 }
 

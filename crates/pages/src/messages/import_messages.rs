@@ -248,23 +248,23 @@ pub(super) const IMPORT_MESSAGES: &[(&str, &str)] = &[
     ),
     // Values that the import empties.
     (
-        "1 known pair loses its {}, which this import does not name: {}",
-        "1 cặp đã có trong dự án bị mất giá trị ở cột {0} vì lần nhập này không có: {1}",
+        "1 known pair loses its {}, empty or missing in this import: {}",
+        "1 cặp đã có trong dự án bị mất giá trị ở cột {0} vì cột này trống hoặc không có trong lần nhập này: {1}",
     ),
     (
-        "{} known pairs lose their {}, which this import does not name, first {}",
-        "{0#} cặp đã có trong dự án bị mất giá trị ở cột {1} vì lần nhập này không có, cặp đầu tiên là {2}",
+        "{} known pairs lose their {}, empty or missing in this import, first {}",
+        "{0#} cặp đã có trong dự án bị mất giá trị ở cột {1} vì cột này trống hoặc không có trong lần nhập này, cặp đầu tiên là {2}",
     ),
     (
-        "1 known block loses its {}, which this import does not name: {}",
-        "1 ván đã có trong dự án bị mất giá trị ở cột {0} vì lần nhập này không có: {1}",
+        "1 known block loses its {}, empty or missing in this import: {}",
+        "1 ván đã có trong dự án bị mất giá trị ở cột {0} vì cột này trống hoặc không có trong lần nhập này: {1}",
     ),
     (
-        "{} known blocks lose their {}, which this import does not name, first {}",
-        "{0#} ván đã có trong dự án bị mất giá trị ở cột {1} vì lần nhập này không có, ván đầu tiên là {2}",
+        "{} known blocks lose their {}, empty or missing in this import, first {}",
+        "{0#} ván đã có trong dự án bị mất giá trị ở cột {1} vì cột này trống hoặc không có trong lần nhập này, ván đầu tiên là {2}",
     ),
     (
-        "if that was not meant, import again with this column or option",
-        "nếu không chủ ý thì hãy nhập lại với cột hoặc tùy chọn này",
+        "if that was not meant, import again with these values",
+        "nếu không chủ ý thì hãy nhập lại với các giá trị này",
     ),
 ];

@@ -210,12 +210,12 @@ fn lists_of_spreadsheets_are_explained() {
 fn values_that_an_import_empties_are_explained() {
     assert_translated(&[
         (
-            "1 known block loses its unit, which this import does not name: b2; if that was not meant, import again with this column or option",
-            "1 ván đã có trong dự án bị mất giá trị ở cột unit vì lần nhập này không có: b2; nếu không chủ ý thì hãy nhập lại với cột hoặc tùy chọn này",
+            "1 known block loses its unit, empty or missing in this import: b2; if that was not meant, import again with these values",
+            "1 ván đã có trong dự án bị mất giá trị ở cột unit vì cột này trống hoặc không có trong lần nhập này: b2; nếu không chủ ý thì hãy nhập lại với các giá trị này",
         ),
         (
-            "12 known pairs lose their character, which this import does not name, first a1; if that was not meant, import again with this column or option",
-            "12 cặp đã có trong dự án bị mất giá trị ở cột character vì lần nhập này không có, cặp đầu tiên là a1; nếu không chủ ý thì hãy nhập lại với cột hoặc tùy chọn này",
+            "12 known pairs lose their character, empty or missing in this import, first a1; if that was not meant, import again with these values",
+            "12 cặp đã có trong dự án bị mất giá trị ở cột character vì cột này trống hoặc không có trong lần nhập này, cặp đầu tiên là a1; nếu không chủ ý thì hãy nhập lại với các giá trị này",
         ),
     ]);
 }
