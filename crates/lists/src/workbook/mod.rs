@@ -35,12 +35,12 @@ pub fn is_workbook(bytes: &[u8]) -> bool {
 }
 
 /// Reads the sheet with a name, or else the first one that is not hidden. Numbers and dates become text as a reader sees
-/// them, `0117` with the format `0000` and `2026-11-21`; of formulas, the stored results are taken. Cells that are merged over
-/// rows of a column all have the value of the first, and values below it are left out.
+/// them, `0117` with the format `0000` and `2026-11-21`; of formulas, the stored results are taken, errors below the header
+/// too. Cells that are merged over rows of a column all have the value of the first, and values below it are left out.
 ///
 /// # Errors
-/// Returns an error if the bytes are not those of an XLSX workbook, it is damaged or too large, has no such sheet, or if a
-/// cell holds the error of a formula or is merged over several columns.
+/// Returns an error if the bytes are not those of an XLSX workbook, it is damaged or too large, has no such sheet, or if its
+/// header has the error of a formula or a cell is merged over several columns.
 pub fn read_sheet(bytes: &[u8], name: Option<&str>) -> Result<SheetTable, WorkbookError> {
     let archive = WorkbookArchive::open(bytes)?;
     let workbook = Workbook::read(&archive)?;

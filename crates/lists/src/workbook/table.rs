@@ -7,7 +7,7 @@ use super::cell_names::{MAX_COLUMNS, MAX_ROWS, column, letters};
 use super::error::WorkbookError;
 use super::merged::{HiddenValues, MergedCells};
 use super::parts::{TextCollector, Workbook, read_part, value};
-use crate::manifest::{UnnamedValues, is_id_or_path_column, is_text_column};
+use crate::manifest::{UnnamedValues, formula_error, is_id_or_path_column, is_text_column};
 use crate::xml::{XmlPart, local_name};
 
 /// Longest table, in bytes. Cells share texts, so a small workbook may hold a large one. Less in tests.
@@ -242,6 +242,10 @@ impl TableWriter<'_> {
             }
             "b" if value.trim() == "1" => "true".to_owned(),
             "b" => "false".to_owned(),
+            // Parsers decide by the column whether the error is refused.
+            "e" if self.width > 0 && formula_error(value.trim()).is_some() => {
+                value.trim().to_owned()
+            }
             "e" => {
                 let cell = self.name(column);
                 return Err(WorkbookError::CellError { cell, value });

@@ -5,7 +5,7 @@ use proptest::sample::Index;
 
 use super::test_helpers::{archive, text_rows, workbook};
 use super::{WorkbookError, is_workbook, read_sheet};
-use crate::manifest::parse_csv;
+use crate::manifest::{parse_csv, read_csv};
 
 const STRINGS: &str = "<sst count=\"9\"><si><t>id</t></si><si><t xml:space=\"preserve\">mesh </t></si>\
     <si><r><t>pr</t></r><r><rPr><b/></rPr><t>int</t></r><rPh sb=\"0\"><t>reading</t></rPh></si>\
@@ -291,6 +291,45 @@ fn the_first_visible_sheet_is_read_or_the_one_that_is_named() {
             .to_string(),
         "there is no sheet \"khối 6\"; the workbook has: \"Ghi chú\", \"Khối 4\", \"Khối 5\""
     );
+}
+
+#[test]
+fn errors_of_formulas_are_those_of_a_list_in_csv() {
+    let cell = |text: &str| {
+        let kind = if text.starts_with('#') { "e" } else { "str" };
+        format!("<c t=\"{kind}\"><v>{text}</v></c>")
+    };
+    let row = |cells: [&str; 5]| format!("<row>{}</row>", cells.map(cell).concat());
+    let table = |rows: [[&str; 5]; 2]| {
+        let header = row(["id", "mesh", "print", "block", "year"]);
+        let rows = header + &rows.map(row).concat();
+        csv(&workbook(&[("a", &rows)], "", ""))
+    };
+    let other = table([["a", "m", "p", "b", "#N/A"], ["b", "m", "p", "b", "1872"]]);
+    let mut rows = Vec::new();
+    let read = read_csv(other.as_bytes(), &mut |row| rows.push(row)).expect("a list");
+    let metadata: Vec<usize> = rows.iter().map(|row| row.meta.len()).collect();
+    assert_eq!(metadata, [0, 1]);
+    let warning = read.formula_errors.warning().expect("an error");
+    assert!(
+        warning.contains("#N/A in column \"year\" on line 2"),
+        "{warning}"
+    );
+    let known = table([
+        ["a", "#REF!", "#N/A", "#DIV/0!", "#N/A"],
+        ["#NAME?", "m", "p", "b", ""],
+    ]);
+    let refused = parse_csv(known.as_bytes()).expect_err("errors").to_string();
+    let lines: Vec<&str> = refused.lines().collect();
+    assert_eq!(lines.len(), 4, "{refused}");
+    for (line, start) in lines.iter().zip([
+        "line 2: column block has the error #DIV/0! of a formula",
+        "line 2: column mesh has the error #REF! of a formula",
+        "line 2: column print has the error #N/A of a formula",
+        "line 3: the id #NAME? is the error of a formula",
+    ]) {
+        assert!(line.starts_with(start), "{refused}");
+    }
 }
 
 #[test]
