@@ -135,7 +135,9 @@ fn csv_rows(
             return Ok(None);
         }
         let line = lines.at(record.position());
-        if record.len() != columns {
+        let mut further = record.iter().skip(columns);
+        let is_complete = (record.len()..columns).all(|column| layout.unnamed.contains(&column));
+        if !is_complete || !further.all(|cell| trimmed(cell).is_empty()) {
             let cells = record.len();
             let reason = format!("{cells} cells where the header has {columns}");
             return Err(RefusedLine::new(line, &reason));

@@ -249,6 +249,16 @@ impl CsvHeader {
     }
 }
 
+/// Returns whether a row can be read below a header: its cells behind the last column are empty, and the last columns for which
+/// it has no cells have no name.
+fn fits_header(columns: &[ListedColumn], record: &::csv::ByteRecord) -> bool {
+    let is_empty =
+        |cell: &[u8]| std::str::from_utf8(cell).is_ok_and(|cell| trimmed(cell).is_empty());
+    let mut further = record.iter().skip(columns.len());
+    let mut lacking = columns.iter().skip(record.len());
+    further.all(is_empty) && lacking.all(|(_, name)| name.is_empty())
+}
+
 /// Returns a row's cells.
 ///
 /// # Errors
@@ -259,7 +269,7 @@ pub(super) fn draft_of(
     record: &::csv::ByteRecord,
     encoding_hint: &str,
 ) -> Result<DraftRow, String> {
-    if record.len() != columns.len() {
+    if !fits_header(columns, record) {
         let (cells, names) = (record.len(), columns.len());
         return Err(format!("the row has {cells} cells, the header has {names}"));
     }

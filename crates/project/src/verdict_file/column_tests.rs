@@ -12,9 +12,19 @@ fn empty_columns_without_a_heading_are_ignored_and_others_named_by_number() {
     for text in [
         "pair,verdict,reviewer,\n1,pass,lan,\n",
         "pair;verdict; ;reviewer;;\u{a0}\n1;pass;;lan; ;\n",
+        "pair,verdict,reviewer\n1,pass,lan,, \n",
+        "pair,verdict,reviewer,,\n1,pass,lan\n",
     ] {
         let rows = parse(text.as_bytes(), false).expect(text);
         assert_eq!(rows, plain, "{text}");
+    }
+    for (text, reason) in [
+        ("1,pass,lan,,,x", "6 cells where the header has 4"),
+        ("1,pass,lan", "3 cells where the header has 4"),
+    ] {
+        let text = format!("pair,verdict,reviewer,note\n{text}\n");
+        let refused = parse(text.as_bytes(), false).expect_err(reason);
+        assert_eq!(refused.to_string(), format!("line 2: {reason}"));
     }
     let text = "pair,verdict,reviewer,,\n1,pass,lan,,\n2,pass,lan,,x\n";
     let refused = parse(text.as_bytes(), false).expect_err("a value");

@@ -1,5 +1,6 @@
 //! Tests of CSV lists.
 
+use super::super::parse_blocks;
 use super::{ManifestError, ManifestRow};
 use mocban_core::domain::LengthUnit;
 
@@ -74,6 +75,32 @@ fn every_problem_is_reported_with_its_line() {
             "line 7: the row has 2 cells, the header has 5",
         ]
     );
+}
+
+#[test]
+fn empty_cells_behind_the_last_column_and_missing_ones_without_a_name_are_ignored() {
+    let plain = parse("id,mesh,print,note\na,m,p,x\n").expect("parses");
+    for text in [
+        "id,mesh,print,note\na,m,p,x,\n",
+        "id;mesh;print;note\na;m;p;x;; ;\u{a0}\n",
+        "id,mesh,print,note,,\na,m,p,x\n",
+        "id,mesh,print,note,,\na,m,p,x,\n",
+    ] {
+        assert_eq!(parse(text).expect(text), plain, "{text:?}");
+    }
+    for (text, cells, columns) in [
+        ("id,mesh,print,note\na,m,p,x,,y\n", 6, 4),
+        ("id,mesh,print,note\na,m,p\n", 3, 4),
+        ("id,mesh,print,,note\na,m,p\n", 3, 5),
+    ] {
+        assert_eq!(
+            refusal(text),
+            format!("line 2: the row has {cells} cells, the header has {columns}")
+        );
+    }
+    let blocks = parse_blocks(b"block,mesh,page\nb,m,p,,\n").expect("parses");
+    assert_eq!(blocks[0].page.to_str(), Some("p"));
+    assert!(blocks[0].meta.is_empty());
 }
 
 #[test]
