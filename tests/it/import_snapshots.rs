@@ -190,6 +190,13 @@ fn workbooks_of_blocks_and_of_verdicts_are_read() {
         ],
     );
     let file = dir.path().join("đánh giá.xlsx").display().to_string();
+    let refused = at(&project, &["verdict", "import", &file]).expect(2).err;
+    let sheets = "only the sheet \"Ghi chú\" is read; name another one with --sheet: \"Danh sách\"";
+    assert!(refused.contains(sheets), "{refused}");
+    assert!(
+        refused.contains("columns pair, verdict, reviewer are missing"),
+        "{refused}"
+    );
     let verdicts = ["verdict", "import", &file, "--sheet", "Danh sách"];
     at(&project, &verdicts).expect(0);
     for (pair, verdict) in [("upright-0000", "pass"), ("upright-0001", "fail")] {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::{ProjectError, ProjectResult};
 use crate::exit::Refusal;
-use crate::files::{self, ListFile, MAX_SHOWN, RefusedLine};
+use crate::files::{self, MAX_SHOWN, RefusedLine};
 use crate::location::{Location, now};
 use crate::reviewers;
 use crate::selection;
@@ -165,15 +165,14 @@ pub struct VerdictFileImport {
     pub warnings: Vec<String>,
 }
 
-/// Records the verdicts of a file in CSV or JSON, or of a sheet of a workbook. If a line is refused, no verdict is
+/// Records the verdicts of a list with this text in CSV or JSON; `file` is its path. If a line is refused, no verdict is
 /// recorded. A new reviewer whose name is similar to another is refused unless `is_new_allowed`.
 pub async fn import(
     file: &Path,
-    sheet: Option<&str>,
+    bytes: Vec<u8>,
     is_new_allowed: bool,
     location: &Location,
 ) -> ProjectResult<VerdictFileImport> {
-    let ListFile { bytes, warning } = files::read_list(file, sheet)?;
     let (_project, catalog) = location.open().await?;
     let outcome = "no verdict was recorded";
     let is_jsonl = files::is_jsonl(file, &bytes);
@@ -227,7 +226,7 @@ pub async fn import(
     Ok(VerdictFileImport {
         counts,
         first_older,
-        warnings: warning.into_iter().chain(read).collect(),
+        warnings: read.collect(),
     })
 }
 

@@ -14,6 +14,7 @@ use mocban_catalog::{
 };
 use mocban_core::domain::shell::shell_quoted;
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
+use mocban_project::files::{self, ListFile};
 use mocban_project::verdict_words;
 use mocban_project::verdicts::{self, VerdictFileImport, VerdictLog};
 use mocban_project::{ExitCode, ProjectResult};
@@ -178,12 +179,18 @@ fn verdict_text(new: &NewVerdict) -> String {
 }
 
 async fn import(args: VerdictImportArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let sheet = args.sheet.as_deref();
+    let ListFile { bytes, warning } = files::read_list(&args.file, args.sheet.as_deref())?;
+    let (file, location) = (&args.file, &context.location);
+    let imported = verdicts::import(file, bytes, args.new_reviewer, location).await;
+    // Also of a list that is refused, whose table may be on another sheet.
+    if let Some(warning) = &warning {
+        context.warn(warning);
+    }
     let VerdictFileImport {
         counts,
         first_older,
         warnings,
-    } = verdicts::import(&args.file, sheet, args.new_reviewer, &context.location).await?;
+    } = imported?;
     for warning in warnings {
         context.warn(&warning);
     }
