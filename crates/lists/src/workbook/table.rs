@@ -50,7 +50,9 @@ struct TableWriter<'w> {
     merged: MergedCells,
     /// Values that other cells cover.
     hidden: HiddenValues,
-    /// The first cells that cannot be read.
+    /// Whether a cell cannot be read.
+    is_refused: bool,
+    /// The first cells that cannot be read, and errors of formulas, which a parser would refuse.
     refused: Vec<WorkbookError>,
     /// Number of these cells.
     refused_count: usize,
@@ -83,6 +85,7 @@ pub(super) fn csv(
         cell: None,
         merged: MergedCells::read(file, text)?,
         hidden: HiddenValues::default(),
+        is_refused: false,
         refused: Vec::new(),
         refused_count: 0,
     };
@@ -116,18 +119,18 @@ pub(super) fn csv(
             XmlPart::End | XmlPart::Text(_) => Ok(()),
         }
     })?;
-    match (writer.refused_count, writer.refused.pop()) {
-        (0, _) | (_, None) => {
-            let left_out = [writer.beside.warning(), writer.hidden.warning()];
-            Ok((writer.csv, left_out.into_iter().flatten().collect()))
-        }
-        (1, Some(alone)) => Err(alone),
-        (count, Some(last)) => {
-            let mut first = writer.refused;
-            first.push(last);
-            Err(WorkbookError::Cells { first, count })
-        }
+    if !writer.is_refused {
+        let left_out = [writer.beside.warning(), writer.hidden.warning()];
+        return Ok((writer.csv, left_out.into_iter().flatten().collect()));
     }
+    let (mut first, count) = (writer.refused, writer.refused_count);
+    Err(match first.pop() {
+        Some(alone) if count == 1 => alone,
+        last => {
+            first.extend(last);
+            WorkbookError::Cells { first, count }
+        }
+    })
 }
 
 impl TableWriter<'_> {
@@ -178,6 +181,7 @@ impl TableWriter<'_> {
             self.beside.add(self.row, usize::from(has_value));
             return Ok(());
         }
+        let is_error = cell.kind == "e";
         let text = match self.text(cell) {
             Err(error) if error.is_of_cell() => {
                 if !is_covered {
@@ -197,6 +201,10 @@ impl TableWriter<'_> {
             }
             return Ok(());
         }
+        if is_error && self.text_columns.contains_key(&column) && formula_error(&text).is_some() {
+            let (cell, value) = (self.name(column), text.clone());
+            self.count_refused(WorkbookError::CellError { cell, value });
+        }
         self.row_bytes += text.len();
         check_table(self.csv.len() + self.row_bytes)?;
         if self.cells.len() <= column {
@@ -206,8 +214,14 @@ impl TableWriter<'_> {
         Ok(())
     }
 
-    /// Counts a cell that cannot be read, and keeps the first ones.
+    /// Refuses the sheet because of a cell that cannot be read.
     fn refuse(&mut self, error: WorkbookError) {
+        self.is_refused = true;
+        self.count_refused(error);
+    }
+
+    /// Counts a cell to be named if the sheet is refused, and keeps the first ones.
+    fn count_refused(&mut self, error: WorkbookError) {
         self.refused_count += 1;
         if self.refused.len() < MAX_REFUSED {
             self.refused.push(error);

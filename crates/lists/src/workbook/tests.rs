@@ -303,11 +303,11 @@ fn errors_of_formulas_are_those_of_a_list_in_csv() {
     let table = |rows: [[&str; 5]; 2]| {
         let header = row(["id", "mesh", "print", "block", "year"]);
         let rows = header + &rows.map(row).concat();
-        csv(&workbook(&[("a", &rows)], "", ""))
+        workbook(&[("a", &rows)], "", "")
     };
     let other = table([["a", "m", "p", "b", "#N/A"], ["b", "m", "p", "b", "1872"]]);
     let mut rows = Vec::new();
-    let read = read_csv(other.as_bytes(), &mut |row| rows.push(row)).expect("a list");
+    let read = read_csv(csv(&other).as_bytes(), &mut |row| rows.push(row)).expect("a list");
     let metadata: Vec<usize> = rows.iter().map(|row| row.meta.len()).collect();
     assert_eq!(metadata, [0, 1]);
     let warning = read.formula_errors.warning().expect("an error");
@@ -319,7 +319,9 @@ fn errors_of_formulas_are_those_of_a_list_in_csv() {
         ["a", "#REF!", "#N/A", "#DIV/0!", "#N/A"],
         ["#NAME?", "m", "p", "b", ""],
     ]);
-    let refused = parse_csv(known.as_bytes()).expect_err("errors").to_string();
+    let refused = parse_csv(csv(&known).as_bytes())
+        .expect_err("errors")
+        .to_string();
     let lines: Vec<&str> = refused.lines().collect();
     assert_eq!(lines.len(), 4, "{refused}");
     for (line, start) in lines.iter().zip([
@@ -330,6 +332,15 @@ fn errors_of_formulas_are_those_of_a_list_in_csv() {
     ]) {
         assert!(line.starts_with(start), "{refused}");
     }
+    let others = [
+        ["a&#10;b", "m", "p", "b", "#N/A"],
+        ["b", "#REF!", "p", "b", ""],
+    ];
+    assert_eq!(
+        refusal(&table(others)),
+        "2 cells cannot be read:\ncell A2 of column \"id\" has a line break; write it on one line\n\
+         cell B3 has the error #REF!; correct it, or clear the cell"
+    );
 }
 
 #[test]
