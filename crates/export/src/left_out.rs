@@ -59,6 +59,13 @@ impl OmissionCounts {
         self.refusals().map(|(_, number)| number).sum()
     }
 
+    /// Returns whether chosen pairs were left out, and all of them only because they have no result.
+    pub fn all_lack_results(&self) -> bool {
+        let mut refusals = self.refusals().peekable();
+        refusals.peek().is_some()
+            && refusals.all(|(reason, _)| reason == OmissionReason::WithoutResult)
+    }
+
     /// Returns the reasons for which chosen pairs were left out with their numbers, such as `12 without a verdict, 3 below
     /// confidence 0.5`. `least` is the lowest confidence that is exported.
     pub fn text(&self, least: Option<f64>) -> String {
@@ -90,6 +97,9 @@ mod tests {
     fn reasons_are_listed_with_their_numbers() {
         let mut counts = OmissionCounts::default();
         assert_eq!((counts.text(None), counts.refused()), (String::new(), 0));
+        assert!(!counts.all_lack_results());
+        counts.add(OmissionReason::WithoutResult);
+        assert!(counts.all_lack_results());
         for reason in [
             OmissionReason::LowConfidence,
             OmissionReason::WithoutVerdict,
@@ -98,8 +108,9 @@ mod tests {
         ] {
             counts.add(reason);
         }
-        let text = "2 without a verdict, 1 below confidence 0.5";
+        let text = "1 without a result, 2 without a verdict, 1 below confidence 0.5";
         assert_eq!(counts.text(Some(0.5)), text);
-        assert_eq!(counts.refused(), 3);
+        assert_eq!(counts.refused(), 4);
+        assert!(!counts.all_lack_results());
     }
 }

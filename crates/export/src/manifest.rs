@@ -39,7 +39,7 @@ pub(super) struct ExportManifest<'a> {
 pub struct PairCounts {
     /// Pairs with a result.
     pub done: u64,
-    /// Pairs without a result.
+    /// Exported pairs without a result.
     pub without_result: u64,
     /// Pairs that were left out because they were not chosen, or no result of theirs was selected.
     pub left_out: u64,

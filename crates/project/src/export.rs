@@ -100,6 +100,9 @@ fn nothing_selected(
 ) -> String {
     let (nothing, advice) = if are_pairs_chosen {
         ("none of the chosen pairs has a result to export", "")
+    } else if left_out.all_lack_results() {
+        let advice = "; `run` computes results, and `status` says which pairs failed";
+        ("no result is selected", advice)
     } else {
         let advice = "; other values of --only and --min-confidence select more";
         ("no result is selected", advice)
@@ -107,5 +110,22 @@ fn nothing_selected(
     match left_out.refused() {
         0 => nothing.to_owned(),
         _ => format!("{nothing}: {}{advice}", left_out.text(least_confidence)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nothing_selected;
+    use mocban_export::{OmissionCounts, OmissionReason};
+
+    #[test]
+    fn other_selections_are_advised_only_if_they_select_more() {
+        let mut left_out = OmissionCounts::default();
+        left_out.add(OmissionReason::WithoutResult);
+        let text = nothing_selected(&left_out, false, None);
+        assert!(!text.contains("--only") && text.contains("`run`"), "{text}");
+        left_out.add(OmissionReason::WithoutVerdict);
+        let text = nothing_selected(&left_out, false, None);
+        assert!(text.contains("--only") && !text.contains("`run`"), "{text}");
     }
 }

@@ -286,6 +286,10 @@ fn print_done(exported: &ExportedProject, args: &ExportArgs, context: &Context) 
         0 => String::new(),
         lost => format!(", {lost} with missing or changed files"),
     };
+    let without_result = match summary.pairs.without_result {
+        0 => String::new(),
+        pairs => format!(", {pairs} without a result"),
+    };
     let left_out = match summary.pairs.left_out {
         0 => String::new(),
         left_out => {
@@ -294,10 +298,9 @@ fn print_done(exported: &ExportedProject, args: &ExportArgs, context: &Context) 
         }
     };
     context.info(&format!(
-        "{} exported to {}, {} without a result{left_out}{unreadable}",
+        "{} exported to {}{without_result}{left_out}{unreadable}",
         count(summary.pairs.done, "pair"),
-        args.output.display(),
-        summary.pairs.without_result
+        args.output.display()
     ));
     context.info(&explanation(args));
     if summary.pairs.done == 0 && summary.pairs.without_result > 0 {

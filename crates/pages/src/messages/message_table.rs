@@ -227,6 +227,14 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "none of the chosen pairs has a result to export",
         "không có cặp nào đã chọn có kết quả để xuất",
     ),
+    (
+        "`run` computes results, and `status` says which pairs failed",
+        "hãy chạy để tính kết quả, và xem các cặp lỗi trong danh sách",
+    ),
+    (
+        "other values of --only and --min-confidence select more",
+        "lựa chọn khác sẽ xuất nhiều cặp hơn",
+    ),
     ("nothing was written to {}", "chưa ghi gì vào {0}"),
     // Files of a pair.
     ("{} is not there", "không có tệp {0}"),
