@@ -361,6 +361,11 @@ fn an_export_without_a_selected_result_keeps_the_earlier_one() {
     let said = at(&project, &passed).expect(0).err;
     let reasons = "9 left out (1 without a result, 6 without a verdict, 1 unsure or in conflict, 1 failed by reviewers)";
     assert!(said.contains(reasons), "{said}");
+    let (_, numbers) = said.split_once(" exported to ").expect("a summary");
+    assert_eq!(numbers.matches("without a result").count(), 1, "{said}");
+    let readme = fs::read_to_string(out.join("README.md")).expect("a file");
+    let reasons = reasons.replace("left out (", "left out by the selection (");
+    assert!(readme.contains(&reasons), "{readme}");
     let json = at(&project, &[&passed[..], &["--json"]].concat())
         .expect(0)
         .json();

@@ -316,7 +316,13 @@ impl ExportRun {
         for output in &mut self.outputs {
             let mut names = output.writer.finish()?;
             let guide = output.writer.guide();
-            let text = readme::render(&guide, output.format, &self.context, summary.pairs);
+            let text = readme::render(
+                &guide,
+                output.format,
+                &self.context,
+                summary.pairs,
+                &summary.left_out,
+            );
             let mut own = vec![(readme::README, text)];
             own.extend(
                 guide

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::format::ExportFormat;
 use super::format_writer::{ExportContext, FormatGuide};
+use super::left_out::OmissionCounts;
 use super::manifest::PairCounts;
 
 /// Name of the README.
@@ -25,6 +26,7 @@ pub(super) fn render(
     format: ExportFormat,
     context: &ExportContext,
     pairs: PairCounts,
+    left_out: &OmissionCounts,
 ) -> String {
     let mut text = guide.front_matter.clone();
     let _ = write!(
@@ -34,14 +36,18 @@ pub(super) fn render(
     );
     let _ = writeln!(
         text,
-        "Made by {} with `export --to {format}`: {} pairs with a result, {} without, {} left out by the selection.\n",
-        context.program, pairs.done, pairs.without_result, pairs.left_out
+        "Made by {} with `export --to {format}`: {}.\n",
+        context.program,
+        numbers(pairs, left_out, context.options.least_confidence())
     );
     if pairs.set_apart > 0 {
+        let rows = match pairs.set_apart {
+            1 => "1 stored row is".to_owned(),
+            rows => format!("{rows} stored rows are"),
+        };
         let _ = writeln!(
             text,
-            "{} stored rows are damaged and not part of this export; `mocban check` lists them.\n",
-            pairs.set_apart
+            "{rows} damaged and not part of this export; `mocban check` lists damaged rows.\n"
         );
     }
     let _ = write!(text, "## Files\n\n| path | content |\n|---|---|\n");
@@ -64,6 +70,23 @@ pub(super) fn render(
     text
 }
 
+/// Returns how many pairs an export has, and how many it lacks for which reasons. `least` is the lowest confidence that is
+/// exported.
+fn numbers(pairs: PairCounts, left_out: &OmissionCounts, least: Option<f64>) -> String {
+    let noun = if pairs.done == 1 { "pair" } else { "pairs" };
+    let mut text = format!("{} {noun} with a result", pairs.done);
+    if pairs.without_result > 0 {
+        let _ = write!(text, ", {} without", pairs.without_result);
+    }
+    if pairs.left_out > 0 {
+        let _ = write!(text, ", {} left out by the selection", pairs.left_out);
+    }
+    if left_out.refused() > 0 {
+        let _ = write!(text, " ({})", left_out.text(least));
+    }
+    text
+}
+
 /// Returns the options of an export as a list.
 fn settings(context: &ExportContext) -> String {
     let options = serde_json::to_value(&context.options).expect("options are JSON");
@@ -72,4 +95,32 @@ fn settings(context: &ExportContext) -> String {
         let _ = writeln!(text, "- `{name}`: `{value}`");
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::numbers;
+    use crate::left_out::{OmissionCounts, OmissionReason};
+    use crate::manifest::PairCounts;
+
+    #[test]
+    fn pairs_that_are_left_out_are_counted_by_reason() {
+        let mut pairs = PairCounts {
+            done: 1,
+            left_out: 2,
+            ..PairCounts::default()
+        };
+        let mut left_out = OmissionCounts::default();
+        left_out.add(OmissionReason::WithoutResult);
+        left_out.add(OmissionReason::Failed);
+        assert_eq!(
+            numbers(pairs, &left_out, None),
+            "1 pair with a result, 2 left out by the selection (1 without a result, 1 failed by reviewers)"
+        );
+        (pairs.done, pairs.without_result, pairs.left_out) = (2, 1, 0);
+        assert_eq!(
+            numbers(pairs, &OmissionCounts::default(), None),
+            "2 pairs with a result, 1 without"
+        );
+    }
 }
