@@ -190,7 +190,7 @@ fn a_failed_block_is_named_on_every_page() {
     }
     let run = html(&page, "/p/p/");
     for part in [
-        "<b>1</b><span>blocks failed<",
+        "<b>1</b><span>block failed<",
         "href=\"block/b1/\">b1<",
         "does not belong to this block",
     ] {
@@ -240,7 +240,7 @@ fn an_export_says_which_one_was_made() {
     let shown = html(&page, "/p/p/export");
     let title = "scans with their prints for MeshLab or CloudCompare (chosen pairs)";
     assert!(
-        shown.contains(&format!("{title}: 1 pairs were exported.")),
+        shown.contains(&format!("{title}: 1 pair was exported.")),
         "{shown}"
     );
 }
@@ -304,7 +304,7 @@ fn a_file_of_a_failed_pair_is_replaced_by_one_of_its_name() {
     let prints = encode(project.join("data/prints").to_str().expect("UTF-8"));
     let address = format!("/import?project=p&meshes={at}&prints={prints}&changed=yes");
     let joined = html(&page, &address);
-    for part in ["<b>1</b> pairs", "name=\"changed\" value=\"yes\" checked"] {
+    for part in ["<b>1</b> pair", "name=\"changed\" value=\"yes\" checked"] {
         assert!(joined.contains(part), "{part}: {joined}");
     }
 }

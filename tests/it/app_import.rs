@@ -123,7 +123,7 @@ fn folders_without_a_pair_can_be_mended_too() {
     assert_eq!(refused.status, 422, "{}", text(&refused));
     let change = format!("&scan={}&print={}", encode("a 1.ply"), encode("chữ.jpg"));
     let joined = folders(&page, dir, &change);
-    assert!(joined.contains("<b>1</b> pairs"), "{joined}");
+    assert!(joined.contains("<b>1</b> pair"), "{joined}");
     let wrong = folders(
         &page,
         dir,
@@ -157,7 +157,7 @@ fn one_scan_and_its_page_are_imported_as_a_whole_block() {
     }
     let block = folders(&page, dir, "&whole_block=yes");
     for part in [
-        "<b>1</b> whole blocks",
+        "<b>1</b> whole block",
         "<th scope=\"row\">b04</th>",
         "page 4.jpg",
     ] {
@@ -282,7 +282,7 @@ fn a_person_names_the_columns_of_a_list() {
         assert!(chosen.contains("<b>2</b> pairs"), "{chosen}");
         assert!(chosen.contains("明"), "{chosen}");
         let left_out = page_of(&format!("{columns}&leave=n2"));
-        assert!(left_out.contains("<b>1</b> pairs"), "{left_out}");
+        assert!(left_out.contains("<b>1</b> pair"), "{left_out}");
         let mut fields = fields(&left_out);
         fields["project"] = json!(project);
         let reply = import(&page, &fields);

@@ -180,7 +180,7 @@ fn a_missing_input_is_said_although_all_results_are_sound() {
     std::fs::remove_file(dir.path().join(print)).expect("removed");
     let check = json!({"what": "check"});
     act(&page, "/p/p/actions/check", &check, |_| {});
-    let found = wait_for(&page, "/p/p/health", "1 missing input files");
+    let found = wait_for(&page, "/p/p/health", "1 missing input file:");
     assert!(found.contains("The results are sound, but"), "{found}");
     assert!(!found.contains("All are sound"), "{found}");
     let vietnamese = text(&page.get("/p/p/health?language=vi"));

@@ -86,7 +86,7 @@ fn an_archive_is_unpacked_or_refused_as_a_whole() {
     assert_eq!(stored(dir.path()), ["quét/chữ 1.png", "quét/chữ 1.stl"]);
     let go = reply.json()["go"].as_str().expect("an address").to_owned();
     let html = text(&page.get(&format!("/{go}")));
-    assert!(html.contains("<b>1</b> pairs"), "{html}");
+    assert!(html.contains("<b>1</b> pair"), "{html}");
     assert!(html.contains("3 other files of the archive"), "{html}");
     let empty = begun(&page, "x", 1);
     let none = archive(&[("readme.md", "x")], false);

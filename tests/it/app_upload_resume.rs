@@ -86,7 +86,7 @@ fn files_that_have_arrived_are_not_sent_again() {
         cut_off(&page, &upload, "a/2.stl");
         assert_eq!(names(dir.path()), ["1.stl"], "the part is removed");
         let why = refusal(&put(&page, &upload, "a/2.stl", b"x"));
-        assert!(why.contains("1 of them have arrived"), "{why}");
+        assert!(why.contains("1 of them has arrived"), "{why}");
         assert!(text(&page.get("/import")).contains(&why), "{why}");
         assert_eq!(refusal(&end(&page, &upload, "finish")), why);
         let (next, arrived) = begun_with(&page, "quét", 3);

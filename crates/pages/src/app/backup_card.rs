@@ -13,7 +13,7 @@ use super::action_body::ActionBody;
 use super::attachment::attachment;
 use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
-use super::number_text::file_size;
+use super::number_text::{english_count, english_form, file_size};
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::tasks::{FinishedTask, TaskKind, TaskLines};
@@ -99,7 +99,13 @@ fn size_sentence(size: &InputsSize, free: Option<u64>) -> Sentence {
         if size.remote > 0 {
             let remote = grouped(size.remote);
             let [before, after] = if is_english {
-                ["; without ", " files of an object store"]
+                [
+                    "; without ",
+                    english_form(
+                        size.remote,
+                        [" file of an object store", " files of an object store"],
+                    ),
+                ]
             } else {
                 ["; không gồm ", " tệp ở kho đối tượng"]
             };
@@ -139,7 +145,11 @@ async fn backup_lines(location: Location, with_inputs: bool) -> ProjectResult<Fi
     let [english, vietnamese] =
         [Language::English, Language::Vietnamese].map(|language| file_size(language, stored.bytes));
     let mut lines = vec![[
-        format!("{pairs} pairs and {verdicts} verdicts are in the backup ({english})."),
+        format!(
+            "{} and {} are in the backup ({english}).",
+            english_count(stored.pairs, ["pair", "pairs"]),
+            english_count(stored.verdicts, ["verdict", "verdicts"])
+        ),
         format!("Bản sao lưu có {pairs} cặp và {verdicts} đánh giá ({vietnamese})."),
     ]];
     lines.extend(stored.inputs.as_ref().map_or_else(Vec::new, inputs_lines));
@@ -156,7 +166,10 @@ fn inputs_lines(saved: &SavedInputs) -> TaskLines {
         .map(|language| file_size(language, saved.copies.bytes));
     let mut lines = vec![[
         format!(
-            "{files} scans and prints ({english}) are in {folder}, {copied} of them were copied now. Copy this folder together with the backup."
+            "{} ({english}) {} in {folder}, {copied} of them {} copied now. Copy this folder together with the backup.",
+            english_count(saved.copies.files, ["scan or print", "scans and prints"]),
+            english_form(saved.copies.files, ["is", "are"]),
+            english_form(saved.copied, ["was", "were"])
         ),
         format!(
             "{files} bản quét và bản in ({vietnamese}) nằm trong {folder}, {copied} trong số đó vừa được chép. Hãy chép cả thư mục này cùng với bản sao lưu."

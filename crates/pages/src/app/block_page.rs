@@ -169,7 +169,7 @@ fn ways(visit: &Visit, detail: &BlockDetail) -> Markup {
             }
         }
         @if let Some(points) = &state.control_points {
-            p.muted { (grouped(points.points.len() as u64)) " " (visit.t("places were chosen by a person.", "điểm do người dùng chọn.")) }
+            p.muted { (grouped(points.points.len() as u64)) " " (visit.form(points.points.len() as u64, ["place was chosen by a person.", "places were chosen by a person."], "điểm do người dùng chọn.")) }
         }
     }
 }
@@ -208,7 +208,7 @@ fn character_list(
                 p.muted { (visit.t("A run finds them on the page.", "Lần chạy sẽ tìm chúng trên trang in.")) }
             } @else {
                 p.row {
-                    (grouped(characters.len() as u64)) " " (visit.t(if characters.len() == 1 { "character" } else { "characters" }, "chữ")) " · "
+                    (grouped(characters.len() as u64)) " " (visit.form(characters.len() as u64, ["character", "characters"], "chữ")) " · "
                     a href={ "../../pairs?block=" (encoded(block.as_str())) } { (visit.t("All pairs of this block", "Tất cả các cặp của ván này")) }
                 }
                 div.scroll tabindex="0" role="region" aria-label=(label) {

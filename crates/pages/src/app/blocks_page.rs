@@ -93,14 +93,15 @@ fn figures(visit: &Visit, blocks: &[BlockState]) -> Markup {
     };
     let [done, failed, waiting] =
         STATES.map(|(name, statuses)| (of(statuses), visit.query.with("state", name).text()));
+    let all = blocks.len() as u64;
     let characters: u64 = blocks.iter().map(|block| block.characters).sum();
     html! {
         div.figures {
-            (figure(blocks.len() as u64, visit.t("blocks", "ván"), None, ""))
+            (figure(all, visit.form(all, ["block", "blocks"], "ván"), None, ""))
             (figure(done.0, visit.t("done", "xong"), Some(&done.1), "good"))
             (figure(failed.0, visit.t("failed", "lỗi"), Some(&failed.1), if failed.0 > 0 { "bad" } else { "" }))
             (figure(waiting.0, visit.t("waiting or running", "đang chờ hoặc đang chạy"), Some(&waiting.1), ""))
-            (figure(characters, visit.t("characters", "chữ"), None, ""))
+            (figure(characters, visit.form(characters, ["character", "characters"], "chữ"), None, ""))
         }
     }
 }

@@ -22,6 +22,7 @@ use super::exports::{
     OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, purpose_of, recover_exports,
 };
 use super::failure::{AppFailure, AppResult};
+use super::number_text::english_count;
 use super::run_blocks::{failed_blocks, failed_blocks_part};
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -252,6 +253,7 @@ async fn run(
         missing_inputs,
     } = export(&output, &[format], options, &location, &()).await?;
     let done = grouped(summary.pairs.done);
+    let exported = english_count(summary.pairs.done, ["pair was", "pairs were"]);
     let is_of_chosen = !of_chosen.is_empty();
     let [english, vietnamese_title] = [Language::English, Language::Vietnamese]
         .map(|language| export_title(language, titles, is_of_chosen));
@@ -263,7 +265,7 @@ async fn run(
         ]
     } else {
         [
-            format!("{english}: {done} pairs were exported."),
+            format!("{english}: {exported} exported."),
             format!("{vietnamese_title}: đã xuất {done} cặp."),
         ]
     }];

@@ -16,6 +16,7 @@ use super::backup_card::{self, BACKUP, DOWNLOAD_BYTES};
 use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::AppResult;
 use super::home::free_space;
+use super::number_text::english_count;
 use super::projects::is_project;
 use super::restore_page::restore_address;
 use super::sentence::Sentence;
@@ -142,7 +143,11 @@ async fn check_lines(location: Location, options: CheckOptions) -> ProjectResult
     let [pairs, files] = [summary.pairs, summary.files].map(grouped);
     let [english, vietnamese] = conclusion(&summary, repair);
     let mut lines = vec![[
-        format!("{pairs} pairs and {files} files were checked. {english}"),
+        format!(
+            "{} and {} were checked. {english}",
+            english_count(summary.pairs, ["pair", "pairs"]),
+            english_count(summary.files, ["file", "files"])
+        ),
         format!("Đã kiểm tra {pairs} cặp và {files} tệp. {vietnamese}"),
     ]];
     for (kind, found) in &summary.damage {
@@ -169,15 +174,24 @@ const fn has_other_inputs(summary: &CheckSummary) -> bool {
 fn input_lines(summary: &CheckSummary) -> TaskLines {
     let kinds = [
         (
-            ["missing input files", "tệp đầu vào bị thiếu"],
+            (
+                ["missing input file", "missing input files"],
+                "tệp đầu vào bị thiếu",
+            ),
             &summary.inputs_missing,
         ),
         (
-            ["changed input files", "tệp đầu vào đã đổi"],
+            (
+                ["changed input file", "changed input files"],
+                "tệp đầu vào đã đổi",
+            ),
             &summary.inputs_changed,
         ),
         (
-            ["unreadable input files", "tệp đầu vào không đọc được"],
+            (
+                ["unreadable input file", "unreadable input files"],
+                "tệp đầu vào không đọc được",
+            ),
             &summary.inputs_unreadable,
         ),
     ];
@@ -186,13 +200,17 @@ fn input_lines(summary: &CheckSummary) -> TaskLines {
 }
 
 /// Returns how many files have a note, and the first notes.
-fn note_line([english, vietnamese]: [&str; 2], notes: &Notes) -> [String; 2] {
+fn note_line((english, vietnamese): ([&str; 2], &str), notes: &Notes) -> [String; 2] {
     let number = grouped(notes.count);
     let first = notes.first.iter().take(SHOWN);
     let translated: Vec<String> = first.clone().map(|note| vietnamese_note(note)).collect();
     let first: Vec<&str> = first.map(String::as_str).collect();
     [
-        format!("{number} {english}: {}", first.join(", ")),
+        format!(
+            "{}: {}",
+            english_count(notes.count, english),
+            first.join(", ")
+        ),
         format!("{number} {vietnamese}: {}", translated.join(", ")),
     ]
 }
@@ -301,7 +319,13 @@ mod tests {
                 "not shown".to_owned(),
             ],
         };
-        let lines = note_line(["missing input files", "tệp đầu vào bị thiếu"], &notes);
+        let lines = note_line(
+            (
+                ["missing input file", "missing input files"],
+                "tệp đầu vào bị thiếu",
+            ),
+            &notes,
+        );
         let expected = [
             "4 missing input files: scans/list of/3.ply of a3, prints/4.jpg may not be read: permission denied (a4), odd",
             "4 tệp đầu vào bị thiếu: scans/list of/3.ply của a3, không có quyền đọc prints/4.jpg (a4), odd",

@@ -158,10 +158,10 @@ fn summary(visit: &Visit, counts: &StatusCounts, running: bool) -> Markup {
     let judged: u64 = counts.verdicts.values().sum();
     html! {
         p {
-            b { (grouped(counts.pairs)) } " " (visit.t("pairs", "cặp")) " · "
+            b { (grouped(counts.pairs)) } " " (visit.form(counts.pairs, ["pair", "pairs"], "cặp")) " · "
             (grouped(done)) " " (visit.t("aligned", "đã căn chỉnh")) " · "
             (grouped(failed)) " " (visit.t("failed", "lỗi")) " · "
-            (grouped(judged)) " " (visit.t("verdicts", "đánh giá"))
+            (grouped(judged)) " " (visit.form(judged, ["verdict", "verdicts"], "đánh giá"))
         }
         progress value=(done + failed) max=(counts.pairs.max(1)) aria-label=(visit.t("Progress", "Tiến độ")) {}
         @if running { p.good { (visit.t("A run is in progress.", "Đang chạy.")) } }

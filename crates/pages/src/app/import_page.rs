@@ -160,7 +160,7 @@ fn chosen_part(visit: &Visit, chosen: &ImportChoice) -> Markup {
     let left_out = visit.query.parsed::<u64>("left_out");
     html! {
         @if let Some(left_out) = left_out {
-            p.notice role="status" { (grouped(left_out)) " " (visit.t("other files of the archive are no scans, images or lists and were left out.", "tệp khác trong tệp nén không phải bản quét, hình ảnh hay danh sách và đã bị bỏ qua.")) }
+            p.notice role="status" { (grouped(left_out)) " " (visit.form(left_out, ["other file of the archive is no scan, image or list and was left out.", "other files of the archive are no scans, images or lists and were left out."], "tệp khác trong tệp nén không phải bản quét, hình ảnh hay danh sách và đã bị bỏ qua.")) }
         }
         @if is_empty {
             p { (visit.t(
@@ -231,13 +231,16 @@ fn picker(visit: &Visit, picked: &PickedFolder) -> Markup {
 /// Says how many files a folder has.
 pub(super) fn counts_text(visit: &Visit, counts: &FileCounts) -> String {
     let parts = [
-        (counts.meshes, visit.t("scans", "bản quét")),
-        (counts.prints, visit.t("images", "hình ảnh")),
-        (counts.lists, visit.t("lists", "danh sách")),
+        (counts.meshes, ["scan", "scans"], "bản quét"),
+        (counts.prints, ["image", "images"], "hình ảnh"),
+        (counts.lists, ["list", "lists"], "danh sách"),
     ];
-    let parts = parts.iter().filter(|(number, _)| *number > 0);
+    let parts = parts.into_iter().filter(|(number, ..)| *number > 0);
     let parts: Vec<String> = parts
-        .map(|(number, name)| format!("{} {name}", grouped(*number)))
+        .map(|(number, english, vietnamese)| {
+            let name = visit.form(number, english, vietnamese);
+            format!("{} {name}", grouped(number))
+        })
         .collect();
     let more = if counts.is_partial {
         visit.t(" and more", " và thêm nữa")

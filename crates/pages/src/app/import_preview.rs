@@ -54,7 +54,7 @@ pub(super) fn plan_part(
             h2 { (visit.t("What would be imported", "Sẽ nhập những gì")) }
             @match planned {
                 Planned::Blocks(read) => {
-                    p { b { (grouped(read.rows.len() as u64)) } " " (visit.t("whole blocks", "ván nguyên")) }
+                    p { b { (grouped(read.rows.len() as u64)) } " " (visit.form(read.rows.len() as u64, ["whole block", "whole blocks"], "ván nguyên")) }
                     p { (visit.t("Scans of whole blocks with their pages. A run finds the characters and makes the pairs.", "Bản quét ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) }
                     @for line in &read.warnings { p.notice { (one_line(&warning(visit, line))) } }
                     @if let Some(renamed) = renamed_columns(&read.renamed).and_then(|line| renamed_text(visit, &line)) { p.muted { (one_line(&renamed)) } }
@@ -89,8 +89,8 @@ fn pairs_part(
     let changes = chosen.changes().unwrap_or_default();
     let no_pair = plan.no_pair.as_deref().map(Sentence::of_program);
     html! {
-        p { b { (grouped(plan.pairs)) } " " (visit.t("pairs", "cặp"))
-            @if plan.missing.count > 0 { " · " span.bad { (grouped(plan.missing.count as u64)) " " (visit.t("missing files", "tệp không có")) } }
+        p { b { (grouped(plan.pairs)) } " " (visit.form(plan.pairs, ["pair", "pairs"], "cặp"))
+            @if plan.missing.count > 0 { " · " span.bad { (grouped(plan.missing.count as u64)) " " (visit.form(plan.missing.count as u64, ["missing file", "missing files"], "tệp không có")) } }
         }
         @if let Some(why) = no_pair { p.notice.bad { (why.text(visit.language)) } }
         @for line in plan.missing.lines.iter().take(SHOWN_LINES) { p.notice.bad { (one_line(Sentence::of_program(line).text(visit.language))) } }

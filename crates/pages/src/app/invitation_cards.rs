@@ -16,6 +16,7 @@ use super::chosen_sets::CHOSEN;
 use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::invitations::{GuestReview, SentInvitation};
+use super::number_text::english_count;
 use super::open_pages::PagesId;
 use super::opened_review::{ReviewPlace, open_review};
 use super::projects::OpenProject;
@@ -213,7 +214,7 @@ fn card(visit: &Visit, invitation: &SentInvitation) -> Markup {
     html! {
         div.card.invitation role="group" aria-label={ (reviewer) ", " (metric) ", " (order) } {
             h3 { (reviewer) }
-            p.muted { (metric) @if let Some(results) = results { ", " (grouped(results)) " " (visit.t("results", "kết quả")) } ", " (order) @if judged.get(CHOSEN).is_some() { ", " (visit.t("chosen pairs", "các cặp đã chọn")) } }
+            p.muted { (metric) @if let Some(results) = results { ", " (grouped(results)) " " (visit.form(results, ["result", "results"], "kết quả")) } ", " (order) @if judged.get(CHOSEN).is_some() { ", " (visit.t("chosen pairs", "các cặp đã chọn")) } }
             (progress(visit, invitation))
             @match &invitation.url {
                 Some(url) => {
@@ -234,15 +235,26 @@ fn card(visit: &Visit, invitation: &SentInvitation) -> Markup {
 /// Returns how many images a guest sees, which are more than the results if some are attention checks.
 fn images_text(visit: &Visit, counts: QueueCounts) -> String {
     let images = grouped(counts.items as u64);
-    let checks = grouped(counts.items.saturating_sub(counts.results) as u64);
+    let in_english = english_count(counts.items as u64, ["image", "images"]);
+    let checks = counts.items.saturating_sub(counts.results) as u64;
     let results = grouped(counts.results as u64);
     match (visit.language, counts.items > counts.results) {
         (Language::English, true) => {
-            format!("{images} images ({results} results, {checks} attention checks and repeats)")
+            format!(
+                "{in_english} ({}, {})",
+                english_count(counts.results as u64, ["result", "results"]),
+                english_count(
+                    checks,
+                    ["attention check or repeat", "attention checks and repeats"]
+                )
+            )
         }
-        (Language::English, false) => format!("{images} images"),
+        (Language::English, false) => in_english,
         (Language::Vietnamese, true) => {
-            format!("{images} hình ({results} kết quả, {checks} hình kiểm tra và lặp lại)")
+            format!(
+                "{images} hình ({results} kết quả, {} hình kiểm tra và lặp lại)",
+                grouped(checks)
+            )
         }
         (Language::Vietnamese, false) => format!("{images} hình"),
     }
@@ -299,5 +311,10 @@ mod tests {
         assert!(vietnamese.contains(part), "{vietnamese}");
         let plain = shown(Language::English, 2);
         assert!(plain.contains("<b>1</b> / 2 images<"), "{plain}");
+        let one = shown(Language::English, 3);
+        assert!(
+            one.contains("(2 results, 1 attention check or repeat)"),
+            "{one}"
+        );
     }
 }

@@ -5,6 +5,16 @@ use crate::review::Language;
 use mocban_core::domain::{UnixMillis, fixed};
 use mocban_system::time_text;
 
+/// Returns the English form of a word for a number: the first one for one thing.
+pub(super) const fn english_form(number: u64, [one, many]: [&str; 2]) -> &str {
+    if number == 1 { one } else { many }
+}
+
+/// Returns a number with the English form of its word, such as `1 pair` and `2 pairs`.
+pub(super) fn english_count(number: u64, forms: [&str; 2]) -> String {
+    format!("{} {}", grouped(number), english_form(number, forms))
+}
+
 /// Returns a text with numbers, such as `0.95 (0.90 to 0.98)`, with the decimal sign of a language.
 pub(super) fn with_decimal_sign(language: Language, text: String) -> String {
     match language {
@@ -57,12 +67,14 @@ pub(super) fn duration(language: Language, ms: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{date_and_time, decimal, duration, file_size, grouped};
+    use super::{date_and_time, decimal, duration, english_count, file_size, grouped};
     use crate::review::Language::{English, Vietnamese};
 
     #[test]
     fn numbers_are_written_as_in_the_language_of_the_page() {
         assert_eq!(grouped(7), "7");
+        let count = |number| english_count(number, ["pair", "pairs"]);
+        assert_eq!([0, 1, 2].map(count), ["0 pairs", "1 pair", "2 pairs"]);
         assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(decimal(English, 0.98765, 3), "0.988");
         assert_eq!(decimal(Vietnamese, -0.98765, 3), "−0,988");

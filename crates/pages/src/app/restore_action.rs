@@ -12,7 +12,7 @@ use super::action_body::ActionBody;
 use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
-use super::number_text::{file_size, grouped};
+use super::number_text::{english_count, english_form, file_size, grouped};
 use super::project_name::new_project_dir;
 use super::projects::is_project;
 use super::restore_page::chosen_path;
@@ -308,7 +308,11 @@ fn copied_line(copied: &InputCopies, is_all: bool) -> [String; 2] {
         ["", ""]
     };
     [
-        format!("{files} scans and prints ({english}) were copied into the project{needs}."),
+        format!(
+            "{} ({english}) {} copied into the project{needs}.",
+            english_count(copied.files, ["scan or print", "scans and prints"]),
+            english_form(copied.files, ["was", "were"])
+        ),
         format!("Đã chép {files} bản quét và bản in ({vietnamese}) vào dự án{needs_vi}."),
     ]
 }

@@ -13,6 +13,7 @@ use super::failure::{AppFailure, AppResult};
 use super::folder_picker::PickerRoots;
 use super::home::free_space;
 use super::looked_part::{first_missing, looked_at_text};
+use super::number_text::{english_count, english_form};
 use super::project_name::{NAME_CHARS, new_project_dir};
 use super::restore_action::{check_backup_file, check_room, restore_sentence};
 use super::restore_page::chosen_path;
@@ -156,7 +157,9 @@ fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> 
         let (files, size) = (grouped(copies.files), visit.file_size(copies.bytes));
         let said = Sentence::new(
             format!(
-                "Beside the backup: {files} files, {size}. They are copied into the new project."
+                "Beside the backup: {}, {size}. {} copied into the new project.",
+                english_count(copies.files, ["file", "files"]),
+                english_form(copies.files, ["It is", "They are"])
             ),
             format!("Ở bên cạnh bản sao lưu: {files} tệp, {size}. Chúng được chép vào dự án mới."),
         );

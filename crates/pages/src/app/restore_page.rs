@@ -222,12 +222,8 @@ fn picker(visit: &Visit, picked: &PickedFolder) -> Markup {
 
 /// Says what is in a folder.
 fn held(visit: &Visit, counts: &FileCounts) -> String {
-    let english = if counts.backups == 1 {
-        "possible backup"
-    } else {
-        "possible backups"
-    };
-    let backups = visit.t(english, "tệp có thể là bản sao lưu");
+    let english = ["possible backup", "possible backups"];
+    let backups = visit.form(counts.backups, english, "tệp có thể là bản sao lưu");
     let backups = (counts.backups > 0).then(|| format!("{} {backups}", grouped(counts.backups)));
     let others = Some(counts_text(visit, counts)).filter(|text| !text.is_empty());
     let parts: Vec<String> = backups.into_iter().chain(others).collect();

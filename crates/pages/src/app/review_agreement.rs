@@ -50,8 +50,12 @@ fn agreement_part(visit: &Visit, found: &ReviewerAgreement) -> Markup {
                 (pair_table(visit, &found.reviewer_pairs))
             }
             @if found.conflicts > 0 {
-                p.notice { b { (grouped(found.conflicts)) } " " (visit.t(
-                    "results on which reviewers disagree wait for a third person: choose the order \"disagreements of two others\".",
+                p.notice { b { (grouped(found.conflicts)) } " " (visit.form(
+                    found.conflicts,
+                    [
+                        "result on which reviewers disagree waits for a third person: choose the order \"disagreements of two others\".",
+                        "results on which reviewers disagree wait for a third person: choose the order \"disagreements of two others\".",
+                    ],
                     "kết quả có bất đồng đang chờ người thứ ba: hãy chọn thứ tự \"chỗ hai người khác bất đồng\".",
                 )) }
             }

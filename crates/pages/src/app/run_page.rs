@@ -77,18 +77,20 @@ fn figures(visit: &Visit, run: &RunState) -> Markup {
         visit.t("interrupted", "bị ngắt")
     };
     let judged: u64 = run.counts.verdicts.values().sum();
+    let blocks = run.blocks.0.len() as u64;
+    let blocks_name = |number: u64| visit.form(number, ["block", "blocks"], "ván");
     html! {
         div.figures {
-            (figure(run.counts.pairs, visit.t("pairs", "cặp"), Some("pairs"), ""))
+            (figure(run.counts.pairs, visit.form(run.counts.pairs, ["pair", "pairs"], "cặp"), Some("pairs"), ""))
             (figure(run.jobs(JobStatus::Done), visit.t("aligned", "đã căn chỉnh"), Some("pairs?state=aligned"), "good"))
             (figure(run.jobs(JobStatus::Quarantined), visit.t("failed", "lỗi"), Some("pairs?state=failed&view=table"), "bad"))
             (figure(waiting, visit.t("waiting", "đang chờ"), list("pairs?state=waiting"), ""))
             @if running > 0 || running_blocks == 0 { (figure(running, running_name, list("pairs?state=running"), "")) }
-            @if running_blocks > 0 { (figure(running_blocks, &format!("{} {running_name}", visit.t("blocks", "ván")), Some("blocks?state=waiting"), "")) }
+            @if running_blocks > 0 { (figure(running_blocks, &format!("{} {running_name}", blocks_name(running_blocks)), Some("blocks?state=waiting"), "")) }
             (figure(run.counts.low_confidence, visit.t("low confidence", "độ tin cậy thấp"), Some("pairs?confidence=low&sort=confidence"), "warn"))
-            (figure(judged, visit.t("verdicts", "đánh giá"), Some("review"), ""))
-            @if !run.blocks.is_empty() { (figure(run.blocks.0.len() as u64, visit.t("blocks", "ván"), Some("blocks"), "")) }
-            @if failed_blocks > 0 { (figure(failed_blocks, visit.t("blocks failed", "ván lỗi"), Some("blocks?state=failed"), "bad")) }
+            (figure(judged, visit.form(judged, ["verdict", "verdicts"], "đánh giá"), Some("review"), ""))
+            @if !run.blocks.is_empty() { (figure(blocks, blocks_name(blocks), Some("blocks"), "")) }
+            @if failed_blocks > 0 { (figure(failed_blocks, visit.form(failed_blocks, ["block failed", "blocks failed"], "ván lỗi"), Some("blocks?state=failed"), "bad")) }
         }
     }
 }
@@ -229,13 +231,13 @@ fn other_files_text(visit: &Visit, run: &RunState) -> Option<String> {
 
 /// Returns the number of blocks and pairs that a run would align, such as `1 block and 3 pairs`.
 fn to_align(visit: &Visit, blocks: u64, pairs: u64) -> String {
-    let counted = |number: u64, one, many, vietnamese| {
-        let name = visit.t(if number == 1 { one } else { many }, vietnamese);
+    let counted = |number: u64, english, vietnamese| {
+        let name = visit.form(number, english, vietnamese);
         (number > 0).then(|| format!("{} {name}", grouped(number)))
     };
     let parts = [
-        counted(blocks, "block", "blocks", "ván"),
-        counted(pairs, "pair", "pairs", "cặp"),
+        counted(blocks, ["block", "blocks"], "ván"),
+        counted(pairs, ["pair", "pairs"], "cặp"),
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     parts.join(visit.t(" and ", " và "))

@@ -123,7 +123,7 @@ fn change_part(visit: &Visit, change: &SettingChange) -> Markup {
                 p { (visit.t("This is the value that it has.", "Đây đã là giá trị hiện tại.")) }
             } @else {
                 p { code { (before.value) } " → " code { (after.value) } }
-                p { b { (grouped(change.stale)) } " " (visit.t("pairs would be computed again by the next run.", "cặp sẽ được tính lại trong lần chạy sau.")) }
+                p { b { (grouped(change.stale)) } " " (visit.form(change.stale, ["pair would be computed again by the next run.", "pairs would be computed again by the next run."], "cặp sẽ được tính lại trong lần chạy sau.")) }
                 @if change.changes_method { p.notice #two-methods { (two_methods(visit)) } }
                 (action_form("actions/setting", "inline", &html! {
                     input type="hidden" name="key" value=(after.key);

@@ -2,7 +2,7 @@
 
 use std::io::{self, ErrorKind};
 
-use super::number_text::{file_size, grouped};
+use super::number_text::{english_form, file_size, grouped};
 use super::sentence::Sentence;
 use crate::review::Language;
 use mocban_core::domain::sanitize;
@@ -132,10 +132,11 @@ pub(super) fn cut() -> Sentence {
 
 /// Says that the browser stopped sending, and how many files need not be sent again.
 pub(super) fn cut_with_rest(arrived: u64) -> Sentence {
+    let [have, are] = [["has", "have"], ["is", "are"]].map(|forms| english_form(arrived, forms));
     let arrived = grouped(arrived);
     Sentence::new(
         format!(
-            "the connection was cut before all files had arrived: choose the same files again within an hour; {arrived} of them have arrived and are not sent again"
+            "the connection was cut before all files had arrived: choose the same files again within an hour; {arrived} of them {have} arrived and {are} not sent again"
         ),
         format!(
             "kết nối bị ngắt trước khi mọi tệp đến nơi: hãy chọn lại đúng các tệp đó trong vòng một giờ; {arrived} tệp đã đến nơi và không phải gửi lại"
@@ -145,10 +146,11 @@ pub(super) fn cut_with_rest(arrived: u64) -> Sentence {
 
 /// Says that not all files of an upload have arrived.
 pub(super) fn incomplete(arrived: u64, announced: u64) -> Sentence {
+    let have = english_form(arrived, ["has", "have"]);
     let [arrived, announced] = [arrived, announced].map(grouped);
     Sentence::new(
         format!(
-            "only {arrived} of {announced} files have arrived, so nothing of them was kept: choose them again"
+            "only {arrived} of {announced} files {have} arrived, so nothing of them was kept: choose them again"
         ),
         format!(
             "mới nhận được {arrived} trên {announced} tệp, nên không tệp nào được giữ lại: hãy chọn lại các tệp"

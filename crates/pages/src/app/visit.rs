@@ -52,6 +52,16 @@ impl Visit {
         }
     }
 
+    /// Returns the word for a number of things. English has a form for one.
+    pub(super) const fn form<'t>(
+        &self,
+        number: u64,
+        english: [&'t str; 2],
+        vietnamese: &'t str,
+    ) -> &'t str {
+        self.t(number_text::english_form(number, english), vietnamese)
+    }
+
     /// Returns the position of the language of the page in texts with one entry per language.
     pub(super) const fn index(&self) -> usize {
         match self.language {

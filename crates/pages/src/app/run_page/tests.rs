@@ -266,7 +266,7 @@ fn failed_blocks_are_counted_and_listed() {
     run.counts.jobs = BTreeMap::from([(JobStatus::Done, 20)]);
     let visit = Visit::in_language(Language::English);
     let counted = figures(&visit, &run).into_string();
-    let figure = "href=\"blocks?state=failed\"><b>1</b><span>blocks failed<";
+    let figure = "href=\"blocks?state=failed\"><b>1</b><span>block failed<";
     assert!(counted.contains(figure), "{counted}");
     let listed = failed_block_list(&visit, &run.blocks).into_string();
     assert!(listed.contains("href=\"block/b1/\">b1<"), "{listed}");
@@ -290,7 +290,7 @@ fn pairs_that_are_only_read_ahead_count_as_waiting() {
     for part in [
         "<b>9</b><span>waiting<",
         "<b>1</b><span>running<",
-        "<b>1</b><span>blocks running<",
+        "<b>1</b><span>block running<",
     ] {
         assert!(shown.contains(part), "{part}: {shown}");
     }
