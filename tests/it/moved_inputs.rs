@@ -47,15 +47,19 @@ fn a_moved_folder_is_named_once_and_its_new_place_can_be_imported() {
 }
 
 #[test]
-fn a_run_that_finds_no_file_names_the_missing_folder() {
+fn a_run_that_finds_no_file_names_the_missing_folders() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let list = "id,mesh,print\na,scans/1.stl,p.png\nb,scans/2.stl,p.png\n";
+    let list = "id,mesh,print\na,scans/1.stl,prints/1.png\nb,scans/2.stl,prints/2.png\n";
     std::fs::write(dir.path().join("pairs.csv"), list).expect("a list");
     let on = |args: &[&str]| crate::cli::mocban(dir.path(), &[&["-C", "p"][..], args].concat());
     on(&["import", "pairs.csv", "--allow-missing"]).expect(0);
     let ran = on(&["--progress", "none", "run"]).expect(3);
-    let said = "(pairs or blocks: 2), and so is the folder ";
+    let said = "4 of 4 input files that were looked at are missing or have moved (pairs or blocks: 2), and so are the folders ";
     assert_eq!(ran.err.matches(said).count(), 1, "{}", ran.err);
+    for folder in ["prints", "scans"] {
+        let folder = dir.path().join(folder).display().to_string();
+        assert!(ran.err.contains(&folder), "{folder}: {}", ran.err);
+    }
 }
 
 #[test]

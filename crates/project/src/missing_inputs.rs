@@ -204,21 +204,23 @@ async fn sample(project: &Project, catalog: &Catalog, pairs: u64) -> ProjectResu
     let retired = catalog.retired_among(&ids).await?;
     known.retain(|known| !retired.contains(&known.pair));
     let mut files = Vec::new();
-    let mut add = |owner: usize, path: String, read: Option<InputVersion>| {
-        files.extend(read.map(|read| SampledInput { owner, path, read }));
+    let mut add = |owner: usize, inputs: Vec<ReadInput>| {
+        let inputs = looked_for(inputs).into_iter();
+        files.extend(inputs.map(|(path, read)| SampledInput { owner, path, read }));
     };
     let pairs: Vec<PairId> = known.iter().map(|known| known.pair).collect();
     let mut commands = Vec::new();
     for (owner, known) in known.into_iter().enumerate() {
-        add(owner, known.mesh_path, known.mesh);
-        add(owner, known.print_path, known.print);
+        let inputs = vec![
+            (known.mesh_path, known.mesh),
+            (known.print_path, known.print),
+        ];
+        add(owner, inputs);
     }
     let blocks = catalog.known_blocks().await?.into_iter().take(MAX_BLOCKS);
     for (owner, block) in (pairs.len()..).zip(blocks) {
         commands.push(ImportCommand::of_block(&block.attributes));
-        for (path, read) in block_files(block) {
-            add(owner, path, read);
-        }
+        add(owner, block_files(block));
     }
     // The files of pairs that were cut from a block are artifacts.
     files.retain(|file| ArtifactRef::at_path(&file.path).is_none());
@@ -279,8 +281,23 @@ struct SampledInput {
     read: InputVersion,
 }
 
+/// Path of an input file as stored, and its version if a run has looked for it.
+type ReadInput = (String, Option<InputVersion>);
+
+/// Returns the files of a pair or block that a run has looked for. If it did not find one, it may have stopped there, so the
+/// other ones count as not found, too.
+fn looked_for(inputs: Vec<ReadInput>) -> Vec<(String, InputVersion)> {
+    let mut reads = inputs.iter().filter_map(|(_, read)| read.as_ref());
+    let is_one_gone = reads.any(InputVersion::is_gone);
+    let inputs = inputs.into_iter().filter_map(|(path, read)| {
+        let read = read.or_else(|| is_one_gone.then(InputVersion::gone));
+        Some((path, read?))
+    });
+    inputs.collect()
+}
+
 /// Returns the paths of the files of a block, each with its version when it was read.
-fn block_files(block: KnownBlock) -> Vec<(String, Option<InputVersion>)> {
+fn block_files(block: KnownBlock) -> Vec<ReadInput> {
     let KnownBlock {
         attributes, inputs, ..
     } = block;
@@ -308,6 +325,9 @@ fn among(project: &Project, files: &[SampledInput], until: Instant) -> InputInsp
                 let is_in_missing_folder = folders.add(input.path());
                 if is_in_missing_folder || !file.read.is_gone() {
                     missing.push(file);
+                } else {
+                    // Its failure says so.
+                    looked_at -= 1;
                 }
             }
             Ok(now) if has_other_size(&file.read, &now) => changed.push(file),

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{InputInspection, SampledInput, among, block_files};
+use super::{InputInspection, SampledInput, among, block_files, looked_for};
 use mocban_catalog::{BlockAttributes, BlockInputVersions, InputVersion, KnownBlock};
 use mocban_core::domain::{BlockId, BlockName, ContentHash};
 use mocban_store::{Project, stat_input};
@@ -113,4 +113,18 @@ fn a_missing_folder_is_named_once() {
     let found = find(&[file(0, "1.stl", version(""))]).expect("a file");
     assert!(found.folders.is_empty() && found.found().contains(", first "));
     assert_eq!(find(&[file(0, "1.stl", InputVersion::gone())]), None);
+}
+
+#[test]
+fn a_print_that_no_run_has_looked_for_counts_if_its_scan_is_gone() {
+    let inputs =
+        |scan: Option<InputVersion>| vec![("1.stl".to_owned(), scan), ("1.png".to_owned(), None)];
+    let gone = InputVersion::gone;
+    let both = [("1.stl", gone()), ("1.png", gone())];
+    let both = both.map(|(path, read)| (path.to_owned(), read));
+    assert_eq!(looked_for(inputs(Some(gone()))), both);
+    let read = version("1");
+    let scan = [("1.stl".to_owned(), read.clone())];
+    assert_eq!(looked_for(inputs(Some(read))), scan);
+    assert!(looked_for(inputs(None)).is_empty());
 }
