@@ -26,6 +26,7 @@ fn a_moved_folder_is_named_once_and_its_new_place_can_be_imported() {
     for (shown, command) in [
         (exported.err, "export"),
         (at(&project, &["run"]).expect(0).err, "run"),
+        (at(&project, &["check"]).expect(0).err, "check"),
         (at(&project, &["status"]).expect(0).out, "status"),
     ] {
         assert_eq!(shown.matches(&sentence).count(), 1, "{command}: {shown}");

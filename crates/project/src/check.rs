@@ -8,6 +8,7 @@ use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use crate::events::{Listener, LongWork, warn};
 use crate::exit::Refusal;
 use crate::location::{Location, now};
+use crate::missing_inputs::{MissingInputs, missing_of_all_after_failures};
 use mocban_catalog::{Catalog, CatalogError};
 use mocban_core::domain::ErrorCode;
 use mocban_runner::check::{CheckOptions, CheckSummary, Kind, check as check_project};
@@ -39,6 +40,15 @@ pub async fn check(
         warn(listener, reason);
     }
     Ok(summary)
+}
+
+/// Inspects the inputs of a project in which a check has found missing ones, and returns what a run says of them. Returns
+/// `None` if the catalog cannot be read.
+pub async fn missing_inputs(location: &Location) -> Option<MissingInputs> {
+    let (project, catalog) = location.open_read_only().await.ok()?;
+    let found = missing_of_all_after_failures(&project, &catalog).await;
+    catalog.close().await;
+    found.ok().flatten()
 }
 
 async fn once(options: CheckOptions, location: &Location) -> ProjectResult<CheckSummary> {

@@ -159,9 +159,21 @@ pub(crate) async fn missing_of_all(
     project: &Project,
     catalog: &Catalog,
 ) -> ProjectResult<Option<MissingInputs>> {
+    missing(project, catalog, all_pairs(catalog).await?).await
+}
+
+/// Inspects files like [`missing_after_failures`], and counts the pairs of the project before.
+pub(crate) async fn missing_of_all_after_failures(
+    project: &Project,
+    catalog: &Catalog,
+) -> ProjectResult<Option<MissingInputs>> {
+    missing_after_failures(project, catalog, all_pairs(catalog).await?).await
+}
+
+/// Returns the number of pairs with the retired ones.
+async fn all_pairs(catalog: &Catalog) -> ProjectResult<u64> {
     let pairs: u64 = catalog.counters().await?.values().sum();
-    let pairs = pairs + catalog.retired_count().await?;
-    missing(project, catalog, pairs).await
+    Ok(pairs + catalog.retired_count().await?)
 }
 
 /// Inspects files like [`missing`], after failures: files that a run did not find count too, if their folder is missing.

@@ -9,7 +9,7 @@ use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::table::{columns, count, pairs_and_blocks};
 use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::one_line;
-use mocban_project::check::check as check_project;
+use mocban_project::check::{check as check_project, missing_inputs};
 use mocban_project::error::without_error_numbers;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::check::{CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced};
@@ -55,6 +55,11 @@ pub(crate) async fn check(args: CheckArgs, context: &Context) -> ProjectResult<E
     };
     let summary = check_project(options, &context.location, &Terminal::new(context)).await?;
     context.print(&summary, || text(&summary, &args, context.stdout))?;
+    if summary.inputs_missing.count > 0
+        && let Some(missing) = missing_inputs(&context.location).await
+    {
+        context.warn(&missing.to_string());
+    }
     for command in next_steps(&summary, args.repair) {
         context.next(command);
     }
