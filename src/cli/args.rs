@@ -13,8 +13,8 @@ use super::commands::{
 };
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
-use super::input::name_request::takes_names;
-use mocban_core::domain::shell::{quoted_id, shell_quoted};
+use super::input::hyphen_tip::hyphen_tip;
+use mocban_core::domain::shell::shell_quoted;
 use mocban_core::domain::spelling::nearest;
 use mocban_project::ExitCode;
 
@@ -150,8 +150,8 @@ fn with_tip(mut error: clap::Error, args: &[OsString]) -> clap::Error {
         }
         ErrorKind::UnknownArgument => word(ContextKind::InvalidArg).and_then(|word| {
             let is_similar = error.get(ContextKind::SuggestedArg).is_some();
-            let id = || id_tip(&word, words(args)).filter(|_| !is_similar);
-            argument_tip(&word).or_else(id)
+            let hyphen = || hyphen_tip(command(), &word, words(args)).filter(|_| !is_similar);
+            argument_tip(&word).or_else(hyphen)
         }),
         _ => None,
     };
@@ -219,36 +219,6 @@ fn argument_tip(word: &str) -> Option<String> {
         Some(format!(
             "if {word} belongs to a name or path with spaces, put all of it in quotes"
         ))
-    })
-}
-
-/// Returns a tip on an id that begins with a hyphen, if the command takes ids. `option` is the option that was found in it.
-fn id_tip<'a>(option: &str, words: impl Iterator<Item = &'a str> + Clone) -> Option<String> {
-    let mut command = command();
-    let mut names = Vec::new();
-    for word in words.clone() {
-        if let Some(sub) = command.find_subcommand(word).cloned() {
-            names.push(word);
-            command = sub;
-        }
-    }
-    // In a word such as `-va1`, the letter that no option has stands behind others.
-    let letter = option.trim_start_matches('-');
-    let is_id = |word: &&str| {
-        if word.starts_with("--") {
-            word.starts_with(option)
-        } else {
-            word.starts_with('-') && word.contains(letter)
-        }
-    };
-    let id = words.take_while(|word| *word != "--").find(is_id)?;
-    let is_named = !command.has_subcommands() && takes_names(&command);
-    is_named.then(|| {
-        format!(
-            "if {id} is an id, write -- before it, and options before that, as in: mocban {} {}",
-            names.join(" "),
-            quoted_id(id)
-        )
     })
 }
 
@@ -389,12 +359,18 @@ mod tests {
         let id = error("mocban -C blocks show -a1");
         assert!(
             id.contains(
-                "tip: if -a1 is an id, write -- before it, and options before that, as in: mocban show -- -a1\n"
+                "tip: if -a1 is an id, write -- before it, and options before that, as in: mocban -C blocks show -- -a1\n"
             ),
             "{id}"
         );
         let id = error("mocban verdict set -a1 pass --reviewer lan");
-        assert!(id.contains("as in: mocban verdict set -- -a1\n"), "{id}");
+        assert!(
+            id.contains("as in: mocban verdict set --reviewer lan -- -a1 pass\n"),
+            "{id}"
+        );
+        let value = error("mocban verdict set a1 pass --reviewer -lan");
+        assert!(value.contains("as in: --reviewer=-lan\n"), "{value}");
+        assert!(!value.contains("is an id"), "{value}");
         let id = error("mocban show --json -o1");
         assert!(id.contains("if -o1 is an id"), "{id}");
         for other in ["mocban report -a1", "mocban show --jsn", "mocban status -x"] {

@@ -91,7 +91,10 @@ pub(crate) fn has_block_option(command: &Command) -> bool {
 
 /// Returns the option of a word that takes a value, and the value if the word has it too. Returns `None` for an unknown
 /// option.
-fn find_option<'a>(command: &'a Command, word: &str) -> Option<(Option<&'a Arg>, Option<String>)> {
+pub(crate) fn find_option<'a>(
+    command: &'a Command,
+    word: &str,
+) -> Option<(Option<&'a Arg>, Option<String>)> {
     let takes_value = |arg: &&Arg| arg.get_action().takes_values();
     if let Some(long) = word.strip_prefix("--") {
         let (name, value) = match long.split_once('=') {
