@@ -243,7 +243,9 @@ fn columns_of(
     let mut problems = ManifestError::default();
     let required = COLUMNS.names[..REQUIRED].iter();
     let missing = required.filter(|name| !columns.contains(&Some(**name)));
-    problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
+    problems.extend(
+        missing.map(|name| at_line(line, &missing_column(name, &COLUMNS, &names, &columns))),
+    );
     problems.check(false)?;
     let names = names.into_iter().map(str::to_owned);
     Ok((columns.into_iter().zip(names).collect(), renamed))

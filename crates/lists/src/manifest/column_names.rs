@@ -1,5 +1,6 @@
 //! Missing columns, and which names are similar.
 
+use crate::columns::{KnownColumns, plain_name};
 use mocban_core::domain::spelling::{composed, quoted};
 
 /// Returns whether a name may be a misspelt or abbreviated name of a column: in short names one letter may be wrong,
@@ -14,6 +15,22 @@ pub(super) fn similar_column(found: &str, name: &str) -> bool {
     let found = composed(found).replace(['_', '-'], " ");
     OTHER_NAMES.contains(&(found.as_str(), name))
         || strsim::osa_distance(&found, &name.replace('_', " ")) <= max_wrong
+}
+
+/// Returns whether a name may be a misspelt one of the other names of a column, such as `Ảnh inn`. Short names are left out,
+/// because too many words are similar to them.
+fn is_near_other_name(found: &str, name: &str, known: &KnownColumns) -> bool {
+    let plain = plain_name(found);
+    known.other_names.iter().any(|(other, of)| {
+        let max_wrong = match other.len() {
+            ..=4 => return false,
+            ..=8 => 1,
+            _ => 2,
+        };
+        *of == name
+            && plain.len().abs_diff(other.len()) <= max_wrong
+            && strsim::osa_distance(&plain, other) <= max_wrong
+    })
 }
 
 /// Other words for the columns, in English and Vietnamese, in lower case.
@@ -59,9 +76,10 @@ const MAX_SHOWN: usize = 12;
 /// Largest number of characters that are shown of a header without separators.
 const MAX_SHOWN_CHARS: usize = 100;
 
-/// Describes a missing column of a header. Suggests a column that is not known and has a similar name.
+/// Describes a missing one of the known columns of a header. Suggests a column that is not known and has a similar name.
 pub(super) fn missing_column(
     name: &str,
+    known_columns: &KnownColumns,
     header: &[&str],
     columns: &[Option<&'static str>],
 ) -> String {
@@ -84,7 +102,10 @@ pub(super) fn missing_column(
             "column {name:?} is missing; the header has one column only, {shown}{hint}"
         );
     }
-    let mut similar = unknown.filter(|(field, _)| similar_column(&field.to_lowercase(), name));
+    let mut similar = unknown.filter(|(field, _)| {
+        similar_column(&field.to_lowercase(), name)
+            || is_near_other_name(field, name, known_columns)
+    });
     let hint = similar
         .next()
         .map(|(field, _)| format!("; rename {} to {name:?} if it is meant", quoted(field)));

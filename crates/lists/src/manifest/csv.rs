@@ -219,7 +219,9 @@ impl CsvHeader {
         let missing = REQUIRED
             .iter()
             .filter(|name| !columns.contains(&Some(**name)));
-        problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
+        problems.extend(
+            missing.map(|name| at_line(line, &missing_column(name, &COLUMNS, &names, &columns))),
+        );
         if let Err(mut problems) = problems.check(false) {
             if let Some(below) = header_below(list, delimiter, line) {
                 if names.len() == 1 {

@@ -227,6 +227,11 @@ fn a_misspelt_column_is_named() {
         "line 1: column \"mesh\" is missing; rename \"mech\" to \"mesh\" if it is meant; the header has: id, \
          mech, print"
     );
+    assert_eq!(
+        refusal("id,mesh,Ảnh inn\na,b,c\n"),
+        "line 1: column \"print\" is missing; rename \"Ảnh inn\" to \"print\" if it is meant; the header has: id, mesh, \
+         Ảnh inn"
+    );
     // Names that may mean something else are offered, not taken.
     let renamed: Vec<_> = refusal("ảnh,mesh,tên\na,b,c\n")
         .lines()
