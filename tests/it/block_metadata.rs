@@ -8,6 +8,7 @@ use mocban::workbook::test_helpers::{text_rows, workbook};
 use serde_json::json;
 
 use crate::app::{open_app, text};
+use crate::app_uploads::encode;
 use crate::blocks::write_blocks;
 use crate::cli::{Call, mocban};
 
@@ -161,5 +162,32 @@ fn metadata_that_an_import_empties_is_named_by_column() {
         let again = import(list);
         assert!(again.contains(sentence), "{again}");
         assert_eq!(again.matches("empty or missing").count(), 1, "{again}");
+    }
+}
+
+#[test]
+fn the_app_says_which_columns_and_pages_a_list_of_blocks_changes() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    write_blocks(dir, &["b1"]);
+    fs::copy(dir.join("b1.png"), dir.join("other.png")).expect("copied");
+    let list = dir.join("list.csv");
+    let write = |text: &str| fs::write(&list, text).expect("written");
+    let header = "Ván,Bản quét,Trang in,Ghi chú,Kho lưu";
+    write(&format!("{header}\nb1,b1.stl,b1.png,x,R.12\n"));
+    project(dir, &["import", "list.csv"]).expect(0);
+    let page = open_app(dir);
+    let query = format!("project=p&list={}", encode(list.to_str().expect("UTF-8")));
+    let shown = || text(&page.get(&format!("/import?{query}&language=vi")));
+    let same = shown();
+    assert!(!same.contains("column-changes"), "{same}");
+    assert!(same.contains("đổi tệp của các ván đã có"), "{same}");
+    write("Ván,Bản quét,Trang in\nb1,b1.stl,other.png\n");
+    let changed = shown();
+    for part in [
+        "Số ván được đổi bản quét hoặc trang in: <b>1</b>",
+        "Số ván mất giá trị ở các cột khác: <b>1</b>",
+    ] {
+        assert!(changed.contains(part), "{part}: {changed}");
     }
 }

@@ -12,7 +12,7 @@ use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, HEAD_BYTES, ListFile};
 use crate::import_pairs::{AllowedChanges, PairSource};
-use crate::input_paths::{SimilarFiles, in_existing_form};
+use crate::input_paths::{SimilarFiles, find_on_disk, in_existing_form};
 use crate::location::{Location, now};
 use crate::lost_values::lost_values;
 use crate::manifest_file::{refuse, renamed_columns};
@@ -284,6 +284,31 @@ fn locate(
             missing.add(line);
         }
     }
+}
+
+/// Returns blocks as an import into a project would store them. Without a list, they have no metadata. Files need not exist.
+///
+/// # Errors
+/// Returns an error if a path cannot be stored.
+pub fn rows_as_stored(
+    rows: Vec<BlockRow>,
+    list: Option<&Path>,
+    project: &Project,
+) -> ProjectResult<Vec<BlockAttributes>> {
+    let folder = list.and_then(Path::parent).unwrap_or(Path::new(""));
+    let rows = rows.into_iter().map(|mut row| {
+        let paths = [&mut row.mesh, &mut row.page].into_iter();
+        for path in paths.chain(row.labels.as_mut()) {
+            *path = folder.join(&*path);
+            let text = path.to_str();
+            if text.is_none_or(|text| !project.is_below_root(text)) {
+                // What cannot be found has the path of the list.
+                let _ = find_on_disk(path);
+            }
+        }
+        stored_row(row, list.is_some(), project)
+    });
+    rows.collect()
 }
 
 fn stored_row(

@@ -4,6 +4,7 @@
 //! each step is a transaction of its own (`worker_requests.rs`). The last step inserts pairs, which the queue of pairs then
 //! runs.
 
+pub(crate) mod attributes;
 pub(crate) mod block_job;
 pub(crate) mod block_results;
 pub(crate) mod characters;

@@ -62,3 +62,19 @@ async fn metadata_of_a_block_is_stored_updated_and_makes_nothing_stale() {
     let states = world.catalog.block_states().await.expect("a read");
     assert_eq!(states[0].attributes.meta, None, "it is not read");
 }
+
+#[tokio::test]
+async fn named_blocks_are_read_with_their_metadata() {
+    let world = world().await;
+    let meta = json!({ "shelfmark": "R.12" });
+    world.import_block(with_metadata(&meta)).await;
+    let names = [block("b"), block("c")];
+    let names: Vec<_> = names.iter().collect();
+    let read = world.catalog.block_attributes(&names).await;
+    assert_eq!(read.expect("a read"), [with_metadata(&meta)]);
+    let mut other = with_metadata(&meta);
+    other.mesh_path = format!("./{}", other.mesh_path);
+    assert!(other.has_same_scan_and_page(&attributes("b")));
+    other.page_path = "other.png".to_owned();
+    assert!(!other.has_same_scan_and_page(&attributes("b")));
+}

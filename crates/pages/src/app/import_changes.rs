@@ -1,16 +1,21 @@
 //! What an import would change in the columns of known pairs or blocks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use maud::{Markup, html};
+use serde_json::Map;
 
 use super::components::grouped;
 use super::failure::AppResult;
 use super::import_choice::Planned;
 use super::projects::OpenProject;
 use super::visit::Visit;
-use mocban_catalog::{BlockAttributes, PairAttributes};
+use mocban_catalog::{BlockAttributes, Catalog, PairAttributes};
+use mocban_core::domain::BlockName;
 use mocban_lists::manifest::BlockRow;
+use mocban_project::blocking::blocking;
+use mocban_project::import_blocks::rows_as_stored;
 use mocban_project::import_plan::{PlannedPair, metadata_hash};
 
 /// What may happen to each column, in English and Vietnamese: pairs lose its value, or get a first or another one.
@@ -58,8 +63,17 @@ const COLUMNS: [[[&str; 2]; 2]; 5] = [
     ],
 ];
 
-/// What may happen to the columns of blocks. Their metadata is not compared.
-const BLOCK_COLUMNS: [[[&str; 2]; 2]; 3] = [
+/// Most known blocks that are compared: their files are looked for, and each may have a MiB of metadata.
+const MAX_BLOCKS: usize = 2000;
+
+/// What may happen to the files of blocks.
+const OTHER_FILES: [&str; 2] = [
+    "Blocks that get another scan or page",
+    "Số ván được đổi bản quét hoặc trang in",
+];
+
+/// What may happen to the columns of blocks. If other columns are lost and changed, they are lost.
+const BLOCK_COLUMNS: [[[&str; 2]; 2]; 4] = [
     [
         ["Blocks that lose their labels", "Số ván mất nhãn"],
         [
@@ -84,6 +98,16 @@ const BLOCK_COLUMNS: [[[&str; 2]; 2]; 3] = [
             "Số ván được ghi thêm hoặc đổi mặt trước, mặt sau",
         ],
     ],
+    [
+        [
+            "Blocks that lose values of other columns",
+            "Số ván mất giá trị ở các cột khác",
+        ],
+        [
+            "Blocks whose other columns change",
+            "Số ván có các cột khác bị đổi",
+        ],
+    ],
 ];
 
 /// How many known pairs or blocks would change.
@@ -94,7 +118,9 @@ pub(super) struct ColumnChanges {
     /// For each of [`COLUMNS`] or [`BLOCK_COLUMNS`], the numbers of pairs or blocks that lose its value and that get a first or
     /// another one.
     columns: [[u64; 2]; COLUMNS.len()],
-    /// Whether there are further pairs, which were not compared.
+    /// Number of blocks that get another scan or page.
+    other_files: u64,
+    /// Whether there are further pairs or blocks, which were not compared.
     is_cut: bool,
     /// Whether they are blocks.
     are_blocks: bool,
@@ -104,22 +130,13 @@ impl ColumnChanges {
     /// Compares the pairs of a list, or the blocks that would be imported, with those of the project. Folders of pairs change no
     /// columns.
     pub(super) async fn find(planned: &Planned, open: &OpenProject) -> AppResult<Self> {
-        let mut changes = Self::default();
         let plan = match planned {
             Planned::Pairs(plan, _) => plan,
-            Planned::Blocks(read) => {
-                changes.are_blocks = true;
-                let known = open.catalog.block_states().await?;
-                let known = known.iter().map(|block| &block.attributes);
-                let known: BTreeMap<_, _> = known.map(|block| (&block.name, block)).collect();
-                for block in &read.rows {
-                    if let Some(old) = known.get(&block.name) {
-                        changes.add_block(old, block);
-                    }
-                }
-                return Ok(changes);
+            Planned::Blocks(read, list) => {
+                return Self::of_blocks(&read.rows, list.as_deref(), open).await;
             }
         };
+        let mut changes = Self::default();
         let names: Vec<_> = plan.shown.iter().map(|pair| &pair.name).collect();
         let known = open.catalog.pair_attributes(&names).await?;
         let known: BTreeMap<_, _> = known.iter().map(|pair| (&pair.name, pair)).collect();
@@ -143,17 +160,54 @@ impl ColumnChanges {
         self.count_changes(&columns);
     }
 
+    async fn of_blocks(
+        rows: &[BlockRow],
+        list: Option<&Path>,
+        open: &OpenProject,
+    ) -> AppResult<Self> {
+        let known = open.catalog.block_names().await?.into_iter().collect();
+        let (rows, is_cut) = known_rows(rows, &known);
+        let mut changes = Self {
+            is_cut,
+            are_blocks: true,
+            ..Self::default()
+        };
+        for rows in rows.chunks(Catalog::BLOCKS_AT_ONCE) {
+            let names: Vec<&BlockName> = rows.iter().map(|row| &row.name).collect();
+            let old = open.catalog.block_attributes(&names).await?;
+            let (project, list) = (open.project.clone(), list.map(Path::to_owned));
+            let rows: Vec<BlockRow> = rows.iter().copied().cloned().collect();
+            let new = blocking(move || rows_as_stored(rows, list.as_deref(), &project));
+            let new = new.await??;
+            let new: BTreeMap<_, _> = new.iter().map(|block| (&block.name, block)).collect();
+            for old in &old {
+                if let Some(new) = new.get(&old.name) {
+                    changes.add_block(old, new);
+                }
+            }
+        }
+        Ok(changes)
+    }
+
     /// Adds a block. Its labels may be the same file under another path, so other labels are not counted.
-    fn add_block(&mut self, old: &BlockAttributes, new: &BlockRow) {
+    fn add_block(&mut self, old: &BlockAttributes, new: &BlockAttributes) {
         let labels = change(
             old.labels_path.is_some().then_some(true),
-            new.labels.is_some().then_some(true),
+            new.labels_path.is_some().then_some(true),
         );
-        self.count_changes(&[
+        let columns = [
             labels,
             change(old.unit, new.unit),
             change(old.side, new.side),
-        ]);
+            other_columns(old, new),
+        ];
+        let has_other_files = !old.has_same_scan_and_page(new);
+        self.other_files += u64::from(has_other_files);
+        // A block with other files and columns is one block.
+        if has_other_files && columns.iter().all(Option::is_none) {
+            self.count += 1;
+        }
+        self.count_changes(&columns);
     }
 
     fn count_changes(&mut self, columns: &[Option<usize>]) {
@@ -191,7 +245,10 @@ impl ColumnChanges {
                         @if self.is_cut { (visit.t("at least", "ít nhất")) " " }
                         b { (grouped(self.count)) }
                     }
-                    ul { @for (number, texts) in lines { li { (texts[visit.index()]) ": " b { (grouped(*number)) } } } }
+                    ul {
+                        @if self.other_files > 0 { li { (OTHER_FILES[visit.index()]) ": " b { (grouped(self.other_files)) } } }
+                        @for (number, texts) in lines { li { (texts[visit.index()]) ": " b { (grouped(*number)) } } }
+                    }
                     @if loses && self.are_blocks {
                         p { (visit.t(
                             "What the import does not name is emptied. To keep it, import a list of blocks with these columns.",
@@ -209,6 +266,23 @@ impl ColumnChanges {
     }
 }
 
+/// Returns the rows of known blocks that are compared, and whether there are more.
+fn known_rows<'r>(rows: &'r [BlockRow], known: &BTreeSet<BlockName>) -> (Vec<&'r BlockRow>, bool) {
+    let mut rows = rows.iter().filter(|row| known.contains(&row.name));
+    let compared = rows.by_ref().take(MAX_BLOCKS).collect();
+    (compared, rows.next().is_some())
+}
+
+/// Returns what happens to the other columns of a block. An import that has none keeps them.
+fn other_columns(old: &BlockAttributes, new: &BlockAttributes) -> Option<usize> {
+    let new = new.meta.as_ref()?;
+    let mut names = old.meta.iter().flat_map(Map::keys);
+    if names.any(|name| !new.contains_key(name)) {
+        return Some(0);
+    }
+    (metadata_hash(old.meta.iter().flatten()) != metadata_hash(new)).then_some(1)
+}
+
 /// Returns 0 if a value is lost, and 1 if there is a first or another one.
 fn change<T: Copy + PartialEq>(old: Option<T>, new: Option<T>) -> Option<usize> {
     match (old, new) {
@@ -224,9 +298,8 @@ mod tests {
     use crate::review::Language;
     use mocban_catalog::{BlockAttributes, PairAttributes};
     use mocban_core::domain::{BlockName, LengthUnit, PairName};
-    use mocban_lists::manifest::parse_blocks;
     use mocban_project::import_plan::PlannedPair;
-    use serde_json::Map;
+    use serde_json::{Map, Value};
 
     #[test]
     fn lost_and_other_values_are_counted() {
@@ -270,9 +343,8 @@ mod tests {
         }
     }
 
-    #[test]
-    fn blocks_that_lose_their_labels_are_counted() {
-        let old = BlockAttributes {
+    fn block() -> BlockAttributes {
+        BlockAttributes {
             name: BlockName::new("b1").expect("a name"),
             mesh_path: "b1.stl".to_owned(),
             page_path: "b1.png".to_owned(),
@@ -280,18 +352,23 @@ mod tests {
             unit: None,
             side: None,
             meta: None,
-        };
-        let row = |list: &str| parse_blocks(list.as_bytes()).expect("a list").remove(0);
+        }
+    }
+
+    #[test]
+    fn blocks_that_lose_their_labels_are_counted() {
+        let old = block();
         let mut changes = ColumnChanges {
             are_blocks: true,
             ..ColumnChanges::default()
         };
-        changes.add_block(
-            &old,
-            &row("block,mesh,page,labels\nb1,b1.stl,b1.png,x/b1.json\n"),
-        );
+        let mut new = old.clone();
+        new.labels_path = Some("x/b1.json".to_owned());
+        new.page_path = "./b1.png".to_owned();
+        changes.add_block(&old, &new);
         assert!(!changes.may_change());
-        changes.add_block(&old, &row("block,mesh,page\nb1,b1.stl,b1.png\n"));
+        new.labels_path = None;
+        changes.add_block(&old, &new);
         assert!(changes.may_change());
         for (language, text) in [
             (Language::English, "Blocks that lose their labels: <b>1</b>"),
@@ -299,6 +376,53 @@ mod tests {
         ] {
             let shown = changes.part(&Visit::in_language(language)).into_string();
             assert!(shown.contains(text), "{shown}");
+        }
+    }
+
+    #[test]
+    fn blocks_that_lose_other_columns_or_get_another_page_are_counted() {
+        let meta = |columns: &[[&str; 2]]| -> Option<Map<String, Value>> {
+            let columns = columns.iter().map(|[name, value]| {
+                let (name, value) = (*name, *value);
+                (name.to_owned(), Value::from(value))
+            });
+            Some(columns.collect())
+        };
+        let old = BlockAttributes {
+            meta: meta(&[["Ghi chú", "x"], ["Kho lưu", "R.12"]]),
+            ..block()
+        };
+        let mut changes = ColumnChanges {
+            are_blocks: true,
+            ..ColumnChanges::default()
+        };
+        // Files without a list have no other columns.
+        changes.add_block(&old, &block());
+        assert!(!changes.may_change());
+        let mut new = old.clone();
+        new.meta = meta(&[["Ghi chú", "x"]]);
+        new.page_path = "b2.png".to_owned();
+        changes.add_block(&old, &new);
+        new.meta = meta(&[["Ghi chú", "y"], ["Kho lưu", "R.12"]]);
+        changes.add_block(&old, &new);
+        let [english, vietnamese] = Language::ALL.map(|language| {
+            let shown = changes.part(&Visit::in_language(language));
+            shown.into_string()
+        });
+        for text in [
+            "this import changes: <b>2</b>",
+            "another scan or page: <b>2</b>",
+            "lose values of other columns: <b>1</b>",
+            "whose other columns change: <b>1</b>",
+        ] {
+            assert!(english.contains(text), "{english}");
+        }
+        for text in [
+            "đổi bản quét hoặc trang in: <b>2</b>",
+            "mất giá trị ở các cột khác: <b>1</b>",
+            "có các cột khác bị đổi: <b>1</b>",
+        ] {
+            assert!(vietnamese.contains(text), "{vietnamese}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What a person has chosen to import, as the address and the form of the page of imports have it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Deserialize;
@@ -68,8 +68,8 @@ pub(super) struct ImportChoice {
 pub(super) enum Planned {
     /// Pairs. The page shows some from a position in the plan.
     Pairs(Arc<ImportPlan>, usize),
-    /// Whole blocks, whose pairs a run finds.
-    Blocks(ReadBlocks),
+    /// Whole blocks, whose pairs a run finds, and the list that names them.
+    Blocks(ReadBlocks, Option<PathBuf>),
 }
 
 /// What the page shows of a choice.
@@ -270,7 +270,14 @@ impl ImportChoice {
         let planned = items.and_then(|(items, warning)| {
             note = warning;
             let source = match items {
-                ListedItems::Blocks(source) => return named_blocks(&source).map(Planned::Blocks),
+                ListedItems::Blocks(source) => {
+                    let read = named_blocks(&source)?;
+                    let list = match source {
+                        BlockSource::List { file, .. } => Some(file),
+                        BlockSource::One(_) => None,
+                    };
+                    return Ok(Planned::Blocks(read, list));
+                }
                 ListedItems::Pairs(source) => source,
             };
             let choices = self.choices()?;

@@ -126,7 +126,7 @@ impl ImportChoice {
                 });
                 (files.collect(), plan.pairs)
             }
-            Planned::Blocks(read) => {
+            Planned::Blocks(read, _) => {
                 let total = read.rows.len() as u64;
                 let folder = Path::new(&self.list).parent().unwrap_or(Path::new(""));
                 let rows = read.rows.into_iter().skip(start as usize).take(most);

@@ -53,7 +53,7 @@ pub(super) fn plan_part(
         section.card {
             h2 { (visit.t("What would be imported", "Sẽ nhập những gì")) }
             @match planned {
-                Planned::Blocks(read) => {
+                Planned::Blocks(read, _) => {
                     p { b { (grouped(read.rows.len() as u64)) } " " (visit.form(read.rows.len() as u64, ["whole block", "whole blocks"], "ván nguyên")) }
                     p { (visit.t("Scans of whole blocks with their pages. A run finds the characters and makes the pairs.", "Bản quét ván nguyên kèm trang in. Lần chạy sẽ tìm các chữ và tạo cặp.")) }
                     @for line in &read.warnings { p.notice { (one_line(&warning(visit, line))) } }
@@ -74,7 +74,7 @@ pub(super) fn plan_part(
 fn has_files(planned: &Planned) -> bool {
     match planned {
         Planned::Pairs(plan, _) => plan.pairs > 0,
-        Planned::Blocks(read) => !read.rows.is_empty(),
+        Planned::Blocks(read, _) => !read.rows.is_empty(),
     }
 }
 
@@ -368,7 +368,10 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
             @if missing {
                 label.check { input type="checkbox" name="missing" value="yes" checked[!chosen.missing.is_empty()] data-in-address; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
             }
-            label.check { input type="checkbox" name="changed" value="yes" checked[!chosen.changed.is_empty()] data-in-address; " " (visit.t("Known pairs may get other files", "Cho phép đổi tệp của các cặp đã có")) }
+            label.check { input type="checkbox" name="changed" value="yes" checked[!chosen.changed.is_empty()] data-in-address; " "
+                @if plan.is_some() { (visit.t("Known pairs may get other files", "Cho phép đổi tệp của các cặp đã có")) }
+                @else { (visit.t("Known blocks may get other files", "Cho phép đổi tệp của các ván đã có")) }
+            }
             button.primary #import disabled[is_nothing] { (visit.t("Import", "Nhập")) }
         },
     )

@@ -70,7 +70,7 @@ fn columns_of_blocks_that_are_not_used_are_named_once() {
 #[test]
 fn what_the_form_of_an_import_has_is_kept_in_the_address_of_its_page() {
     let chosen = ImportChoice::of(&PageQuery::parse("project=p&unit=cm&changed=yes"));
-    let planned = Planned::Blocks(ReadBlocks::default());
+    let planned = Planned::Blocks(ReadBlocks::default(), None);
     let visit = Visit::in_language(Language::English);
     let shown = import_form(&visit, &chosen, &planned).into_string();
     assert_eq!(shown.matches(" data-in-address>").count(), 3, "{shown}");
