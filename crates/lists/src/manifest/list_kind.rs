@@ -15,6 +15,8 @@ use mocban_core::domain::{sanitize, value_text};
 
 /// Maximum number of rows that are looked at.
 const MAX_ROWS: usize = 1000;
+/// Maximum number of columns that are the same as an earlier one.
+const MAX_REPEATED: usize = 8;
 /// Longest name of a block in bytes.
 const MAX_ID_BYTES: usize = 200;
 /// Longest name of a block or column in a message, in characters.
@@ -103,8 +105,8 @@ struct KindColumns {
 
 impl KindColumns {
     fn of(names: &[&str]) -> Self {
-        let of = |known: &KnownColumns| known.assign(names).unwrap_or_default().columns;
-        let (blocks, pairs) = (of(&block_columns::COLUMNS), of(&row::COLUMNS));
+        let blocks = first_columns(&block_columns::COLUMNS, names);
+        let pairs = first_columns(&row::COLUMNS, names);
         let at = |columns: &[Option<&str>], name: &str| {
             columns.iter().position(|known| *known == Some(name))
         };
@@ -174,6 +176,19 @@ impl KindColumns {
     }
 }
 
+/// Returns what the columns of a header are, without those that are the same as an earlier one: a header with such columns is
+/// refused, but of its kind.
+fn first_columns(known: &KnownColumns, names: &[&str]) -> Vec<Option<&'static str>> {
+    let mut names = names.to_vec();
+    for _ in 0..MAX_REPEATED {
+        match known.assign(&names) {
+            Ok(found) => return found.columns,
+            Err(same) => names[same.second - 1] = "",
+        }
+    }
+    Vec::new()
+}
+
 /// What speaks for pairs in the rows of a list whose columns fit both kinds.
 #[derive(Debug, Default)]
 struct PairSigns {
@@ -222,6 +237,7 @@ impl PairSigns {
 #[cfg(test)]
 mod tests {
     use super::ListKind;
+    use crate::manifest::read_blocks;
 
     #[test]
     fn rows_decide_if_columns_fit_pairs_and_blocks() {
@@ -288,5 +304,16 @@ mod tests {
             let expected = ListKind { is_of_blocks, note };
             assert_eq!(ListKind::of_csv(list.as_bytes()), expected, "{list}");
         }
+    }
+
+    #[test]
+    fn a_list_of_blocks_with_two_same_columns_is_refused_as_one_of_blocks() {
+        let list = "Ván,Bản quét,Trang in,Nhãn,Nhan\nb,m.stl,p.png,l.json,l.json\n".as_bytes();
+        assert!(ListKind::of_csv(list).is_of_blocks);
+        let refused = read_blocks(list).expect_err("two labels").to_string();
+        let reason = "columns 4 and 5, \"Nhãn\" and \"Nhan\", are the same; rename one of them";
+        assert!(refused.contains(reason), "{refused}");
+        let pairs = "Mã,Bản quét,Bản in,ma\n1,m.stl,p.png,1\n";
+        assert!(!ListKind::of_csv(pairs.as_bytes()).is_of_blocks);
     }
 }
