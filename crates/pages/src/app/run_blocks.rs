@@ -32,6 +32,16 @@ pub(super) fn other_blocks_text(visit: &Visit, blocks: &BlockStatus) -> Option<S
     })
 }
 
+/// Returns the button that cuts these blocks again.
+pub(super) fn cut_again_text(visit: &Visit, blocks: u64) -> String {
+    let number = grouped(blocks);
+    match (visit.language, blocks) {
+        (Language::English, 1) => "Cut 1 block again".to_owned(),
+        (Language::English, _) => format!("Cut {number} blocks again"),
+        (Language::Vietnamese, _) => format!("Cắt lại {number} ván"),
+    }
+}
+
 /// Returns how many finished or failed blocks the next run would align again, because their control points, settings or
 /// files have changed.
 pub(super) async fn outdated_blocks(

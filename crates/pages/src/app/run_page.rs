@@ -14,7 +14,8 @@ use super::looked_part::looked_part;
 use super::projects::OpenProject;
 use super::remedies::pair_remedy;
 use super::run_blocks::{
-    blocks_text, failed_block_list, failed_blocks, other_blocks_text, outdated_blocks_text,
+    blocks_text, cut_again_text, failed_block_list, failed_blocks, other_blocks_text,
+    outdated_blocks_text,
 };
 use super::run_state::RunState;
 use super::state::AppState;
@@ -170,7 +171,9 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
             }
             button.primary #start name="which" value=(if is_idle { "look" } else { "all" }) disabled[is_empty] {
-                @if is_idle {
+                @if is_idle && run.blocks.other_files() > 0 {
+                    (cut_again_text(visit, run.blocks.other_files()))
+                } @else if is_idle {
                     (visit.t("Look for changed files", "Tìm tệp đã đổi"))
                 } @else {
                     (visit.t("Align", "Căn chỉnh")) " "

@@ -178,17 +178,20 @@ fn blocks_with_other_files_are_named_in_both_languages() {
     assert!(before.contains("Everything is aligned"), "{before}");
     assert!(!before.contains("other-block-files"), "{before}");
     run.blocks.0[0].other_files = true;
-    for (language, text) in [
+    for (language, text, button) in [
         (
             Language::English,
             "Blocks with another scan, page or labels than before: 1.",
+            "Cut 1 block again<",
         ),
         (
             Language::Vietnamese,
             "Số ván có bản quét, trang in hoặc nhãn khác so với trước: 1.",
+            "Cắt lại 1 ván<",
         ),
     ] {
         let shown = shown(&run, language);
+        assert!(shown.contains(button), "{shown}");
         assert!(shown.contains(text), "{shown}");
         assert!(!shown.contains("Everything is aligned"), "{shown}");
     }
