@@ -244,9 +244,9 @@ fn blocks_are_counted_on_the_page_of_the_run() {
     finished_block(dir.path());
     let page = open_app(dir.path());
     let english = text(&page.get("/p/p/"));
-    assert!(english.contains("1 of 1 done"), "{english}");
+    assert!(english.contains("1 of 1 block done"), "{english}");
     let vietnamese = text(&page.get("/p/p/?language=vi"));
-    assert!(vietnamese.contains("xong 1 trên 1"), "{vietnamese}");
+    assert!(vietnamese.contains("xong 1 trên 1 ván"), "{vietnamese}");
 }
 
 #[cfg(unix)]

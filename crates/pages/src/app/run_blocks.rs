@@ -61,7 +61,8 @@ pub(super) async fn outdated_blocks(
     Ok(outdated.count() as u64)
 }
 
-/// Returns the stages of the blocks in progress and how many blocks are done, such as `b04: registration with the page, 1 of 3 done`.
+/// Returns the stages of the blocks in progress and how many blocks are done, such as `b04: registration with the page,
+/// 1 of 3 blocks done`.
 pub(super) fn blocks_text(visit: &Visit, blocks: &BlockStatus) -> String {
     let mut parts: Vec<String> = (blocks.in_progress())
         .take(MAX_BLOCKS)
@@ -71,10 +72,12 @@ pub(super) fn blocks_text(visit: &Visit, blocks: &BlockStatus) -> String {
         })
         .collect();
     let done = grouped(blocks.number(&[JobStatus::Done]));
-    let all = grouped(blocks.0.len() as u64);
-    parts.push(match visit.language {
-        Language::English => format!("{done} of {all} done"),
-        Language::Vietnamese => format!("xong {done} trên {all}"),
+    let all = blocks.0.len() as u64;
+    let number = grouped(all);
+    parts.push(match (visit.language, all) {
+        (Language::English, 1) => format!("{done} of 1 block done"),
+        (Language::English, _) => format!("{done} of {number} blocks done"),
+        (Language::Vietnamese, _) => format!("xong {done} trên {number} ván"),
     });
     let failed = failed_blocks(blocks);
     parts.extend((failed > 0).then(|| format!("{} {}", grouped(failed), visit.t("failed", "lỗi"))));

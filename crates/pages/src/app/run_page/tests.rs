@@ -89,11 +89,11 @@ fn blocks_in_progress_have_their_stage_in_both_languages() {
     let text = |language| blocks_text(&Visit::in_language(language), &blocks);
     assert_eq!(
         text(Language::English),
-        "b04: registration with the page, 1 of 3 done"
+        "b04: registration with the page, 1 of 3 blocks done"
     );
     assert_eq!(
         text(Language::Vietnamese),
-        "b04: căn chỉnh với trang in, xong 1 trên 3"
+        "b04: căn chỉnh với trang in, xong 1 trên 3 ván"
     );
 }
 
