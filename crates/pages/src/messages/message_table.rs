@@ -196,15 +196,19 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} = {} is outside the range {} to {}",
-        "{0} = {1} nằm ngoài khoảng {2} đến {3}",
+        "{0} = {1#} nằm ngoài khoảng {2#} đến {3#}",
+    ),
+    (
+        "{} = {} is outside the range {} or more",
+        "{0} = {1#} phải từ {2#} trở lên",
     ),
     (
         "{} = {}: must be above {} = {}",
-        "{0} = {1}: phải lớn hơn {2} = {3}",
+        "{0} = {1#}: phải lớn hơn {2} = {3#}",
     ),
     (
         "{} = {}: must be below {} = {}",
-        "{0} = {1}: phải nhỏ hơn {2} = {3}",
+        "{0} = {1#}: phải nhỏ hơn {2} = {3#}",
     ),
     ("{} = {} is not text", "{0} = {1} không phải là văn bản"),
     ("{} = {} is not a list", "{0} = {1} không phải là danh sách"),

@@ -78,6 +78,10 @@ fn frequent_messages_are_translated_with_their_parts() {
             "p/mocban.toml: fit.seed = 7 nằm ngoài khoảng 0 đến 1; new words",
         ),
         (
+            "run.stage_timeout_s = 1000000 is outside the range 1 to 86400",
+            "run.stage_timeout_s = 1\u{202f}000\u{202f}000 nằm ngoài khoảng 1 đến 86\u{202f}400",
+        ),
+        (
             "storage.catalog = 2.5 is not text",
             "storage.catalog = 2,5 không phải là văn bản",
         ),
