@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::components::grouped;
 use super::failure::{AppFailure, AppResult};
 use super::projects::is_project;
 use super::sentence::Sentence;
@@ -30,18 +31,86 @@ pub(super) fn new_project_dir(given: &str, folder: &Path) -> AppResult<PathBuf> 
             format!("{name} là thư mục của các tệp từ trình duyệt: hãy đặt tên khác cho dự án"),
         )));
     }
-    let is_plain = !name.starts_with('.') && !name.contains(['/', '\\', ':']);
-    let is_short = name.chars().count() <= NAME_CHARS && !name.is_empty();
-    if is_plain && is_short && !name.contains(char::is_control) {
-        return Ok(folder.join(name));
+    match problem(name) {
+        None => Ok(folder.join(name)),
+        Some(why) => Err(AppFailure::refused(why)),
     }
-    let given = quoted(given);
-    Err(AppFailure::refused(Sentence::new(
-        format!(
-            "{given} cannot be the name of a project: give a name of at most {NAME_CHARS} characters without / and :"
-        ),
-        format!(
-            "{given} không thể là tên dự án: hãy đặt tên tối đa {NAME_CHARS} ký tự, không có / và :"
-        ),
-    )))
+}
+
+/// Returns what is wrong with the name of a project and how to name it instead, or `None` if it can have this name.
+fn problem(name: &str) -> Option<Sentence> {
+    if name.is_empty() {
+        return Some(Sentence::new(
+            "the name of the project is empty: give it a name",
+            "tên dự án đang để trống: hãy đặt tên cho dự án",
+        ));
+    }
+    let [why, why_vi] = if name.starts_with('.') {
+        [
+            "begins with a dot: begin it with another character".to_owned(),
+            "bắt đầu bằng dấu chấm: hãy bắt đầu bằng ký tự khác".to_owned(),
+        ]
+    } else if let Some(other) = name.chars().find(|c| ['/', '\\', ':'].contains(c)) {
+        [
+            format!("has \"{other}\": give a name without /, \\ and :"),
+            format!("có ký tự \"{other}\": hãy đặt tên không có /, \\ và :"),
+        ]
+    } else if name.contains(char::is_control) {
+        [
+            "has a line break or another control character: give a name without it".to_owned(),
+            "có dấu xuống dòng hoặc ký tự điều khiển khác: hãy đặt tên không có ký tự đó"
+                .to_owned(),
+        ]
+    } else {
+        let chars = name.chars().count();
+        if chars <= NAME_CHARS {
+            return None;
+        }
+        let number = grouped(chars as u64);
+        [
+            format!("has {number} characters: give a name of at most {NAME_CHARS}"),
+            format!("có {number} ký tự: hãy đặt tên tối đa {NAME_CHARS} ký tự"),
+        ]
+    };
+    let name = quoted(name);
+    Some(Sentence::new(
+        format!("{name} cannot be the name of a project, because it {why}"),
+        format!("{name} không thể là tên dự án vì {why_vi}"),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::problem;
+    use crate::review::Language;
+
+    #[test]
+    fn a_name_is_refused_for_what_is_wrong_with_it() {
+        let longest = "x".repeat(60);
+        for name in ["ván 04", "b.c", "a…", longest.as_str()] {
+            assert_eq!(problem(name), None, "{name}");
+        }
+        let long = "x".repeat(61);
+        for (name, parts) in [
+            ("", ["is empty", "để trống"]),
+            (
+                ".an",
+                [
+                    "\".an\" cannot be the name of a project, because it begins with a dot",
+                    "bắt đầu bằng dấu chấm",
+                ],
+            ),
+            ("..", ["begins with a dot", "bắt đầu bằng dấu chấm"]),
+            ("a/b", ["because it has \"/\": ", "có ký tự \"/\": "]),
+            ("a:b", ["because it has \":\": ", "có ký tự \":\": "]),
+            ("a\nb", ["has a line break", "có dấu xuống dòng"]),
+            (long.as_str(), ["has 61 characters", "có 61 ký tự"]),
+        ] {
+            let why = problem(name).expect("refused");
+            for (language, part) in Language::ALL.into_iter().zip(parts) {
+                let said = why.text(language);
+                assert!(said.contains(part), "{part}: {said}");
+            }
+        }
+    }
 }
