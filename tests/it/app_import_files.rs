@@ -235,6 +235,9 @@ fn a_block_is_shown_with_its_page_labels_and_scan_before_the_import() {
     ] {
         assert!(shown.contains(part), "{part}: {shown}");
     }
+    let (found, blocks) = problems(&page, &query);
+    assert_eq!((found.len(), blocks), (1, json!(2)), "{found:#?}");
+    assert!(found[0].starts_with("b2: "), "{found:#?}");
     let picture =
         |kind: &str, place: u32| page.get(&format!("/import/picture/{kind}{query}&place={place}"));
     let drawn = |kind: &str, place: u32| {

@@ -28,9 +28,29 @@ const STEP_TIME: Duration = Duration::from_millis(500);
 /// How long files of the shown pairs are looked at; the file that is read then is finished.
 const SHOWN_TIME: Duration = Duration::from_secs(3);
 
-/// Returns the places of the page that are filled from its files: a table, and the files that cannot be used.
-pub(super) fn files_part(visit: &Visit) -> Markup {
+/// Returns the places of the page that are filled from the files of pairs or blocks: a table, and the files that cannot be used.
+pub(super) fn files_part(visit: &Visit, are_blocks: bool) -> Markup {
     let query = visit.query.text();
+    let [looked_at, others] = if are_blocks {
+        [
+            visit.t(
+                "Blocks whose files were looked at",
+                "Số ván đã kiểm tra tệp",
+            ),
+            visit.t(
+                "The files of the other blocks are checked by the run.",
+                "Tệp của các ván khác được kiểm tra khi căn chỉnh.",
+            ),
+        ]
+    } else {
+        [
+            visit.t("Pairs whose files were looked at", "Số cặp đã kiểm tra tệp"),
+            visit.t(
+                "The files of the other pairs are checked by the run.",
+                "Tệp của các cặp khác được kiểm tra khi căn chỉnh.",
+            ),
+        ]
+    };
     html! {
         h3 { (visit.t("What the files say", "Các tệp cho biết gì")) }
         div #import-files data-load={ (visit.root) "import/files" (query) } aria-live="polite" {
@@ -38,12 +58,12 @@ pub(super) fn files_part(visit: &Visit) -> Markup {
         }
         div #file-problems data-address={ (visit.root) "import/problems" (query) } {
             p.muted role="status" {
-                (visit.t("Pairs whose files were looked at", "Số cặp đã kiểm tra tệp")) ": " span #looked-at { "0" }
+                (looked_at) ": " span #looked-at { "0" }
                 " · " (visit.t("files that cannot be used", "tệp không dùng được")) ": " b #unusable { "0" }
             }
             ul #unusable-files {}
             p #more-unusable hidden { (visit.t("More files that cannot be used", "Số tệp không dùng được khác")) ": " b {} }
-            p #other-pairs hidden { (visit.t("The files of the other pairs are checked by the run.", "Tệp của các cặp khác được kiểm tra khi căn chỉnh.")) }
+            p #other-pairs hidden { (others) }
             p.notice.warn #stopped-looking hidden role="alert" { (visit.t("Stopped before all files were looked at: reload the page to start again.", "Đã dừng trước khi kiểm tra hết các tệp: hãy tải lại trang để làm lại.")) }
         }
         script type="module" src={ (visit.root) "assets/import-files.js" } {}
@@ -64,7 +84,7 @@ pub(super) async fn part(
     let part = html! {
         @if !headers.is_empty() { (table(&visit, &headers, &units)) }
         @if headers.len() < asked {
-            p.muted { (visit.t("Reading takes long, so the table has only the first of the shown pairs.", "Việc đọc mất nhiều thời gian nên bảng chỉ có các cặp đầu tiên được hiện.")) }
+            p.muted { (visit.t("Reading takes long, so the table has only the first.", "Việc đọc mất nhiều thời gian nên bảng chỉ có các mục đầu tiên.")) }
         }
         (pictures_part(&visit, &headers, from))
         @if let Some(unit) = common_unit(&units).filter(|_| !has_list) { (unit_part(&visit, unit, &units)) }
@@ -103,9 +123,14 @@ pub(super) async fn problems(
     })))
 }
 
-/// Returns why files of a pair cannot be used.
+/// Returns why files of a pair or of a block cannot be used.
 fn unusable(headers: &FileHeaders) -> impl Iterator<Item = (&PlannedFiles, &Sentence)> {
-    let whys = [headers.scan.as_ref().err(), headers.print.as_ref().err()];
+    let labels = headers.labels.as_ref();
+    let whys = [
+        headers.scan.as_ref().err(),
+        headers.print.as_ref().err(),
+        labels.and_then(|labels| labels.as_ref().err()),
+    ];
     whys.into_iter().flatten().filter_map(move |why| match why {
         UnreadFile::Unusable(why) => Some((&headers.files, why)),
         UnreadFile::Outside => None,
@@ -276,8 +301,8 @@ fn why_unit(visit: &Visit, kind: ScanKind, extent: &MeshExtent, unit: Option<Sca
 mod tests {
     use std::path::PathBuf;
 
-    use super::{common_unit, size, table, unit, why_unit};
-    use crate::app::import_headers::{FileHeaders, PlannedFiles};
+    use super::{common_unit, files_part, size, table, unit, unusable, why_unit};
+    use crate::app::import_headers::{FileHeaders, PlannedFiles, UnreadFile};
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_core::domain::LengthUnit;
@@ -360,5 +385,33 @@ mod tests {
             "{doubted}"
         );
         assert!(!fitting.contains("as long as its page"), "{fitting}");
+    }
+
+    #[test]
+    fn labels_that_cannot_be_used_are_counted_with_the_files_of_blocks() {
+        let mut heads = block(LengthUnit::Mm);
+        assert_eq!(unusable(&heads).count(), 0);
+        heads.labels = Some(Err(UnreadFile::of_program("b.json cannot be opened")));
+        assert_eq!(unusable(&heads).count(), 1);
+        for (language, of_pairs, of_blocks) in [
+            (
+                Language::English,
+                "Pairs whose files were looked at",
+                "Blocks whose files were looked at",
+            ),
+            (
+                Language::Vietnamese,
+                "Số cặp đã kiểm tra tệp",
+                "Số ván đã kiểm tra tệp",
+            ),
+        ] {
+            let visit = Visit::in_language(language);
+            let [pairs, blocks] = [false, true].map(|are_blocks| {
+                let part = files_part(&visit, are_blocks);
+                part.into_string()
+            });
+            assert!(pairs.contains(of_pairs), "{pairs}");
+            assert!(blocks.contains(of_blocks), "{blocks}");
+        }
     }
 }

@@ -63,7 +63,7 @@ pub(super) fn plan_part(
                 },
                 Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
             }
-            @if has_files(planned) { (files_part(visit)) }
+            @if has_files(planned) { (files_part(visit, matches!(planned, Planned::Blocks(..)))) }
             (changed)
             (import_form(visit, chosen, planned))
         }
