@@ -43,15 +43,21 @@ pub struct BackupContent {
     pub first_not_copied: Vec<String>,
     /// What is wrong with their list, if it cannot be read. They are then found by their paths, and not copied.
     pub list_problem: Option<String>,
-    /// Without copies, the scans and prints that a project in the new folder would find. With copies, none is looked at.
+    /// Without copies or with a chosen folder, the scans and prints that a project in the new folder would find. Otherwise, none
+    /// is looked at.
     pub inputs: InputPlaces,
 }
 
-/// Reads what a backup holds for a project in the folder `dir`, which need not exist. Writes nothing.
+/// Reads what a backup holds for a project in the folder `dir`, which need not exist. Scans and prints are looked for in the
+/// folder `chosen`, if there is one. Writes nothing.
 ///
 /// # Errors
 /// Returns an error if the file is not a backup, or is damaged where it is read.
-pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupContent> {
+pub async fn backup_content(
+    backup: &Path,
+    dir: &Path,
+    chosen: Option<&Path>,
+) -> ProjectResult<BackupContent> {
     check_backup(backup)?;
     let meta = std::fs::metadata(backup);
     let meta = meta.with_context(|| format!("cannot read {}", backup.display()))?;
@@ -68,8 +74,8 @@ pub async fn backup_content(backup: &Path, dir: &Path) -> ProjectResult<BackupCo
         let blocks = catalog.count_blocks().await?;
         let last_activity = catalog.last_activity().await?;
         let inputs = match copies {
-            Some(_) => InputPlaces::default(),
-            None => InputPlaces::of_backup(&Project::at(dir), &catalog).await?,
+            Some(_) if chosen.is_none() => InputPlaces::default(),
+            _ => InputPlaces::of_backup(&Project::at(dir), &catalog, chosen).await?,
         };
         let (not_copied, first_not_copied) = match &list {
             Some(list) => missing_copies(list, &catalog).await?,

@@ -1,9 +1,10 @@
 //! Finds out which inputs are at their places: those of all pairs and blocks, as far as a limited time allows.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::error::ProjectResult;
+use crate::input_finder::finder_in;
 use crate::missing_inputs::{INSPECTION_TIME, MAX_TIME};
 use crate::wanted_inputs::{WantedInput, first_counted_inputs, first_wanted_inputs};
 use mocban_catalog::Catalog;
@@ -35,13 +36,17 @@ impl InputPlaces {
     /// Looks at the files of a project that are not of retired pairs alone.
     pub async fn of_project(project: &Project, catalog: &Catalog) -> ProjectResult<Self> {
         let (inputs, has_more) = first_counted_inputs(catalog, MAX_PAIRS).await?;
-        Ok(Self::of_inputs(project, inputs, has_more).await)
+        Ok(Self::of_inputs(project, inputs, has_more, None).await)
     }
 
-    /// Looks at all files of a catalog where a restored project would read them.
-    pub(crate) async fn of_backup(project: &Project, catalog: &Catalog) -> ProjectResult<Self> {
+    /// Looks at all files of a catalog where a restored project would read them: also in a folder, if one is chosen.
+    pub(crate) async fn of_backup(
+        project: &Project,
+        catalog: &Catalog,
+        folder: Option<&Path>,
+    ) -> ProjectResult<Self> {
         let (inputs, has_more) = first_wanted_inputs(catalog, MAX_PAIRS).await?;
-        Ok(Self::of_inputs(project, inputs, has_more).await)
+        Ok(Self::of_inputs(project, inputs, has_more, folder.map(Path::to_owned)).await)
     }
 
     /// Returns whether every file was looked at.
@@ -49,10 +54,17 @@ impl InputPlaces {
         self.looked_at == self.known && !self.has_more
     }
 
-    async fn of_inputs(project: &Project, inputs: Vec<WantedInput>, has_more: bool) -> Self {
+    async fn of_inputs(
+        project: &Project,
+        inputs: Vec<WantedInput>,
+        has_more: bool,
+        folder: Option<PathBuf>,
+    ) -> Self {
         let known = inputs.len();
         let (project, until) = (project.clone(), Instant::now() + INSPECTION_TIME);
-        let look = tokio::task::spawn_blocking(move || looked_at(&project, &inputs, until));
+        let look = tokio::task::spawn_blocking(move || {
+            looked_at(&project, &inputs, folder.as_deref(), until)
+        });
         // A disk may hang.
         let looked = tokio::time::timeout(MAX_TIME, look).await;
         let places = looked.ok().and_then(Result::ok).unwrap_or_default();
@@ -64,8 +76,14 @@ impl InputPlaces {
     }
 }
 
-/// Looks at files until a time.
-fn looked_at(project: &Project, inputs: &[WantedInput], until: Instant) -> InputPlaces {
+/// Looks at files until a time, also in a folder.
+fn looked_at(
+    project: &Project,
+    inputs: &[WantedInput],
+    folder: Option<&Path>,
+    until: Instant,
+) -> InputPlaces {
+    let mut finder = folder.map(|folder| finder_in(project, folder, &()));
     let mut places = InputPlaces {
         known: inputs.len(),
         ..InputPlaces::default()
@@ -75,11 +93,15 @@ fn looked_at(project: &Project, inputs: &[WantedInput], until: Instant) -> Input
             break;
         }
         let input = project.input(stored);
-        if input.is_remote() || is_below_unknown_root(project, stored) {
+        if input.is_remote() || finder.is_none() && is_below_unknown_root(project, stored) {
             continue;
         }
         places.looked_at += 1;
-        if input.exists() {
+        let is_there = match &mut finder {
+            Some(find) => matches!(find(stored), Ok(Some(_))),
+            None => input.exists(),
+        };
+        if is_there {
             continue;
         }
         let is_inside = Path::new(stored).is_relative() && !project.is_below_root(stored);
@@ -130,7 +152,7 @@ mod tests {
         ];
         let inputs = stored.each_ref().map(|stored| WantedInput::unread(stored));
         let later = Instant::now() + Duration::from_hours(1);
-        let places = looked_at(&project, &inputs, later);
+        let places = looked_at(&project, &inputs, None, later);
         let expected = InputPlaces {
             known: 5,
             has_more: false,
@@ -141,13 +163,26 @@ mod tests {
         };
         assert_eq!(places, expected);
         assert!(!places.is_of_all(), "a root is not known");
-        assert!(looked_at(&project, &inputs[..4], later).is_of_all());
-        let late = looked_at(&project, &inputs, Instant::now());
+        assert!(looked_at(&project, &inputs[..4], None, later).is_of_all());
+        let late = looked_at(&project, &inputs, None, Instant::now());
         assert_eq!((late.known, late.looked_at, late.missing), (5, 0, 0));
         let many: Vec<_> = (0..9)
             .map(|i| WantedInput::unread(&format!("{i}.ply")))
             .collect();
-        let places = looked_at(&project, &many, later);
+        let places = looked_at(&project, &many, None, later);
         assert_eq!((places.missing, places.first.len()), (9, MAX_NAMED));
+    }
+
+    #[test]
+    fn files_in_a_chosen_folder_are_not_missing() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let (project, folder) = (Project::at(&dir.path().join("p")), dir.path().join("f"));
+        std::fs::create_dir(&folder).expect("a folder");
+        std::fs::write(folder.join("1.stl"), "scan").expect("written");
+        let inputs = ["scans/1.stl", "scans/2.stl"].map(WantedInput::unread);
+        let later = Instant::now() + Duration::from_hours(1);
+        let places = looked_at(&project, &inputs, Some(&folder), later);
+        assert_eq!((places.looked_at, places.missing), (2, 1));
+        assert_eq!(places.first, ["scans/2.stl"]);
     }
 }

@@ -55,11 +55,15 @@ async fn read(folder: &Path, given: &str, inputs: &str) -> AppResult<(BackupCont
     let roots = PickerRoots::new(folder);
     let backup = chosen_path(&roots, given)?;
     check_backup_file(&backup)?;
-    if !inputs.is_empty() {
-        roots.allowed(Path::new(inputs))?;
-    }
+    let chosen = if inputs.is_empty() {
+        None
+    } else {
+        Some(roots.allowed(Path::new(inputs))?)
+    };
     let name = free_name(folder, &backup);
-    let content: ProjectResult<BackupContent> = backup_content(&backup, &folder.join(&name)).await;
+    let dir = folder.join(&name);
+    let content: ProjectResult<BackupContent> =
+        backup_content(&backup, &dir, chosen.as_deref()).await;
     let content = content
         .map_err(|error| AppFailure::refused(restore_sentence(&error, &backup, folder, &name)))?;
     Ok((content, name))
@@ -168,18 +172,32 @@ fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> 
     let said = match inputs {
         Some(inputs) => {
             let inputs = one_line(inputs);
+            let [found, found_vi] = found_in_folder(&content.inputs);
             Sentence::new(
                 format!(
-                    "Not in a backup. Files that are not at their places are looked for in {inputs}."
+                    "Not in a backup. Files that are not at their places are looked for in {inputs}. {found}"
                 ),
                 format!(
-                    "Không có trong bản sao lưu. Các tệp không có ở đúng chỗ sẽ được tìm trong {inputs}."
+                    "Không có trong bản sao lưu. Các tệp không có ở đúng chỗ sẽ được tìm trong {inputs}. {found_vi}"
                 ),
             )
         }
         None => places_sentence(&content.inputs),
     };
     said.text(visit.language).to_owned()
+}
+
+/// Says how many scans and prints are missing although they were looked for in a folder, too.
+fn found_in_folder(places: &InputPlaces) -> [String; 2] {
+    let [looked_at, looked_at_vi] = looked_at_text(places);
+    if places.missing == 0 {
+        return [format!("{looked_at}."), format!("{looked_at_vi}.")];
+    }
+    let (missing, first) = (grouped(places.missing as u64), first_missing(places));
+    [
+        format!("{looked_at}. Missing: {missing} ({first})."),
+        format!("{looked_at_vi}. Số tệp thiếu: {missing} ({first})."),
+    ]
 }
 
 /// Says how many scans and prints were looked at, and which of these the new project would not find.
@@ -234,7 +252,7 @@ fn places_sentence(places: &InputPlaces) -> Sentence {
 mod tests {
     use std::path::Path;
 
-    use super::{free_name, places_sentence};
+    use super::{found_in_folder, free_name, places_sentence};
     use crate::review::Language;
     use mocban_project::input_places::InputPlaces;
 
@@ -298,5 +316,19 @@ mod tests {
                 assert!(text.contains(part), "{part}: {text}");
             }
         }
+    }
+
+    #[test]
+    fn files_that_a_chosen_folder_lacks_are_counted() {
+        let places = InputPlaces {
+            known: 4,
+            looked_at: 4,
+            missing: 1,
+            first: vec!["scans/2.stl".to_owned()],
+            ..InputPlaces::default()
+        };
+        let [english, vietnamese] = found_in_folder(&places);
+        assert!(english.ends_with("4 of 4. Missing: 1 (scans/2.stl)."));
+        assert!(vietnamese.ends_with("4 trên 4. Số tệp thiếu: 1 (scans/2.stl)."));
     }
 }
