@@ -23,8 +23,8 @@ fn is_near_other_name(found: &str, name: &str, known: &KnownColumns) -> bool {
     let plain = plain_name(found);
     known.other_names.iter().any(|(other, of)| {
         let max_wrong = match other.len() {
-            ..=4 => return false,
-            ..=8 => 1,
+            0..=4 => return false,
+            5..=8 => 1,
             _ => 2,
         };
         *of == name

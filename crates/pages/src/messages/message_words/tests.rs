@@ -41,6 +41,12 @@ fn frequent_messages_are_translated_with_their_parts() {
             "m/1.stl: with the unit m, the scan is 12.7 m long; correct the unit (perhaps mm) in the list, and import it again",
             "m/1.stl: với đơn vị m, bản quét dài 12,7 m; hãy sửa đơn vị (có lẽ là mm) trong danh sách rồi nhập lại",
         ),
+    ]);
+}
+
+#[test]
+fn messages_about_files_are_translated_with_their_parts() {
+    assert_translated(&[
         (
             "data/prints/1.jpg: the file is a BMP image",
             "data/prints/1.jpg: tệp là hình BMP",
