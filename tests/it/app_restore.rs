@@ -160,6 +160,7 @@ fn a_restore_that_cannot_be_done_is_refused_in_both_languages() {
                 "there is a folder",
                 "outside your folders",
                 "cannot be the name",
+                "the name of the project is empty",
             ],
         ),
         (
@@ -171,6 +172,7 @@ fn a_restore_that_cannot_be_done_is_refused_in_both_languages() {
                 "đã có thư mục",
                 "nằm ngoài các thư mục",
                 "không thể là tên dự án",
+                "tên dự án đang để trống",
             ],
         ),
     ] {
@@ -188,7 +190,7 @@ fn a_restore_that_cannot_be_done_is_refused_in_both_languages() {
             (backup.as_path(), "p", parts[3]),
             (Path::new("/etc/passwd"), "again", parts[4]),
             (backup.as_path(), "../again", parts[5]),
-            (backup.as_path(), "", parts[5]),
+            (backup.as_path(), "", parts[6]),
         ] {
             let reply = start(&page, &body(file, name));
             let said = text(&reply);
