@@ -93,14 +93,17 @@ fn looked_at(
             break;
         }
         let input = project.input(stored);
-        if input.is_remote() || finder.is_none() && is_below_unknown_root(project, stored) {
+        if input.is_remote() {
             continue;
         }
-        places.looked_at += 1;
         let is_there = match &mut finder {
             Some(find) => matches!(find(stored), Ok(Some(_))),
             None => input.exists(),
         };
+        if !is_there && is_below_unknown_root(project, stored) {
+            continue;
+        }
+        places.looked_at += 1;
         if is_there {
             continue;
         }
@@ -179,7 +182,8 @@ mod tests {
         let (project, folder) = (Project::at(&dir.path().join("p")), dir.path().join("f"));
         std::fs::create_dir(&folder).expect("a folder");
         std::fs::write(folder.join("1.stl"), "scan").expect("written");
-        let inputs = ["scans/1.stl", "scans/2.stl"].map(WantedInput::unread);
+        // A root of the settings is not known.
+        let inputs = ["scans/1.stl", "scans/2.stl", "disk:3.stl"].map(WantedInput::unread);
         let later = Instant::now() + Duration::from_hours(1);
         let places = looked_at(&project, &inputs, Some(&folder), later);
         assert_eq!((places.looked_at, places.missing), (2, 1));
