@@ -190,8 +190,14 @@ fn inputs_text(visit: &Visit, content: &BackupContent, inputs: Option<&str>) -> 
 /// Says how many scans and prints are missing although they were looked for in a folder, too.
 fn found_in_folder(places: &InputPlaces) -> [String; 2] {
     let [looked_at, looked_at_vi] = looked_at_text(places);
-    if places.missing == 0 {
+    if places.looked_at == 0 {
         return [format!("{looked_at}."), format!("{looked_at_vi}.")];
+    }
+    if places.missing == 0 {
+        return [
+            format!("{looked_at}. None of these is missing."),
+            format!("{looked_at_vi}. Không thiếu tệp nào trong số này."),
+        ];
     }
     let (missing, first) = (grouped(places.missing as u64), first_missing(places));
     [
@@ -320,7 +326,7 @@ mod tests {
 
     #[test]
     fn files_that_a_chosen_folder_lacks_are_counted() {
-        let places = InputPlaces {
+        let mut places = InputPlaces {
             known: 4,
             looked_at: 4,
             missing: 1,
@@ -330,5 +336,12 @@ mod tests {
         let [english, vietnamese] = found_in_folder(&places);
         assert!(english.ends_with("4 of 4. Missing: 1 (scans/2.stl)."));
         assert!(vietnamese.ends_with("4 trên 4. Số tệp thiếu: 1 (scans/2.stl)."));
+        places.missing = 0;
+        let [english, vietnamese] = found_in_folder(&places);
+        assert!(english.ends_with("4 of 4. None of these is missing."));
+        assert!(vietnamese.ends_with("4 trên 4. Không thiếu tệp nào trong số này."));
+        places.looked_at = 0;
+        let [english, _] = found_in_folder(&places);
+        assert!(english.ends_with("0 of 4."), "{english}");
     }
 }

@@ -24,10 +24,10 @@ pub(super) fn other_blocks_text(visit: &Visit, blocks: &BlockStatus) -> Option<S
     let number = grouped(blocks.other_files());
     (blocks.other_files() > 0).then(|| match visit.language {
         Language::English => format!(
-            "Blocks with another scan, page or labels than before: {number}. The next run looks at them."
+            "Blocks with another scan, page or labels than before: {number}. The next run looks at these files, and cuts the blocks again if their content differs."
         ),
         Language::Vietnamese => format!(
-            "Số ván có bản quét, trang in hoặc nhãn khác so với trước: {number}. Lần chạy tới sẽ xem lại các tệp đó."
+            "Số ván có bản quét, trang in hoặc nhãn khác so với trước: {number}. Lần chạy tới sẽ xem lại các tệp đó và cắt lại ván nếu nội dung tệp khác đi."
         ),
     })
 }
