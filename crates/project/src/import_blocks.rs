@@ -154,9 +154,9 @@ pub async fn import_blocks(
     listener: &dyn Listener,
 ) -> ProjectResult<BlockImportOutcome> {
     let _work = LongWork::begin(listener, "importing");
-    let mut listing = listing(source)?;
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
+    let mut listing = listing(source, &project)?;
     let (mut missing, mut searches) = (MissingFiles::default(), SimilarFiles::default());
     for row in &mut listing.rows {
         locate(row, &listing.label, &project, &mut missing, &mut searches);
@@ -217,7 +217,8 @@ pub fn listed_blocks(file: &Path, bytes: &[u8]) -> ProjectResult<ReadBlocks> {
     Ok(read)
 }
 
-fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
+/// Returns the blocks to import. Paths start with the folder of the list, except those below a named root of the project.
+fn listing(source: &BlockSource, project: &Project) -> ProjectResult<BlockListing> {
     let (file, bytes) = match source {
         BlockSource::List { file, bytes } => (file, bytes),
         BlockSource::One(files) => {
@@ -245,11 +246,8 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
         warnings,
     } = listed_blocks(file, bytes)?;
     let folder = file.parent().unwrap_or(Path::new(""));
-    for row in &mut rows {
-        let paths = [&mut row.mesh, &mut row.page].into_iter();
-        for path in paths.chain(row.labels.as_mut()) {
-            *path = folder.join(&*path);
-        }
+    for path in rows.iter_mut().flat_map(|row| local_paths(row, project)) {
+        *path = folder.join(&*path);
     }
     Ok(BlockListing {
         rows,
@@ -258,6 +256,25 @@ fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
         warnings,
         renamed: renamed_columns(&renamed),
     })
+}
+
+/// Returns the paths of the files of a row that are not below a named root of the project.
+fn local_paths<'r>(
+    row: &'r mut BlockRow,
+    project: &Project,
+) -> impl Iterator<Item = &'r mut PathBuf> + use<'r> {
+    let BlockRow {
+        mesh, page, labels, ..
+    } = row;
+    let paths = [Some(mesh), Some(page), labels.as_mut()];
+    let is_local = |path: &&mut PathBuf| {
+        let text = path.to_str();
+        text.is_none_or(|text| !project.is_below_root(text))
+    };
+    paths
+        .map(|path| path.filter(is_local))
+        .into_iter()
+        .flatten()
 }
 
 /// Returns the given name, or the name of the mesh file without its extension.
@@ -297,14 +314,10 @@ pub fn rows_as_stored(
 ) -> ProjectResult<Vec<BlockAttributes>> {
     let folder = list.and_then(Path::parent).unwrap_or(Path::new(""));
     let rows = rows.into_iter().map(|mut row| {
-        let paths = [&mut row.mesh, &mut row.page].into_iter();
-        for path in paths.chain(row.labels.as_mut()) {
+        for path in local_paths(&mut row, project) {
             *path = folder.join(&*path);
-            let text = path.to_str();
-            if text.is_none_or(|text| !project.is_below_root(text)) {
-                // What cannot be found has the path of the list.
-                let _ = find_on_disk(path);
-            }
+            // What cannot be found has the path of the list.
+            let _ = find_on_disk(path);
         }
         stored_row(row, list.is_some(), project)
     });
@@ -330,9 +343,35 @@ fn stored_row(
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
     use std::path::Path;
 
-    use super::{ListedItems, listed_blocks};
+    use super::{BlockSource, ListedItems, listed_blocks, listing, rows_as_stored};
+    use mocban_store::{Project, ProjectStorage, StorageOptions};
+
+    #[test]
+    fn paths_below_a_named_root_do_not_depend_on_the_folder_of_the_list() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let within = |name: &str| dir.path().join(name).to_str().expect("UTF-8").to_owned();
+        let options = StorageOptions {
+            artifacts: String::new(),
+            roots: BTreeMap::from([("nas".to_owned(), within("nas"))]),
+            cache: within("cache"),
+            cache_bytes: 1,
+        };
+        let storage = ProjectStorage::open(&options).expect("valid settings");
+        let project = Project::at(&dir.path().join("p")).with_storage(storage);
+        let (file, bytes) = (
+            dir.path().join("lists/b.csv"),
+            b"block,mesh,page\nb,nas:b.stl,b.png\n".to_vec(),
+        );
+        let read = listed_blocks(&file, &bytes).expect("a list");
+        let stored = rows_as_stored(read.rows, Some(&file), &project).expect("paths");
+        assert_eq!(stored[0].mesh_path, "nas:b.stl");
+        let listed = listing(&BlockSource::List { file, bytes }, &project).expect("a list");
+        assert_eq!(listed.rows[0].mesh, Path::new("nas:b.stl"));
+        assert_eq!(listed.rows[0].page, dir.path().join("lists/b.png"));
+    }
 
     #[test]
     fn the_same_files_under_the_ids_of_two_blocks_are_counted_with_the_first() {
