@@ -219,7 +219,7 @@ impl ColumnChanges {
         }
     }
 
-    /// Returns whether something changes, or may change in pairs that were not compared.
+    /// Returns whether something changes, or may change in pairs or blocks that were not compared.
     pub(super) const fn may_change(&self) -> bool {
         self.count > 0 || self.is_cut
     }

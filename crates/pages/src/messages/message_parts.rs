@@ -68,6 +68,7 @@ const PARTS: &[(&str, &str)] = &[
     ),
     ("without a name", "không có tên"),
     ("id or print", "id hoặc print"),
+    ("other metadata", "khác"),
     (
         "MeshLab, Blender or CloudCompare",
         "MeshLab, Blender hoặc CloudCompare",

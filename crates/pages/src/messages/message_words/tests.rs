@@ -224,6 +224,10 @@ fn values_that_an_import_empties_are_explained() {
             "1 ván đã có trong dự án bị mất giá trị ở cột unit vì cột này trống hoặc không có trong lần nhập này: b2; nếu không chủ ý thì hãy nhập lại với các giá trị này",
         ),
         (
+            "2 known pairs lose their other metadata, empty or missing in this import, first a1",
+            "2 cặp đã có trong dự án bị mất giá trị ở cột khác vì cột này trống hoặc không có trong lần nhập này, cặp đầu tiên là a1",
+        ),
+        (
             "12 known pairs lose their character, empty or missing in this import, first a1; if that was not meant, import again with these values",
             "12 cặp đã có trong dự án bị mất giá trị ở cột character vì cột này trống hoặc không có trong lần nhập này, cặp đầu tiên là a1; nếu không chủ ý thì hãy nhập lại với các giá trị này",
         ),
