@@ -363,6 +363,8 @@ mod tests {
             ),
             "{id}"
         );
+        let id = error("mocban show --config postgres://u:secret@h/d -a1");
+        assert!(!id.contains("secret"), "{id}");
         let id = error("mocban verdict set -a1 pass --reviewer lan");
         assert!(
             id.contains("as in: mocban verdict set --reviewer lan -- -a1 pass\n"),

@@ -4,6 +4,7 @@ use clap::{Arg, Command};
 
 use super::name_request::{find_option, takes_names};
 use mocban_core::domain::shell::shell_quoted;
+use mocban_core::domain::{is_address, without_password};
 
 /// Returns a tip on a word that begins with a hyphen: the value of the option before it or, if the command takes ids, an id.
 /// `option` is the unknown option that was found in it, and `words` the command line without the name of the program.
@@ -68,8 +69,14 @@ fn has_option(word: &str, option: &str) -> bool {
     }
 }
 
-/// Returns words as they are typed into a shell.
+/// Returns words as they are typed into a shell, without the passwords of addresses.
 fn quoted(words: &[&str]) -> String {
-    let quoted = words.iter().map(|word| shell_quoted(word));
+    let quoted = words.iter().map(|word| {
+        if is_address(word) {
+            shell_quoted(&without_password(word))
+        } else {
+            shell_quoted(word)
+        }
+    });
     quoted.collect::<Vec<_>>().join(" ")
 }
