@@ -167,6 +167,8 @@ fn number(tab: &Tab<'_>, expression: &str) -> f64 {
 fn use_page(tab: &Tab<'_>) {
     let zoom = |tab: &Tab<'_>| number(tab, "mocbanBlock.camera.zoom");
     tab.screenshot("block-page");
+    // The first layer has loaded: its end would hide what is said of the next one, whose address is held back.
+    tab.wait("mocbanBlock.work.hidden");
     for (key, layer) in [("KeyR", "relief"), ("KeyO", "overlay"), ("KeyP", "page")] {
         tab.key(key);
         if layer == "relief" {

@@ -61,6 +61,17 @@ fn a_run_that_finds_no_file_names_the_missing_folders() {
         let folder = dir.path().join(folder).display().to_string();
         assert!(ran.err.contains(&folder), "{folder}: {}", ran.err);
     }
+
+    // Files that no run has read are not changed.
+    std::fs::create_dir(dir.path().join("new")).expect("a folder");
+    for name in ["1.stl", "1.png", "2.stl", "2.png"] {
+        std::fs::write(dir.path().join("new").join(name), "x").expect("written");
+    }
+    let list = "id,mesh,print\na,new/1.stl,new/1.png\nb,new/2.stl,new/2.png\n";
+    std::fs::write(dir.path().join("new.csv"), list).expect("a list");
+    on(&["import", "new.csv", "--allow-changed-files"]).expect(0);
+    let checked = on(&["check"]);
+    assert!(!checked.out.contains("changed since"), "{}", checked.out);
 }
 
 #[test]

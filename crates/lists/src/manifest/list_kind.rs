@@ -176,7 +176,7 @@ impl KindColumns {
     }
 }
 
-/// Returns what the columns of a header are, without those that are the same as an earlier one: a header with such columns is
+/// Returns what the columns of a header are, without the repeated ones: a header with such columns is
 /// refused, but of its kind.
 fn first_columns(known: &KnownColumns, names: &[&str]) -> Vec<Option<&'static str>> {
     let mut names = names.to_vec();

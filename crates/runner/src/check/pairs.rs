@@ -209,7 +209,9 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
             Err(InputError::NotThere(_)) => check.inputs_missing.push(note()),
             Err(error) => check.inputs_unreadable.push(unreadable(&error)),
             Ok(stat) => {
-                let Some(seen) = seen.filter(|seen: &&InputVersion| seen.stat != stat) else {
+                // A file that was not there was not read.
+                let is_other = |seen: &&InputVersion| !seen.is_gone() && seen.stat != stat;
+                let Some(seen) = seen.filter(is_other) else {
                     continue;
                 };
                 match hash_input(&input) {
