@@ -209,8 +209,9 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
             Err(InputError::NotThere(_)) => check.inputs_missing.push(note()),
             Err(error) => check.inputs_unreadable.push(unreadable(&error)),
             Ok(stat) => {
-                // A file that was not there was not read.
-                let is_other = |seen: &&InputVersion| !seen.is_gone() && seen.stat != stat;
+                // A file that was not there was not read. With a new path, it keeps the hash of nothing.
+                let unread = InputVersion::gone().hash;
+                let is_other = |seen: &&InputVersion| seen.hash != unread && seen.stat != stat;
                 let Some(seen) = seen.filter(is_other) else {
                     continue;
                 };
