@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::blocking::blocking_within;
 use crate::error::{ProjectError, ProjectResult};
 use crate::location::Location;
 use crate::pair_table::{self, PairRow};
@@ -117,7 +118,7 @@ async fn changed_inputs(
     let project = Project::at(&location.dir).with_storage(storage);
     let pair = catalog.select(std::slice::from_ref(name)).await?;
     let known = catalog.known_inputs(None, 1, Some(&pair)).await?;
-    let look = tokio::task::spawn_blocking(move || {
+    let look = move || {
         let files = known.into_iter().flat_map(|known| {
             [
                 ("mesh", known.mesh_path, known.mesh),
@@ -132,9 +133,9 @@ async fn changed_inputs(
         let changed = files
             .filter(|(_, path, read)| read.as_ref().is_some_and(|read| is_changed(path, read)));
         changed.map(|(kind, ..)| kind).collect()
-    });
-    let looked = tokio::time::timeout(MAX_LOOK, look).await;
-    Ok(looked.ok().and_then(Result::ok).unwrap_or_default())
+    };
+    let looked = blocking_within(MAX_LOOK, look).await;
+    Ok(looked.unwrap_or_default())
 }
 
 /// Returns which files of a block are not at their places: `mesh`, `page` or `labels`; none if the disk does not answer in time.
@@ -149,15 +150,15 @@ pub async fn missing_block_files(
         ("labels", labels.cloned()),
     ];
     let project = project.clone();
-    let look = tokio::task::spawn_blocking(move || {
+    let look = move || {
         let missing = files.into_iter().filter(|(_, path)| {
             let path = path.as_ref();
             path.is_some_and(|path| !project.input(path).exists())
         });
         missing.map(|(kind, _)| kind).collect()
-    });
-    let looked = tokio::time::timeout(MAX_LOOK, look).await;
-    looked.ok().and_then(Result::ok).unwrap_or_default()
+    };
+    let looked = blocking_within(MAX_LOOK, look).await;
+    looked.unwrap_or_default()
 }
 
 /// Returns the names of all blocks and of all pairs that are not retired.

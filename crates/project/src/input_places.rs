@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::blocking::blocking_within;
 use crate::error::ProjectResult;
 use crate::input_finder::finder_in;
 use crate::missing_inputs::{INSPECTION_TIME, MAX_TIME};
@@ -62,12 +63,8 @@ impl InputPlaces {
     ) -> Self {
         let known = inputs.len();
         let (project, until) = (project.clone(), Instant::now() + INSPECTION_TIME);
-        let look = tokio::task::spawn_blocking(move || {
-            looked_at(&project, &inputs, folder.as_deref(), until)
-        });
-        // A disk may hang.
-        let looked = tokio::time::timeout(MAX_TIME, look).await;
-        let places = looked.ok().and_then(Result::ok).unwrap_or_default();
+        let look = move || looked_at(&project, &inputs, folder.as_deref(), until);
+        let places = blocking_within(MAX_TIME, look).await.unwrap_or_default();
         Self {
             known,
             has_more,

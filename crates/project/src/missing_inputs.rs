@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::blocking::blocking_within;
 use crate::error::ProjectResult;
 use crate::import_command::ImportCommand;
 use crate::missing_folders::MissingFolders;
@@ -256,9 +257,9 @@ async fn inspect_files(
         pairs,
         blocks,
     } = sample;
-    let inspection = tokio::task::spawn_blocking(move || among(&project, &files, until));
-    let inspected = tokio::time::timeout(MAX_TIME, inspection).await;
-    let mut inspection = inspected.ok().and_then(Result::ok).unwrap_or_default();
+    let look = move || among(&project, &files, until);
+    let looked = blocking_within(MAX_TIME, look).await;
+    let mut inspection = looked.unwrap_or_default();
     if let Some(missing) = &mut inspection.missing {
         missing.command = match pairs.get(missing.first_owner) {
             Some(pair) => {

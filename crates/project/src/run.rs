@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::blocking::blocking;
+use crate::blocking::{blocking, blocking_within};
 use crate::closing::close;
 use crate::error::ProjectResult;
 use crate::events::{Listener, ProjectEvent, warn};
@@ -203,9 +203,9 @@ async fn open(location: &Location, listener: &dyn Listener) -> ProjectResult<(Pr
             .storage()
             .map_or_else(Vec::new, ProjectStorage::unusable_roots)
     };
-    // The run needs a root only if one of its pairs does. A disk may hang.
-    let found = tokio::time::timeout(ROOT_CHECK, tokio::task::spawn_blocking(find)).await;
-    for root in found.into_iter().flatten().flatten() {
+    // The run needs a root only if one of its pairs does.
+    let found = blocking_within(ROOT_CHECK, find).await;
+    for root in found.into_iter().flatten() {
         warn(listener, root);
     }
     Ok((project, catalog))
