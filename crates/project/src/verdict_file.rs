@@ -21,7 +21,8 @@ use mocban_core::domain::spelling::{hint, quoted};
 use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{
-    CsvText, LineCounter, NotText, as_utf8, cell_error, is_array, later_header, trimmed,
+    CsvText, LineCounter, NotText, as_utf8, cell_error, fits_header, is_array, later_header,
+    trimmed,
 };
 use mocban_lists::quotes::check_quotes;
 use mocban_system::time_text::{day, duration};
@@ -135,9 +136,8 @@ fn csv_rows(
             return Ok(None);
         }
         let line = lines.at(record.position());
-        let mut further = record.iter().skip(columns);
-        let is_complete = (record.len()..columns).all(|column| layout.unnamed.contains(&column));
-        if !is_complete || !further.all(|cell| trimmed(cell).is_empty()) {
+        let is_unnamed = |column| layout.unnamed.contains(&column);
+        if !fits_header(record.as_byte_record(), columns, is_unnamed) {
             let cells = record.len();
             let reason = format!("{cells} cells where the header has {columns}");
             return Err(RefusedLine::new(line, &reason));

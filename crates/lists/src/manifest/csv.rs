@@ -251,14 +251,16 @@ impl CsvHeader {
     }
 }
 
-/// Returns whether a row can be read below a header: its cells behind the last column are empty, and the last columns for which
-/// it has no cells have no name.
-fn fits_header(columns: &[ListedColumn], record: &::csv::ByteRecord) -> bool {
+/// Returns whether a row can be read below a header with `columns` columns: its cells behind the last column are empty, and the
+/// last columns for which it has no cells have no name.
+pub fn fits_header(
+    record: &::csv::ByteRecord,
+    columns: usize,
+    is_unnamed: impl Fn(usize) -> bool,
+) -> bool {
     let is_empty =
         |cell: &[u8]| std::str::from_utf8(cell).is_ok_and(|cell| trimmed(cell).is_empty());
-    let mut further = record.iter().skip(columns.len());
-    let mut lacking = columns.iter().skip(record.len());
-    further.all(is_empty) && lacking.all(|(_, name)| name.is_empty())
+    record.iter().skip(columns).all(is_empty) && (record.len()..columns).all(is_unnamed)
 }
 
 /// Returns a row's cells.
@@ -271,8 +273,8 @@ pub(super) fn draft_of(
     record: &::csv::ByteRecord,
     encoding_hint: &str,
 ) -> Result<DraftRow, String> {
-    if !fits_header(columns, record) {
-        let (cells, names) = (record.len(), columns.len());
+    let (cells, names) = (record.len(), columns.len());
+    if !fits_header(record, names, |column| columns[column].1.is_empty()) {
         return Err(format!("the row has {cells} cells, the header has {names}"));
     }
     let mut draft = DraftRow::new(line);

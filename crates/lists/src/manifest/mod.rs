@@ -23,7 +23,7 @@ mod similar_columns;
 mod text;
 mod unnamed_values;
 
-pub use self::csv::{parse_csv, read_csv, read_csv_as};
+pub use self::csv::{fits_header, parse_csv, read_csv, read_csv_as};
 pub use block_list::{BlockRow, ReadBlocks, parse_blocks, read_block_json, read_blocks};
 pub(crate) use cell_errors::formula_error;
 pub use cell_errors::{FormulaErrors, cell_error};
