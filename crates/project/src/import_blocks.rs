@@ -15,7 +15,7 @@ use crate::import_pairs::{AllowedChanges, PairSource};
 use crate::input_paths::{SimilarFiles, find_on_disk, in_existing_form};
 use crate::location::{Location, now};
 use crate::lost_values::lost_values;
-use crate::manifest_file::{refuse, renamed_columns};
+use crate::manifest_file::{is_below_root, refuse, renamed_columns};
 use crate::missing_files::{MissingFiles, locate_file};
 use crate::new_project::import_with;
 use crate::repeated_files::RepeatedFiles;
@@ -267,10 +267,7 @@ fn local_paths<'r>(
         mesh, page, labels, ..
     } = row;
     let paths = [Some(mesh), Some(page), labels.as_mut()];
-    let is_local = |path: &&mut PathBuf| {
-        let text = path.to_str();
-        text.is_none_or(|text| !project.is_below_root(text))
-    };
+    let is_local = |path: &&mut PathBuf| !is_below_root(path, project);
     paths
         .map(|path| path.filter(is_local))
         .into_iter()

@@ -209,10 +209,6 @@ impl Listing {
         project: &Project,
         mut each: impl FnMut(ManifestRow, Vec<String>),
     ) -> ContentHash {
-        let is_below_root = |path: &Path| {
-            path.to_str()
-                .is_some_and(|path| project.is_below_root(path))
-        };
         let mut searches = SimilarFiles::default();
         let mut each = |mut row: ManifestRow| {
             let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
@@ -248,7 +244,7 @@ impl Listing {
                     }
                     hash.add(&row, true);
                     for path in [&mut row.mesh, &mut row.print] {
-                        if !is_below_root(path) {
+                        if !is_below_root(path, project) {
                             *path = folder.join(&*path);
                         }
                     }
@@ -259,6 +255,12 @@ impl Listing {
             }
         }
     }
+}
+
+/// Returns whether a path of a list is below a named root of a project, so that it does not depend on the folder of the list.
+pub(crate) fn is_below_root(path: &Path, project: &Project) -> bool {
+    path.to_str()
+        .is_some_and(|path| project.is_below_root(path))
 }
 
 /// Reads a list of pairs.
