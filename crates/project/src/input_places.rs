@@ -108,11 +108,10 @@ fn looked_at(
         places.missing += 1;
         places.missing_inside += usize::from(is_inside);
         if places.first.len() < MAX_NAMED {
-            let path = input.path().display();
             let shown = if is_inside {
                 stored.clone()
             } else {
-                path.to_string()
+                input.path().display().to_string()
             };
             places.first.push(shown);
         }

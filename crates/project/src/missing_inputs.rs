@@ -331,21 +331,20 @@ fn among(project: &Project, files: &[SampledInput], until: Instant) -> InputInsp
         if Instant::now() >= until {
             break;
         }
-        looked_at += 1;
         let input = project.input(&file.path);
         match stat_input(&input) {
             Err(InputError::NotThere(_)) => {
                 let is_in_missing_folder = folders.add(input.path());
-                if is_in_missing_folder || !file.read.is_gone() {
-                    missing.push(file);
-                } else {
+                if file.read.is_gone() && !is_in_missing_folder {
                     // Its failure says so.
-                    looked_at -= 1;
+                    continue;
                 }
+                missing.push(file);
             }
             Ok(now) if has_other_size(&file.read, &now) => changed.push(file),
             Ok(_) | Err(_) => {}
         }
+        looked_at += 1;
     }
     let shown = |file: &SampledInput| project.input(&file.path).path().display().to_string();
     let owners: BTreeSet<usize> = missing.iter().map(|file| file.owner).collect();
