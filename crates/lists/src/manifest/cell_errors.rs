@@ -124,6 +124,7 @@ mod tests {
         let other = parse_csv(b"id,mesh,print\n#12,m,p\n").expect("a list");
         assert_eq!(other[0].name.as_str(), "#12");
     }
+
     #[test]
     fn errors_of_formulas_are_refused_in_known_columns() {
         for (column, error) in [

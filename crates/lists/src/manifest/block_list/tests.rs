@@ -288,3 +288,10 @@ fn columns_with_other_names_are_named() {
     let plain = read_blocks(b"Block,mesh,page\nb1,m.stl,p.jpg\n").expect("valid");
     assert!(plain.renamed.is_empty());
 }
+
+#[test]
+fn empty_cells_behind_the_last_column_are_ignored() {
+    let blocks = parse_blocks(b"block,mesh,page\nb,m,p,,\n").expect("parses");
+    assert_eq!(blocks[0].page.to_str(), Some("p"));
+    assert!(blocks[0].meta.is_empty());
+}
