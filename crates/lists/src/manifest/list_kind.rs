@@ -13,9 +13,9 @@ use crate::columns::KnownColumns;
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{sanitize, value_text};
 
-/// Maximum number of rows that are looked at.
+/// Maximum number of rows that are read to decide.
 const MAX_ROWS: usize = 1000;
-/// Maximum number of columns that are the same as an earlier one.
+/// Maximum number of attempts at a header, each with one more repeated column left out.
 const MAX_REPEATED: usize = 8;
 /// Longest name of a block in bytes.
 const MAX_ID_BYTES: usize = 200;
@@ -32,7 +32,7 @@ pub struct ListKind {
 }
 
 impl ListKind {
-    /// Finds the kind of a list in CSV. What cannot be read is one of pairs.
+    /// Finds the kind of a list in CSV. One that cannot be read counts as a list of pairs.
     pub fn of_csv(bytes: &[u8]) -> Self {
         let Ok(text) = CsvText::new(bytes) else {
             return Self::default();
@@ -61,7 +61,7 @@ impl ListKind {
         columns.kind(&names, &signs)
     }
 
-    /// Finds the kind of a list in JSON by the keys of its first row that can be read.
+    /// Finds the kind of a list in JSON. Its columns are the keys of the first row that can be read.
     pub fn of_json(bytes: &[u8]) -> Self {
         let mut first: Option<(KindColumns, Vec<String>)> = None;
         let (mut signs, mut count) = (PairSigns::default(), 0);
@@ -90,10 +90,10 @@ impl ListKind {
     }
 }
 
-/// The positions of the columns that tell the kinds apart.
+/// Positions of the columns by which a list of pairs differs from a list of blocks.
 struct KindColumns {
     id: Option<usize>,
-    /// The id of a pair, if it is not also that of a block.
+    /// The id of a pair, unless the same column is also the id of a block.
     own_id: Option<usize>,
     print: Option<usize>,
     character: Option<usize>,
@@ -176,8 +176,7 @@ impl KindColumns {
     }
 }
 
-/// Returns what the columns of a header are, without the repeated ones: a header with such columns is
-/// refused, but of its kind.
+/// Returns what the columns of a header are, without repeated ones. Their list is refused later, with the message of its kind.
 fn first_columns(known: &KnownColumns, names: &[&str]) -> Vec<Option<&'static str>> {
     let mut names = names.to_vec();
     for _ in 0..MAX_REPEATED {
@@ -189,16 +188,17 @@ fn first_columns(known: &KnownColumns, names: &[&str]) -> Vec<Option<&'static st
     Vec::new()
 }
 
-/// What speaks for pairs in the rows of a list whose columns fit both kinds.
+/// Evidence for pairs in the rows of a list whose columns fit both kinds.
 #[derive(Debug, Default)]
 struct PairSigns {
     blocks: BTreeSet<String>,
     /// A block that several rows have.
     repeated: Option<String>,
-    /// Whether a print has the name of an image.
+    /// Whether a print is named like an image.
     has_print: bool,
-    /// Whether a page has a name, and whether one has that of an image.
+    /// Whether a row has a page.
     has_page: bool,
+    /// Whether a page is named like an image.
     has_page_image: bool,
 }
 
@@ -219,7 +219,7 @@ impl PairSigns {
         }
     }
 
-    /// Returns what speaks for pairs, if anything does.
+    /// Returns the first evidence as a clause of a sentence, if there is any.
     fn text(&self) -> Option<String> {
         if let Some(block) = &self.repeated {
             let block = quoted(&sanitize(block, MAX_SHOWN));
