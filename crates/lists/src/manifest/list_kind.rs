@@ -11,14 +11,12 @@ use super::row;
 use super::text::{CsvText, trimmed};
 use crate::columns::KnownColumns;
 use mocban_core::domain::spelling::quoted;
-use mocban_core::domain::{sanitize, value_text};
+use mocban_core::domain::{PairName, sanitize, value_text};
 
 /// Maximum number of rows that are read to decide.
 const MAX_ROWS: usize = 1000;
 /// Maximum number of attempts at a header, each with one more repeated column left out.
 const MAX_REPEATED: usize = 8;
-/// Longest name of a block in bytes.
-const MAX_ID_BYTES: usize = 200;
 /// Longest name of a block or column in a message, in characters.
 const MAX_SHOWN: usize = 48;
 
@@ -213,7 +211,7 @@ impl PairSigns {
         self.has_print |= is_named_like_print(Path::new(&print));
         self.has_page |= !page.is_empty();
         self.has_page_image |= is_named_like_print(Path::new(&page));
-        let is_id = (1..=MAX_ID_BYTES).contains(&block.len());
+        let is_id = (1..=PairName::MAX_BYTES).contains(&block.len());
         if is_id && self.repeated.is_none() && !self.blocks.insert(block.clone()) {
             self.repeated = Some(block);
         }
