@@ -13,6 +13,24 @@ pub(crate) const STYLE: &str = "text/css; charset=utf-8";
 /// Name, content type and text of a script or style.
 pub(crate) type EmbeddedAsset = (&'static str, &'static str, &'static str);
 
+/// Builds an asset from its folder in `assets`, its name and its content type.
+macro_rules! embedded_asset {
+    ($folder:literal, $name:literal, $kind:ident) => {
+        (
+            $name,
+            $kind,
+            include_str!(concat!(
+                env!("CARGO_MANIFEST_DIR"),
+                "/../../assets/",
+                $folder,
+                "/",
+                $name
+            )),
+        )
+    };
+}
+pub(crate) use embedded_asset;
+
 /// Returns content type and text of an asset of a page or of the 3D view.
 pub(crate) fn find(own: &[EmbeddedAsset], name: &str) -> Option<(&'static str, &'static str)> {
     let found = own.iter().find(|(asset, ..)| *asset == name);

@@ -3,29 +3,18 @@
 use axum::extract::Path;
 use axum::response::Response;
 
-use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE};
-
-/// Builds an asset from its name and content type.
-macro_rules! asset {
-    ($name:literal, $kind:ident) => {
-        (
-            $name,
-            $kind,
-            include_str!(concat!("../../../../assets/app/", $name)),
-        )
-    };
-}
+use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE, embedded_asset};
 
 const ASSETS: [EmbeddedAsset; 9] = [
-    asset!("tokens.css", STYLE),
-    asset!("app.css", STYLE),
-    asset!("action.js", SCRIPT),
-    asset!("app.js", SCRIPT),
-    asset!("choose.js", SCRIPT),
-    asset!("columns.js", SCRIPT),
-    asset!("import-files.js", SCRIPT),
-    asset!("pair.js", SCRIPT),
-    asset!("upload.js", SCRIPT),
+    embedded_asset!("app", "tokens.css", STYLE),
+    embedded_asset!("app", "app.css", STYLE),
+    embedded_asset!("app", "action.js", SCRIPT),
+    embedded_asset!("app", "app.js", SCRIPT),
+    embedded_asset!("app", "choose.js", SCRIPT),
+    embedded_asset!("app", "columns.js", SCRIPT),
+    embedded_asset!("app", "import-files.js", SCRIPT),
+    embedded_asset!("app", "pair.js", SCRIPT),
+    embedded_asset!("app", "upload.js", SCRIPT),
 ];
 
 pub(super) async fn asset(Path(name): Path<String>) -> Response {

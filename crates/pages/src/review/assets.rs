@@ -1,17 +1,6 @@
 //! Scripts and styles of the page, embedded in the program. The page loads nothing from other hosts.
 
-use crate::embedded::{EmbeddedAsset, SCRIPT, STYLE};
-
-/// Name, content type and text of an asset.
-macro_rules! asset {
-    ($name:literal, $kind:ident) => {
-        (
-            $name,
-            $kind,
-            include_str!(concat!("../../../../assets/review/", $name)),
-        )
-    };
-}
+use crate::embedded::{EmbeddedAsset, SCRIPT, STYLE, embedded_asset};
 
 pub(super) const ASSETS: [EmbeddedAsset; 18] = [
     (
@@ -23,23 +12,23 @@ pub(super) const ASSETS: [EmbeddedAsset; 18] = [
             include_str!("../../../../assets/review/review.css")
         ),
     ),
-    asset!("main.js", SCRIPT),
-    asset!("config.js", SCRIPT),
-    asset!("details.js", SCRIPT),
-    asset!("end-page.js", SCRIPT),
-    asset!("guide.js", SCRIPT),
-    asset!("practice.js", SCRIPT),
-    asset!("queue.js", SCRIPT),
-    asset!("retry-queue.js", SCRIPT),
-    asset!("image-cache.js", SCRIPT),
-    asset!("render-worker.js", SCRIPT),
-    asset!("masks.js", SCRIPT),
-    asset!("viewer.js", SCRIPT),
-    asset!("viewport.js", SCRIPT),
-    asset!("keyboard.js", SCRIPT),
-    asset!("alignment-editor.js", SCRIPT),
-    asset!("scan-dialog.js", SCRIPT),
-    asset!("ui.js", SCRIPT),
+    embedded_asset!("review", "main.js", SCRIPT),
+    embedded_asset!("review", "config.js", SCRIPT),
+    embedded_asset!("review", "details.js", SCRIPT),
+    embedded_asset!("review", "end-page.js", SCRIPT),
+    embedded_asset!("review", "guide.js", SCRIPT),
+    embedded_asset!("review", "practice.js", SCRIPT),
+    embedded_asset!("review", "queue.js", SCRIPT),
+    embedded_asset!("review", "retry-queue.js", SCRIPT),
+    embedded_asset!("review", "image-cache.js", SCRIPT),
+    embedded_asset!("review", "render-worker.js", SCRIPT),
+    embedded_asset!("review", "masks.js", SCRIPT),
+    embedded_asset!("review", "viewer.js", SCRIPT),
+    embedded_asset!("review", "viewport.js", SCRIPT),
+    embedded_asset!("review", "keyboard.js", SCRIPT),
+    embedded_asset!("review", "alignment-editor.js", SCRIPT),
+    embedded_asset!("review", "scan-dialog.js", SCRIPT),
+    embedded_asset!("review", "ui.js", SCRIPT),
 ];
 
 /// Returns the text of every script.

@@ -14,35 +14,24 @@ use super::boxes_page;
 use super::correction_page;
 use super::page;
 use super::scan_page::jpeg;
-use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE};
+use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE, embedded_asset};
 use crate::local_server::WorkThread;
 use crate::review::Language;
 use mocban_core::domain::BlockName;
 use mocban_export::block_view::{BlockView, PageLayer, PageRegion};
 
-/// Builds an asset from its name and content type.
-macro_rules! asset {
-    ($name:literal, $kind:ident) => {
-        (
-            $name,
-            $kind,
-            include_str!(concat!("../../../../assets/block-view/", $name)),
-        )
-    };
-}
-
 /// The assets of this page.
 const ASSETS: [EmbeddedAsset; 10] = [
-    asset!("block-view.js", SCRIPT),
-    asset!("block-correct.js", SCRIPT),
-    asset!("block-boxes.js", SCRIPT),
-    asset!("box-edits.js", SCRIPT),
-    asset!("box-messages.js", SCRIPT),
-    asset!("block-messages.js", SCRIPT),
-    asset!("block-request.js", SCRIPT),
-    asset!("block-shapes.js", SCRIPT),
-    asset!("block-camera.js", SCRIPT),
-    asset!("block-view.css", STYLE),
+    embedded_asset!("block-view", "block-view.js", SCRIPT),
+    embedded_asset!("block-view", "block-correct.js", SCRIPT),
+    embedded_asset!("block-view", "block-boxes.js", SCRIPT),
+    embedded_asset!("block-view", "box-edits.js", SCRIPT),
+    embedded_asset!("block-view", "box-messages.js", SCRIPT),
+    embedded_asset!("block-view", "block-messages.js", SCRIPT),
+    embedded_asset!("block-view", "block-request.js", SCRIPT),
+    embedded_asset!("block-view", "block-shapes.js", SCRIPT),
+    embedded_asset!("block-view", "block-camera.js", SCRIPT),
+    embedded_asset!("block-view", "block-view.css", STYLE),
 ];
 /// Longer side of the image of a whole layer or of a region, pixels. Closer views ask for regions, which show a smaller
 /// part and so never have fewer pixels.

@@ -10,17 +10,13 @@ use axum::response::{Html, IntoResponse as _, Response};
 use axum::routing::get;
 
 use super::page;
-use crate::embedded::{self, EmbeddedAsset, SCRIPT};
+use crate::embedded::{self, EmbeddedAsset, SCRIPT, embedded_asset};
 use crate::local_server::WorkThread;
 use crate::review::Language;
 use mocban_export::scan_view::ScanView;
 
 /// The script of the page.
-const VIEW: EmbeddedAsset = (
-    "view.js",
-    SCRIPT,
-    include_str!("../../../../assets/scan-viewer/view.js"),
-);
+const VIEW: EmbeddedAsset = embedded_asset!("scan-viewer", "view.js", SCRIPT);
 
 /// The scan of a page.
 #[derive(Debug)]
