@@ -1,5 +1,7 @@
 // Requests that change something.
 
+import { parseReply } from "./reply.js";
+
 /** The token that they carry. */
 export const token = document.querySelector('meta[name="csrf-token"]').content;
 
@@ -23,16 +25,10 @@ export function showProblem(problem, text, hasFocus = true) {
 
 /** Returns what a reply says; throws the sentence of a refusal, with its status and the retired pairs that it names. */
 export function read(status, text) {
-  let reply = {};
-  try {
-    reply = JSON.parse(text);
-  } catch {
-    // A request that reached no page of the app is refused in English and, on the next line, in Vietnamese.
-    const lines = text.split("\n");
-    reply = { error: document.documentElement.lang === "vi" ? (lines[1] ?? text) : lines[0] };
-  }
+  const reply = parseReply(text);
   if (status !== 200) {
-    throw Object.assign(new Error(reply.error || text || String(status)), { status, retired: reply.retired ?? [] });
+    const why = (document.documentElement.lang === "vi" && reply.error_vi) || reply.error || text || String(status);
+    throw Object.assign(new Error(why), { status, retired: reply.retired ?? [] });
   }
   return reply;
 }

@@ -1,22 +1,13 @@
 // Requests of the pages on which a block is changed.
 
 import { blockText } from "./block-messages.js";
-
-/** Parses a reply. A request that reached no page is refused in English and, on the next line, in Vietnamese. */
-function parsed(text) {
-  try {
-    return JSON.parse(text);
-  } catch {
-    const [error, vietnamese] = text.split("\n");
-    return { error, error_vi: vietnamese };
-  }
-}
+import { parseReply } from "./reply.js";
 
 /** Returns the JSON of a reply; throws the sentence of a refusal in the language of the page. */
 export async function request(language, path, options) {
   const response = await fetch(path, options).catch(() => null);
   if (!response) throw new Error(blockText(language, "no_answer"));
-  const answer = parsed(await response.text());
+  const answer = parseReply(await response.text());
   if (!response.ok) throw new Error(answer[`error_${language}`] ?? (answer.error || response.statusText));
   return answer;
 }

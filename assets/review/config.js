@@ -1,5 +1,6 @@
 // Configuration from the server: CSRF token, key bindings, messages.
 
+import { parseReply } from "./reply.js";
 import { withValues } from "./scan-messages.js";
 
 export const language = document.documentElement.lang;
@@ -30,13 +31,6 @@ export function translate(key, values = {}) {
 /** Returns why a request was refused, in the language of the page if the server says it. */
 export async function refusalOf(response) {
   const text = await response.text().catch(() => "");
-  let reply;
-  try {
-    reply = JSON.parse(text);
-  } catch {
-    // A request that reached no page is refused in English and, on the next line, in Vietnamese.
-    const [error, vietnamese] = text.split("\n");
-    reply = { error, error_vi: vietnamese };
-  }
+  const reply = parseReply(text);
   return reply[`error_${language}`] ?? (reply.error || String(response.status));
 }

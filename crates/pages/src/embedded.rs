@@ -31,17 +31,33 @@ macro_rules! embedded_asset {
 }
 pub(crate) use embedded_asset;
 
-/// Returns content type and text of an asset of a page or of the 3D view.
+/// The script of all pages that reads replies of the server.
+const REPLY: EmbeddedAsset = embedded_asset!("local-server", "reply.js", SCRIPT);
+
+/// Returns content type and text of an asset of a page, of all pages or of the 3D view.
 pub(crate) fn find(own: &[EmbeddedAsset], name: &str) -> Option<(&'static str, &'static str)> {
-    let found = own.iter().find(|(asset, ..)| *asset == name);
+    let mut known = own.iter().chain([&REPLY]);
+    let found = known.find(|(asset, ..)| *asset == name);
     let found = found.map(|(_, kind, text)| (*kind, *text));
     found.or_else(|| scan_view::assets::find(name))
 }
 
-/// Responds with an asset of a page or of the 3D view.
+/// Responds with an asset of a page, of all pages or of the 3D view.
 pub(crate) fn asset(own: &[EmbeddedAsset], name: &str) -> Response {
     match find(own, name) {
         Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
         None => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::REPLY;
+    use crate::local_server::assert_loads_nothing;
+
+    #[test]
+    fn the_script_of_all_pages_refers_to_no_other_host() {
+        let (name, _, text) = REPLY;
+        assert_loads_nothing(name, text);
     }
 }
