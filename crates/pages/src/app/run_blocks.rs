@@ -6,6 +6,7 @@ use maud::{Markup, html};
 
 use super::address::encoded;
 use super::components::{grouped, stored_message};
+use super::number_text::english_count;
 use super::visit::Visit;
 use crate::review::Language;
 use mocban_catalog::Catalog;
@@ -34,11 +35,9 @@ pub(super) fn other_blocks_text(visit: &Visit, blocks: &BlockStatus) -> Option<S
 
 /// Returns the button that cuts these blocks again.
 pub(super) fn cut_again_text(visit: &Visit, blocks: u64) -> String {
-    let number = grouped(blocks);
-    match (visit.language, blocks) {
-        (Language::English, 1) => "Cut 1 block again".to_owned(),
-        (Language::English, _) => format!("Cut {number} blocks again"),
-        (Language::Vietnamese, _) => format!("Cắt lại {number} ván"),
+    match visit.language {
+        Language::English => format!("Cut {} again", english_count(blocks, ["block", "blocks"])),
+        Language::Vietnamese => format!("Cắt lại {} ván", grouped(blocks)),
     }
 }
 
@@ -73,11 +72,12 @@ pub(super) fn blocks_text(visit: &Visit, blocks: &BlockStatus) -> String {
         .collect();
     let done = grouped(blocks.number(&[JobStatus::Done]));
     let all = blocks.0.len() as u64;
-    let number = grouped(all);
-    parts.push(match (visit.language, all) {
-        (Language::English, 1) => format!("{done} of 1 block done"),
-        (Language::English, _) => format!("{done} of {number} blocks done"),
-        (Language::Vietnamese, _) => format!("xong {done} trên {number} ván"),
+    parts.push(match visit.language {
+        Language::English => {
+            let all = english_count(all, ["block", "blocks"]);
+            format!("{done} of {all} done")
+        }
+        Language::Vietnamese => format!("xong {done} trên {} ván", grouped(all)),
     });
     let failed = failed_blocks(blocks);
     parts.extend((failed > 0).then(|| format!("{} {}", grouped(failed), visit.t("failed", "lỗi"))));
