@@ -157,7 +157,7 @@ impl ColumnChanges {
             change(old.scanned_face_down, new.scanned_face_down),
             change(metadata_hash(&old.meta), new.metadata),
         ];
-        self.count_changes(&columns);
+        self.count_changes(&columns, false);
     }
 
     async fn of_blocks(
@@ -201,17 +201,13 @@ impl ColumnChanges {
             change(old.side, new.side),
             other_columns(old, new),
         ];
-        let has_other_files = !old.has_same_scan_and_page(new);
-        self.other_files += u64::from(has_other_files);
-        // A block with other files and columns is one block.
-        if has_other_files && columns.iter().all(Option::is_none) {
-            self.count += 1;
-        }
-        self.count_changes(&columns);
+        self.count_changes(&columns, !old.has_same_scan_and_page(new));
     }
 
-    fn count_changes(&mut self, columns: &[Option<usize>]) {
-        self.count += u64::from(columns.iter().any(Option::is_some));
+    /// Counts a pair or block once, and each of its columns that changes.
+    fn count_changes(&mut self, columns: &[Option<usize>], has_other_files: bool) {
+        self.other_files += u64::from(has_other_files);
+        self.count += u64::from(has_other_files || columns.iter().any(Option::is_some));
         for (counts, found) in self.columns.iter_mut().zip(columns) {
             if let Some(what) = *found {
                 counts[what] += 1;
