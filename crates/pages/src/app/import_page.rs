@@ -95,7 +95,7 @@ pub(super) async fn page(
     let body = html! {
         @if let Some(failure) = &refused { p.notice.bad role="alert" { (failure.text(visit.language)) } }
         @if visit.query.get("compare").is_some() {
-            p.notice role="status" { (visit.t("Nothing was imported yet: look first at what the list changes in this project.", "Chưa nhập gì: trước hết hãy xem danh sách thay đổi những gì trong dự án này.")) }
+            p.notice role="status" { (visit.t("Nothing was imported yet: look first at what this import changes in the project.", "Chưa nhập gì: trước hết hãy xem lần nhập này thay đổi những gì trong dự án.")) }
         }
         @if let Some(pair) = &mended { (mending_part(&visit, pair)) }
         (chosen_part(&visit, &chosen))
@@ -316,8 +316,8 @@ pub(super) async fn import(
     Ok(Json(json!({ "go": format!("p/{}/", encoded(&key)) })))
 }
 
-/// Returns the address of the page that shows what a list changes in a known project, if the page has compared the list with
-/// another one: the name of the project is typed below the pairs.
+/// Returns the address of the page that shows what an import changes in a known project, if the page has compared it with
+/// another one: the name of the project is typed below the pairs or blocks.
 async fn unseen_changes(
     state: &AppState,
     chosen: &ImportChoice,

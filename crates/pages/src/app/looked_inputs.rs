@@ -12,7 +12,7 @@ use mocban_core::domain::UnixMillis;
 use mocban_core::locked;
 use mocban_project::input_places::InputPlaces;
 
-/// How long a page that is read again and again shows what was found. The button looks anew.
+/// How long a page that reloads itself shows what was found. A press of the button looks again.
 const MAX_AGE: Duration = Duration::from_secs(10);
 
 /// What was found last, by the folder of the project.
