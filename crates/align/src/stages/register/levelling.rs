@@ -13,8 +13,7 @@ use mocban_core::raster::DepthMap;
 /// Number of nodes along each side of the grid whose heights are chosen first. Few heights are hardly misled by lost
 /// strokes and heavy ink, so this grid decides whether the map is levelled at all.
 const COARSE: usize = Levelling::COARSE_NODES;
-/// Number of nodes along each side of the grid whose heights are chosen next. Its cells are halves of the coarse ones. With
-/// it, the masks of 40 of 40 generated scans that drift are right, without it 36.
+/// Number of nodes along each side of the grid whose heights are chosen next. Its cells are halves of the coarse ones.
 const FINE: usize = Levelling::NODES;
 /// Heights of a node over the threshold reach this share of the relief up and down.
 const REACH: f64 = 2.0;
@@ -22,7 +21,7 @@ const REACH: f64 = 2.0;
 const STEP: f64 = 0.02;
 const BINS: usize = (2.0 * REACH / STEP) as usize + 1;
 /// Distance between the pixels from which the heights are chosen, in pixels of the half canvas. A quarter of all pixels
-/// suffices for 16 heights.
+/// suffices.
 const SAMPLING_PX: usize = 2;
 /// Number of times that all nodes are chosen, each given the others, unless the first time shows that levelling does not help.
 const ROUNDS: usize = 5;
