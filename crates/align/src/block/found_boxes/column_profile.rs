@@ -188,11 +188,12 @@ pub(super) fn usual_ink(profiles: &[ColumnProfile]) -> f64 {
     lines.get(lines.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Returns the usual height of a character on a page with few of them, cells; `None` on other pages.
+/// Returns the usual height of a character on a page with few of them, in cells and within [`ROW_PITCHES`]; `None` on other
+/// pages.
 ///
-/// There, most characters have no neighbour above or below, so that a column is most like itself at a lag within a
-/// character.
-fn height_of_few(profiles: &[ColumnProfile], column_pitch: f64) -> Option<usize> {
+/// On such a page, most characters have no neighbour above or below, so that the autocorrelation of a column is largest at
+/// a lag within a character.
+fn usual_height_if_sparse(profiles: &[ColumnProfile], column_pitch: f64) -> Option<usize> {
     let [shortest, longest] = ROW_PITCHES.map(|share| share * column_pitch);
     let (mut inked, mut all) = (0, 0);
     let mut heights = Vec::new();
@@ -215,8 +216,8 @@ fn height_of_few(profiles: &[ColumnProfile], column_pitch: f64) -> Option<usize>
 /// Returns the lag at which the columns are most like themselves.
 pub(super) fn row_pitch(profiles: &[ColumnProfile], column_pitch: f64) -> f64 {
     let mut lags = ROW_PITCHES.map(|share| (share * column_pitch) as usize);
-    if let Some(height) = height_of_few(profiles, column_pitch) {
-        lags[0] = lags[0].max(height);
+    if let Some(height) = usual_height_if_sparse(profiles, column_pitch) {
+        lags[0] = height;
     }
     let mut sums = vec![0.0; lags[1] + 2];
     for profile in profiles.iter().filter(|profile| !profile.is_strip) {
