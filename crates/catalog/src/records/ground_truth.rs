@@ -10,7 +10,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::Row;
 use crate::db::rows::json_array;
-use crate::db::value::Json;
+use crate::db::value::{FromValue, Json};
 use crate::records::checksums;
 use crate::records::model::PrintPlace;
 use crate::{Catalog, CatalogError, Result};
@@ -51,14 +51,23 @@ pub(crate) async fn print_places(
     conn: &mut Conn,
     pairs: &[i64],
 ) -> Result<BTreeMap<i64, PrintPlace>> {
-    let mut places = BTreeMap::new();
     if pairs.is_empty() {
-        return Ok(places);
+        return Ok(BTreeMap::new());
     }
-    let query = query(PLACES).bind(json_array(pairs.iter().copied()));
-    for row in &query.fetch_all(conn).await? {
+    read_places(conn, PLACES, json_array(pairs.iter().copied())).await
+}
+
+/// Reads the places of the pairs in a list, by the first column of the statement.
+async fn read_places<K: FromValue + Ord>(
+    conn: &mut Conn,
+    sql: &'static str,
+    wanted: String,
+) -> Result<BTreeMap<K, PrintPlace>> {
+    let rows = query(sql).bind(wanted).fetch_all(conn).await?;
+    let mut places = BTreeMap::new();
+    for row in &rows {
         if let Some(place) = place(row)? {
-            places.insert(row.get("pair")?, place);
+            places.insert(row.get(0)?, place);
         }
     }
     Ok(places)
@@ -92,16 +101,8 @@ pub(crate) async fn set(conn: &mut Conn, truths: &[(PairName, Value)]) -> Result
     let mut stored = 0;
     for chunk in truths.chunks(500) {
         let names = json_array(chunk.iter().map(|(name, _)| name.as_str()));
-        let mut places: BTreeMap<PairName, PrintPlace> = BTreeMap::new();
-        for row in &query(PLACES_OF_NAMES)
-            .bind(&names)
-            .fetch_all(&mut *conn)
-            .await?
-        {
-            if let Some(place) = place(row)? {
-                places.insert(row.get("name")?, place);
-            }
-        }
+        let places: BTreeMap<PairName, PrintPlace> =
+            read_places(conn, PLACES_OF_NAMES, names).await?;
         let items = chunk.iter();
         let items = items.map(|(name, body)| {
             let body = with_crop(body, places.get(name));
