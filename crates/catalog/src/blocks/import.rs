@@ -174,7 +174,7 @@ async fn import_block(
         Some(old) => {
             if let Some(old) = &old {
                 let name = row.name.as_str();
-                summary.lost.add(name, &kept_values(old, row));
+                summary.lost.add(name, &lost_columns(old, row));
                 if let (Some(old), Some(new)) = (&old.meta, &row.meta) {
                     summary.lost.add_metadata(name, old, new);
                 }
@@ -209,16 +209,15 @@ async fn import_block(
     query(NEW_JOB).bind(id).execute(conn).await
 }
 
-/// Returns columns other than metadata, each with whether the known block has a value and whether the new row has one.
-fn kept_values(old: &BlockAttributes, new: &BlockAttributes) -> [(&'static str, bool, bool); 3] {
+/// Returns columns other than metadata, each with whether the known block has a value and the new row has none.
+fn lost_columns(old: &BlockAttributes, new: &BlockAttributes) -> [(&'static str, bool); 3] {
     [
         (
             "labels",
-            old.labels_path.is_some(),
-            new.labels_path.is_some(),
+            old.labels_path.is_some() && new.labels_path.is_none(),
         ),
-        ("unit", old.unit.is_some(), new.unit.is_some()),
-        ("side", old.side.is_some(), new.side.is_some()),
+        ("unit", old.unit.is_some() && new.unit.is_none()),
+        ("side", old.side.is_some() && new.side.is_none()),
     ]
 }
 

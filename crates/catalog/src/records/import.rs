@@ -362,7 +362,7 @@ fn count_changes(
             }
             Some(Some(old)) => {
                 let name = row.name.as_str();
-                summary.lost.add(name, &kept_values(&old, row));
+                summary.lost.add(name, &lost_columns(&old, row));
                 summary.lost.add_metadata(name, &old.meta, &row.meta);
                 differing(&old, row)
             }
@@ -423,18 +423,20 @@ fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
     .collect()
 }
 
-/// Returns columns other than metadata, each with whether the known pair has a value and whether the new row has one.
-fn kept_values(old: &ImportRow, new: &ImportRow) -> [(&'static str, bool, bool); 4] {
-    let [old, new] = [old, new].map(|row| {
-        [
-            row.character.is_some(),
-            row.block.is_some(),
-            row.unit.is_some(),
-            row.scanned_face_down.is_some(),
-        ]
-    });
-    let names = ["character", "block", "unit", "scanned_face_down"];
-    std::array::from_fn(|k| (names[k], old[k], new[k]))
+/// Returns columns other than metadata, each with whether the known pair has a value and the new row has none.
+fn lost_columns(old: &ImportRow, new: &ImportRow) -> [(&'static str, bool); 4] {
+    [
+        (
+            "character",
+            old.character.is_some() && new.character.is_none(),
+        ),
+        ("block", old.block.is_some() && new.block.is_none()),
+        ("unit", old.unit.is_some() && new.unit.is_none()),
+        (
+            "scanned_face_down",
+            old.scanned_face_down.is_some() && new.scanned_face_down.is_none(),
+        ),
+    ]
 }
 
 /// Returns whether two stored paths are those of one file. If a folder before `..` is a link, they may not be; a run finds

@@ -28,9 +28,9 @@ pub struct LostColumn {
 }
 
 impl LostValues {
-    /// Adds a pair or block with its columns, each with whether it had a value and whether it still has one.
-    pub(crate) fn add(&mut self, name: &str, columns: &[(&'static str, bool, bool)]) {
-        for (column, _, _) in columns.iter().filter(|(_, had, has)| *had && !*has) {
+    /// Adds a pair or block with its columns, each with whether it loses its value.
+    pub(crate) fn add(&mut self, name: &str, columns: &[(&'static str, bool)]) {
+        for (column, _) in columns.iter().filter(|(_, is_lost)| *is_lost) {
             self.count(name, (*column).to_owned());
         }
     }
