@@ -15,8 +15,8 @@ use mocban_results::gallery::Gallery;
 
 /// Maximum size of a page in bytes.
 pub const MAX_PAGE_BYTES: usize = 10_000_000;
-/// Bytes reserved for the sentences on how many images are shown, and because a translated page is longer. A test of the
-/// translation measures that.
+/// Bytes reserved for the sentences on how many images are shown, and because a translated page is longer, as a test of
+/// the translation measures.
 pub const RESERVED_BYTES: usize = 200_000;
 const STYLE: &str = include_str!("../../../../../assets/report/report.css");
 /// Forbids the page to load or run anything.
