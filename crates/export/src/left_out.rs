@@ -61,9 +61,10 @@ impl OmissionCounts {
 
     /// Returns whether chosen pairs were left out, and all of them only because they have no result.
     pub fn all_lack_results(&self) -> bool {
-        let mut refusals = self.refusals().peekable();
-        refusals.peek().is_some()
-            && refusals.all(|(reason, _)| reason == OmissionReason::WithoutResult)
+        self.refused() > 0
+            && self
+                .refusals()
+                .all(|(reason, _)| reason == OmissionReason::WithoutResult)
     }
 
     /// Returns the reasons for which chosen pairs were left out with their numbers, such as `12 without a verdict, 3 below
