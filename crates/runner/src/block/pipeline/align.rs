@@ -22,10 +22,7 @@ pub(crate) fn align(
         }
         None => by_search(context, &faces, &page.ink),
     };
-    if found.is_err() {
-        log_warning(&context.inputs.page, &page.image);
-    }
-    let (side, found) = found?;
+    let (side, found) = found.inspect_err(|_| log_warning(&context.inputs.page, &page.image))?;
     output(&AlignOutcome {
         side,
         warnings: page.image.profile_warning().into_iter().collect(),
