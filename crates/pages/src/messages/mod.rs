@@ -22,6 +22,8 @@ mod report_source_tests;
 mod report_table;
 mod report_words;
 mod review_messages;
+#[cfg(test)]
+mod source_texts;
 mod stage_words;
 
 pub(crate) use left_out_words::left_out_reasons;

@@ -1,10 +1,9 @@
 //! Checks that the program still says every sentence of the report that is translated.
 
-use std::path::{Path, PathBuf};
-
 use super::report_answers::REPORT_ANSWERS;
 use super::report_captions::REPORT_CAPTIONS;
 use super::report_table::{REPORT_COUNTED, REPORT_FRAME, REPORT_TERMS};
+use super::source_texts::{code_of, joined};
 
 /// Files and folders of all crates that have the words of the report.
 const SOURCES: [&str; 6] = [
@@ -22,32 +21,12 @@ const NAMES: [&str; 2] = ["mcnemar exact two-sided", "percentile bootstrap"];
 
 /// Returns the sources without comments and tests. Strings that go on in the next line are joined.
 fn sources() -> String {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let mut open: Vec<PathBuf> = SOURCES.iter().map(|path| crates.join(path)).collect();
-    let mut all = String::new();
-    while let Some(path) = open.pop() {
-        if path.is_dir() {
-            if !path.ends_with("tests") {
-                let entries = std::fs::read_dir(path).expect("a folder");
-                open.extend(entries.map(|entry| entry.expect("an entry").path()));
-            }
-            continue;
-        }
-        let name = path.to_string_lossy();
-        let is_test = ["tests.rs", "test_fixtures.rs"].map(|end| name.ends_with(end));
-        if path.extension().is_none_or(|extension| extension != "rs") || is_test.contains(&true) {
-            continue;
-        }
-        let text = std::fs::read_to_string(&path).expect("a source");
-        let code = text.split("#[cfg(test)]\nmod tests {").next();
-        let lines = code.unwrap_or_default().lines();
-        for line in lines.filter(|line| !line.trim_start().starts_with("//")) {
-            let goes_on = line.strip_suffix('\\');
-            all += goes_on.unwrap_or(line);
-            all += if goes_on.is_some() { "" } else { "\n" };
-        }
-    }
-    all.replace("\\u{b0}", "°")
+    let code = code_of(&SOURCES).join("\n");
+    let lines = code.lines();
+    let lines: Vec<&str> = lines
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .collect();
+    joined(&lines.join("\n")).replace("\\u{b0}", "°")
 }
 
 /// Returns the words of a text in lower case between single blanks, without punctuation and what stands in braces.

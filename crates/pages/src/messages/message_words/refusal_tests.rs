@@ -1,8 +1,7 @@
 //! Every refusal of a stage has a Vietnamese text.
 
-use std::path::Path;
-
-use super::tests::{assert_translated, joined};
+use super::super::source_texts::{code_of, literals};
+use super::tests::assert_translated;
 use super::{TABLES, parts_of, vietnamese};
 
 /// Sources with the errors that become failures of pairs and blocks, or say why ground truth is not used.
@@ -34,24 +33,11 @@ const PUT_TOGETHER: [&str; 3] = [
 
 /// Returns the texts of the errors in a source, as `thiserror` has them.
 fn error_texts(source: &str) -> Vec<String> {
-    let source = joined(source);
-    let attributes = source.split("#[error(").skip(1);
-    attributes
-        .filter_map(|rest| string(rest.trim_start()))
+    let attributes = source.split("#[error(").skip(1).map(str::trim_start);
+    let with_texts = attributes.filter(|attribute| attribute.starts_with('"'));
+    with_texts
+        .filter_map(|attribute| literals(attribute).into_iter().next())
         .collect()
-}
-
-/// Returns the string at the beginning of a source.
-fn string(source: &str) -> Option<String> {
-    let mut chars = source.strip_prefix('"')?.chars();
-    let mut said = String::new();
-    loop {
-        match chars.next()? {
-            '"' => return Some(said),
-            '\\' => said.push(chars.next()?),
-            other => said.push(other),
-        }
-    }
 }
 
 /// Returns a text with a number in each place. A place behind a letter or a number may be empty, and is.
@@ -83,10 +69,8 @@ fn is_translated(message: &str) -> bool {
 
 #[test]
 fn every_error_of_a_stage_is_translated() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     for path in SOURCES {
-        let source = std::fs::read_to_string(crates.join(path)).expect("a source");
-        let texts = error_texts(&source);
+        let texts = error_texts(&code_of(&[path]).concat());
         assert!(!texts.is_empty(), "{path}");
         for text in texts {
             let message = filled_in(&text);

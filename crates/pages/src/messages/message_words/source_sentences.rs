@@ -1,7 +1,6 @@
 //! Sentences of sources and snapshots of other crates: every one that a page shows has a Vietnamese text.
 
-use std::path::{Path, PathBuf};
-
+use super::super::source_texts::{code_of, crates, files, literals};
 use super::fragments::{FRAGMENTS, SENTENCES};
 use super::vietnamese;
 
@@ -59,74 +58,6 @@ fn untranslated(sentence: &str) -> Option<String> {
     }
 }
 
-fn crates() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-/// Returns the files of a kind below a folder, or the file itself.
-fn files(path: PathBuf, extension: &str) -> Vec<PathBuf> {
-    let (mut open, mut found) = (vec![path], Vec::new());
-    while let Some(path) = open.pop() {
-        if path.is_dir() {
-            let entries = std::fs::read_dir(path).expect("a folder");
-            open.extend(entries.flatten().map(|entry| entry.path()));
-        } else if path.extension().is_some_and(|known| known == extension) {
-            found.push(path);
-        }
-    }
-    found
-}
-
-/// Returns the content of the literal after an opening quotation mark, and its length in the source.
-fn literal(rest: &[char], is_raw: bool) -> (String, usize) {
-    let (mut text, mut at) = (String::new(), 0);
-    while let Some(c) = rest.get(at) {
-        match (c, rest.get(at + 1)) {
-            ('"', _) => break,
-            // The text goes on in the next line, without the blanks at its beginning.
-            ('\\', Some('\n')) if !is_raw => {
-                let blanks = rest[at + 1..].iter().take_while(|c| c.is_whitespace());
-                at += 1 + blanks.count();
-            }
-            ('\\', Some(escaped)) if !is_raw => {
-                text.push(if *escaped == 'n' { '\n' } else { *escaped });
-                at += 2;
-            }
-            _ => {
-                text.push(*c);
-                at += 1;
-            }
-        }
-    }
-    (text, at + 1)
-}
-
-/// Returns the texts in quotation marks of a source, without its comments and its tests.
-fn literals(source: &str) -> Vec<String> {
-    let code = source.split("#[cfg(test)]\nmod ").next();
-    let chars: Vec<char> = code.unwrap_or_default().chars().collect();
-    let (mut found, mut at) = (Vec::new(), 0);
-    while at < chars.len() {
-        let rest = &chars[at..];
-        at += match rest {
-            ['/', '/', ..] => rest.iter().take_while(|c| **c != '\n').count(),
-            ['\'', '\\', _, ..] => {
-                let inside = rest[3..].iter().take_while(|c| **c != '\'');
-                4 + inside.count()
-            }
-            ['\'', _, '\'', ..] => 3,
-            ['"', inside @ ..] => {
-                let is_raw = at > 0 && matches!(chars[at - 1], 'r' | '#');
-                let (text, length) = literal(inside, is_raw);
-                found.push(text);
-                1 + length
-            }
-            _ => 1,
-        };
-    }
-    found
-}
-
 /// Returns a literal with a number in place of each part that varies, and without clauses that name commands or options.
 /// What follows a colon at the end of a line is on lines of its own.
 fn sample(literal: &str) -> String {
@@ -154,19 +85,9 @@ fn is_sentence(text: &str) -> bool {
 
 /// Returns the sentences of the sources, and the literals that they are made of.
 fn sentences() -> Vec<(String, String)> {
-    let files = SOURCES
-        .into_iter()
-        .flat_map(|path| files(crates().join(path), "rs"));
-    let is_of_tests = |path: &Path| {
-        let mut parts = path.components().rev().take(2);
-        parts.any(|part| {
-            let name = part.as_os_str().to_string_lossy();
-            matches!(&*name, "tests" | "tests.rs" | "test_helpers.rs")
-        })
-    };
     let mut found = Vec::new();
-    for path in files.filter(|path| !is_of_tests(path)) {
-        for literal in literals(&std::fs::read_to_string(&path).expect("a source")) {
+    for code in code_of(&SOURCES) {
+        for literal in literals(&code) {
             let text = sample(&literal);
             if is_sentence(&text) {
                 found.push((text, literal));

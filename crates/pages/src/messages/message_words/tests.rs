@@ -5,6 +5,7 @@ use std::path::Path;
 use mocban_core::raster::profile_warning;
 
 use super::super::foreign_messages::FOREIGN_MESSAGES;
+use super::super::source_texts::{crates, files, joined};
 use super::{TABLES, parts_of, vietnamese};
 
 /// Checks messages and their Vietnamese texts.
@@ -382,33 +383,18 @@ const COMPOSED: [&str; 40] = [
 
 /// Returns the sources of all crates and tests as one text, without the translated messages and their tests.
 fn sources() -> String {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let mut open = vec![crates.join("../tests/it"), crates];
-    let mut all = String::new();
-    while let Some(folder) = open.pop() {
-        for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
-            let path = entry.path();
-            if path.is_dir() {
-                // The tables and their tests have every message, even one that the program does not say any more.
-                if !path.ends_with("pages/src/messages") {
-                    open.push(path);
-                }
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                all += &std::fs::read_to_string(path).expect("a source");
-            }
-        }
-    }
+    let folders = [crates(), crates().join("../tests/it")];
+    let files = folders.into_iter().flat_map(|folder| files(folder, "rs"));
+    // The tables and their tests have every message, even one that the program does not say any more.
+    let is_of_tables = |path: &Path| {
+        let mut folders = path.ancestors();
+        folders.any(|folder| folder.ends_with("pages/src/messages"))
+    };
+    let others = files.filter(|path| !is_of_tables(path));
+    let all: String = others
+        .map(|path| std::fs::read_to_string(path).expect("a source"))
+        .collect();
     joined(&all).replace("\\\"", "\"")
-}
-
-/// Returns sources in which strings that go on in the next line are joined.
-pub(super) fn joined(sources: &str) -> String {
-    let mut parts = sources.split("\\\n");
-    let mut joined = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        joined += part.trim_start();
-    }
-    joined
 }
 
 #[test]
