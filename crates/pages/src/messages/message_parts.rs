@@ -110,7 +110,7 @@ pub(super) fn place_text(place: &str) -> Option<String> {
     of_row.or_else(|| with_more(place, "mục khác"))
 }
 
-/// Returns whether a text can be a part of a place. Those of the names of files, such as `box 1.ply`, cannot.
+/// Returns whether a text can be a part of a place. `1.ply` cannot, because `box 1.ply` is the name of a file.
 fn is_of_place(part: &str) -> bool {
     let is_of_lines = |word: &str| {
         let mut bytes = word.bytes();
@@ -143,8 +143,9 @@ fn part_text(part: &str) -> String {
     if part.starts_with("VIA (JSON or CSV)") {
         return part.replace(" or ", " hoặc ");
     }
-    if let Some(keys) = part.strip_prefix("the keys \"") {
-        return format!("các khóa {}", names_text(&format!("\"{keys}")));
+    let keys = part.strip_prefix("the keys ");
+    if let Some(keys) = keys.filter(|keys| keys.starts_with('"')) {
+        return format!("các khóa {}", names_text(keys));
     }
     let listed = kind_text(part).or_else(|| left_out_reasons(part));
     listed.unwrap_or_else(|| names_text(part))
