@@ -16,6 +16,12 @@ fn project(dir: &Path, args: &[&str]) -> Call {
     mocban(dir, &[&["-C", "p"], args].concat())
 }
 
+/// Imports a list and returns what is said of it.
+fn import_list(dir: &Path, list: &str) -> String {
+    fs::write(dir.join("list.csv"), list).expect("written");
+    project(dir, &["import", "list.csv"]).expect(0).err
+}
+
 /// Writes a workbook with one sheet of these rows.
 fn write_workbook(dir: &Path, rows: &[&[&str]]) {
     let rows = text_rows(rows);
@@ -111,10 +117,7 @@ fn a_list_that_lacks_a_known_column_says_what_is_lost() {
     let dir = dir.path();
     write_blocks(dir, &["b1", "b2"]);
     fs::write(dir.join("l.json"), "{}").expect("written");
-    let import = |list: &str| {
-        fs::write(dir.join("list.csv"), list).expect("written");
-        project(dir, &["import", "list.csv"]).expect(0).err
-    };
+    let import = |list: &str| import_list(dir, list);
     let labels =
         "block,mesh,page,labels,unit\nb1,b1.stl,b1.png,l.json,mm\nb2,b2.stl,b2.png,l.json,mm\n";
     let first = import(labels);
@@ -139,10 +142,7 @@ fn metadata_that_an_import_empties_is_named_by_column() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let dir = dir.path();
     write_blocks(dir, &["b1"]);
-    let import = |list: &str| {
-        fs::write(dir.join("list.csv"), list).expect("written");
-        project(dir, &["import", "list.csv"]).expect(0).err
-    };
+    let import = |list: &str| import_list(dir, list);
     import("block,mesh,page,shelf,room\nb1,b1.stl,b1.png,R.1,2\n");
     import("id,mesh,print,shelf,room\na,b1.stl,b1.png,R.1,2\n");
     for (list, sentence) in [

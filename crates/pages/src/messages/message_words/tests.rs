@@ -294,12 +294,16 @@ fn colour_profiles_that_cannot_be_applied_are_explained() {
 
 #[test]
 fn an_export_of_nothing_is_explained() {
-    let said = "no result is selected: 12 without a verdict, 3 below confidence 0.5; nothing was written to out";
-    let wanted = "không có kết quả nào được chọn: 12 chưa có đánh giá, 3 có độ tin cậy dưới 0,5; chưa ghi gì vào out";
-    assert_eq!(vietnamese(said).as_deref(), Some(wanted));
-    let said = "none of the chosen pairs has a result to export: 1 without a result";
-    let wanted = "không có cặp nào đã chọn có kết quả để xuất: 1 chưa có kết quả";
-    assert_eq!(vietnamese(said).as_deref(), Some(wanted));
+    assert_translated(&[
+        (
+            "no result is selected: 12 without a verdict, 3 below confidence 0.5; nothing was written to out",
+            "không có kết quả nào được chọn: 12 chưa có đánh giá, 3 có độ tin cậy dưới 0,5; chưa ghi gì vào out",
+        ),
+        (
+            "none of the chosen pairs has a result to export: 1 without a result",
+            "không có cặp nào đã chọn có kết quả để xuất: 1 chưa có kết quả",
+        ),
+    ]);
 }
 
 #[test]

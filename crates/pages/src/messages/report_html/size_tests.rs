@@ -9,6 +9,8 @@ use mocban_results::{ManualErrors, TruthEvaluation, test_fixtures};
 
 /// Results of a group, as many as a report takes at most.
 const ITEMS: usize = 80;
+/// Numbers of a result with everything that is measured.
+const NUMBERS: &str = "IoU 0.700, confidence 0.500, off the truth by 1.0° and 2.0 % of the height, IoU with the true stroke tops 0.9";
 /// Bytes of an image with which nearly all results fit into a page.
 const IMAGE_BYTES: usize = 6_000;
 
@@ -34,20 +36,17 @@ fn full_report() -> Report {
 
 /// Returns results with images and long captions, a few more than fit into a page.
 fn full_gallery() -> Gallery {
-    let item = |i: usize| {
-        GalleryItem {
+    let item = |i: usize| GalleryItem {
         pair: PairName::new(&format!("p{i}")).expect("an id"),
         character: Some("明".to_owned()),
         files: ["meshes/1.ply".to_owned(), "prints/1.png".to_owned()],
         metrics: ThresholdMetric::ALL.to_vec(),
-        numbers: "IoU 0.700, confidence 0.500, off the truth by 1.0° and 2.0 % of the height, IoU with the true stroke tops 0.9"
-            .to_owned(),
+        numbers: NUMBERS.to_owned(),
         verdicts: (0..9)
             .map(|reviewer| format!("r{reviewer}: fail, background included"))
             .collect(),
         images: [1_u8, 2, 3].map(|byte| Some(vec![byte; IMAGE_BYTES])),
         problem: None,
-    }
     };
     let group = |reason| GalleryGroup {
         reason,
