@@ -1,7 +1,7 @@
 //! Messages of the parsers of JSON and XML and of the server of pages, which are other programs, with their Vietnamese
 //! texts.
 
-/// Messages without and with a place. Pages that leave out commands leave out the marks around signs, too.
+/// Messages without the line and column behind them. Pages that leave out commands leave out the marks around signs, too.
 pub(super) const FOREIGN_MESSAGES: &[(&str, &str)] = &[
     ("expected value", "cần một giá trị"),
     ("expected ident", "cần true, false hoặc null"),
@@ -36,87 +36,7 @@ pub(super) const FOREIGN_MESSAGES: &[(&str, &str)] = &[
     ("EOF while parsing a list", "kết thúc giữa một danh sách"),
     ("EOF while parsing a string", "kết thúc giữa một văn bản"),
     ("EOF while parsing a value", "kết thúc trước một giá trị"),
-    (
-        "expected value at line {} column {}",
-        "cần một giá trị, dòng {0} cột {1}",
-    ),
-    (
-        "expected ident at line {} column {}",
-        "cần true, false hoặc null, dòng {0} cột {1}",
-    ),
-    (
-        "expected `:` at line {} column {}",
-        "cần dấu hai chấm, dòng {0} cột {1}",
-    ),
-    (
-        "expected : at line {} column {}",
-        "cần dấu hai chấm, dòng {0} cột {1}",
-    ),
-    (
-        "expected `,` or `}` at line {} column {}",
-        "cần dấu phẩy hoặc dấu ngoặc nhọn đóng, dòng {0} cột {1}",
-    ),
-    (
-        "expected , or } at line {} column {}",
-        "cần dấu phẩy hoặc dấu ngoặc nhọn đóng, dòng {0} cột {1}",
-    ),
-    (
-        "expected `,` or `]` at line {} column {}",
-        "cần dấu phẩy hoặc dấu ngoặc vuông đóng, dòng {0} cột {1}",
-    ),
-    (
-        "expected , or ] at line {} column {}",
-        "cần dấu phẩy hoặc dấu ngoặc vuông đóng, dòng {0} cột {1}",
-    ),
-    (
-        "key must be a string at line {} column {}",
-        "khóa phải là văn bản trong ngoặc kép, dòng {0} cột {1}",
-    ),
-    (
-        "trailing comma at line {} column {}",
-        "thừa dấu phẩy, dòng {0} cột {1}",
-    ),
-    (
-        "trailing characters at line {} column {}",
-        "thừa ký tự ở cuối, dòng {0} cột {1}",
-    ),
-    (
-        "invalid number at line {} column {}",
-        "số không hợp lệ, dòng {0} cột {1}",
-    ),
-    (
-        "number out of range at line {} column {}",
-        "số quá lớn, dòng {0} cột {1}",
-    ),
-    (
-        "invalid escape at line {} column {}",
-        "dấu gạch chéo ngược không hợp lệ, dòng {0} cột {1}",
-    ),
-    (
-        "invalid unicode code point at line {} column {}",
-        "mã ký tự không hợp lệ, dòng {0} cột {1}",
-    ),
-    (
-        "control character (\\u0000-\\u001F) found while parsing a string at line {} column {}",
-        "có ký tự điều khiển trong văn bản, dòng {0} cột {1}",
-    ),
-    (
-        "recursion limit exceeded at line {} column {}",
-        "có quá nhiều tầng lồng nhau, dòng {0} cột {1}",
-    ),
     // XML.
-    (
-        "ill-formed document: expected `</{}>`, but `</{}>` was found at line {}",
-        "cần `</{0}>` nhưng thấy `</{1}>`, dòng {2}",
-    ),
-    (
-        "ill-formed document: close tag `</{}>` does not match any open tag at line {}",
-        "thẻ đóng `</{0}>` không khớp với thẻ mở nào, dòng {1}",
-    ),
-    (
-        "ill-formed document: start tag not closed: `</{}>` not found before end of input at line {}",
-        "thẻ `{0}` không được đóng, dòng {1}",
-    ),
     (
         "ill-formed document: expected `</{}>`, but `</{}>` was found",
         "cần `</{0}>` nhưng thấy `</{1}>`",
@@ -128,18 +48,6 @@ pub(super) const FOREIGN_MESSAGES: &[(&str, &str)] = &[
     (
         "ill-formed document: start tag not closed: `</{}>` not found before end of input",
         "thẻ `{0}` không được đóng",
-    ),
-    (
-        "ill-formed document: expected </{}>, but </{}> was found at line {}",
-        "cần `</{0}>` nhưng thấy `</{1}>`, dòng {2}",
-    ),
-    (
-        "ill-formed document: close tag </{}> does not match any open tag at line {}",
-        "thẻ đóng `</{0}>` không khớp với thẻ mở nào, dòng {1}",
-    ),
-    (
-        "ill-formed document: start tag not closed: </{}> not found before end of input at line {}",
-        "thẻ `{0}` không được đóng, dòng {1}",
     ),
     (
         "ill-formed document: expected </{}>, but </{}> was found",

@@ -9,6 +9,7 @@ use crate::digit_groups::grouped;
 /// quoted name.
 const PLACES: &[(&str, &str)] = &[
     ("line {}", "dòng {0}"),
+    ("line {} column {}", "dòng {0} cột {1}"),
     ("lines {}", "các dòng {0}"),
     ("box {}", "khung {0}"),
     ("image {}", "hình {0}"),

@@ -69,7 +69,19 @@ fn line(text: &str) -> Option<String> {
 /// Returns a clause in Vietnamese, which may follow the path of a file, the name of a layer of settings, a line or another
 /// clause.
 fn clause(text: &str) -> Option<String> {
-    clause_among(text, &TABLES).or_else(|| clause_among(text, &[OPEN_ENDED]))
+    clause_among(text, &TABLES)
+        .or_else(|| clause_before_line(text))
+        .or_else(|| clause_among(text, &[OPEN_ENDED]))
+}
+
+/// Returns a clause of a parser in Vietnamese, which ends with the line, and perhaps the column, of the fault.
+fn clause_before_line(text: &str) -> Option<String> {
+    let (message, place) = text.rsplit_once(" at ")?;
+    if !place.starts_with("line ") {
+        return None;
+    }
+    let place = place_text(place)?;
+    clause_among(message, &TABLES).map(|known| format!("{known}, {place}"))
 }
 
 fn clause_among(text: &str, tables: &[&[MessageRow]]) -> Option<String> {

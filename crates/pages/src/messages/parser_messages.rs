@@ -128,7 +128,7 @@ pub(super) const PARSER_MESSAGES: &[(&str, &str)] = &[
         "the unpacked bytes cannot be written: {}",
         "không ghi được phần đã giải nén: {0}",
     ),
-    // XML and numbers of JSON.
+    // XML.
     (
         "more than {} elements are nested",
         "có hơn {0} phần tử lồng nhau",
@@ -138,24 +138,4 @@ pub(super) const PARSER_MESSAGES: &[(&str, &str)] = &[
         "có phần tử kết thúc mà không bắt đầu",
     ),
     ("the entity {} is unknown", "không biết thực thể {0}"),
-    (
-        "more than {} elements are nested at line {}",
-        "có hơn {0} phần tử lồng nhau, dòng {1}",
-    ),
-    (
-        "an element ends that did not begin at line {}",
-        "có phần tử kết thúc mà không bắt đầu, dòng {0}",
-    ),
-    (
-        "the entity {} is unknown at line {}",
-        "không biết thực thể {0}, dòng {1}",
-    ),
-    (
-        "the key {} is given twice at line {} column {}",
-        "khóa {0} được ghi hai lần, dòng {1} cột {2}",
-    ),
-    (
-        "{} is not a number at line {} column {}",
-        "{0} không phải là số, dòng {1} cột {2}",
-    ),
 ];

@@ -124,6 +124,23 @@ fn refusals_that_are_put_together_are_translated() {
 }
 
 #[test]
+fn places_behind_messages_of_parsers_are_translated() {
+    assert_translated(&[
+        (
+            "b.json: the JSON is damaged: the key \"a\" is given twice at line 3 column 14; save the labels again",
+            "b.json: tệp JSON bị hỏng: khóa \"a\" được ghi hai lần, dòng 3 cột 14; hãy lưu lại nhãn",
+        ),
+        (
+            "b.xml: the PAGE-XML is damaged: an element ends that did not begin at line 1200; save the labels again",
+            "b.xml: tệp PAGE-XML bị hỏng: có phần tử kết thúc mà không bắt đầu, dòng 1200; hãy lưu lại nhãn",
+        ),
+    ]);
+    for other in ["new words at line 3", "expected value at line 3, column 14"] {
+        assert_eq!(vietnamese(other), None, "{other:?}");
+    }
+}
+
+#[test]
 fn failures_of_a_run_are_translated() {
     assert_translated(&[
         (
