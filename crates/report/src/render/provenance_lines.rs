@@ -29,7 +29,12 @@ pub(super) fn provenance_lines(report: &Report) -> Vec<ProvenanceLine> {
     let bootstrap = report.bootstrap.as_ref().filter(|_| has_intervals);
     lines.extend(bootstrap.map(|used| ("Seed", format!("{} (bootstrap)", used.seed))));
     let time = found.last_result.as_deref();
-    lines.extend(time.map(|time| ("Last result", time.replace('T', " ").replace('Z', " UTC"))));
+    lines.extend(time.map(|time| {
+        (
+            "Last result",
+            time.replace('T', " ").replace('Z', " +00:00"),
+        )
+    }));
     lines
 }
 
