@@ -11,7 +11,8 @@ use crate::own_files::refuse_project_file;
 use crate::status::{all_retired, warn_about_stale};
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{
-    ExportFormat, ExportOptions, ExportSummary, OmissionCounts, export as export_pairs,
+    ExportFormat, ExportOptions, ExportSummary, OmissionCounts, ResultFilter,
+    export as export_pairs,
 };
 
 /// An export of a project.
@@ -58,6 +59,7 @@ pub async fn export(
     options.settings = config.that_change_results()?;
     let are_pairs_chosen = options.pairs.is_some();
     let least_confidence = options.least_confidence();
+    let selection = UsedSelection::of(&options);
     let checked = options.check(formats);
     checked.map_err(|unused| Refusal::Usage(unused.to_string()))?;
     warn_about_stale(&catalog, location, listener).await?;
@@ -76,7 +78,12 @@ pub async fn export(
     catalog.close().await;
     if summary.is_nothing_selected {
         let nothing = retired.unwrap_or_else(|| {
-            nothing_selected(&summary.left_out, are_pairs_chosen, least_confidence)
+            nothing_selected(
+                &summary.left_out,
+                are_pairs_chosen,
+                selection,
+                least_confidence,
+            )
         });
         let text = format!("{nothing}; nothing was written to {}", output.display());
         return Err(Refusal::NothingSelected(text).into());
@@ -92,10 +99,37 @@ pub async fn export(
     })
 }
 
+/// The options that select results.
+#[derive(Debug, Clone, Copy)]
+struct UsedSelection {
+    has_filter: bool,
+    has_min_confidence: bool,
+}
+
+impl UsedSelection {
+    fn of(options: &ExportOptions) -> Self {
+        Self {
+            has_filter: options.only != ResultFilter::All,
+            has_min_confidence: options.min_confidence.is_some(),
+        }
+    }
+
+    /// Returns which of these options select more with another value.
+    const fn advice(self) -> &'static str {
+        match (self.has_filter, self.has_min_confidence) {
+            (true, true) => "; other values of --only and --min-confidence select more",
+            (true, false) => "; another value of --only selects more",
+            (false, true) => "; another value of --min-confidence selects more",
+            (false, false) => "",
+        }
+    }
+}
+
 /// Returns why no pair has a selected result.
 fn nothing_selected(
     left_out: &OmissionCounts,
     are_pairs_chosen: bool,
+    selection: UsedSelection,
     least_confidence: Option<f64>,
 ) -> String {
     let (nothing, advice) = if are_pairs_chosen {
@@ -104,8 +138,7 @@ fn nothing_selected(
         let advice = "; `run` computes results, and `status` says which pairs failed";
         ("no result is selected", advice)
     } else {
-        let advice = "; other values of --only and --min-confidence select more";
-        ("no result is selected", advice)
+        ("no result is selected", selection.advice())
     };
     match left_out.refused() {
         0 => nothing.to_owned(),
@@ -115,17 +148,37 @@ fn nothing_selected(
 
 #[cfg(test)]
 mod tests {
-    use super::nothing_selected;
+    use super::{UsedSelection, nothing_selected};
     use mocban_export::{OmissionCounts, OmissionReason};
+
+    const ONLY: UsedSelection = UsedSelection {
+        has_filter: true,
+        has_min_confidence: false,
+    };
 
     #[test]
     fn other_selections_are_advised_only_if_they_select_more() {
         let mut left_out = OmissionCounts::default();
         left_out.add(OmissionReason::WithoutResult);
-        let text = nothing_selected(&left_out, false, None);
+        let text = nothing_selected(&left_out, false, ONLY, None);
         assert!(!text.contains("--only") && text.contains("`run`"), "{text}");
         left_out.add(OmissionReason::WithoutVerdict);
-        let text = nothing_selected(&left_out, false, None);
+        let text = nothing_selected(&left_out, false, ONLY, None);
         assert!(text.contains("--only") && !text.contains("`run`"), "{text}");
+    }
+
+    #[test]
+    fn an_option_that_was_not_given_is_not_advised() {
+        let mut left_out = OmissionCounts::default();
+        left_out.add(OmissionReason::LowConfidence);
+        for (has_filter, has_min_confidence) in [(true, false), (false, true), (true, true)] {
+            let used = UsedSelection {
+                has_filter,
+                has_min_confidence,
+            };
+            let text = nothing_selected(&left_out, false, used, Some(0.9));
+            let named = ["--only", "--min-confidence"].map(|option| text.contains(option));
+            assert_eq!(named, [has_filter, has_min_confidence], "{text}");
+        }
     }
 }

@@ -64,6 +64,10 @@ pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
         "đã có cặp {0} không được cắt từ ván này, và các mã phải khác nhau không chỉ ở chữ hoa và chữ thường",
     ),
     (
+        "import the block with another id",
+        "hãy nhập ván với mã khác",
+    ),
+    (
         "the temporary file of the cut cannot be written or read",
         "không ghi hoặc đọc được tệp tạm của bước cắt",
     ),

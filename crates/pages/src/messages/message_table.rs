@@ -239,6 +239,14 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "other values of --only and --min-confidence select more",
         "lựa chọn khác sẽ xuất nhiều cặp hơn",
     ),
+    (
+        "another value of --only selects more",
+        "lựa chọn khác sẽ xuất nhiều cặp hơn",
+    ),
+    (
+        "another value of --min-confidence selects more",
+        "độ tin cậy thấp hơn sẽ xuất nhiều cặp hơn",
+    ),
     ("nothing was written to {}", "chưa ghi gì vào {0}"),
     // Files of a pair.
     ("{} is not there", "không có tệp {0}"),

@@ -204,7 +204,7 @@ async fn finish_cut(
         CutReply::Refused => return Ok(AfterStage::End(JobEnd::LeaseLost)),
         CutReply::NameTaken(taken) => {
             let text = format!(
-                "there is a pair {taken} that was not cut from this block, and ids must differ in more than upper and lower case; import the block with another --name"
+                "there is a pair {taken} that was not cut from this block, and ids must differ in more than upper and lower case; import the block with another id"
             );
             let error = BlockStageError::failed(FailureClass::BadInput, text);
             return store_failure(context, block, BlockStage::Cut, error, Some(checkpoint.ms))
