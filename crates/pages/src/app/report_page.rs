@@ -6,9 +6,11 @@ use axum::extract::{Path, State};
 use axum::response::{Html, Response};
 use maud::{Markup, html};
 
+use super::address::encoded;
 use super::attachment::attachment;
 use super::components::{NavSection, empty, frame, grouped, number_table, score, stored_message};
 use super::failure::{AppFailure, AppResult};
+use super::pair_query::RETIRED;
 use super::run_blocks::failed_blocks_part;
 use super::sentence::without_commands;
 use super::state::AppState;
@@ -79,12 +81,12 @@ pub(super) async fn numbers(
     let location = open.location();
     let found = read_in_turn(open.reports(), async move || read(&location).await).await?;
     let found = found.map_err(|error| AppFailure::of(error, &open.dir))?;
-    Ok(Html(numbers_part(&visit, &found).into_string()))
+    Ok(Html(numbers_part(&visit, &key, &found).into_string()))
 }
 
-fn numbers_part(visit: &Visit, report: &Report) -> Markup {
+fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
     html! {
-        @for text in &report.headline { p { (shown_sentences(visit, text)) } }
+        @for text in &report.headline { p { (shown_sentences(visit, text)) (remedy_link(visit, key, text)) } }
         (failed_blocks_part(visit, "./", report.block_progress.map_or(0, |blocks| blocks.failed)))
         @if report.rows.iter().all(|row| row.n == 0) {
             (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! { a.button href="./" { (visit.t("Run", "Căn chỉnh")) } }))
@@ -98,9 +100,41 @@ fn numbers_part(visit: &Visit, report: &Report) -> Markup {
         (reasons(visit, report))
         @if !report.warnings.is_empty() {
             h2 { (visit.t("What limits these numbers", "Những giới hạn của các con số này")) }
-            ul { @for text in &report.warnings { li { (shown_sentences(visit, text)) } } }
+            ul { @for text in &report.warnings { li { (shown_sentences(visit, text)) (remedy_link(visit, key, text)) } } }
         }
     }
+}
+
+/// Returns the link to the page that does what a command in sentences of the report does, if they name one that is not on the
+/// page anyway. Addresses are relative to that of the report.
+fn remedy_link(visit: &Visit, key: &str, text: &str) -> Markup {
+    let see_why = visit.t("See why", "Xem lý do");
+    let links = [
+        (
+            "`mocban review ",
+            "review".to_owned(),
+            visit.t("Review", "Đánh giá"),
+        ),
+        (
+            "`mocban import`",
+            format!("../../import?project={}", encoded(key)),
+            visit.t("Import", "Nhập dữ liệu"),
+        ),
+        (
+            "`mocban status --retired`",
+            format!("pairs?state={RETIRED}"),
+            see_why,
+        ),
+        (
+            "`check`",
+            "health".to_owned(),
+            visit.t("Health", "Tình trạng"),
+        ),
+    ];
+    let found = links
+        .into_iter()
+        .find(|(command, ..)| text.contains(*command));
+    html! { @if let Some((_, address, name)) = found { " " a href=(address) { (name) } } }
 }
 
 /// Returns sentences of the report, which are in English, in the language of the page and without commands.
@@ -205,4 +239,38 @@ pub(super) async fn download(
     let rendered = read_in_turn(open.reports(), render).await?;
     let rendered = rendered.map_err(|error| AppFailure::of(error, &open.dir))?;
     Ok(attachment(&file, kind, rendered.text.into_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::remedy_link;
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+
+    #[test]
+    fn a_sentence_with_a_command_has_a_link_instead() {
+        let of = |language, text| {
+            remedy_link(&Visit::in_language(language), "ván 4", text).into_string()
+        };
+        let unjudged = "There is no Acc (`mocban review --reviewer NAME` starts judging).";
+        assert_eq!(
+            of(Language::English, unjudged),
+            " <a href=\"review\">Review</a>"
+        );
+        assert_eq!(
+            of(Language::Vietnamese, unjudged),
+            " <a href=\"review\">Đánh giá</a>"
+        );
+        let retired = of(
+            Language::English,
+            "all are retired; `mocban status --retired` says why.",
+        );
+        assert_eq!(retired, " <a href=\"pairs?state=retired\">See why</a>");
+        let empty = of(
+            Language::English,
+            "The project has no pairs yet; `mocban import` adds them.",
+        );
+        assert!(empty.contains("../../import?project="), "{empty}");
+        assert_eq!(of(Language::English, "All 2 pairs are aligned."), "");
+    }
 }

@@ -10,13 +10,19 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
         "There is nothing to report: the only pair of the project is retired.",
         "Không có gì để báo cáo: cặp duy nhất của dự án đã được đưa ra khỏi thống kê.",
     ),
-    ("says why.", "cho biết lý do."),
+    (
+        "In the app, the page Pairs has the reason.",
+        "Trong ứng dụng, trang Các cặp cho biết lý do.",
+    ),
     (
         "The project has no pairs yet: {}.",
         "Dự án chưa có cặp nào: {0}.",
     ),
     ("The project has no pairs yet.", "Dự án chưa có cặp nào."),
-    ("adds them.", "sẽ thêm các cặp."),
+    (
+        "In the app, the page Import adds them.",
+        "Trong ứng dụng, hãy thêm các cặp ở trang Nhập dữ liệu.",
+    ),
     ("Characters are missing: {}.", "Còn thiếu các chữ: {0}."),
     (
         "{}; {} failed and {} is not finished.",
@@ -83,8 +89,14 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
         "There is no result to judge yet.",
         "Chưa có kết quả nào để đánh giá.",
     ),
-    ("continues the work.", "làm tiếp việc này."),
-    ("lists the reasons.", "liệt kê các lý do."),
+    (
+        "In the app, the page Run continues the work.",
+        "Trong ứng dụng, trang Căn chỉnh làm tiếp việc này.",
+    ),
+    (
+        "Failed pairs are listed below with their reasons.",
+        "Các cặp lỗi được liệt kê bên dưới cùng với lý do.",
+    ),
     (
         "Acc of {} is {} ({}, {} interval): reviewers passed {} of {}.",
         "Acc của {0} là {1} ({2}, khoảng {3}): người đánh giá cho đạt {4} trên {5}.",
@@ -129,7 +141,10 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
         "Nobody has judged a result yet, so there is no Acc.",
         "Chưa ai đánh giá kết quả nào, nên chưa có Acc.",
     ),
-    ("starts judging).", "để bắt đầu đánh giá)."),
+    (
+        "In the app, results are judged on the page Review.",
+        "Trong ứng dụng, các kết quả được đánh giá ở trang Đánh giá.",
+    ),
     (
         "Against ground truth, {} of {} results of {} are right, {}.",
         "Theo dữ liệu đối chứng, {0} trên {1} kết quả của {2} là đúng, {3}.",
@@ -307,5 +322,8 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
         "{} stored rows that are damaged or missing are set apart and not counted, first: {}.",
         "{0} dòng dữ liệu bị hỏng hoặc mất được để riêng và không tính, đầu tiên: {!1}.",
     ),
-    ("lists them.", "liệt kê chúng."),
+    (
+        "In the app, the page Health lists them.",
+        "Trong ứng dụng, trang Tình trạng liệt kê chúng.",
+    ),
 ];

@@ -256,8 +256,8 @@ pub(super) const REPORT_CAPTIONS: &[(&str, &str)] = &[
         "Mã băm gồm 12 chữ số đầu.",
     ),
     (
-        "has them whole, and all digits of every number.",
-        "cho toàn bộ mã băm và mọi chữ số của từng số.",
+        "The report as JSON has them whole, and all digits of every number.",
+        "Báo cáo dạng JSON có toàn bộ mã băm và mọi chữ số của từng số.",
     ),
     ("{}, meshes and prints {}", "{0}, bản quét và bản in {=1}"),
     ("{} by {} reviewers", "{0} của {1} người đánh giá"),

@@ -7,19 +7,10 @@ use super::report_captions::REPORT_CAPTIONS;
 use super::report_table::{REPORT_COUNTED, REPORT_FRAME, REPORT_TERMS};
 use super::stage_words::stage_text;
 
-/// Ends of texts behind which a command follows. The tables have the sentence with a stop.
-const BEFORE_COMMANDS: [&str; 2] = [";", " ("];
-
 /// Returns a text of the report in Vietnamese: a term, or sentences. Words that are not known stay as they are.
 pub(crate) fn report_text(text: &str) -> String {
     if let Some(known) = found(REPORT_TERMS, text).or_else(|| stage_text(text)) {
         return known.to_owned();
-    }
-    for end in BEFORE_COMMANDS {
-        if let Some(start) = text.strip_suffix(end) {
-            let known = report_text(&format!("{start}."));
-            return [known.strip_suffix('.').unwrap_or(&known), end].concat();
-        }
     }
     let is_end = |at: &usize| !text[..*at].ends_with(" v");
     let ends = text.match_indices(". ").map(|(at, _)| at);
@@ -238,16 +229,14 @@ mod tests {
                 "Dự án chưa có cặp nào: 2 ván bị lỗi và 1 ván chưa xong.",
             ),
             (
-                "There is nothing to report: all 2 pairs of the project are retired;",
-                "Không có gì để báo cáo: cả 2 cặp của dự án đã được đưa ra khỏi thống kê;",
+                "There is nothing to report: all 2 pairs of the project are retired. In the app, the page Pairs has the reason.",
+                "Không có gì để báo cáo: cả 2 cặp của dự án đã được đưa ra khỏi thống kê. Trong ứng dụng, trang Các cặp cho biết lý do.",
             ),
             (
-                "Nobody has judged a result yet, so there is no Acc (",
-                "Chưa ai đánh giá kết quả nào, nên chưa có Acc (",
-            ),
-            (
-                "starts judging). Against ground truth, 1 of 2 results of Relief is right, 50.0 %.",
-                "để bắt đầu đánh giá). Theo dữ liệu đối chứng, 1 trên 2 kết quả của Mặt khắc là đúng, 50,0 %.",
+                "Nobody has judged a result yet, so there is no Acc. In the app, results are judged on the page Review. \
+                 Against ground truth, 1 of 2 results of Relief is right, 50.0 %.",
+                "Chưa ai đánh giá kết quả nào, nên chưa có Acc. Trong ứng dụng, các kết quả được đánh giá ở trang Đánh giá. \
+                 Theo dữ liệu đối chứng, 1 trên 2 kết quả của Mặt khắc là đúng, 50,0 %.",
             ),
             (
                 "Means have no intervals, and metrics are not compared by score. There are more than 100,000 blocks, and \

@@ -86,7 +86,8 @@ fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
 mod tests {
     use super::{Cover, MAX_PAGE_BYTES, page};
     use crate::{Report, ReportAccumulator, test_fixtures};
-    use mocban_core::domain::{PairName, ThresholdMetric, Verdict};
+    use mocban_catalog::{PairResults, SetApart};
+    use mocban_core::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
     use mocban_results::TruthEvaluation;
     use mocban_results::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
 
@@ -97,8 +98,11 @@ mod tests {
             let pair = test_fixtures::done(name, 0.75, &[Verdict::Pass, second]);
             report.add(&pair, &test_fixtures::truth(1.0, 2.0, 0.9));
         }
-        let class = mocban_core::domain::FailureClass::BadInput;
-        let failed = test_fixtures::failed("c", class, "<script>alert(1)</script>.stl is empty");
+        let failed = test_fixtures::failed(
+            "c",
+            FailureClass::BadInput,
+            "<script>alert(1)</script>.stl is empty",
+        );
         report.add(&failed, &TruthEvaluation::default());
         report.finish()
     }
@@ -174,6 +178,53 @@ mod tests {
         // Two of the eight results of each group are shown when the reader opens them.
         let opened = text.matches("<summary>2 more</summary>").count();
         assert_eq!(opened, GalleryReason::ALL.len());
+    }
+
+    #[test]
+    fn a_page_says_what_to_do_without_commands() {
+        let of = |pair: Option<PairResults>, retired| {
+            let mut report = ReportAccumulator::default();
+            if let Some(pair) = pair {
+                report.add(&pair, &TruthEvaluation::default());
+            }
+            report.set_retired(retired);
+            report.finish()
+        };
+        let failed = test_fixtures::failed("a", FailureClass::Io, "gone");
+        for (mut report, said) in [
+            (of(None, 0), "yet. In the app, the page Import adds them."),
+            (
+                of(None, 2),
+                "retired. In the app, the page Pairs has the reason.",
+            ),
+            (
+                of(Some(test_fixtures::pending("a")), 0),
+                "yet. In the app, the page Run continues the work.",
+            ),
+            (of(Some(failed), 0), "yet. Failed pairs are listed below"),
+            (
+                of(Some(test_fixtures::done("a", 0.75, &[])), 0),
+                "no Acc. In the app, results are judged on the page Review.",
+            ),
+        ] {
+            assert!(
+                report.headline.iter().any(|text| text.contains('`')),
+                "{said}"
+            );
+            let set_apart = SetApart {
+                count: 1,
+                first: vec!["row 3".to_owned()],
+            };
+            let sentence = set_apart.sentence().expect("a row");
+            report.warnings.push(sentence + ".");
+            let page = page(&report, &Gallery::default(), &Cover::default());
+            for said in [said, "row 3. In the app, the page Health lists them."] {
+                assert!(page.contains(said), "{said}: {page}");
+            }
+            for command in ["`", "<code", "mocban status", "mocban review"] {
+                assert!(!page.contains(command), "{command}: {page}");
+            }
+        }
     }
 
     #[test]

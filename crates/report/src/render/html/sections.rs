@@ -148,8 +148,7 @@ fn provenance(report: &Report) -> Markup {
         dl.provenance {
             @for (what, text) in provenance_lines(report) { dt { (what) } dd { (text) } }
         }
-        p { "Hashes are the first 12 digits; " code { "mocban report --format json" }
-            " has them whole, and all digits of every number." }
+        p { "Hashes are the first 12 digits. The report as JSON has them whole, and all digits of every number." }
     }
 }
 
