@@ -36,6 +36,8 @@ struct ProjectState {
     failed_blocks: u64,
     /// Number of blocks that a run would work on or works on.
     open_blocks: u64,
+    /// Number of finished pairs and blocks that an import gave other files, at which the next run looks.
+    other_files: u64,
 }
 
 pub(super) async fn page(
@@ -93,10 +95,11 @@ async fn read(state: &AppState, key: String) -> Overview {
                 outdated_blocks(&open.catalog, &options, &blocks).await?
             };
             Ok::<_, mocban_project::ProjectError>(ProjectState {
+                other_files: counts.other_files + blocks.other_files(),
                 counts,
                 is_running: running,
                 failed_blocks: failed_blocks(&blocks),
-                open_blocks: blocks.waiting() + blocks.leased() + blocks.other_files() + outdated,
+                open_blocks: blocks.waiting() + blocks.leased() + outdated,
             })
         };
         read.await.map_err(|error| AppFailure::of(error, &open.dir))
@@ -177,10 +180,12 @@ fn next_step(visit: &Visit, found: &ProjectState) -> &'static str {
     let outstanding: u64 = outstanding.iter().sum();
     if found.is_running {
         visit.t("Watch the run", "Xem tiến trình")
-    } else if outstanding + counts.stale + counts.other_files > 0 {
+    } else if outstanding + counts.stale > 0 {
         visit.t("Align the pairs", "Căn chỉnh các cặp")
     } else if found.open_blocks > 0 {
         visit.t("Align the blocks", "Căn chỉnh các ván")
+    } else if found.other_files > 0 {
+        visit.t("Look for changed files", "Tìm tệp đã đổi")
     } else if jobs(JobStatus::Quarantined) + found.failed_blocks > 0 {
         visit.t("See what failed", "Xem các mục lỗi")
     } else {

@@ -45,6 +45,7 @@ mod last_import;
 mod latest_results;
 mod looked_inputs;
 mod looked_part;
+mod moved_blocks;
 mod named_blocks;
 mod number_text;
 mod open_pages;

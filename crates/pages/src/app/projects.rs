@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use super::failure::{AppFailure, AppResult};
+use super::moved_blocks::MovedFiles;
 use crate::local_server::WorkThread;
 use crate::on_thread::on_thread;
 use mocban_catalog::Catalog;
@@ -33,6 +34,8 @@ pub(super) struct OpenProject {
     pub(super) catalog: Catalog,
     /// Whether this user may store verdicts in the catalog.
     pub(super) may_store: bool,
+    /// Versions of the files of blocks that an import moved.
+    pub(super) moved_files: Arc<MovedFiles>,
     /// Reads results for reports; started by the first one.
     reports: OnceLock<WorkThread>,
     /// Identity of the catalog's file, which changes if the project is made anew.
@@ -130,6 +133,7 @@ impl OpenProject {
             project,
             catalog,
             may_store: rights.may_store(),
+            moved_files: Arc::default(),
             reports: OnceLock::new(),
             file,
         }))

@@ -171,8 +171,8 @@ fn controls(visit: &Visit, run: &RunState) -> Markup {
                 input.short type="number" name="jobs" min="1" max="1024" value=(run.jobs);
             }
             button.primary #start name="which" value=(if is_idle { "look" } else { "all" }) disabled[is_empty] {
-                @if is_idle && run.blocks.other_files() > 0 {
-                    (cut_again_text(visit, run.blocks.other_files()))
+                @if is_idle && run.changed_blocks > 0 {
+                    (cut_again_text(visit, run.changed_blocks))
                 } @else if is_idle {
                     (visit.t("Look for changed files", "Tìm tệp đã đổi"))
                 } @else {

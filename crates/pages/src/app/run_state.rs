@@ -2,6 +2,7 @@
 
 use super::child_run;
 use super::latest_results::LatestResults;
+use super::moved_blocks::changed_blocks;
 use super::projects::OpenProject;
 use super::run_blocks::outdated_blocks;
 use super::sentence::Sentence;
@@ -29,6 +30,8 @@ pub(super) struct RunState {
     pub(super) blocks: BlockStatus,
     /// Number of finished or failed blocks that the next run would align again. 0 during a run.
     pub(super) outdated_blocks: u64,
+    /// Number of finished blocks whose moved files are known to have other content. 0 during a run.
+    pub(super) changed_blocks: u64,
     /// Why the last run that the app started ended, if it failed.
     pub(super) failed_run: Option<Sentence>,
     /// Number of pairs at the same time, as the settings give it.
@@ -76,10 +79,14 @@ impl RunState {
             failures.push((class, number, list.await?.pairs));
         }
         let blocks = BlockStatus(catalog.block_states().await?);
-        let outdated_blocks = if running {
-            0
+        let [outdated_blocks, changed_blocks] = if running {
+            [0; 2]
         } else {
-            outdated_blocks(catalog, &options, &blocks).await?
+            let files = &open.moved_files;
+            [
+                outdated_blocks(catalog, &options, &blocks).await?,
+                changed_blocks(catalog, &open.project, files, &blocks).await?,
+            ]
         };
         Ok(Self {
             counts,
@@ -89,6 +96,7 @@ impl RunState {
             failures,
             blocks,
             outdated_blocks,
+            changed_blocks,
             failed_run,
             jobs: options.workers,
             plan,

@@ -73,6 +73,7 @@ fn running(blocks: Vec<BlockState>) -> RunState {
         failures: Vec::new(),
         blocks: BlockStatus(blocks),
         outdated_blocks: 0,
+        changed_blocks: 0,
         failed_run: None,
         jobs: 2,
         plan: None,
@@ -178,6 +179,9 @@ fn blocks_with_other_files_are_named_in_both_languages() {
     assert!(before.contains("Everything is aligned"), "{before}");
     assert!(!before.contains("other-block-files"), "{before}");
     run.blocks.0[0].other_files = true;
+    let moved = shown(&run, Language::English);
+    assert!(moved.contains("Look for changed files<"), "{moved}");
+    run.changed_blocks = 1;
     for (language, text, button) in [
         (
             Language::English,
