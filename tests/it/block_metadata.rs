@@ -186,7 +186,7 @@ fn the_app_says_which_columns_and_pages_a_list_of_blocks_changes() {
     let changed = shown();
     for part in [
         "Số ván được đổi bản quét hoặc trang in: <b>1</b>",
-        "Số ván mất giá trị ở các cột khác: <b>1</b>",
+        "Số ván mất giá trị ở các cột khác: <b>1</b> (Ghi chú, Kho lưu)",
     ] {
         assert!(changed.contains(part), "{part}: {changed}");
     }

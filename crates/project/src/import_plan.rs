@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
+use crate::column_hashes::{ColumnHasher, ColumnHashes};
 use crate::error::ProjectResult;
 use crate::import_pairs::{PairSource, listing};
 use crate::location::Location;
@@ -34,6 +35,8 @@ pub struct PlannedPair {
     pub scanned_face_down: Option<bool>,
     /// Hash of its other columns, as [`metadata_hash`] returns it.
     pub metadata: Option<ContentHash>,
+    /// Hashes of its other columns by name. `None` if these columns are too many to be kept.
+    pub columns: Option<ColumnHashes>,
     /// Messages about its files that do not exist.
     pub missing: Vec<String>,
 }
@@ -85,6 +88,7 @@ pub fn plan_import(
     let listing = listing(source, choices)?;
     let (mut pairs, mut planned) = (0, Vec::new());
     let mut missing = MissingFiles::default();
+    let mut columns = ColumnHasher::default();
     let hash = listing.rows(&project, |row, lines| {
         poll();
         for line in &lines {
@@ -100,6 +104,7 @@ pub fn plan_import(
                 unit: row.unit,
                 scanned_face_down: row.scanned_face_down,
                 metadata: metadata_hash(&row.meta),
+                columns: columns.hashes(&row.meta),
                 missing: lines,
             });
         }

@@ -44,6 +44,7 @@ pub mod byte_size;
 pub mod change_setting;
 pub mod check;
 pub mod closing;
+pub mod column_hashes;
 pub mod copy;
 pub mod demo_folder;
 pub mod details;

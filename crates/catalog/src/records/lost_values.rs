@@ -73,7 +73,7 @@ impl LostValues {
 }
 
 /// Returns whether metadata is more than an empty cell.
-fn has_value(value: &Value) -> bool {
+pub fn has_value(value: &Value) -> bool {
     !value.is_null() && value.as_str() != Some("")
 }
 

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use maud::{Markup, html};
-use serde_json::Map;
+use serde_json::{Map, Value};
 
+use super::changed_columns::ColumnNames;
 use super::components::grouped;
 use super::failure::AppResult;
 use super::import_choice::Planned;
@@ -15,6 +16,7 @@ use mocban_catalog::{BlockAttributes, Catalog, PairAttributes};
 use mocban_core::domain::BlockName;
 use mocban_lists::manifest::BlockRow;
 use mocban_project::blocking::blocking;
+use mocban_project::column_hashes::{ColumnHasher, ColumnHashes};
 use mocban_project::import_blocks::rows_as_stored;
 use mocban_project::import_plan::{PlannedPair, metadata_hash};
 
@@ -53,8 +55,8 @@ const COLUMNS: [[[&str; 2]; 2]; 5] = [
     ],
     [
         [
-            "Pairs that lose all their other columns",
-            "Số cặp mất mọi cột khác",
+            "Pairs that lose values of other columns",
+            "Số cặp mất giá trị ở các cột khác",
         ],
         [
             "Pairs whose other columns change",
@@ -72,7 +74,7 @@ const OTHER_FILES: [&str; 2] = [
     "Số ván được đổi bản quét hoặc trang in",
 ];
 
-/// What may happen to the columns of blocks. If other columns are lost and changed, they are lost.
+/// What may happen to the columns of blocks.
 const BLOCK_COLUMNS: [[[&str; 2]; 2]; 4] = [
     [
         ["Blocks that lose their labels", "Số ván mất nhãn"],
@@ -118,6 +120,8 @@ pub(super) struct ColumnChanges {
     /// For each of [`COLUMNS`] or [`BLOCK_COLUMNS`], the numbers of pairs or blocks that lose its value and that get a first or
     /// another one.
     columns: [[u64; 2]; COLUMNS.len()],
+    /// The other columns whose values are lost, and those that get a first or another one.
+    names: [ColumnNames; 2],
     /// Number of blocks that get another scan or page.
     other_files: u64,
     /// Whether there are further pairs or blocks, which were not compared.
@@ -155,7 +159,10 @@ impl ColumnChanges {
             change(old.character.as_ref(), new.character.as_ref()),
             change(old.unit, new.unit),
             change(old.scanned_face_down, new.scanned_face_down),
-            change(metadata_hash(&old.meta), new.metadata),
+            match &new.columns {
+                Some(columns) => self.other_columns(&old.meta, columns),
+                None => change(metadata_hash(&old.meta), new.metadata),
+            },
         ];
         self.count_changes(&columns, false);
     }
@@ -199,19 +206,50 @@ impl ColumnChanges {
             labels,
             change(old.unit, new.unit),
             change(old.side, new.side),
-            other_columns(old, new),
+            self.other_columns_of_block(old, new),
         ];
         self.count_changes(&columns, !old.has_same_scan_and_page(new));
     }
 
-    /// Counts a pair or block once, and each of its columns that changes.
-    fn count_changes(&mut self, columns: &[Option<usize>], has_other_files: bool) {
-        self.other_files += u64::from(has_other_files);
-        self.count += u64::from(has_other_files || columns.iter().any(Option::is_some));
-        for (counts, found) in self.columns.iter_mut().zip(columns) {
-            if let Some(what) = *found {
-                counts[what] += 1;
+    /// Returns whether other columns lose values, and whether they get first or other ones, and keeps their names.
+    fn other_columns(&mut self, old: &Map<String, Value>, new: &ColumnHashes) -> [bool; 2] {
+        let Some(old) = ColumnHasher::default().hashes(old) else {
+            return [false, true];
+        };
+        let changes = old.changes(new);
+        for (names, changed) in self.names.iter_mut().zip(&changes) {
+            for name in changed {
+                names.add(name);
             }
+        }
+        changes.map(|changed| !changed.is_empty())
+    }
+
+    /// Returns what happens to the other columns of a block. An import that has none keeps them.
+    fn other_columns_of_block(
+        &mut self,
+        old: &BlockAttributes,
+        new: &BlockAttributes,
+    ) -> [bool; 2] {
+        let Some(new) = &new.meta else {
+            return [false; 2];
+        };
+        let none = Map::new();
+        let old = old.meta.as_ref().unwrap_or(&none);
+        match ColumnHasher::default().hashes(new) {
+            Some(new) => self.other_columns(old, &new),
+            None => [false, old != new],
+        }
+    }
+
+    /// Counts a pair or block once, and each of its columns that changes.
+    fn count_changes(&mut self, columns: &[[bool; 2]], has_other_files: bool) {
+        self.other_files += u64::from(has_other_files);
+        let is_changed = columns.as_flattened().contains(&true);
+        self.count += u64::from(has_other_files || is_changed);
+        let counts = self.columns.as_flattened_mut().iter_mut();
+        for (count, is_changed) in counts.zip(columns.as_flattened()) {
+            *count += u64::from(*is_changed);
         }
     }
 
@@ -227,9 +265,12 @@ impl ColumnChanges {
         } else {
             COLUMNS.as_slice()
         };
-        let counts = self.columns.iter().zip(texts);
-        let lines = counts.flat_map(|(counts, texts)| counts.iter().zip(texts));
-        let lines = lines.filter(|(number, _)| **number > 0);
+        let named = self.names.each_ref().map(ColumnNames::text);
+        let unnamed = texts.len().saturating_sub(1);
+        let names = std::iter::repeat_n("", 2 * unnamed).chain(named.iter().map(String::as_str));
+        let counts = self.columns.as_flattened().iter();
+        let lines = counts.zip(texts.as_flattened()).zip(names);
+        let lines = lines.filter(|((number, _), _)| **number > 0);
         let loses = self.columns.iter().any(|[lost, _]| *lost > 0);
         html! {
             @if self.count > 0 {
@@ -243,7 +284,7 @@ impl ColumnChanges {
                     }
                     ul {
                         @if self.other_files > 0 { li { (OTHER_FILES[visit.index()]) ": " b { (grouped(self.other_files)) } } }
-                        @for (number, texts) in lines { li { (texts[visit.index()]) ": " b { (grouped(*number)) } } }
+                        @for ((number, texts), names) in lines { li { (texts[visit.index()]) ": " b { (grouped(*number)) } (names) } }
                     }
                     @if loses && self.are_blocks {
                         p { (visit.t(
@@ -269,22 +310,10 @@ fn known_rows<'r>(rows: &'r [BlockRow], known: &BTreeSet<BlockName>) -> (Vec<&'r
     (compared, rows.next().is_some())
 }
 
-/// Returns what happens to the other columns of a block. An import that has none keeps them.
-fn other_columns(old: &BlockAttributes, new: &BlockAttributes) -> Option<usize> {
-    let new = new.meta.as_ref()?;
-    let mut names = old.meta.iter().flat_map(Map::keys);
-    if names.any(|name| !new.contains_key(name)) {
-        return Some(0);
-    }
-    (metadata_hash(old.meta.iter().flatten()) != metadata_hash(new)).then_some(1)
-}
-
-/// Returns 0 if a value is lost, and 1 if there is a first or another one.
-fn change<T: Copy + PartialEq>(old: Option<T>, new: Option<T>) -> Option<usize> {
-    match (old, new) {
-        (Some(_), None) => Some(0),
-        _ => (old != new).then_some(1),
-    }
+/// Returns whether a value is lost, and whether there is a first or another one.
+fn change<T: Copy + PartialEq>(old: Option<T>, new: Option<T>) -> [bool; 2] {
+    let is_lost = old.is_some() && new.is_none();
+    [is_lost, !is_lost && old != new]
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ mod backup_card;
 mod backup_files;
 mod block_page;
 mod blocks_page;
+mod changed_columns;
 mod child_run;
 mod choice_bar;
 mod chosen_pairs;

@@ -5,12 +5,12 @@ use crate::app::visit::Visit;
 use crate::review::Language;
 use mocban_catalog::{BlockAttributes, PairAttributes};
 use mocban_core::domain::{BlockName, LengthUnit, PairName};
+use mocban_project::column_hashes::{ColumnHasher, ColumnHashes};
 use mocban_project::import_plan::PlannedPair;
 use serde_json::{Map, Value};
 
-#[test]
-fn lost_and_other_values_are_counted() {
-    let old = PairAttributes {
+fn pair() -> PairAttributes {
+    PairAttributes {
         name: PairName::new("1").expect("a name"),
         mesh_path: "1.stl".to_owned(),
         print_path: "1.png".to_owned(),
@@ -20,8 +20,12 @@ fn lost_and_other_values_are_counted() {
         block: Some("Ván 1".to_owned()),
         meta: Map::new(),
         prior: None,
-    };
-    let mut new = PlannedPair {
+    }
+}
+
+/// Returns what an import of the same pair without other columns would store.
+fn planned(old: &PairAttributes) -> PlannedPair {
+    PlannedPair {
         name: old.name.clone(),
         mesh: "1.stl".into(),
         print: "1.png".into(),
@@ -30,8 +34,22 @@ fn lost_and_other_values_are_counted() {
         unit: old.unit,
         scanned_face_down: None,
         metadata: None,
+        columns: Some(ColumnHashes::default()),
         missing: Vec::new(),
-    };
+    }
+}
+
+/// Returns other columns with their values.
+fn meta(columns: &[[&str; 2]]) -> Map<String, Value> {
+    let columns = columns.iter();
+    let columns = columns.map(|[name, value]| ((*name).to_owned(), Value::from(*value)));
+    columns.collect()
+}
+
+#[test]
+fn lost_and_other_values_are_counted() {
+    let old = pair();
+    let mut new = planned(&old);
     let mut changes = ColumnChanges::default();
     changes.add(&old, &new);
     assert_eq!(changes, ColumnChanges::default());
@@ -48,6 +66,65 @@ fn lost_and_other_values_are_counted() {
     ] {
         assert!(shown.contains(text), "{shown}");
     }
+}
+
+#[test]
+fn other_columns_of_pairs_are_named_that_are_lost_or_change() {
+    let old = PairAttributes {
+        meta: meta(&[["Ghi chú", "x"], ["Kho lưu", "R.12"], ["Năm", "1872"]]),
+        ..pair()
+    };
+    let new = |columns: &[[&str; 2]]| PlannedPair {
+        columns: ColumnHasher::default().hashes(&meta(columns)),
+        ..planned(&old)
+    };
+    let mut changes = ColumnChanges::default();
+    changes.add(
+        &old,
+        &new(&[["Ghi chú", "x"], ["Kho lưu", "R.12"], ["Năm", "1872"]]),
+    );
+    assert_eq!(changes, ColumnChanges::default());
+    changes.add(
+        &old,
+        &new(&[["Ghi chú", "x"], ["Năm", "1873"], ["Dòng", "3"]]),
+    );
+    changes.add(&old, &new(&[["Năm", "1872"]]));
+    for (language, texts) in [
+        (
+            Language::English,
+            [
+                "this import changes: <b>2</b>",
+                "lose values of other columns: <b>2</b> (Ghi chú, Kho lưu)",
+                "whose other columns change: <b>1</b> (Dòng, Năm)",
+            ],
+        ),
+        (
+            Language::Vietnamese,
+            [
+                "thay đổi: <b>2</b>",
+                "mất giá trị ở các cột khác: <b>2</b> (Ghi chú, Kho lưu)",
+                "có các cột khác bị đổi: <b>1</b> (Dòng, Năm)",
+            ],
+        ),
+    ] {
+        let shown = changes.part(&Visit::in_language(language)).into_string();
+        for text in texts {
+            assert!(shown.contains(text), "{text}: {shown}");
+        }
+    }
+    // The columns of a list with very many are compared together.
+    let unnamed = PlannedPair {
+        columns: None,
+        ..planned(&old)
+    };
+    let mut changes = ColumnChanges::default();
+    changes.add(&old, &unnamed);
+    let shown = changes.part(&Visit::in_language(Language::English));
+    let shown = shown.into_string();
+    assert!(
+        shown.contains("lose values of other columns: <b>1</b></li>"),
+        "{shown}"
+    );
 }
 
 fn block() -> BlockAttributes {
@@ -88,13 +165,7 @@ fn blocks_that_lose_their_labels_are_counted() {
 
 #[test]
 fn blocks_that_lose_other_columns_or_get_another_page_are_counted() {
-    let meta = |columns: &[[&str; 2]]| -> Option<Map<String, Value>> {
-        let columns = columns.iter().map(|[name, value]| {
-            let (name, value) = (*name, *value);
-            (name.to_owned(), Value::from(value))
-        });
-        Some(columns.collect())
-    };
+    let meta = |columns: &[[&str; 2]]| Some(meta(columns));
     let old = BlockAttributes {
         meta: meta(&[["Ghi chú", "x"], ["Kho lưu", "R.12"]]),
         ..block()
@@ -119,15 +190,15 @@ fn blocks_that_lose_other_columns_or_get_another_page_are_counted() {
     for text in [
         "this import changes: <b>2</b>",
         "another scan or page: <b>2</b>",
-        "lose values of other columns: <b>1</b>",
-        "whose other columns change: <b>1</b>",
+        "lose values of other columns: <b>1</b> (Kho lưu)",
+        "whose other columns change: <b>1</b> (Ghi chú)",
     ] {
         assert!(english.contains(text), "{english}");
     }
     for text in [
         "đổi bản quét hoặc trang in: <b>2</b>",
-        "mất giá trị ở các cột khác: <b>1</b>",
-        "có các cột khác bị đổi: <b>1</b>",
+        "mất giá trị ở các cột khác: <b>1</b> (Kho lưu)",
+        "có các cột khác bị đổi: <b>1</b> (Ghi chú)",
     ] {
         assert!(vietnamese.contains(text), "{vietnamese}");
     }
