@@ -45,7 +45,7 @@ pub(super) fn card(visit: &Visit) -> Markup {
                 label.check {
                     input #with-inputs type="checkbox" name="inputs" value="yes" autocomplete="off"; " "
                     (visit.t("with the scans and prints", "kèm bản quét và bản in")) " "
-                    span.muted #inputs-size data-load="health/inputs" aria-live="polite" {}
+                    span.muted #inputs-size data-load="health/inputs" aria-live="polite" { (visit.t("(adding up their sizes…)", "(đang tính dung lượng…)")) }
                 }
                 button #backup { (visit.t("Back up now", "Sao lưu ngay")) }
             }))

@@ -28,8 +28,9 @@ const STEP_TIME: Duration = Duration::from_millis(500);
 /// How long files of the shown pairs are looked at; the file that is read then is finished.
 const SHOWN_TIME: Duration = Duration::from_secs(3);
 
-/// Returns the places of the page that are filled from the files of pairs or blocks: a table, and the files that cannot be used.
-pub(super) fn files_part(visit: &Visit, are_blocks: bool) -> Markup {
+/// Returns the places of the page that are filled from the files of a number of pairs or blocks: a table, and the files that
+/// cannot be used.
+pub(super) fn files_part(visit: &Visit, are_blocks: bool, total: u64) -> Markup {
     let query = visit.query.text();
     let [looked_at, others] = if are_blocks {
         [
@@ -58,7 +59,7 @@ pub(super) fn files_part(visit: &Visit, are_blocks: bool) -> Markup {
         }
         div #file-problems data-address={ (visit.root) "import/problems" (query) } {
             p.muted role="status" {
-                (looked_at) ": " span #looked-at { "0" }
+                (looked_at) ": " span #looked-at { "0 / " (grouped(total)) }
                 " · " (visit.t("files that cannot be used", "tệp không dùng được")) ": " b #unusable { "0" }
             }
             ul #unusable-files {}
@@ -407,9 +408,13 @@ mod tests {
         ] {
             let visit = Visit::in_language(language);
             let [pairs, blocks] = [false, true].map(|are_blocks| {
-                let part = files_part(&visit, are_blocks);
+                let part = files_part(&visit, are_blocks, 1200);
                 part.into_string()
             });
+            for part in [&pairs, &blocks] {
+                let counter = "<span id=\"looked-at\">0 / 1\u{202f}200</span>";
+                assert!(part.contains(counter), "{part}");
+            }
             assert!(pairs.contains(of_pairs), "{pairs}");
             assert!(blocks.contains(of_blocks), "{blocks}");
         }

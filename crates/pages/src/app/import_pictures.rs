@@ -86,7 +86,10 @@ fn labels_text(visit: &Visit, one: &FileHeaders) -> Markup {
             },
             Some(Err(why)) => span.bad[matches!(why, UnreadFile::Unusable(_))] { (one_line(why.sentence().text(visit.language))) },
             None if one.files.labels.is_none() => (visit.t("No labels: a run looks for the characters on the page.", "Không có nhãn: lần chạy sẽ tìm các chữ trên trang in.")),
-            None => {},
+            None => (visit.t(
+                "The labels are not counted, because the page cannot be used.",
+                "Không đếm nhãn vì không dùng được trang in.",
+            )),
         }
     }
 }
@@ -178,4 +181,38 @@ fn draw_scan(
     let points = places.read(&files.scan, |path| scan_points(path, &limits.mesh))?;
     let picture = points_from_above(&points, SIDE);
     picture.ok_or_else(|| UnreadFile::of_program("the mesh has no vertices"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::labels_text;
+    use crate::app::import_headers::{FileHeaders, PlannedFiles, UnreadFile};
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+    use mocban_project::file_headers::ScanKind;
+
+    #[test]
+    fn labels_of_a_page_that_cannot_be_used_are_said_not_to_be_counted() {
+        let one = FileHeaders {
+            files: PlannedFiles {
+                name: "b".to_owned(),
+                kind: ScanKind::Block,
+                scan: "b.stl".into(),
+                print: "b.png".into(),
+                labels: Some("b.json".into()),
+                unit: None,
+            },
+            scan: Err(UnreadFile::Outside),
+            print: Err(UnreadFile::Outside),
+            page_mm: None,
+            labels: None,
+        };
+        for (language, said) in [
+            (Language::English, "The labels are not counted"),
+            (Language::Vietnamese, "Không đếm nhãn"),
+        ] {
+            let shown = labels_text(&Visit::in_language(language), &one).into_string();
+            assert!(shown.starts_with(said), "{shown}");
+        }
+    }
 }

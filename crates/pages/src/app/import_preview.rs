@@ -49,6 +49,10 @@ pub(super) fn plan_part(
     from: u64,
     changed: &Markup,
 ) -> Markup {
+    let total = match planned {
+        Planned::Pairs(plan, _) => plan.pairs,
+        Planned::Blocks(read, _) => read.rows.len() as u64,
+    };
     html! {
         section.card {
             h2 { (visit.t("What would be imported", "Sẽ nhập những gì")) }
@@ -63,18 +67,10 @@ pub(super) fn plan_part(
                 },
                 Planned::Pairs(plan, at) => (pairs_part(visit, chosen, plan, *at, from)),
             }
-            @if has_files(planned) { (files_part(visit, matches!(planned, Planned::Blocks(..)))) }
+            @if total > 0 { (files_part(visit, matches!(planned, Planned::Blocks(..)), total)) }
             (changed)
             (import_form(visit, chosen, planned))
         }
-    }
-}
-
-/// Returns whether there are files to look at.
-fn has_files(planned: &Planned) -> bool {
-    match planned {
-        Planned::Pairs(plan, _) => plan.pairs > 0,
-        Planned::Blocks(read, _) => !read.rows.is_empty(),
     }
 }
 

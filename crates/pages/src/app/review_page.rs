@@ -75,7 +75,9 @@ pub(super) async fn page(
             },
         }
         div #live data-live="3000" role="status" { (invitation_list(&visit, &invited)) }
-        div #reviewers data-load="review/agreement" aria-live="polite" {}
+        div #reviewers data-load="review/agreement" aria-live="polite" {
+            p.muted { (visit.t("Reading the verdicts…", "Đang đọc các đánh giá…")) }
+        }
     };
     let title = visit.t("Review", "Đánh giá");
     Ok(frame(&visit, title, Some(&key), NavSection::Review, &body))
