@@ -7,7 +7,7 @@ use crate::events::{Listener, LongWork, warn};
 use crate::exit::Refusal;
 use crate::location::{Location, now, refuse_password, settings_of};
 use crate::missing_inputs;
-use crate::new_project::check_new_folder;
+use crate::new_project::{check_new_folder, warn_about_name};
 use mocban_catalog::{Catalog, CatalogCopy, CatalogError};
 use mocban_core::domain::is_address;
 use mocban_runner::is_running;
@@ -29,6 +29,9 @@ pub async fn copy(from: &str, to: &str, listener: &dyn Listener) -> ProjectResul
     }
     let source = open(from, listener).await;
     let source = source.map_err(|error| of_source(error, from))?;
+    if !is_address(to) {
+        warn_about_name(Path::new(to), listener);
+    }
     let work = LongWork::begin(listener, "copying the catalog");
     let copied = write(&source, from, to).await;
     drop(work);

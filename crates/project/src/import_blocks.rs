@@ -17,7 +17,7 @@ use crate::location::{Location, now};
 use crate::lost_values::lost_values;
 use crate::manifest_file::{is_below_root, refuse, renamed_columns};
 use crate::missing_files::{MissingFiles, locate_file};
-use crate::new_project::import_with;
+use crate::new_project::{import_with, warn_about_name};
 use crate::repeated_files::RepeatedFiles;
 use mocban_catalog::{BlockAttributes, BlockImportSummary, SameFiles};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
@@ -156,6 +156,7 @@ pub async fn import_blocks(
     let _work = LongWork::begin(listener, "importing");
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
+    warn_about_name(project.dir(), listener);
     let mut listing = listing(source, &project)?;
     let (mut missing, mut searches) = (MissingFiles::default(), SimilarFiles::default());
     for row in &mut listing.rows {

@@ -16,7 +16,7 @@ use crate::location::{Location, now};
 use crate::lost_values::lost_values;
 use crate::manifest_file::{Listing, list_content};
 use crate::missing_files::MissingFiles;
-use crate::new_project::import_with;
+use crate::new_project::{import_with, warn_about_name};
 use crate::pair_choices::PairChoices;
 use crate::row_spool::RowSpool;
 use crate::truth_file::{self, TruthRow};
@@ -125,6 +125,7 @@ pub async fn import_pairs(
     };
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
+    warn_about_name(project.dir(), listener);
     let truths = stored_truths(truths, &project)?;
     // The files are looked at before the catalog is locked, because a disk may be slow and a list long.
     let looked_at = project.clone();

@@ -3,9 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::ProjectResult;
+use crate::events::{Listener, warn};
 use crate::exit::Refusal;
 use crate::own_files::{is_project, project_role};
 use mocban_catalog::{Catalog, NewCatalog};
+use mocban_core::domain::spelling::quoted;
+use mocban_lists::relative_path::RelativePath;
 use mocban_store::Project;
 
 /// Returns the missing directories of a path, the deepest first.
@@ -38,6 +41,28 @@ pub(crate) fn check_new_folder(dir: &Path) -> Result<(), Refusal> {
             "the name of the new folder \"{}\" begins or ends with white space and would look like another name; name it without",
             dir.display()
         ))),
+    }
+}
+
+/// Returns a warning about a new folder whose name no folder on Windows can have, because a project may be copied there. It is
+/// no error, because a path that a command names may be meant, and may never leave this computer.
+pub fn name_warning(dir: &Path) -> Option<String> {
+    let new = missing_dirs(dir);
+    let mut names = new.iter().filter_map(|dir| dir.file_name());
+    names.find_map(|name| {
+        let name = name.to_string_lossy();
+        let fault = RelativePath::new(&name).err()?;
+        Some(format!(
+            "the project in the new folder {} cannot be copied to Windows, because {fault}; another name avoids that",
+            quoted(&name)
+        ))
+    })
+}
+
+/// Warns about the name of a new folder like [`name_warning`].
+pub(crate) fn warn_about_name(dir: &Path, listener: &dyn Listener) {
+    if let Some(warning) = name_warning(dir) {
+        warn(listener, warning);
     }
 }
 
@@ -115,8 +140,36 @@ async fn try_begin(project: &Project) -> ProjectResult<Option<NewCatalog>> {
 mod tests {
     use unicode_normalization::UnicodeNormalization as _;
 
-    use super::check_new_folder;
+    use super::{check_new_folder, name_warning};
     use crate::location::Location;
+
+    #[test]
+    fn new_folders_that_windows_cannot_have_are_warned_about() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let warning = |name: &str| name_warning(&dir.path().join(name));
+        assert_eq!(warning("dự án 1"), None);
+        for (name, why) in [
+            (
+                "con",
+                "\"con\" cannot be copied to Windows, because its name is that of a device",
+            ),
+            ("aux/project", "\"aux\" cannot"),
+            ("a?", "because its name has '?'"),
+            ("ván.", "ends with a space or a dot"),
+        ] {
+            let said = warning(name).expect(name);
+            assert!(said.contains(why), "{said}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_that_exists_is_not_warned_about() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let device = dir.path().join("nul");
+        std::fs::create_dir(&device).expect("a folder");
+        assert_eq!(name_warning(&device), None);
+    }
 
     #[test]
     fn folders_that_look_like_another_are_not_created() {

@@ -14,7 +14,7 @@ use crate::input_finder::finder_in;
 use crate::input_list::{InputCopies, has_list, inputs_folder};
 use crate::location::Location;
 use crate::missing_inputs::{self, MissingInputs};
-use crate::new_project::check_new_folder;
+use crate::new_project::{check_new_folder, warn_about_name};
 use crate::restore_inputs::{ListedCopies, ProjectCopies, locate_inputs};
 use mocban_catalog::Catalog;
 use mocban_config::{LocalSettings, make_local};
@@ -79,6 +79,7 @@ pub async fn restore(
     }
     check_directory(&Project::at(dir))?;
     check_new_folder(dir)?;
+    warn_about_name(dir, listener);
     location.at(dir).require_local("the restored project")?;
     let copies = match inputs {
         Some(_) => None,

@@ -29,6 +29,7 @@ use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::import_blocks::import_blocks;
 use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
+use mocban_project::new_project::name_warning;
 use mocban_project::pair_choices::PairChoices;
 use mocban_project::run::{PreparedRun, options};
 use mocban_project::sheets::contact_sheet;
@@ -73,6 +74,9 @@ pub(crate) async fn demo(args: DemoArgs, context: &Context) -> ProjectResult<Exi
     let context = context.at(&dir);
     // Before settings and data are written there.
     check_directory(&dir, &dir.join("data"), &content)?;
+    if let Some(warning) = name_warning(&dir) {
+        context.warn(&warning);
+    }
     context.location.require_local("the demo")?;
     context.location.data_locations()?;
     let context = &save_settings(&dir, &context)?;

@@ -13,8 +13,8 @@ use super::{ErrorCode, Explained, is_hidden, sanitize};
 /// Characters of an id that a file name on Windows may not have, and the escape character itself. All are ASCII.
 const ESCAPED: &str = "%\"*:<>?|";
 /// Names that are devices on Windows, with and without an extension.
-const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
-/// Devices with a number from 0 to 9.
+const DEVICES: [&str; 6] = ["con", "prn", "aux", "nul", "conin$", "conout$"];
+/// Devices with a number from 0 to 9, which may be a superscript.
 const NUMBERED_DEVICES: [&str; 2] = ["com", "lpt"];
 
 /// Spaces that text programs write and nobody sees.
@@ -168,7 +168,8 @@ pub fn is_device(text: &str) -> bool {
         let mut devices = devices.iter();
         devices.any(|device| name.eq_ignore_ascii_case(device))
     };
-    let unnumbered = stem.strip_suffix(|c: char| c.is_ascii_digit());
+    let is_number = |c: char| c.is_ascii_digit() || "\u{b9}\u{b2}\u{b3}".contains(c);
+    let unnumbered = stem.strip_suffix(is_number);
     is_in(&DEVICES, stem) || unnumbered.is_some_and(|name| is_in(&NUMBERED_DEVICES, name))
 }
 
@@ -281,6 +282,8 @@ mod tests {
         assert_eq!(of("tờ 1."), "tờ 1%2E");
         assert_eq!(of("nul.1"), "%6Eul.1");
         assert_eq!(of("COM7"), "%43OM7");
+        assert_eq!(of("lpt\u{b2}.a"), "%6Cpt\u{b2}.a");
+        assert_eq!(of("CONIN$"), "%43ONIN$");
         assert_eq!(of("COM10"), "COM10");
         assert_eq!(of("aux."), "%61ux%2E");
     }

@@ -7,10 +7,13 @@ use super::failure::{AppFailure, AppResult};
 use super::projects::is_project;
 use super::sentence::Sentence;
 use super::uploads::FOLDER as UPLOADS;
+use mocban_core::domain::is_device;
 use mocban_core::domain::spelling::quoted;
 
 /// Longest name of a new project, characters.
 pub(super) const NAME_CHARS: usize = 60;
+/// Characters that the name of a folder on Windows may not have. A project may be copied there.
+const FORBIDDEN: [char; 9] = ['/', '\\', ':', '*', '?', '"', '<', '>', '|'];
 
 /// Returns the folder of a new project in the folder of the app.
 ///
@@ -50,10 +53,23 @@ fn problem(name: &str) -> Option<Sentence> {
             "begins with a dot: begin it with another character".to_owned(),
             "bắt đầu bằng dấu chấm: hãy bắt đầu bằng ký tự khác".to_owned(),
         ]
-    } else if let Some(other) = name.chars().find(|c| ['/', '\\', ':'].contains(c)) {
+    } else if let Some(other) = name.chars().find(|c| FORBIDDEN.contains(c)) {
+        let others = FORBIDDEN.map(String::from).join(" ");
         [
-            format!("has \"{other}\": give a name without /, \\ and :"),
-            format!("có ký tự \"{other}\": hãy đặt tên không có /, \\ và :"),
+            format!("has \"{other}\": give a name without any of {others}"),
+            format!("có ký tự \"{other}\": hãy đặt tên không có các ký tự {others}"),
+        ]
+    } else if is_device(name) {
+        [
+            "is that of a device on Windows, to which the project may be copied: give another name"
+                .to_owned(),
+            "là tên thiết bị của Windows, nơi dự án có thể được chép đến: hãy đặt tên khác"
+                .to_owned(),
+        ]
+    } else if name.ends_with('.') {
+        [
+            "ends with a dot, which Windows leaves out: end it with another character".to_owned(),
+            "kết thúc bằng dấu chấm, mà Windows sẽ bỏ đi: hãy kết thúc bằng ký tự khác".to_owned(),
         ]
     } else if name.contains(char::is_control) {
         [
@@ -87,7 +103,7 @@ mod tests {
     #[test]
     fn a_name_is_refused_for_what_is_wrong_with_it() {
         let longest = "x".repeat(60);
-        for name in ["ván 04", "b.c", "a…", longest.as_str()] {
+        for name in ["ván 04", "b.c", "a…", "con 1", "com10", longest.as_str()] {
             assert_eq!(problem(name), None, "{name}");
         }
         let long = "x".repeat(61);
@@ -103,6 +119,11 @@ mod tests {
             ("..", ["begins with a dot", "bắt đầu bằng dấu chấm"]),
             ("a/b", ["because it has \"/\": ", "có ký tự \"/\": "]),
             ("a:b", ["because it has \":\": ", "có ký tự \":\": "]),
+            ("a?", ["because it has \"?\": ", "có ký tự \"?\": "]),
+            ("Con", ["it is that of a device", "là tên thiết bị"]),
+            ("nul.1", ["it is that of a device", "là tên thiết bị"]),
+            ("com1", ["it is that of a device", "là tên thiết bị"]),
+            ("ván.", ["it ends with a dot", "kết thúc bằng dấu chấm"]),
             ("a\nb", ["has a line break", "có dấu xuống dòng"]),
             (long.as_str(), ["has 61 characters", "có 61 ký tự"]),
         ] {
