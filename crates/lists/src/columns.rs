@@ -38,11 +38,11 @@ impl SameColumn {
         let Self { first, second } = self;
         let (one, other) = (header[first - 1], header[second - 1]);
         let [shown, shown_other] = [one, other].map(quoted);
-        if one.eq_ignore_ascii_case(other) {
+        if one == other {
             format!("columns {first} and {second} are both named {shown_other}")
         } else {
             format!(
-                "columns {first} and {second}, {shown} and {shown_other}, are the same; rename one of them"
+                "columns {first} and {second}, {shown} and {shown_other}, have the same name (upper and lower case, accents and blanks do not count); rename one of them"
             )
         }
     }
@@ -148,6 +148,27 @@ mod tests {
         ] {
             let expected = [Some("id"), Some("face_down"), Some("block")];
             assert_eq!(columns(&header), expected, "{header:?}");
+        }
+    }
+
+    #[test]
+    fn headings_that_are_written_differently_are_both_shown() {
+        let of = |header: &[&str]| {
+            let same = COLUMNS.assign(header).expect_err("two of one name");
+            same.reason(header)
+        };
+        assert_eq!(
+            of(&["block", "x", "block"]),
+            "columns 1 and 3 are both named \"block\""
+        );
+        for (one, other) in [
+            ("block", "Block"),
+            ("Khối", "khoi"),
+            ("face_down", "Face Down"),
+        ] {
+            let shown = format!("columns 1 and 2, \"{one}\" and \"{other}\", have the same name (");
+            let reason = of(&[one, other]);
+            assert!(reason.starts_with(&shown), "{reason}");
         }
     }
 

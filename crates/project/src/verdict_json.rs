@@ -162,7 +162,9 @@ fn with_known_names(fields: Map<String, Value>) -> Result<Map<String, Value>, St
     let names: Vec<&str> = fields.keys().map(|name| name.trim()).collect();
     let found = COLUMNS.assign(&names).map_err(|same| {
         let [one, other] = [same.first, same.second].map(|number| quoted(names[number - 1]));
-        format!("the fields {one} and {other} are the same; leave one of them out")
+        format!(
+            "the fields {one} and {other} have the same name (upper and lower case, accents and blanks do not count); leave one of them out"
+        )
     })?;
     let named = fields.into_iter().zip(found.columns);
     Ok(named

@@ -120,10 +120,16 @@ impl RowKeys {
         }
         let twice = |k: usize| format!("the key {} {KEY_TWICE}", quoted(&object[k].0));
         let names: Vec<&str> = keys.clone().map(|key| key.trim()).collect();
-        let found = self
-            .known
-            .assign(&names)
-            .map_err(|same| twice(same.second - 1))?;
+        let found = self.known.assign(&names).map_err(|same| {
+            let [one, other] = [same.first, same.second].map(|number| names[number - 1]);
+            if one == other {
+                return twice(same.second - 1);
+            }
+            let [one, other] = [one, other].map(quoted);
+            format!(
+                "the keys {one} and {other} have the same name (upper and lower case, accents and blanks do not count); leave one of them out"
+            )
+        })?;
         let mut others = BTreeSet::new();
         let is_twice = |k: &usize| found.columns[*k].is_none() && !others.insert(&object[*k].0);
         if let Some(k) = (0..object.len()).find(is_twice) {

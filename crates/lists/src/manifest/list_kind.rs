@@ -309,7 +309,11 @@ mod tests {
         let list = "Ván,Bản quét,Trang in,Nhãn,Nhan\nb,m.stl,p.png,l.json,l.json\n".as_bytes();
         assert!(ListKind::of_csv(list).is_of_blocks);
         let refused = read_blocks(list).expect_err("two labels").to_string();
-        let reason = "columns 4 and 5, \"Nhãn\" and \"Nhan\", are the same; rename one of them";
+        let reason = "columns 4 and 5, \"Nhãn\" and \"Nhan\", have the same name (";
+        assert!(refused.contains(reason), "{refused}");
+        let list = "block,mesh,page,labels,Labels\nb,m.stl,p.png,l.json,l.json\n".as_bytes();
+        let refused = read_blocks(list).expect_err("two labels").to_string();
+        let reason = "columns 4 and 5, \"labels\" and \"Labels\", have the same name (";
         assert!(refused.contains(reason), "{refused}");
         let pairs = "Mã,Bản quét,Bản in,ma\n1,m.stl,p.png,1\n";
         assert!(!ListKind::of_csv(pairs.as_bytes()).is_of_blocks);

@@ -99,8 +99,8 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "cột {0} và cột {1} cùng có tên {2}",
     ),
     (
-        "columns {} and {}, {} and {}, are the same",
-        "cột {0} và cột {1}, {2} và {3}, là một",
+        "columns {} and {}, {} and {}, have the same name (upper and lower case, accents and blanks do not count)",
+        "cột {0} và cột {1}, {2} và {3}, trùng tên (không phân biệt chữ hoa, chữ thường, dấu và khoảng trắng)",
     ),
     ("column \"id\" is missing", "thiếu cột \"id\" (mã)"),
     (
@@ -242,6 +242,11 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ("the list ends early", "danh sách kết thúc sớm"),
     ("save or copy it again", "hãy lưu hoặc chép lại"),
     ("the key {} is given twice", "khóa {0} được ghi hai lần"),
+    (
+        "the keys {} and {} have the same name (upper and lower case, accents and blanks do not count)",
+        "khóa {0} và khóa {1} trùng tên (không phân biệt chữ hoa, chữ thường, dấu và khoảng trắng)",
+    ),
+    ("leave one of them out", "hãy bỏ một trong hai"),
     (
         "the rows are in the list {} of an object",
         "các dòng nằm trong danh sách {0} của một đối tượng",

@@ -90,8 +90,9 @@ fn fields_of_json_have_the_names_of_columns() {
     let refused = parse_jsonl(twice.as_bytes())
         .expect_err("twice")
         .to_string();
-    let reason = "line 1: the fields \"Pair\" and \"pair\" are the same; leave one of them out";
-    assert_eq!(refused, reason);
+    let reason =
+        "line 1: the fields \"Pair\" and \"pair\" have the same name (upper and lower case, ";
+    assert!(refused.starts_with(reason), "{refused}");
 }
 
 #[test]

@@ -130,8 +130,8 @@ fn missing_and_repeated_columns_are_reported() {
          model, print"
     );
     assert_eq!(
-        refusal("id,mesh,print,Mesh\na,b,c,d\n"),
-        "line 1: columns 2 and 4 are both named \"Mesh\""
+        refusal("id,mesh,print,mesh\na,b,c,d\n"),
+        "line 1: columns 2 and 4 are both named \"mesh\""
     );
     assert_eq!(refusal(""), "the list is empty");
     assert_eq!(refusal("id,mesh,print\n"), "the list contains no pairs");
@@ -425,7 +425,7 @@ fn headings_and_cells_of_macos_are_shown_as_they_are_read() {
     for (list, expected) in [
         (
             format!("id,mesh,{print},Bản in\n"),
-            "line 1: columns 3 and 4, \"bản in\" and \"Bản in\", are the same; rename one of them",
+            "line 1: columns 3 and 4, \"bản in\" and \"Bản in\", have the same name (upper and lower case, accents and blanks do not count); rename one of them",
         ),
         (
             format!("id,mesh,print,{block} x,{block} x\n"),
