@@ -12,7 +12,7 @@ use super::files::{MAX_SHOWN, RefusedLine, fields_with_lines};
 use super::location::now;
 use super::verdict_columns::{COLUMNS, REQUIRED};
 use super::verdict_json::{array_rows, json_rows};
-use super::verdict_row::{DAY_MS, GivenTime, VerdictRow, at_line};
+use super::verdict_row::{DAY_MS, GivenTime, VerdictRow, at_line, cells_reason};
 use super::verdict_words;
 use mocban_catalog::{
     CLOCK_SKEW_MS, InvalidVerdict, ListedVerdict, NewVerdict, ReviewContext, person_name,
@@ -21,8 +21,7 @@ use mocban_core::domain::spelling::{hint, quoted};
 use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{
-    CsvText, LineCounter, NotText, as_utf8, cell_error, fits_header, is_array, later_header,
-    trimmed,
+    CsvText, LineCounter, NotText, as_utf8, fits_header, is_array, later_header, trimmed,
 };
 use mocban_lists::quotes::check_quotes;
 use mocban_system::time_text::{day, duration};
@@ -240,14 +239,13 @@ impl CsvColumns {
         Err(RefusedLine::new(line, &reason))
     }
 
-    /// Refuses a row with the error of a formula.
+    /// Refuses a row with errors of formulas.
     fn refuse_errors(&self, record: &StringRecord, line: usize) -> Result<(), RefusedLine> {
-        let mut cells = COLUMNS.names.iter().zip(self.positions);
-        let error = cells.find_map(|(name, position)| {
-            let cell = record.get(position?)?;
-            cell_error(name, trimmed(cell))
-        });
-        error.map_or(Ok(()), |reason| Err(RefusedLine::new(line, &reason)))
+        let cells = COLUMNS.names.iter().zip(self.positions);
+        let cells =
+            cells.filter_map(|(name, position)| Some((*name, trimmed(record.get(position?)?))));
+        let reason = cells_reason(cells);
+        reason.map_or(Ok(()), |reason| Err(RefusedLine::new(line, &reason)))
     }
 }
 

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use super::files::RefusedLine;
 use super::location::now;
 use super::verdict_columns::COLUMNS;
-use super::verdict_row::{GivenTime, VerdictRow, at_line};
+use super::verdict_row::{GivenTime, VerdictRow, at_line, cells_reason};
 use super::verdict_words;
 use mocban_catalog::{ListedVerdict, NewVerdict, person_name};
 use mocban_core::domain::spelling::quoted;
@@ -16,7 +16,7 @@ use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
 use mocban_lists::json_numbers::nan_as_null;
-use mocban_lists::manifest::{ArrayCursor, cell_error, place_in_row, trimmed};
+use mocban_lists::manifest::{ArrayCursor, place_in_row, trimmed};
 
 /// The fields of the log of verdicts, which JSON Lines may have.
 const LOG_FIELDS: [&str; 17] = [
@@ -127,16 +127,16 @@ fn parsed(row: &[u8], first: usize) -> Result<(VerdictLine, GivenTime), String> 
     if !fields.contains_key("pair") || fields.keys().any(is_unknown) {
         fields = with_known_names(fields)?;
     }
+    // Notes are stored as they were given.
+    let texts = fields.iter().filter(|(field, _)| *field != "note");
+    let texts = texts.filter_map(|(field, value)| Some((field.as_str(), trimmed(value.as_str()?))));
+    let known = texts.filter(|(field, _)| COLUMNS.names.contains(field));
+    if let Some(reason) = cells_reason(known) {
+        return Err(reason);
+    }
     for (field, stored) in TEXTS {
         match text_of(&fields, field)? {
-            Some(text) => {
-                // Notes are stored as they were given.
-                let error = cell_error(field, &text).filter(|_| field != "note");
-                if let Some(error) = error {
-                    return Err(error);
-                }
-                fields.insert(field.to_owned(), stored(&text)?.into())
-            }
+            Some(text) => fields.insert(field.to_owned(), stored(&text)?.into()),
             None if REQUIRED.contains(&field) => {
                 let is_there = fields.contains_key(field);
                 let what = if is_there { "empty" } else { "missing" };

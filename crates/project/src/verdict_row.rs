@@ -6,6 +6,7 @@ use super::files::RefusedLine;
 use mocban_catalog::ListedVerdict;
 use mocban_core::domain::UnixMillis;
 use mocban_core::domain::spelling::quoted;
+use mocban_lists::manifest::{cell_error, formula_error};
 use mocban_system::time_text::{has_offset, parse_day_first, parse_utc};
 
 pub(crate) const DAY_MS: UnixMillis = 24 * 60 * 60 * 1000;
@@ -66,6 +67,29 @@ impl GivenTime {
             is_day_first,
             is_zone_unknown: true,
         })
+    }
+}
+
+/// Returns why a row with these cells, each with its column, is refused, if some are errors of formulas.
+pub(crate) fn cells_reason<'c>(
+    cells: impl IntoIterator<Item = (&'c str, &'c str)>,
+) -> Option<String> {
+    let cells = cells.into_iter();
+    let found = cells.filter_map(|(column, cell)| Some((column, formula_error(cell)?)));
+    let found: Vec<(&str, &str)> = found.collect();
+    match found.as_slice() {
+        [] => None,
+        [(column, error)] => cell_error(column, error),
+        several => {
+            let shown = several.iter();
+            let shown: Vec<String> = shown
+                .map(|(column, error)| format!("{column} ({error})"))
+                .collect();
+            Some(format!(
+                "columns {} have errors of formulas; correct them in the spreadsheet program, or clear the cells",
+                shown.join(", ")
+            ))
+        }
     }
 }
 

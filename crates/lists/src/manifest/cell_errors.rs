@@ -34,7 +34,7 @@ const ERRORS: [&str; 16] = [
 const NUMBERED: &str = "Err:";
 
 /// Returns the error of a formula that a text is, such as `#REF!`.
-pub(crate) fn formula_error(text: &str) -> Option<&str> {
+pub fn formula_error(text: &str) -> Option<&str> {
     let number = text.strip_prefix(NUMBERED);
     let is_number =
         |number: &str| number.len() == 3 && number.bytes().all(|byte| byte.is_ascii_digit());

@@ -25,8 +25,7 @@ mod unnamed_values;
 
 pub use self::csv::{fits_header, parse_csv, read_csv, read_csv_as};
 pub use block_list::{BlockRow, ReadBlocks, parse_blocks, read_block_json, read_blocks};
-pub(crate) use cell_errors::formula_error;
-pub use cell_errors::{FormulaErrors, cell_error};
+pub use cell_errors::{FormulaErrors, cell_error, formula_error};
 pub use changed_ids::ChangedIds;
 pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;

@@ -68,6 +68,14 @@ fn errors_of_formulas_are_refused_with_their_line_and_column() {
         let start = format!("line 3: column {column} has the error #");
         assert!(refused.starts_with(&start), "{refused}");
     }
+    let text = "pair,verdict,reviewer,note,at\n#REF!,pass,lan,#n/a,Err:502\n";
+    let refused = parse(text.as_bytes(), false).expect_err("errors");
+    let all = "line 2: columns pair (#REF!), note (#N/A), at (Err:502) have errors of formulas; ";
+    assert!(refused.to_string().starts_with(all), "{refused}");
+    let json = r##"{"pair":"#REF!","verdict":"pass","reviewer":"#N/A"}"##;
+    let refused = parse(json.as_bytes(), true).expect_err("errors");
+    let all = "line 1: columns pair (#REF!), reviewer (#N/A) have errors of formulas; ";
+    assert!(refused.to_string().starts_with(all), "{refused}");
     let json = r##"{"pair":"1","verdict":"pass","reviewer":"#N/A"}"##;
     let refused = parse(json.as_bytes(), true).expect_err("an error");
     let refused = refused.to_string();
