@@ -5,7 +5,7 @@
 pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     (
         "the page does not belong to this block: at the best position found, {} % of the places agree",
-        "trang in không thuộc ván này: ở vị trí tốt nhất tìm được, {0} % số chỗ khớp nhau",
+        "trang in không thuộc ván này: ở vị trí tốt nhất tìm được, {0#} % số chỗ khớp nhau",
     ),
     (
         "on the right page nearly all do",
@@ -13,7 +13,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the scan was taken to be {} x {} mm",
-        "bản quét được coi là có cỡ {0} x {1} mm",
+        "bản quét được coi là có cỡ {0#} x {1#} mm",
     ),
     (
         "check the file names and the unit",
@@ -21,19 +21,19 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "characters of about {} mm, but most have 6 to 30 mm",
-        "các chữ khoảng {0} mm, trong khi đa số có 6 đến 30 mm",
+        "các chữ khoảng {0#} mm, trong khi đa số có 6 đến 30 mm",
     ),
     (
         "with the unit {}, its carved surface is {} mm across, but most characters have 6 to 30 mm",
-        "với đơn vị {0}, mặt khắc rộng {1} mm, trong khi đa số chữ có 6 đến 30 mm",
+        "với đơn vị {0}, mặt khắc rộng {1#} mm, trong khi đa số chữ có 6 đến 30 mm",
     ),
     (
         "with the unit {}, the scan is {} m long",
-        "với đơn vị {0}, bản quét dài {1} m",
+        "với đơn vị {0}, bản quét dài {1#} m",
     ),
     (
         "with the unit {}, the scan is {} mm long",
-        "với đơn vị {0}, bản quét dài {1} mm",
+        "với đơn vị {0}, bản quét dài {1#} mm",
     ),
     (
         "correct the unit (perhaps {}) in the list, and import it again",
@@ -53,7 +53,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "its carving is {} mm deep, but most blocks are carved 0.3 to 5 mm deep",
-        "nét khắc sâu {0} mm, trong khi đa số ván được khắc sâu 0,3 đến 5 mm",
+        "nét khắc sâu {0#} mm, trong khi đa số ván được khắc sâu 0,3 đến 5 mm",
     ),
     (
         "if the unit is wrong, so are all lengths in mm",
@@ -90,11 +90,11 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "vertices without a position (NaN, infinite or repeated 0 0 0) were left out with their faces: {}",
-        "số đỉnh không có vị trí (NaN, vô hạn hoặc 0 0 0 lặp lại) đã bị bỏ cùng các mặt của chúng: {0}",
+        "số đỉnh không có vị trí (NaN, vô hạn hoặc 0 0 0 lặp lại) đã bị bỏ cùng các mặt của chúng: {0#}",
     ),
     (
         "faces with fewer than three corners were left out: {}",
-        "số mặt có ít hơn ba góc đã bị bỏ: {0}",
+        "số mặt có ít hơn ba góc đã bị bỏ: {0#}",
     ),
     (
         "the labels would be saved in {}, where workers on other computers do not find them",
@@ -107,15 +107,15 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     // Inputs that are no longer at their places.
     (
         "{} of {} input files that were looked at are missing or have moved (pairs or blocks: {}), and so is the folder {}",
-        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ (số cặp hoặc ván: {2}), và cả thư mục {3}",
+        "{0#} trong số {1#} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ (số cặp hoặc ván: {2#}), và cả thư mục {3}",
     ),
     (
         "{} of {} input files that were looked at are missing or have moved (pairs or blocks: {}), and so are the folders {}",
-        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ (số cặp hoặc ván: {2}), và cả các thư mục {3}",
+        "{0#} trong số {1#} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ (số cặp hoặc ván: {2#}), và cả các thư mục {3}",
     ),
     (
         "{} of {} input files that were looked at are missing or have moved, first {}",
-        "{0} trong số {1} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, tệp đầu tiên là {2}",
+        "{0#} trong số {1#} tệp đầu vào đã kiểm tra bị thiếu hoặc đã chuyển chỗ, tệp đầu tiên là {2}",
     ),
     (
         "put them back, or import them from their new place",
@@ -132,7 +132,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} ids look like dates or powers of ten, such as {} (lines {}): a spreadsheet program may have made them of texts such as 1-11 and 1E5",
-        "{0} mã trông như ngày tháng hoặc lũy thừa của mười, chẳng hạn {1} (dòng {2}): có thể chương trình bảng tính đã đổi chúng từ các văn bản như 1-11 và 1E5",
+        "{0#} mã trông như ngày tháng hoặc lũy thừa của mười, chẳng hạn {1} (dòng {2}): có thể chương trình bảng tính đã đổi chúng từ các văn bản như 1-11 và 1E5",
     ),
     (
         "give the column the format Text, correct the ids and save the list again, best as XLSX",
@@ -179,15 +179,15 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} control points are too few: choose at least {}",
-        "{0} điểm là quá ít: hãy chọn ít nhất {1} điểm",
+        "{0#} điểm là quá ít: hãy chọn ít nhất {1#} điểm",
     ),
     (
         "the control points lie within {} mm of each other: choose points that are at least {} mm apart, best near the corners of the text",
-        "các điểm chỉ cách nhau {0} mm: hãy chọn các điểm cách nhau ít nhất {1} mm, tốt nhất gần các góc của phần chữ",
+        "các điểm chỉ cách nhau {0#} mm: hãy chọn các điểm cách nhau ít nhất {1#} mm, tốt nhất gần các góc của phần chữ",
     ),
     (
         "the control points contradict each other: no common position is nearer than {} mm to all of them",
-        "các điểm mâu thuẫn với nhau: không có vị trí chung nào gần tất cả các điểm hơn {0} mm",
+        "các điểm mâu thuẫn với nhau: không có vị trí chung nào gần tất cả các điểm hơn {0#} mm",
     ),
     (
         "choose them again on the same strokes of both images, or add a fourth one",
@@ -195,11 +195,11 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "control point {} contradicts the others, which put it {} mm away: choose it again on the same stroke of both images",
-        "điểm {0} mâu thuẫn với các điểm khác, vốn cho vị trí cách đó {1} mm: hãy chọn lại điểm đó trên cùng một nét của hai hình",
+        "điểm {0} mâu thuẫn với các điểm khác, vốn cho vị trí cách đó {1#} mm: hãy chọn lại điểm đó trên cùng một nét của hai hình",
     ),
     (
         "relief and ink do not agree at the control points: {} % of the places agree",
-        "mặt khắc và mực không khớp tại các điểm: {0} % số chỗ khớp nhau",
+        "mặt khắc và mực không khớp tại các điểm: {0#} % số chỗ khớp nhau",
     ),
     (
         "choose points on the same strokes of both images",
@@ -207,7 +207,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the scans and prints need {} in {}, and the disk has {}",
-        "bản quét và bản in cần {0} trong {1}, đĩa còn {2}",
+        "bản quét và bản in cần {0#} trong {1}, đĩa còn {2#}",
     ),
     (
         "make room, or name another disk",
@@ -252,7 +252,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} boxes repeat others and were left out: {}",
-        "có {0} khung trùng với khung khác và đã bị bỏ: {1}",
+        "có {0#} khung trùng với khung khác và đã bị bỏ: {1}",
     ),
     (
         "1 box repeats another: {}",
@@ -260,7 +260,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} boxes repeat others: {}",
-        "có {0} khung trùng với khung khác: {1}",
+        "có {0#} khung trùng với khung khác: {1}",
     ),
     (
         "1 box is smaller than a pixel, a point or a line and was left out: {}",
@@ -268,7 +268,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} boxes are smaller than a pixel, a point or a line and were left out: {}",
-        "có {0} khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ, và đã bị bỏ: {1}",
+        "có {0#} khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ, và đã bị bỏ: {1}",
     ),
     (
         "1 box is smaller than a pixel, a point or a line: {}",
@@ -276,23 +276,23 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} boxes are smaller than a pixel, a point or a line: {}",
-        "có {0} khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ: {1}",
+        "có {0#} khung nhỏ hơn một điểm ảnh, là điểm hoặc đường kẻ: {1}",
     ),
     (
         "{} of {} boxes lies outside the page and was left out: {}",
-        "{0} trong {1} khung nằm ngoài trang in và đã bị bỏ: {2}",
+        "{0#} trong {1#} khung nằm ngoài trang in và đã bị bỏ: {2}",
     ),
     (
         "{} of {} boxes lie outside the page and were left out: {}",
-        "{0} trong {1} khung nằm ngoài trang in và đã bị bỏ: {2}",
+        "{0#} trong {1#} khung nằm ngoài trang in và đã bị bỏ: {2}",
     ),
     (
         "{} of {} boxes lies outside the page: {}",
-        "{0} trong {1} khung nằm ngoài trang in: {2}",
+        "{0#} trong {1#} khung nằm ngoài trang in: {2}",
     ),
     (
         "{} of {} boxes lie outside the page: {}",
-        "{0} trong {1} khung nằm ngoài trang in: {2}",
+        "{0#} trong {1#} khung nằm ngoài trang in: {2}",
     ),
     (
         "1 box reaches over an edge of the page and was cut there: {}",
@@ -300,7 +300,7 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} boxes reach over an edge of the page and were cut there: {}",
-        "có {0} khung vượt ra ngoài mép trang in và đã được cắt ở mép: {1}",
+        "có {0#} khung vượt ra ngoài mép trang in và đã được cắt ở mép: {1}",
     ),
     (
         "1 box reaches over an edge of the page: {}",
@@ -308,11 +308,11 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} boxes reach over an edge of the page: {}",
-        "có {0} khung vượt ra ngoài mép trang in: {1}",
+        "có {0#} khung vượt ra ngoài mép trang in: {1}",
     ),
     (
         "the labels are for an image of {} x {} px, the page is {} x {} px",
-        "nhãn là của hình {0} x {1} px, trang in có {2} x {3} px",
+        "nhãn là của hình {0#} x {1#} px, trang in có {2#} x {3#} px",
     ),
     (
         "the boxes were scaled",

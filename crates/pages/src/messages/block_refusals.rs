@@ -4,7 +4,7 @@
 pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
     (
         "the scan is {} x {} m large if a unit of it is {} mm, more than the {} square metres of which height maps are computed",
-        "bản quét rộng {0} x {1} m nếu một đơn vị là {2} mm, hơn {3} mét vuông là mức tính được bản đồ độ cao",
+        "bản quét rộng {0#} x {1#} m nếu một đơn vị là {2#} mm, hơn {3#} mét vuông là mức tính được bản đồ độ cao",
     ),
     (
         "no side has a large flat part",
@@ -20,11 +20,11 @@ pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "its face is only {} mm long, which is the size of a single character (with the unit {}: {} mm)",
-        "mặt khắc chỉ dài {0} mm, bằng cỡ một chữ (với đơn vị {1}: {2} mm)",
+        "mặt khắc chỉ dài {0#} mm, bằng cỡ một chữ (với đơn vị {1}: {2#} mm)",
     ),
     (
         "its face is only {} mm long, which is the size of a single character",
-        "mặt khắc chỉ dài {0} mm, bằng cỡ một chữ",
+        "mặt khắc chỉ dài {0#} mm, bằng cỡ một chữ",
     ),
     (
         "the page image shows no ink: {}",
@@ -32,7 +32,7 @@ pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "its darkest parts take {} % of the light",
-        "chỗ tối nhất chỉ hấp thụ {0} % ánh sáng",
+        "chỗ tối nhất chỉ hấp thụ {0#} % ánh sáng",
     ),
     (
         "no columns of characters were found",
@@ -113,11 +113,11 @@ pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "the character's height is {} px",
-        "chiều cao của chữ là {0} px",
+        "chiều cao của chữ là {0#} px",
     ),
     (
         "the tops mask is {} px, the print {} px",
-        "mặt nạ đỉnh nét có cỡ {0} px, bản in {1} px",
+        "mặt nạ đỉnh nét có cỡ {0#} px, bản in {1#} px",
     ),
     ("the tops mask {}", "mặt nạ đỉnh nét {!0}"),
     // The path of a file. It is the last row, because other messages with paths begin like it.

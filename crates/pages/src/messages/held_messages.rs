@@ -83,7 +83,7 @@ pub(super) const HELD_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} points are too many: choose at most {}",
-        "{0} điểm là quá nhiều: hãy chọn nhiều nhất {1} điểm",
+        "{0#} điểm là quá nhiều: hãy chọn nhiều nhất {1#} điểm",
     ),
     // Blocks that cannot be aligned.
     (
@@ -101,7 +101,7 @@ pub(super) const HELD_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "its {} triangles overlap more than {} times, or most are slivers across the scan",
-        "{0#} tam giác của nó chồng lên nhau hơn {1} lần, hoặc phần lớn là tam giác rất mảnh chạy ngang bản quét",
+        "{0#} tam giác của nó chồng lên nhau hơn {1#} lần, hoặc phần lớn là tam giác rất mảnh chạy ngang bản quét",
     ),
     (
         "remove repeated faces or remesh the scan",

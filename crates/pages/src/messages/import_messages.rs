@@ -104,7 +104,7 @@ pub(super) const IMPORT_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "with the unit {}, the scan of {} is {} mm long, but its page {} mm by the resolution of the image",
-        "với đơn vị {0}, bản quét của {1} dài {2} mm, nhưng trang in của nó dài {3} mm theo độ phân giải của hình",
+        "với đơn vị {0}, bản quét của {1} dài {2#} mm, nhưng trang in của nó dài {3#} mm theo độ phân giải của hình",
     ),
     ("rename the file", "hãy đổi tên tệp"),
     ("{} is {}, not a list", "{0} là {1}, không phải danh sách"),
@@ -212,11 +212,11 @@ pub(super) const IMPORT_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} of the {} pairs in it that the project has would get another mesh and another print, such as {}: their ids may be those of others",
-        "{0} trong số {1} cặp mà dự án đã có sẽ nhận bản quét và bản in khác, chẳng hạn {2}: có thể đây là mã của các cặp khác",
+        "{0#} trong số {1#} cặp mà dự án đã có sẽ nhận bản quét và bản in khác, chẳng hạn {2}: có thể đây là mã của các cặp khác",
     ),
     (
         "{} of the {} blocks in it that the project has would get another scan and another page, such as {}: their ids may be those of others",
-        "{0} trong số {1} ván mà dự án đã có sẽ nhận bản quét và trang in khác, chẳng hạn {2}: có thể đây là mã của các ván khác",
+        "{0#} trong số {1#} ván mà dự án đã có sẽ nhận bản quét và trang in khác, chẳng hạn {2}: có thể đây là mã của các ván khác",
     ),
     (
         "nothing was imported, give other ids (of folders, import the one above, so that ids begin with the name of the folder)",
@@ -236,15 +236,15 @@ pub(super) const IMPORT_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "blocks with the same scan and page as one of the project: {}, first {}, as {}",
-        "số ván có cùng bản quét và trang in với một ván của dự án: {0}, ván đầu tiên là {1}, giống {2}",
+        "số ván có cùng bản quét và trang in với một ván của dự án: {0#}, ván đầu tiên là {1}, giống {2}",
     ),
     (
         "pairs with the same mesh and print as an earlier one: {}, first {}, as {}",
-        "số cặp có cùng bản quét và bản in với một cặp trước: {0}, cặp đầu tiên là {1}, giống {2}",
+        "số cặp có cùng bản quét và bản in với một cặp trước: {0#}, cặp đầu tiên là {1}, giống {2}",
     ),
     (
         "blocks with the same scan and page as an earlier one: {}, first {}, as {}",
-        "số ván có cùng bản quét và trang in với một ván trước: {0}, ván đầu tiên là {1}, giống {2}",
+        "số ván có cùng bản quét và trang in với một ván trước: {0#}, ván đầu tiên là {1}, giống {2}",
     ),
     // Values that the import empties.
     (

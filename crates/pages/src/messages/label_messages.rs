@@ -60,7 +60,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the outline has more than {} corners",
-        "đường viền có hơn {0} góc",
+        "đường viền có hơn {0#} góc",
     ),
     (
         "simplify it or draw a box",
@@ -68,7 +68,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "reading the JSON would take more than {} MiB of memory",
-        "đọc JSON này cần hơn {0} MiB bộ nhớ",
+        "đọc JSON này cần hơn {0#} MiB bộ nhớ",
     ),
     (
         "save fewer pages in one file",
@@ -76,16 +76,16 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the boxes together are {} times as large as the page, more than {} times",
-        "tổng các khung lớn gấp {0} lần trang in, hơn {1} lần",
+        "tổng các khung lớn gấp {0#} lần trang in, hơn {1#} lần",
     ),
     (
         "{} entries of the file are about {}",
-        "{0} mục của tệp nói về {1}",
+        "{0#} mục của tệp nói về {1}",
     ),
     ("keep one of them", "hãy giữ một mục"),
     (
         "the labels are for an image of {} x {} px, the page is {} x {} px (the labelled image was turned, perhaps by its EXIF orientation)",
-        "nhãn là của hình {0} x {1} px, trang in có {2} x {3} px (hình được gán nhãn đã bị xoay, có thể do hướng EXIF)",
+        "nhãn là của hình {0#} x {1#} px, trang in có {2#} x {3#} px (hình được gán nhãn đã bị xoay, có thể do hướng EXIF)",
     ),
     (
         "take the image that was labelled",
@@ -93,15 +93,15 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} of {} boxes lie outside the page of {} x {} px: {}",
-        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: {!4}",
+        "{0#} trong {1#} khung nằm ngoài trang in {2#} x {3#} px: {!4}",
     ),
     (
         "{} of {} boxes lies outside the page of {} x {} px: {}",
-        "{0} trong {1} khung nằm ngoài trang in {2} x {3} px: {!4}",
+        "{0#} trong {1#} khung nằm ngoài trang in {2#} x {3#} px: {!4}",
     ),
     (
         "{} of 1 box lies outside the page of {} x {} px: {}",
-        "khung duy nhất nằm ngoài trang in {1} x {2} px: {!3}",
+        "khung duy nhất nằm ngoài trang in {1#} x {2#} px: {!3}",
     ),
     (
         "labels of another page?",
@@ -164,7 +164,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} boxes left out, whose image_id is that of no image",
-        "đã bỏ {0} khung có image_id không phải của hình nào",
+        "đã bỏ {0#} khung có image_id không phải của hình nào",
     ),
     (
         "bbox is {}, not [x, y, width, height]",
@@ -176,11 +176,11 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "segmentation has {} numbers, an odd count",
-        "segmentation có {0} số, là số lẻ",
+        "segmentation có {0#} số, là số lẻ",
     ),
     (
         "a circle has {} points, not 2",
-        "hình tròn có {0} điểm, không phải 2",
+        "hình tròn có {0#} điểm, không phải 2",
     ),
     (
         "{} is not a shape of labelme",
@@ -194,15 +194,15 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ("it has several elements Page", "có nhiều phần tử Page"),
     (
         "{} elements are not divided as others are, and taken as characters: {}",
-        "{0} phần tử không được chia nhỏ như các phần tử khác và được coi là chữ: {1}",
+        "{0#} phần tử không được chia nhỏ như các phần tử khác và được coi là chữ: {1}",
     ),
     (
         "{} elements are not divided as others are, and left out, because they hold several characters: {}",
-        "{0} phần tử không được chia nhỏ như các phần tử khác và đã bị bỏ vì chứa nhiều chữ: {1}",
+        "{0#} phần tử không được chia nhỏ như các phần tử khác và đã bị bỏ vì chứa nhiều chữ: {1}",
     ),
     (
         "{} columns; the first line has {}; correct or remove it",
-        "{0} cột, trong khi dòng đầu có {1}; hãy sửa hoặc bỏ đi",
+        "{0#} cột, trong khi dòng đầu có {1#}; hãy sửa hoặc bỏ đi",
     ),
     ("the column {} is missing", "thiếu cột {0}"),
     (
@@ -219,11 +219,11 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ("{} is not a list", "{0} không phải là danh sách"),
     (
         "{} values in all_points_x, but {} in all_points_y",
-        "có {0} giá trị trong all_points_x, nhưng {1} trong all_points_y",
+        "có {0#} giá trị trong all_points_x, nhưng {1#} trong all_points_y",
     ),
     (
         "the file has more than {} numbers up to here",
-        "đến đây tệp có hơn {0} số",
+        "đến đây tệp có hơn {0#} số",
     ),
     (
         "simplify its outlines or draw boxes",
@@ -239,7 +239,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} numbers; a line has a class and at least 4 more; correct or remove it",
-        "có {0} số, trong khi mỗi dòng cần một lớp và ít nhất 4 số nữa; hãy sửa hoặc bỏ đi",
+        "có {0#} số, trong khi mỗi dòng cần một lớp và ít nhất 4 số nữa; hãy sửa hoặc bỏ đi",
     ),
     (
         "column {} is {}, neither a confidence from 0 to 1 nor the id of a track",
@@ -247,7 +247,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} columns are neither a box nor an outline beside the {} columns of line {}",
-        "{0} cột không phải là khung hay đường viền, so với {1} cột của dòng {2}",
+        "{0#} cột không phải là khung hay đường viền, so với {1#} cột của dòng {2}",
     ),
     (
         "7 columns may be a box with a confidence and an id, or a triangle (a box needs only 5)",
@@ -255,7 +255,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the first 5 of {} columns are a box and the others neither corners nor a confidence and an id",
-        "5 cột đầu trong {0} cột là khung, còn các cột khác không phải góc cũng không phải độ tin cậy và mã",
+        "5 cột đầu trong {0#} cột là khung, còn các cột khác không phải góc cũng không phải độ tin cậy và mã",
     ),
     ("x is missing", "thiếu x"),
     ("y is missing", "thiếu y"),
@@ -281,7 +281,7 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the labels were drawn on the mirrored image: the outlines have {} % of the ink inside them, mirrored {} %",
-        "nhãn được vẽ trên hình lật gương: các khung chứa {0} % mực, lật lại thì {1} %",
+        "nhãn được vẽ trên hình lật gương: các khung chứa {0#} % mực, lật lại thì {1#} %",
     ),
     (
         "mirror the image or the labels",
@@ -289,11 +289,11 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the labels were drawn on the image turned by 180 degrees: the outlines have {} % of the ink inside them, turned {} %",
-        "nhãn được vẽ trên hình xoay 180 độ: các khung chứa {0} % mực, xoay lại thì {1} %",
+        "nhãn được vẽ trên hình xoay 180 độ: các khung chứa {0#} % mực, xoay lại thì {1#} %",
     ),
     ("turn the image or the labels", "hãy xoay hình hoặc nhãn"),
     (
         "the labels seem to be those of another page: the outlines have {} % of the ink inside them (usually less than 35 %)",
-        "có vẻ đây là nhãn của trang khác: các khung chứa {0} % mực (thường là dưới 35 %)",
+        "có vẻ đây là nhãn của trang khác: các khung chứa {0#} % mực (thường là dưới 35 %)",
     ),
 ];

@@ -1,5 +1,7 @@
 //! Why an export leaves out pairs, in Vietnamese.
 
+use super::message_numbers::number_text;
+
 /// Reasons as `OmissionCounts::text` writes them, without that of a low confidence.
 const REASONS: [(&str, &str); 6] = [
     ("without a result", "chưa có kết quả"),
@@ -18,9 +20,9 @@ const REASONS: [(&str, &str); 6] = [
 pub(crate) fn left_out_reasons(list: &str) -> Option<String> {
     let one = |text: &str| {
         let (number, why) = text.split_once(' ')?;
-        number.parse::<u64>().ok()?;
+        let number = number_text(number)?;
         if let Some(least) = why.strip_prefix("below confidence ") {
-            let least = least.replace('.', ",");
+            let least = number_text(least)?;
             return Some(format!("{number} có độ tin cậy dưới {least}"));
         }
         let (_, vietnamese) = REASONS.iter().find(|(english, _)| *english == why)?;

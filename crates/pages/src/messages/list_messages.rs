@@ -45,7 +45,7 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "the cell of column {} is not UTF-8",
         "ô của cột {0} không phải là UTF-8",
     ),
-    ("byte {} is not UTF-8", "byte {0} không phải là UTF-8"),
+    ("byte {} is not UTF-8", "byte {0#} không phải là UTF-8"),
     (
         "a quote is opened here and never closed",
         "dấu ngoặc kép mở ở đây mà không được đóng",
@@ -64,7 +64,7 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "a cell has at most {} lines",
-        "một ô có nhiều nhất {0} dòng",
+        "một ô có nhiều nhất {0#} dòng",
     ),
     ("the row has more than {} bytes", "dòng dài hơn {0#} byte"),
     (
@@ -137,7 +137,7 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     // Rows of a list.
     (
         "the row has {} cells, the header has {}",
-        "dòng có {0} ô, dòng tiêu đề có {1}",
+        "dòng có {0#} ô, dòng tiêu đề có {1#}",
     ),
     ("id is empty", "ô mã (id) trống"),
     ("the id is empty", "mã trống"),
@@ -171,9 +171,9 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "an id of {} bytes is too long",
-        "mã dài {0} byte là quá dài",
+        "mã dài {0#} byte là quá dài",
     ),
-    ("the limit is {}", "giới hạn là {0}"),
+    ("the limit is {}", "giới hạn là {0#}"),
     (
         "the id {} is the error of a formula",
         "mã {0} là lỗi của một công thức",
@@ -224,7 +224,7 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ("name the column to keep it", "hãy đặt tên cột để giữ lại"),
     (
         "{} values in columns without a name are left out, the first on line {}",
-        "{0} giá trị trong các cột không có tên bị bỏ qua, giá trị đầu tiên ở dòng {1}",
+        "{0#} giá trị trong các cột không có tên bị bỏ qua, giá trị đầu tiên ở dòng {1}",
     ),
     (
         "name the columns to keep them",
@@ -274,7 +274,7 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} errors of formulas are left out, the first {} in column {} on line {}",
-        "{0} lỗi công thức bị bỏ qua, lỗi đầu tiên là {1} ở cột {2}, dòng {3}",
+        "{0#} lỗi công thức bị bỏ qua, lỗi đầu tiên là {1} ở cột {2}, dòng {3}",
     ),
     (
         "correct it in the spreadsheet program, and import again",
@@ -316,7 +316,7 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} values are hidden below merged cells and are left out, the first in cell {}",
-        "{0} giá trị bị che dưới các ô gộp nên bị bỏ qua, giá trị đầu tiên ở ô {1}",
+        "{0#} giá trị bị che dưới các ô gộp nên bị bỏ qua, giá trị đầu tiên ở ô {1}",
     ),
     (
         "unmerge the cells to see it",

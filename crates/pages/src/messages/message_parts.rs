@@ -1,6 +1,7 @@
 //! The parts of messages that vary, and the places that stand before them, in Vietnamese.
 
 use super::left_out_words::left_out_reasons;
+use super::message_numbers::number_text;
 use super::message_patterns::{day_first, filled_by, parts_of};
 use super::stage_words::stage_text;
 use crate::digit_groups::grouped;
@@ -82,22 +83,22 @@ const PARTS: &[(&str, &str)] = &[
     ("No space left on device", "đĩa đã đầy"),
 ];
 
-/// Returns a pattern with `{0}` replaced by the first part, and so on. `{0#}` is the same for a count, whose digits are grouped,
-/// and `{!0}` for a message of its own, which `message` translates, or the name of a stage. Braces in a part stay as they are.
+/// Returns a pattern with `{0}` replaced by the first part, and so on. `{0#}` is the same for a number, which is written as in
+/// Vietnamese: other parts may be ids, names of files and values of settings, which stay. `{!0}` is for a message of its own, which
+/// `message` translates, or the name of a stage. Braces in a part stay as they are.
 pub(super) fn filled(
     pattern: &str,
     parts: &[&str],
     message: impl Fn(&str) -> Option<String>,
 ) -> String {
     filled_by(pattern, |place| {
-        let (counted, inner) = (place.strip_suffix('#'), place.strip_prefix('!'));
-        let index = counted.or(inner).unwrap_or(place).parse::<usize>().ok()?;
+        let (number, inner) = (place.strip_suffix('#'), place.strip_prefix('!'));
+        let index = number.or(inner).unwrap_or(place).parse::<usize>().ok()?;
         let part = parts.get(index)?;
-        let count = counted.and_then(|_| part.parse::<u64>().ok());
+        let number = number.and_then(|_| number_text(part));
         let stage = || stage_text(part).map(str::to_owned);
         let known = inner.and_then(|_| message(part).or_else(stage));
-        let known = known.or_else(|| count.map(grouped));
-        Some(known.unwrap_or_else(|| part_text(part)))
+        Some(known.or(number).unwrap_or_else(|| part_text(part)))
     })
 }
 
@@ -123,11 +124,8 @@ fn is_of_place(part: &str) -> bool {
         || part.bytes().all(|byte| byte.is_ascii_alphabetic())
 }
 
-/// Returns a part of a message: numbers with a decimal comma, and kinds of files and values by their Vietnamese names.
+/// Returns a part of a message: kinds of files and values by their Vietnamese names, and all else as it is.
 fn part_text(part: &str) -> String {
-    if part.parse::<f64>().is_ok() {
-        return part.replace('.', ",");
-    }
     let mut known = PARTS.iter();
     if let Some((_, vietnamese)) = known.find(|(english, _)| *english == part) {
         return (*vietnamese).to_owned();
@@ -137,7 +135,7 @@ fn part_text(part: &str) -> String {
         return time;
     }
     let number = part.strip_prefix("a list of ");
-    if let Some(number) = number.filter(|number| number.parse::<u64>().is_ok()) {
+    if let Some(number) = number.and_then(number_text) {
         return format!("danh sách {number} phần tử");
     }
     // All formats of labels.
@@ -167,7 +165,7 @@ fn kind_text(part: &str) -> Option<String> {
 /// Returns a list of names or boxes in Vietnamese, which may end in words such as `and 3 more`.
 fn names_text(list: &str) -> String {
     let (names, more) = match split_more(list) {
-        Some((names, count)) => (names, format!(" và {count} mục khác")),
+        Some((names, count)) => (names, format!(" và {} mục khác", grouped(count))),
         None => (list, String::new()),
     };
     let pages = names.split(", ").map(|page| match page {
@@ -179,17 +177,16 @@ fn names_text(list: &str) -> String {
 }
 
 /// Returns the names of a list that ends in words such as `and 3 more`, and the number of the others.
-fn split_more(list: &str) -> Option<(&str, &str)> {
+fn split_more(list: &str) -> Option<(&str, u64)> {
     let (names, count) = list.strip_suffix(" more")?.rsplit_once(" and ")?;
-    count.parse::<u64>().ok()?;
-    Some((names, count))
+    Some((names, count.parse().ok()?))
 }
 
 /// Returns a list that ends in words such as `and 3 more` in Vietnamese, where `others` names the rest. `None` if it
 /// does not end like this.
 pub(crate) fn with_more(list: &str, others: &str) -> Option<String> {
     let (names, count) = split_more(list)?;
-    Some(format!("{names} và {count} {others}"))
+    Some(format!("{names} và {} {others}", grouped(count)))
 }
 
 /// Returns a list of boxes of labels, such as `box 3 "c" as box 1` or `Word box 2`, in Vietnamese. `None` if it is something

@@ -6,7 +6,7 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     // Files of a list or of folders.
     (
         "{} files are missing, nothing was imported:",
-        "thiếu {0} tệp nên chưa nhập gì:",
+        "thiếu {0#} tệp nên chưa nhập gì:",
     ),
     (
         "1 file is missing, nothing was imported:",
@@ -14,7 +14,7 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} files are missing or a folder, nothing was imported:",
-        "không dùng được {0} tệp nên chưa nhập gì:",
+        "không dùng được {0#} tệp nên chưa nhập gì:",
     ),
     (
         "1 file is missing or a folder, nothing was imported:",
@@ -50,7 +50,7 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "rename it to {} if it is meant, and import again",
         "nếu đó là cột {0} thì hãy đổi tên rồi nhập lại",
     ),
-    ("and {} more", "và {0} mục khác"),
+    ("and {} more", "và {0#} mục khác"),
     ("the header has: {}", "dòng tiêu đề có: {0}"),
     ("the list contains no pairs", "danh sách không có cặp nào"),
     ("the list is empty", "danh sách trống"),
@@ -66,20 +66,20 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ("{} holds no images", "{0} không có hình"),
     (
         "pairs with the same mesh and print as an earlier one: {}, first {}, as on line {}",
-        "số cặp có cùng bản quét và bản in với một cặp trước: {0}, cặp đầu tiên là {1}, giống dòng {2}",
+        "số cặp có cùng bản quét và bản in với một cặp trước: {0#}, cặp đầu tiên là {1}, giống dòng {2}",
     ),
     (
         "blocks with the same scan and page as an earlier one: {}, first {}, as on line {}",
-        "số ván có cùng bản quét và trang in với một ván trước: {0}, ván đầu tiên là {1}, giống dòng {2}",
+        "số ván có cùng bản quét và trang in với một ván trước: {0#}, ván đầu tiên là {1}, giống dòng {2}",
     ),
     (
         "pairs with the same mesh and print as one of the project: {}, first {}, as {}",
-        "số cặp có cùng bản quét và bản in với một cặp của dự án: {0}, cặp đầu tiên là {1}, giống {2}",
+        "số cặp có cùng bản quét và bản in với một cặp của dự án: {0#}, cặp đầu tiên là {1}, giống {2}",
     ),
     // Formats that are not read.
     (
         "ignored, {} is not read: {} and {} more",
-        "bỏ qua, không đọc được {0}: {1} và {2} tệp khác",
+        "bỏ qua, không đọc được {0}: {1} và {2#} tệp khác",
     ),
     (
         "ignored, {} is not read: {}",
@@ -87,7 +87,7 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "{} is not read: {} and {} more",
-        "không đọc được {0}: {1} và {2} tệp khác",
+        "không đọc được {0}: {1} và {2#} tệp khác",
     ),
     ("{} is not read: {}", "không đọc được {0}: {1}"),
     (
@@ -169,7 +169,7 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ("the export has no pairs", "bản xuất không có cặp nào"),
     (
         "all {} pairs of the project are retired",
-        "cả {0} cặp của dự án đã được đưa ra khỏi thống kê",
+        "cả {0#} cặp của dự án đã được đưa ra khỏi thống kê",
     ),
     (
         "the only pair of the project is retired",
@@ -321,19 +321,19 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     // Pairs that do not match.
     (
         "relief and print do not match: confidence {} in the pose is below register.min_confidence {}",
-        "mặt khắc và bản in không khớp: độ tin cậy {0} của tư thế thấp hơn register.min_confidence {1}",
+        "mặt khắc và bản in không khớp: độ tin cậy {0#} của tư thế thấp hơn register.min_confidence {1#}",
     ),
     (
         "relief and print have strokes that the other one lacks (confidence in the pose {}, in the same character {})",
-        "mặt khắc và bản in có những nét mà bên kia không có (độ tin cậy của tư thế {0}, của việc cùng một chữ {1})",
+        "mặt khắc và bản in có những nét mà bên kia không có (độ tin cậy của tư thế {0#}, của việc cùng một chữ {1#})",
     ),
     (
         "no pose of the relief matches the print: the best correlation is {}, needs {}",
-        "không có tư thế nào của mặt khắc khớp với bản in: tương quan cao nhất là {0}, cần {1}",
+        "không có tư thế nào của mặt khắc khớp với bản in: tương quan cao nhất là {0#}, cần {1#}",
     ),
     (
         "the relief matches the mirrored print better ({} as well as the print itself)",
-        "mặt khắc khớp với bản in lật gương hơn (bằng {0} so với chính bản in)",
+        "mặt khắc khớp với bản in lật gương hơn (bằng {0#} so với chính bản in)",
     ),
     (
         "the print or the mesh may be mirrored, the print may be of another character, or the scan may show another side of the block",
@@ -353,11 +353,11 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the scan shows {} separate pieces: does one file hold several characters or pieces?",
-        "bản quét có {0} mảnh rời: một tệp có chứa nhiều chữ hoặc nhiều mảnh không?",
+        "bản quét có {0#} mảnh rời: một tệp có chứa nhiều chữ hoặc nhiều mảnh không?",
     ),
     (
         "the face of the scan is nearly flat (its relief is {} % of its length): does it show the back of the block?",
-        "bề mặt bản quét gần như phẳng (độ nổi là {0} % chiều dài): có phải là mặt sau của ván không?",
+        "bề mặt bản quét gần như phẳng (độ nổi là {0#} % chiều dài): có phải là mặt sau của ván không?",
     ),
     (
         "print or relief has no strokes to register",
@@ -369,7 +369,7 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "print has no ink to tell from paper: their greys differ by {} of full white",
-        "không phân biệt được mực với giấy trên bản in: mức xám chỉ chênh {0} so với trắng hoàn toàn",
+        "không phân biệt được mực với giấy trên bản in: mức xám chỉ chênh {0#} so với trắng hoàn toàn",
     ),
     (
         "if you see ink, raise the contrast of the image",
@@ -377,7 +377,7 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "print shows the character with {} px, too few to tell its strokes, needs {} px",
-        "chữ trên bản in chỉ có {0} điểm ảnh, quá ít để phân biệt các nét, cần {1} điểm ảnh",
+        "chữ trên bản in chỉ có {0#} điểm ảnh, quá ít để phân biệt các nét, cần {1#} điểm ảnh",
     ),
     (
         "scan or photograph it at a higher resolution",

@@ -120,6 +120,8 @@ fn before_text(before: &str) -> String {
 #[cfg(test)]
 mod fragments;
 #[cfg(test)]
+mod number_tests;
+#[cfg(test)]
 mod refusal_tests;
 #[cfg(test)]
 mod source_sentences;

@@ -8,6 +8,7 @@ mod import_messages;
 mod label_messages;
 mod left_out_words;
 mod list_messages;
+mod message_numbers;
 mod message_parts;
 mod message_patterns;
 mod message_table;

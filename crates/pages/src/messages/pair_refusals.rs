@@ -28,7 +28,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "no carving found: the likeliest side has a relief of {} on an extent of {} (mesh units), a share below fit.min_relief {}",
-        "không tìm thấy nét khắc: phía khả dĩ nhất có độ nổi {0} trên chiều dài {1} (đơn vị của bản quét), tỉ lệ thấp hơn fit.min_relief {2}",
+        "không tìm thấy nét khắc: phía khả dĩ nhất có độ nổi {0#} trên chiều dài {1#} (đơn vị của bản quét), tỉ lệ thấp hơn fit.min_relief {2#}",
     ),
     (
         "no other side or part resembles the print",
@@ -45,7 +45,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ("give it in the manifest", "hãy ghi đơn vị trong danh sách"),
     (
         "depth map would be {} px long, more than {}",
-        "bản đồ độ sâu sẽ dài {0} điểm ảnh, hơn {1}",
+        "bản đồ độ sâu sẽ dài {0#} điểm ảnh, hơn {1#}",
     ),
     (
         "lower depth.px_per_mm or check the unit",
@@ -57,11 +57,11 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "print has no ink: {} of it is beyond the grey threshold {}",
-        "bản in không có mực: {0} của hình vượt ngưỡng xám {1}",
+        "bản in không có mực: {0#} của hình vượt ngưỡng xám {1#}",
     ),
     (
         "print is ink all over: its lightest grey is {} of full white",
-        "bản in toàn là mực: mức xám sáng nhất chỉ bằng {0} của trắng hoàn toàn",
+        "bản in toàn là mực: mức xám sáng nhất chỉ bằng {0#} của trắng hoàn toàn",
     ),
     (
         "normalize chose no threshold for {}",
@@ -89,24 +89,24 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "this looks like a whole block ({} mm): import it with its page by {}",
-        "trông như cả ván ({0} mm): hãy nhập cùng trang in của nó bằng {1}",
+        "trông như cả ván ({0#} mm): hãy nhập cùng trang in của nó bằng {1}",
     ),
     (
         "the stage took longer than {} s (run.stage_timeout_s)",
-        "bước này mất hơn {0} giây (run.stage_timeout_s)",
+        "bước này mất hơn {0#} giây (run.stage_timeout_s)",
     ),
     (
         "{} took longer than {} s while it read {}",
-        "bước {!0} mất hơn {1} giây khi đọc {2}",
+        "bước {!0} mất hơn {1#} giây khi đọc {2}",
     ),
     (
         "its disk or network may hang",
         "ổ đĩa hoặc mạng có thể bị treo",
     ),
-    ("{} took longer than {} s", "bước {!0} mất hơn {1} giây"),
+    ("{} took longer than {} s", "bước {!0} mất hơn {1#} giây"),
     (
         "{} workers died or hung over it at {}",
-        "{0} tiến trình đã chết hoặc treo vì nó ở bước {!1}",
+        "{0#} tiến trình đã chết hoặc treo vì nó ở bước {!1}",
     ),
     (
         "the stage returned a number that is not finite",
@@ -149,7 +149,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "the binary STL has {} bytes a triangle instead of 50",
-        "tệp STL nhị phân có {0} byte mỗi tam giác thay vì 50",
+        "tệp STL nhị phân có {0#} byte mỗi tam giác thay vì 50",
     ),
     (
         "save it again without attributes, or as PLY",
@@ -168,7 +168,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "có mặt dùng một đỉnh mà tệp không có",
     ),
     ("the PLY header is wrong: {}", "phần đầu tệp PLY sai: {!0}"),
-    ("{} of 3 coordinates", "chỉ có {0} trong 3 tọa độ"),
+    ("{} of 3 coordinates", "chỉ có {0#} trong 3 tọa độ"),
     (
         "a coordinate is missing or not a number",
         "thiếu tọa độ hoặc tọa độ không phải là số",
@@ -207,7 +207,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "it names {} columns, but the first point has {}",
-        "dòng này nêu {0} cột, nhưng điểm đầu tiên có {1}",
+        "dòng này nêu {0#} cột, nhưng điểm đầu tiên có {1#}",
     ),
     ("no format line", "thiếu dòng format"),
     (
@@ -221,16 +221,19 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "the image is {} x {} pixels: it has no pixels",
-        "hình có cỡ {0} x {1}: không có điểm ảnh nào",
+        "hình có cỡ {0#} x {1#}: không có điểm ảnh nào",
     ),
-    ("the image is {} x {} pixels", "hình có {0} x {1} điểm ảnh"),
+    (
+        "the image is {} x {} pixels",
+        "hình có {0#} x {1#} điểm ảnh",
+    ),
     (
         "limits.image.max_pixels is {}",
         "limits.image.max_pixels là {0#}",
     ),
     (
         "the TIFF image has {} pages, {} of them of full size",
-        "hình TIFF có {0} trang, trong đó {1} trang đủ cỡ",
+        "hình TIFF có {0#} trang, trong đó {1#} trang đủ cỡ",
     ),
     (
         "a print is one page: save it as its own file",

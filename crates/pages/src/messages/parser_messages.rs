@@ -34,7 +34,7 @@ pub(super) const PARSER_MESSAGES: &[(&str, &str)] = &[
     ("save it again", "hãy lưu lại"),
     (
         "{} of the workbook has more than {} MiB",
-        "{0} của bảng tính lớn hơn {1} MiB",
+        "{0} của bảng tính lớn hơn {1#} MiB",
     ),
     ("save the sheet alone", "hãy lưu riêng trang tính đó"),
     ("there is no sheet {}", "không có trang tính {0}"),
@@ -88,7 +88,7 @@ pub(super) const PARSER_MESSAGES: &[(&str, &str)] = &[
         "có hơn {0#} vùng ô gộp",
     ),
     ("it has more than {} files", "có hơn {0#} tệp"),
-    ("it has more than {} sheets", "có hơn {0} trang tính"),
+    ("it has more than {} sheets", "có hơn {0#} trang tính"),
     ("it has more than {} styles", "có hơn {0#} kiểu"),
     (
         "it has more than {} shared strings",
@@ -131,7 +131,7 @@ pub(super) const PARSER_MESSAGES: &[(&str, &str)] = &[
     // XML.
     (
         "more than {} elements are nested",
-        "có hơn {0} phần tử lồng nhau",
+        "có hơn {0#} phần tử lồng nhau",
     ),
     (
         "an element ends that did not begin",

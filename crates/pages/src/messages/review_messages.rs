@@ -76,7 +76,7 @@ pub(super) const REVIEW_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "the reviewer's name must be one line of 1 to {} visible characters",
-        "tên người đánh giá phải nằm trên một dòng, từ 1 đến {0} ký tự nhìn thấy được",
+        "tên người đánh giá phải nằm trên một dòng, từ 1 đến {0#} ký tự nhìn thấy được",
     ),
     (
         "NAME and TÊN stand for a name",
@@ -96,7 +96,7 @@ pub(super) const REVIEW_MESSAGES: &[(&str, &str)] = &[
     ),
     (
         "an event is 1 to {} letters, digits and hyphens",
-        "mã sự kiện gồm 1 đến {0} chữ cái, chữ số và gạch nối",
+        "mã sự kiện gồm 1 đến {0#} chữ cái, chữ số và gạch nối",
     ),
     (
         "an angle is from -180 to 180 degrees",

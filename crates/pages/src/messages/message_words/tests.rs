@@ -90,7 +90,7 @@ fn messages_about_files_are_translated_with_their_parts() {
         ),
         (
             "storage.catalog = 2.5 is not text",
-            "storage.catalog = 2,5 không phải là văn bản",
+            "storage.catalog = 2.5 không phải là văn bản",
         ),
         (
             "the control points contradict each other: no common position is nearer than 12 mm to all of them; choose them again on the same strokes of both images, or add a fourth one",
