@@ -90,8 +90,11 @@ fn the_page_of_a_pair_doubts_a_unit_that_gives_no_character() {
 fn a_refused_action_is_explained_in_the_language_of_the_page() {
     let (_dir, page) = with_project();
     for (language, expected) in [
-        ("en", "700000 is not a number of pairs from 1 to 1024"),
-        ("vi", "700000 không phải là số cặp từ 1 đến 1024"),
+        (
+            "en",
+            "700000 is not a number of pairs from 1 to 1\u{202f}024",
+        ),
+        ("vi", "700000 không phải là số cặp từ 1 đến 1\u{202f}024"),
     ] {
         page.get(&format!("/?language={language}"));
         let jobs = json!({"jobs": "700000", "which": "all"});

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::address::PageQuery;
 use super::failure::{AppFailure, AppResult};
+use super::number_text::grouped;
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use crate::on_thread::read_on_thread;
@@ -78,14 +79,17 @@ pub(super) async fn open_review(
                 "no two reviewers disagree on a result of this metric",
                 "không có hai người đánh giá nào bất đồng về kết quả của độ đo này",
             ),
-            own => Sentence::new(
-                format!(
-                    "you have judged these results yourself ({own}): a third person must settle them, under another name"
-                ),
-                format!(
-                    "chính bạn đã đánh giá các kết quả này ({own}): một người thứ ba phải quyết định, với tên khác"
-                ),
-            ),
+            own => {
+                let own = grouped(own as u64);
+                Sentence::new(
+                    format!(
+                        "you have judged these results yourself ({own}): a third person must settle them, under another name"
+                    ),
+                    format!(
+                        "chính bạn đã đánh giá các kết quả này ({own}): một người thứ ba phải quyết định, với tên khác"
+                    ),
+                )
+            }
         }
     } else {
         nothing_to_judge(&open.catalog).await?
@@ -119,6 +123,7 @@ async fn nothing_to_judge(catalog: &Catalog) -> AppResult<Sentence> {
     let blocks = BlockStatus(catalog.block_states().await?);
     let failed = blocks.number(&[JobStatus::Quarantined]);
     if failed > 0 && blocks.waiting() + blocks.leased() == 0 {
+        let failed = grouped(failed);
         return Ok(Sentence::new(
             format!(
                 "there is no result to judge, because blocks failed ({failed}): the page Blocks says why"

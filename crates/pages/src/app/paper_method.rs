@@ -8,6 +8,7 @@ use tokio::time::timeout;
 
 use super::encoded_picture::{PICTURE_SIDE, jpeg};
 use super::failure::{AppFailure, AppResult};
+use super::number_text::grouped;
 use super::projects::OpenProject;
 use super::sentence::Sentence;
 use crate::local_server::WorkThread;
@@ -138,7 +139,7 @@ fn compute(
 }
 
 fn too_long(longest: Duration) -> Sentence {
-    let seconds = longest.as_secs();
+    let seconds = grouped(longest.as_secs());
     Sentence::new(
         format!(
             "the paper's method was stopped after {seconds} s, the longest time of a stage; choose a longer one on the page Settings"

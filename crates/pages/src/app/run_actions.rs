@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use super::action_body::ActionBody;
 use super::child_run;
 use super::failure::{AppFailure, AppResult};
+use super::number_text::grouped;
 use super::projects::{OpenProject, is_project};
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -63,10 +64,10 @@ pub(super) async fn run(
         let jobs = body.jobs.parse::<u16>().ok();
         let jobs = jobs.filter(|jobs| (1..=MAX_JOBS).contains(jobs));
         let jobs = jobs.ok_or_else(|| {
-            let jobs = &body.jobs;
+            let (jobs, most) = (&body.jobs, grouped(u64::from(MAX_JOBS)));
             AppFailure::refused(Sentence::new(
-                format!("{jobs} is not a number of pairs from 1 to {MAX_JOBS}"),
-                format!("{jobs} không phải là số cặp từ 1 đến {MAX_JOBS}"),
+                format!("{jobs} is not a number of pairs from 1 to {most}"),
+                format!("{jobs} không phải là số cặp từ 1 đến {most}"),
             ))
         })?;
         args.extend(["-j".to_owned(), jobs.to_string()]);
