@@ -1,6 +1,7 @@
 //! Integration tests in one binary.
 
 mod accessible;
+mod advice;
 mod agreement;
 mod align_command;
 mod alignment_editor;
