@@ -86,7 +86,8 @@ class BoxesPage {
       input.addEventListener("input", () => this.edit({ [key]: input.value.trim() }, `${key} ${this.selected}`));
       return [input, element("label", { class: "box-field" }, element("span", {}, text(key)), input)];
     };
-    this.title = element("h1", {});
+    // The name of the block and the counts are known once the boxes are read.
+    this.title = element("h1", {}, "…");
     this.back = element("a", { href: "./" }, text("back_to_page"));
     this.choices = [["previous", -1, "←"], ["next", 1, "→"]].map(([key, way, shown]) => button(key, () => this.chooseNext(way), shown));
     // A key that presses the button has no place on the page.
@@ -102,7 +103,7 @@ class BoxesPage {
     this.earlierButton = button("use_earlier", () => this.question.showModal());
     [this.name, this.nameField] = field("name");
     [this.character, this.characterField] = field("text");
-    this.counts = element("span", { class: "block-summary" });
+    this.counts = element("span", { class: "block-summary" }, text("loading"));
     return element("header", { class: "block-bar" },
       this.title, this.back, group("choose", ...this.choices), group("change", this.addButton, this.removeButton),
       group("steps", this.undoButton, this.redoButton), this.stepButton, group("view", ...zooms.map(zoom)),

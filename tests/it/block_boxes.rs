@@ -20,6 +20,13 @@ const SHOWN: &str = "window.mocbanBoxes && mocbanBoxes.image.naturalWidth > 100"
 /// The boxes are saved.
 const SAVED: &str = "mocbanBoxes.status.textContent.includes('The next run cuts the block again')";
 
+/// Notes whether the title or the counts were blank when parts were added to the page.
+const NOTE_BLANKS: &str = "new MutationObserver(() => {
+    const parts = [...document.querySelectorAll('.box-view h1, .box-view .block-summary')];
+    window.hadParts ||= parts.length === 2;
+    window.hadBlanks ||= parts.some((part) => part.textContent === '');
+}).observe(document, { childList: true, subtree: true })";
+
 /// Returns what the page of the boxes shows.
 fn shown(page: &Page) -> Value {
     page.get(&format!("{BOXES}/block.json")).json()
@@ -191,10 +198,12 @@ fn boxes_are_changed_saved_and_replaced_by_the_earlier_ones() {
     let page = Page::of(app(dir).args(["--lang", "en"]));
     let (tab, home) = enter(&browser, &page, [1400, 900]);
     let other = browser.tab(1400, 900);
+    tab.before_scripts(NOTE_BLANKS);
     for one in [&tab, &other] {
         one.open(&format!("{home}p/p/block/b1/view/boxes"));
         one.wait(SHOWN);
     }
+    assert_eq!(tab.eval("[hadParts, hadBlanks]"), json!([true, false]));
     if let Some(axe) = axe() {
         for dark in [false, true] {
             tab.dark(dark);
