@@ -113,6 +113,7 @@ pub use records::review_context::ReviewContext;
 pub use records::review_rights::ReviewRights;
 pub use records::reviewer_names::person_name;
 pub use records::same_files::{SameContents, SameFiles};
+pub use records::scan_corrections::ScanCorrection;
 pub use records::set_apart::SetApart;
 pub use records::verdict_rules::{
     CLOCK_SKEW_MS, InvalidVerdict, NOTE_CHARS, check_event, reviewer_name,

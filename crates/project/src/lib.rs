@@ -90,6 +90,7 @@ pub mod retry;
 pub mod reviewers;
 mod row_spool;
 pub mod run;
+pub mod scan_corrections;
 pub mod selection;
 pub mod sheets;
 pub mod status;

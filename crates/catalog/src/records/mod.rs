@@ -24,6 +24,7 @@ pub(crate) mod review_context;
 pub(crate) mod review_rights;
 pub(crate) mod reviewer_names;
 pub(crate) mod same_files;
+pub(crate) mod scan_corrections;
 pub(crate) mod set_apart;
 pub(crate) mod similar_names;
 pub(crate) mod stage_results;

@@ -20,6 +20,7 @@ mod place;
 mod protocol;
 mod recovery;
 mod retired;
+mod scan_corrections;
 mod schema;
 mod server_plans;
 mod set_apart;
