@@ -87,6 +87,8 @@ fn every_page_is_shown_and_links_only_to_this_server() {
         "/p/p/export",
         "/p/p/settings",
         "/p/p/settings?key=run.workers&value=3",
+        "/p/p/correct?what=unit&class=bad_input",
+        "/p/p/correct?what=side&pair=upright-0000",
         "/p/p/health",
     ] {
         for language in ["en", "vi"] {
@@ -113,6 +115,7 @@ fn every_page_is_shown_and_links_only_to_this_server() {
         "print_mask",
         "depth_mask",
         "overlay",
+        "scan",
     ] {
         let reply = page.get(&format!(
             "/p/p/pair/upright-0000/picture/{picture}-ensemble"

@@ -103,6 +103,8 @@ fn every_page_is_accessible_in_both_themes_and_logs_no_error() {
         ("pair", "p/p/pair/upright-0000/"),
         ("paper", "p/p/pair/upright-0000/?compare=paper"),
         ("failed_pair", "p/p/pair/broken/"),
+        ("unit", "p/p/correct?what=unit&class=no_solution"),
+        ("side", "p/p/correct?what=side&pair=upright-0000"),
         ("no_blocks", "p/p/blocks"),
         ("review", "p/p/review"),
         ("report", "p/p/report"),

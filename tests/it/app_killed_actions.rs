@@ -85,6 +85,13 @@ fn views(project: &Path) -> Value {
     content(project, "saved-views.json")
 }
 
+/// Returns the unit and the side of a pair.
+fn said_of_scan(project: &Path) -> Value {
+    let shown = mocban(project, &["show", "upright-0001", "--json"]).expect(0);
+    let shown = shown.json();
+    json!([shown["unit"], shown["scanned_face_down"]])
+}
+
 /// Adds a pair that fails.
 fn fail_one(project: &Path) {
     std::fs::write(project.join("broken.stl"), "solid x").expect("written");
@@ -176,7 +183,7 @@ fn view(action: &str) -> Value {
 }
 
 /// Actions that only start a run change nothing by themselves: `app_kills.rs` tests that their run goes on.
-const IN_CATALOG: [KilledAction; 13] = [
+const IN_CATALOG: [KilledAction; 15] = [
     KilledAction::in_catalog(
         "/p/p/actions/retry",
         |_, _| json!({"class": "bad_input"}),
@@ -189,6 +196,16 @@ const IN_CATALOG: [KilledAction; 13] = [
         attempts,
     )
     .after(fail_one),
+    KilledAction::in_catalog(
+        "/p/p/actions/correct",
+        |_, _| json!({"what": "unit", "pair": "upright-0001", "unit": "cm", "shown": "1"}),
+        said_of_scan,
+    ),
+    KilledAction::in_catalog(
+        "/p/p/actions/correct",
+        |_, _| json!({"what": "side", "pair": "upright-0001", "shown": "1"}),
+        said_of_scan,
+    ),
     KilledAction::in_catalog(
         "/p/p/actions/retire",
         |_, _| json!({"pair": "upright-0001"}),

@@ -39,12 +39,14 @@ fn no_page_names_a_command_or_an_option() {
         "/p/p/review/agreement",
         "/p/p/export",
         "/p/p/health",
+        "/p/p/correct?what=side&pair=upright-0000",
         "/import",
         "/restore",
         "/p/nowhere/",
     ] {
         for language in ["en", "vi"] {
-            let html = text(&page.get(&format!("{path}?language={language}")));
+            let join = if path.contains('?') { '&' } else { '?' };
+            let html = text(&page.get(&format!("{path}{join}language={language}")));
             for command in ["`", "mocban run", "mocban import", "mocban check", " --"] {
                 assert!(
                     !html.contains(command),

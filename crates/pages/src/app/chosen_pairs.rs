@@ -16,7 +16,7 @@ use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::pair_query::PairQuery;
 use super::projects::OpenProject;
-use super::run_actions::runs;
+use super::run_actions::{refuse_during_run, runs};
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
@@ -223,12 +223,7 @@ pub(super) async fn change(
 
 /// Computes the results of pairs again.
 async fn compute(state: &AppState, open: &OpenProject, names: Vec<String>) -> AppResult<()> {
-    if runs(open).await? {
-        return Err(AppFailure::refused(Sentence::new(
-            "a run is in progress: wait for its end, or press Stop on the page Run",
-            "đang có một lần chạy: hãy chờ, hoặc bấm Dừng ở trang Căn chỉnh",
-        )));
-    }
+    refuse_during_run(open).await?;
     let args = ["--rerun", "all"].map(str::to_owned);
     child_run::start(state, &open.dir, &args, &names).await
 }

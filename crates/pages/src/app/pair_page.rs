@@ -14,6 +14,7 @@ use super::pair_numbers::numbers;
 use super::paper_method::{PAPER, is_comparable};
 use super::remedies::{failed_part, pair_remedy};
 use super::retired_pairs::retired_band;
+use super::scan_correction::ScanQuestion;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
@@ -334,6 +335,11 @@ fn pair_actions(visit: &Visit, key: &str, detail: &PairDetail) -> Markup {
                     input type="hidden" name="pair" value=(name);
                     button { (visit.t("Let it run again", "Cho chạy lại")) }
                 }))
+            }
+            @if detail.results.attributes.prior.is_none() {
+                @for question in ScanQuestion::ALL {
+                    a.button href={ "../../correct?what=" (question.name()) "&pair=" (encoded(name)) } { (question.title(visit, 1)) }
+                }
             }
             (action_form("../../actions/retire", "inline", &html! {
                 input type="hidden" name="pair" value=(name);

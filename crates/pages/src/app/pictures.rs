@@ -15,9 +15,11 @@ use mocban_catalog::PairResults;
 use mocban_core::InputLimits;
 use mocban_core::domain::{Affine2, PairName, ThresholdMetric, enum_names};
 use mocban_core::raster::{Mask, png_mask};
+use mocban_export::import_pictures::points_from_above;
 use mocban_export::pictures::PrintView;
 use mocban_export::scan_view::{ScanView, scan_alone};
 use mocban_export::{PictureError, SourcePrint};
+use mocban_project::file_headers::scan_points;
 use mocban_results::pair_artifacts::PairArtifacts;
 
 /// Longer side of a picture on a card, pixels.
@@ -38,10 +40,13 @@ pub(super) enum PairPicture {
     DepthMask,
     /// The print with the edges of the relief's strokes.
     Overlay,
+    /// Points of the scan as a relief, seen from above.
+    Scan,
 }
 
 enum_names! { pub PairPicture, "a picture":
     Thumb = "thumb", Print = "print", Relief = "relief", PrintMask = "print_mask", DepthMask = "depth_mask", Overlay = "overlay",
+    Scan = "scan",
 }
 
 /// Responds with a picture of the result of a metric. `name` is that of the picture and of the metric: `overlay-relief`.
@@ -123,6 +128,11 @@ fn draw(
     picture: PairPicture,
     limits: InputLimits,
 ) -> Option<Encoded> {
+    if picture == PairPicture::Scan {
+        let path = open.project.input_path(&pair.attributes.mesh_path);
+        let points = scan_points(&path, &limits.mesh).ok()?;
+        return Some(jpeg(&points_from_above(&points, THUMB_SIDE)?));
+    }
     let source = SourcePrint::read(&open.project, pair, &limits.image).ok()?;
     let side = match picture {
         PairPicture::Thumb => THUMB_SIDE,
@@ -150,7 +160,7 @@ fn draw(
             });
             Some(jpeg(&view.relief(&depth, &print_from_depth)))
         }
-        (_, None) => None,
+        (PairPicture::Scan, _) | (_, None) => None,
         (PairPicture::DepthMask, Some(outcome)) => {
             let strokes = artifacts.depth().ok()?.stroke_mask(outcome.threshold_level);
             Some(mask(&view.mask(&strokes, &outcome.print_from_depth)))

@@ -12,7 +12,7 @@ use super::{
     failure_page, health_page, home, import_files, import_page, import_pictures, invitation_cards,
     last_import, pair_page, pairs_page, paper_page, pictures, report_page, restore_action,
     restore_content, restore_page, review_agreement, review_page, run_actions, run_page,
-    settings_page, upload_actions, view_bar,
+    scan_correction, settings_page, upload_actions, view_bar,
 };
 
 /// Returns the routes of the app, for a server.
@@ -90,6 +90,11 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/p/{project}/actions/stop", post(run_actions::stop))
         .route("/p/{project}/actions/retry", post(run_actions::retry))
         .route("/p/{project}/actions/retire", post(run_actions::retire))
+        .route("/p/{project}/correct", get(scan_correction::page))
+        .route(
+            "/p/{project}/actions/correct",
+            post(scan_correction::correct),
+        )
         .route("/p/{project}/actions/review", post(review_page::start))
         .route(
             "/p/{project}/actions/invitation",

@@ -151,6 +151,17 @@ pub(super) async fn retire(
     Ok(Json(json!({ "go": go })))
 }
 
+/// Refuses what must not change while a run works on the project.
+pub(super) async fn refuse_during_run(open: &OpenProject) -> AppResult<()> {
+    if !runs(open).await? {
+        return Ok(());
+    }
+    Err(AppFailure::refused(Sentence::new(
+        "a run is in progress: wait for its end, or press Stop on the page Run",
+        "đang có một lần chạy: hãy chờ, hoặc bấm Dừng ở trang Căn chỉnh",
+    )))
+}
+
 /// Returns whether a run works on a project.
 pub(super) async fn runs(open: &OpenProject) -> AppResult<bool> {
     let running = is_running(&open.project, &open.catalog, now()).await;

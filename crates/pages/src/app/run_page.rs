@@ -6,13 +6,13 @@ use axum::extract::{Path, State};
 use axum::response::Html;
 use maud::{Markup, html};
 
-use super::components::{NavSection, action_form, figure, frame, grouped, stored_message};
+use super::components::{NavSection, action_form, figure, frame, grouped};
+use super::failed_groups::failed_groups;
 use super::failure::AppResult;
 use super::home::free_space;
 use super::latest_results::latest_results;
 use super::looked_part::looked_part;
 use super::projects::OpenProject;
-use super::remedies::pair_remedy;
 use super::run_blocks::{
     blocks_text, cut_again_text, failed_block_list, failed_blocks, other_blocks_text,
     outdated_blocks_text,
@@ -21,10 +21,8 @@ use super::run_state::RunState;
 use super::state::AppState;
 use super::visit::Visit;
 use crate::review::Language;
-use mocban_catalog::PairResults;
 use mocban_core::domain::{JobStatus, UnixMillis, one_line};
 use mocban_project::ProjectError;
-use mocban_project::failures::may_succeed_unchanged;
 use mocban_system::platform;
 
 pub(super) async fn page(
@@ -58,7 +56,7 @@ pub(super) async fn page(
             (disk(&visit, &open))
             (latest_results(&visit, &run.latest))
             (failed_block_list(&visit, &run.blocks))
-            (failures(&visit, &key, &run))
+            (failed_groups(&visit, &key, &run.failures))
         }
     };
     let title = visit.t("Run", "Căn chỉnh");
@@ -249,41 +247,6 @@ fn to_align(visit: &Visit, blocks: u64, pairs: u64) -> String {
 fn disk(visit: &Visit, open: &OpenProject) -> Markup {
     let free = platform::free_bytes(&open.dir);
     html! { @if let Some(free) = free { p.muted { (free_space(visit, free)) } } }
-}
-
-fn failures(visit: &Visit, key: &str, run: &RunState) -> Markup {
-    html! {
-        @if !run.failures.is_empty() {
-            section {
-                h2 { (visit.t("Failed pairs by reason", "Các cặp lỗi theo lý do")) }
-                @for (class, number, examples) in &run.failures {
-                    article.card {
-                        h3 { (grouped(*number)) " · " (visit.class(*class)) }
-                        (pair_remedy(visit, key, *class, &examples.iter().collect::<Vec<_>>()))
-                        ul { @for pair in examples { (example(visit, pair)) } }
-                        div.row {
-                            a.button href={ "pairs?view=table&state=failed&class=" (class) } { (visit.t("Show them", "Xem các cặp này")) }
-                            (action_form("actions/retry", "inline", &html! {
-                                input type="hidden" name="class" value=(class);
-                                button class=[may_succeed_unchanged(*class).then_some("primary")] { (visit.t("Try these again", "Thử lại các cặp này")) }
-                            }))
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-fn example(visit: &Visit, pair: &PairResults) -> Markup {
-    let name = pair.attributes.name.as_str();
-    let message = pair.failure.as_ref().map(|stored| &stored.failure.message);
-    html! {
-        li { p {
-            a href={ "pair/" (super::address::encoded(name)) "/" } { (one_line(name)) }
-            @if let Some(message) = message { ": " (stored_message(visit, message)) }
-        } }
-    }
 }
 
 #[cfg(test)]

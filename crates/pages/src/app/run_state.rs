@@ -1,22 +1,19 @@
 //! The state of a project that its first page shows: counts, the run in progress, and what the next run would do.
 
 use super::child_run;
+use super::failed_groups::FailedGroup;
 use super::latest_results::LatestResults;
 use super::moved_blocks::changed_blocks;
 use super::projects::OpenProject;
 use super::run_blocks::outdated_blocks;
 use super::sentence::Sentence;
-use mocban_catalog::{
-    Catalog, PairFilter, PairOrder, PairResults, Plan, StatusCounts, WorkerRecord, WorkerState,
-};
-use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, UnixMillis};
+use mocban_catalog::{Catalog, Plan, StatusCounts, WorkerRecord, WorkerState};
+use mocban_core::domain::{JobStatus, UnixMillis};
 use mocban_project::ProjectResult;
 use mocban_project::block_status::BlockStatus;
 use mocban_project::location::now;
 use mocban_runner::{fingerprints, is_running};
 
-/// Number of failed pairs that are shown as examples of each class.
-const EXAMPLES: usize = 3;
 /// Most pairs that failed or have other files with which the page asks what the next run would do: each is inspected.
 const MAX_INSPECTED: u64 = 1000;
 
@@ -26,7 +23,7 @@ pub(super) struct RunState {
     pub(super) is_running: bool,
     pub(super) workers: Vec<WorkerRecord>,
     pub(super) latest: LatestResults,
-    pub(super) failures: Vec<(FailureClass, u64, Vec<PairResults>)>,
+    pub(super) failures: Vec<FailedGroup>,
     pub(super) blocks: BlockStatus,
     /// Number of finished or failed blocks that the next run would align again. 0 during a run.
     pub(super) outdated_blocks: u64,
@@ -65,19 +62,6 @@ impl RunState {
         } else {
             Some(catalog.plan(&current, None, options.rerun).await?)
         };
-        let mut classes = catalog.failure_counts().await?;
-        classes.sort_by_key(|(class, number)| (std::cmp::Reverse(*number), *class));
-        let mut failures = Vec::new();
-        for (class, number) in classes {
-            let filter = PairFilter {
-                class: Some(class),
-                statuses: vec![JobStatus::Quarantined],
-                ..PairFilter::default()
-            };
-            let metric = ThresholdMetric::DEFAULT;
-            let list = catalog.pair_list(&filter, PairOrder::Imported, metric, None, EXAMPLES);
-            failures.push((class, number, list.await?.pairs));
-        }
         let blocks = BlockStatus(catalog.block_states().await?);
         let [outdated_blocks, changed_blocks] = if running {
             [0; 2]
@@ -93,7 +77,7 @@ impl RunState {
             is_running: running,
             workers: workers.unwrap_or_default(),
             latest: LatestResults::read(catalog, now()).await?,
-            failures,
+            failures: FailedGroup::read_all(catalog).await?,
             blocks,
             outdated_blocks,
             changed_blocks,
