@@ -199,9 +199,10 @@ fn spool(
     let mut missing = MissingFiles::default();
     let mut outcome = Ok(());
     let mut count = 0_u64;
-    let hash = listing.rows(project, |row, lines| {
+    let hash = listing.rows(project, |mut row, lines| {
         poll();
         count += 1;
+        choices.add_block(&mut row);
         failpoint::hit("import", Point::Computed, Some(&row.name));
         for line in lines {
             missing.add(line);

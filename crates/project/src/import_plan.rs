@@ -50,6 +50,8 @@ pub struct ImportPlan {
     pub hash: ContentHash,
     /// The pairs that were asked for.
     pub shown: Vec<PlannedPair>,
+    /// Whether the list or the folders name the block of a pair.
+    pub has_blocks: bool,
     /// Meshes and prints of folders without a partner, by their paths below the folders.
     pub alone: [Vec<String>; 2],
     /// Says why folders have no pair.
@@ -86,11 +88,13 @@ pub fn plan_import(
     let (storage, _) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
     let listing = listing(source, choices)?;
-    let (mut pairs, mut planned) = (0, Vec::new());
+    let (mut pairs, mut planned, mut has_blocks) = (0, Vec::new(), false);
     let mut missing = MissingFiles::default();
     let mut columns = ColumnHasher::default();
-    let hash = listing.rows(&project, |row, lines| {
+    let hash = listing.rows(&project, |mut row, lines| {
         poll();
+        has_blocks |= row.block.is_some();
+        choices.add_block(&mut row);
         for line in &lines {
             missing.add(line.clone());
         }
@@ -117,6 +121,7 @@ pub fn plan_import(
         pairs,
         hash,
         shown: planned,
+        has_blocks,
         missing,
         alone: listing.alone,
         no_pair: listing.no_pair.map(|why| why.to_string()),
@@ -229,6 +234,58 @@ mod tests {
             .await
             .expect_err("no such pair");
         assert!(refused.contains("there is no pair \"c\""), "{refused}");
+    }
+
+    #[tokio::test]
+    async fn a_block_is_chosen_for_the_pairs_that_have_none() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        for name in ["a.stl", "a.png", "b.stl", "b.png"] {
+            std::fs::write(dir.path().join(name), "x").expect("written");
+        }
+        let location = Location::new(dir.path().join("project"));
+        let list = |text: &str| PairSource::List {
+            file: dir.path().join("pairs.csv"),
+            bytes: Some(text.as_bytes().to_vec()),
+        };
+        let rows = "id,mesh,print,block\na,a.stl,a.png,\nb,b.stl,b.png,Ván 2\n";
+        let mut choices = PairChoices {
+            block: Some("Ván 1".to_owned()),
+            ..PairChoices::default()
+        };
+        let plan = plan_import(list(rows), &choices, &location, &(0..9)).expect("a plan");
+        let blocks: Vec<Option<&str>> = plan
+            .shown
+            .iter()
+            .map(|pair| pair.block.as_deref())
+            .collect();
+        assert_eq!(blocks, [Some("Ván 1"), Some("Ván 2")]);
+        assert!(plan.has_blocks);
+        let without = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
+        let plan = plan_import(list(without), &choices, &location, &(0..9)).expect("a plan");
+        assert!(!plan.has_blocks, "the list has none");
+        // Like the unit of folders, the block is typed below the pairs that are shown.
+        choices.shown = Some(plan.hash);
+        choices.block = Some("Ván 3".to_owned());
+        let import = |source, choices| PairImport {
+            source,
+            truth: None,
+            allowed: AllowedChanges::default(),
+            choices,
+        };
+        let imported = import_pairs(import(list(without), choices.clone()), &location, &()).await;
+        assert_eq!(imported.expect("imported").summary.added, 2);
+        let folders = PairSource::Folders {
+            meshes: dir.path().to_owned(),
+            prints: dir.path().to_owned(),
+            unit: None,
+        };
+        let other = PairChoices {
+            block: Some("Ván 4".to_owned()),
+            ..PairChoices::default()
+        };
+        let again = import_pairs(import(folders, other), &location, &()).await;
+        let again = again.expect("imported").summary;
+        assert_eq!((again.added, again.unchanged), (0, 2), "they keep theirs");
     }
 
     #[test]

@@ -14,6 +14,17 @@ pub struct PairChoices {
     pub changes: PairingChanges,
     /// Hash of the pairs that were shown. Others are refused.
     pub shown: Option<ContentHash>,
+    /// The block of the pairs for which the list or the folders name none.
+    pub block: Option<String>,
+}
+
+impl PairChoices {
+    /// Gives a pair the chosen block, unless it has one.
+    pub(crate) fn add_block(&self, row: &mut ManifestRow) {
+        if row.block.is_none() {
+            row.block.clone_from(&self.block);
+        }
+    }
 }
 
 /// Hashes the pairs of an import in their order, as they are listed: the project does not matter.
@@ -26,7 +37,7 @@ impl RowsHash {
         Self(ContentHash::of(folder.as_os_str().as_encoded_bytes()))
     }
 
-    /// Adds a pair. The unit counts unless it is chosen with the import.
+    /// Adds a pair. The unit counts unless it is chosen with the import, as a block for all pairs is.
     pub(crate) fn add(&mut self, row: &ManifestRow, has_unit: bool) {
         let attributes = (&row.character, &row.block, row.scanned_face_down, &row.meta);
         let unit = row.unit.filter(|_| has_unit);

@@ -51,7 +51,8 @@ pub struct ImportTerms {
     pub changed_files: bool,
     /// Whether pairs that the list does not have are retired, except for pairs of blocks.
     pub replace: bool,
-    /// Whether known pairs keep the columns that folders do not have: character, block, scanned side and metadata.
+    /// Whether known pairs keep the columns that folders do not have: character, block if they have one, scanned side and
+    /// metadata.
     pub keep_columns: bool,
 }
 
@@ -309,7 +310,9 @@ pub(crate) async fn import_chunk(
             if let Some(Some(known)) = stored.get(&row.name) {
                 row.scanned_face_down = known.scanned_face_down;
                 row.character.clone_from(&known.character);
-                row.block.clone_from(&known.block);
+                if known.block.is_some() {
+                    row.block.clone_from(&known.block);
+                }
                 row.meta.clone_from(&known.meta);
             }
         }

@@ -13,6 +13,7 @@ use super::named_blocks::named_blocks;
 use super::plan_cache::{KEPT_PAIRS, PlanCache};
 use super::sentence::Sentence;
 use mocban_core::domain::LengthUnit;
+use mocban_core::domain::spelling::composed;
 use mocban_lists::manifest::{
     ChosenColumns, ListHead, PairingChanges, ReadBlocks, is_named_like_mesh, is_named_like_print,
     read_head,
@@ -27,6 +28,8 @@ use mocban_project::pair_choices::PairChoices;
 
 /// Number of pairs that are shown at once before an import.
 pub(super) const SHOWN_PAIRS: u64 = 20;
+/// Longest name of a block that is typed.
+pub(super) const BLOCK_CHARS: usize = 60;
 /// Rows of a list that are shown to choose its columns.
 const SHOWN_ROWS: usize = 3;
 
@@ -43,6 +46,8 @@ pub(super) struct ImportChoice {
     /// A list.
     pub(super) list: String,
     pub(super) unit: String,
+    /// The block of pairs for which none is named, or the name of the only whole block.
+    pub(super) block: String,
     /// Whether files may be missing.
     pub(super) missing: String,
     /// Whether most known pairs may get other files.
@@ -94,6 +99,7 @@ impl ImportChoice {
             prints: get("prints"),
             list: get("list"),
             unit: get("unit"),
+            block: get("block"),
             missing: get("missing"),
             changed: get("changed"),
             matches: get("matches"),
@@ -139,6 +145,7 @@ impl ImportChoice {
         let others = [
             ("project", project),
             ("unit", &*self.unit),
+            ("block", &*self.block),
             ("missing", &*self.missing),
             ("changed", &*self.changed),
             ("compare", "1"),
@@ -177,7 +184,23 @@ impl ImportChoice {
             columns,
             changes: self.changes()?,
             shown: shown.transpose().map_err(|_invalid| not_of_page())?,
+            block: self.named_block()?,
         })
+    }
+
+    /// Returns the name of the block that was typed, if any.
+    ///
+    /// # Errors
+    /// Refuses a name that is too long or has a line break.
+    fn named_block(&self) -> AppResult<Option<String>> {
+        let name = self.block.trim();
+        if name.chars().count() > BLOCK_CHARS || name.chars().any(char::is_control) {
+            return Err(AppFailure::refused(Sentence::new(
+                format!("the name of a block has at most {BLOCK_CHARS} characters on one line"),
+                format!("tên ván có tối đa {BLOCK_CHARS} ký tự trên một dòng"),
+            )));
+        }
+        Ok((!name.is_empty()).then(|| composed(name).into_owned()))
     }
 
     /// Returns what is imported, once enough is chosen, and a warning about how a list was read.
@@ -228,7 +251,7 @@ impl ImportChoice {
             page: only(&self.prints, is_named_like_print)?,
             labels: None,
             side: None,
-            name: None,
+            name: self.named_block()?,
             unit: self.unit.parse::<LengthUnit>().ok(),
         })
     }
@@ -241,6 +264,7 @@ impl ImportChoice {
             &self.prints,
             &self.matches,
             &self.whole_block,
+            &self.block,
         ];
         format!("{:?}", (dir, start, source, self.columns()))
     }
@@ -318,7 +342,7 @@ const fn kept_start(from: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::ImportChoice;
+    use super::{BLOCK_CHARS, ImportChoice};
     use crate::app::address::PageQuery;
 
     #[test]
@@ -333,11 +357,27 @@ mod tests {
     }
 
     #[test]
+    fn the_name_of_a_block_is_one_line_and_not_long() {
+        let named = |text: &str| {
+            let chosen = ImportChoice {
+                block: text.to_owned(),
+                ..ImportChoice::default()
+            };
+            chosen.choices().map(|choices| choices.block).ok()
+        };
+        assert_eq!(named(" "), Some(None));
+        assert_eq!(named(" Ván 1 "), Some(Some("Ván 1".to_owned())));
+        assert_eq!(named("a\nb"), None);
+        assert_eq!(named(&"ơ".repeat(BLOCK_CHARS + 1)), None);
+    }
+
+    #[test]
     fn the_page_that_compares_a_list_keeps_what_the_form_allows() {
         let chosen = ImportChoice {
             list: "/a/list.csv".to_owned(),
             missing: "yes".to_owned(),
             changed: "yes".to_owned(),
+            block: "Ván 1".to_owned(),
             ..ImportChoice::default()
         };
         let address = chosen.comparison("p 1");

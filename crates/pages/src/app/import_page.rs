@@ -37,8 +37,9 @@ use mocban_project::location::Location;
 use mocban_project::pair_choices::PairChoices;
 
 /// Values of the address that belong to the files that were chosen, beside the columns of a list.
-const OF_FILES: [&str; 7] = [
+const OF_FILES: [&str; 8] = [
     "matches",
+    "block",
     "from",
     "left_out",
     "whole_block",

@@ -6,7 +6,7 @@ use std::path::Path;
 use maud::{Markup, html};
 
 use super::components::{action_form, choice, grouped, unit_name};
-use super::import_choice::{ImportChoice, Planned, SHOWN_PAIRS};
+use super::import_choice::{BLOCK_CHARS, ImportChoice, Planned, SHOWN_PAIRS};
 use super::import_files::files_part;
 use super::project_name::NAME_CHARS;
 use super::sentence::{Sentence, without_commands};
@@ -361,6 +361,11 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
                     }
                 }
             }
+            @if let Some(label) = block_label(visit, chosen, planned) {
+                label { span { (label) }
+                    input #block name="block" value=(chosen.block) maxlength=(BLOCK_CHARS) data-in-address;
+                }
+            }
             @if missing {
                 label.check { input type="checkbox" name="missing" value="yes" checked[!chosen.missing.is_empty()] data-in-address; " " (visit.t("Also import pairs whose files are missing", "Nhập cả các cặp thiếu tệp")) }
             }
@@ -371,6 +376,26 @@ fn import_form(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Marku
             button.primary #import disabled[is_nothing] { (visit.t("Import", "Nhập")) }
         },
     )
+}
+
+/// Returns what the field for the name of a block is called: of all pairs, if neither list nor folders name a block, or of
+/// the only whole block. `None` if they do.
+fn block_label(visit: &Visit, chosen: &ImportChoice, planned: &Planned) -> Option<&'static str> {
+    let is_named = !chosen.block.is_empty();
+    match planned {
+        Planned::Pairs(plan, _) => (!plan.has_blocks || is_named).then(|| {
+            visit.t(
+                "Block of these pairs (may be left empty)",
+                "Ván của các cặp này (có thể để trống)",
+            )
+        }),
+        Planned::Blocks(..) => (!chosen.whole_block.is_empty()).then(|| {
+            visit.t(
+                "Name of the block (empty: that of its file)",
+                "Tên của ván (để trống: theo tên tệp)",
+            )
+        }),
+    }
 }
 
 #[cfg(test)]

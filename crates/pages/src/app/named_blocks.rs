@@ -19,8 +19,14 @@ pub(super) fn named_blocks(source: &BlockSource) -> AppResult<ReadBlocks> {
         BlockSource::One(block) => {
             let shown = block.mesh.display();
             let stem = block.mesh.file_stem().unwrap_or_default().to_string_lossy();
-            let name = BlockName::new(&stem)
-                .map_err(|error| refused(format!("{shown}: {error}; rename the file")))?;
+            let typed = block.name.as_deref();
+            let name = BlockName::new(typed.unwrap_or(&stem)).map_err(|error| {
+                let why = match typed {
+                    Some(_) => error.to_string(),
+                    None => format!("{shown}: {error}; rename the file"),
+                };
+                refused(why)
+            })?;
             let row = BlockRow {
                 line: 1,
                 name,

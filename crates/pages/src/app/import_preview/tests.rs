@@ -77,3 +77,27 @@ fn what_the_form_of_an_import_has_is_kept_in_the_address_of_its_page() {
     let part = "name=\"changed\" value=\"yes\" checked data-in-address>";
     assert!(shown.contains(part), "{shown}");
 }
+
+#[test]
+fn the_only_whole_block_gets_a_name() {
+    let planned = Planned::Blocks(ReadBlocks::default(), None);
+    for (language, label) in [
+        (
+            Language::English,
+            "Name of the block (empty: that of its file)",
+        ),
+        (Language::Vietnamese, "Tên của ván (để trống: theo tên tệp)"),
+    ] {
+        let visit = Visit::in_language(language);
+        let of = |address| {
+            let chosen = ImportChoice::of(&PageQuery::parse(address));
+            import_form(&visit, &chosen, &planned).into_string()
+        };
+        let shown = of("whole_block=yes&block=b+7");
+        for part in [label, "name=\"block\" value=\"b 7\""] {
+            assert!(shown.contains(part), "{part}: {shown}");
+        }
+        let listed = of("list=blocks.csv");
+        assert!(!listed.contains("name=\"block\""), "{listed}");
+    }
+}
