@@ -27,7 +27,7 @@ and of the first request for the page. A part is loaded by its page after the pa
 memory of the app after the page.";
 
 /// Pages below the project.
-const PAGES: [(&str, &str); 22] = [
+const PAGES: [(&str, &str); 23] = [
     ("Run, with the worst of the hour", ""),
     ("Pairs", "pairs"),
     ("Pairs, table", "pairs?view=table"),
@@ -47,6 +47,10 @@ const PAGES: [(&str, &str); 22] = [
     ("Pairs, retired", "pairs?state=retired"),
     ("Pair", "pair/p00000001/"),
     ("Pair, two metrics", "pair/p00000001/?compare=density"),
+    (
+        "Unit of failed scans",
+        "correct?what=unit&class=no_solution",
+    ),
     ("Blocks", "blocks"),
     ("Review", "review"),
     ("Report", "report"),

@@ -8,6 +8,7 @@ use crate::app_browser::{enter, fits_width, looks_right};
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
+use crate::small_block::demo_block;
 use crate::waiting::wait_until;
 
 /// The page of imports can take files.
@@ -104,6 +105,35 @@ fn files_and_a_zip_are_chosen_in_a_browser_and_become_pairs() {
     assert!(dir.join("uploads/quét/chữ số 1.ply").is_file());
     let problems = browser.take_problems();
     assert!(problems.is_empty(), "{problems:#?}");
+}
+
+#[test]
+fn dragged_files_become_a_whole_block_with_a_name() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let source = tempfile::tempdir().expect("a temporary directory");
+    demo_block(source.path());
+    let files = ["block.ply", "page.jpg"].map(|name| source.path().join("d/data").join(name));
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1366, 660]);
+    tab.open(&format!("{home}import"));
+    tab.wait(READY);
+    tab.drop_files("#upload", &files);
+    tab.wait("document.body?.dataset.ready && document.querySelector('#whole-block button')");
+    tab.click("#whole-block button", false);
+    tab.wait("document.body?.dataset.ready && location.search.includes('whole_block=yes')");
+    tab.eval("document.querySelector('#block').value = 'Ván 7', null");
+    import(&tab, "blocks");
+    let shown = mocban(&dir.path().join("blocks"), &["show", "Ván 7", "--json"]);
+    let shown = shown.expect(0).json();
+    let mesh = shown["mesh_path"].as_str().expect("a path");
+    assert!(mesh.ends_with("uploads/files block/block.ply"), "{mesh}");
+    tab.open(&format!("{home}p/blocks/blocks"));
+    tab.wait("document.body?.dataset.ready && document.querySelector('a[href^=\"block/\"]')");
+    let listed = tab.eval("document.querySelector('a[href^=\"block/\"]').textContent");
+    assert_eq!(listed, "Ván 7");
 }
 
 #[test]

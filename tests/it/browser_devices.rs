@@ -1,5 +1,7 @@
 //! The devices at a browser: a keyboard, a mouse, a screen for fingers, and a slow network.
 
+use std::path::PathBuf;
+
 use serde_json::json;
 
 use crate::browser::Tab;
@@ -103,6 +105,16 @@ impl Tab<'_> {
     /// Types text into the focused element.
     pub(crate) fn text(&self, text: &str) {
         self.call("Input.insertText", &json!({ "text": text }));
+    }
+
+    /// Drags files of the computer onto the middle of an element, and drops them there.
+    pub(crate) fn drop_files(&self, element: &str, files: &[PathBuf]) {
+        let [x, y] = self.middle(element);
+        let data = json!({ "items": [], "files": files, "dragOperationsMask": 1 });
+        for kind in ["dragEnter", "dragOver", "drop"] {
+            let event = json!({ "type": kind, "x": x, "y": y, "data": data });
+            self.call("Input.dispatchDragEvent", &event);
+        }
     }
 
     /// Drags with the left button.

@@ -7,6 +7,7 @@ mod align_command;
 mod alignment_editor;
 mod all_pages;
 mod app;
+mod app_actions_browser;
 #[cfg(target_os = "linux")]
 mod app_backup;
 mod app_blocks;
@@ -14,6 +15,7 @@ mod app_browser;
 mod app_choice;
 mod app_choice_browser;
 mod app_controls;
+mod app_corrections;
 mod app_curator;
 mod app_devices;
 mod app_export_zip;

@@ -29,7 +29,7 @@ use mocban_project::scan_corrections::correct_scans;
 /// Most pairs that are corrected at a time.
 const MAX_CORRECTED: usize = 10_000;
 /// Most failures of a class that are searched.
-const MAX_SEARCHED: usize = 100_000;
+const MAX_SEARCHED: usize = 20_000;
 /// Number of pairs that are named.
 const NAMED: usize = 12;
 /// Value of the field for a unit that is not known: an empty one asks for a choice.
