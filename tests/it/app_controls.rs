@@ -17,7 +17,7 @@ const SMALLEST: u32 = 44;
 pub(crate) const SHOWN: &str = "document.body?.dataset.ready && !document.querySelector('#choice:not([data-ready])') && [...document.querySelectorAll('[data-load]')].every((part) => part.dataset.loaded)";
 
 /// Pages of the app.
-pub(crate) const PAGES: [&str; 21] = [
+pub(crate) const PAGES: [&str; 22] = [
     "",
     "p/p/",
     "p/p/pairs",
@@ -29,6 +29,7 @@ pub(crate) const PAGES: [&str; 21] = [
     "p/p/pair/upright-0000/?compare=paper",
     "p/p/pair/upright-0007/",
     "p/p/pair/broken/",
+    "p/p/correct?what=unit&pair=broken",
     "p/p/blocks",
     "p/p/review",
     "p/p/report",

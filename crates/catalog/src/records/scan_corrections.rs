@@ -96,7 +96,7 @@ impl Catalog {
     }
 }
 
-/// Returns a pair as it is imported after a correction.
+/// Returns the row that an import of a corrected list would have.
 fn corrected(row: &Row, correction: ScanCorrection) -> Result<ImportRow> {
     let mut pair = PairAttributes::from_row(row)?;
     match correction {
