@@ -379,3 +379,28 @@ fn a_change_that_is_refused_leaves_what_was_chosen() {
         }
     }
 }
+
+#[test]
+fn pairs_without_a_block_get_the_typed_one() {
+    let (dir, page) = with_project();
+    let dir = dir.path();
+    copy_inputs(dir, &INPUTS);
+    let shown = folders(&page, dir, "");
+    let field = "<input id=\"block\" name=\"block\" value=\"\"";
+    assert!(shown.contains(field), "{shown}");
+    let mut typed = fields(&shown);
+    typed["block"] = json!("v".repeat(61));
+    let refused = import(&page, &typed);
+    assert_eq!(refused.status, 422, "{}", text(&refused));
+    assert!(!dir.join("new").exists(), "nothing is stored");
+    typed["block"] = json!(" Ván 9 ");
+    let reply = import(&page, &typed);
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    let pair = mocban(&dir.join("new"), &["show", "2", "--json"]).expect(0);
+    assert_eq!(pair.json()["block"], "Ván 9");
+    // The list of the shared project has a column for blocks.
+    let list = encode(dir.join("p/data/manifest.csv").to_str().expect("UTF-8"));
+    let listed = text(&page.get(&format!("/import?project=new&list={list}")));
+    assert!(listed.contains("id=\"import\""), "{listed}");
+    assert!(!listed.contains("id=\"block\""), "{listed}");
+}

@@ -122,8 +122,8 @@ pub(super) async fn page(
         (pairs_part(&visit, &names))
         (meaning(&visit, what))
         p { (visit.t(
-            "All stages of these pairs are then computed again. A verdict counts again only if the result stays the same.",
-            "Sau đó mọi giai đoạn của các cặp này được tính lại. Đánh giá chỉ được tính tiếp nếu kết quả không đổi.",
+            "All stages of these pairs are then computed again. A verdict counts again only if the result stays the same. A list that is imported later must say the same.",
+            "Sau đó mọi giai đoạn của các cặp này được tính lại. Đánh giá chỉ được tính tiếp nếu kết quả không đổi. Danh sách được nhập sau này phải ghi như vậy.",
         )) }
         @if is_running { p.notice #running { (visit.t(
             "A run is in progress: wait for its end, or press Stop on the page Run.",
