@@ -21,8 +21,10 @@ enum FileOrigin {
 }
 
 impl FileOrigin {
+    /// Returns the origin of a pair. Its block, its unit and its side may have been typed in the app.
     fn of_pair(pair: &PairAttributes) -> Self {
-        match (&pair.prior, pair.is_listed()) {
+        let is_listed = pair.character.is_some() || !pair.meta.is_empty();
+        match (&pair.prior, is_listed) {
             (Some(_), _) => Self::Block,
             (None, true) => Self::List,
             (None, false) => Self::Unknown,
@@ -200,6 +202,16 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_was_typed_in_the_app_makes_no_list() {
+        let mut typed = attributes(None);
+        typed.block = Some("Ván 9".to_owned());
+        typed.scanned_face_down = Some(true);
+        assert_eq!(FileOrigin::of_pair(&typed), FileOrigin::Unknown);
+        typed.meta.insert("folio".to_owned(), "3a".into());
+        assert_eq!(FileOrigin::of_pair(&typed), FileOrigin::List);
     }
 
     #[test]

@@ -139,9 +139,9 @@ pub(super) async fn page(
 fn pairs_part(visit: &Visit, names: &[PairName]) -> Markup {
     let count = names.len() as u64;
     html! {
-        p #corrected { b { (grouped(count)) } " " (visit.form(count, ["pair", "pairs"], "cặp")) ": "
+        p #corrected { b { (grouped(count)) } " " (visit.form(count, ["pair", "pairs"], "cặp"))
             @for (at, name) in names.iter().take(NAMED).enumerate() {
-                @if at > 0 { ", " }
+                (if at == 0 { ": " } else { ", " })
                 a href={ "pair/" (encoded(name.as_str())) "/" } { (one_line(name.as_str())) }
             }
             @if names.len() > NAMED { ", …" }
