@@ -154,6 +154,7 @@ mod queue;
 mod readers;
 #[cfg(unix)]
 mod refused_writes;
+mod release_files;
 mod renamed;
 mod report;
 mod resume;
