@@ -19,6 +19,7 @@ mod app_corrections;
 mod app_curator;
 mod app_devices;
 mod app_export_zip;
+mod app_guide;
 mod app_import;
 mod app_import_files;
 mod app_invitations;
