@@ -37,6 +37,7 @@ mod app_phone;
 mod app_print;
 #[cfg(unix)]
 mod app_read_only;
+mod app_report;
 mod app_restore;
 mod app_resume_browser;
 mod app_routes;

@@ -61,8 +61,8 @@ pub struct PairFilter {
     pub verdict: Option<Verdict>,
     /// Whether this verdict, a pass or a fail, must be the joint verdict of all reviewers, as a report counts it.
     pub is_joint: bool,
-    /// Whether the current result of the metric must have no verdict.
-    pub is_unjudged: bool,
+    /// Whether the current result of the metric must have a verdict, or must have none.
+    pub is_judged: Option<bool>,
     /// Whether the result of the default metric must have a low confidence.
     pub is_low_confidence: bool,
     /// The block of the list.
@@ -134,7 +134,7 @@ macro_rules! listed {
             ELSE 0 END ",
             from_current_verdicts!(),
             " AND v.pair = c.id AND v.metric = ?5))
-        AND (?11 = 0 OR NOT EXISTS (SELECT 1 ",
+        AND (?11 < 0 OR (?11 = 0) <> EXISTS (SELECT 1 ",
             from_current_verdicts!(),
             " AND v.pair = c.id AND v.metric = ?5))
         AND (?12 = 0 OR j.status = 3 AND j.low_confidence = 1) AND (?13 = 0 OR j.status = 3)
@@ -163,6 +163,8 @@ const LOW: &str = listed!(
 const JUDGED: &str = listed!(
     "SELECT DISTINCT pair AS id FROM verdict WHERE verdict = ?10 AND pair > ?3 ORDER BY pair"
 );
+const JUDGED_BY_ANYBODY: &str =
+    listed!("SELECT DISTINCT pair AS id FROM verdict WHERE pair > ?3 ORDER BY pair");
 const BY_CONFIDENCE: &str = listed!(
     "SELECT pair AS id FROM metric_result WHERE metric = ?5 AND (confidence, pair) > (?2, ?3) ORDER BY confidence, pair"
 );
@@ -179,7 +181,7 @@ const BY_IOU_DOWN: &str = listed!(
 
 /// Returns every statement of this list, with a name.
 #[cfg(test)]
-pub(crate) fn statements() -> [(&'static str, &'static str); 11] {
+pub(crate) fn statements() -> [(&'static str, &'static str); 12] {
     [
         ("all", ALL),
         ("block", OF_BLOCK),
@@ -188,6 +190,7 @@ pub(crate) fn statements() -> [(&'static str, &'static str); 11] {
         ("class", OF_CLASS),
         ("low", LOW),
         ("judged", JUDGED),
+        ("judged by anybody", JUDGED_BY_ANYBODY),
         ("confidence", BY_CONFIDENCE),
         ("confidence down", BY_CONFIDENCE_DOWN),
         ("iou", BY_IOU),
@@ -200,6 +203,8 @@ impl PairFilter {
     const fn source(&self) -> &'static str {
         if self.verdict.is_some() {
             JUDGED
+        } else if matches!(self.is_judged, Some(true)) {
+            JUDGED_BY_ANYBODY
         } else if self.class.is_some() {
             OF_CLASS
         } else if self.is_low_confidence {
@@ -294,7 +299,7 @@ impl<'l> ListReader<'l> {
             .bind(filter.status_bits())
             .bind(filter.class.map(FailureClass::name))
             .bind(verdict)
-            .bind(i64::from(filter.is_unjudged))
+            .bind(filter.is_judged.map_or(-1, i64::from))
             .bind(i64::from(filter.is_low_confidence))
             // The scores of a pair that runs again are those of its last result.
             .bind(i64::from(self.order != PairOrder::Imported))

@@ -167,11 +167,18 @@ async fn retired_pairs_are_in_no_list_and_verdicts_are_found() {
             .is_empty()
     );
     let unjudged = PairFilter {
-        is_unjudged: true,
+        is_judged: Some(false),
         ..PairFilter::default()
     };
     let found = listed(&world, &unjudged, PairOrder::Imported, 2).await;
     assert_eq!(found, [0, 1, 3, 5, 6, 7]);
+    let judged = PairFilter {
+        is_judged: Some(true),
+        ..PairFilter::default()
+    };
+    for order in [PairOrder::Imported, PairOrder::LowestIou] {
+        assert_eq!(listed(&world, &judged, order, 1).await, [4], "{order}");
+    }
 }
 
 #[tokio::test]
@@ -217,6 +224,12 @@ async fn a_joint_verdict_is_undisputed_or_settled_by_adjudications() {
         let found = listed(&world, &filter, PairOrder::Imported, 2).await;
         assert_eq!(found, expected, "{verdict} {is_joint}");
     }
+    let judged = PairFilter {
+        is_judged: Some(true),
+        ..PairFilter::default()
+    };
+    let found = listed(&world, &judged, PairOrder::Imported, 2).await;
+    assert_eq!(found, [0, 1, 2, 3, 4, 5]);
 }
 
 #[tokio::test]

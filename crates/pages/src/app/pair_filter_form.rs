@@ -33,6 +33,7 @@ pub(super) fn filter_form(visit: &Visit, blocks: &[String], retired: u64) -> Mar
     let mut verdicts = vec![("", any)];
     verdicts.extend(JOINT_VERDICTS.map(|(name, one)| (name, visit.joint_verdict(one))));
     verdicts.extend(Verdict::ALL.map(|one| (one.name(), visit.given_by_somebody(one))));
+    verdicts.push(("judged", visit.t("judged", "đã đánh giá")));
     verdicts.push(("none", visit.t("not judged", "chưa đánh giá")));
     let metrics = ThresholdMetric::ALL.map(|metric| (metric.name(), visit.metric(metric)));
     let metric = visit
@@ -45,7 +46,7 @@ pub(super) fn filter_form(visit: &Visit, blocks: &[String], retired: u64) -> Mar
             (field(visit, "state", visit.t("State", "Trạng thái"), &[
                 ("", any), ("aligned", visit.status(JobStatus::Done)), ("failed", visit.status(JobStatus::Quarantined)),
                 ("waiting", visit.status(JobStatus::Ready)), ("running", visit.status(JobStatus::Leased)),
-                (RETIRED, &retired),
+                ("unfinished", visit.t("not finished", "chưa xong")), (RETIRED, &retired),
             ]))
             (field(visit, "class", visit.t("Why failed", "Lý do lỗi"), &classes))
             (field(visit, "confidence", visit.t("Confidence", "Độ tin cậy"), &[("", any), ("low", visit.t("low", "thấp"))]))

@@ -5,11 +5,15 @@ use mocban_catalog::{MetricDifference, PairCursor, PairFilter, PairOrder};
 use mocban_core::domain::{JobStatus, ThresholdMetric, Verdict};
 
 /// States that a list can be filtered by, with the statuses of their jobs.
-const STATES: [(&str, &[JobStatus]); 4] = [
+const STATES: [(&str, &[JobStatus]); 5] = [
     ("aligned", &[JobStatus::Done]),
     ("failed", &[JobStatus::Quarantined]),
     ("waiting", &[JobStatus::Ready, JobStatus::Backoff]),
     ("running", &[JobStatus::Leased]),
+    (
+        "unfinished",
+        &[JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased],
+    ),
 ];
 
 /// Values of the joint verdict of all reviewers in an address.
@@ -86,7 +90,11 @@ impl PairQuery {
                 class,
                 verdict: joint.map_or_else(|| verdict?.parse().ok(), |(_, verdict)| Some(*verdict)),
                 is_joint: joint.is_some(),
-                is_unjudged: verdict == Some("none"),
+                is_judged: match verdict {
+                    Some("none") => Some(false),
+                    Some("judged") => Some(true),
+                    _ => None,
+                },
                 is_low_confidence: query.get("confidence") == Some("low"),
                 block: query.get("block").map(str::to_owned),
                 character: query.get("character").map(str::to_owned),
@@ -167,7 +175,11 @@ mod tests {
         assert_eq!(query.after, Some(after));
         assert_eq!(query.order, PairOrder::HighestIou);
         assert_eq!(query.metric, ThresholdMetric::Relief);
-        assert!(query.filter.is_unjudged && query.is_table && !query.is_retired);
+        assert_eq!(query.filter.is_judged, Some(false));
+        assert!(query.is_table && !query.is_retired);
+        let judged = of("verdict=judged").filter;
+        assert_eq!((judged.verdict, judged.is_judged), (None, Some(true)));
+        assert_eq!(of("state=unfinished").filter.statuses.len(), 3);
         assert!(of("state=retired").is_retired);
         let joint = of("verdict=joint-fail").filter;
         assert_eq!((joint.verdict, joint.is_joint), (Some(Verdict::Fail), true));

@@ -8,7 +8,9 @@ use maud::{Markup, html};
 
 use super::address::encoded;
 use super::attachment::attachment;
-use super::components::{NavSection, empty, frame, grouped, number_table, score, stored_message};
+use super::components::{
+    NavSection, empty, figure, frame, grouped, number_table, score, stored_message,
+};
 use super::failure::{AppFailure, AppResult};
 use super::pair_query::RETIRED;
 use super::run_blocks::failed_blocks_part;
@@ -19,7 +21,7 @@ use crate::messages;
 use crate::on_thread::read_in_turn;
 use crate::report_language::report_page;
 use crate::review::Language;
-use mocban_core::domain::one_line;
+use mocban_core::domain::{ThresholdMetric, one_line};
 use mocban_project::ProjectError;
 use mocban_project::location::now;
 use mocban_project::report::{ReportOptions, read, report};
@@ -87,6 +89,7 @@ pub(super) async fn numbers(
 fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
     html! {
         @for text in &report.headline { p { (shown_sentences(visit, text)) (remedy_link(visit, key, text)) } }
+        @if report.pairs + report.retired > 0 { (counts(visit, report)) }
         (failed_blocks_part(visit, "./", report.block_progress.map_or(0, |blocks| blocks.failed)))
         @if report.rows.iter().all(|row| row.n == 0) {
             (empty(visit.t("There are no results yet.", "Chưa có kết quả."), &html! { a.button href="./" { (visit.t("Run", "Căn chỉnh")) } }))
@@ -146,6 +149,27 @@ fn shown_sentences(visit: &Visit, text: &str) -> String {
     }
 }
 
+/// Returns the numbers of pairs that the sentences above have, with links to these pairs.
+fn counts(visit: &Visit, report: &Report) -> Markup {
+    let progress = report.progress;
+    let row = report.row(ThresholdMetric::DEFAULT);
+    let low = row.and_then(|row| row.low_confidence);
+    html! {
+        div.figures #counts {
+            (figure(report.pairs, visit.form(report.pairs, ["pair", "pairs"], "cặp"), Some("pairs"), ""))
+            (figure(progress.done, visit.t("aligned", "đã căn chỉnh"), Some("pairs?state=aligned"), "good"))
+            @if let Some(low) = low {
+                (figure(low, visit.t("low confidence", "độ tin cậy thấp"), Some("pairs?confidence=low&sort=confidence"), "warn"))
+            }
+            (figure(progress.failed, visit.t("failed", "lỗi"), Some("pairs?state=failed&view=table"), "bad"))
+            (figure(progress.pending, visit.t("not finished", "chưa xong"), Some("pairs?state=unfinished"), ""))
+            @if report.retired > 0 {
+                (figure(report.retired, visit.t("retired", "đã đưa ra khỏi thống kê"), Some("pairs?state=retired"), ""))
+            }
+        }
+    }
+}
+
 fn table(visit: &Visit, report: &Report) -> Markup {
     let link = |query: String, number: u64| {
         html! { @if number > 0 { a href={ "pairs?" (query) } { (grouped(number)) } } @else { "0" } }
@@ -168,7 +192,7 @@ fn table(visit: &Visit, report: &Report) -> Markup {
             tr {
                 th scope="row" { (visit.metric(row.metric)) }
                 td.number { (link(format!("state=aligned&metric={metric}"), row.n)) }
-                td.number { (grouped(row.judged)) }
+                td.number { (link(format!("verdict=judged&metric={metric}"), row.judged)) }
                 td.number { (link(format!("verdict=joint-pass&metric={metric}"), row.passed)) }
                 td.number { (link(format!("verdict=joint-fail&metric={metric}"), row.failed)) }
                 td.number { (percent(visit, row.acc)) }
