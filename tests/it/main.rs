@@ -18,6 +18,7 @@ mod app_controls;
 mod app_corrections;
 mod app_curator;
 mod app_devices;
+mod app_export_size;
 mod app_export_zip;
 mod app_guide;
 mod app_import;

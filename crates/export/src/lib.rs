@@ -9,6 +9,7 @@
 //! - `pictures` and `contact_sheet.rs` draw overlays and sheets; `block_view` draws any part of a page, of its relief, or of
 //!   both
 //! - `import_pictures.rs` draws a page with its labels and a scan before a block is imported
+//! - `size_forecast.rs` estimates the size of an export before it is written
 //! - `zip_folder.rs` writes an export as one ZIP archive, in the order of `zip_listing.rs`
 //! - `scan_view` encodes a scan in the frame of its print for the viewer, on pages of a server and in files
 //!
@@ -50,6 +51,7 @@ mod record;
 mod record_fields;
 mod sample;
 pub mod scan_view;
+mod size_forecast;
 mod source_print;
 mod split;
 mod stage_outcomes;
@@ -75,6 +77,7 @@ pub use record::{
     ManualAlignmentFields, MetricFields, PairFields, PairRecord, RecordStatus, ReviewerFields,
     SplitName,
 };
+pub use size_forecast::{ExportedSizes, PrintFileSize, shared_bytes};
 pub use source_print::{SourcePrint, SourcePrintError};
 pub use split::{SplitBy, SplitCounts, SplitSettings, SplitShares};
 pub use zip_error::FolderZipError;

@@ -11,7 +11,8 @@
 //!   pair or block, and whether scans, files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`change_setting`]: changes a setting, after saying what that costs
-//! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
+//! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures; [`export_forecast`]: how large
+//!   such files will be
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database;
 //!   [`backup_content`]: what such a file holds; [`backup_inputs`], [`input_list`]: scans and prints beside it
 //! - [`missing_inputs`], [`input_places`]: inputs that are no longer where they were
@@ -53,6 +54,7 @@ pub mod error;
 pub mod events;
 pub mod exit;
 pub mod export;
+pub mod export_forecast;
 pub mod failures;
 pub mod file_headers;
 pub mod files;

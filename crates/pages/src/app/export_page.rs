@@ -17,9 +17,11 @@ use super::address::encoded;
 use super::attachment::attachment;
 use super::chosen_pairs::require_pairs;
 use super::components::{NavSection, action_form, choice, frame, grouped};
+use super::export_size::size_card;
 use super::export_zip::zip_link;
 use super::exports::{
-    OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, purpose_of, recover_exports,
+    OF_CHOSEN, PURPOSES, Purpose, exports_dir, is_export, pictures_side, purpose_of,
+    recover_exports,
 };
 use super::failure::{AppFailure, AppResult};
 use super::number_text::english_count;
@@ -38,8 +40,6 @@ use mocban_project::block_status::BlockStatus;
 use mocban_project::export::{ExportedProject, export};
 use mocban_project::location::Location;
 
-/// Side of the pictures of a dataset for training, pixels.
-const CANVAS_PX: u32 = 256;
 /// Most files of an export that are listed.
 const SHOWN_FILES: usize = 100;
 /// Largest file that is offered for download, bytes. Larger ones are in the folder.
@@ -80,6 +80,7 @@ pub(super) async fn page(
     let body = html! {
         (failed_blocks_part(&visit, "./", failed_blocks(&blocks)))
         (form(&visit))
+        (size_card(&visit))
         div #live data-live="1500" {
             (task_part(&visit, task.as_ref()))
             @for (name, files) in &folders {
@@ -243,7 +244,7 @@ async fn run(
         only,
         csv_bom: format == ExportFormat::Csv,
         csv_decimal_comma: name == "excel-comma",
-        canvas_px: (name == "training").then_some(CANVAS_PX),
+        canvas_px: pictures_side(name),
         ..ExportOptions::all_of(&metrics, limits)
     };
     let output = exports_dir(&location.dir).join(format!("{name}{of_chosen}"));

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use mocban_export::ExportFormat;
 use mocban_store::ReplacementFolder;
 
+/// Side of the pictures of a dataset for training, pixels.
+const CANVAS_PX: u32 = 256;
 /// Folder of exports in a project.
 const FOLDER: &str = "exports";
 /// End of the name of an export of chosen pairs, which does not replace that of all pairs.
@@ -71,6 +73,11 @@ pub(super) const PURPOSES: [Purpose; 8] = [
         ],
     ),
 ];
+
+/// Returns the side of the pictures of a purpose, pixels, if they are not as large as the print.
+pub(super) fn pictures_side(purpose: &str) -> Option<u32> {
+    (purpose == "training").then_some(CANVAS_PX)
+}
 
 /// Returns the folder of the exports of a project.
 pub(super) fn exports_dir(dir: &Path) -> PathBuf {

@@ -20,6 +20,7 @@ mod chosen_sets;
 mod components;
 mod encoded_picture;
 mod export_page;
+mod export_size;
 mod export_zip;
 mod exports;
 mod failed_groups;

@@ -8,11 +8,11 @@ use axum::{Router, middleware};
 use super::failure::AppFailure;
 use super::state::{AppOptions, AppState};
 use super::{
-    assets, backup_card, block_page, blocks_page, chosen_pairs, export_page, export_zip,
-    failure_page, health_page, home, import_files, import_page, import_pictures, invitation_cards,
-    last_import, pair_page, pairs_page, paper_page, pictures, report_page, restore_action,
-    restore_content, restore_page, review_agreement, review_page, run_actions, run_page,
-    scan_correction, settings_page, upload_actions, view_bar,
+    assets, backup_card, block_page, blocks_page, chosen_pairs, export_page, export_size,
+    export_zip, failure_page, health_page, home, import_files, import_page, import_pictures,
+    invitation_cards, last_import, pair_page, pairs_page, paper_page, pictures, report_page,
+    restore_action, restore_content, restore_page, review_agreement, review_page, run_actions,
+    run_page, scan_correction, settings_page, upload_actions, view_bar,
 };
 
 /// Returns the routes of the app, for a server.
@@ -68,6 +68,7 @@ pub fn app_pages(options: AppOptions) -> Router {
             get(report_page::download),
         )
         .route("/p/{project}/export", get(export_page::page))
+        .route("/p/{project}/export/size", get(export_size::part))
         .route("/p/{project}/actions/export", post(export_page::start))
         .route("/p/{project}/exports/{archive}", get(export_zip::download))
         .route(

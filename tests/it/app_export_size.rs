@@ -1,0 +1,66 @@
+//! The size that the app shows before an export, compared with the export.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use crate::app::{act, html, text, with_project};
+use crate::waiting::wait_until;
+
+/// Largest ratio of the size before and the size of the export.
+const FACTOR: f64 = 1.3;
+
+/// Returns the length of all files below a folder.
+fn bytes_below(folder: &Path) -> u64 {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    paths
+        .map(|path| {
+            if path.is_dir() {
+                bytes_below(&path)
+            } else {
+                path.metadata().expect("a file").len()
+            }
+        })
+        .sum()
+}
+
+/// Returns the purposes of a page with the sizes that it shows.
+fn shown_sizes(part: &str) -> Vec<(String, u64)> {
+    let rows = part.split("data-purpose=\"").skip(1);
+    let sizes = rows.map(|row| {
+        let (name, rest) = row.split_once('"').expect("a purpose");
+        let size = rest.split("data-bytes=\"").nth(1);
+        let size = size.and_then(|size| size.split('"').next());
+        let size = size.expect("a size").parse().expect("a number");
+        (name.to_owned(), size)
+    });
+    sizes.collect()
+}
+
+#[test]
+fn the_size_of_every_purpose_is_about_that_of_its_export() {
+    let (dir, page) = with_project();
+    let shown = html(&page, "/p/p/export");
+    assert!(shown.contains("data-load=\"export/size\""), "{shown}");
+    let part = html(&page, "/p/p/export/size");
+    assert!(!part.contains("not enough room"), "{part}");
+    let sizes = shown_sizes(&part);
+    let purposes = shown.split("id=\"purpose\"").nth(1).expect("the question");
+    let (purposes, _) = purposes.split_once("</select>").expect("its end");
+    assert_eq!(sizes.len(), purposes.matches("<option").count());
+    for (purpose, expected) in sizes {
+        let body = json!({"purpose": purpose, "only": "all", "metric": ""});
+        let reply = act(&page, "/p/p/actions/export", &body, |_| {});
+        assert_eq!(reply.status, 200, "{}", text(&reply));
+        wait_until("the export is done", || {
+            html(&page, "/p/p/export").contains("data-task=\"done\"")
+        });
+        let written = bytes_below(&dir.path().join("p/exports").join(&purpose));
+        let ratio = expected as f64 / written as f64;
+        assert!(
+            (1.0 / FACTOR..FACTOR).contains(&ratio),
+            "{purpose}: {expected} bytes shown, {written} written"
+        );
+    }
+}
