@@ -20,6 +20,7 @@ mod app_curator;
 mod app_devices;
 mod app_export_size;
 mod app_export_zip;
+mod app_guests;
 mod app_guide;
 mod app_import;
 mod app_import_files;
@@ -153,6 +154,7 @@ mod postgres_server;
 mod power;
 mod print_forms;
 mod processes;
+mod qr_decoder;
 mod queue;
 mod readers;
 #[cfg(unix)]
