@@ -77,6 +77,7 @@ mod corruption;
 mod creation;
 #[cfg(target_os = "linux")]
 mod crowd;
+mod css_colours;
 #[path = "../support/decoy.rs"]
 mod decoy;
 mod decoys;
