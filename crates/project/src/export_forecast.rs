@@ -32,6 +32,7 @@ impl ExportForecast {
     ) -> ProjectResult<Self> {
         let counts = catalog.counters().await?.into_iter();
         let done = counts.filter(|((_, status), _)| *status == JobStatus::Done);
+        let pairs = done.map(|(_, pairs)| pairs).sum();
         let filter = PairFilter {
             statuses: vec![JobStatus::Done],
             ..PairFilter::default()
@@ -47,7 +48,7 @@ impl ExportForecast {
             sizes.collect::<Vec<_>>()
         };
         Ok(Self {
-            pairs: done.map(|(_, pairs)| pairs).sum(),
+            pairs,
             sample: blocking(measure).await?,
             blocks: catalog.count_blocks().await?,
             verdicts: catalog.count_verdicts().await?,
