@@ -54,9 +54,10 @@ async fn a_corrected_unit_lets_failed_and_finished_pairs_run_again() {
         attributes_of(&world, &failed).await.unit,
         Some(LengthUnit::Cm)
     );
+    let settings = fingerprints([1; 4]);
     let requeued = world
         .catalog
-        .requeue_stale(&fingerprints([1; 4]), None, RerunPolicy::Changed);
+        .requeue_stale(&settings, None, RerunPolicy::Changed);
     assert_eq!(requeued.await.expect("requeued"), 2);
     for pair in &both {
         let detail = world.catalog.pair(pair).await.expect("a read");

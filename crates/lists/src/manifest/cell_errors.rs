@@ -35,16 +35,21 @@ const NUMBERED: &str = "Err:";
 
 /// Returns the error of a formula that a text is, such as `#REF!`.
 pub fn formula_error(text: &str) -> Option<&str> {
-    let number = text.strip_prefix(NUMBERED);
-    let is_number =
-        |number: &str| number.len() == 3 && number.bytes().all(|byte| byte.is_ascii_digit());
-    if number.is_some_and(is_number) {
-        return Some(text);
+    // Most cells are no error, so only the first byte of each is looked at.
+    match text.as_bytes() {
+        [b'#', ..] => {
+            let mut errors = ERRORS.iter();
+            errors
+                .find(|error| error.eq_ignore_ascii_case(text))
+                .copied()
+        }
+        [b'E', ..] => {
+            let number = text.strip_prefix(NUMBERED)?;
+            let is_number = number.len() == 3 && number.bytes().all(|byte| byte.is_ascii_digit());
+            is_number.then_some(text)
+        }
+        _ => None,
     }
-    let mut errors = ERRORS.iter();
-    errors
-        .find(|error| error.eq_ignore_ascii_case(text))
-        .copied()
 }
 
 /// Returns why a text is no id, if it is the error of a formula.

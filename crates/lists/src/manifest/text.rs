@@ -136,6 +136,13 @@ fn end_of_quotes(list: &[u8], start: usize) -> usize {
 
 /// Returns a cell without blanks, no-break spaces and invisible marks at its ends.
 pub fn trimmed(cell: &str) -> &str {
+    // Visible ASCII at both ends, as most cells have it, is found without decoding.
+    if let [first, .., last] = cell.as_bytes()
+        && first.is_ascii_graphic()
+        && last.is_ascii_graphic()
+    {
+        return cell;
+    }
     cell.trim_matches(|c: char| c.is_whitespace() || matches!(c, '\u{feff}' | '\u{200b}'))
 }
 

@@ -210,8 +210,9 @@ impl<S: NumberSource> BodyReader<'_, S> {
     /// Reads the length of a list. Returns a fault if the length is negative or not a whole number.
     fn list_length(&mut self, kind: PlyScalar) -> Result<u64, BodyFault> {
         let length = self.source.next(kind)?;
-        if length >= 0.0 && length.fract() == 0.0 {
-            return Ok(length as u64);
+        let whole = length as u64;
+        if whole as f64 == length {
+            return Ok(whole);
         }
         let reason = format!("{length} is not the length of a list");
         Err(BodyFault::Invalid(reason))
