@@ -202,6 +202,11 @@ fn the_newest_import_is_undone_unless_another_followed() {
     assert_eq!((change(&at, "retire"), counted()), (200, json!(0)));
     assert!(part().contains("Bring them back"), "{}", part());
     assert_eq!((change(&at, "restore"), counted()), (200, all));
+    // A pair that was retired by hand does not come back.
+    mocban(&project, &["retire", "upright-0000"]).expect(0);
+    assert_eq!(change(&at, "retire"), 200);
+    assert!(part().contains("come back: <b>14</b>"), "{}", part());
+    assert_eq!((change(&at, "restore"), counted()), (200, json!(14)));
     assert!(text(&page.get("/import?project=p")).contains("data-load=\"p/p/last-import\""));
 }
 

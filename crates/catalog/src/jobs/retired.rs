@@ -94,11 +94,14 @@ ORDER BY p.name";
 const LAST_IMPORT_COUNTS: &str = "
 WITH newest AS (SELECT q.id, q.imported FROM pair AS q
     WHERE NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = q.id) ORDER BY q.id DESC LIMIT 1)
-SELECT p.imported, count(*) AS pairs, count(j.pair) AS jobs FROM (SELECT q.id, q.imported FROM pair AS q
-        WHERE q.id <= (SELECT id FROM newest) ORDER BY q.id DESC LIMIT ?1) AS p LEFT JOIN job AS j ON j.pair = p.id
-WHERE p.imported = (SELECT imported FROM newest)
-    AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)
-GROUP BY p.imported";
+SELECT imported, count(*) AS pairs, count(job) AS jobs, count(CASE WHEN retired_at = latest THEN 1 END) AS retired_last
+FROM (SELECT p.imported, j.pair AS job, r.at AS retired_at, max(r.at) OVER () AS latest
+    FROM (SELECT q.id, q.imported FROM pair AS q
+        WHERE q.id <= (SELECT id FROM newest) ORDER BY q.id DESC LIMIT ?1) AS p
+    LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN retired_pair AS r ON r.pair = p.id
+    WHERE p.imported = (SELECT imported FROM newest)
+        AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = p.id)) AS added
+GROUP BY imported";
 
 /// Number of pairs in one statement.
 const CHUNK: usize = 2_000;
@@ -153,9 +156,11 @@ pub struct LastImport {
     pub pairs: u64,
     /// Number of counted pairs that are not retired.
     pub jobs: u64,
+    /// Number of counted pairs that were retired last, all at the same time. An undo brings only these back.
+    pub retired_last: u64,
 }
 
-from_row! { LastImport { imported, pairs, jobs } }
+from_row! { LastImport { imported, pairs, jobs, retired_last } }
 
 /// A removed job.
 struct RemovedJob {

@@ -298,21 +298,24 @@ async fn the_newest_import_is_counted_to_a_limit() {
     // The list of the newest import may name pairs of earlier ones.
     let rows = ["p0", "r0", "r1", "r2", "r3"].map(row).to_vec();
     world.catalog.import(rows, 7).await.expect("imported");
-    let names = [name("p0"), name("r3")];
-    world
-        .catalog
-        .retire_pairs(&names, 9)
-        .await
-        .expect("retired");
+    let retire = async |names: &[PairName], at| {
+        let retired = world.catalog.retire_pairs(names, at).await;
+        retired.expect("retired");
+    };
+    retire(&[name("p0"), name("r3")], 9).await;
     let counts = async |most| {
         let counted = world.catalog.last_import_counts(most).await;
         let LastImport {
             imported,
             pairs,
             jobs,
+            retired_last,
         } = counted.expect("a read").expect("an import");
-        (imported, pairs, jobs)
+        (imported, pairs, jobs, retired_last)
     };
-    assert_eq!(counts(3).await, (7, 3, 2));
-    assert_eq!(counts(100).await, (7, 4, 3));
+    assert_eq!(counts(3).await, (7, 3, 2, 1));
+    assert_eq!(counts(100).await, (7, 4, 3, 1));
+    // An undo of the import does not count the pair that was retired before.
+    retire(&["r0", "r1", "r2", "r3"].map(name), 11).await;
+    assert_eq!(counts(100).await, (7, 4, 0, 3));
 }

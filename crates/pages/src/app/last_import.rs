@@ -44,8 +44,8 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
     let (text, number) = if has_jobs {
         (
             visit.t(
-                "Pairs added by the newest import that added pairs",
-                "Số cặp được thêm trong lần nhập gần nhất có thêm cặp",
+                "Pairs of the newest import that added pairs, which are counted",
+                "Số cặp của lần nhập gần nhất có thêm cặp, hiện được tính",
             ),
             added.jobs,
         )
@@ -58,11 +58,22 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
             added.pairs,
         )
     };
-    let number = number.min(MAX_COUNTED);
+    let count = |number: u64| {
+        let number = grouped(number.min(MAX_COUNTED));
+        html! { b { @if is_cut { (visit.t("at least", "ít nhất")) " " } (number) } }
+    };
     html! {
         h2 { (visit.t("Newest import that added pairs", "Lần nhập gần nhất có thêm cặp")) }
         p { (text) " (" (visit.time(added.imported)) "): "
-            b { @if is_cut { (visit.t("at least", "ít nhất")) " " } (grouped(number)) } ". "
+            (count(number)) ". "
+            @if !has_jobs && added.retired_last < added.pairs {
+                (visit.t("Pairs among them that were taken out last, and come back", "Số cặp trong đó bị đưa ra sau cùng và được đưa trở lại")) ": "
+                (count(added.retired_last)) ". "
+            }
+            @if has_jobs && added.jobs < added.pairs {
+                (visit.t("Pairs of it that are in no count already", "Số cặp của lần nhập này đã không được tính từ trước")) ": "
+                (count(added.pairs - added.jobs)) ". "
+            }
             span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
         }
         // The part stands on the page of imports, so the address is relative to that page.
@@ -156,12 +167,38 @@ mod tests {
                 imported,
                 pairs,
                 jobs,
+                retired_last: pairs - jobs,
             };
             let shown = undo_part(&visit, "p", counts).into_string();
             assert!(shown.contains(number), "{shown}");
             let offered = ["retire", "restore"].into_iter();
             let offered = offered.filter(|change| shown.contains(&format!("value=\"{change}\"")));
             assert_eq!(offered.collect::<Vec<_>>().join(" "), buttons, "{shown}");
+        }
+    }
+
+    #[test]
+    fn pairs_that_were_retired_apart_from_the_undo_are_counted_apart() {
+        let visit = Visit::in_language(Language::English);
+        let shown = |jobs, retired_last| {
+            let counts = LastImport {
+                imported: 1,
+                pairs: 6,
+                jobs,
+                retired_last,
+            };
+            undo_part(&visit, "p", counts).into_string()
+        };
+        let undone = shown(0, 5);
+        assert!(undone.contains("in no count ("), "{undone}");
+        assert!(undone.contains("<b>6</b>"), "{undone}");
+        assert!(undone.contains("come back: <b>5</b>"), "{undone}");
+        let added = shown(5, 1);
+        assert!(added.contains("counted ("), "{added}");
+        assert!(added.contains("<b>5</b>"), "{added}");
+        assert!(added.contains("already: <b>1</b>"), "{added}");
+        for simple in [shown(6, 0), shown(0, 6)] {
+            assert_eq!(simple.matches("<b>").count(), 1, "{simple}");
         }
     }
 }
