@@ -164,7 +164,7 @@ fn folder_part(
     let folder = std::path::absolute(&folder).unwrap_or(folder);
     html! {
         section.card {
-            h3 { (title) }
+            h2 { (title) }
             (zip)
             p.muted { (visit.t("Folder", "Thư mục")) ": " code { (one_line(&folder.to_string_lossy())) } }
             ul { @for (file, bytes) in files {

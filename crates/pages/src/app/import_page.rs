@@ -132,7 +132,8 @@ fn preview_part(
         @if let Some(note) = &preview.note { p.notice { (one_line(&warning(visit, note))) } }
         @match &preview.planned {
             Err(_) if asks_for_columns => {},
-            Err(failure) => {
+            Err(failure) => section.card {
+                h2 { (visit.t("What would be imported", "Sẽ nhập những gì")) }
                 p.notice.bad role="alert" { (failure.text(visit.language)) }
                 (changes_part(visit, &chosen.changes().unwrap_or_default()))
             },
