@@ -141,4 +141,7 @@ export function followPage(camera, clicked) {
   };
   element.addEventListener("pointerup", ended);
   element.addEventListener("pointercancel", ended);
+  // The click of a tap comes after the lifted finger, and would fall on what `clicked` has put there. Buttons on the page
+  // need theirs.
+  element.addEventListener("touchend", (event) => event.target.closest("button") || event.preventDefault(), { passive: false });
 }

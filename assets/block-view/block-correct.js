@@ -71,9 +71,14 @@ class MarkedPicture {
       if (!place) return [];
       const label = text("remove_point", { n: index + 1 });
       const button = element("button", { type: "button", class: "block-point", "aria-label": label, title: label }, `${index + 1}`);
-      button.addEventListener("click", () => this.removed(index));
-      // The canvas would capture the pointer.
-      button.addEventListener("pointerdown", (event) => event.stopPropagation());
+      let isPressed = false;
+      // The click of the tap that chose the place falls on the mark, too. A key clicks without a pointer.
+      button.addEventListener("click", (event) => (isPressed || event.detail === 0) && this.removed(index));
+      button.addEventListener("pointerdown", (event) => {
+        isPressed = true;
+        // The canvas would capture the pointer.
+        event.stopPropagation();
+      });
       this.canvas.append(button);
       return [{ button, place }];
     });
