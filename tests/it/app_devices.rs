@@ -126,7 +126,7 @@ fn a_folder_comes_to_its_report_by_touch_alone_on_a_phone() {
 }
 
 /// Presses Tab until a control has the focus.
-fn tab_to(tab: &Tab<'_>, control: &str) {
+pub(crate) fn tab_to(tab: &Tab<'_>, control: &str) {
     let is_there = format!("Boolean(document.activeElement?.matches(`{control}`))");
     for _ in 0..MOST_TABS {
         if tab.eval(&is_there) == true {
@@ -138,7 +138,7 @@ fn tab_to(tab: &Tab<'_>, control: &str) {
 }
 
 /// Moves to a control with Tab, and presses Enter.
-fn press_enter(tab: &Tab<'_>, control: &str) {
+pub(crate) fn press_enter(tab: &Tab<'_>, control: &str) {
     tab_to(tab, control);
     tab.press("Enter", false);
 }

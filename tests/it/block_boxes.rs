@@ -16,9 +16,10 @@ use crate::small_block::stored_block;
 
 const BOXES: &str = "/p/p/block/b1/view/boxes";
 /// The boxes are shown.
-const SHOWN: &str = "window.mocbanBoxes && mocbanBoxes.image.naturalWidth > 100";
+pub(crate) const SHOWN: &str = "window.mocbanBoxes && mocbanBoxes.image.naturalWidth > 100";
 /// The boxes are saved.
-const SAVED: &str = "mocbanBoxes.status.textContent.includes('The next run cuts the block again')";
+pub(crate) const SAVED: &str =
+    "mocbanBoxes.status.textContent.includes('The next run cuts the block again')";
 
 /// Notes whether the title or the counts were blank when parts were added to the page.
 const NOTE_BLANKS: &str = "new MutationObserver(() => {
@@ -108,7 +109,7 @@ fn boxes_are_checked_before_they_are_stored() {
 }
 
 /// Returns where a place of the page is on the screen, once the page has its final layout.
-fn on_screen(tab: &Tab<'_>, [x, y]: [f64; 2]) -> [f64; 2] {
+pub(crate) fn on_screen(tab: &Tab<'_>, [x, y]: [f64; 2]) -> [f64; 2] {
     let frame = "new Promise((done) => requestAnimationFrame(() => setTimeout(done)))";
     let found = tab.eval(&format!(
         "{frame}.then(() => {frame}).then(() => {{
@@ -120,7 +121,7 @@ fn on_screen(tab: &Tab<'_>, [x, y]: [f64; 2]) -> [f64; 2] {
 }
 
 /// Returns left, top, right and bottom of the chosen box.
-fn chosen(tab: &Tab<'_>) -> [f64; 4] {
+pub(crate) fn chosen(tab: &Tab<'_>) -> [f64; 4] {
     let outline = tab.eval("mocbanBoxes.box().outline");
     let corner = |index: usize, axis: usize| outline[index][axis].as_f64().expect("a number");
     [corner(0, 0), corner(0, 1), corner(2, 0), corner(2, 1)]

@@ -305,6 +305,20 @@ fn check_conflicts(dir: &Path) {
     assert_eq!(other.save(id, &hash).status, 200);
 }
 
+/// Returns where a pixel of one of the two pictures is on the screen, once the page has its final layout: a sentence of another
+/// length changes the size of the pictures, which their positions follow in the next frame.
+pub(crate) fn on_picture(tab: &Tab<'_>, part: &str, at: &Value) -> [f64; 2] {
+    let frame = "new Promise((done) => requestAnimationFrame(() => setTimeout(done)))";
+    let found = tab.eval(&format!(
+        "{frame}.then(() => {frame}).then(() => {{
+            const {{ camera, canvas }} = mocbanCorrection.{part}, {{ left, top }} = canvas.getBoundingClientRect();
+            const [x, y] = mocbanCorrection.{part}.shown({at});
+            return [left + camera.x + (x + 0.5) * camera.zoom, top + camera.y + (y + 0.5) * camera.zoom];
+        }})"
+    ));
+    [0, 1].map(|k: usize| found[k].as_f64().expect("a number"))
+}
+
 /// Chooses the points as a person does.
 fn use_page(dir: &Path, tab: &Tab<'_>) {
     tab.wait("window.mocbanCorrection && mocbanCorrection.face.image.naturalWidth > 100");
@@ -326,21 +340,9 @@ fn use_page(dir: &Path, tab: &Tab<'_>) {
     tab.key("KeyT");
     tab.key("KeyT");
     tab.wait("mocbanCorrection.face.image.complete && mocbanCorrection.face.turns === 2");
-    // A sentence of another length changes the size of the pictures, which their positions follow in the next frame.
-    tab.eval("window.nextFrame = () => new Promise((done) => requestAnimationFrame(() => setTimeout(done))), null");
-    let place = |part: &str, at: &Value| -> [f64; 2] {
-        let found = tab.eval(&format!(
-            "nextFrame().then(nextFrame).then(() => {{
-                const {{ camera, canvas }} = mocbanCorrection.{part}, {{ left, top }} = canvas.getBoundingClientRect();
-                [x, y] = mocbanCorrection.{part}.shown({at});
-                return [left + camera.x + (x + 0.5) * camera.zoom, top + camera.y + (y + 0.5) * camera.zoom];
-            }})"
-        ));
-        [0, 1].map(|k: usize| found[k].as_f64().expect("a number"))
-    };
     for point in true_points(dir, &block) {
         for part in ["face", "page"] {
-            let at = place(part, &point[part]);
+            let at = on_picture(tab, part, &point[part]);
             tab.drag(at, at);
         }
     }

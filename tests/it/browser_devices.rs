@@ -1,6 +1,7 @@
 //! The devices at a browser: a keyboard, a mouse, a screen for fingers, and a slow network.
 
 use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::json;
 
@@ -131,15 +132,25 @@ impl Tab<'_> {
         }
     }
 
-    /// Puts fingers on the screen at the first points, moves them to the second, and lifts them.
+    /// Puts fingers on the screen at the first points, moves them to the second, and lifts them. A movement is slow, because
+    /// the browser takes a tap that follows a fast one for its end.
     pub(crate) fn touch(&self, from: &[[f64; 2]], to: &[[f64; 2]]) {
         let points = |places: &[[f64; 2]]| {
             let places = places.iter().enumerate();
             let points = places.map(|(id, [x, y])| json!({ "x": x, "y": y, "id": id }));
             points.collect::<Vec<_>>()
         };
-        for (kind, places) in [("touchStart", from), ("touchMove", to), ("touchEnd", &[])] {
-            let params = json!({ "type": kind, "touchPoints": points(places) });
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+        let now = now.expect("a time after 1970").as_secs_f64();
+        for (kind, places, seconds_ago) in [
+            ("touchStart", from, 1.0),
+            ("touchMove", to, 0.5),
+            ("touchEnd", &[], 0.0),
+        ] {
+            let mut params = json!({ "type": kind, "touchPoints": points(places) });
+            if from != to {
+                params["timestamp"] = json!(now - seconds_ago);
+            }
             self.call("Input.dispatchTouchEvent", &params);
         }
     }

@@ -63,6 +63,7 @@ mod block_export;
 mod block_metadata;
 #[cfg(unix)]
 mod block_outage;
+mod block_touch;
 mod block_view;
 mod blocks;
 mod browser;
