@@ -5,6 +5,7 @@ use serde_json::Value;
 use crate::browser::Tab;
 use crate::cli::mocban;
 use crate::review_browser::{current_verdicts, on_a_page, ready};
+use crate::waiting::wait_until;
 
 /// Returns the middle of an element on the screen.
 fn middle(tab: &Tab<'_>, element: &str) -> [f64; 2] {
@@ -30,8 +31,14 @@ fn is_turned_by(tab: &Tab<'_>, degrees: &str) {
     ));
 }
 
-/// Presses every button of the editor, by mouse and by finger, and leaves it open with the saved computed alignment.
-fn align_by_buttons(tab: &Tab<'_>, iou: &dyn Fn() -> f64, computed: f64) {
+fn tap(tab: &Tab<'_>, element: &str) {
+    let at = middle(tab, element);
+    tab.touch(&[at], &[at]);
+}
+
+/// Presses every button of the editor but the one that saves, and leaves it open with the computed alignment.
+fn press_buttons(tab: &Tab<'_>, press: fn(&Tab<'_>, &str), iou: &dyn Fn() -> f64, computed: f64) {
+    let is_computed = || (iou() - computed).abs() < 1e-9;
     for step in [
         "move_left",
         "move_right",
@@ -41,31 +48,44 @@ fn align_by_buttons(tab: &Tab<'_>, iou: &dyn Fn() -> f64, computed: f64) {
         "larger",
         "mirror",
     ] {
-        click(tab, "[data-align=reset]");
-        assert!((iou() - computed).abs() < 1e-9, "{step}");
-        click(tab, &format!("[data-align={step}]"));
-        assert!((iou() - computed).abs() > 1e-9, "{step} changes nothing");
+        press(tab, "[data-align=reset]");
+        wait_until("the alignment is the computed one", is_computed);
+        press(tab, &format!("[data-align={step}]"));
+        wait_until(step, || !is_computed());
     }
-    click(tab, "[data-align=reset]");
-    click(tab, "[data-align=rotate_right]");
+    press(tab, "[data-align=reset]");
+    press(tab, "[data-align=rotate_right]");
     is_turned_by(tab, "1.00");
-    click(tab, "#alignment-fine");
-    click(tab, "[data-align=rotate_right]");
+    press(tab, "#alignment-fine");
+    tab.wait("document.getElementById('alignment-fine').checked");
+    press(tab, "[data-align=rotate_right]");
     is_turned_by(tab, "1.10");
     for turned in ["1.00", "0.90"] {
-        let at = middle(tab, "[data-align=rotate_left]");
-        tab.touch(&[at], &[at]);
+        press(tab, "[data-align=rotate_left]");
         is_turned_by(tab, turned);
     }
-    let at = middle(tab, "#alignment-fine");
-    tab.touch(&[at], &[at]);
+    press(tab, "#alignment-fine");
     tab.wait("!document.getElementById('alignment-fine').checked");
-    click(tab, "#alignment [data-action=cancel]");
+    press(tab, "#alignment [data-action=cancel]");
     tab.wait("document.getElementById('alignment').hidden");
-    tab.key("KeyC");
+    press(tab, "[data-action=align]");
+    tab.wait("!document.getElementById('alignment').hidden");
     is_turned_by(tab, "0.00");
-    let at = middle(tab, "#alignment [data-action=save]");
-    tab.touch(&[at], &[at]);
+}
+
+/// Uses the editor by mouse and by finger, and leaves it open with the saved computed alignment.
+fn align_by_buttons(tab: &Tab<'_>, iou: &dyn Fn() -> f64, computed: f64) {
+    for press in [click, tap] {
+        press_buttons(tab, press, iou, computed);
+    }
+    let [x, y] = middle(tab, "#canvas");
+    tab.touch(&[[x, y]], &[[x + 60.0, y]]);
+    wait_until("a finger moves the relief", || iou() < computed);
+    tap(tab, "[data-align=reset]");
+    wait_until("the alignment is the computed one", || {
+        (iou() - computed).abs() < 1e-9
+    });
+    tap(tab, "#alignment [data-action=save]");
     tab.wait("document.getElementById('legend').textContent.includes('aligned manually by lan: rotated 0.0°')");
     tab.wait("document.getElementById('alignment').hidden");
     tab.key("KeyC");
