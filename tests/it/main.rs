@@ -46,6 +46,8 @@ mod app_routes;
 mod app_sentences;
 #[cfg(unix)]
 mod app_shared;
+#[cfg(unix)]
+mod app_states;
 mod app_upload_archives;
 mod app_upload_browser;
 mod app_upload_resume;
