@@ -127,18 +127,23 @@ export class AlignmentEditor {
       const at = { x: (event.clientX - box.left) * ratio, y: (event.clientY - box.top) * ratio };
       return imagePoint(this.viewer.frames()[0], at);
     };
-    let last = null;
+    // A second finger moves nothing.
+    let held = null;
+    const isHeld = (event) => held?.pointer === event.pointerId;
     canvas.addEventListener("pointerdown", (event) => {
-      last = point(event);
+      if (held && !isHeld(event)) return;
+      held = { pointer: event.pointerId, last: point(event) };
       canvas.setPointerCapture(event.pointerId);
     }, { signal });
     canvas.addEventListener("pointermove", (event) => {
-      if (!last || event.buttons !== 1) return;
+      if (!isHeld(event) || event.buttons !== 1) return;
       const now = point(event);
-      this.shift(now.x - last.x, now.y - last.y);
-      last = now;
+      this.shift(now.x - held.last.x, now.y - held.last.y);
+      held.last = now;
     }, { signal });
-    canvas.addEventListener("pointerup", () => (last = null), { signal });
+    for (const end of ["pointerup", "pointercancel"]) {
+      canvas.addEventListener(end, (event) => isHeld(event) && (held = null), { signal });
+    }
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       const up = (event.deltaY || event.deltaX) < 0;

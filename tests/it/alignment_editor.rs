@@ -79,12 +79,17 @@ fn align_by_buttons(tab: &Tab<'_>, iou: &dyn Fn() -> f64, computed: f64) {
         press_buttons(tab, press, iou, computed);
     }
     let [x, y] = middle(tab, "#canvas");
+    let equals = |wanted: f64| (iou() - wanted).abs() < 1e-9;
     tab.touch(&[[x, y]], &[[x + 60.0, y]]);
-    wait_until("a finger moves the relief", || iou() < computed);
+    wait_until("a finger moves the relief", || !equals(computed));
+    let moved = iou();
     tap(tab, "[data-align=reset]");
-    wait_until("the alignment is the computed one", || {
-        (iou() - computed).abs() < 1e-9
-    });
+    wait_until("the alignment is the computed one", || equals(computed));
+    let two = |x: f64| [[x, y], [x, y + 40.0]];
+    tab.touch(&two(x), &two(x + 60.0));
+    wait_until("the second finger moves nothing", || equals(moved));
+    tap(tab, "[data-align=reset]");
+    wait_until("the alignment is the computed one", || equals(computed));
     tap(tab, "#alignment [data-action=save]");
     tab.wait("document.getElementById('legend').textContent.includes('aligned manually by lan: rotated 0.0°')");
     tab.wait("document.getElementById('alignment').hidden");
