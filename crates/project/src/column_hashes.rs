@@ -65,7 +65,7 @@ impl ColumnHasher {
 }
 
 impl ColumnHashes {
-    /// Returns the names of the columns whose values a newer row lacks, and of those that get a first or another value.
+    /// Returns the names of the columns whose values a newer row lacks, and of the columns that get a first or another value.
     pub fn changes<'c>(&'c self, newer: &'c Self) -> [Vec<&'c str>; 2] {
         let lost = self.0.keys().filter(|name| !newer.0.contains_key(*name));
         let new = newer.0.iter();

@@ -120,7 +120,7 @@ pub(super) struct ColumnChanges {
     /// For each of [`COLUMNS`] or [`BLOCK_COLUMNS`], the numbers of pairs or blocks that lose its value and that get a first or
     /// another one.
     columns: [[u64; 2]; COLUMNS.len()],
-    /// The other columns whose values are lost, and those that get a first or another one.
+    /// The other columns whose values are lost, and the columns that get a first or another one.
     names: [ColumnNames; 2],
     /// Number of blocks that get another scan or page.
     other_files: u64,
