@@ -21,7 +21,7 @@ use crate::domain::cancel::PolledReader;
 
 use colour_profile::FileProfile;
 use error::broken;
-use print_image::colours_on_white;
+use print_image::{colours_on_white, widen_narrow};
 use tags::TagFileWindow;
 
 pub use error::DecodeError;
@@ -49,11 +49,11 @@ pub use samples::{PrintSamples, SampleSlice};
 /// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
 pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
     limits.check_bytes(bytes.len() as u64)?;
-    let (rgb, orientation, profile, has_16_bits) = match FileKind::of(bytes) {
+    let (rgb, orientation, profile) = match FileKind::of(bytes) {
         FileKind::Tiff => {
             let image = tiff::decode(bytes, limits)?;
             let orientation = orientation::of_tag(image.orientation);
-            (image.rgb, orientation, image.profile, image.has_16_bits)
+            (image.rgb, orientation, image.profile)
         }
         FileKind::Png => {
             let (pixels, profile) = decode_png(bytes, limits)?;
@@ -61,13 +61,16 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
                 pixels,
                 DynamicImage::ImageLuma16(_) | DynamicImage::ImageRgb16(_)
             );
-            let rgb = colours_on_white(&pixels);
-            (rgb, orientation::of_png(bytes), profile, has_16_bits)
+            let mut rgb = colours_on_white(&pixels);
+            if has_16_bits {
+                widen_narrow(&mut rgb, false);
+            }
+            (rgb, orientation::of_png(bytes), profile)
         }
         FileKind::Jpeg => {
             let image = jpeg::decode(bytes, limits)?;
             let orientation = orientation::of_exif(image.exif);
-            (image.rgb, orientation, image.profile, false)
+            (image.rgb, orientation, image.profile)
         }
         other => return Err(DecodeError::NotAnImage(other)),
     };
@@ -76,9 +79,6 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
         turned: Some(orientation.to_exif()).filter(|number| *number != 1),
         ignored_profile: None,
     };
-    if has_16_bits {
-        print_image::widen_narrow(&mut image.rgb);
-    }
     if let Some(profile) = profile {
         image.ignored_profile = profile.apply(&mut image.rgb).err();
     }

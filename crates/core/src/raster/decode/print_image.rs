@@ -98,17 +98,19 @@ pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
 }
 
 /// Scales the colours of an image of 16 bits if none needs more than 12 of them: cameras of 10 and 12 bits store their
-/// numbers without scaling, and the paper of a print is never as dark as a sixteenth of white.
-pub(super) fn widen_narrow(rgb: &mut Grid<[u16; 3]>) {
+/// numbers without scaling, and the paper of a print is never as dark as a sixteenth of white. If white was stored as 0, the
+/// numbers are those of the ink, which takes more than a sixteenth of the light.
+pub(super) fn widen_narrow(rgb: &mut Grid<[u16; 3]>, is_inverted: bool) {
     const TEN_BITS: u16 = (1 << 10) - 1;
     const TWELVE_BITS: u16 = (1 << 12) - 1;
+    let flip = if is_inverted { u16::MAX } else { 0 };
     let mut most = 0;
     for row in 0..rgb.height() {
         most = rgb
             .row(row)
             .as_flattened()
             .iter()
-            .fold(most, |most, c| most.max(*c));
+            .fold(most, |most, c| most.max(*c ^ flip));
         if most > TWELVE_BITS {
             return;
         }
@@ -118,6 +120,9 @@ pub(super) fn widen_narrow(rgb: &mut Grid<[u16; 3]>) {
     } else {
         TEN_BITS
     };
-    let scale = |level: u16| (u32::from(level) * u32::from(u16::MAX) / u32::from(white)) as u16;
+    let scale = |level: u16| {
+        let scaled = u32::from(level ^ flip) * u32::from(u16::MAX) / u32::from(white);
+        scaled as u16 ^ flip
+    };
     *rgb = rgb.map(|colour| colour.map(scale));
 }

@@ -83,7 +83,7 @@ impl PrintSamples {
             SampleVec::Sixteen(samples) => {
                 widen_to(&mut rgb, samples, self.channels, |sample| sample);
                 if self.channels % 2 == 1 {
-                    widen_narrow(&mut rgb);
+                    widen_narrow(&mut rgb, false);
                 }
             }
         }

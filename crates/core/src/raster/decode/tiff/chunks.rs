@@ -102,6 +102,12 @@ impl TiffLayout<'_> {
         Ok(bytes)
     }
 
+    /// Returns whether the first strip or tile, which has some rows, holds at least `len` bytes when it is decompressed.
+    pub(super) fn unpacks_to(&self, file: &[u8], len: usize, rows: usize) -> bool {
+        let stored = self.stored(file, 0);
+        stored.is_ok_and(|stored| self.decompress(stored, len, rows).is_ok())
+    }
+
     /// Returns the bytes of a strip or tile in the file.
     fn stored<'b>(&self, file: &'b [u8], at: usize) -> Result<Cow<'b, [u8]>, DecodeError> {
         let offset = self.offsets.get(at).and_then(|at| usize::try_from(at).ok());

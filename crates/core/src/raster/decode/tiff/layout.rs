@@ -8,6 +8,8 @@ use crate::raster::decode::error::DecodeError;
 use crate::raster::decode::limits::ImageLimits;
 use crate::raster::decode::tags::{TagDirectory, TagValues};
 
+/// Bits that a sample of 9 to 15 bits takes if it is padded.
+const PADDED_BITS: usize = 16;
 /// Most samples of a pixel.
 const MAX_SAMPLES: u64 = 64;
 
@@ -130,13 +132,14 @@ impl<'b> TiffLayout<'b> {
             byte_counts,
         };
         if layout.is_padded() {
-            layout.bits = 16;
+            layout.bits = PADDED_BITS;
         }
         layout.check_memory(limits)?;
         Ok(layout)
     }
 
-    /// Returns whether samples of 9 to 15 bits take 16 bits each, as some cameras store them.
+    /// Returns whether the first strip or tile has 16 bits for each sample of 9 to 15 bits, as some cameras store them.
+    /// Compressed samples count as not padded.
     fn is_padded(&self) -> bool {
         let [width, rows] = [self.chunk[0], self.chunk[1].min(self.height)];
         let bytes = (width as u64).saturating_mul((2 * rows * self.samples) as u64);
@@ -144,6 +147,28 @@ impl<'b> TiffLayout<'b> {
         matches!(self.bits, 9..16)
             && self.compression == TiffCompression::None
             && stored.is_some_and(|stored| stored >= bytes)
+    }
+
+    /// Finds out from the first strip or tile whether compressed samples of 9 to 15 bits take 16 bits each: more bytes come
+    /// out than packed samples have.
+    ///
+    /// # Errors
+    /// Returns an error if samples that are packed have a predictor.
+    pub(super) fn find_compressed_padding(&mut self, file: &[u8]) -> Result<(), DecodeError> {
+        if !matches!(self.bits, 9..16) || self.compression == TiffCompression::None {
+            return Ok(());
+        }
+        let rows = self.chunk[1].min(self.height);
+        let packed = rows * self.row_bytes();
+        let padded = rows * self.chunk[0] * self.samples * PADDED_BITS / 8;
+        // The last bytes may be missing, and a few may follow packed samples.
+        if self.unpacks_to(file, usize::midpoint(packed, padded) + 1, rows) {
+            self.bits = PADDED_BITS;
+        }
+        match self.predictor {
+            TiffPredictor::Horizontal if self.bits != PADDED_BITS => refuse_predictor(self.bits, 2),
+            _ => Ok(()),
+        }
     }
 
     /// Returns how many strips or tiles are side by side, and how many are one below the other.
@@ -222,9 +247,10 @@ fn sample_type(page: &TagDirectory<'_>) -> Result<(usize, bool), DecodeError> {
     let bits = common(page, BITS_PER_SAMPLE, "sizes", 1)?;
     let format = common(page, SAMPLE_FORMAT, "types", 1)?;
     match (format, bits) {
-        (1, 1..=32 | 64) => Ok((bits as usize, false)),
+        // 4 stands for samples that the program did not describe.
+        (1 | 4, 1..=32 | 64) => Ok((bits as usize, false)),
         (3, 16 | 32 | 64) => Ok((bits as usize, true)),
-        (1 | 3, _) => refuse(&format!(
+        (1 | 3 | 4, _) => refuse(&format!(
             "its samples have {bits} bits; save it with 8 or 16 bits per sample"
         )),
         _ => refuse(
@@ -244,12 +270,17 @@ fn predictor(
     let (bits, is_float) = sample_type(page)?;
     match number(page, PREDICTOR, 1)? {
         1 => Ok(TiffPredictor::None),
-        2 if matches!(bits, 8 | 16 | 32 | 64) => Ok(TiffPredictor::Horizontal),
+        // Of samples of 9 to 15 bits, only padded ones can have it.
+        2 if matches!(bits, 8..=16 | 32 | 64) => Ok(TiffPredictor::Horizontal),
         3 if is_float => Ok(TiffPredictor::Float),
-        other => refuse(&format!(
-            "its samples of {bits} bits are stored by the predictor {other}; save it without a predictor"
-        )),
+        other => refuse_predictor(bits, other),
     }
+}
+
+fn refuse_predictor<T>(bits: usize, predictor: u64) -> Result<T, DecodeError> {
+    refuse(&format!(
+        "its samples of {bits} bits are stored by the predictor {predictor}; save it without a predictor"
+    ))
 }
 
 /// Returns the size of a strip or tile, and where they are.

@@ -15,7 +15,7 @@ mod tests;
 use super::colour_profile::FileProfile;
 use super::error::{DecodeError, broken};
 use super::limits::ImageLimits;
-use super::print_image::{on_white, widen};
+use super::print_image::{on_white, widen, widen_narrow};
 use super::tags::TagSource;
 use crate::domain::FileKind;
 use crate::domain::cancel::poll;
@@ -34,7 +34,6 @@ pub(super) struct TiffImage {
     /// EXIF orientation, if the page has one.
     pub(super) orientation: Option<u64>,
     pub(super) profile: Option<FileProfile>,
-    pub(super) has_16_bits: bool,
 }
 
 /// Decodes the print of a TIFF file.
@@ -46,16 +45,22 @@ pub(super) struct TiffImage {
 /// Returns an error if there is no single print, or if it is too large, truncated, or stored in a way that is not read.
 pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, DecodeError> {
     let print = pages::find_print_page(&bytes)?;
-    let layout = TiffLayout::read(&print.page, limits)?;
+    let mut layout = TiffLayout::read(&print.page, limits)?;
+    layout.find_compressed_padding(bytes)?;
     let is_of_inks = matches!(layout.photometric, Photometric::Cmyk);
+    let has_16_bits = layout.used_bits == 16 && !layout.is_float;
+    let mut rgb = pixels(&layout, bytes)?;
+    if has_16_bits {
+        let is_inverted = layout.photometric == Photometric::WhiteIsZero;
+        widen_narrow(&mut rgb, is_inverted);
+    }
     Ok(TiffImage {
-        rgb: pixels(&layout, bytes)?,
+        rgb,
         orientation: print.inherited(ORIENTATION),
         profile: print.inherited_bytes(ICC_PROFILE).map(|bytes| FileProfile {
             bytes: bytes.to_vec(),
             is_of_inks,
         }),
-        has_16_bits: layout.used_bits == 16 && !layout.is_float,
     })
 }
 

@@ -11,6 +11,8 @@ const MASK: u64 = 4;
 const OLD_REDUCED: u64 = 2;
 /// Most pages that are counted.
 const MAX_PAGES: usize = 1000;
+/// Most subdirectories that are one within the other, below one of a page.
+const MAX_DEPTH: usize = 4;
 
 const NEW_SUBFILE_TYPE: u64 = 254;
 const SUBFILE_TYPE: u64 = 255;
@@ -22,26 +24,27 @@ const SUB_DIRECTORIES: u64 = 330;
 #[derive(Clone, Copy)]
 pub(in crate::raster::decode) struct PrintPage<'b> {
     pub(super) page: TagDirectory<'b>,
-    /// The page that refers to it, if it is a subdirectory. Metadata of the picture may be there.
-    parent: Option<TagDirectory<'b>>,
+    /// If it is a subdirectory, the page that refers to it, and the page at the top, which may be the same. Metadata of the
+    /// picture may be there.
+    parents: Option<[TagDirectory<'b>; 2]>,
 }
 
 impl<'b> PrintPage<'b> {
-    /// Returns the first value of a tag of the page, or of its parent.
+    /// Returns the first value of a tag of the page, or of its parents.
     pub(in crate::raster::decode) fn inherited(&self, tag: u64) -> Option<u64> {
         let own = self.page.number(tag);
-        own.or_else(|| self.parent?.number(tag))
+        own.or_else(|| self.parents?.iter().find_map(|parent| parent.number(tag)))
     }
 
-    /// Returns the bytes of a tag of the page, or of its parent.
+    /// Returns the bytes of a tag of the page, or of its parents.
     pub(super) fn inherited_bytes(&self, tag: u64) -> Option<&'b [u8]> {
         self.inherited_values(tag)?.bytes()
     }
 
-    /// Returns the values of a tag of the page, or of its parent.
+    /// Returns the values of a tag of the page, or of its parents.
     pub(in crate::raster::decode) fn inherited_values(&self, tag: u64) -> Option<TagValues<'b>> {
         let own = self.page.values(tag);
-        own.or_else(|| self.parent?.values(tag))
+        own.or_else(|| self.parents?.iter().find_map(|parent| parent.values(tag)))
     }
 }
 
@@ -81,23 +84,44 @@ impl<'b> FoundPages<'b> {
     /// Adds a page, or the full pictures of which it is a preview: cameras and Photoshop store them in subdirectories.
     fn add(&mut self, page: TagDirectory<'b>) -> Result<(), DecodeError> {
         self.count()?;
-        let is_full = !is_auxiliary(&page);
         let mut larger = Vec::new();
+        self.find_larger(page, [page; 2], 0, &mut larger)?;
+        if larger.is_empty() && !is_auxiliary(&page) {
+            let parents = None;
+            self.full.push(PrintPage { page, parents });
+        }
+        self.full.extend(larger);
+        Ok(())
+    }
+
+    /// Finds full pictures in the subdirectories of a page, and in theirs. `parents` are the page and the one at the top.
+    fn find_larger(
+        &mut self,
+        page: TagDirectory<'b>,
+        parents: [TagDirectory<'b>; 2],
+        depth: usize,
+        larger: &mut Vec<PrintPage<'b>>,
+    ) -> Result<(), DecodeError> {
+        let [_, top] = parents;
+        let of_same = if is_auxiliary(&page) { top } else { page };
         let offsets = page.values(SUB_DIRECTORIES);
         for offset in offsets.iter().flat_map(|offsets| offsets.iter().flatten()) {
             self.count()?;
-            let picture = page.file.directory_at(offset);
-            larger.extend(picture.filter(|picture| {
-                !is_auxiliary(picture) && (!is_full || pixel_count(picture) > pixel_count(&page))
-            }));
+            let Some(picture) = page.file.directory_at(offset) else {
+                continue;
+            };
+            let is_larger = is_auxiliary(&of_same) || pixel_count(&picture) > pixel_count(&of_same);
+            if !is_auxiliary(&picture) && is_larger {
+                let parents = Some(parents);
+                larger.push(PrintPage {
+                    page: picture,
+                    parents,
+                });
+            }
+            if depth < MAX_DEPTH {
+                self.find_larger(picture, [picture, top], depth + 1, larger)?;
+            }
         }
-        if larger.is_empty() && is_full {
-            let parent = None;
-            self.full.push(PrintPage { page, parent });
-        }
-        let parent = Some(page);
-        let pictures = larger.into_iter().map(|page| PrintPage { page, parent });
-        self.full.extend(pictures);
         Ok(())
     }
 
@@ -142,7 +166,7 @@ pub(super) fn find_print_page(bytes: &dyn TagSource) -> Result<PrintPage<'_>, De
         // The only page is marked as a copy or a mask.
         [] if found.count == 1 => Ok(PrintPage {
             page: first,
-            parent: None,
+            parents: None,
         }),
         _ => Err(DecodeError::Pages {
             full: found.full.len(),

@@ -35,6 +35,19 @@ fn the_picture_of_a_preview_is_read_from_its_subdirectory() {
 }
 
 #[test]
+fn the_picture_of_a_preview_of_a_preview_is_read_with_the_tags_at_the_top() {
+    let nested = |picture: TestPage| preview(vec![preview(vec![picture])]);
+    for kind in TestTiff::ALL {
+        let file = kind.encode(&[nested(plain_page(&picture())).short(274, 3)]);
+        let image = decode(&file, &ImageLimits::SUGGESTED).expect("reads");
+        assert_eq!(image.turned, Some(3), "{kind:?}");
+        let wanted = widened(&picture());
+        let turned = Grid::from_fn(20, 14, |x, y| wanted.at(19 - x, 13 - y));
+        assert_eq!(image.rgb, turned, "{kind:?}");
+    }
+}
+
+#[test]
 fn the_orientation_of_a_preview_holds_for_its_picture() {
     let parent = preview(vec![plain_page(&picture())]).short(274, 6);
     let image = decode(

@@ -62,6 +62,35 @@ fn ten_bits_in_sixteen_span_black_to_white_whatever_the_tags_say() {
 }
 
 #[test]
+fn ten_bits_in_sixteen_span_white_to_black_if_white_is_zero() {
+    for bits in [9, 10, 12, 16] {
+        // The paper is 0, and the ink has all bits.
+        let inks = levels(bits)
+            .into_iter()
+            .map(|number| if number == 0 { (1 << bits) - 1 } else { 0 });
+        let words = inks.flat_map(|number: u32| (number as u16).to_le_bytes());
+        let page = TestPage::new([20, 14], 0, 16, 1).strips(14, vec![words.collect()]);
+        let read = colours(&TestTiff::default().encode(&[page])).expect("reads");
+        let is_dark = |grid: &Grid<[u16; 3]>| grid.map(|[r, ..]| *r < 33_000);
+        assert_eq!(is_dark(&read), is_dark(&bilevel()), "{bits}");
+        let white = read.data().iter().filter(|colour| **colour == [65535; 3]);
+        let paper = bilevel()
+            .data()
+            .iter()
+            .filter(|colour| **colour == [65535; 3])
+            .count();
+        assert_eq!(white.count(), paper, "{bits}");
+    }
+}
+
+#[test]
+fn samples_of_an_undefined_kind_are_unsigned() {
+    let page = plain_page(&picture()).short(339, 4);
+    let read = colours(&TestTiff::default().encode(&[page])).expect("reads");
+    assert_eq!(read, widened(&picture()));
+}
+
+#[test]
 fn a_palette_of_8_bit_colours_is_widened() {
     let read = |white: u16| {
         let mut palette = vec![white; 3 * 256];

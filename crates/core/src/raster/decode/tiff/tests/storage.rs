@@ -179,3 +179,86 @@ fn jpeg_strips_are_read_with_and_without_shared_tables() {
         wanted
     );
 }
+
+/// Numbers of 12 bits from 0 to 4095, of which neighbours differ.
+fn twelve_bits(width: usize, height: usize) -> Vec<u32> {
+    let count = (width * height) as u32;
+    (0..count).map(|at| at * 4095 / (count - 1)).collect()
+}
+
+#[test]
+fn samples_in_16_bits_each_are_known_by_what_comes_out_of_a_compression() {
+    let wanted = |number: u32| (f64::from(number) / 4095.0 * 65535.0).round() as u16;
+    let numbers = twelve_bits(20, 14);
+    for order in TestTiff::BYTE_ORDERS {
+        let words = |numbers: &[u32]| -> Vec<u8> {
+            let words = numbers.iter().map(|number| *number as u16);
+            let bytes = words.map(|word| {
+                if order.is_big_endian {
+                    word.to_be_bytes()
+                } else {
+                    word.to_le_bytes()
+                }
+            });
+            bytes.flatten().collect()
+        };
+        for compression in [UNCOMPRESSED, LZW, DEFLATE, PACK_BITS] {
+            let pack = |bytes: Vec<u8>| compressed(&bytes, compression);
+            let base = TestPage::new([20, 14], BLACK_IS_ZERO, 12, 1).short(259, compression);
+            let strips = numbers.chunks(20 * 5);
+            let grid = Grid::from_vec(20, 14, numbers.clone()).expect("a number for each pixel");
+            let tiles: Vec<_> = tiled(&grid)
+                .iter()
+                .map(|tile| pack(words(tile.data())))
+                .collect();
+            let packed_strips = strips.clone().map(|strip| pack(packed(strip, 20, 12)));
+            for (name, page) in [
+                (
+                    "padded strips",
+                    base.clone()
+                        .strips(5, strips.clone().map(|strip| pack(words(strip))).collect()),
+                ),
+                ("padded tiles", base.clone().tiles([16, 16], tiles)),
+                (
+                    "packed strips",
+                    base.clone().strips(5, packed_strips.collect()),
+                ),
+            ] {
+                let read = colours(&order.encode(&[page])).expect(name);
+                let pairs = read.data().iter().zip(&numbers);
+                for (colour, number) in pairs {
+                    assert_eq!(*colour, [wanted(*number); 3], "{name}, {compression}");
+                }
+            }
+            let plane = pack(words(&numbers));
+            let planes = TestPage::new([20, 14], RGB, 12, 3)
+                .short(259, compression)
+                .short(284, 2)
+                .strips(14, vec![plane; 3]);
+            let read = colours(&order.encode(&[planes])).expect("planes");
+            assert_eq!(read.at(19, 13), [65535; 3], "{compression}");
+            assert_eq!(read.at(10, 5), [wanted(numbers[110]); 3], "{compression}");
+        }
+    }
+}
+
+#[test]
+fn only_padded_samples_of_12_bits_may_have_a_predictor() {
+    let numbers: Vec<u16> = twelve_bits(20, 14).iter().map(|n| *n as u16).collect();
+    let words = differences(&numbers, 20, 1)
+        .iter()
+        .flat_map(|word| word.to_le_bytes())
+        .collect::<Vec<_>>();
+    let page = TestPage::new([20, 14], BLACK_IS_ZERO, 12, 1)
+        .short(259, DEFLATE)
+        .short(317, 2);
+    let padded = page.clone().strips(14, vec![compressed(&words, DEFLATE)]);
+    let read = colours(&TestTiff::default().encode(&[padded])).expect("reads");
+    assert_eq!((read.at(0, 0), read.at(19, 13)), ([0; 3], [65535; 3]));
+    let strip = packed(&twelve_bits(20, 14), 20, 12);
+    let refused = page.strips(14, vec![compressed(&strip, DEFLATE)]);
+    assert_eq!(
+        super::refusal(&refused),
+        "the TIFF image cannot be decoded: its samples of 12 bits are stored by the predictor 2; save it without a predictor"
+    );
+}
