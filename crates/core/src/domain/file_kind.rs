@@ -48,6 +48,7 @@ const SIGNATURES: &[(&[u8], FileKind)] = &[
         FileKind::OtherImage("a JPEG 2000 image"),
     ),
     (b"\0\0\0\x0cJXL ", FileKind::OtherImage("a JPEG XL image")),
+    (b"\xff\x0a", FileKind::OtherImage("a JPEG XL image")),
     (b"ply\n", FileKind::Ply),
     (b"ply\r", FileKind::Ply),
     (b"glTF", GLTF),
@@ -79,12 +80,13 @@ const SIGNATURES: &[(&[u8], FileKind)] = &[
 ];
 
 /// Extensions of unsupported 3D formats.
-const UNREAD_MESHES: [(&[&str], FileKind); 13] = [
+const UNREAD_MESHES: [(&[&str], FileKind); 14] = [
     (&["glb", "gltf"], GLTF),
     (&["off"], FileKind::OtherMesh("an OFF mesh")),
     (&["3mf"], FileKind::OtherMesh("a 3MF model")),
     (&["fbx"], FileKind::OtherMesh("an FBX scene")),
     (&["dae"], FileKind::OtherMesh("a COLLADA scene")),
+    (&["3ds"], FileKind::OtherMesh("a 3DS scene")),
     (&["x3d"], FileKind::OtherMesh("an X3D scene")),
     (&["wrl"], FileKind::OtherMesh("a VRML scene")),
     (&["blend"], FileKind::OtherMesh("a Blender scene")),
@@ -99,7 +101,7 @@ const UNREAD_MESHES: [(&[&str], FileKind); 13] = [
 ];
 
 /// Extensions of unsupported images and documents.
-const UNREAD_IMAGES: [(&[&str], FileKind); 9] = [
+const UNREAD_IMAGES: [(&[&str], FileKind); 10] = [
     (&["bmp", "dib"], FileKind::OtherImage("a BMP image")),
     (&["webp"], FileKind::OtherImage("a WebP image")),
     (&["gif"], FileKind::OtherImage("a GIF image")),
@@ -111,9 +113,11 @@ const UNREAD_IMAGES: [(&[&str], FileKind); 9] = [
     (&["heic", "heif"], FileKind::OtherImage("a HEIC image")),
     (&["avif"], FileKind::OtherImage("an AVIF image")),
     (&["psd"], FileKind::OtherImage("a Photoshop image")),
+    (&["svg"], SVG),
     (&["pdf"], FileKind::Other("a PDF document")),
 ];
 
+const SVG: FileKind = FileKind::OtherImage("an SVG image");
 const GLTF: FileKind = FileKind::OtherMesh("a glTF scene");
 /// Bytes at the beginning and the end of a container that are searched for the name of its content.
 const SEARCHED_BYTES: usize = 1 << 16;
@@ -140,6 +144,9 @@ impl FileKind {
             }
             _ => {}
         }
+        if is_3ds(bytes) {
+            return Self::OtherMesh("a 3DS scene");
+        }
         let found = SIGNATURES
             .iter()
             .find(|(signature, kind)| bytes.starts_with(signature) && !is_text(kind, bytes))
@@ -147,7 +154,7 @@ impl FileKind {
         Self::scene_within(found, bytes).unwrap_or(found)
     }
 
-    /// Returns the 3D format whose files are archives, XML or text.
+    /// Returns the format of images or 3D files that are archives, XML or text.
     fn scene_within(outer: Self, bytes: &[u8]) -> Option<Self> {
         let part = bytes.len().min(SEARCHED_BYTES);
         let (head, tail) = (&bytes[..part], &bytes[bytes.len() - part..]);
@@ -159,6 +166,7 @@ impl FileKind {
             Self::Other("a ZIP archive") if has("3D/3dmodel.model") => "a 3MF model",
             Self::Other("XML or HTML text") if has("<COLLADA") => "a COLLADA scene",
             Self::Other("XML or HTML text") if has("<X3D") => "an X3D scene",
+            Self::Other("XML or HTML text") if has("<svg") && !has("<html") => return Some(SVG),
             Self::Text if is_off(head) => "an OFF mesh",
             Self::Text if head.trim_ascii_start().starts_with(b"{") => {
                 return (has_gltf_asset(head) || has_gltf_asset(tail)).then_some(GLTF);
@@ -261,6 +269,16 @@ impl FileKind {
 /// Returns whether a text only begins like an image: the signatures of some images are few letters.
 fn is_text(kind: &FileKind, bytes: &[u8]) -> bool {
     matches!(kind, FileKind::OtherImage(_)) && FileKind::without_signature(bytes) == FileKind::Text
+}
+
+/// Returns whether a file begins with a main chunk of 3DS, and in it with the chunk of its version or of its objects.
+fn is_3ds(bytes: &[u8]) -> bool {
+    let is_tiff = matches!(bytes.get(2..4), Some(b"\0*" | b"\0+"));
+    let inner = bytes.get(6..8);
+    bytes.starts_with(b"MM")
+        && !is_tiff
+        && bytes.get(5) == Some(&0)
+        && matches!(inner, Some(b"\x02\0" | b"=="))
 }
 
 /// Returns whether a part of a JSON file has the member that each glTF scene has, an object `asset` with a `version`.

@@ -35,6 +35,10 @@ fn types_are_detected_by_content() {
     assert_eq!(FileKind::of(b"\x89PNG\r\n\x1a\n...."), FileKind::Png);
     assert_eq!(FileKind::of(b"\xff\xd8\xff\xe0"), FileKind::Jpeg);
     assert_eq!(FileKind::of(b"MM\0*rest"), FileKind::Tiff);
+    // A TIFF whose first directory is at 2.
+    assert_eq!(FileKind::of(b"MM\0*\0\0\x02\0"), FileKind::Tiff);
+    assert_eq!(FileKind::of(b"\xff\x0a\xfa\x1f\0").name(), "JPEG XL image");
+    assert_eq!(FileKind::of(b"\xff\n1 2 3"), FileKind::Text);
     assert_eq!(
         FileKind::of(b"RIFF\0\0\0\0WEBPVP8 "),
         FileKind::OtherImage("a WebP image")
@@ -50,7 +54,7 @@ fn types_are_detected_by_content() {
 }
 
 #[test]
-fn all_files_of_a_scene_format_have_one_description() {
+fn all_files_of_a_format_have_one_description() {
     let zip = |name: &str| {
         [
             b"PK\x03\x04".as_slice(),
@@ -88,6 +92,24 @@ fn all_files_of_a_scene_format_have_one_description() {
             .to_vec(),
         ),
         ("a 3MF model", vec![zip("3D/3dmodel.model")]),
+        (
+            "a 3DS scene",
+            vec![
+                b"MM\x20\0\0\0\x02\0\x0a\0\0\0".to_vec(),
+                b"MM\x20\0\0\0==\x0a\0\0\0".to_vec(),
+            ],
+        ),
+        (
+            "an SVG image",
+            vec![
+                b"<svg xmlns=\"http://www.w3.org/2000/svg\"/>".to_vec(),
+                b"<?xml version=\"1.0\"?>\n<!-- a -->\n<svg>".to_vec(),
+            ],
+        ),
+        (
+            "XML or HTML text",
+            vec![b"<!DOCTYPE html>\n<html><body><svg/></body></html>".to_vec()],
+        ),
         ("a ZIP archive", vec![zip("xl/workbook.xml")]),
         (
             "a COLLADA scene",
