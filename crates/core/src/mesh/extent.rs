@@ -148,7 +148,11 @@ pub(super) fn each_position(
         }
         DetectedFormat::Xyz => {
             let points = SampledPoints::of(whole_lines(text, lines.line_end, true))?;
-            lines.visit(file, spread, |line| {
+            let rows = TextLines {
+                start: lines.start + points.header_bytes,
+                ..lines
+            };
+            rows.visit(file, spread, |line| {
                 points.position(line).into_iter().for_each(&mut visit_other);
             })?;
         }
@@ -241,7 +245,7 @@ struct TextLines {
 }
 
 impl TextLines {
-    /// Visits lines at some places.
+    /// Visits lines at some places, with white space at their ends.
     fn visit(
         self,
         file: &mut (impl Read + Seek),
@@ -252,7 +256,7 @@ impl TextLines {
         each_part(file, [self.start, self.end], 1, spread, |part| {
             let lines = whole_lines(part, self.line_end, std::mem::take(&mut is_first));
             let lines = lines.split(|byte| *byte == self.line_end);
-            lines.for_each(|line| visit(line.trim_ascii()));
+            lines.for_each(&mut visit);
         })
     }
 }

@@ -19,7 +19,7 @@ pub(super) enum DetectedFormat {
 }
 
 /// Extensions of point sets.
-const POINT_EXTENSIONS: [&str; 6] = ["xyz", "asc", "txt", "csv", "pts", "xyzrgb"];
+const POINT_EXTENSIONS: [&str; 7] = ["xyz", "asc", "txt", "csv", "pts", "ptx", "xyzrgb"];
 
 /// Lines of a text that are examined, without comments.
 const LINES_TRIED: usize = 1000;

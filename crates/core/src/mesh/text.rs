@@ -14,6 +14,11 @@ const BYTES_PER_POLL: usize = 1 << 20;
 /// Returns the trimmed lines with their line numbers, counted from 1. Lines end in LF or CRLF, and in files of classic
 /// Mac OS also in CR.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
+    raw_lines(bytes).map(|(line, content)| (line, content.trim_ascii()))
+}
+
+/// Returns the lines like [`lines`], with white space at their ends, such as tabs beside empty cells.
+pub(super) fn raw_lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
     let is_classic_mac = is_classic_mac(bytes);
     let mut counter = PollCounter::default();
     let mut unread = Some(bytes);
@@ -27,7 +32,7 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
         let line = &rest[..end.unwrap_or(rest.len())];
         unread = end.map(|end| &rest[end + 1..]);
         counter.add(poll_items(line.len()));
-        Some(line.trim_ascii())
+        Some(line)
     });
     (1..).zip(lines)
 }

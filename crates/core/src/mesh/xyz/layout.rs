@@ -1,13 +1,15 @@
-//! The layout of an XYZ file: its title, its columns, and what its commas mean.
+//! The layout of an XYZ file: its columns, what separates them, and what its commas mean.
 
+use super::cells::{
+    MISSING, cells, has_grouped_digits, outer_cells, plain_position, plain_tabbed_position,
+    tab_cells, without_wide_spaces,
+};
+use super::title::{MAX_NAMES, Title, is_comment, is_other_title};
 use crate::mesh::MeshError;
-use crate::mesh::{decimal, text};
+use crate::mesh::text;
 
-/// Most cells of a title that are read.
-const MAX_NAMES: usize = 64;
-/// Columns that may precede the coordinates in a commented title.
-const NUMBER_NAMES: [&str; 8] = ["id", "no", "nr", "n", "index", "number", "num", "point"];
-const UNITS: [&str; 5] = ["mm", "cm", "m", "in", "inch"];
+/// Lines of points that show how cells are separated.
+const SAMPLED_LINES: usize = 1000;
 
 /// What commas mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +22,16 @@ enum CommaUse {
     Unclear,
 }
 
+/// The fast parser that may read a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FastParser {
+    None,
+    /// [`plain_position`].
+    Words,
+    /// [`plain_tabbed_position`].
+    Tabs,
+}
+
 /// Where the coordinates are.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PointLayout {
@@ -28,47 +40,82 @@ pub(super) struct PointLayout {
     /// Columns of x, y and z.
     columns: [usize; 3],
     commas: CommaUse,
+    /// Number of columns between tabs, if each tab ends a cell that may be empty. Otherwise tabs are white space.
+    tabs: Option<usize>,
+    /// Number of columns of most lines.
+    width: usize,
+    /// Whether a title names the columns.
+    is_titled: bool,
     /// Whether the first column may be the numbers of points.
     may_be_numbered: bool,
+    fast_parser: FastParser,
 }
 
 impl PointLayout {
-    /// Determines the layout from the title and the first point, and from the first point with a comma.
+    /// Determines the layout from the title and the first points, and from the first point with a comma.
     ///
     /// # Errors
-    /// Returns an error if the title has more columns than the first point.
+    /// Returns an error if the title has more columns than the points.
     pub(super) fn of(bytes: &[u8]) -> Result<Self, MeshError> {
-        let mut lines = text::lines(bytes);
-        let mut title = None;
+        let mut lines = text::raw_lines(bytes);
+        let (mut title, mut first) = (None, None);
+        for (line, raw) in lines.by_ref() {
+            let content = raw.trim_ascii();
+            if let Some(found) = Title::of(content) {
+                title = Some((line, found));
+            } else if !is_comment(content) && !is_other_title(content, title.is_some()) {
+                first = Some((line, raw));
+                break;
+            }
+        }
         let mut layout = Self {
             first_point: u64::MAX,
             columns: [0, 1, 2],
             commas: CommaUse::Separator,
+            tabs: None,
+            width: 0,
+            is_titled: false,
             may_be_numbered: false,
+            fast_parser: FastParser::None,
         };
-        for (line, content) in &mut lines {
-            if let Some(found) = Title::of(content) {
-                title = Some((line, found));
-                continue;
-            }
-            if is_comment(content) || is_other_title(content) {
-                continue;
-            }
-            layout.first_point = line;
-            if text::contains(bytes, b',') {
-                let later = lines.map(|(_, line)| line).filter(|line| !is_comment(line));
-                let found = std::iter::once(content).chain(later).find_map(comma_use);
-                layout.commas = found.unwrap_or(layout.commas);
-            }
-            let width = layout.cells(content).take(MAX_NAMES).count();
-            let first = layout.cells(content).next().unwrap_or_default();
-            layout.may_be_numbered = width > 3 && first.iter().all(u8::is_ascii_digit);
-            if let Some((line, title)) = title {
-                layout.name_columns(&title, line, width)?;
-            }
-            break;
+        let Some((first_point, first)) = first else {
+            return Ok(layout);
+        };
+        layout.first_point = first_point;
+        let later = lines.map(|(_, raw)| raw);
+        let later = later.filter(|raw| !is_comment(raw.trim_ascii()));
+        let mut points = std::iter::once(first).chain(later);
+        let sample: Vec<&[u8]> = points.by_ref().take(SAMPLED_LINES).collect();
+        if text::contains(bytes, b',') {
+            let found = sample.iter().copied().chain(points).find_map(comma_use);
+            layout.commas = found.unwrap_or(layout.commas);
         }
-        Ok(layout)
+        let named = title.as_ref().map(|(_, title)| title);
+        layout.tabs = tab_columns(&sample, named);
+        let widths: Vec<usize> = sample.iter().map(|line| layout.width_of(line)).collect();
+        layout.width = most_frequent(&widths);
+        let number = layout.cells(first).next().and_then(number_with_comma);
+        let is_whole = number.is_some_and(|number| number.fract() == 0.0);
+        layout.may_be_numbered = layout.width > 3 && is_whole;
+        if let Some((line, title)) = title {
+            let widest = widths.into_iter().max().unwrap_or_default();
+            layout.name_columns(&title, line, widest)?;
+        }
+        Ok(layout.with_columns(layout.columns))
+    }
+
+    /// Returns the layout with other columns of coordinates.
+    fn with_columns(self, columns: [usize; 3]) -> Self {
+        let fast_parser = match self.tabs {
+            _ if self.commas != CommaUse::Separator || columns != [0, 1, 2] => FastParser::None,
+            None => FastParser::Words,
+            Some(_) => FastParser::Tabs,
+        };
+        Self {
+            columns,
+            fast_parser,
+            ..self
+        }
     }
 
     fn name_columns(&mut self, title: &Title, line: u64, width: usize) -> Result<(), MeshError> {
@@ -80,36 +127,89 @@ impl PointLayout {
             let reason = format!("it names {named} columns, but the first point has {width}");
             return Err(MeshError::Line { line, reason });
         }
-        (self.columns, self.may_be_numbered) = (title.columns, false);
+        self.columns = title.columns;
+        (self.is_titled, self.may_be_numbered) = (true, false);
         Ok(())
+    }
+
+    /// Returns the number of columns of a line, without empty ones at its end.
+    fn width_of(&self, line: &[u8]) -> usize {
+        let cells = self.cells(line).take(MAX_NAMES).enumerate();
+        let filled = cells.filter(|(_, cell)| *cell != MISSING);
+        filled.last().map_or(0, |(column, _)| column + 1)
     }
 
     /// Returns the layout of a file whose first column is the numbers of points, unless the title says otherwise.
     pub(super) fn numbered(self) -> Option<Self> {
-        self.may_be_numbered.then_some(Self {
-            columns: [1, 2, 3],
-            ..self
-        })
+        let layout = self.with_columns([1, 2, 3]);
+        self.may_be_numbered.then_some(layout)
     }
 
-    /// Parses the coordinates of a point; the error is a message.
-    pub(super) fn position(&self, line: &[u8]) -> Result<[f64; 3], String> {
-        if self.commas == CommaUse::Separator && self.columns == [0, 1, 2] {
-            return plain_position(line).map_or_else(|| text::position(cells(line)), Ok);
+    /// Returns the layout of a file whose first two columns are the row and the column of a point. `None` if there are too
+    /// few columns, or if a title names them.
+    pub(super) fn gridded(self) -> Option<Self> {
+        let layout = self.with_columns([2, 3, 4]);
+        (self.width > 4 && !self.is_titled).then_some(layout)
+    }
+
+    /// Returns the layout of normals that follow the position, if there are enough columns.
+    pub(super) fn of_normals(self) -> Option<Self> {
+        let layout = self.with_columns([3, 4, 5]);
+        (self.width > 5).then_some(layout)
+    }
+
+    /// Returns the part of a line that may be a point. `None` if the line is empty or a comment.
+    #[inline]
+    pub(super) fn row<'a>(&self, raw: &'a [u8]) -> Option<&'a [u8]> {
+        let content = raw.trim_ascii();
+        if self.tabs.is_none() {
+            return (!is_comment(content)).then_some(content);
         }
+        let is_row = content.is_empty() && raw.contains(&b'\t');
+        (!is_comment(content) || is_row).then_some(raw)
+    }
+
+    /// Parses the coordinates of a row; the error is a message.
+    #[inline]
+    pub(super) fn position(&self, row: &[u8]) -> Result<[f64; 3], String> {
+        let plain = match self.fast_parser {
+            FastParser::None => None,
+            FastParser::Words => plain_position(row, self.width == 3),
+            FastParser::Tabs => plain_tabbed_position(row),
+        };
+        plain.map_or_else(|| self.odd_position(row), Ok)
+    }
+
+    fn odd_position(&self, row: &[u8]) -> Result<[f64; 3], String> {
+        let found = self.position_of_cells(row);
+        match found.is_err().then(|| without_wide_spaces(row)).flatten() {
+            Some(plain) => self.position_of_cells(&plain).or(found),
+            None => found,
+        }
+    }
+
+    fn position_of_cells(&self, line: &[u8]) -> Result<[f64; 3], String> {
         if self.commas == CommaUse::Unclear && line.contains(&b',') {
             let reason =
                 "its commas may separate numbers or be part of them; write spaces between numbers";
             return Err(reason.into());
         }
+        if self.fast_parser != FastParser::None {
+            self.check_cells(line, self.width_of(line))?;
+            return text::position(self.cells(line));
+        }
         let mut coordinates: [&[u8]; 3] = [b"missing"; 3];
-        let mut have = 0;
+        let (mut have, mut count) = (0, 0);
         for (column, cell) in self.cells(line).enumerate().take(MAX_NAMES) {
+            if cell != MISSING {
+                count = column + 1;
+            }
             if let Some(axis) = self.columns.iter().position(|of_axis| *of_axis == column) {
                 coordinates[axis] = cell;
                 have += 1;
             }
         }
+        self.check_cells(line, count)?;
         if have < 3 {
             return Err(format!("{have} of 3 coordinates"));
         }
@@ -127,117 +227,75 @@ impl PointLayout {
         text::position(with_points.iter().map(Vec::as_slice))
     }
 
+    /// Checks that the cells of a line with `count` columns can be told apart; the error is a message.
+    fn check_cells(&self, line: &[u8], count: usize) -> Result<(), String> {
+        if count <= self.tabs.unwrap_or(self.width) {
+            return Ok(());
+        }
+        match self.tabs {
+            Some(width) if self.cells(line).take(count).any(|cell| cell == MISSING) => {
+                Err(format!(
+                    "it has {count} columns between tabs, but others have {width}; write one tab between columns"
+                ))
+            }
+            None if has_grouped_digits(self.cells(line).take(MAX_NAMES)) => {
+                let width = self.width;
+                Err(format!(
+                    "it has {count} columns, but most lines have {width}; write numbers such as \"1 234\" without blanks"
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn cells<'a>(&self, line: &'a [u8]) -> impl Iterator<Item = &'a [u8]> + use<'a> {
+        let mut between_tabs = tab_cells(line);
         let mut words = outer_cells(line);
         let mut cells = cells(line);
-        let commas = self.commas;
+        let (is_tabbed, commas) = (self.tabs.is_some(), self.commas);
         std::iter::from_fn(move || match commas {
+            _ if is_tabbed => {
+                let cell = between_tabs.next()?;
+                Some(if cell.is_empty() { MISSING } else { cell })
+            }
             CommaUse::Decimal => words.next(),
             CommaUse::Separator | CommaUse::Unclear => cells.next(),
         })
     }
 }
 
-/// Parses three numbers with simple separators, as in almost every line. Returns `None` for all other lines.
-#[inline]
-fn plain_position(line: &[u8]) -> Option<[f64; 3]> {
-    let mut position = [0.0; 3];
-    let mut rest = line;
-    for value in &mut position {
-        while let [b' ' | b'\t', next @ ..] = rest {
-            rest = next;
-        }
-        (*value, rest) = decimal::parse(rest)?;
-        rest = match rest {
-            [] | [b' ' | b'\t', ..] => rest,
-            [b',' | b';', next @ ..] => next,
-            _ => return None,
-        };
+/// Returns the number of columns if each tab ends a cell. Tabs that only align numbers stand side by side in lines that have
+/// a number in every column.
+fn tab_columns(sample: &[&[u8]], title: Option<&Title>) -> Option<usize> {
+    let columns = title.map_or([0, 1, 2], |title| title.columns);
+    let (mut most_cells, mut most_filled, mut has_point) = (0, 0, false);
+    for line in sample.iter().filter(|line| line.contains(&b'\t')) {
+        let cells: Vec<&[u8]> = tab_cells(line).take(MAX_NAMES).collect();
+        let last = cells.iter().rposition(|cell| !cell.is_empty());
+        let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
+        let is_number = |column: usize| cells.get(column).copied().and_then(number_with_comma);
+        most_cells = most_cells.max(last.map_or(0, |last| last + 1));
+        most_filled = most_filled.max(filled);
+        has_point |= columns.iter().all(|column| is_number(*column).is_some());
     }
-    Some(position)
+    let is_named = title.is_some_and(|title| title.width == most_cells);
+    let is_each = has_point && (most_cells == most_filled || is_named);
+    is_each.then_some(most_cells)
 }
 
-/// Returns whether a file that begins with this line may be a point set.
-pub(in crate::mesh) fn is_data_or_title(line: &[u8]) -> bool {
-    Title::of(line).is_some() || is_count(line) || text::position(cells(line)).is_ok()
-}
-
-/// Returns whether a line is empty or a comment.
-pub(in crate::mesh) fn is_comment(line: &[u8]) -> bool {
-    matches!(line, [] | [b'#' | b'%', ..] | [b'/', b'/', ..])
-}
-
-/// Returns whether a line is a number of points.
-fn is_count(line: &[u8]) -> bool {
-    line.iter().all(u8::is_ascii_digit)
-}
-
-/// Returns whether a line before the points is a count of them, units or a quoted text.
-fn is_other_title(line: &[u8]) -> bool {
-    let is_units = names(line).count() >= 3 && names(line).all(|name| UNITS.contains(&&*name));
-    let is_quoted = matches!(line.first(), Some(b'"' | b'\''));
-    let mut unquoted = line.to_vec();
-    unquoted.retain(|byte| !matches!(byte, b'"' | b'\''));
-    is_count(line) || is_units || (is_quoted && text::position(cells(&unquoted)).is_err())
-}
-
-/// A line that names columns.
-struct Title {
-    /// Columns of x, y and z.
-    columns: [usize; 3],
-    /// Number of columns.
-    width: usize,
-    is_comment: bool,
-}
-
-impl Title {
-    /// Returns the columns that a line names. A comment names them only if x, y and z are its first words, or follow the
-    /// name of a column of numbers.
-    fn of(line: &[u8]) -> Option<Self> {
-        let is_delimited = line.iter().any(|byte| b",;\t".contains(byte));
-        let is_name = |name: &String| is_delimited || !UNITS.contains(&&**name);
-        let names: Vec<String> = names(line).filter(is_name).collect();
-        let mut columns = [0; 3];
-        for (column, wanted) in columns.iter_mut().zip(["x", "y", "z"]) {
-            *column = names.iter().position(|name| name == wanted)?;
-        }
-        let is_comment = is_comment(line);
-        let has_number = NUMBER_NAMES.contains(&&*names[0]);
-        let last = columns.into_iter().max().unwrap_or_default();
-        let is_title = !is_comment || last == 2 + usize::from(has_number);
-        is_title.then_some(Self {
-            columns,
-            width: names.len(),
-            is_comment,
-        })
+/// Returns the most frequent of some numbers of columns, at most [`MAX_NAMES`] each.
+fn most_frequent(widths: &[usize]) -> usize {
+    let mut counts = [0; MAX_NAMES + 1];
+    for width in widths {
+        counts[*width] += 1;
     }
+    let found = (0..counts.len()).max_by_key(|width| counts[*width]);
+    found.unwrap_or_default()
 }
 
-/// Returns the names in a title in lower case: the letters and digits that its cells begin with, without quotes, brackets
-/// and what marks a comment. Tabs, commas and semicolons separate cells, or else white space.
-fn names(line: &[u8]) -> impl Iterator<Item = String> {
-    let is_mark = |byte: &u8| b"#%/ \t".contains(byte);
-    let start = line.iter().position(|byte| !is_mark(byte));
-    let text = &line[start.unwrap_or(line.len())..];
-    let is_delimiter = |byte: &u8| b",;\t".contains(byte);
-    let is_delimited = text.iter().any(is_delimiter);
-    let cells = text.split(move |byte| {
-        if is_delimited {
-            is_delimiter(byte)
-        } else {
-            byte.is_ascii_whitespace()
-        }
-    });
-    cells
-        .filter(|cell| !cell.is_empty())
-        .take(MAX_NAMES)
-        .map(|cell| {
-            let start = cell.iter().position(u8::is_ascii_alphanumeric);
-            let name = &cell[start.unwrap_or(cell.len())..];
-            let end = name.iter().position(|byte| !byte.is_ascii_alphanumeric());
-            let name = &name[..end.unwrap_or(name.len())];
-            String::from_utf8_lossy(name).to_ascii_lowercase()
-        })
+/// Parses a number that may have a decimal comma.
+fn number_with_comma(cell: &[u8]) -> Option<f64> {
+    text::number(&with_point(cell))
 }
 
 /// Returns what the commas of a point mean; `None` if it has none.
@@ -250,7 +308,8 @@ fn comma_use(line: &[u8]) -> Option<CommaUse> {
     let without_last = first.strip_suffix(b",").unwrap_or(first);
     let is_list = without_last.split(|byte| *byte == b',').count() > 2;
     let is_spaced = first.ends_with(b",") && first_comma + 1 == first.len();
-    if is_list || is_spaced || second.is_none() {
+    let is_alone = second.is_none() && !line.contains(&b';') && !line.contains(&b'\t');
+    if is_list || is_spaced || is_alone {
         return Some(CommaUse::Separator);
     }
     let is_decimal = |word: &[u8]| {
@@ -281,87 +340,4 @@ fn with_point(number: &[u8]) -> Vec<u8> {
 
 const fn is_outer_separator(byte: u8) -> bool {
     byte.is_ascii_whitespace() || byte == b';'
-}
-
-/// Returns the cells between white space and semicolons, without commas at their ends.
-fn outer_cells(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let words = line.split(|byte| is_outer_separator(*byte)).map(|word| {
-        let word = word.strip_prefix(b",").unwrap_or(word);
-        word.strip_suffix(b",").unwrap_or(word)
-    });
-    words.filter(|word| !word.is_empty())
-}
-
-/// Returns the cells between white space, commas and semicolons. Between two commas or semicolons a coordinate is
-/// missing.
-fn cells(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let mut at = 0;
-    let skip_space = |mut at: usize| {
-        while line.get(at).is_some_and(u8::is_ascii_whitespace) {
-            at += 1;
-        }
-        at
-    };
-    std::iter::from_fn(move || {
-        let start = skip_space(at);
-        let rest = line.get(start..).unwrap_or_default();
-        let is_end =
-            |byte: &u8| matches!(byte, b',' | b';' | b' ' | b'\t' | b'\r' | b'\n' | b'\x0c');
-        let end = start + rest.iter().position(is_end).unwrap_or(rest.len());
-        at = skip_space(end);
-        if let Some(b',' | b';') = line.get(at) {
-            at += 1;
-        } else if start == end {
-            return None;
-        }
-        Some(if start == end {
-            b"nan"
-        } else {
-            &line[start..end]
-        })
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{cells, plain_position};
-    use crate::mesh::text;
-
-    #[test]
-    fn plain_lines_have_the_numbers_of_their_cells() {
-        let numbers = [
-            "1",
-            "-2.5",
-            "0.1234567",
-            "1e3",
-            "",
-            "nan",
-            "+4",
-            "12345678901234567890",
-            "x",
-        ];
-        let separators = [" ", ",", ";", "\t", " , ", ", ", "  ", ";;", ""];
-        let (mut plain, mut other) = (0, 0);
-        for code in 0..9_usize.pow(5) {
-            let choice = |place: u32| code / 9_usize.pow(place) % 9;
-            let [a, b, c] = [0, 1, 2].map(|place| numbers[choice(place)]);
-            let (first, second) = (separators[choice(3)], separators[choice(4)]);
-            let line = format!("{a}{first}{b}{second}{c}{}", ["", " 7", ",9"][code % 3]);
-            match plain_position(line.trim_ascii_start().as_bytes()) {
-                Some(position) => {
-                    plain += 1;
-                    assert_eq!(
-                        Ok(position),
-                        text::position(cells(line.as_bytes())),
-                        "{line}"
-                    );
-                }
-                None => other += 1,
-            }
-        }
-        assert!(
-            plain > 1000 && other > 1000,
-            "{plain} plain lines, {other} others"
-        );
-    }
 }

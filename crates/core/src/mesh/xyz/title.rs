@@ -1,0 +1,108 @@
+//! Lines before the points: titles that name columns, counts, units and comments.
+
+use super::cells::cells;
+use crate::mesh::text;
+
+/// Most cells of a title that are read.
+pub(super) const MAX_NAMES: usize = 64;
+/// Columns that may precede the coordinates in a commented title.
+const NUMBER_NAMES: [&str; 8] = ["id", "no", "nr", "n", "index", "number", "num", "point"];
+const UNITS: [&str; 5] = ["mm", "cm", "m", "in", "inch"];
+
+/// Returns whether a file that begins with this line may be a point set.
+pub(in crate::mesh) fn is_data_or_title(line: &[u8]) -> bool {
+    Title::of(line).is_some()
+        || is_count(line)
+        || is_separator_name(line)
+        || text::position(cells(line)).is_ok()
+}
+
+/// Returns whether a line is empty or a comment.
+pub(in crate::mesh) fn is_comment(line: &[u8]) -> bool {
+    matches!(line, [] | [b'#' | b'%', ..] | [b'/', b'/', ..])
+}
+
+/// Returns whether a line is a number of points.
+pub(super) fn is_count(line: &[u8]) -> bool {
+    line.iter().all(u8::is_ascii_digit)
+}
+
+/// Returns whether a line names the separator for spreadsheet programs, as `sep=;`.
+fn is_separator_name(line: &[u8]) -> bool {
+    let (name, separator) = line.split_at_checked(4).unwrap_or_default();
+    name.eq_ignore_ascii_case(b"sep=") && separator.len() <= 1
+}
+
+/// Returns whether a line before the points is a count of them, units, a separator or a quoted text, which has no numbers if
+/// the columns are named before it.
+pub(super) fn is_other_title(line: &[u8], is_named: bool) -> bool {
+    let is_units = names(line).count() >= 3 && names(line).all(|name| UNITS.contains(&&*name));
+    let is_quoted = matches!(line.first(), Some(b'"' | b'\''));
+    let mut unquoted = line.to_vec();
+    unquoted.retain(|byte| !matches!(byte, b'"' | b'\''));
+    is_count(line)
+        || is_units
+        || is_separator_name(line)
+        || (is_quoted
+            && text::position(cells(&unquoted)).is_err()
+            && !(is_named && cells(&unquoted).any(|cell| text::number(cell).is_some())))
+}
+
+/// A line that names columns.
+pub(super) struct Title {
+    /// Columns of x, y and z.
+    pub(super) columns: [usize; 3],
+    /// Number of columns.
+    pub(super) width: usize,
+    pub(super) is_comment: bool,
+}
+
+impl Title {
+    /// Returns the columns that a line names. A comment names them only if x, y and z are its first words, or follow the
+    /// name of a column of numbers.
+    pub(super) fn of(line: &[u8]) -> Option<Self> {
+        let is_delimited = line.iter().any(|byte| b",;\t".contains(byte));
+        let is_name = |name: &String| is_delimited || !UNITS.contains(&&**name);
+        let names: Vec<String> = names(line).filter(is_name).collect();
+        let mut columns = [0; 3];
+        for (column, wanted) in columns.iter_mut().zip(["x", "y", "z"]) {
+            *column = names.iter().position(|name| name == wanted)?;
+        }
+        let is_comment = is_comment(line);
+        let has_number = NUMBER_NAMES.contains(&&*names[0]);
+        let last = columns.into_iter().max().unwrap_or_default();
+        let is_title = !is_comment || last == 2 + usize::from(has_number);
+        is_title.then_some(Self {
+            columns,
+            width: names.len(),
+            is_comment,
+        })
+    }
+}
+
+/// Returns the names in a title in lower case: the letters and digits that its cells begin with, without quotes, brackets
+/// and what marks a comment. Tabs, commas and semicolons separate cells, or else white space.
+fn names(line: &[u8]) -> impl Iterator<Item = String> {
+    let is_mark = |byte: &u8| b"#%/ \t".contains(byte);
+    let start = line.iter().position(|byte| !is_mark(byte));
+    let text = &line[start.unwrap_or(line.len())..];
+    let is_delimiter = |byte: &u8| b",;\t".contains(byte);
+    let is_delimited = text.iter().any(is_delimiter);
+    let cells = text.split(move |byte| {
+        if is_delimited {
+            is_delimiter(byte)
+        } else {
+            byte.is_ascii_whitespace()
+        }
+    });
+    cells
+        .filter(|cell| !cell.is_empty())
+        .take(MAX_NAMES)
+        .map(|cell| {
+            let start = cell.iter().position(u8::is_ascii_alphanumeric);
+            let name = &cell[start.unwrap_or(cell.len())..];
+            let end = name.iter().position(|byte| !byte.is_ascii_alphanumeric());
+            let name = &name[..end.unwrap_or(name.len())];
+            String::from_utf8_lossy(name).to_ascii_lowercase()
+        })
+}
