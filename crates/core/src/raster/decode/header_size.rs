@@ -6,7 +6,7 @@ use image::metadata::Orientation;
 
 use super::error::{DecodeError, broken};
 use super::limits::ImageLimits;
-use super::orientation::{of_exif, of_tag, swaps_sides};
+use super::orientation::{StatedOrientation, of_tag, swaps_sides};
 use super::tags::TagFileWindow;
 use super::tiff;
 use crate::domain::FileKind;
@@ -19,8 +19,8 @@ const TAIL_BYTES: u64 = 1 << 16;
 const MAX_SEGMENTS: usize = 1000;
 /// Most chunks of a PNG.
 const MAX_CHUNKS: usize = 100_000;
-/// Longest EXIF block that is read.
-const MAX_EXIF_BYTES: u64 = 1 << 16;
+/// Longest chunk of EXIF or text that is read.
+const MAX_CHUNK_BYTES: u64 = 1 << 20;
 
 /// The size of the stored image, and how it is turned.
 type StoredSize = ([u32; 2], Orientation);
@@ -63,7 +63,7 @@ pub fn header_size(
 /// Reads the frame header of a JPEG, and what precedes it. `None` if it is not found, or if no mark of the end follows.
 fn jpeg_size(file: &mut (impl Read + Seek), len: u64) -> Option<StoredSize> {
     let mut at = 2;
-    let mut exif: Option<Vec<u8>> = None;
+    let mut turned = StatedOrientation::default();
     for _ in 0..MAX_SEGMENTS {
         let head: [u8; 9] = array_at(file, at)?;
         let number = |at: usize| u16::from_be_bytes([head[at], head[at + 1]]);
@@ -74,14 +74,13 @@ fn jpeg_size(file: &mut (impl Read + Seek), len: u64) -> Option<StoredSize> {
             (0xff, 0xc0..=0xc3 | 0xc5..=0xc7 | 0xc9..=0xcb | 0xcd..=0xcf) => {
                 let size = [number(7), number(5)].map(u32::from);
                 let has_end = has_jpeg_end(file, at.max(len.saturating_sub(TAIL_BYTES)))?;
-                return has_end.then(|| (size, of_exif(exif.as_deref())));
+                return has_end.then(|| (size, turned.orientation()));
             }
             // The end, or a scan before the frame.
             (0xff, 0x00 | 0xd9 | 0xda) => return None,
             (0xff, marker) => {
-                if marker == 0xe1 && exif.is_none() {
-                    let block = block_at(file, at + 4, segment.saturating_sub(2))?;
-                    exif = Some(block).filter(|block| block.starts_with(b"Exif\0\0"));
+                if marker == 0xe1 {
+                    turned.add_segment(&block_at(file, at + 4, segment.saturating_sub(2))?);
                 }
                 at += 2 + segment;
             }
@@ -101,7 +100,7 @@ fn has_jpeg_end(file: &mut (impl Read + Seek), start: u64) -> Option<bool> {
 /// Reads the chunks of a PNG. `None` if the last one is not found.
 fn png_size(file: &mut (impl Read + Seek)) -> Option<StoredSize> {
     let mut size = None;
-    let mut exif: Option<Vec<u8>> = None;
+    let mut turned = StatedOrientation::default();
     let mut at = 8;
     for _ in 0..MAX_CHUNKS {
         poll();
@@ -118,10 +117,10 @@ fn png_size(file: &mut (impl Read + Seek)) -> Option<StoredSize> {
                 };
                 size = Some([width, height].map(u32::from_be_bytes));
             }
-            b"eXIf" if exif.is_none() => {
-                exif = Some(block_at(file, at + 8, len.min(MAX_EXIF_BYTES))?);
+            b"eXIf" | b"tEXt" | b"zTXt" | b"iTXt" => {
+                turned.add_chunk(kind, &block_at(file, at + 8, len.min(MAX_CHUNK_BYTES))?);
             }
-            b"IEND" => return Some((size?, of_exif(exif.as_deref()))),
+            b"IEND" => return Some((size?, turned.orientation())),
             _ => {}
         }
         at += 12 + len;
@@ -234,6 +233,19 @@ mod tests {
             let decoded = decode(&bytes, &ImageLimits::SUGGESTED).expect("decodes");
             let sides = [decoded.rgb.width(), decoded.rgb.height()];
             assert_eq!(sides.map(|side| side as u32), upright);
+        }
+    }
+
+    #[test]
+    fn the_orientation_of_a_later_segment_turns_the_image() {
+        let later = jpeg_with_exif(6, &[]);
+        let (start, rest) = later.split_at(2);
+        for first in [&b"Exif\0\0"[..], b"http://ns.adobe.com/xap/1.0/\0<x/>"] {
+            let len = (first.len() as u16 + 2).to_be_bytes();
+            let bytes = [start, &[0xff, 0xe1], &len, first, rest].concat();
+            assert_eq!(size(&bytes), Ok([80, 120]));
+            let decoded = decode(&bytes, &ImageLimits::SUGGESTED).expect("decodes");
+            assert_eq!(decoded.turned, Some(6));
         }
     }
 

@@ -6,6 +6,7 @@ mod header_size;
 mod jpeg;
 mod limits;
 mod orientation;
+mod png_chunks;
 mod print_image;
 mod resolution;
 mod samples;
@@ -21,6 +22,8 @@ use crate::domain::cancel::PolledReader;
 
 use colour_profile::FileProfile;
 use error::broken;
+use orientation::StatedOrientation;
+use png_chunks::png_chunk;
 use print_image::{colours_on_white, widen_narrow};
 use tags::TagFileWindow;
 
@@ -65,12 +68,12 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
             if has_16_bits {
                 widen_narrow(&mut rgb, false);
             }
-            (rgb, orientation::of_png(bytes), profile)
+            let stated = StatedOrientation::of_png(bytes);
+            (rgb, stated.orientation(), profile)
         }
         FileKind::Jpeg => {
             let image = jpeg::decode(bytes, limits)?;
-            let orientation = orientation::of_exif(image.exif);
-            (image.rgb, orientation, image.profile)
+            (image.rgb, image.orientation, image.profile)
         }
         other => return Err(DecodeError::NotAnImage(other)),
     };
@@ -119,7 +122,7 @@ fn decode_png(
     let mut decoder = reader.into_decoder().map_err(|error| png_error(&error))?;
     let profile = decoder.icc_profile().ok().flatten();
     // The decoder skips a profile that it cannot decompress.
-    let profile = profile.or_else(|| orientation::png_chunk(bytes, *b"iCCP").map(|_| Vec::new()));
+    let profile = profile.or_else(|| png_chunk(bytes, *b"iCCP").map(|_| Vec::new()));
     let pixels = DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error))?;
     let profile = profile.map(|bytes| FileProfile {
         bytes,

@@ -1,34 +1,77 @@
-//! The EXIF orientation of an image: how the stored pixels are turned to show the image upright.
+//! The orientation of an image: how the stored pixels are turned to show the image upright.
 
 use image::metadata::Orientation;
 
+use super::png_chunks::{png_chunks, png_text};
 use super::tags::TaggedFile;
-use crate::domain::cancel::PollCounter;
 use crate::raster::Grid;
 
 const ORIENTATION: u64 = 274;
+/// Begins a segment of XMP in a JPEG.
+const XMP_PREFIX: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
+const XMP_KEYWORD: &[u8] = b"XML:com.adobe.xmp";
+/// Keywords of texts that are the hexadecimal digits of a segment of a JPEG, as ImageMagick writes them.
+const RAW_PROFILES: [&[u8]; 3] = [
+    b"Raw profile type exif",
+    b"Raw profile type APP1",
+    b"Raw profile type xmp",
+];
+const KEYWORDS: [&[u8]; 4] = [
+    XMP_KEYWORD,
+    RAW_PROFILES[0],
+    RAW_PROFILES[1],
+    RAW_PROFILES[2],
+];
 
-/// Returns the orientation of a PNG.
-pub(super) fn of_png(bytes: &[u8]) -> Orientation {
-    of_exif(png_chunk(bytes, *b"eXIf"))
+/// The EXIF orientations, 1 to 8, that parts of a file state.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct StatedOrientation {
+    exif: Option<u64>,
+    /// In EXIF that is stored as text.
+    raw_profile: Option<u64>,
+    xmp: Option<u64>,
 }
 
-/// Returns the content of the first chunk of a kind, which may stand before or after the pixels.
-pub(super) fn png_chunk(bytes: &[u8], wanted: [u8; 4]) -> Option<&[u8]> {
-    let mut counter = PollCounter::default();
-    let mut at = 8;
-    while let Some(head) = bytes.get(at..at + 8) {
-        counter.tick();
-        let (len, kind) = head.split_at(4);
-        let len = len
-            .iter()
-            .fold(0, |sum, byte| sum << 8 | usize::from(*byte));
-        if kind == wanted {
-            return bytes.get(at + 8..at + 8 + len);
+impl StatedOrientation {
+    /// Returns what the chunks of a PNG state.
+    pub(super) fn of_png(bytes: &[u8]) -> Self {
+        let mut stated = Self::default();
+        for (kind, content) in png_chunks(bytes) {
+            stated.add_chunk(kind, content);
         }
-        at += 12 + len;
+        stated
     }
-    None
+
+    /// Adds what a chunk of a PNG states.
+    pub(super) fn add_chunk(&mut self, kind: [u8; 4], content: &[u8]) {
+        if kind == *b"eXIf" {
+            self.exif = self.exif.or_else(|| exif_number(content));
+        }
+        match png_text(kind, content, &KEYWORDS) {
+            Some((XMP_KEYWORD, packet)) => self.xmp = self.xmp.or_else(|| xmp_number(&packet)),
+            Some((_, text)) => {
+                let segment = raw_profile(&text).unwrap_or_default();
+                let number = || exif_number(&segment);
+                self.raw_profile = self.raw_profile.or_else(number);
+                self.xmp = self.xmp.or_else(|| xmp_number(&segment));
+            }
+            None => {}
+        }
+    }
+
+    /// Adds what an application segment of a JPEG states, which may be EXIF or XMP.
+    pub(super) fn add_segment(&mut self, segment: &[u8]) {
+        if segment.starts_with(b"Exif\0\0") {
+            self.exif = self.exif.or_else(|| exif_number(segment));
+        } else if segment.starts_with(XMP_PREFIX) {
+            self.xmp = self.xmp.or_else(|| xmp_number(segment));
+        }
+    }
+
+    /// Returns the orientation; upright if none is stated.
+    pub(super) fn orientation(self) -> Orientation {
+        of_tag(self.exif.or(self.raw_profile).or(self.xmp))
+    }
 }
 
 /// Returns an EXIF block without the prefix of JPEG segments, which some programs copy to other formats.
@@ -36,11 +79,43 @@ pub(super) fn without_prefix(block: &[u8]) -> &[u8] {
     block.strip_prefix(b"Exif\0\0").unwrap_or(block)
 }
 
-/// Returns the orientation in an EXIF block, whatever integer type it is stored as. An unreadable one counts as upright.
-pub(super) fn of_exif(block: Option<&[u8]>) -> Orientation {
-    let block = block.map(without_prefix).unwrap_or_default();
-    let directory = TaggedFile::new(&block).and_then(|file| file.first_directory());
-    of_tag(directory.and_then(|directory| directory.number(ORIENTATION)))
+/// Returns the orientation in an EXIF block, whatever integer type it is stored as.
+fn exif_number(block: &[u8]) -> Option<u64> {
+    let block = without_prefix(block);
+    let directory = TaggedFile::new(&block)?.first_directory()?;
+    let number = directory.number(ORIENTATION)?;
+    (1..=8).contains(&number).then_some(number)
+}
+
+/// Returns the orientation in XMP: an attribute or an element of one digit.
+fn xmp_number(packet: &[u8]) -> Option<u64> {
+    const NAME: &[u8] = b"tiff:Orientation";
+    let start = memchr::memmem::find(packet, NAME)? + NAME.len();
+    let value = match packet[start..].trim_ascii_start() {
+        [b'>', value @ ..] => value,
+        [b'=', value @ ..] => value.trim_ascii_start().get(1..)?,
+        _ => return None,
+    };
+    match value.trim_ascii_start() {
+        [digit @ b'1'..=b'8', next, ..] if !next.is_ascii_digit() => Some(u64::from(digit - b'0')),
+        _ => None,
+    }
+}
+
+/// Returns the bytes of a text with a name, their number, and two hexadecimal digits for each of them.
+fn raw_profile(text: &[u8]) -> Option<Vec<u8>> {
+    let mut words = text
+        .split(u8::is_ascii_whitespace)
+        .filter(|word| !word.is_empty());
+    let _name = words.next()?;
+    let len: usize = std::str::from_utf8(words.next()?).ok()?.parse().ok()?;
+    let digits: Option<Vec<u32>> = words
+        .flatten()
+        .map(|byte| char::from(*byte).to_digit(16))
+        .collect();
+    let digits = digits?;
+    let pairs = digits.as_chunks::<2>().0.iter().take(len);
+    Some(pairs.map(|[high, low]| (high << 4 | low) as u8).collect())
 }
 
 /// Returns the orientation with a number from a tag. A number that is not in 1..=8 counts as upright.
@@ -79,8 +154,42 @@ mod tests {
     use image::DynamicImage;
     use image::metadata::Orientation;
 
-    use super::{of_exif, of_png, of_tag, upright};
+    use std::io::Write as _;
+
+    use super::{RAW_PROFILES, StatedOrientation, XMP_KEYWORD, XMP_PREFIX, of_tag, upright};
     use crate::raster::Grid;
+
+    /// Returns the chunk of a PNG, whose checksum nobody compares here.
+    fn chunk(kind: &[u8], content: &[u8]) -> Vec<u8> {
+        let len = (content.len() as u32).to_be_bytes();
+        [&len[..], kind, content, &[0; 4]].concat()
+    }
+
+    fn of_chunks(chunks: &[Vec<u8>]) -> Orientation {
+        let png = [b"\x89PNG\r\n\x1a\n".to_vec(), chunks.concat()].concat();
+        StatedOrientation::of_png(&png).orientation()
+    }
+
+    fn of_segments(segments: &[&[u8]]) -> Orientation {
+        let mut stated = StatedOrientation::default();
+        for segment in segments {
+            stated.add_segment(segment);
+        }
+        stated.orientation()
+    }
+
+    fn compressed(text: &[u8]) -> Vec<u8> {
+        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        encoder.write_all(text).expect("encodes");
+        encoder.finish().expect("encodes")
+    }
+
+    /// Returns the text of a segment as ImageMagick writes it.
+    fn raw_text(segment: &[u8]) -> Vec<u8> {
+        let digits: Vec<String> = segment.iter().map(|byte| format!("{byte:02x}")).collect();
+        let lines: Vec<String> = digits.chunks(36).map(<[String]>::concat).collect();
+        format!("\nexif\n{:8}\n{}\n", segment.len(), lines.join("\n")).into_bytes()
+    }
 
     #[test]
     fn every_orientation_is_applied_as_by_the_image_crate() {
@@ -132,15 +241,10 @@ mod tests {
             for is_big_endian in [false, true] {
                 let block = exif(is_big_endian, kind, len, 6);
                 let prefixed = [b"Exif\0\0", &block[..]].concat();
-                let png = |block: &[u8]| {
-                    let len = (block.len() as u32).to_be_bytes();
-                    [b"\x89PNG\r\n\x1a\n", &len[..], b"eXIf", block, &[0; 4]].concat()
-                };
                 for found in [
-                    of_exif(Some(&block)),
-                    of_exif(Some(&prefixed)),
-                    of_png(&png(&block)),
-                    of_png(&png(&prefixed)),
+                    of_segments(&[&prefixed]),
+                    of_chunks(&[chunk(b"eXIf", &block)]),
+                    of_chunks(&[chunk(b"eXIf", &prefixed)]),
                 ] {
                     assert_eq!(found, Orientation::Rotate90, "type {kind}");
                 }
@@ -152,8 +256,68 @@ mod tests {
             b"",
             b"II",
         ] {
-            assert_eq!(of_exif(Some(unreadable)), Orientation::NoTransforms);
+            let found = of_chunks(&[chunk(b"eXIf", unreadable)]);
+            assert_eq!(found, Orientation::NoTransforms);
         }
+    }
+
+    #[test]
+    fn the_first_segment_that_states_an_orientation_counts() {
+        let prefixed = |number| [b"Exif\0\0", &exif(false, 3, 2, number)[..]].concat();
+        let without = [b"Exif\0\0", &exif(false, 11, 4, 6)[..]].concat();
+        let xmp = |text: &str| [XMP_PREFIX, text.as_bytes()].concat();
+        let attribute = xmp("<rdf:Description tiff:Orientation=\"8\"/>");
+        let [three, six, nine] = [3, 6, 9].map(prefixed);
+        let pairs: [[&[u8]; 2]; 5] = [
+            [b"Exif\0\0", &six],
+            [&without, &six],
+            [&six, &three],
+            [&nine, &six],
+            [&attribute, &six],
+        ];
+        for segments in pairs {
+            assert_eq!(of_segments(&segments), Orientation::Rotate90);
+        }
+        for text in [
+            "<rdf:Description tiff:Orientation=\"6\"/>",
+            "<rdf:Description tiff:Orientation = '6'>",
+            "<tiff:Orientation>6</tiff:Orientation>",
+        ] {
+            let segment = xmp(text);
+            let found = of_segments(&[&without, &segment]);
+            assert_eq!(found, Orientation::Rotate90, "{text}");
+        }
+        for text in ["<tiff:Orientation>16</tiff:Orientation>", "<x>6</x>"] {
+            assert_eq!(of_segments(&[&xmp(text)]), Orientation::NoTransforms);
+        }
+    }
+
+    #[test]
+    fn an_orientation_in_a_text_of_a_png_counts_after_that_of_exif() {
+        let segment = [b"Exif\0\0", &exif(true, 3, 2, 6)[..]].concat();
+        let raw = raw_text(&segment);
+        let packet = b"<rdf:Description tiff:Orientation=\"6\"/>";
+        let plain = [RAW_PROFILES[0], b"\0", &raw].concat();
+        let packed = [RAW_PROFILES[1], b"\0\0", &compressed(&raw)].concat();
+        let xmp = [XMP_KEYWORD, b"\0\0\0\0\0", &packet[..]].concat();
+        let packed_xmp = [XMP_KEYWORD, b"\0\x01\0en\0\0", &compressed(packet)].concat();
+        let texts = [
+            chunk(b"tEXt", &plain),
+            chunk(b"zTXt", &packed),
+            chunk(b"iTXt", &xmp),
+            chunk(b"iTXt", &packed_xmp),
+        ];
+        let stated = |number| chunk(b"eXIf", &exif(false, 3, 2, number));
+        for text in texts {
+            let other = chunk(b"tEXt", b"Title\0tiff:Orientation=\"3\"");
+            let found = of_chunks(&[other, text.clone()]);
+            assert_eq!(found, Orientation::Rotate90);
+            assert_eq!(of_chunks(&[stated(0), text.clone()]), found);
+            assert_eq!(of_chunks(&[text, stated(3)]), Orientation::Rotate180);
+        }
+        let damaged = [RAW_PROFILES[0], b"\0\nexif\n 9\n45xx"].concat();
+        let found = of_chunks(&[chunk(b"tEXt", &damaged)]);
+        assert_eq!(found, Orientation::NoTransforms);
     }
 
     #[test]

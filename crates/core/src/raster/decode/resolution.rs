@@ -4,6 +4,8 @@ use std::io::{BufRead, Read as _, Seek};
 
 use image::metadata::Orientation;
 
+use super::orientation::StatedOrientation;
+use super::png_chunks::png_chunk;
 use super::tags::{TagFileWindow, TagSource, TagValues, TaggedFile};
 use super::{jpeg, orientation, tiff};
 use crate::domain::FileKind;
@@ -26,14 +28,16 @@ type StoredDpi = (Option<[f64; 2]>, Orientation);
 pub fn stated_dpi(bytes: &[u8]) -> Option<[f64; 2]> {
     upright_dpi(match FileKind::of(bytes) {
         FileKind::Png => {
-            let physical = orientation::png_chunk(bytes, *b"pHYs").and_then(of_phys);
-            let exif = || of_exif(orientation::png_chunk(bytes, *b"eXIf")?);
-            (physical.or_else(exif), orientation::of_png(bytes))
+            let physical = png_chunk(bytes, *b"pHYs").and_then(of_phys);
+            let exif = || of_exif(png_chunk(bytes, *b"eXIf")?);
+            let turned = StatedOrientation::of_png(bytes);
+            (physical.or_else(exif), turned.orientation())
         }
         FileKind::Jpeg => {
-            let [jfif, exif] = jpeg::metadata(bytes);
-            let stored = jfif.and_then(of_jfif).or_else(|| of_exif(exif?));
-            (stored, orientation::of_exif(exif))
+            let found = jpeg::metadata(bytes);
+            let exif = || found.exif.iter().find_map(|block| of_exif(block));
+            let stored = found.jfif.and_then(of_jfif).or_else(exif);
+            (stored, found.orientation.orientation())
         }
         FileKind::Tiff => of_tiff(&bytes)?,
         _ => return None,

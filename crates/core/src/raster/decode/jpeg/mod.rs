@@ -7,9 +7,12 @@ mod segments;
 #[cfg(test)]
 mod tests;
 
+use image::metadata::Orientation;
+
 use super::colour_profile::FileProfile;
 use super::error::{DecodeError, broken};
 use super::limits::ImageLimits;
+use super::orientation::StatedOrientation;
 use super::print_image::widened;
 use crate::domain::FileKind;
 use crate::domain::cancel::run_aside;
@@ -18,10 +21,20 @@ use interleaved::{JpegColours, JpegSamples, interleaved};
 use segments::{JpegFrame, JpegSegments};
 
 /// A decoded JPEG, as stored.
-pub(super) struct JpegImage<'b> {
+pub(super) struct JpegImage {
     pub(super) rgb: Grid<[u16; 3]>,
-    pub(super) exif: Option<&'b [u8]>,
+    pub(super) orientation: Orientation,
     pub(super) profile: Option<FileProfile>,
+}
+
+/// What the segments of a JPEG say about its image.
+#[derive(Default)]
+pub(super) struct JpegMetadata<'b> {
+    /// The JFIF header behind its name.
+    pub(super) jfif: Option<&'b [u8]>,
+    /// The EXIF blocks.
+    pub(super) exif: Vec<&'b [u8]>,
+    pub(super) orientation: StatedOrientation,
 }
 
 const CMYK_COMPONENTS: usize = 4;
@@ -30,17 +43,14 @@ const CMYK_COMPONENTS: usize = 4;
 ///
 /// # Errors
 /// Returns an error if the image is too large, truncated, damaged, or coded in a way that is not read.
-pub(super) fn decode<'b>(
-    bytes: &'b [u8],
-    limits: &ImageLimits,
-) -> Result<JpegImage<'b>, DecodeError> {
+pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<JpegImage, DecodeError> {
     let segments = JpegSegments::read(bytes)?;
     let frame = frame_of(&segments)?;
     limits.check_size(frame.width as u32, frame.height as u32)?;
     let image = samples(bytes, &segments, JpegColours::Usual)?;
     Ok(JpegImage {
         rgb: widened(image.width, image.height, image.channels, &image.samples),
-        exif: segments.exif,
+        orientation: segments.orientation.orientation(),
         profile: segments.profile().map(|bytes| FileProfile {
             bytes,
             is_of_inks: frame.components.len() >= CMYK_COMPONENTS,
@@ -48,10 +58,17 @@ pub(super) fn decode<'b>(
     })
 }
 
-/// Returns the JFIF header behind its name, and the EXIF block, if the file has them.
-pub(super) fn metadata(bytes: &[u8]) -> [Option<&[u8]>; 2] {
+/// Returns what the segments say about the image; nothing if they cannot be read.
+pub(super) fn metadata(bytes: &[u8]) -> JpegMetadata<'_> {
     let segments = JpegSegments::read(bytes);
-    segments.map_or([None; 2], |found| [found.jfif, found.exif])
+    segments.map_or_else(
+        |_| JpegMetadata::default(),
+        |found| JpegMetadata {
+            jfif: found.jfif,
+            exif: found.exif,
+            orientation: found.orientation,
+        },
+    )
 }
 
 /// Decodes a part of a TIFF image. Luma and chroma samples are not converted.

@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::domain::FileKind;
 use crate::domain::cancel::{PollCounter, poll};
 use crate::raster::decode::error::{DecodeError, broken};
+use crate::raster::decode::orientation::StatedOrientation;
 
 /// A colour component of the frame.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +45,9 @@ pub(super) struct JpegSegments<'b> {
     pub(super) tables: Vec<Range<usize>>,
     /// The JFIF header behind its name.
     pub(super) jfif: Option<&'b [u8]>,
-    pub(super) exif: Option<&'b [u8]>,
+    /// The EXIF blocks.
+    pub(super) exif: Vec<&'b [u8]>,
+    pub(super) orientation: StatedOrientation,
     /// Numbers and bytes of the parts of the ICC profile.
     profile: Vec<(u8, &'b [u8])>,
     /// The colour transform that Adobe programs store.
@@ -54,7 +57,7 @@ pub(super) struct JpegSegments<'b> {
 }
 
 const START_OF_SCAN: u8 = 0xda;
-/// Most segments of tables, scans and parts of a profile.
+/// Most segments of tables, scans, EXIF and parts of a profile.
 const MAX_SEGMENTS: usize = 10_000;
 
 fn number(bytes: &[u8], at: usize) -> Option<usize> {
@@ -105,7 +108,13 @@ impl<'b> JpegSegments<'b> {
     }
 
     fn add(&mut self, marker: u8, range: Range<usize>, bytes: &'b [u8]) -> Result<(), DecodeError> {
-        if self.tables.len() + self.scans.len() + self.profile.len() >= MAX_SEGMENTS {
+        let kept = [
+            self.tables.len(),
+            self.scans.len(),
+            self.profile.len(),
+            self.exif.len(),
+        ];
+        if kept.iter().sum::<usize>() >= MAX_SEGMENTS {
             let reason = format!("it has more than {MAX_SEGMENTS} segments");
             return Err(broken(FileKind::Jpeg, &reason));
         }
@@ -123,7 +132,10 @@ impl<'b> JpegSegments<'b> {
                 self.scans.extend(scan);
             }
             0xe0 if self.jfif.is_none() => self.jfif = body.strip_prefix(b"JFIF\0"),
-            0xe1 if self.exif.is_none() => self.exif = body.strip_prefix(b"Exif\0\0"),
+            0xe1 => {
+                self.exif.extend(body.strip_prefix(b"Exif\0\0"));
+                self.orientation.add_segment(body);
+            }
             0xe2 => {
                 let part = body.strip_prefix(b"ICC_PROFILE\0");
                 if let Some(&[number, _, ref part @ ..]) = part {
