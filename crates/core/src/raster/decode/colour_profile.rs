@@ -2,6 +2,7 @@
 
 use moxcms::{ColorProfile, DataColorSpace, Layout, ProfileText, ToneReprCurve, TransformOptions};
 
+use super::light_curve::srgb_level;
 use crate::domain::cancel::poll;
 use crate::domain::sanitize;
 use crate::raster::Grid;
@@ -102,12 +103,7 @@ fn is_nearly_srgb(profile: &ColorProfile, layout: Layout) -> bool {
 
 /// Returns whether a light has nearly a level in sRGB.
 fn is_level(light: f64, level: f32) -> bool {
-    let light = light.clamp(0.0, 1.0);
-    let found = if light <= 0.003_130_8 {
-        12.92 * light
-    } else {
-        1.055 * light.powf(1.0 / 2.4) - 0.055
-    };
+    let found = srgb_level(light);
     (found - f64::from(level)).abs() <= TOLERANCE
 }
 

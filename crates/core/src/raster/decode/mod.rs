@@ -4,6 +4,7 @@ mod colour_profile;
 mod error;
 mod header_size;
 mod jpeg;
+mod light_curve;
 mod limits;
 mod orientation;
 mod png_chunks;
@@ -22,6 +23,7 @@ use crate::domain::cancel::PolledReader;
 
 use colour_profile::FileProfile;
 use error::broken;
+use light_curve::LightCurve;
 use orientation::StatedOrientation;
 use png_chunks::png_chunk;
 use print_image::{colours_on_white, widen_narrow};
@@ -52,11 +54,11 @@ pub use samples::{PrintSamples, SampleSlice};
 /// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
 pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
     limits.check_bytes(bytes.len() as u64)?;
-    let (rgb, orientation, profile) = match FileKind::of(bytes) {
+    let (rgb, orientation, profile, curve) = match FileKind::of(bytes) {
         FileKind::Tiff => {
             let image = tiff::decode(bytes, limits)?;
             let orientation = orientation::of_tag(image.orientation);
-            (image.rgb, orientation, image.profile)
+            (image.rgb, orientation, image.profile, image.light_curve)
         }
         FileKind::Png => {
             let (pixels, profile) = decode_png(bytes, limits)?;
@@ -69,11 +71,12 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
                 widen_narrow(&mut rgb, false);
             }
             let stated = StatedOrientation::of_png(bytes);
-            (rgb, stated.orientation(), profile)
+            let curve = LightCurve::of_png(bytes);
+            (rgb, stated.orientation(), profile, curve)
         }
         FileKind::Jpeg => {
             let image = jpeg::decode(bytes, limits)?;
-            (image.rgb, image.orientation, image.profile)
+            (image.rgb, image.orientation, image.profile, None)
         }
         other => return Err(DecodeError::NotAnImage(other)),
     };
@@ -82,9 +85,12 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
         turned: Some(orientation.to_exif()).filter(|number| *number != 1),
         ignored_profile: None,
     };
-    if let Some(profile) = profile {
-        image.ignored_profile = profile.apply(&mut image.rgb).err();
-    }
+    let applied = match (profile, curve) {
+        (Some(profile), _) => profile.apply(&mut image.rgb),
+        (None, Some(curve)) => curve.apply(&mut image.rgb),
+        (None, None) => Ok(()),
+    };
+    image.ignored_profile = applied.err();
     Ok(image)
 }
 

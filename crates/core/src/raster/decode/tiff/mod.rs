@@ -14,9 +14,10 @@ mod tests;
 
 use super::colour_profile::FileProfile;
 use super::error::{DecodeError, broken};
+use super::light_curve::LightCurve;
 use super::limits::ImageLimits;
 use super::print_image::{on_white, widen, widen_narrow};
-use super::tags::TagSource;
+use super::tags::{TagSource, TagValues};
 use crate::domain::FileKind;
 use crate::domain::cancel::poll;
 use crate::raster::Grid;
@@ -27,6 +28,7 @@ use photometric::{Photometric, YCbCrCode};
 
 pub(super) const ORIENTATION: u64 = 274;
 const ICC_PROFILE: u64 = 34675;
+const TRANSFER_FUNCTION: u64 = 301;
 
 /// The print of a TIFF file, as stored.
 pub(super) struct TiffImage {
@@ -34,6 +36,7 @@ pub(super) struct TiffImage {
     /// EXIF orientation, if the page has one.
     pub(super) orientation: Option<u64>,
     pub(super) profile: Option<FileProfile>,
+    pub(super) light_curve: Option<LightCurve>,
 }
 
 /// Decodes the print of a TIFF file.
@@ -61,7 +64,33 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, De
             bytes: bytes.to_vec(),
             is_of_inks,
         }),
+        light_curve: print
+            .inherited_values(TRANSFER_FUNCTION)
+            .map(|lights| light_curve(&layout, lights)),
     })
+}
+
+/// Returns the curve of a transfer function, which has a light for each number of a sample, or for each of three colours.
+fn light_curve(layout: &TiffLayout<'_>, lights: TagValues<'_>) -> LightCurve {
+    let is_of_light = matches!(
+        layout.photometric,
+        Photometric::BlackIsZero | Photometric::Rgb
+    );
+    let count = 1 << layout.used_bits.min(16);
+    let is_whole = [count, 3 * count].contains(&lights.len());
+    let is_read = is_of_light && is_whole && layout.used_bits <= 16 && count > 1;
+    let levels: Option<Vec<u16>> = is_read
+        .then(|| {
+            lights
+                .iter()
+                .map(|light| u16::try_from(light?).ok())
+                .collect()
+        })
+        .flatten();
+    levels.map_or_else(
+        || LightCurve::Unread("TIFF transfer function".to_owned()),
+        |levels| LightCurve::Tables(levels.chunks(count).map(<[u16]>::to_vec).collect()),
+    )
 }
 
 /// Reads tags of the print of a TIFF file. Returns `None` if its tags cannot be read.

@@ -209,3 +209,29 @@ fn a_colour_profile_of_inks_is_named() {
     );
     assert_eq!(read.rgb.data(), [[65535, 0, 52428], [13107; 3]]);
 }
+
+#[test]
+fn a_transfer_function_is_applied_or_named() {
+    let read = |photometric: u16, lights: Vec<u16>| {
+        let page = TestPage::new([3, 1], photometric, 8, 1)
+            .with(301, TestValues::Shorts(lights))
+            .strips(1, vec![vec![0, 100, 255]]);
+        let file = TestTiff::default().encode(&[page]);
+        decode(&file, &ImageLimits::SUGGESTED).expect("reads")
+    };
+    let linear: Vec<u16> = (0..256).map(|level| level * 257).collect();
+    let found = read(BLACK_IS_ZERO, linear.clone());
+    // The level of sRGB of the light 100 / 255.
+    let level = (1.055 * (100.0_f64 / 255.0).powf(1.0 / 2.4) - 0.055) * 65535.0;
+    assert_eq!(
+        found.rgb.data(),
+        [[0; 3], [level.round() as u16; 3], [65535; 3]]
+    );
+    assert_eq!(found.ignored_profile, None);
+    for (photometric, lights, level) in [(0, linear, 155), (BLACK_IS_ZERO, vec![0; 7], 100)] {
+        let found = read(photometric, lights);
+        let named = found.ignored_profile.as_deref();
+        assert_eq!(named, Some("TIFF transfer function"));
+        assert_eq!(found.rgb.at(1, 0), [level * 257; 3]);
+    }
+}
