@@ -95,10 +95,14 @@ fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
     None
 }
 
-/// Returns whether a file is an ASCII STL. The header of a binary STL may begin with `solid`, too, and a name in text may
-/// have NUL.
+/// Returns whether a file is an ASCII STL, which may begin with comments. The header of a binary STL may begin with `solid`,
+/// too, and a name in text may have NUL.
 fn is_ascii_stl(bytes: &[u8]) -> bool {
-    let head = bytes[..bytes.len().min(4096)].trim_ascii_start();
+    let mut head = bytes[..bytes.len().min(4096)].trim_ascii_start();
+    while !head.is_empty() && xyz::is_comment(head) {
+        let end = memchr::memchr2(b'\n', b'\r', head);
+        head = head[end.unwrap_or(head.len())..].trim_ascii_start();
+    }
     let has = |word: &[u8]| {
         head.windows(word.len())
             .any(|at| at.eq_ignore_ascii_case(word))

@@ -71,7 +71,8 @@ pub(crate) fn truncated(have: u64, count: u32) -> MeshError {
     }
 }
 
-/// Reads a binary STL. Ignores normals, attributes, and trailing bytes that are too few for a triangle.
+/// Reads a binary STL. Ignores normals, attributes, text after the last triangle, and other trailing bytes that are too few
+/// for a triangle.
 pub(crate) fn read_binary(
     bytes: &[u8],
     limits: &MeshLimits,
@@ -97,12 +98,19 @@ pub(crate) fn read_binary(
         for facet in with_attributes {
             facets.push(&[*facet]);
         }
-    } else if have == u64::from(count) && !is_each {
-        facets.push(rows);
+    } else if (have == u64::from(count) && !is_each) || is_text_after(rest, count) {
+        facets.push(&rows[..count as usize]);
     } else {
         return Err(uncounted(rest, count));
     }
     facets.into_mesh()
+}
+
+/// Returns whether the bytes after the facets are text. The floats of a facet never are.
+fn is_text_after(body: &[u8], count: u32) -> bool {
+    let is_text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
+    let after = body.get(FACET * count as usize..).unwrap_or_default();
+    count > 0 && !after.is_empty() && polled(after).all(is_text)
 }
 
 /// Returns the facets of a body in which the last two bytes of each are the length of attributes after it. Returns `None`
@@ -121,17 +129,44 @@ fn facets_with_attributes(mut rest: &[u8], count: u32) -> Option<Vec<&[u8; FACET
 /// Returns the error of a body with more bytes than `count` facets have.
 fn uncounted(body: &[u8], count: u32) -> MeshError {
     let (bytes, want) = (body.len() as u64, u64::from(count));
-    if want > 0 && bytes.is_multiple_of(want) && !bytes.is_multiple_of(want * FACET as u64) {
-        return MeshError::FacetBytes {
-            bytes: bytes / want,
+    let facet = FACET as u64;
+    let each = bytes.div_ceil(want.max(1));
+    let is_longer = want > 0 && each > facet && !bytes.is_multiple_of(want * facet);
+    let is_exact = each * want == bytes;
+    let has_facets = have_positions(body, FACET);
+    let has_longer = is_longer && have_positions(body, each as usize);
+    if has_longer && (!has_facets || (is_exact && !bytes.is_multiple_of(facet))) {
+        return if is_exact {
+            MeshError::FacetBytes { bytes: each }
+        } else {
+            // The last facet is cut off.
+            truncated(bytes / each, count)
         };
     }
-    MeshError::Uncounted {
-        format: FORMAT,
-        what: "triangles",
-        have: bytes / FACET as u64,
-        want,
+    if has_facets && bytes.is_multiple_of(facet) {
+        return MeshError::Uncounted {
+            format: FORMAT,
+            what: "triangles",
+            have: bytes / facet,
+            want,
+        };
     }
+    MeshError::BytesAfterRows {
+        format: FORMAT,
+        bytes: bytes - facet * want,
+    }
+}
+
+/// Facets that are compared with what a body holds if all have one length.
+const COMPARED_FACETS: usize = 1000;
+
+/// Returns whether the first facets of a body have positions, if each takes `each` bytes. Read from a wrong place, almost all
+/// floats are extremely large or small.
+fn have_positions(body: &[u8], each: usize) -> bool {
+    let is_likely = |value: f32| value == 0.0 || (1e-20..1e20).contains(&value.abs());
+    let facets = body.chunks_exact(each).take(COMPARED_FACETS);
+    let mut facets = facets.filter_map(|bytes| bytes.first_chunk());
+    facets.all(|facet| corners(facet).into_iter().flatten().all(is_likely))
 }
 
 /// Vertices of the facets read so far.

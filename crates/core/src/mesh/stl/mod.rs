@@ -69,6 +69,70 @@ mod tests {
         }
     }
 
+    /// Returns a binary STL whose facets have no simple numbers, with bytes after each.
+    fn odd_facets(count: u32, after_each: &[u8]) -> Vec<u8> {
+        let mut bytes = vec![b' '; 80];
+        bytes.extend(count.to_le_bytes());
+        for facet in 0..count {
+            for value in 0..12 {
+                let value = (facet * 12 + value) as f32;
+                bytes.extend((value * 0.37 + 1.01).sin().to_le_bytes());
+            }
+            bytes.extend([0; 2]);
+            bytes.extend(after_each);
+        }
+        bytes
+    }
+
+    #[test]
+    fn text_after_the_last_triangle_is_ignored_and_other_bytes_are_named() {
+        let usual = open(&odd_facets(20, &[])).expect("reads");
+        let text = b"made by a scanner\n".repeat(12);
+        for len in [1, 7, 20, 49, 50, 100, 200, 216] {
+            let bytes = [&odd_facets(20, &[])[..], &text[..len]].concat();
+            assert_eq!(open(&bytes).as_ref(), Ok(&usual), "{len}");
+            let bytes = [&odd_facets(20, &[])[..], &vec![0xff; len]].concat();
+            match open(&bytes) {
+                Ok(mesh) => assert!(len < 50 && mesh == usual, "{len}"),
+                Err(error) => assert_eq!(
+                    error.to_string(),
+                    format!(
+                        "the binary STL has {len} bytes after the rows that its header counts; save it again with the right counts"
+                    )
+                ),
+            }
+        }
+        let mut more = odd_facets(24, &[]);
+        more[80] = 20;
+        assert_eq!(
+            open(&more).expect_err("uncounted").to_string(),
+            "the binary STL holds 24 triangles, but its header says 20; save it again with the right count"
+        );
+    }
+
+    #[test]
+    fn long_triangles_that_are_cut_off_are_truncated() {
+        let bytes = odd_facets(20, &[7; 4]);
+        let said = |bytes: &[u8]| open(bytes).expect_err("refused").to_string();
+        assert_eq!(
+            said(&bytes),
+            "the binary STL has 54 bytes a triangle instead of 50; save it again without attributes, or as PLY"
+        );
+        assert_eq!(
+            said(&bytes[..bytes.len() - 1]),
+            "the binary STL is truncated: it holds 19 of 20 triangles"
+        );
+    }
+
+    #[test]
+    fn comments_may_precede_an_ascii_solid() {
+        let usual = open(ASCII.as_bytes()).expect("reads");
+        for comment in ["# made by a scanner\n", "// a\r\n% b\r\n", "\n#\n\n"] {
+            let text = format!("{comment}{ASCII}");
+            assert_eq!(open(text.as_bytes()).as_ref(), Ok(&usual), "{comment:?}");
+        }
+    }
+
     /// A file may contain several solids, so the parser reads on after the last solid and finds an unknown word.
     #[test]
     fn ascii_text_after_the_last_solid_is_refused_by_its_line() {

@@ -31,9 +31,7 @@ impl LightCurve {
                 (1 | 2, 4) if full_range == 1 => Some(Self::Gamma(USUAL_GAMMA)),
                 (1 | 2, 5) if full_range == 1 => Some(Self::Gamma(1.0 / 2.8)),
                 (1 | 2, 8) if full_range == 1 => Some(Self::Gamma(1.0)),
-                _ => Some(Self::Unread(format!(
-                    "cICP with primaries {primaries} and transfer {transfer}"
-                ))),
+                _ => Some(Self::Unread(format!("cICP {primaries}/{transfer}"))),
             };
         }
         if png_chunk(bytes, *b"sRGB").is_some() {
@@ -177,9 +175,9 @@ mod tests {
         let found = read(&[(b"cICP", &[1, 8, 0, 1][..])]);
         assert_eq!(found.rgb.data(), with_power(1.0));
         for (points, name) in [
-            ([9, 16, 0, 1], "cICP with primaries 9 and transfer 16"),
-            ([12, 13, 0, 1], "cICP with primaries 12 and transfer 13"),
-            ([1, 13, 0, 0], "cICP with primaries 1 and transfer 13"),
+            ([9, 16, 0, 1], "cICP 9/16"),
+            ([12, 13, 0, 1], "cICP 12/13"),
+            ([1, 13, 0, 0], "cICP 1/13"),
         ] {
             let found = read(&[(b"cICP", &points[..])]);
             assert_eq!(found.ignored_profile.as_deref(), Some(name));
