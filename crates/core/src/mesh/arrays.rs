@@ -1,6 +1,6 @@
 //! Meshes from arrays in memory, and back.
 
-use super::missing::{CoordinateValue, are_finite};
+use super::missing::{CoordinateValue, are_positions};
 use super::{Mesh, Vertices};
 use crate::domain::cancel::{PollCounter, poll};
 use crate::page_vec::PageVec;
@@ -126,7 +126,7 @@ fn exact_singles(all: &[[f64; 3]]) -> Option<PageVec<[f32; 3]>> {
 fn check_finite<T: CoordinateValue>(positions: &[[T; 3]]) -> Result<(), MeshArrayError> {
     for (block, part) in positions.chunks(1 << 10).enumerate() {
         poll();
-        if are_finite(part) {
+        if are_positions(part) {
             continue;
         }
         let mut values = part.as_flattened().iter().map(|value| (*value).into());

@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use super::error::{MeshLimits, MeshReadError};
 use super::format::DetectedFormat;
-use super::missing::is_finite;
+use super::missing::is_position;
 use super::ply::VertexRows;
 use super::robust_bounds::Bounds;
 use super::stated_unit::stated_unit;
@@ -281,7 +281,7 @@ struct GrowingBox(Option<Bounds<3>>);
 
 impl GrowingBox {
     fn add(&mut self, position: [f64; 3]) {
-        if !is_finite(position) {
+        if !is_position(position) {
             return;
         }
         let [low, high] = self.0.get_or_insert([position; 2]);

@@ -1,11 +1,15 @@
 //! What is left out of a mesh: vertices without a position, and faces without three corners.
 //!
-//! Scanners and converters write NaN for a point that they did not measure, and 0 0 0 in organized clouds.
+//! Scanners and converters write NaN for a point that they did not measure, 0 0 0 in organized clouds, and others a number
+//! that no scan has, such as 1e30 or the largest float.
 
 use super::error::MeshError;
 use super::{Mesh, Vertices};
 use crate::domain::MeshLosses;
 use crate::domain::cancel::polled;
+
+/// Absolute values from this on stand for a missing coordinate. No scan is so large in any unit: 1 m has 1e9 nanometres.
+const MISSING_FROM: f64 = 1e15;
 
 /// A mesh as read.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +23,7 @@ pub struct MeshRead {
 /// Notices vertices that may have no position, while a file is read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PositionCheck {
-    is_finite: bool,
+    are_all_positions: bool,
     /// Number of vertices at the origin.
     origins: u64,
 }
@@ -27,7 +31,7 @@ pub(super) struct PositionCheck {
 impl PositionCheck {
     /// Checks no vertex yet.
     pub(super) const NONE: Self = Self {
-        is_finite: true,
+        are_all_positions: true,
         origins: 0,
     };
 
@@ -43,7 +47,7 @@ impl PositionCheck {
 
     /// Checks some more vertices that faces use.
     pub(super) fn add_used<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
-        self.is_finite &= are_finite(positions);
+        self.are_all_positions &= are_positions(positions);
     }
 
     /// Checks some more vertices.
@@ -51,7 +55,7 @@ impl PositionCheck {
     pub(super) fn add<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
         let values = positions.as_flattened().iter();
         if !values.fold(true, |usual, value| usual & value.is_usual()) {
-            self.is_finite &= are_finite(positions);
+            self.are_all_positions &= are_positions(positions);
             self.origins += origins(positions);
         }
     }
@@ -71,7 +75,7 @@ impl PositionCheck {
             missing_vertices,
             incomplete_faces,
         };
-        if self.is_finite && (self.origins < 2 || !has_unused_origin(&mesh)) {
+        if self.are_all_positions && (self.origins < 2 || !has_unused_origin(&mesh)) {
             let losses = losses(0);
             return Ok(MeshRead { mesh, losses });
         }
@@ -79,13 +83,13 @@ impl PositionCheck {
             vertices,
             mut triangles,
         } = mesh;
-        let finite: Vec<bool> = polled(vertices.iter()).map(is_finite).collect();
-        let mut uses = vec![Use::None; finite.len()];
+        let is_kept_vertex: Vec<bool> = polled(vertices.iter()).map(is_position).collect();
+        let mut uses = vec![Use::None; is_kept_vertex.len()];
         let is_points = triangles.is_empty();
         triangles = polled(triangles.iter().copied())
             .filter(|corners| {
                 let corners = corners.map(|corner| corner as usize);
-                let is_kept = corners.iter().all(|corner| finite[*corner]);
+                let is_kept = corners.iter().all(|corner| is_kept_vertex[*corner]);
                 for corner in corners {
                     uses[corner] = uses[corner].max(if is_kept { Use::Kept } else { Use::Removed });
                 }
@@ -96,17 +100,17 @@ impl PositionCheck {
         for (index, vertex) in (0..).zip(polled(vertices.iter())) {
             let used = uses[index as usize];
             let is_unused_origin = used == Use::None && self.origins > 1 && is_origin(vertex);
-            if !finite[index as usize] || is_unused_origin {
+            if !is_kept_vertex[index as usize] || is_unused_origin {
                 missing += 1;
             } else if used != Use::Removed {
                 kept.push(index);
             }
         }
         if kept.is_empty() || (triangles.is_empty() && !is_points) {
-            let vertices = finite.len() as u64;
+            let vertices = is_kept_vertex.len() as u64;
             return Err(MeshError::NothingLeft { missing, vertices });
         }
-        let mut new_index = vec![0; finite.len()];
+        let mut new_index = vec![0; is_kept_vertex.len()];
         for (new, old) in (0..).zip(polled(&kept)) {
             new_index[*old as usize] = new;
         }
@@ -125,29 +129,31 @@ impl PositionCheck {
 
 /// A coordinate of 32 or 64 bits, which is 0 by default.
 pub(super) trait CoordinateValue: Copy + Into<f64> + PartialEq + Default {
-    /// Returns whether a value is neither 0 nor NaN nor infinite.
+    /// Returns whether a value is a coordinate other than 0.
     fn is_usual(self) -> bool;
 }
 
 impl CoordinateValue for f32 {
     #[inline]
     fn is_usual(self) -> bool {
-        (self.abs() > 0.0) & (self.abs() < Self::INFINITY)
+        (self.abs() > 0.0) & (self.abs() < MISSING_FROM as Self)
     }
 }
 
 impl CoordinateValue for f64 {
     #[inline]
     fn is_usual(self) -> bool {
-        (self.abs() > 0.0) & (self.abs() < Self::INFINITY)
+        (self.abs() > 0.0) & (self.abs() < MISSING_FROM)
     }
 }
 
-/// Returns whether no coordinate is NaN or infinite.
+/// Returns whether no coordinate is missing.
 #[inline(never)] // As a loop of its own, it is vectorized.
-pub(super) fn are_finite<T: CoordinateValue>(positions: &[[T; 3]]) -> bool {
+pub(super) fn are_positions<T: CoordinateValue>(positions: &[[T; 3]]) -> bool {
     let values = positions.as_flattened().iter();
-    values.fold(true, |finite, value| finite & (*value).into().is_finite())
+    values.fold(true, |all, value| {
+        all & ((*value).into().abs() < MISSING_FROM)
+    })
 }
 
 /// Returns the number of positions at the origin.
@@ -160,7 +166,7 @@ fn origins<T: CoordinateValue>(positions: &[[T; 3]]) -> u64 {
 }
 
 /// Returns whether a value and the next one are 0, as at every origin.
-#[inline(never)] // Like `are_finite`.
+#[inline(never)] // Like `are_positions`.
 fn has_adjacent_zeros<T: CoordinateValue>(values: &[T]) -> bool {
     let zero = T::default();
     let pairs = values.iter().zip(values.iter().skip(1));
@@ -178,9 +184,9 @@ fn has_unused_origin(mesh: &Mesh) -> bool {
     polled(mesh.vertices.iter().zip(is_used)).any(|(vertex, is_used)| !is_used && is_origin(vertex))
 }
 
-/// Returns whether no coordinate is NaN or infinite.
-pub(super) fn is_finite(position: [f64; 3]) -> bool {
-    position.iter().all(|value| value.is_finite())
+/// Returns whether no coordinate is missing.
+pub(super) fn is_position(position: [f64; 3]) -> bool {
+    position.iter().all(|value| value.abs() < MISSING_FROM)
 }
 
 fn is_origin(position: [f64; 3]) -> bool {
@@ -200,7 +206,7 @@ enum Use {
 #[cfg(test)]
 mod tests {
     use super::PositionCheck;
-    use crate::mesh::{Mesh, MeshError};
+    use crate::mesh::{Mesh, MeshError, Vertices};
 
     const NAN: [f64; 3] = [1.0, f64::NAN, 0.0];
 
@@ -245,6 +251,25 @@ mod tests {
     }
 
     #[test]
+    fn numbers_that_no_scan_has_stand_for_missing_positions() {
+        for far in [
+            1e15,
+            -1e30,
+            f64::from(f32::MAX),
+            f64::MIN,
+            f64::NEG_INFINITY,
+        ] {
+            let points = vec![[1.0; 3], [2.0, far, 0.5], [3.0, 1e9, -1e14], [far; 3]];
+            let (mesh, missing) = without_missing(points, Vec::new()).expect("sound");
+            let kept = vec![[1.0; 3], [3.0, 1e9, -1e14]];
+            assert_eq!((mesh.vertices, missing), (kept.into(), 2), "{far}");
+        }
+        let singles = vec![[1.0_f32; 3], [f32::MAX, 0.0, 0.0]];
+        let check = PositionCheck::of(&Vertices::Single(singles.into()));
+        assert!(!check.are_all_positions);
+    }
+
+    #[test]
     fn a_mesh_of_which_nothing_is_left_is_refused() {
         let [all, faces] = [vec![], vec![[0, 1, 2]]].map(|triangles| {
             let vertices = vec![NAN, [1.0; 3], [2.0, 1.0, 0.0]];
@@ -254,7 +279,7 @@ mod tests {
         let refused = faces.expect_err("no face").to_string();
         assert_eq!(
             refused,
-            "1 of 3 vertices have no position (NaN, infinite or repeated 0 0 0), and without them nothing is left"
+            "1 of 3 vertices have no position (NaN, infinite, above 1e15 or repeated 0 0 0), and without them nothing is left"
         );
     }
 }

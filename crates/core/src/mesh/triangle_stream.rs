@@ -4,7 +4,7 @@ use std::io::Read;
 
 use super::error::{MeshError, MeshLimits, MeshReadError};
 use super::format::has_extension;
-use super::missing::is_finite;
+use super::missing::is_position;
 use super::stl;
 use super::triangle_mesh::Mesh;
 use crate::domain::FileKind;
@@ -105,7 +105,10 @@ pub fn pass_over_binary_stl(
         batch.clear();
         for facet in facets {
             let corners = stl::corners(facet).map(|corner| corner.map(f64::from));
-            let absent = corners.iter().filter(|corner| !is_finite(**corner)).count();
+            let absent = corners
+                .iter()
+                .filter(|corner| !is_position(**corner))
+                .count();
             missing += absent as u64;
             if absent == 0 {
                 batch.push(corners);
