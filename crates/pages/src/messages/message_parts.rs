@@ -69,6 +69,7 @@ const PARTS: &[(&str, &str)] = &[
         "hồ sơ ICC không đọc được",
     ),
     ("without a name", "không có tên"),
+    ("TIFF transfer function", "hàm truyền của TIFF"),
     ("id or print", "id hoặc print"),
     ("other metadata", "khác"),
     (

@@ -286,4 +286,36 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "run the command again with the new path",
         "hãy chạy lại với đường dẫn mới",
     ),
+    (
+        "it has {} columns between tabs, but others have {}",
+        "dòng này có {0} cột giữa các dấu tab, nhưng các dòng khác có {1}",
+    ),
+    (
+        "write one tab between columns",
+        "hãy viết một dấu tab giữa hai cột",
+    ),
+    (
+        "it has {} columns, but most lines have {}",
+        "dòng này có {0} cột, nhưng hầu hết các dòng có {1}",
+    ),
+    (
+        "write numbers such as \"1 234\" without blanks",
+        "hãy viết các số như \"1 234\" liền nhau, không có dấu cách",
+    ),
+    (
+        "its first two numbers may be a row and a column, or x and y",
+        "hai số đầu có thể là hàng và cột, hoặc x và y",
+    ),
+    (
+        "name the columns in a line before the points, such as `row col x y z`",
+        "hãy ghi tên các cột trên một dòng trước các điểm, chẳng hạn `row col x y z`",
+    ),
+    (
+        "no header of a PTX scan begins here",
+        "không có phần đầu của bản quét PTX ở dòng này",
+    ),
+    (
+        "the scan before it may have more points than its header says",
+        "bản quét trước đó có thể có nhiều điểm hơn phần đầu của nó ghi",
+    ),
 ];

@@ -103,6 +103,10 @@ fn refusals_that_are_put_together_are_translated() {
             "m.ply: dòng 6: chỉ có 2 trong 3 tọa độ; đây là dòng cuối nên tệp có vẻ bị cắt cụt",
         ),
         (
+            "m.xyz: line 6: it has 4 columns, but most lines have 3; write numbers such as \"1 234\" without blanks",
+            "m.xyz: dòng 6: dòng này có 4 cột, nhưng hầu hết các dòng có 3; hãy viết các số như \"1 234\" liền nhau, không có dấu cách",
+        ),
+        (
             "m.ply: the PLY header is wrong: the file ends before end_header",
             "m.ply: phần đầu tệp PLY sai: tệp hết trước end_header",
         ),
