@@ -8,8 +8,9 @@ use super::{Mesh, Vertices};
 use crate::domain::MeshLosses;
 use crate::domain::cancel::polled;
 
-/// Absolute values from this on stand for a missing coordinate. No scan is so large in any unit: 1 m has 1e9 nanometres.
-const MISSING_FROM: f64 = 1e15;
+/// Absolute values from this on, about 1e15, stand for a missing coordinate. No scan is so large in any unit: 1 m has 1e9
+/// nanometres. The number is a power of two, so that it is the same in single precision.
+const MISSING_FROM: f64 = (1_u64 << 50) as f64;
 
 /// A mesh as read.
 #[derive(Debug, Clone, PartialEq)]
@@ -131,12 +132,20 @@ impl PositionCheck {
 pub(super) trait CoordinateValue: Copy + Into<f64> + PartialEq + Default {
     /// Returns whether a value is a coordinate other than 0.
     fn is_usual(self) -> bool;
+
+    /// Returns whether a value does not stand for a missing coordinate.
+    fn is_coordinate(self) -> bool;
 }
 
 impl CoordinateValue for f32 {
     #[inline]
     fn is_usual(self) -> bool {
         (self.abs() > 0.0) & (self.abs() < MISSING_FROM as Self)
+    }
+
+    #[inline]
+    fn is_coordinate(self) -> bool {
+        self.abs() < MISSING_FROM as Self
     }
 }
 
@@ -145,15 +154,18 @@ impl CoordinateValue for f64 {
     fn is_usual(self) -> bool {
         (self.abs() > 0.0) & (self.abs() < MISSING_FROM)
     }
+
+    #[inline]
+    fn is_coordinate(self) -> bool {
+        self.abs() < MISSING_FROM
+    }
 }
 
 /// Returns whether no coordinate is missing.
 #[inline(never)] // As a loop of its own, it is vectorized.
 pub(super) fn are_positions<T: CoordinateValue>(positions: &[[T; 3]]) -> bool {
     let values = positions.as_flattened().iter();
-    values.fold(true, |all, value| {
-        all & ((*value).into().abs() < MISSING_FROM)
-    })
+    values.fold(true, |all, value| all & value.is_coordinate())
 }
 
 /// Returns the number of positions at the origin.
@@ -186,7 +198,7 @@ fn has_unused_origin(mesh: &Mesh) -> bool {
 
 /// Returns whether no coordinate is missing.
 pub(super) fn is_position(position: [f64; 3]) -> bool {
-    position.iter().all(|value| value.abs() < MISSING_FROM)
+    position.into_iter().all(CoordinateValue::is_coordinate)
 }
 
 fn is_origin(position: [f64; 3]) -> bool {
@@ -253,7 +265,7 @@ mod tests {
     #[test]
     fn numbers_that_no_scan_has_stand_for_missing_positions() {
         for far in [
-            1e15,
+            2e15,
             -1e30,
             f64::from(f32::MAX),
             f64::MIN,

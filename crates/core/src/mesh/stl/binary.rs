@@ -17,6 +17,8 @@ pub(crate) const FACET: usize = 50;
 /// Facets that are checked at a time, and read from a file at a time.
 const CHECKED_FACETS: usize = 128;
 const READ_FACETS: usize = 1280;
+/// Facets that show whether all facets of a body have some length.
+const COMPARED_FACETS: usize = 1000;
 /// Parts of [`CHECKED_FACETS`] between two polls for a cancellation.
 const PARTS_PER_POLL: usize = 128;
 
@@ -156,9 +158,6 @@ fn uncounted(body: &[u8], count: u32) -> MeshError {
         bytes: bytes - facet * want,
     }
 }
-
-/// Facets that are compared with what a body holds if all have one length.
-const COMPARED_FACETS: usize = 1000;
 
 /// Returns whether the first facets of a body have positions, if each takes `each` bytes. Read from a wrong place, almost all
 /// floats are extremely large or small.

@@ -44,10 +44,11 @@ fn cells(line: &[u8], separator: u8) -> Vec<Vec<u8>> {
         match *byte {
             b'"' => is_quoted = !is_quoted,
             byte if byte == separator && !is_quoted => cells.push(Vec::new()),
-            byte => cells
-                .last_mut()
-                .into_iter()
-                .for_each(|cell| cell.push(byte)),
+            byte => {
+                if let Some(cell) = cells.last_mut() {
+                    cell.push(byte);
+                }
+            }
         }
     }
     let trimmed = cells.into_iter().map(|cell| cell.trim_ascii().to_vec());
