@@ -13,7 +13,7 @@ use mocban_core::domain::PairName;
 use mocban_core::domain::spelling::{composed, fold_case, plain_form, quoted};
 
 /// Extensions of meshes.
-pub const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
+pub const MESH_EXTENSIONS: [&str; 6] = ["obj", "ply", "stl", "xyz", "pts", "ptx"];
 /// Extensions of prints.
 pub const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
