@@ -152,6 +152,7 @@ pub(crate) fn points(mesh: &Mesh) -> Vec<MeshForm> {
     let commas = rows(&|_, [x, y, z]| format!("{x:.6};{y:.6};{z:.6}\n").replace('.', ","));
     let spaced = rows(&|_, [x, y, z]| format!("{x:.6} {y:.6} {z:.6}\n").replace('.', ","));
     let numbered = rows(&|index, [x, y, z]| format!("{} {x} {y} {z}\n", index + 1));
+    let tabs = rows(&|_, [x, y, z]| format!("{x}\t{y}\t{z}\t128\n"));
     let mut organized = Mesh {
         vertices: mesh.vertices.clone(),
         ..Mesh::default()
@@ -168,6 +169,7 @@ pub(crate) fn points(mesh: &Mesh) -> Vec<MeshForm> {
         form("commas.xyz", commas, 0),
         form("spaced-commas.xyz", spaced, 0),
         form("numbered.xyz", numbered, 0),
+        form("tabs.xyz", format!("{tabs}1\t\t2\t128\n\t\t\t128\n"), 2),
         form(
             "titles.xyz",
             format!("% made by a scanner\n\"block 4\"\nX [mm] Y [mm] Z [mm]\n{plain}"),
