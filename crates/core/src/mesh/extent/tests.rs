@@ -176,6 +176,20 @@ fn the_title_of_long_points_names_their_columns_in_all_parts() {
 }
 
 #[test]
+fn the_header_of_a_long_scan_of_ptx_has_no_points() {
+    let row = |_: usize, [x, y, z]: [f64; 3]| {
+        let [x, y] = [x, y].map(|value| value + 500.0);
+        format!("{x:.9}\t{y:.9}\t{z:.9}\t0.5\n")
+    };
+    let rows = lines(420, row);
+    assert_sheet(long_sides(rows.as_bytes(), "a.xyz"), "tabs");
+    let scanner = "420\n420\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+    let matrix = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+    let scan = format!("{scanner}{matrix}{rows}");
+    assert_sheet(long_sides(scan.as_bytes(), "a.ptx"), "PTX");
+}
+
+#[test]
 fn the_unit_and_all_vertices_of_a_short_file_are_known() {
     let xyz = b"# units: m\n0 0 0\n0.04 0.03 0\n0 0.01 0\n";
     let found = found(xyz, "a.xyz").expect("points");
