@@ -10,7 +10,7 @@ const ORIENTATION: u64 = 274;
 /// Begins a segment of XMP in a JPEG.
 const XMP_PREFIX: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
 const XMP_KEYWORD: &[u8] = b"XML:com.adobe.xmp";
-/// Keywords of texts that are the hexadecimal digits of a segment of a JPEG, as ImageMagick writes them.
+/// Keywords of texts that are the hexadecimal digits of a segment of a JPEG, as `ImageMagick` writes them.
 const RAW_PROFILES: [&[u8]; 3] = [
     b"Raw profile type exif",
     b"Raw profile type APP1",
@@ -184,7 +184,7 @@ mod tests {
         encoder.finish().expect("encodes")
     }
 
-    /// Returns the text of a segment as ImageMagick writes it.
+    /// Returns the text of a segment as `ImageMagick` writes it.
     fn raw_text(segment: &[u8]) -> Vec<u8> {
         let digits: Vec<String> = segment.iter().map(|byte| format!("{byte:02x}")).collect();
         let lines: Vec<String> = digits.chunks(36).map(<[String]>::concat).collect();
