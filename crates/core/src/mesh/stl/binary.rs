@@ -214,8 +214,12 @@ impl FacetBuffer {
 
 /// Returns the corners of a facet. A facet starts with twelve little-endian 32-bit floats: the normal and three
 /// corners.
+#[inline]
 pub(crate) fn corners(facet: &[u8; FACET]) -> [[f32; 3]; 3] {
-    let (floats, _) = facet[12..48].as_chunks::<4>();
-    let at = |i: usize| f32::from_le_bytes(floats[i]);
-    [0, 3, 6].map(|i| [at(i), at(i + 1), at(i + 2)])
+    let mut corners = [[0.0; 3]; 3];
+    let (floats, _) = facet[12..48].as_chunks();
+    for (coordinate, bytes) in corners.as_flattened_mut().iter_mut().zip(floats) {
+        *coordinate = f32::from_le_bytes(*bytes);
+    }
+    corners
 }
