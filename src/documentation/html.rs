@@ -135,6 +135,7 @@ pub(super) fn web_page(path: &str, markdown: &str, outline: &Outline) -> String 
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="generator" content="mocban docs";
                 title { (outline.title(path)) " - mocban" }
                 link rel="stylesheet" href=(format!("{to_root}style.css"));
             }

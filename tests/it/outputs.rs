@@ -119,19 +119,19 @@ fn files_of_other_programs_are_no_scripts_and_no_logs() {
     for (args, reason) in [
         (
             ["completions", "zsh", "-o", "a.stl"],
-            "is no completion script for zsh",
+            "is not a completion script for zsh",
         ),
         (
             ["completions", "zsh", "-o", ".zshrc"],
-            "is no completion script for zsh",
+            "is not a completion script for zsh",
         ),
         (
             ["config", "show", "--log-file", "a.stl"],
-            "is not a log file",
+            "is not a log file of this program",
         ),
         (
             ["config", "show", "--log-file", "scan"],
-            "is not a log file",
+            "is not a log file of this program",
         ),
     ] {
         let name = args[3];
@@ -160,6 +160,41 @@ fn files_of_other_programs_are_no_scripts_and_no_logs() {
         }
     }
     mocban(dir.path(), &["completions", "bash", "-o", "fish"]).expect(2);
+}
+
+#[test]
+fn reports_sheets_and_logs_replace_only_their_own_earlier_files() {
+    let dir = empty();
+    let project = done(dir.path());
+    let path = |name: &str| dir.path().join(name).display().to_string();
+    let [list, truth] = ["manifest.csv", "truth.jsonl"]
+        .map(|name| project.dir().join("data").join(name).display().to_string());
+    let page = path("page.png");
+    std::fs::write(&page, b"\x89PNG\r\n\x1a\n").expect("written");
+    let notes = path("notes.txt");
+    std::fs::write(&notes, "my notes\n").expect("written");
+    for (args, output) in [
+        (&["report", "--format", "csv", "-o"][..], &list),
+        (&["report", "--format", "json", "-o"], &truth),
+        (&["report", "-o"], &notes),
+        (&["contact-sheet", "-o"], &page),
+        (&["status", "--log-file"], &list),
+        (&["status", "--log-file"], &notes),
+    ] {
+        let before = std::fs::read(output).expect("a file");
+        let refused = at(&project, &[args, &[output.as_str()]].concat()).expect(2);
+        let reason = "of this program; choose another name, or remove it if you do not need it";
+        let is_said = refused.err.contains(reason);
+        assert!(is_said, "{args:?}: {}", refused.err);
+        assert_eq!(std::fs::read(output).expect("a file"), before, "{args:?}");
+    }
+    let [report, sheet] = [path("report.md"), path("sheet.png")];
+    for _ in 0..2 {
+        at(&project, &["report", "-o", &report]).expect(0);
+        at(&project, &["contact-sheet", "-o", &sheet]).expect(0);
+    }
+    at(&project, &["report", "--format", "text", "-o", &report]).expect(0);
+    at(&project, &["report", "-o", &sheet]).expect(2);
 }
 
 #[test]

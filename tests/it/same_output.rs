@@ -99,13 +99,13 @@ fn backups_to_one_name_leave_one_whole_backup() {
 }
 
 #[test]
-fn reports_and_sheets_to_one_file_all_succeed_and_leave_one_whole_file() {
+fn reports_to_one_file_all_succeed_and_leave_one_whole_file() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let calls = [
         &["report", "-o", "../r"] as &[&str],
         &["report", "-f", "csv", "-o", "../r"],
-        &["contact-sheet", "-o", "../r"],
+        &["report", "-f", "json", "-o", "../r"],
     ];
     let result = dir.path().join("r");
     let whole = calls.map(|args| {
@@ -277,7 +277,11 @@ fn an_output_replaces_no_input_of_the_project() {
         }
         if !name.ends_with("link") {
             let log = at(&project, &["--log-file", name, "-v", "check"]).expect(2);
-            assert!(log.err.contains("is not a log file"), "{}", log.err);
+            assert!(
+                log.err.contains("is not a log file of this program"),
+                "{}",
+                log.err
+            );
         }
         assert!(before == std::fs::read(&file).expect("a file"), "{name}");
     }

@@ -344,7 +344,8 @@ fn documentation() {
     assert!(first.contains("tutorial/first-hour.html"), "{first}");
     assert!(dir.path().join("mocban-docs/pictures/viewer.jpg").exists());
     // An earlier version of the pages is replaced; anything else is kept.
-    write(dir.path(), "mocban-docs/index.html", "old");
+    let old = "<meta name=\"generator\" content=\"mocban docs\">old";
+    write(dir.path(), "mocban-docs/index.html", old);
     assert_call("docs", dir.path(), &["docs"]);
     assert_eq!(std::fs::read_to_string(&index).expect("a page"), first);
     write(dir.path(), "mocban-docs/guides/notes.txt", "mine");

@@ -252,6 +252,7 @@ pub fn alignment_folder(dir: &Path) -> ProjectResult<GeneratedFolder<'_>> {
     let folder = GeneratedFolder {
         dir,
         content: "alignment",
+        marker: (NUMBERS, "\"print_from_mesh\""),
     };
     let names = ALIGNMENT_FILES.iter().chain([&NUMBERS]);
     folder.refuse_foreign(&names.map(Path::new).collect::<Vec<_>>())?;

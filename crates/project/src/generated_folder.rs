@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{ProjectResult, WithContext as _};
 use crate::exit::Refusal;
+use crate::files;
 use crate::own_files::refuse_project_file;
 use mocban_store::{Leftover, ReplacementFolder, create_folders};
 
@@ -15,6 +16,8 @@ pub struct GeneratedFolder<'a> {
     pub dir: &'a Path,
     /// What its files are, such as `documentation`.
     pub content: &'a str,
+    /// The file by which an earlier folder is recognized, and a text that it has.
+    pub marker: (&'a str, &'a str),
 }
 
 impl GeneratedFolder<'_> {
@@ -45,7 +48,8 @@ impl GeneratedFolder<'_> {
         folder.finish().with_context(failed)
     }
 
-    /// Refuses a folder that holds anything but files with these paths, or that belongs to a project.
+    /// Refuses a folder that holds anything but files with these paths, files of these names without the marker of an earlier
+    /// folder, or that belongs to a project.
     ///
     /// # Errors
     /// Returns an error that names a foreign file, or if the folder cannot be read.
@@ -59,14 +63,28 @@ impl GeneratedFolder<'_> {
         if !self.dir.is_dir() {
             return Err(Refusal::Usage(format!("{shown} is not a directory")).into());
         }
-        let Some(foreign) = foreign_file(self.dir, Path::new(""), names)? else {
-            return Ok(());
+        let foreign = match foreign_file(self.dir, Path::new(""), names)? {
+            Some(foreign) => foreign,
+            None if self.is_marked() => return Ok(()),
+            // Without a marker, every file is foreign.
+            None => match foreign_file(self.dir, Path::new(""), &[])? {
+                Some(foreign) => foreign,
+                None => return Ok(()),
+            },
         };
         let (foreign, content) = (foreign.display(), self.content);
         Err(Refusal::Usage(format!(
             "{shown} holds {foreign}, which is not part of the {content}; name another directory"
         ))
         .into())
+    }
+
+    /// Returns whether the folder holds the file by which an earlier one is recognized.
+    fn is_marked(self) -> bool {
+        let (name, text) = self.marker;
+        let head = files::head(&self.dir.join(name)).unwrap_or_default();
+        let mut parts = head.windows(text.len());
+        parts.any(|part| part == text.as_bytes())
     }
 }
 
@@ -92,4 +110,38 @@ fn foreign_file(dir: &Path, inner: &Path, names: &[&Path]) -> ProjectResult<Opti
         }
     }
     Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::GeneratedFolder;
+
+    #[test]
+    fn files_with_the_names_of_a_generated_folder_are_kept_unless_it_is_marked() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let folder = GeneratedFolder {
+            dir: &dir.path().join("out"),
+            content: "alignment",
+            marker: ("numbers.json", "\"schema\""),
+        };
+        let files = [
+            ("numbers.json", b"{\"schema\": 1}".to_vec()),
+            ("overlay.png", b"new".to_vec()),
+        ];
+        for _ in 0..2 {
+            folder.write(&files).expect("a new or an earlier folder");
+        }
+        std::fs::remove_file(folder.dir.join("numbers.json")).expect("removed");
+        std::fs::write(folder.dir.join("overlay.png"), "mine").expect("written");
+        for numbers in [None, Some("[]")] {
+            if let Some(numbers) = numbers {
+                std::fs::write(folder.dir.join("numbers.json"), numbers).expect("written");
+            }
+            let refused = folder.write(&files).expect_err("files of somebody else");
+            let reason = "which is not part of the alignment";
+            assert!(refused.to_string().contains(reason), "{refused}");
+            let kept = std::fs::read(folder.dir.join("overlay.png")).expect("a file");
+            assert_eq!(kept, b"mine");
+        }
+    }
 }

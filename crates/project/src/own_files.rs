@@ -1,5 +1,6 @@
 //! Files that a project needs, over which no output is written.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use crate::empty_import::EMPTY_IMPORT_FILE;
@@ -7,7 +8,7 @@ use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::files::is_backup;
 use mocban_catalog::Catalog;
-use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};
+use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE, open_regular};
 
 /// File of the lists of pairs that were saved in the app, in the project folder.
 pub const VIEWS_FILE: &str = "saved-views.json";
@@ -22,6 +23,37 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     Err(Refusal::Usage(format!(
         "{shown} {reason}; name another file for the output"
     )))
+}
+
+/// Bytes of an earlier output by which it is recognized. No report is longer.
+const MAX_EARLIER_BYTES: u64 = 64 << 20;
+
+/// Refuses to write over a file that is not empty and that `is_ours` does not recognize by its content. `what` is the output,
+/// such as `a report of this program`. Anything but a regular file is left to the function that writes.
+pub fn refuse_foreign_file(
+    path: &Path,
+    what: &str,
+    is_ours: impl FnOnce(&[u8]) -> bool,
+) -> Result<(), Refusal> {
+    let is_free = path
+        .metadata()
+        .map_or(true, |meta| !meta.is_file() || meta.len() == 0);
+    // A file that cannot be read may be anything.
+    if is_free || beginning(path).is_some_and(|earlier| is_ours(&earlier)) {
+        return Ok(());
+    }
+    Err(Refusal::Usage(format!(
+        "{} exists and is not {what}; choose another name, or remove it if you do not need it",
+        path.display()
+    )))
+}
+
+/// Returns the first bytes of a regular file, or `None` if it cannot be read.
+fn beginning(path: &Path) -> Option<Vec<u8>> {
+    let (file, _) = open_regular(path).ok()?;
+    let mut bytes = Vec::new();
+    let read = file.take(MAX_EARLIER_BYTES).read_to_end(&mut bytes);
+    read.ok().map(|_| bytes)
 }
 
 /// Returns what a path is to a project, such as `is a file of a project`, or `None` if no project needs it. The path need
@@ -114,4 +146,25 @@ pub(crate) async fn refuse_used_file(
 fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::refuse_foreign_file;
+
+    #[test]
+    fn only_a_file_that_is_recognized_is_replaced() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("a.txt");
+        let is_ours = |bytes: &[u8]| bytes == b"ours";
+        let check = || refuse_foreign_file(&path, "a report of this program", is_ours);
+        check().expect("no file");
+        for (content, is_replaced) in [("", true), ("ours", true), ("theirs", false)] {
+            std::fs::write(&path, content).expect("written");
+            assert_eq!(check().is_ok(), is_replaced, "{content}");
+        }
+        let refused = check().expect_err("another file").to_string();
+        let reason = "a.txt exists and is not a report of this program; choose another name";
+        assert!(refused.contains(reason), "{refused}");
+    }
 }

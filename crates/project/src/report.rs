@@ -6,11 +6,11 @@ use std::path::Path;
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::location::{Location, now};
-use crate::own_files::refuse_used_file;
+use crate::own_files::{refuse_foreign_file, refuse_used_file};
 use crate::status::warn_about_stale;
 use mocban_config::{Sources, load};
 use mocban_export::{GallerySelection, draw_gallery};
-use mocban_report::{Cover, Report, ReportFormat, build, build_with, page, render};
+use mocban_report::{Cover, Report, ReportFormat, build, build_with, is_report, page, render};
 use mocban_results::IntervalMethod;
 use mocban_store::Project;
 use mocban_system::time_text::day;
@@ -40,7 +40,8 @@ pub struct RenderedReport {
     pub is_complete: bool,
 }
 
-/// Builds the report of a project. `output` is the file that it will be written to; a file that the project needs is refused.
+/// Builds the report of a project. `output` is the file that it will be written to; a file that the project needs is refused,
+/// and so is every file that is not an earlier report.
 pub async fn report(
     options: ReportOptions,
     output: Option<&Path>,
@@ -50,6 +51,7 @@ pub async fn report(
     let (project, catalog) = location.open_read_only().await?;
     if let Some(path) = output {
         refuse_used_file(path, &project, &catalog).await?;
+        refuse_foreign_file(path, "a report of this program", is_report)?;
     }
     warn_about_stale(&catalog, location, listener).await?;
     let _work = LongWork::begin(listener, "reading the results");

@@ -8,15 +8,28 @@ use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::exit::Refusal;
 use crate::files;
 use crate::location::Location;
-use crate::own_files::refuse_used_file;
+use crate::own_files::{refuse_foreign_file, refuse_used_file};
 use crate::selection;
 use crate::status::all_retired;
 use mocban_catalog::Catalog;
 use mocban_core::domain::ThresholdMetric;
-use mocban_core::raster::png_rgb8;
+use mocban_core::raster::png_rgb8_of;
 use mocban_export::block_view::BlockView;
 use mocban_export::{ContactSheet, ContactSheetOptions, draw_contact_sheet};
 use mocban_store::Project;
+
+/// What the pictures name as their program, and what an earlier one is recognized by.
+const SOFTWARE: &str = "mocban contact-sheet";
+
+/// Returns whether a file is a picture of this module.
+fn is_sheet(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(files::HEAD_BYTES)];
+    let is_named = || {
+        head.windows(SOFTWARE.len())
+            .any(|part| part == SOFTWARE.as_bytes())
+    };
+    head.starts_with(b"\x89PNG") && is_named()
+}
 
 /// Draws the pairs with these ids, or all, and writes the sheet. By default, it is `sheet.png` in the project. Returns its
 /// path too. A sheet that lacks images replaces an earlier one only if `allow_missing` is set.
@@ -35,6 +48,7 @@ pub async fn contact_sheet(
     let path = output.map_or_else(|| project.dir().join("sheet.png"), Path::to_owned);
     refuse_used_file(&path, &project, &catalog).await?;
     files::require_png(output)?;
+    refuse_foreign_file(&path, "a contact sheet of this program", is_sheet)?;
     let metric = options.metric;
     let options = ContactSheetOptions {
         pairs: selection::some_or_all(&catalog, pairs).await?,
@@ -60,7 +74,7 @@ pub async fn contact_sheet(
         warn(listener, text);
     }
     let is_complete = allow_missing || sheet.problems.is_empty();
-    let written = files::write_output(&path, &png_rgb8(&sheet.picture), is_complete);
+    let written = files::write_output(&path, &png_rgb8_of(&sheet.picture, SOFTWARE), is_complete);
     files::or_elsewhere(written, output)?;
     Ok((path, sheet))
 }
@@ -87,6 +101,7 @@ pub async fn block_sheet(
     let path = output.map_or_else(|| project.dir().join(default()), Path::to_owned);
     refuse_used_file(&path, &project, &catalog).await?;
     files::require_png(output)?;
+    refuse_foreign_file(&path, "a contact sheet of this program", is_sheet)?;
     let work = LongWork::begin(listener, "drawing the page");
     let view = block_view(block, metric, &project, &catalog, location).await?;
     let draw = move || {
@@ -95,7 +110,7 @@ pub async fn block_sheet(
         } else {
             view.draw_boxes()
         };
-        (png_rgb8(&picture), view.characters.len())
+        (png_rgb8_of(&picture, SOFTWARE), view.characters.len())
     };
     let drawn = blocking(draw).await;
     drop(work);
@@ -116,4 +131,18 @@ pub async fn block_view(
     let name = selection::existing_block(catalog, block).await?;
     let limits = location.settings()?.config.limits;
     Ok(BlockView::read(catalog, project, &name, metric, limits).await?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SOFTWARE, is_sheet};
+    use mocban_core::raster::{Grid, png_rgb8, png_rgb8_of};
+
+    #[test]
+    fn a_sheet_is_recognized_and_a_page_is_not() {
+        let grid = Grid::new(3, 2, [250, 240, 9]);
+        assert!(is_sheet(&png_rgb8_of(&grid, SOFTWARE)));
+        assert!(!is_sheet(&png_rgb8(&grid)));
+        assert!(!is_sheet(SOFTWARE.as_bytes()));
+    }
 }

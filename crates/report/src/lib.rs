@@ -41,7 +41,8 @@ pub use model::{
 };
 pub use provenance::{ChangedSetting, Provenance, UsedSettings};
 pub use render::{
-    Cover, MAX_PAGE_BYTES, RESERVED_BYTES, ReportFormat, agreement_text, page, render, summary,
+    Cover, MAX_PAGE_BYTES, RESERVED_BYTES, ReportFormat, agreement_text, is_report, page, render,
+    summary,
 };
 pub use report_error::ReportError;
 pub use risk_coverage::{

@@ -1,6 +1,6 @@
 //! `completions SHELL`: prints a completion script, and the names of pairs and blocks for it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Command};
@@ -12,8 +12,8 @@ use crate::cli::output::streams;
 use mocban_project::details::names_with_prefix;
 use mocban_project::files;
 use mocban_project::location::Location;
-use mocban_project::own_files::refuse_project_file;
-use mocban_project::{ExitCode, ProjectResult, Refusal};
+use mocban_project::own_files::{refuse_foreign_file, refuse_project_file};
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_system::failpoint::time_scale;
 
 /// Arguments of `completions`.
@@ -52,27 +52,13 @@ pub(crate) async fn completions(
         return Ok(ExitCode::Done);
     };
     refuse_project_file(path)?;
-    refuse_foreign(path, &script, args.shell)?;
+    let first_line = |text: &str| text.lines().next().map(str::to_owned);
+    let is_ours =
+        |earlier: &[u8]| first_line(&String::from_utf8_lossy(earlier)) == first_line(&script);
+    let what = format!("a completion script for {}", args.shell);
+    refuse_foreign_file(path, &what, is_ours)?;
     files::write_output(path, script.as_bytes(), true)?;
     Ok(ExitCode::Done)
-}
-
-/// Refuses to write over a file that is not empty and does not begin like the script.
-fn refuse_foreign(path: &Path, script: &str, shell: Shell) -> ProjectResult<()> {
-    let first_line = |text: &str| text.lines().next().map(str::to_owned);
-    let is_ours = |head: Vec<u8>| first_line(&String::from_utf8_lossy(&head)) == first_line(script);
-    // A folder is refused when the script is written.
-    let is_free = path
-        .metadata()
-        .map_or(true, |meta| !meta.is_file() || meta.len() == 0);
-    if is_free || files::head(path).is_some_and(is_ours) {
-        return Ok(());
-    }
-    let text = format!(
-        "{} exists and is no completion script for {shell}; name another file for the script",
-        path.display()
-    );
-    Err(Refusal::Usage(text).into())
 }
 
 /// Returns the names that the last word may be, or `None` if it is none or they cannot be read in time.

@@ -30,6 +30,7 @@ pub(crate) fn docs(args: DocsArgs, context: &Context) -> ProjectResult<ExitCode>
     let folder = GeneratedFolder {
         dir: &dir,
         content: "documentation",
+        marker: (INDEX, "content=\"mocban docs\""),
     };
     if let Some((path, error)) = folder.write(&web_files())? {
         let path = path.display();

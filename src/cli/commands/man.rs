@@ -8,8 +8,8 @@ use crate::cli::output::context::Context;
 use mocban_core::domain::shell::shell_quoted;
 use mocban_project::error::WithContext as _;
 use mocban_project::files;
-use mocban_project::own_files::refuse_project_file;
-use mocban_project::{ExitCode, ProjectResult, Refusal};
+use mocban_project::own_files::{refuse_foreign_file, refuse_project_file};
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_store::{StagingFolder, create_folders, rename_into_place};
 
 /// Arguments of `man`.
@@ -59,18 +59,13 @@ fn write_pages(command: Command, staging: &Path) -> ProjectResult<Vec<PathBuf>> 
 /// Refuses to replace a file that is not an earlier version of a page.
 fn refuse_foreign(page: &Path, dir: &Path) -> ProjectResult<()> {
     let there = dir.join(page.file_name().unwrap_or_default());
-    let Some(earlier) = files::small(&there)? else {
-        return Ok(());
-    };
-    let new = files::small(page)?.unwrap_or_default();
-    if title(&new).is_some_and(|name| title(&earlier) == Some(name)) {
+    if files::small(&there)?.is_none() {
         return Ok(());
     }
-    Err(Refusal::Usage(format!(
-        "{} exists and is not a manual page of this program; rename it or name another directory",
-        there.display()
-    ))
-    .into())
+    let new = files::small(page)?.unwrap_or_default();
+    let is_ours = |earlier: &[u8]| title(&new).is_some_and(|name| title(earlier) == Some(name));
+    refuse_foreign_file(&there, "a manual page of this program", is_ours)?;
+    Ok(())
 }
 
 /// Returns the name in the title line of a manual page (`man(7)`), or `None` if the file has no such line.

@@ -15,12 +15,10 @@ use tracing_subscriber::registry::LookupSpan;
 use super::context::indented;
 use super::screen::{Palette, Screen, warning_label};
 use crate::cli::input::global::{Global, LogFormat};
-use mocban_core::domain::FileKind;
-use mocban_lists::manifest::is_named_like_input;
+use mocban_project::ProjectResult;
 use mocban_project::error::WithContext as _;
 use mocban_project::files;
-use mocban_project::own_files::refuse_project_file;
-use mocban_project::{ProjectResult, Refusal};
+use mocban_project::own_files::{refuse_foreign_file, refuse_project_file};
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
 pub(crate) fn start(global: &Global, screen: &Screen) -> ProjectResult<()> {
@@ -63,15 +61,7 @@ fn writer(
         return Ok((BoxMakeWriter::new(writer), false));
     };
     refuse_project_file(path)?;
-    // Which files are inputs of the project is not known yet.
-    let is_named_like_input = is_named_like_input(path) && path.exists();
-    if is_named_like_input || files::kind(path).is_some_and(|kind| kind != FileKind::Text) {
-        let text = format!(
-            "{} is not a log file; name another file for the log",
-            path.display()
-        );
-        return Err(Refusal::Usage(text).into());
-    }
+    refuse_foreign_file(path, "a log file of this program", is_log_text)?;
     files::create_parent(path)?;
     let file = OpenOptions::new()
         .create(true)
@@ -79,6 +69,20 @@ fn writer(
         .open(path)
         .with_context(|| format!("cannot open the log file {}", path.display()))?;
     Ok((BoxMakeWriter::new(Mutex::new(file)), true))
+}
+
+/// Returns whether a file begins like a log: with a time, in JSON as the first field.
+fn is_log_text(bytes: &[u8]) -> bool {
+    let time = bytes.strip_prefix(b"{\"timestamp\":\"").unwrap_or(bytes);
+    let Some(day) = time.get(..11) else {
+        return false;
+    };
+    let is_day = |(i, byte): (usize, &u8)| match i {
+        4 | 7 => *byte == b'-',
+        10 => *byte == b'T',
+        _ => byte.is_ascii_digit(),
+    };
+    day.iter().enumerate().all(is_day)
 }
 
 /// The fields of a warning.
@@ -210,7 +214,7 @@ const fn level(verbose: u8, quiet: bool, to_file: bool) -> &'static str {
 mod tests {
     use std::sync::{Arc, Mutex};
 
-    use super::{EventFormat, Format, level};
+    use super::{EventFormat, Format, is_log_text, level};
 
     /// Keeps what is written.
     #[derive(Debug, Clone, Default)]
@@ -255,6 +259,22 @@ mod tests {
         let log = lines(false);
         assert!(log.contains("WARN 1.ply: 5 vertices"), "{log}");
         assert!(log.contains("pair=b1"), "{log}");
+    }
+
+    #[test]
+    fn lists_are_no_logs() {
+        for (text, is_log) in [
+            ("2026-11-30T08:14:24.123456Z  INFO the run ends\n", true),
+            (
+                "{\"timestamp\":\"2026-11-30T08:14:24.1Z\",\"level\":\"INFO\"}\n",
+                true,
+            ),
+            ("id,mesh,print\n2026-11-30,a.stl,a.png\n", false),
+            ("{\"id\":\"a\"}\n", false),
+            ("2026-11-30,a.stl,a.png\n", false),
+        ] {
+            assert_eq!(is_log_text(text.as_bytes()), is_log, "{text}");
+        }
     }
 
     #[test]

@@ -111,6 +111,24 @@ pub fn png_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
     png_of(grid, png::ColorType::Rgb, png::BitDepth::Eight, samples)
 }
 
+/// Encodes like [`png_rgb8`], and names what made the file in a text chunk `Software` behind the header. `software` is ASCII.
+///
+/// ```
+/// use mocban_core::raster::{Grid, png_rgb8_of};
+///
+/// let png = png_rgb8_of(&Grid::new(2, 2, [9, 80, 7]), "a program");
+/// assert!(png.windows(18).any(|part| part == b"Software\0a program"));
+/// ```
+pub fn png_rgb8_of(grid: &Grid<[u8; 3]>, software: &str) -> Vec<u8> {
+    encode(
+        grid,
+        (png::ColorType::Rgb, png::BitDepth::Eight),
+        grid.data().as_flattened(),
+        png::DeflateCompression::FdeflateUltraFast,
+        Some(software),
+    )
+}
+
 /// Encodes like [`png_rgb8`] a sixth smaller and five times as slowly, for pictures in which pixels are repeated.
 ///
 /// ```
@@ -129,6 +147,7 @@ pub fn compact_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
         (png::ColorType::Rgb, png::BitDepth::Eight),
         grid.data().as_flattened(),
         png::DeflateCompression::Level(2),
+        None,
     )
 }
 
@@ -159,7 +178,7 @@ fn png_of<T: Copy>(
 ) -> Vec<u8> {
     // A depth map of 512 px takes 0.8 ms and 278 kB with this setting, and 2.2 ms and 251 kB with level 1 of miniz.
     let deflate = png::DeflateCompression::FdeflateUltraFast;
-    encode(grid, (color, depth), samples, deflate)
+    encode(grid, (color, depth), samples, deflate, None)
 }
 
 fn encode<T: Copy>(
@@ -167,6 +186,7 @@ fn encode<T: Copy>(
     (color, depth): (png::ColorType, png::BitDepth),
     samples: &[u8],
     deflate: png::DeflateCompression,
+    software: Option<&str>,
 ) -> Vec<u8> {
     let mut out = Vec::with_capacity(samples.len() / 2 + 1024);
     let mut encoder = png::Encoder::new(&mut out, grid.width() as u32, grid.height() as u32);
@@ -174,8 +194,11 @@ fn encode<T: Copy>(
     encoder.set_depth(depth);
     encoder.set_deflate_compression(deflate);
     encoder.set_filter(png::Filter::Paeth);
-    encoder
-        .write_header()
+    let named = software.map_or(Ok(()), |software| {
+        encoder.add_text_chunk("Software".to_owned(), software.to_owned())
+    });
+    named
+        .and_then(|()| encoder.write_header())
         .and_then(|mut writer| {
             if samples.len() < STREAMED_BYTES {
                 writer.write_image_data(samples)?;

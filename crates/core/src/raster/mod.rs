@@ -28,7 +28,7 @@ pub use decode::{
 pub use depth_map::DepthMap;
 pub use encode::{
     PngError, compact_rgb8, decode_grey8, decode_grey16, jpeg_rgb8, png_grey8, png_grey16,
-    png_mask, png_rgb8,
+    png_mask, png_rgb8, png_rgb8_of,
 };
 pub use grid::Grid;
 pub use mask::{Mask, MaskOverlap, PixelBox};

@@ -8,7 +8,7 @@ use crate::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT};
 use mocban_core::domain::Reason;
 
 /// The columns.
-const HEADER: &str = "metric,quantity,n,value,low,high\r\n";
+pub(super) const HEADER: &str = "metric,quantity,n,value,low,high\r\n";
 
 /// A quantity, and JSON pointers to its parts in the JSON that [`document`] returns.
 struct CsvQuantity {

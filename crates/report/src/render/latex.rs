@@ -10,7 +10,7 @@ use super::table::{ColumnFormat, Table, TableColumn};
 use crate::model::Report;
 
 /// What a document needs, and how characters of other scripts are shown.
-const PREAMBLE: &str = r"% Needs \usepackage{array,booktabs,graphicx,siunitx}.
+pub(super) const PREAMBLE: &str = r"% Needs \usepackage{array,booktabs,graphicx,siunitx}.
 % Thousands: \sisetup{group-digits = integer, group-minimum-digits = 4, group-separator = {,}}.
 % Labels of tables begin with tab:mocban-, such as \ref{tab:mocban-scores}.
 % Letters beyond Latin, such as Han-Nom characters and Vietnamese letters with two marks, are in \mocbanchar. XeLaTeX and

@@ -5,6 +5,7 @@ mod block_table;
 mod code_spans;
 mod comparison_tables;
 mod csv;
+mod earlier_report;
 mod html;
 mod latex;
 mod latex_text;
@@ -22,6 +23,7 @@ use mocban_core::domain::{enum_names, visible, visible_json};
 use mocban_results::gallery::Gallery;
 
 pub use agreement_text::agreement_text;
+pub use earlier_report::is_report;
 pub use html::{Cover, MAX_PAGE_BYTES, RESERVED_BYTES, page};
 pub use text::summary;
 

@@ -22,6 +22,9 @@ const STYLE: &str = include_str!("../../../../../assets/report/report.css");
 /// Forbids the page to load or run anything.
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'";
 
+/// The element by which a page is recognized.
+pub(super) const GENERATOR: &str = "<meta name=\"generator\" content=\"mocban report\">";
+
 /// Texts of the page besides the report.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Cover {
@@ -50,6 +53,7 @@ fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
+                (PreEscaped(GENERATOR))
                 meta http-equiv="Content-Security-Policy" content=(POLICY);
                 title { "Report on " (title) }
                 style { (PreEscaped(STYLE)) }
