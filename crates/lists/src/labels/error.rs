@@ -77,6 +77,16 @@ pub enum LabelsProblem {
     /// There is no box.
     #[error("the file has no boxes{}; draw at least one", of_page(.0.as_deref()))]
     NoBoxes(Option<String>),
+    /// The page has no box, but this number of boxes are of no image.
+    #[error(
+        "the file has no boxes of this page, and the image_id of others is that of no image (boxes: {0}); write the id of their image there"
+    )]
+    OfNoImage(usize),
+    /// All boxes have numbers from 0 to 1 where the format has pixels.
+    #[error(
+        "all numbers of its boxes are from 0 to 1: they look like fractions of the page, and this format has pixels; multiply them by width and height of the page"
+    )]
+    Fractions,
     /// More boxes than a page can have.
     #[error("the page has more than {limit} boxes; keep only the boxes of its characters")]
     TooManyBoxes {

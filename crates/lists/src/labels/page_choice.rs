@@ -15,7 +15,7 @@ pub(super) struct PageEntry {
 }
 
 /// Returns a file name without folders for comparison: composed, in lower case.
-fn comparable(name: &str) -> String {
+pub(super) fn comparable(name: &str) -> String {
     let file = name.rsplit(['/', '\\']).next().unwrap_or_default();
     fold_case(file)
 }

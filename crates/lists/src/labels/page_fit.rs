@@ -45,7 +45,7 @@ pub(super) fn fit_to_page(
     let mut warnings = page_warnings(&file, page);
     warnings.extend(file.warnings);
     let scale = scale(file.size, page, &mut warnings)?;
-    let placed = with_area(file.regions, scale, &mut warnings);
+    let placed = with_area(file.regions, scale, &mut warnings)?;
     if placed.is_empty() {
         return Err(LabelsProblem::NoBoxes(file.file_name));
     }
@@ -139,13 +139,13 @@ fn scale(
     Ok(scale)
 }
 
-/// Drops points, lines and boxes smaller than a pixel.
+/// Drops points, lines and boxes smaller than a pixel. Refuses boxes that all look like fractions of the page.
 fn with_area(
     regions: Vec<LabelRegion>,
     scale: [f64; 2],
     warnings: &mut Vec<String>,
-) -> Vec<PlacedRegion> {
-    let mut flat = Vec::new();
+) -> Result<Vec<PlacedRegion>, LabelsProblem> {
+    let (mut flat, mut fractions) = (Vec::new(), 0);
     let mut placed = Vec::with_capacity(regions.len());
     for mut region in regions {
         let mut corners = region.corners.take().unwrap_or_default();
@@ -158,7 +158,13 @@ fn with_area(
             placed.push(PlacedRegion { region, corners });
         } else {
             flat.push(region.shown());
+            let has_area = x1 > x0 && y1 > y0;
+            let is_fraction = x0 >= 0.0 && y0 >= 0.0 && x1 <= scale[0] && y1 <= scale[1];
+            fractions += usize::from(has_area && is_fraction);
         }
+    }
+    if placed.is_empty() && fractions == flat.len() {
+        return Err(LabelsProblem::Fractions);
     }
     if !flat.is_empty() {
         let verb = for_count(flat.len(), "is", "are");
@@ -168,7 +174,7 @@ fn with_area(
             "{count} {verb} smaller than a pixel, a point or a line and {left_out} left out: {names}"
         ));
     }
-    placed
+    Ok(placed)
 }
 
 /// Drops boxes outside the page and cuts the others at its edges.

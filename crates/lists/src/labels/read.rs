@@ -1,5 +1,7 @@
 //! Recognition of the format of labels, and their reading.
 
+use std::borrow::Cow;
+
 use serde_json::{Map, Value};
 
 use super::error::{LabelsError, LabelsProblem};
@@ -10,6 +12,7 @@ use super::model::{LabelFormat, Labels, PageFile};
 use super::page_fit::fit_to_page;
 use super::region::{PageRegions, shown};
 use crate::json_numbers::unknown_number;
+use crate::separator_line::separator_line;
 use mocban_core::domain::{FileKind, UniqueKeys, sanitize};
 
 /// Largest file that is read, in bytes.
@@ -66,17 +69,44 @@ fn parse(bytes: &[u8], page: &PageFile<'_>) -> Result<(LabelFormat, PageRegions)
         return Err(LabelsProblem::Pointer);
     }
     let text = text.trim_start_matches('\u{feff}').trim();
-    let first_line = text.lines().next().unwrap_or_default();
     match text.chars().next() {
         None => Err(LabelsProblem::NoBoxes(None)),
         Some('{' | '[') => parse_json(text, page),
         Some('<') => Ok((LabelFormat::PageXml, page_xml::read(text)?)),
-        _ if via_csv::is_header(first_line) => {
-            Ok((LabelFormat::ViaCsv, via_csv::read(text, page)?))
-        }
-        _ if yolo::is_region(first_line) => Ok((LabelFormat::Yolo, yolo::read(text, page)?)),
-        _ => Err(LabelsProblem::UnknownText(first_line.to_owned())),
+        Some(_) => parse_lines(&with_line_feeds(text), page),
     }
+}
+
+/// Recognizes and parses text in lines.
+fn parse_lines(
+    text: &str,
+    page: &PageFile<'_>,
+) -> Result<(LabelFormat, PageRegions), LabelsProblem> {
+    let first_line = text.lines().next().unwrap_or_default();
+    let below = without_separator_line(text);
+    let header = below.trim_start().lines().next().unwrap_or_default();
+    if via_csv::is_header(header) {
+        Ok((LabelFormat::ViaCsv, via_csv::read(below, page)?))
+    } else if yolo::is_region(first_line) {
+        Ok((LabelFormat::Yolo, yolo::read(text, page)?))
+    } else {
+        Err(LabelsProblem::UnknownText(first_line.to_owned()))
+    }
+}
+
+/// Returns a text without the content of a first line that names the separator for Excel, such as `sep=;`. No line moves.
+fn without_separator_line(text: &str) -> &str {
+    separator_line(text.as_bytes()).map_or(text, |(_, end)| &text[end..])
+}
+
+/// Returns a text in which each line ends with a line feed. Old programs for the Macintosh end lines with a carriage return
+/// alone.
+fn with_line_feeds(text: &str) -> Cow<'_, str> {
+    let is_alone = |(at, _): (usize, &str)| text.as_bytes().get(at + 1) != Some(&b'\n');
+    if !text.match_indices('\r').any(is_alone) {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(text.replace("\r\n", "\n").replace('\r', "\n"))
 }
 
 fn parse_json(

@@ -4,6 +4,8 @@ use std::borrow::Cow;
 
 use memchr::memchr_iter;
 
+use crate::separator_line::separator_line;
+
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Why a file is not a list.
@@ -59,31 +61,20 @@ impl<'t> CsvText<'t> {
     pub fn new(bytes: &'t [u8]) -> Result<Self, NotText> {
         let mut bytes = as_utf8(bytes)?;
         let named = separator_line(&bytes);
-        if named.is_some() {
+        if let Some((_, end)) = named {
             bytes = match bytes {
-                Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[SEPARATOR.len() + 1..]),
-                Cow::Owned(bytes) => Cow::Owned(bytes[SEPARATOR.len() + 1..].to_vec()),
+                Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[end..]),
+                Cow::Owned(bytes) => Cow::Owned(bytes[end..].to_vec()),
             };
         }
         // A spreadsheet program may have saved the list with another separator since the line was written.
         let is_used = |named: &u8| header(&bytes).contains(named);
+        let named = named.map(|(separator, _)| separator);
         let delimiter = named.filter(is_used).unwrap_or_else(|| delimiter(&bytes));
         if let Some(changed) = without_blanks_before_quotes(&bytes, delimiter) {
             bytes = Cow::Owned(changed);
         }
         Ok(Self { bytes, delimiter })
-    }
-}
-
-/// Begins a first line that names the separator for Excel.
-const SEPARATOR: &[u8] = b"sep=";
-
-/// Returns the separator that the first line names.
-fn separator_line(list: &[u8]) -> Option<u8> {
-    let (start, rest) = list.split_at_checked(SEPARATOR.len())?;
-    match *rest {
-        [separator, b'\r' | b'\n', ..] if start.eq_ignore_ascii_case(SEPARATOR) => Some(separator),
-        _ => None,
     }
 }
 

@@ -4,6 +4,7 @@
 use super::block_messages::BLOCK_MESSAGES;
 use super::block_refusals::BLOCK_REFUSALS;
 use super::foreign_messages::FOREIGN_MESSAGES;
+use super::form_messages::FORM_MESSAGES;
 use super::held_messages::HELD_MESSAGES;
 use super::import_messages::IMPORT_MESSAGES;
 use super::label_messages::LABEL_MESSAGES;
@@ -19,7 +20,7 @@ use super::review_messages::REVIEW_MESSAGES;
 type MessageRow = (&'static str, &'static str);
 
 /// The tables of messages. A row of an earlier one is preferred.
-const TABLES: [&[MessageRow]; 11] = [
+const TABLES: [&[MessageRow]; 12] = [
     MESSAGES,
     BLOCK_MESSAGES,
     LIST_MESSAGES,
@@ -31,6 +32,7 @@ const TABLES: [&[MessageRow]; 11] = [
     FOREIGN_MESSAGES,
     PAIR_REFUSALS,
     BLOCK_REFUSALS,
+    FORM_MESSAGES,
 ];
 
 /// Messages that end with a reason that no table has.

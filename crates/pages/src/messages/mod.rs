@@ -3,6 +3,7 @@
 mod block_messages;
 mod block_refusals;
 mod foreign_messages;
+mod form_messages;
 mod held_messages;
 mod import_messages;
 mod label_messages;

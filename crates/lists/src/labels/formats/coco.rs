@@ -1,5 +1,6 @@
 //! COCO: images, annotations with boxes or polygons, and categories.
 
+use std::cell::OnceCell;
 use std::collections::HashMap;
 
 use serde_json::{Map, Value};
@@ -7,7 +8,7 @@ use serde_json::{Map, Value};
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::boxes;
 use crate::labels::model::PageFile;
-use crate::labels::page_choice::{PageEntry, choose_page};
+use crate::labels::page_choice::{PageEntry, choose_page, comparable};
 use crate::labels::page_fit::check_count;
 use crate::labels::region::{
     Corners, LabelRegion, PageRegions, class_text, coordinate, filled, name_attribute, object,
@@ -33,14 +34,24 @@ pub(in crate::labels) fn read(
             .flatten()
     };
     let images: Vec<&Value> = list("images").collect();
-    let (by_image, warnings) = by_image(&images, list("annotations"))?;
+    let (by_image, others) = by_image(&images, list("annotations"))?;
     let entry = |(k, image): (usize, &&Value)| PageEntry {
         file_name: file_name(image).map(str::to_owned),
         bytes: None,
         has_boxes: !by_image[k].is_empty(),
     };
     let entries: Vec<PageEntry> = images.iter().enumerate().map(entry).collect();
-    let chosen = choose_page(&entries, page)?;
+    let chosen = choose_page(&entries, page).map_err(|problem| match problem {
+        LabelsProblem::NoBoxes(_) if others > 0 => LabelsProblem::OfNoImage(others),
+        problem => problem,
+    })?;
+    if by_image[chosen].is_empty() && others > 0 {
+        return Err(LabelsProblem::OfNoImage(others));
+    }
+    let warning = format!(
+        "{} left out, whose image_id is that of no image",
+        boxes(others)
+    );
     let categories = categories(list("categories"));
     check_count(by_image[chosen].len())?;
     let annotations = by_image[chosen].iter().enumerate();
@@ -50,7 +61,7 @@ pub(in crate::labels) fn read(
         bytes: None,
         size: size(images[chosen]),
         regions: regions.collect::<Result<_, _>>()?,
-        warnings,
+        warnings: (others > 0).then_some(warning).into_iter().collect(),
     })
 }
 
@@ -70,12 +81,12 @@ fn id_key(id: Option<&Value>) -> Option<String> {
     }
 }
 
-/// Returns the annotations of each image, and a warning about those of other images. Instead of the id of an image, an
-/// annotation may have its file name.
+/// Returns the annotations of each image, and the number of those of no image. Instead of the id of an image, an annotation
+/// may have its file name.
 fn by_image<'a>(
     images: &[&Value],
     annotations: impl Iterator<Item = &'a Value>,
-) -> Result<(Vec<Vec<&'a Value>>, Vec<String>), LabelsProblem> {
+) -> Result<(Vec<Vec<&'a Value>>, usize), LabelsProblem> {
     let mut known: HashMap<String, usize> = HashMap::new();
     for (k, image) in images.iter().enumerate() {
         let Some(id) = id_key(image.get("id")) else {
@@ -91,6 +102,7 @@ fn by_image<'a>(
             known.entry(name.to_owned()).or_insert(k);
         }
     }
+    let similar = OnceCell::new();
     let mut found = vec![Vec::new(); images.len()];
     let mut others = 0;
     for (k, annotation) in annotations.enumerate() {
@@ -100,16 +112,54 @@ fn by_image<'a>(
                 .map_or_else(|| "missing".to_owned(), shown);
             LabelsProblem::at(format!("annotation {}", k + 1), format!("image_id is {id}"))
         })?;
-        match known.get(&id) {
-            Some(image) => found[*image].push(annotation),
+        let image = known.get(&id).copied().or_else(|| {
+            let similar = similar.get_or_init(|| similar_ids(images));
+            similar.get(&similar_form(&id)).copied().flatten()
+        });
+        match image {
+            Some(image) => found[image].push(annotation),
             None => others += 1,
         }
     }
-    let warning = format!(
-        "{} left out, whose image_id is that of no image",
-        boxes(others)
-    );
-    Ok((found, (others > 0).then_some(warning).into_iter().collect()))
+    Ok((found, others))
+}
+
+/// Returns the images by the forms of their ids and file names in which case, folders, zeros before a number and decimals do
+/// not matter, and by file names without extensions. A form of several images is that of none.
+fn similar_ids(images: &[&Value]) -> HashMap<String, Option<usize>> {
+    let mut found: HashMap<String, Option<usize>> = HashMap::new();
+    for (k, image) in images.iter().enumerate() {
+        let name = file_name(image);
+        let stem = name.and_then(|name| Some(name.rsplit_once('.')?.0));
+        // A number in place of an id may count images in another order than the numbers in file names.
+        let stem = stem.map(comparable).filter(|stem| !is_number(stem));
+        let forms = [
+            id_key(image.get("id")).map(|id| similar_form(&id)),
+            name.map(comparable),
+            stem,
+        ];
+        for form in forms.into_iter().flatten() {
+            let known = found.entry(form).or_insert(Some(k));
+            *known = known.filter(|first| *first == k);
+        }
+    }
+    found
+}
+
+/// Returns the form of an id that is compared if it is that of no image.
+fn similar_form(id: &str) -> String {
+    match id.parse::<f64>() {
+        Ok(number) if number.fract() == 0.0 && number.abs() < MAX_EXACT => format!("{number:.0}"),
+        Ok(_) => id.to_owned(),
+        Err(_) => comparable(id),
+    }
+}
+
+/// Whole numbers below this one are exact as floating-point numbers.
+const MAX_EXACT: f64 = 9e15;
+
+fn is_number(text: &str) -> bool {
+    text.parse::<f64>().is_ok()
 }
 
 /// Returns width and height of an image, unless one is missing or zero.

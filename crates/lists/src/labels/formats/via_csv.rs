@@ -37,7 +37,7 @@ pub(in crate::labels) fn read(
     text: &str,
     page: &PageFile<'_>,
 ) -> Result<PageRegions, LabelsProblem> {
-    let header = text.lines().next().unwrap_or_default();
+    let header = text.trim_start().lines().next().unwrap_or_default();
     let delimiter = [b';', b'\t']
         .into_iter()
         .find(|c| header.contains(char::from(*c)));

@@ -206,3 +206,16 @@ fn the_page_is_found_by_its_name_in_versions_of_via() {
     let labels = read_sample(&from_address);
     assert_eq!((labels.boxes, labels.warnings), (expected(), vec![]));
 }
+
+#[test]
+fn a_line_with_the_separator_and_old_line_ends_do_not_change_csv() {
+    let plain = read(VIA_CSV.as_bytes(), "via.csv", &PAGE).expect("labels");
+    for text in [
+        format!("sep=,\n{VIA_CSV}"),
+        format!("Sep = ,\r\n{}", VIA_CSV.replace('\n', "\r\n")),
+        VIA_CSV.replace('\n', "\r"),
+    ] {
+        let labels = read(text.as_bytes(), "via.csv", &PAGE).expect("labels");
+        assert_eq!(labels.boxes, plain.boxes, "{text}");
+    }
+}

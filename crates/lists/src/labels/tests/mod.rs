@@ -1,6 +1,7 @@
 //! Labels of one page in all formats.
 
 mod any_bytes;
+mod coco_ids;
 mod errors;
 mod format_agreement;
 mod levels;

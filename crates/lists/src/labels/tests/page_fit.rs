@@ -179,3 +179,27 @@ fn many_names_are_counted() {
     let warning = read_boxes(&boxes).warnings.swap_remove(0);
     assert!(warning.ends_with("box 7, box 8 and 4 more"), "{warning}");
 }
+
+#[test]
+fn boxes_in_fractions_are_named() {
+    let size = serde_json::json!({"id": 1, "file_name": PAGE.name, "width": PAGE.width, "height": PAGE.height});
+    let coco = serde_json::json!({
+        "images": [size],
+        "annotations": [{"image_id": 1, "bbox": [0.5, 0.1, 0.06, 0.1]}, {"image_id": 1, "bbox": [0.5, 0.3, 0.06, 0.1]}],
+    });
+    let bboxes = boxes_file(&[[0.5, 0.1, 0.56, 0.2], [0.5, 0.3, 0.56, 0.4]]);
+    for text in [coco.to_string(), bboxes] {
+        let refused = read(text.as_bytes(), "l", &PAGE)
+            .expect_err("fractions")
+            .to_string();
+        assert!(
+            refused.contains("they look like fractions of the page"),
+            "{refused}"
+        );
+    }
+    let points = boxes_file(&[[0.5, 0.5, 0.5, 0.5]]);
+    let refused = read(points.as_bytes(), "l", &PAGE)
+        .expect_err("a point")
+        .to_string();
+    assert!(refused.contains("the file has no boxes"), "{refused}");
+}

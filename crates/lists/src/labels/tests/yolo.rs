@@ -96,3 +96,30 @@ fn lines_that_are_neither_boxes_nor_outlines_are_refused() {
     ];
     insta::assert_snapshot!(sentences.join("\n"));
 }
+
+#[test]
+fn lines_that_end_with_a_carriage_return_alone_are_lines() {
+    let plain = boxes(|_| String::new());
+    for text in [plain.replace('\n', "\r"), plain.replacen('\n', "\r", 3)] {
+        assert_eq!(bounds(&labels(&text)), bounds(&labels(&plain)));
+    }
+    let damaged = plain.replacen('\n', "\r0 0.5 x 0.1 0.1\r", 2);
+    assert!(refusal(&damaged).contains("line 2: \"x\" is not a number"));
+}
+
+#[test]
+fn points_of_a_pose_are_no_outline_though_a_box_is_near_the_corner() {
+    let near = "0 0.01 0.01 0.02 0.02";
+    for points in [
+        " 0.5 0.4",
+        " 0.5 0.4 0.52 0.41",
+        " 0.5 0.4 0.52 0.41 0.53 0.44 0.5 0.46",
+    ] {
+        let near_points = points.replace("0.5", "0.01").replace("0.4", "0.01");
+        let text = format!("{}{near}{near_points}\n", boxes(|_| points.to_owned()));
+        let columns = 5 + points.split_whitespace().count();
+        let reason = format!("the first 5 of {columns} columns are a box");
+        let refused = refusal(&text);
+        assert!(refused.contains(&reason), "{points}: {refused}");
+    }
+}
