@@ -21,6 +21,8 @@ pub struct HeaderColumns {
     pub columns: Vec<Option<&'static str>>,
     /// Columns with other names, as written, each with its name.
     pub renamed: Vec<(String, &'static str)>,
+    /// Columns that are not known, although they have other names of columns that are, as written, each with the name.
+    pub unread: Vec<(String, &'static str)>,
 }
 
 /// Two columns of a header, counted from 1, that are the same.
@@ -98,7 +100,19 @@ impl KnownColumns {
             columns[first] = Some(name);
             renamed.push((header[first].trim().to_owned(), *name));
         }
-        Ok(HeaderColumns { columns, renamed })
+        let known_elsewhere = |k: usize| {
+            let mut others = self.other_names.iter();
+            let (_, name) = others
+                .find(|(other, name)| plain[k] == *other && columns.contains(&Some(*name)))?;
+            Some((header[k].trim().to_owned(), *name))
+        };
+        let unknown = (0..header.len()).filter(|k| columns[*k].is_none());
+        let unread = unknown.filter_map(known_elsewhere).collect();
+        Ok(HeaderColumns {
+            columns,
+            renamed,
+            unread,
+        })
     }
 
     /// Returns the column with this name.
@@ -181,6 +195,21 @@ mod tests {
         let (first, second) = (1, 3);
         for header in [["khối", "x", "Khoi"], ["block", "x", "Block"]] {
             assert_eq!(COLUMNS.assign(&header), Err(SameColumn { first, second }));
+        }
+    }
+
+    #[test]
+    fn other_names_of_a_column_that_is_known_are_returned() {
+        for (header, expected) in [
+            (["khối", "block"], &[("khối", "block")][..]),
+            (["Khối ", "Số hiệu ván"], &[("Khối", "block")]),
+            (["ma", "x"], &[]),
+            (["id", "khối"], &[]),
+        ] {
+            let found = COLUMNS.assign(&header).expect("columns that differ");
+            let unread = found.unread.iter();
+            let unread: Vec<(&str, &str)> = unread.map(|(text, name)| (&**text, *name)).collect();
+            assert_eq!(unread, expected, "{header:?}");
         }
     }
 }

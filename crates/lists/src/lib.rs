@@ -2,7 +2,7 @@
 //!
 //! - [`manifest`]: rows of CSV, JSON Lines and folders become drafts of pairs and blocks
 //! - [`columns`]: names of columns in any case, with blanks, and in Vietnamese
-//! - [`json_numbers`]: `NaN` and `Infinity` in JSON
+//! - [`json_numbers`]: `NaN` and `Infinity` in JSON, and its numbers as text
 //! - [`quotes`]: refuses CSV text with a quotation mark that takes in further rows
 //! - [`workbook`]: sheets of XLSX workbooks as CSV
 //! - [`zip`]: files of ZIP archives; [`relative_path`]: paths in them and from browsers that are safe on every system

@@ -112,6 +112,8 @@ impl Listing {
         let mut warnings = misspelt.warnings();
         warnings.extend(read.unnamed.warning());
         warnings.extend(read.formula_errors.warning());
+        warnings.extend(read.unusual_cells.warnings());
+        warnings.extend(read.unread_columns.warnings());
         warnings.extend(ids.warning());
         match unread.warnings() {
             Ok(unread) => warnings.extend(unread),
@@ -369,7 +371,7 @@ mod tests {
             "{missing:?}"
         );
         std::fs::create_dir(dir.path().join("d.stl")).expect("a folder");
-        let list = "id,mesh,print\na,d.stl,https://museum.vn/1.png\nb,file:///d/1.stl,\"a\nb.png\"\nc,a\t.stl,c.csv\n";
+        let list = "id,mesh,print\na,d.stl,https://museum.vn/1.png\nb,file:///d/1.stl,b.png\nc,a\t.stl,c.csv\n";
         std::fs::write(&file, list).expect("written");
         let mut odd = Vec::new();
         let listing = from_file(&file).expect("valid");
@@ -378,7 +380,7 @@ mod tests {
             "d.stl of a is a folder, not a file",
             "https://museum.vn/1.png of a is a web address; download the file and write the path of the copy",
             "file:///d/1.stl of b does not exist; write its path without file://",
-            "b.png of b does not exist; its path has a line break: write the cell on one line",
+            "b.png of b does not exist",
             " of c does not exist; its path has a tab: remove it",
         ]) {
             assert!(line.ends_with(end), "{line}");

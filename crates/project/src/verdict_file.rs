@@ -21,7 +21,8 @@ use mocban_core::domain::spelling::{hint, quoted};
 use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{
-    CsvText, LineCounter, NotText, as_utf8, fits_header, is_array, later_header, trimmed,
+    CsvText, LineCounter, NotText, as_utf8, fits_header, is_array, later_header, plain_cell,
+    trimmed,
 };
 use mocban_lists::quotes::check_quotes;
 use mocban_system::time_text::{day, duration};
@@ -311,7 +312,7 @@ fn row(
     let cell = |column: usize| {
         positions[column]
             .and_then(|position| record.get(position))
-            .map(trimmed)
+            .map(plain_cell)
             .filter(|text| !text.is_empty())
     };
     let required = |column: usize| {

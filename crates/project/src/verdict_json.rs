@@ -15,7 +15,7 @@ use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
-use mocban_lists::json_numbers::nan_as_null;
+use mocban_lists::json_numbers::{nan_as_null, number_text};
 use mocban_lists::manifest::{ArrayCursor, place_in_row, trimmed};
 
 /// The fields of the log of verdicts, which JSON Lines may have.
@@ -180,7 +180,7 @@ fn text_of(fields: &Map<String, Value>, field: &str) -> Result<Option<String>, S
         // Notes are stored as they were given.
         Some(Value::String(text)) if field == "note" => text.clone(),
         Some(Value::String(text)) => trimmed(text).to_owned(),
-        Some(Value::Number(number)) => number.to_string(),
+        Some(Value::Number(number)) => number_text(number),
         Some(other) => return Err(format!("{field} is {other}, not text")),
     };
     Ok((!trimmed(&text).is_empty()).then_some(text))

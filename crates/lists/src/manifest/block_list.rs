@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
 use super::cell_errors::{FormulaErrors, id_error};
+use super::cell_forms::UnusualCells;
 use super::changed_ids::ChangedIds;
 use super::column_names::missing_column;
 use super::csv::{ListedColumn, column_names, draft_of, row_reader};
@@ -20,6 +21,7 @@ use super::row::RowIds;
 use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter, encoding_hint};
 use super::unnamed_values::UnnamedValues;
+use super::unread_columns::UnreadColumns;
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
@@ -102,15 +104,23 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
         }
         let line = lines.at(Some(record.position().unwrap_or(&start)));
         let Some(columns) = &header else {
-            let (columns, renamed) = columns_of(line, &record, &hint)?;
+            let HeaderColumns {
+                columns,
+                renamed,
+                unread,
+            } = columns_of(line, &record, &hint)?;
             rows.renamed.extend(renamed);
-            header = Some(columns);
+            rows.unread.add(unread);
+            let names = column_names(line, &record, &hint)?;
+            let names = names.into_iter().map(str::to_owned);
+            header = Some(columns.into_iter().zip(names).collect());
             continue;
         };
         if record.iter().all(<[u8]>::is_empty) {
             continue;
         }
-        rows.push(line, draft_of(line, columns, &record, &hint));
+        let place = (line, text.delimiter);
+        rows.push(line, draft_of(place, columns, &record, &hint));
     }
     rows.finish()
 }
@@ -127,6 +137,7 @@ pub fn read_block_json(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             draft => draft,
         };
         rows.renamed.extend(row.renamed);
+        rows.unread.add(row.unread);
         rows.push(row.line, draft);
     });
     if let Err(refused) = read {
@@ -150,9 +161,11 @@ fn is_exported(draft: &DraftRow) -> bool {
 struct BlockRows {
     rows: Vec<BlockRow>,
     renamed: BTreeMap<String, &'static str>,
+    unread: UnreadColumns,
     ids: RowIds,
     unnamed: UnnamedValues,
     formula_errors: FormulaErrors,
+    unusual_cells: UnusualCells,
     problems: ManifestError,
 }
 
@@ -162,6 +175,7 @@ impl BlockRows {
         let mut reasons = Vec::new();
         if let Ok(draft) = &mut draft {
             self.unnamed.add(line, draft.unnamed);
+            self.unusual_cells.add(line, &draft.unusual);
             self.formula_errors.leave_out(line, &mut draft.meta);
         }
         match draft.map(|draft| row(draft, &mut reasons)) {
@@ -184,8 +198,10 @@ impl BlockRows {
         let Self {
             rows,
             renamed,
+            unread,
             unnamed,
             formula_errors,
+            unusual_cells,
             problems,
             ..
         } = self;
@@ -199,6 +215,8 @@ impl BlockRows {
         }
         let of_cells = [unnamed.warning(), formula_errors.warning(), ids.warning()];
         let of_cells = of_cells.into_iter().flatten();
+        let of_cells = of_cells.chain(unusual_cells.warnings());
+        let of_cells = of_cells.chain(unread.warnings());
         let warnings = of_cells.chain(similar_columns(&rows)).collect();
         Ok(ReadBlocks {
             rows,
@@ -223,15 +241,12 @@ fn similar_columns(rows: &[BlockRow]) -> Vec<String> {
     similar.warnings().collect()
 }
 
-/// The columns of a header, and those with other names with what they are.
-type BlockColumns = (Vec<ListedColumn>, Vec<(String, &'static str)>);
-
-/// Returns the columns of a header, and those with other names.
+/// Returns what the columns of a header are.
 fn columns_of(
     line: usize,
     record: &::csv::ByteRecord,
     encoding_hint: &str,
-) -> Result<BlockColumns, ManifestError> {
+) -> Result<HeaderColumns, ManifestError> {
     let names = column_names(line, record, encoding_hint)?;
     let found = COLUMNS
         .assign(&names)
@@ -239,16 +254,15 @@ fn columns_of(
     if let Some(same) = found.same_others(&names) {
         return Err(at_line(line, &same.reason(&names)).into());
     }
-    let HeaderColumns { columns, renamed } = found;
+    let columns = &found.columns;
     let mut problems = ManifestError::default();
     let required = COLUMNS.names[..REQUIRED].iter();
     let missing = required.filter(|name| !columns.contains(&Some(**name)));
     problems.extend(
-        missing.map(|name| at_line(line, &missing_column(name, &COLUMNS, &names, &columns))),
+        missing.map(|name| at_line(line, &missing_column(name, &COLUMNS, &names, columns))),
     );
     problems.check(false)?;
-    let names = names.into_iter().map(str::to_owned);
-    Ok((columns.into_iter().zip(names).collect(), renamed))
+    Ok(found)
 }
 
 /// Returns a row, or records why it is not valid.

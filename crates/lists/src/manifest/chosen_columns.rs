@@ -48,6 +48,7 @@ impl ChosenColumns {
             *column = column.filter(|name| is_free(name));
         }
         found.renamed.retain(|(_, name)| is_free(name));
+        found.unread.retain(|(_, name)| is_free(name));
         for (at, field) in chosen {
             found.columns[at] = Some(field);
             if header[at] != field {

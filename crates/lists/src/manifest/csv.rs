@@ -1,6 +1,7 @@
 //! CSV lists, separated by commas, semicolons or tabs.
 
 use super::block_columns;
+use super::cell_forms::{CellForm, plain_cell};
 use super::chosen_columns::ChosenColumns;
 use super::column_names::missing_column;
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
@@ -10,6 +11,7 @@ use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
+use memchr::memchr2;
 use mocban_core::domain::first_names;
 use mocban_core::domain::spelling::quoted;
 
@@ -68,6 +70,7 @@ pub fn read_csv_as(
             (Ok(true), None) => {
                 let mut parsed = CsvHeader::parse(line, &record, (bytes, delimiter), chosen)?;
                 rows.add_renamed(std::mem::take(&mut parsed.renamed));
+                rows.add_unread(std::mem::take(&mut parsed.unread));
                 header = Some(parsed);
             }
             (Err(error), _) => {
@@ -193,8 +196,11 @@ struct CsvHeader {
     columns: Vec<ListedColumn>,
     /// Columns with other names, as written, each with its name.
     renamed: Vec<(String, &'static str)>,
+    /// Columns with other names of columns that are known.
+    unread: Vec<(String, &'static str)>,
     /// What to do about cells that are not UTF-8.
     encoding_hint: String,
+    delimiter: u8,
 }
 
 impl CsvHeader {
@@ -214,7 +220,11 @@ impl CsvHeader {
         if let Some(same) = found.same_others(&names) {
             return Err(at_line(line, &same.reason(&names)).into());
         }
-        let HeaderColumns { columns, renamed } = found;
+        let HeaderColumns {
+            columns,
+            renamed,
+            unread,
+        } = found;
         let mut problems = ManifestError::default();
         let missing = REQUIRED
             .iter()
@@ -235,7 +245,9 @@ impl CsvHeader {
         Ok(Self {
             columns: columns.into_iter().zip(names).collect(),
             renamed,
+            unread,
             encoding_hint,
+            delimiter,
         })
     }
 
@@ -247,7 +259,8 @@ impl CsvHeader {
         if record.iter().all(<[u8]>::is_empty) {
             return Ok(None);
         }
-        draft_of(line, &self.columns, record, &self.encoding_hint).map(Some)
+        let place = (line, self.delimiter);
+        draft_of(place, &self.columns, record, &self.encoding_hint).map(Some)
     }
 }
 
@@ -263,12 +276,12 @@ pub fn fits_header(
     record.iter().skip(columns).all(is_empty) && (record.len()..columns).all(is_unnamed)
 }
 
-/// Returns a row's cells.
+/// Returns the cells of a row on a line.
 ///
 /// # Errors
-/// Returns an error if the number of cells is wrong or a cell is not UTF-8.
+/// Returns an error if the number of cells is wrong, a cell is not UTF-8, or a path or a character has a line break.
 pub(super) fn draft_of(
-    line: usize,
+    (line, delimiter): (usize, u8),
     columns: &[ListedColumn],
     record: &::csv::ByteRecord,
     encoding_hint: &str,
@@ -278,6 +291,8 @@ pub(super) fn draft_of(
         return Err(format!("the row has {cells} cells, the header has {names}"));
     }
     let mut draft = DraftRow::new(line);
+    // Few rows have any.
+    let has_breaks = memchr2(b'\n', b'\r', record.as_slice()).is_some();
     for ((known, name), cell) in columns.iter().zip(record) {
         let Ok(cell) = std::str::from_utf8(cell) else {
             let name = quoted(known.unwrap_or(name));
@@ -285,8 +300,21 @@ pub(super) fn draft_of(
                 "the cell of column {name} is not UTF-8{encoding_hint}"
             ));
         };
-        let cell = trimmed(cell);
+        let cell = plain_cell(cell);
+        if CellForm::has_apostrophe(cell) {
+            let column = known.unwrap_or(name).to_owned();
+            draft.unusual.push((CellForm::Apostrophe, column));
+        }
+        if has_breaks && known.is_none() && CellForm::takes_row(cell, delimiter, names) {
+            draft.unusual.push((CellForm::TakesRow, name.clone()));
+        }
         if let Some(known) = known {
+            // An id and a block have their own sentences.
+            if has_breaks && cell.contains(['\n', '\r']) && !matches!(*known, "id" | "block") {
+                return Err(format!(
+                    "column {known} has a line break; write it on one line"
+                ));
+            }
             draft.cells.insert(known, cell.to_owned());
         } else if !cell.is_empty() && !name.is_empty() {
             draft.meta.insert(name.clone(), cell.into());

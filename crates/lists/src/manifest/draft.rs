@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::cell_errors::{cell_error, id_error};
+use super::cell_forms::CellForm;
 use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
@@ -18,6 +19,8 @@ pub(super) struct DraftRow {
     pub(super) meta: BTreeMap<String, serde_json::Value>,
     /// Number of values in columns without a name.
     pub(super) unnamed: usize,
+    /// Cells of CSV in unusual forms, each with its column.
+    pub(super) unusual: Vec<(CellForm, String)>,
 }
 
 impl DraftRow {
@@ -65,6 +68,11 @@ impl<'e> RowCollector<'e> {
         self.read.renamed.extend(renamed);
     }
 
+    /// Adds columns that are not read, although they have other names of columns that are.
+    pub(super) fn add_unread(&mut self, unread: impl IntoIterator<Item = (String, &'static str)>) {
+        self.read.unread_columns.add(unread);
+    }
+
     /// Adds a problem of the list or of a line.
     pub(super) fn add_problem(&mut self, problem: Problem) {
         self.problems.add(problem);
@@ -76,6 +84,7 @@ impl<'e> RowCollector<'e> {
         let row = match draft {
             Ok(Some(mut draft)) => {
                 self.read.unnamed.add(line, draft.unnamed);
+                self.read.unusual_cells.add(line, &draft.unusual);
                 self.read.formula_errors.leave_out(line, &mut draft.meta);
                 let name = self.name(&draft, &mut reasons);
                 complete(draft, name, &mut reasons)

@@ -11,7 +11,7 @@ use super::error::{Problem, at_line, of_list};
 use super::json_array::{ArrayCursor, DamagedArray, is_array, place_in_row};
 use super::text::{as_utf8, trimmed};
 use crate::columns::{HeaderColumns, KnownColumns};
-use crate::json_numbers::{nan_as_null, unknown_number};
+use crate::json_numbers::{nan_as_null, number_text, unknown_number};
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{KEY_TWICE, UniqueKeys, sanitize, value_error_text};
 
@@ -23,6 +23,8 @@ pub(super) struct JsonRow {
     pub(super) draft: Result<DraftRow, String>,
     /// Keys with other names that no earlier row has in this order, each with its name.
     pub(super) renamed: Vec<(String, &'static str)>,
+    /// Such keys that are not read, because the row has another one of the same meaning.
+    pub(super) unread: Vec<(String, &'static str)>,
 }
 
 /// Passes the rows of a list in JSON, with these columns, to `each`.
@@ -46,10 +48,12 @@ pub(super) fn json_rows(
             draft(line, content, &mut keys)
         };
         let renamed = std::mem::take(&mut keys.columns.renamed);
+        let unread = std::mem::take(&mut keys.columns.unread);
         each(JsonRow {
             line,
             draft,
             renamed,
+            unread,
         });
     };
     for next in row_contents(bytes) {
@@ -226,7 +230,7 @@ impl<'de> Visitor<'de> for EntriesVisitor {
 fn cell(name: &str, value: Value) -> Result<String, String> {
     match value {
         Value::String(text) => Ok(trimmed(&text).to_owned()),
-        Value::Number(number) => Ok(number.to_string()),
+        Value::Number(number) => Ok(number_text(&number)),
         Value::Bool(flag) => Ok(flag.to_string()),
         Value::Null | Value::Array(_) | Value::Object(_) => {
             Err(format!("{name:?} is {value}, not text"))

@@ -30,6 +30,7 @@ pub fn read_jsonl(
     let mut rows = RowCollector::new(each);
     let read = json_rows(bytes, COLUMNS, &mut |row| {
         rows.add_renamed(row.renamed);
+        rows.add_unread(row.unread);
         rows.push(row.line, row.draft.map(Some));
     });
     if let Err(refused) = read {
@@ -44,6 +45,22 @@ mod tests {
 
     fn parse(text: &str) -> Result<Vec<ManifestRow>, ManifestError> {
         super::parse_jsonl(text.as_bytes())
+    }
+
+    #[test]
+    fn whole_numbers_with_decimals_are_ids_without() {
+        for (id, expected) in [
+            ("117.0", "117"),
+            ("1e3", "1000"),
+            ("117", "117"),
+            ("-0.0", "0"),
+            ("2.5", "2.5"),
+        ] {
+            let row = format!("{{\"id\":{id},\"mesh\":\"m\",\"print\":\"p\",\"block\":{id}}}");
+            let rows = parse(&row).expect("parses");
+            assert_eq!(rows[0].name.as_str(), expected);
+            assert_eq!(rows[0].block.as_deref(), Some(expected));
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 mod block_columns;
 mod block_list;
 mod cell_errors;
+mod cell_forms;
 mod changed_ids;
 mod chosen_columns;
 mod column_names;
@@ -22,10 +23,12 @@ mod row;
 mod similar_columns;
 mod text;
 mod unnamed_values;
+mod unread_columns;
 
 pub use self::csv::{fits_header, parse_csv, read_csv, read_csv_as};
 pub use block_list::{BlockRow, ReadBlocks, parse_blocks, read_block_json, read_blocks};
 pub use cell_errors::{FormulaErrors, cell_error, formula_error};
+pub use cell_forms::{UnusualCells, plain_cell};
 pub use changed_ids::ChangedIds;
 pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;
@@ -43,3 +46,4 @@ pub use row::{ManifestRow, ReadRows, RowIds};
 pub(crate) use row::{is_id_or_path_column, is_text_column};
 pub use text::{CsvText, LineCounter, NotText, as_utf8, trimmed};
 pub use unnamed_values::UnnamedValues;
+pub use unread_columns::UnreadColumns;

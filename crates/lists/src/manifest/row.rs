@@ -5,7 +5,9 @@ use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 
 use super::cell_errors::FormulaErrors;
+use super::cell_forms::UnusualCells;
 use super::unnamed_values::UnnamedValues;
+use super::unread_columns::UnreadColumns;
 use crate::columns::{KnownColumns, plain_name};
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ContentHash, LengthUnit, PairName};
@@ -139,10 +141,14 @@ pub struct ReadRows {
     pub ids: RowIds,
     /// Columns that were read under other names, as written, each with its name.
     pub renamed: BTreeMap<String, &'static str>,
+    /// Columns with other names of columns that are read.
+    pub unread_columns: UnreadColumns,
     /// Values in columns without a name.
     pub unnamed: UnnamedValues,
     /// Values of other columns that are errors of formulas.
     pub formula_errors: FormulaErrors,
+    /// Cells in unusual forms.
+    pub unusual_cells: UnusualCells,
 }
 
 /// Why ids that differ only in case are refused.

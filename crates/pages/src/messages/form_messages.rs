@@ -19,4 +19,26 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
         "multiply them by width and height of the page",
         "hãy nhân với chiều rộng và chiều cao của trang",
     ),
+    // Cells of CSV.
+    ("column {} has a line break", "cột {0} có ngắt dòng"),
+    (
+        "cells that begin with an apostrophe: {}, the first in column {} on line {}",
+        "số ô bắt đầu bằng dấu nháy đơn: {0#}, ô đầu tiên ở cột {1}, dòng {2}",
+    ),
+    (
+        "it is kept, so remove it if it only marks text",
+        "dấu này được giữ lại, hãy xóa nếu nó chỉ đánh dấu văn bản",
+    ),
+    (
+        "cells in quotation marks with a line break and what seems to be another row: {}, the first in column {} on line {}",
+        "số ô trong ngoặc kép có ngắt dòng và có vẻ chứa một dòng khác của danh sách: {0#}, ô đầu tiên ở cột {1}, dòng {2}",
+    ),
+    (
+        "close the quotation marks on their line if it is one",
+        "nếu đúng vậy, hãy đóng ngoặc kép ngay trên dòng của nó",
+    ),
+    (
+        "column {} is kept as metadata, because another column is read as {}",
+        "cột {0} được giữ làm thông tin thêm, vì một cột khác được đọc là {1}",
+    ),
 ];

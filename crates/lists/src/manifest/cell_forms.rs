@@ -1,0 +1,174 @@
+//! Forms of cells of CSV: texts that are kept from becoming numbers, and cells that take in what seems to be another row.
+
+use std::collections::BTreeMap;
+
+use super::text::trimmed;
+use mocban_core::domain::sanitize;
+use mocban_core::domain::spelling::quoted;
+
+/// Longest name of a column in a message, in characters.
+const MAX_COLUMN_CHARS: usize = 60;
+
+/// Returns the text of a cell without blanks at its ends. A formula that is a text alone, such as `="0117"`, with which
+/// spreadsheet programs keep zeros, is this text.
+///
+/// ```
+/// use mocban_lists::manifest::plain_cell;
+///
+/// assert_eq!(plain_cell(" =\"0117\""), "0117");
+/// assert_eq!(plain_cell("=A1"), "=A1");
+/// ```
+pub fn plain_cell(cell: &str) -> &str {
+    let cell = trimmed(cell);
+    let inner = cell.strip_prefix("=\"");
+    let inner = inner.and_then(|rest| rest.strip_suffix('"'));
+    inner
+        .filter(|inner| !inner.contains('"'))
+        .map_or(cell, trimmed)
+}
+
+/// What is unusual about a cell that is read as it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum CellForm {
+    /// It begins with an apostrophe and what a spreadsheet program would take for a number or a formula.
+    Apostrophe,
+    /// It has a line break, and as many separators as a row.
+    TakesRow,
+}
+
+impl CellForm {
+    /// Returns whether a cell begins with the apostrophe that marks text in a spreadsheet program.
+    pub(super) fn has_apostrophe(cell: &str) -> bool {
+        matches!(cell.as_bytes(), [b'\'', next, ..] if next.is_ascii_digit() || b"=+-".contains(next))
+    }
+
+    /// Returns whether a cell of a list with this number of columns has what seems to be another row.
+    pub(super) fn takes_row(cell: &str, delimiter: u8, columns: usize) -> bool {
+        let separators = cell.bytes().filter(|byte| *byte == delimiter).count();
+        cell.contains(['\n', '\r']) && separators + 1 >= columns
+    }
+}
+
+/// Cells of a list in unusual forms.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct UnusualCells(BTreeMap<CellForm, FormCount>);
+
+/// Cells in one form: their number, and the column and line of the first.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct FormCount {
+    count: usize,
+    column: String,
+    line: usize,
+}
+
+impl UnusualCells {
+    /// Adds the cells of a row on a line, each with its column.
+    pub(super) fn add(&mut self, line: usize, cells: &[(CellForm, String)]) {
+        for (form, column) in cells {
+            let found = self.0.entry(*form).or_default();
+            if found.count == 0 {
+                found.column = quoted(&sanitize(column, MAX_COLUMN_CHARS));
+                found.line = line;
+            }
+            found.count += 1;
+        }
+    }
+
+    /// Returns a warning for each form that was found.
+    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+        self.0.iter().map(|(form, found)| {
+            let FormCount {
+                count,
+                column,
+                line,
+            } = found;
+            match form {
+                CellForm::Apostrophe => format!(
+                    "cells that begin with an apostrophe: {count}, the first in column {column} on line {line}; it is kept, \
+                     so remove it if it only marks text"
+                ),
+                CellForm::TakesRow => format!(
+                    "cells in quotation marks with a line break and what seems to be another row: {count}, the first in column \
+                     {column} on line {line}; close the quotation marks on their line if it is one"
+                ),
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{parse_csv, read_blocks, read_csv};
+    use super::plain_cell;
+
+    /// Returns the warnings about cells of a list of pairs.
+    fn warnings(list: &str) -> Vec<String> {
+        let read = read_csv(list.as_bytes(), &mut drop).expect(list);
+        read.unusual_cells.warnings().collect()
+    }
+
+    #[test]
+    fn texts_in_the_form_of_formulas_are_read() {
+        for (cell, expected) in [
+            ("=\"0117\"", "0117"),
+            (" =\" a \" ", "a"),
+            ("=\"\"", ""),
+            ("=\"", "=\""),
+            ("=\"a\"\"b\"", "=\"a\"\"b\""),
+            ("=\"a\"&\"b\"", "=\"a\"&\"b\""),
+            ("=1", "=1"),
+            ("0117", "0117"),
+        ] {
+            assert_eq!(plain_cell(cell), expected, "{cell}");
+        }
+        let list =
+            "id,mesh,print,year,note\n\"=\"\"0117\"\"\",=\"a.stl\",a.png,\"=\"\"01\"\"\",=\"\"\n";
+        let rows = parse_csv(list.as_bytes()).expect("a list");
+        assert_eq!(rows[0].name.as_str(), "0117");
+        assert_eq!(rows[0].mesh.to_str(), Some("a.stl"));
+        assert_eq!(rows[0].meta["year"], "01");
+        assert_eq!(rows[0].meta.len(), 1);
+        let blocks = "block;mesh;page\n\"=\"\"007\"\"\";a.stl;=\"a.png\"\n";
+        let read = read_blocks(blocks.as_bytes()).expect("a list");
+        assert_eq!(read.rows[0].name.as_str(), "007");
+        assert_eq!(read.rows[0].page.to_str(), Some("a.png"));
+    }
+
+    #[test]
+    fn apostrophes_before_numbers_are_named() {
+        let list = "id,mesh,print,note\n'0117,m,p,'t Hooft\n'0118,m,p,'=A1\n";
+        let expected = "cells that begin with an apostrophe: 3, the first in column \"id\" on line 2; it is kept, so remove it \
+            if it only marks text";
+        assert_eq!(warnings(list), [expected]);
+        assert_eq!(warnings("id,mesh,print,note\na,m,p,'t Hooft\n"), [""; 0]);
+        let read = read_blocks(b"block,mesh,page\n'01,m,p\n").expect("a list");
+        assert!(read.warnings[0].starts_with("cells that begin with an apostrophe: 1"));
+    }
+
+    #[test]
+    fn a_cell_that_takes_in_a_row_is_named() {
+        let list = "id,mesh,print,note\nA,a.stl,a.png,\"x\nB,b.stl,b.png,y\"\nC,c.stl,c.png,\"two\nlines, and more\"\n";
+        let expected = "cells in quotation marks with a line break and what seems to be another row: 1, the first in column \
+            \"note\" on line 2; close the quotation marks on their line if it is one";
+        assert_eq!(warnings(list), [expected]);
+        let list = "block,mesh,page,note\r\nA,a.stl,a.png,\"x\r\nB,b.stl,b.png,y\"\r\n";
+        let read = read_blocks(list.as_bytes()).expect("a list");
+        assert!(read.warnings[0].starts_with("cells in quotation marks with a line break"));
+    }
+
+    #[test]
+    fn a_line_break_in_a_path_or_character_is_refused() {
+        for (row, column) in [
+            ("A,\"a.stl\nB,b.stl\",a.png,x", "mesh"),
+            ("A,a.stl,\"a\r.png\",x", "print"),
+            ("A,a.stl,a.png,\"x\ny\"", "character"),
+        ] {
+            let list = format!("id,mesh,print,character\n{row}\n");
+            let refused = parse_csv(list.as_bytes()).expect_err(column).to_string();
+            let reason = format!("line 2: column {column} has a line break; write it on one line");
+            assert_eq!(refused, reason);
+        }
+        let refused = read_blocks(b"block,mesh,page\nb,m,\"p\nq\"\n").expect_err("a page");
+        assert!(refused.to_string().contains("column page has a line break"));
+    }
+}
