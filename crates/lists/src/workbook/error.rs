@@ -46,6 +46,16 @@ pub enum WorkbookError {
         /// A text that is converted in this way.
         example: &'static str,
     },
+    /// An id or a file name that is a number with text of its format.
+    #[error("cell {cell} of column \"{}\" shows its number in the format {}, which is not read; give the column the format Text and write the cell again", sanitize(.column, MAX_SHOWN), sanitize(.code, MAX_SHOWN))]
+    ShownNumber {
+        /// The cell, such as `B5`.
+        cell: String,
+        /// Name of its column.
+        column: String,
+        /// The format.
+        code: String,
+    },
     /// A text longer than a spreadsheet program allows.
     #[error("cell {cell} has more than {limit} bytes of text; shorten it")]
     LongCell {
@@ -102,6 +112,7 @@ impl WorkbookError {
         matches!(
             self,
             Self::Converted { .. }
+                | Self::ShownNumber { .. }
                 | Self::LongCell { .. }
                 | Self::NoResult { .. }
                 | Self::CellError { .. }

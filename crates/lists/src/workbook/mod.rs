@@ -3,9 +3,11 @@
 mod archive;
 mod cell_names;
 mod error;
+mod hidden_rows;
 mod merged;
 mod number_format;
 mod parts;
+mod shown_number;
 mod table;
 #[cfg(any(test, feature = "test-helpers"))]
 pub mod test_helpers;
@@ -25,7 +27,8 @@ const START: &[u8] = b"PK\x03\x04";
 pub struct SheetTable {
     /// The table, separated by commas. Its lines are the rows of the sheet, so an error in a line is one in that row.
     pub csv: Vec<u8>,
-    /// Says which sheet was read if there are others, and how many values stand beside the table or below merged cells.
+    /// Says which sheet was read if there are others, how many values stand beside the table or below merged cells, and how
+    /// many rows are hidden.
     pub warning: Option<String>,
 }
 

@@ -7,6 +7,7 @@ use quick_xml::events::BytesStart;
 use super::archive::{WorkbookArchive, damaged};
 use super::error::WorkbookError;
 use super::number_format::NumberFormat;
+use super::shown_number::ShownNumber;
 use crate::xml::{XmlFault, XmlPart, attribute, local_name, read_xml};
 
 /// The file that names the sheets, and the folder of the others.
@@ -63,6 +64,8 @@ pub(super) struct Workbook {
     pub(super) strings: Vec<String>,
     /// Format of numbers of each style.
     pub(super) formats: Vec<NumberFormat>,
+    /// How styles show the numbers of ids, if not as numbers.
+    pub(super) shown_numbers: HashMap<usize, ShownNumber>,
     /// Whether days are counted from 1904.
     pub(super) is_1904: bool,
 }
@@ -101,7 +104,7 @@ impl Workbook {
         if let Some(file) = &relations.styles
             && let Some(text) = archive.text(file)?
         {
-            workbook.formats = formats(file, &text)?;
+            workbook.read_formats(file, &text)?;
         }
         Ok(workbook)
     }
@@ -204,39 +207,48 @@ impl TextCollector {
     }
 }
 
-/// Reads the format of numbers of each style of cells.
-fn formats(file: &str, text: &str) -> Result<Vec<NumberFormat>, WorkbookError> {
-    let mut codes: HashMap<u32, NumberFormat> = HashMap::new();
-    let (mut formats, mut in_cells) = (Vec::new(), false);
-    let mut open = Vec::new();
-    read_part(file, text, |part| {
-        match part {
-            XmlPart::Start(element) => {
-                let name = local_name(&element);
-                let id = |key| Ok(value(&element, key)?.parse::<u32>().unwrap_or_default());
-                match name.as_str() {
-                    "numFmt" => {
-                        let code = value(&element, "formatCode")?;
-                        codes.insert(id("numFmtId")?, NumberFormat::of_code(&code));
+impl Workbook {
+    /// Reads the format of numbers of each style of cells.
+    fn read_formats(&mut self, file: &str, text: &str) -> Result<(), WorkbookError> {
+        let mut codes: HashMap<u32, (NumberFormat, Option<ShownNumber>)> = HashMap::new();
+        let mut in_cells = false;
+        let mut open = Vec::new();
+        read_part(file, text, |part| {
+            match part {
+                XmlPart::Start(element) => {
+                    let name = local_name(&element);
+                    let id = |key| Ok(value(&element, key)?.parse::<u32>().unwrap_or_default());
+                    match name.as_str() {
+                        "numFmt" => {
+                            let code = value(&element, "formatCode")?;
+                            let format = NumberFormat::of_code(&code);
+                            let is_plain = format == NumberFormat::Plain;
+                            let shown = is_plain.then(|| ShownNumber::of_code(&code)).flatten();
+                            codes.insert(id("numFmtId")?, (format, shown));
+                        }
+                        "cellXfs" => in_cells = true,
+                        "xf" if in_cells => {
+                            let id = id("numFmtId")?;
+                            let (format, shown) = match codes.get(&id) {
+                                Some((format, shown)) => (*format, shown.clone()),
+                                None => (NumberFormat::built_in(id), None),
+                            };
+                            let style = self.formats.len();
+                            self.shown_numbers.extend(shown.map(|shown| (style, shown)));
+                            self.formats.push(format);
+                        }
+                        _ => {}
                     }
-                    "cellXfs" => in_cells = true,
-                    "xf" if in_cells => {
-                        let id = id("numFmtId")?;
-                        let format = codes.get(&id).copied();
-                        formats.push(format.unwrap_or_else(|| NumberFormat::built_in(id)));
+                    open.push(name);
+                }
+                XmlPart::End => {
+                    if open.pop().is_some_and(|name| name == "cellXfs") {
+                        in_cells = false;
                     }
-                    _ => {}
                 }
-                open.push(name);
+                XmlPart::Text(_) => {}
             }
-            XmlPart::End => {
-                if open.pop().is_some_and(|name| name == "cellXfs") {
-                    in_cells = false;
-                }
-            }
-            XmlPart::Text(_) => {}
-        }
-        check_count(formats.len().max(codes.len()), MAX_STYLES, "styles")
-    })?;
-    Ok(formats)
+            check_count(self.formats.len().max(codes.len()), MAX_STYLES, "styles")
+        })
+    }
 }

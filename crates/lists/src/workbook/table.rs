@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::archive::damaged;
 use super::cell_names::{MAX_COLUMNS, MAX_ROWS, column, letters};
 use super::error::WorkbookError;
+use super::hidden_rows::HiddenRows;
 use super::merged::{HiddenValues, MergedCells};
 use super::parts::{TextCollector, Workbook, read_part, value};
 use crate::manifest::{UnnamedValues, formula_error, is_id_or_path_column, is_text_column};
@@ -50,6 +51,10 @@ struct TableWriter<'w> {
     merged: MergedCells,
     /// Values that other cells cover.
     hidden: HiddenValues,
+    /// Whether the open row is hidden.
+    is_row_hidden: bool,
+    /// Rows that are hidden, and read.
+    hidden_rows: HiddenRows,
     /// Whether a cell cannot be read.
     is_refused: bool,
     /// The first cells that cannot be read, and errors of formulas, which a parser would refuse.
@@ -61,9 +66,9 @@ struct TableWriter<'w> {
 /// Largest number of cells that are named because they cannot be read.
 const MAX_REFUSED: usize = 10;
 
-/// Returns the text of a sheet as CSV, and warnings about values that are left out: to the right of the header, and below
-/// merged cells. Line breaks in cells that are no ids and no paths become blanks. Cells that are merged over rows of a column
-/// all have the value of the first.
+/// Returns the text of a sheet as CSV, and warnings about values that are left out, to the right of the header and below
+/// merged cells, and about hidden rows. Line breaks in cells that are no ids and no paths become blanks. Cells that are
+/// merged over rows of a column all have the value of the first.
 ///
 /// The header is the first row with a value that is no title: see [`is_header`]. A parser refuses titles above it.
 pub(super) fn csv(
@@ -85,11 +90,15 @@ pub(super) fn csv(
         cell: None,
         merged: MergedCells::read(file, text)?,
         hidden: HiddenValues::default(),
+        is_row_hidden: false,
+        hidden_rows: HiddenRows::default(),
         is_refused: false,
         refused: Vec::new(),
         refused_count: 0,
     };
     let mut collector = TextCollector::default();
+    // Few sheets have hidden rows.
+    let may_hide = text.contains(" hidden=");
     read_part(file, text, |part| {
         if let (XmlPart::Text(text), Some(cell)) = (&part, &mut writer.cell)
             && collector.is_in("v")
@@ -101,7 +110,12 @@ pub(super) fn csv(
         }
         match part {
             XmlPart::Start(element) => match local_name(&element).as_str() {
-                "row" => writer.begin_row(&value(&element, "r")?),
+                "row" => {
+                    let hidden = may_hide.then(|| value(&element, "hidden")).transpose()?;
+                    let is_hidden = hidden.is_some_and(|hidden| matches!(&*hidden, "1" | "true"));
+                    writer.is_row_hidden = is_hidden;
+                    writer.begin_row(&value(&element, "r")?)
+                }
                 "c" => {
                     let style = value(&element, "s")?.parse().unwrap_or_default();
                     writer.begin_cell(&value(&element, "r")?, value(&element, "t")?, style)
@@ -120,7 +134,11 @@ pub(super) fn csv(
         }
     })?;
     if !writer.is_refused {
-        let left_out = [writer.beside.warning(), writer.hidden.warning()];
+        let left_out = [
+            writer.beside.warning(),
+            writer.hidden.warning(),
+            writer.hidden_rows.warning(),
+        ];
         return Ok((writer.csv, left_out.into_iter().flatten().collect()));
     }
     let (mut first, count) = (writer.refused, writer.refused_count);
@@ -288,8 +306,27 @@ impl TableWriter<'_> {
                         example,
                     });
                 }
-                text
+                self.shown_number(column, style, &value)?.unwrap_or(text)
             }
+        })
+    }
+
+    /// Returns what a reader sees of the number of an id or a file name, if its format has more than digits.
+    fn shown_number(
+        &self,
+        column: usize,
+        style: usize,
+        number: &str,
+    ) -> Result<Option<String>, WorkbookError> {
+        let shown = self.workbook.shown_numbers.get(&style);
+        let (Some(shown), Some(header)) = (shown, self.text_columns.get(&column)) else {
+            return Ok(None);
+        };
+        let text = shown.text(number);
+        text.map(Some).map_err(|code| WorkbookError::ShownNumber {
+            cell: self.name(column),
+            column: header.clone(),
+            code,
         })
     }
 
@@ -344,6 +381,9 @@ impl TableWriter<'_> {
             self.text_columns = names.map(|(k, name)| (k, name.clone())).collect();
         } else if self.width > 0 {
             self.fill_merged()?;
+            if self.is_row_hidden {
+                self.hidden_rows.add(self.row);
+            }
         }
         for _ in self.rows + 1..self.row {
             self.csv.push(b'\n');

@@ -41,4 +41,17 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
         "column {} is kept as metadata, because another column is read as {}",
         "cột {0} được giữ làm thông tin thêm, vì một cột khác được đọc là {1}",
     ),
+    // Workbooks.
+    (
+        "cell {} of column {} shows its number in the format {}, which is not read",
+        "ô {0} của cột {1} hiện số theo định dạng {2} không đọc được",
+    ),
+    (
+        "hidden rows are read, too: {}, the first is row {}",
+        "số dòng bị ẩn vẫn được đọc: {0#}, dòng đầu tiên là {1}",
+    ),
+    (
+        "remove them if they are not meant",
+        "hãy xóa các dòng đó nếu không cần",
+    ),
 ];

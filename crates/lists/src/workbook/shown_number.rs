@@ -1,0 +1,187 @@
+//! Numbers in formats with text of their own, such as `"B"000`: what a reader sees is the id, and the cell has only its number.
+
+/// Longest code of a format that Excel has, in characters.
+const MAX_CODE_CHARS: usize = 255;
+
+/// How a format of numbers shows the whole number of an id.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum ShownNumber {
+    /// With at least this many digits between two texts.
+    Between(String, usize, String),
+    /// In a way that is not read; the code of the format.
+    Unread(String),
+}
+
+/// Where the reader of a code is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum CodePart {
+    Before,
+    Digits,
+    Behind,
+}
+
+/// The parts of a code up to a place.
+struct CodeParts {
+    part: CodePart,
+    before: String,
+    zeros: usize,
+    behind: String,
+    /// Whether text stands between digits, or digits stand behind a point.
+    is_divided: bool,
+}
+
+impl CodeParts {
+    fn add_text(&mut self, text: &str) {
+        if self.part == CodePart::Before {
+            self.before += text;
+        } else {
+            self.part = CodePart::Behind;
+            self.behind += text;
+        }
+    }
+
+    fn add_digits(&mut self, zeros: usize) {
+        self.is_divided |= self.part == CodePart::Behind;
+        self.part = CodePart::Digits;
+        self.zeros += zeros;
+    }
+}
+
+impl ShownNumber {
+    /// Returns what a code does to a whole number that is no date, percentage or power of ten, or `None` if it shows it as it
+    /// is, but for separators of thousands.
+    pub(super) fn of_code(code: &str) -> Option<Self> {
+        if code.chars().count() > MAX_CODE_CHARS {
+            return Some(Self::Unread(code.chars().take(MAX_CODE_CHARS).collect()));
+        }
+        let mut parts = CodeParts {
+            part: CodePart::Before,
+            before: String::new(),
+            zeros: 0,
+            behind: String::new(),
+            is_divided: false,
+        };
+        let mut rest = code;
+        while let Some(c) = rest.chars().next() {
+            let general = rest.get(..GENERAL.len());
+            if general.is_some_and(|word| word.eq_ignore_ascii_case(GENERAL)) {
+                parts.add_digits(0);
+                rest = &rest[GENERAL.len()..];
+                continue;
+            }
+            rest = &rest[c.len_utf8()..];
+            match c {
+                // The first section is that of positive numbers.
+                ';' => break,
+                '%' | 'E' | 'e' | '@' => return None,
+                '0' => parts.add_digits(1),
+                '#' | '?' => parts.add_digits(0),
+                ',' if parts.part == CodePart::Digits => {}
+                '.' if parts.part == CodePart::Digits => parts.is_divided = true,
+                '"' => {
+                    let (text, behind) = rest.split_once('"').unwrap_or((rest, ""));
+                    parts.add_text(text);
+                    rest = behind;
+                }
+                '[' => {
+                    let (inner, behind) = rest.split_once(']').unwrap_or((rest, ""));
+                    // A currency, such as `[$€-407]`; all else is a colour or a condition.
+                    let currency = inner.strip_prefix('$');
+                    let currency = currency.and_then(|inner| inner.split('-').next());
+                    parts.add_text(currency.unwrap_or_default());
+                    rest = behind;
+                }
+                '\\' | '_' | '*' => {
+                    let next = rest.chars().next().unwrap_or_default();
+                    let (character, behind) = rest.split_at(next.len_utf8().min(rest.len()));
+                    // The others only make room.
+                    if c == '\\' {
+                        parts.add_text(character);
+                    }
+                    rest = behind;
+                }
+                other => parts.add_text(other.encode_utf8(&mut [0; 4])),
+            }
+        }
+        parts.shown(code)
+    }
+}
+
+/// The number as it is, in a code.
+const GENERAL: &str = "General";
+
+impl CodeParts {
+    fn shown(self, code: &str) -> Option<ShownNumber> {
+        let has_text = !self.before.trim().is_empty() || !self.behind.trim().is_empty();
+        if self.is_divided && has_text {
+            return Some(ShownNumber::Unread(code.to_owned()));
+        }
+        let is_changed = !self.is_divided && (has_text || self.zeros > 1);
+        is_changed.then(|| {
+            let before = self.before.trim_start().to_owned();
+            let behind = self.behind.trim_end().to_owned();
+            ShownNumber::Between(before, self.zeros, behind)
+        })
+    }
+}
+
+impl ShownNumber {
+    /// Returns what a reader sees of a number, or the code of the format if that is not known.
+    pub(super) fn text(&self, number: &str) -> Result<String, String> {
+        let whole = number.trim().parse::<u64>().ok();
+        match (self, whole) {
+            (Self::Between(before, zeros, behind), Some(whole)) => {
+                let digits = format!("{whole:0>width$}", width = *zeros);
+                Ok([before, digits.as_str(), behind].concat())
+            }
+            (Self::Between(before, _, behind), None) => Err(format!("{before}0{behind}")),
+            (Self::Unread(code), _) => Err(code.clone()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ShownNumber;
+
+    #[test]
+    fn text_of_a_format_is_part_of_what_is_shown() {
+        for (code, number, expected) in [
+            ("\"B\"000", "17", "B017"),
+            ("B\\-0", "17", "B-17"),
+            ("0000;-0000", "17", "0017"),
+            ("[Red]000", "17", "017"),
+            ("General\" a\"", "17", "17 a"),
+            ("\"Ván \"0", "4", "Ván 4"),
+            ("[$\u{20ab}-42A]0", "5", "\u{20ab}5"),
+            ("\"x\"00\"y\"", "123", "x123y"),
+        ] {
+            let shown = ShownNumber::of_code(code).expect(code);
+            assert_eq!(shown.text(number).as_deref(), Ok(expected), "{code}");
+        }
+    }
+
+    #[test]
+    fn codes_that_show_a_number_as_it_is_and_codes_that_are_not_read_are_told_apart() {
+        for code in [
+            "0",
+            "#,##0",
+            "General",
+            "0.00",
+            "0%",
+            "_-* #,##0_-",
+            "[Red]0",
+            "0.00E+00",
+            "@",
+            "",
+        ] {
+            assert_eq!(ShownNumber::of_code(code), None, "{code}");
+        }
+        for code in ["00\"-\"00", "000\\-000", "\"B\"0.0"] {
+            let shown = ShownNumber::of_code(code).expect(code);
+            assert_eq!(shown.text("17"), Err(code.to_owned()));
+        }
+        let shown = ShownNumber::of_code("\"B\"000").expect("a code");
+        assert!(shown.text("1.5").is_err() && shown.text("-1").is_err());
+    }
+}
