@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{ManifestError, at_file, of_list};
 use super::row::ManifestRow;
+use crate::columns::plain_name;
 use mocban_core::domain::PairName;
 use mocban_core::domain::spelling::{composed, fold_case, plain_form, quoted};
 
@@ -17,8 +18,9 @@ pub const MESH_EXTENSIONS: [&str; 6] = ["obj", "ply", "stl", "xyz", "pts", "ptx"
 /// Extensions of prints.
 pub const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
-/// Folders that name a kind of file, such as `stl` in `block-4/stl/12.stl`. They are no part of ids.
-const KIND_FOLDERS: [&str; 22] = [
+/// Folders that name a kind of file, such as `stl` in `block-4/stl/12.stl`, as [`plain_name`] writes them. They are no part
+/// of ids.
+const KIND_FOLDERS: [&str; 24] = [
     "image",
     "images",
     "img",
@@ -36,11 +38,13 @@ const KIND_FOLDERS: [&str; 22] = [
     "stl",
     "tif",
     "tiff",
-    "quét",
-    "bản quét",
+    "quet",
+    "ban_quet",
+    "luoi",
     "in",
-    "bản in",
-    "ảnh in",
+    "ban_in",
+    "anh_in",
+    "anh_ban_in",
 ];
 
 /// Longest list of similar files in a message.
@@ -275,10 +279,11 @@ fn no_equal_name(meshes: &[FolderFile], prints: &[FolderFile], similar: &[String
     if let Some(first) = similar.first() {
         return format!("{reason}; {first}");
     }
-    let prints = prints.iter().map(|print| (fold_case(&print.stem), print));
-    let prints: BTreeMap<String, &FolderFile> = prints.collect();
+    let prints = grouped(prints, |print| fold_case(&print.stem));
     let other_folder = meshes.iter().find_map(|mesh| {
-        let print = *prints.get(&fold_case(&mesh.stem))?;
+        let prints = prints.get(&fold_case(&mesh.stem))?.iter().copied();
+        // Of equally near ones the first.
+        let print = prints.rev().max_by_key(|print| mesh.shared_folders(print))?;
         let [mesh_folder, print_folder] = [mesh, print].map(|file| quoted(&file.folders.join("/")));
         let (mesh, print) = (mesh.path.display(), print.path.display());
         Some(format!(
@@ -288,18 +293,27 @@ fn no_equal_name(meshes: &[FolderFile], prints: &[FolderFile], similar: &[String
     other_folder.unwrap_or_else(|| reason.to_owned())
 }
 
+/// Returns files by a key.
+fn grouped(
+    files: &[FolderFile],
+    key: impl Fn(&FolderFile) -> String,
+) -> BTreeMap<String, Vec<&FolderFile>> {
+    let mut groups: BTreeMap<String, Vec<&FolderFile>> = BTreeMap::new();
+    for file in files {
+        groups.entry(key(file)).or_default().push(file);
+    }
+    groups
+}
+
 /// Describes meshes and prints without each other whose ids differ only in accents or in zeros before a number.
 fn similar(meshes: &[FolderFile], prints: &[FolderFile]) -> Vec<String> {
-    let prints: BTreeMap<String, &FolderFile> = prints
-        .iter()
-        .map(|print| (plain_form(&print.id()), print))
-        .collect();
-    let similar = meshes.iter().filter_map(|mesh| {
-        let print = prints.get(&plain_form(&mesh.id()))?;
-        let (mesh, print) = (mesh.path.display(), print.path.display());
-        Some(format!(
-            "{mesh} and {print} have similar names; rename one if they are a pair"
-        ))
+    let prints = grouped(prints, |print| plain_form(&print.id()));
+    let similar = meshes.iter().flat_map(|mesh| {
+        let prints = prints.get(&plain_form(&mesh.id())).into_iter().flatten();
+        prints.map(move |print| {
+            let (mesh, print) = (mesh.path.display(), print.path.display());
+            format!("{mesh} and {print} have similar names; rename one if they are a pair")
+        })
     });
     similar.take(MAX_SIMILAR).collect()
 }
@@ -342,7 +356,7 @@ impl FolderFile {
             Component::Normal(name) => Some(text(name)),
             _ => None,
         });
-        let is_kind = |name: &String| KIND_FOLDERS.contains(&name.to_lowercase().as_str());
+        let is_kind = |name: &String| KIND_FOLDERS.contains(&plain_name(name).as_str());
         Some(Self {
             folders: folders.filter(|name| !is_kind(name)).collect(),
             stem: text(path.file_stem()?),
@@ -357,6 +371,15 @@ impl FolderFile {
     fn id(&self) -> String {
         let block = self.block().map_or_else(String::new, |block| block + "_");
         block + &self.stem
+    }
+
+    /// Returns how many folders of another file have the name of one of this file.
+    fn shared_folders(&self, other: &Self) -> usize {
+        let is_shared = |folder: &&String| {
+            let folded = fold_case(folder);
+            self.folders.iter().any(|own| fold_case(own) == folded)
+        };
+        other.folders.iter().filter(is_shared).count()
     }
 
     fn place(&self) -> Vec<SortedPart> {

@@ -74,6 +74,8 @@ fn meshes_and_prints_may_be_in_one_folder_per_block() {
         ["d/b1/quét/1.stl", "d/b1/in/1.png"],
         ["d/b1/Bản Quét/1.stl", "d/b1/BẢN IN/1.png"],
         ["d/b1/que\u{301}t/1.stl", "d/b1/a\u{309}nh in/1.png"],
+        ["d/b1/scan/1.stl", "d/b1/ban in/1.png"],
+        ["d/b1/lưới/1.stl", "d/b1/Ban_In/1.png"],
     ] {
         let both = root(&[mesh, print, "d/notes.txt"]);
         let found = paired(&both, &both).expect("a pair");
@@ -254,4 +256,51 @@ fn a_person_leaves_pairs_out_and_joins_files_without_a_partner() {
         let refused = pairs(left_out, joined).expect_err("not there");
         assert!(refused.contains(expected), "{refused}");
     }
+}
+
+#[test]
+fn every_near_name_is_offered() {
+    let offered = |meshes: &[&str], prints: &[&str]| {
+        let (meshes, prints) = (files(meshes), files(prints));
+        let both = |own: &[PathBuf], end: &str| {
+            let mut all = own.to_vec();
+            all.push(end.into());
+            all
+        };
+        let found = pair_folders(&both(&meshes, "m/x.stl"), &both(&prints, "p/x.png"));
+        found.expect("a pair").similar
+    };
+    let of = |mesh: &str, print: &str| {
+        format!("{mesh} and {print} have similar names; rename one if they are a pair")
+    };
+    assert_eq!(
+        offered(&["m/117.stl"], &["p/00117.png", "p/0117.png"]),
+        [
+            of("m/117.stl", "p/00117.png"),
+            of("m/117.stl", "p/0117.png")
+        ]
+    );
+    assert_eq!(
+        offered(&["m/00117.stl", "m/0117.stl"], &["p/117.png"]),
+        [
+            of("m/00117.stl", "p/117.png"),
+            of("m/0117.stl", "p/117.png")
+        ]
+    );
+}
+
+#[test]
+fn the_nearest_file_of_the_same_name_is_named_if_folders_differ() {
+    let root = ListedFolder {
+        root: "d".into(),
+        files: files(&[
+            "d/b1/x/1.stl",
+            "d/b1/y/1.png",
+            "d/b2/x/1.stl",
+            "d/b2/y/1.png",
+        ]),
+    };
+    let refused = paired(&root, &root).expect_err("no pair").to_string();
+    let reason = "d/b1/x/1.stl and d/b1/y/1.png have the same name, but their folders";
+    assert!(refused.contains(reason), "{refused}");
 }
