@@ -262,10 +262,17 @@ fn restore_refuses_other_files_and_keeps_other_settings() {
     std::fs::write(project.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
     at(&project, &["backup", "../b"]).expect(0);
     std::fs::write(dir.path().join("thesis.docx"), "ten years").expect("written");
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n";
+    std::fs::write(dir.path().join("pointer"), pointer).expect("written");
     std::fs::create_dir(dir.path().join("mine")).expect("a folder");
     std::fs::write(dir.path().join("mine/mocban.toml"), "[run]\n").expect("written");
     for (args, code, says) in [
         (["thesis.docx", "q"], 2, "thesis.docx is not a backup"),
+        (
+            ["pointer", "q"],
+            2,
+            "pointer is a pointer of Git LFS and does not hold the backup",
+        ),
         (["none", "q"], 2, "there is no file none"),
         (["b", "mine"], 2, "mine/mocban.toml exists and differs"),
     ] {

@@ -75,6 +75,19 @@ mod tests {
     }
 
     #[test]
+    fn a_pointer_of_git_lfs_in_place_of_settings_is_named() {
+        let (_dir, file) =
+            project("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n");
+        let error = load(&Sources {
+            base: BaseLayer::File(file),
+            ..Sources::default()
+        });
+        let error = error.expect_err("no settings").to_string();
+        let reason = "mocban.toml: the file is a pointer of Git LFS and does not hold the settings; fetch the settings with";
+        assert!(error.contains(reason), "{error}");
+    }
+
+    #[test]
     fn flag_overrides_environment_which_overrides_the_file() {
         let (_dir, file) = project("[run]\nworkers = 2\nstage_timeout_s = 7");
         let sources = Sources {

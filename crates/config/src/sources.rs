@@ -7,8 +7,8 @@ use toml::{Table, Value};
 
 use super::error::{ConfigError, Origin, quote};
 use super::tree::Tree;
-use mocban_core::domain::enum_names;
 use mocban_core::domain::spelling::hint;
+use mocban_core::domain::{FileKind, enum_names, pointer_of};
 use mocban_store::read_file_or_pipe;
 use mocban_system::platform::is_pipe;
 
@@ -268,6 +268,12 @@ fn find_preset(name: &Value, origin: &Origin) -> Result<Preset, ConfigError> {
 
 pub(super) fn parse(text: &str, origin: &Origin) -> Result<Table, ConfigError> {
     text.parse::<Table>().map_err(|error| {
+        if FileKind::of(text.as_bytes()) == FileKind::LfsPointer {
+            return ConfigError::Layer {
+                origin: origin.clone(),
+                problem: format!("the file {}", pointer_of("settings")),
+            };
+        }
         let before = error
             .span()
             .map_or(0, |span| text.floor_char_boundary(span.start));

@@ -12,12 +12,13 @@ use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, HEAD_BYTES, ListFile};
 use crate::import_pairs::{AllowedChanges, PairSource};
-use crate::input_paths::{SimilarFiles, find_on_disk, in_existing_form};
+use crate::input_paths::{find_on_disk, in_existing_form};
 use crate::location::{Location, now};
 use crate::lost_values::lost_values;
 use crate::manifest_file::{is_below_root, refuse, renamed_columns};
 use crate::missing_files::{MissingFiles, locate_file};
 use crate::new_project::{import_with, warn_about_name};
+use crate::pointer_files::FileSearches;
 use crate::repeated_files::RepeatedFiles;
 use mocban_catalog::{BlockAttributes, BlockImportSummary, SameFiles};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
@@ -158,7 +159,7 @@ pub async fn import_blocks(
     let project = Project::at(&location.dir).with_storage(storage);
     warn_about_name(project.dir(), listener);
     let mut listing = listing(source, &project)?;
-    let (mut missing, mut searches) = (MissingFiles::default(), SimilarFiles::default());
+    let (mut missing, mut searches) = (MissingFiles::default(), FileSearches::default());
     for row in &mut listing.rows {
         locate(row, &listing.label, &project, &mut missing, &mut searches);
     }
@@ -168,6 +169,7 @@ pub async fn import_blocks(
     if missing.count == 0 {
         block_files::check(&listing.rows, &listing.label, &project)?;
     }
+    listing.warnings.extend(searches.pointers.warning());
     let limits = location.settings()?.config.limits;
     let doubts = block_scale::doubts(&listing.rows, &listing.label, &project, &limits);
     listing.warnings.extend(doubts);
@@ -290,7 +292,7 @@ fn locate(
     label: &str,
     project: &Project,
     missing: &mut MissingFiles,
-    searches: &mut SimilarFiles,
+    searches: &mut FileSearches,
 ) {
     let (line, name) = (row.line, row.name.clone());
     let required = [("mesh", &mut row.mesh), ("page", &mut row.page)].into_iter();

@@ -14,7 +14,7 @@ use crate::exit::Refusal;
 use crate::files;
 use crate::location::{Location, now};
 use crate::lost_values::lost_values;
-use crate::manifest_file::{Listing, list_content};
+use crate::manifest_file::{ListedRows, Listing, list_content};
 use crate::missing_files::MissingFiles;
 use crate::new_project::{import_with, warn_about_name};
 use crate::pair_choices::PairChoices;
@@ -133,7 +133,8 @@ pub async fn import_pairs(
     let spooled = blocking(move || {
         token.scope(|| spool(&listing, &looked_at, import.allowed, &import.choices))
     });
-    let (rows, missing) = spooled.await??;
+    let (rows, missing, pointers) = spooled.await??;
+    warnings.extend(pointers);
     let (rows, terms) = (
         Arc::new(Mutex::new(rows)),
         ImportTerms {
@@ -183,7 +184,8 @@ async fn store_in(
     Ok(stored?)
 }
 
-/// Looks at the files of all rows. Returns the rows as they are stored, and the missing files.
+/// Looks at the files of all rows. Returns the rows as they are stored, the missing files, and a warning about pointers of
+/// Git LFS.
 ///
 /// # Errors
 /// Returns an error if files are missing that must exist, if the path of a file cannot be stored, or if there is no space
@@ -193,13 +195,13 @@ fn spool(
     project: &Project,
     allowed: AllowedChanges,
     choices: &PairChoices,
-) -> ProjectResult<(RowSpool, MissingFiles)> {
+) -> ProjectResult<(RowSpool, MissingFiles, Option<String>)> {
     let failed = || "cannot write a temporary file for the list".to_owned();
     let mut spool = RowSpool::new().with_context(failed)?;
     let mut missing = MissingFiles::default();
     let mut outcome = Ok(());
     let mut count = 0_u64;
-    let hash = listing.rows(project, |mut row, lines| {
+    let ListedRows { hash, pointers } = listing.rows(project, |mut row, lines| {
         poll();
         count += 1;
         choices.add_block(&mut row);
@@ -226,7 +228,7 @@ fn spool(
     if missing.count > 0 && !allowed.missing {
         return Err(missing.refusal().into());
     }
-    Ok((spool, missing))
+    Ok((spool, missing, pointers))
 }
 
 /// Reads what a source names, as a person has chosen.

@@ -10,6 +10,7 @@ use crate::column_hashes::{ColumnHasher, ColumnHashes};
 use crate::error::ProjectResult;
 use crate::import_pairs::{PairSource, listing};
 use crate::location::Location;
+use crate::manifest_file::ListedRows;
 use crate::missing_files::MissingFiles;
 use crate::pair_choices::PairChoices;
 use mocban_core::domain::cancel::poll;
@@ -91,7 +92,7 @@ pub fn plan_import(
     let (mut pairs, mut planned, mut has_blocks) = (0, Vec::new(), false);
     let mut missing = MissingFiles::default();
     let mut columns = ColumnHasher::default();
-    let hash = listing.rows(&project, |mut row, lines| {
+    let ListedRows { hash, pointers } = listing.rows(&project, |mut row, lines| {
         poll();
         has_blocks |= row.block.is_some();
         choices.add_block(&mut row);
@@ -125,7 +126,7 @@ pub fn plan_import(
         missing,
         alone: listing.alone,
         no_pair: listing.no_pair.map(|why| why.to_string()),
-        warnings: listing.warnings,
+        warnings: listing.warnings.into_iter().chain(pointers).collect(),
         renamed: listing.renamed,
     })
 }

@@ -83,6 +83,7 @@ pub mod new_project;
 pub mod own_files;
 pub mod pair_choices;
 pub mod pair_table;
+mod pointer_files;
 mod repeated_files;
 pub mod report;
 pub mod restore;

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::{SimilarFiles, in_existing_form};
+use super::input_paths::in_existing_form;
 use super::missing_files::locate_file;
+use super::pointer_files::FileSearches;
 use super::repeated_files::RepeatedFiles;
 use super::unread_files::{UnreadFiles, UnreadRows};
 use crate::error::ProjectResult;
@@ -48,6 +49,15 @@ pub struct Listing {
     pub refused: Option<Refusal>,
     /// Label of row numbers in messages: `pairs.csv: line`, or `pair` for directories.
     row_label: String,
+}
+
+/// What was found out about all rows of a listing.
+#[derive(Debug)]
+pub struct ListedRows {
+    /// A hash of the rows as they are listed.
+    pub hash: ContentHash,
+    /// A warning about files that are pointers of Git LFS.
+    pub pointers: Option<String>,
 }
 
 /// Where the rows come from.
@@ -205,13 +215,13 @@ impl Listing {
     }
 
     /// Calls `each` for every row, with a message for each missing file. Paths start with the manifest's directory.
-    /// Paths below a named root of `project` stay as they are. Returns a hash of all rows as they are listed.
+    /// Paths below a named root of `project` stay as they are.
     pub fn rows(
         &self,
         project: &Project,
         mut each: impl FnMut(ManifestRow, Vec<String>),
-    ) -> ContentHash {
-        let mut searches = SimilarFiles::default();
+    ) -> ListedRows {
+        let mut searches = FileSearches::default();
         let mut each = |mut row: ManifestRow| {
             let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
             let place = (self.row_label.as_str(), row.line);
@@ -222,7 +232,7 @@ impl Listing {
                 .collect();
             each(row, missing);
         };
-        match &self.source {
+        let hash = match &self.source {
             ListingSource::Folders(rows) => {
                 let mut hash = RowsHash::new(Path::new(""));
                 for row in rows {
@@ -255,6 +265,10 @@ impl Listing {
                 debug_assert_eq!(parsed.is_err(), self.refused.is_some());
                 hash.value()
             }
+        };
+        ListedRows {
+            hash,
+            pointers: searches.pointers.warning(),
         }
     }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::exit::Refusal;
 use super::files::listed;
 use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
+use super::pointer_files::FileSearches;
 use mocban_core::domain::sanitize;
 use mocban_store::Project;
 
@@ -28,22 +29,32 @@ const TAB_HINT: &str = "; its path has a tab: remove it";
 const IS_FOLDER: &str = "is a folder, not a file";
 
 /// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
-/// row with a label and a number; returns `None` if it exists.
+/// row with a label and a number; returns `None` if it exists. Counts pointers of Git LFS.
 pub(crate) fn locate_file(
     (label, line): (&str, usize),
     kind: &str,
     path: &mut PathBuf,
     name: &dyn Display,
     project: &Project,
-    searches: &mut SimilarFiles,
+    searches: &mut FileSearches,
 ) -> Option<String> {
     let exists = match path.to_str() {
         Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
         _ => find_on_disk(path),
     };
     let problem = match exists {
-        Ok(true) if place_of(path, project).is_dir() => IS_FOLDER.to_owned(),
-        Ok(true) => return None,
+        Ok(true) => {
+            let place = place_of(path, project);
+            match place.metadata() {
+                Ok(meta) if meta.is_dir() => IS_FOLDER.to_owned(),
+                Ok(meta) => {
+                    searches.pointers.add(&place, &meta);
+                    return None;
+                }
+                // It may be in an object store.
+                Err(_) => return None,
+            }
+        }
         Ok(false) if path.is_symlink() => "is a link to a file that does not exist".to_owned(),
         Ok(false) if has_scheme(path, "file://") => {
             "does not exist; write its path without file://".to_owned()
@@ -51,7 +62,10 @@ pub(crate) fn locate_file(
         Ok(false) if has_scheme(path, "://") => {
             "is a web address; download the file and write the path of the copy".to_owned()
         }
-        Ok(false) => format!("does not exist{}", missing_hint(path, searches)),
+        Ok(false) => format!(
+            "does not exist{}",
+            missing_hint(path, &mut searches.similar)
+        ),
         Err(error) => format!("cannot be read: {error}"),
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);

@@ -18,7 +18,7 @@ use crate::new_project::{check_new_folder, warn_about_name};
 use crate::restore_inputs::{ListedCopies, ProjectCopies, locate_inputs};
 use mocban_catalog::Catalog;
 use mocban_config::{LocalSettings, make_local};
-use mocban_core::domain::ErrorCode;
+use mocban_core::domain::{ErrorCode, FileKind, pointer_of};
 use mocban_store::{
     CATALOG_FILE, NewFolder, Project, ProjectStorage, SETTINGS_FILE, StagingFolder, TargetLock,
     place_new_file, write_synced,
@@ -313,6 +313,9 @@ pub(crate) fn check_backup(backup: &Path) -> ProjectResult<()> {
         return refuse(format!("there is no file {shown}"));
     }
     if !is_backup(backup).with_context(failed)? {
+        if files::kind(backup) == Some(FileKind::LfsPointer) {
+            return refuse(format!("{shown} {}", pointer_of("backup")));
+        }
         return refuse(format!("{shown} is not a backup"));
     }
     // The log of a catalog in use holds changes that the file lacks.

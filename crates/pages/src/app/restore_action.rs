@@ -21,10 +21,10 @@ use super::state::AppState;
 use super::tasks::{FinishedTask, TaskKind};
 use crate::review::Language;
 use mocban_core::domain::spelling::quoted;
-use mocban_core::domain::{ErrorCode, one_line};
+use mocban_core::domain::{ErrorCode, FileKind, one_line, pointer_of};
 use mocban_project::blocking::blocking;
 use mocban_project::check::check;
-use mocban_project::files::is_backup;
+use mocban_project::files::{is_backup, kind};
 use mocban_project::input_list::{InputCopies, copies_beside};
 use mocban_project::location::Location;
 use mocban_project::restore::{RestoreRequest, Restored, is_free, restore};
@@ -116,6 +116,14 @@ pub(super) fn check_backup_file(backup: &Path) -> AppResult<()> {
         return Ok(());
     }
     let shown = backup.display();
+    if kind(backup) == Some(FileKind::LfsPointer) {
+        return Err(AppFailure::refused(Sentence::new(
+            format!("{shown} {}", pointer_of("backup")),
+            format!(
+                "{shown} là con trỏ của Git LFS và không chứa bản sao lưu; hãy tải nội dung bằng `git lfs pull`"
+            ),
+        )));
+    }
     Err(AppFailure::refused(Sentence::new(
         format!(
             "{shown} is not a backup: choose a file that the page Health of a project has made"

@@ -54,4 +54,13 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
         "remove them if they are not meant",
         "hãy xóa các dòng đó nếu không cần",
     ),
+    // Files that were not fetched.
+    (
+        "files that are pointers of Git LFS and do not hold scans, prints or labels: {}, the first {}",
+        "số tệp là con trỏ của Git LFS, không chứa bản quét, bản in hay nhãn: {0#}, tệp đầu tiên là {1}",
+    ),
+    (
+        "fetch them with `git lfs pull` before the run",
+        "hãy tải nội dung bằng `git lfs pull` trước khi chạy",
+    ),
 ];
