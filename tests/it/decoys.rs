@@ -183,6 +183,49 @@ fn rough_back(index: u64) -> DecoyPair {
     wrong
 }
 
+/// A pair whose print is folded: the right half is turned by 30 degrees about the centre.
+fn folded(index: u64) -> DecoyPair {
+    let pair = PairGenerator::new(Tier::Upright, 1).pair(index);
+    let pair = pair.expect("images encode");
+    let print = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("an image");
+    let flat = print.to_rgb8();
+    let (width, height) = (flat.width(), flat.height());
+    let paper = flat.at(1, 1);
+    let (sin, cos) = 30_f64.to_radians().sin_cos();
+    let [mid_x, mid_y] = [width, height].map(|side| side as f64 / 2.0);
+    let picture = raster::Grid::from_fn(width, height, |x, y| {
+        if x < width / 2 {
+            return flat.at(x, y);
+        }
+        let (dx, dy) = (x as f64 - mid_x, y as f64 - mid_y);
+        let from = [mid_x + cos * dx - sin * dy, mid_y + sin * dx + cos * dy].map(f64::round);
+        let is_inside =
+            from[0] >= 0.0 && from[1] >= 0.0 && from[0] < width as f64 && from[1] < height as f64;
+        if is_inside {
+            flat.at(from[0] as usize, from[1] as usize)
+        } else {
+            paper
+        }
+    });
+    DecoyPair {
+        mesh: pair.mesh,
+        print: raster::png_rgb8(&picture),
+    }
+}
+
+#[test]
+fn a_print_that_matches_in_one_half_is_refused_with_this_half() {
+    let refused: Vec<String> = [2, 3, 5]
+        .into_par_iter()
+        .filter_map(|index| refusal(&folded(index)))
+        .collect();
+    let is_half = |text: &&String| {
+        let halves = ["left", "right"].map(|half| format!("agree in the {half} half of the print"));
+        halves.iter().any(|half| text.contains(half))
+    };
+    assert!(refused.iter().filter(is_half).count() > 0, "{refused:#?}");
+}
+
 #[test]
 fn refusals_say_what_was_seen() {
     let seen = ["separate pieces", "nearly flat", "half of the print only"];

@@ -165,9 +165,15 @@ fn with_unmatched(features: PoseFeatures, unmatched: &Unmatched) -> PoseFeatures
     }
 }
 
+/// Depths to which ink may reach, as fractions of the relief's depth.
+const INK_DEPTHS: [f64; 6] = [0.05, 0.1, 0.2, 0.3, 0.4, 0.5];
+
 /// Returns what is unusual about a pair that does not match.
 fn observe(depth: &DepthMap, relief: &ReliefHeights, canvas: &HalfCanvas) -> Observation {
-    let halves = || Observation::of_halves(canvas, relief.level_at(&depth.scale, 0.5));
+    let halves = || {
+        let levels = INK_DEPTHS.map(|share| relief.level_at(&depth.scale, share));
+        Observation::of_halves(canvas, levels)
+    };
     Observation::of_scan(depth, relief).or(halves)
 }
 
