@@ -404,6 +404,23 @@ mod tests {
         assert!(refused.to_string().contains("--meshes"), "{refused}");
     }
 
+    #[test]
+    fn pointers_in_place_of_files_are_counted() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n";
+        for (name, content) in [("a.stl", pointer), ("a.png", pointer), ("b.png", "x")] {
+            std::fs::write(dir.path().join(name), content).expect("written");
+        }
+        let file = dir.path().join("pairs.csv");
+        std::fs::write(&file, "id,mesh,print\na,a.stl,a.png\nb,a.stl,b.png\n").expect("written");
+        let listing = from_file(&file).expect("valid");
+        let read = listing.rows(&Project::at(dir.path()), |_, lines| {
+            assert!(lines.is_empty(), "{lines:?}");
+        });
+        let warning = read.pointers.expect("three pointers");
+        assert!(warning.contains("labels: 3, the first"), "{warning}");
+    }
+
     #[cfg(unix)]
     #[test]
     fn a_link_to_a_missing_file_is_named() {

@@ -5,7 +5,7 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
     // Labels.
     (
         "the file has no boxes of this page, and the image_id of others is that of no image (boxes: {})",
-        "tệp không có khung nào của trang này, còn image_id của các khung khác không phải của hình nào (số khung: {0})",
+        "tệp không có khung nào của trang này, còn image_id của các khung khác không phải của hình nào (số khung: {0#})",
     ),
     (
         "write the id of their image there",
