@@ -1,4 +1,4 @@
-//! Numbers of JSON as text, and those that Python writes into JSON although it has none of them.
+//! Numbers of JSON as text, and numbers that Python writes into JSON although it has none of them.
 
 use serde_json::Number;
 

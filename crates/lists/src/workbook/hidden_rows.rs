@@ -1,4 +1,4 @@
-//! Rows that a spreadsheet program does not show, such as those that a filter leaves out. They are read like others.
+//! Rows that a spreadsheet program does not show, such as rows that a filter leaves out. They are read like others.
 
 /// Hidden rows of a table.
 #[derive(Debug, Default)]

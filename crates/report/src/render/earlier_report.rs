@@ -17,13 +17,6 @@ struct JsonReport {
 }
 
 /// Returns whether a file is a report, in any format.
-///
-/// ```
-/// use mocban_report::is_report;
-///
-/// assert!(is_report(b"metric,quantity,n,value,low,high\r\n"));
-/// assert!(!is_report(b"id,mesh,print\r\n"));
-/// ```
 pub fn is_report(bytes: &[u8]) -> bool {
     let text = bytes.trim_ascii_start();
     if text.starts_with(b"{") {
