@@ -13,10 +13,12 @@ const PIECE: f64 = 0.15;
 const MOST_PIECES: usize = 3;
 /// A relief that is less deep than this fraction of the longer side of the scan is no carving. Carvings have several percent.
 const FLAT: f64 = 0.012;
-/// One half of the print agrees with the relief if its `IoU` is at least the first value, and not if it is below the second.
-/// The halves of folded and half covered prints have 0.83 to 0.93 and 0.22 to 0.32, those of other characters at most 0.79 and
-/// at least 0.42 beside it.
-const HALF_IOU: [f64; 2] = [0.8, 0.38];
+/// One half of the print agrees with the relief, and the other one does not, if its `IoU` is at least the first value and
+/// exceeds that of the other half by the second. It is 0.82 to 0.94 and exceeds by 0.5 to 0.67 on folded and half covered
+/// prints. On prints of other characters, it exceeds by at most 0.42 where it is above 0.55.
+const HALF_IOU: [f64; 2] = [0.75, 0.46];
+/// Where a print is divided, as fractions of the canvas, which is centred on the ink.
+const CUTS: [f64; 3] = [0.5, 0.45, 0.55];
 /// The half that does not agree has at least this share of the strokes and ink of the other one. It is empty if the print is
 /// not known there.
 const LEAST_IN_HALF: f64 = 0.2;
@@ -80,27 +82,13 @@ impl Observation {
     /// Compares the halves of a canvas, on which relief and print have the best pose, at each of several levels: how deep the
     /// ink reaches depends on the print.
     pub(super) fn of_halves(canvas: &HalfCanvas, levels: impl IntoIterator<Item = u16>) -> Self {
-        let (width, height) = (canvas.ink.width(), canvas.ink.height());
-        let halves: [(&str, InPart<'_>); 4] = [
-            ("left", &|x, _| x < width / 2),
-            ("right", &|x, _| x >= width / 2),
-            ("upper", &|_, y| y < height / 2),
-            ("lower", &|_, y| y >= height / 2),
-        ];
-        let [agrees, differs] = HALF_IOU;
         let at_level = |level| {
             let strokes = canvas.mask(level);
-            let overlaps =
-                halves.map(|(_, is_inside)| HalfOverlap::of(&strokes, &canvas.ink, is_inside));
-            let is_alone = |half: &usize| {
-                let (one, other) = (overlaps[*half], overlaps[*half ^ 1]);
-                let is_filled = other.any as f64 >= LEAST_IN_HALF * one.any as f64;
-                one.iou() >= agrees && other.iou() < differs && is_filled
-            };
-            (0..4).find(is_alone)
+            CUTS.iter()
+                .find_map(|cut| agreeing_half(&strokes, &canvas.ink, *cut))
         };
         let found = levels.into_iter().find_map(at_level);
-        found.map_or(Self::Nothing, |half| Self::Half(halves[half].0))
+        found.map_or(Self::Nothing, Self::Half)
     }
 
     /// Returns whether the scan, rather than the print, is the likelier cause.
@@ -112,6 +100,26 @@ impl Observation {
     pub(super) fn or(self, other: impl FnOnce() -> Self) -> Self {
         if self == Self::Nothing { other() } else { self }
     }
+}
+
+/// Returns the half of two masks, divided at a fraction of their sides, in which they agree, if they do so in one only.
+fn agreeing_half(strokes: &Mask, ink: &Mask, cut: f64) -> Option<&'static str> {
+    let [x_cut, y_cut] = [ink.width(), ink.height()].map(|side| (cut * side as f64) as usize);
+    let halves: [(&'static str, InPart<'_>); 4] = [
+        ("left", &|x, _| x < x_cut),
+        ("right", &|x, _| x >= x_cut),
+        ("upper", &|_, y| y < y_cut),
+        ("lower", &|_, y| y >= y_cut),
+    ];
+    let overlaps = halves.map(|(_, is_inside)| HalfOverlap::of(strokes, ink, is_inside));
+    let [agrees, exceeds] = HALF_IOU;
+    let is_alone = |half: &usize| {
+        let (one, other) = (overlaps[*half], overlaps[*half ^ 1]);
+        let is_filled = other.any as f64 >= LEAST_IN_HALF * one.any as f64;
+        one.iou() >= agrees && one.iou() - other.iou() >= exceeds && is_filled
+    };
+    let found = (0..4).find(is_alone)?;
+    Some(halves[found].0)
 }
 
 /// Numbers of pixels inside a part of two masks.
