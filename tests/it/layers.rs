@@ -9,9 +9,12 @@ use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 /// Dependencies that only these crates may have.
 const ONLY_IN: &[(&str, &[&str])] = &[
     ("anyhow", &[]),
+    ("axum", &["mocban", "pages"]),
     ("clap", &["mocban"]),
     ("fax", &["core"]),
     ("flate2", &["core", "lists"]),
+    ("hyper", &["pages"]),
+    ("hyper-util", &["pages"]),
     ("indicatif", &["mocban"]),
     ("pulldown-cmark", &["mocban"]),
     ("toml", &["mocban", "config"]),
