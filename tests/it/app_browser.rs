@@ -1,6 +1,8 @@
 //! `mocban app` in a browser: from an empty folder to a report without a typed command, every page in both themes, and the
 //! keyboard alone.
 
+use std::time::{Duration, Instant};
+
 use crate::accessible::{axe, no_faint_text, no_violation};
 use crate::app::app;
 use crate::browser::{Browser, Tab};
@@ -8,6 +10,9 @@ use crate::cli::mocban;
 use crate::page::{Page, read_project};
 use crate::review_browser::{ITEM, judge, saved, shown_long_enough};
 use crate::waiting::wait_until;
+
+/// Longest way of the demo from an empty folder to its report.
+const DEMO_LIMIT: Duration = Duration::from_mins(5);
 
 /// Opens the app in a tab and returns the address of its home page.
 pub(crate) fn enter<'b>(browser: &'b Browser, page: &Page, size: [u32; 2]) -> (Tab<'b>, String) {
@@ -18,12 +23,10 @@ pub(crate) fn enter<'b>(browser: &'b Browser, page: &Page, size: [u32; 2]) -> (T
     (tab, home.as_str().expect("a URL").to_owned())
 }
 
-/// Follows a link or presses a button, and waits for the next page.
-fn click(tab: &Tab<'_>, element: &str, shown: &str) {
-    tab.eval(&format!(
-        "document.querySelector(`{element}`).click(), null"
-    ));
-    tab.wait(shown);
+/// Follows a link or presses a button with the mouse, and waits for what follows.
+fn click(tab: &Tab<'_>, element: &str, follows: &str) {
+    tab.click(element, false);
+    tab.wait(follows);
 }
 
 /// The page of a section is shown.
@@ -45,19 +48,24 @@ fn the_demo_comes_to_its_report_without_a_typed_command() {
         return;
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
+    let began = Instant::now();
     let page = Page::of(app(dir.path()).args(["--lang", "en"]));
     let (tab, _) = enter(&browser, &page, [1366, 660]);
     click(&tab, "#demo", &on_page("/p/mocban-demo/"));
     tab.screenshot("app_before_run");
-    tab.eval("document.querySelector('#start').click(), null");
-    tab.wait("document.querySelectorAll('.pair-card').length > 0");
+    click(
+        &tab,
+        "#start",
+        "document.querySelectorAll('.pair-card').length > 0",
+    );
     tab.screenshot("app_running");
     // The page follows the run by itself.
     tab.wait("document.querySelector('a.figure.good b')?.textContent === '24'");
     tab.wait("!document.querySelector('#stop') && document.querySelector('#start')");
     click(&tab, "nav a[href$='/review']", &on_page("/review"));
-    tab.eval("document.querySelector('#reviewer').value = 'lan', document.querySelector('[name=sample]').value = '2', null");
-    click(&tab, "form.action button", ITEM);
+    tab.click("#reviewer", false);
+    tab.text("lan");
+    click(&tab, "form.action .primary", ITEM);
     tab.key("Escape");
     tab.wait("!document.querySelector('dialog[open]')");
     for _ in 0..4 {
@@ -69,6 +77,8 @@ fn the_demo_comes_to_its_report_without_a_typed_command() {
     click(&tab, "header a", &on_page("/p/mocban-demo/"));
     click(&tab, "nav a[href$='/report']", &on_page("/report"));
     tab.wait("document.querySelector('#numbers table')");
+    let took = began.elapsed();
+    assert!(took < DEMO_LIMIT, "the demo took {took:?}");
     tab.screenshot("app_report");
     let text = tab.eval("document.querySelector('#numbers').innerText");
     assert!(text.as_str().expect("text").contains("24"), "{text}");
@@ -177,11 +187,9 @@ fn a_pair_is_found_and_seen_with_the_keyboard_alone() {
     let (tab, home) = enter(&browser, &page, [1280, 800]);
     tab.open(&format!("{home}p/p/pairs"));
     tab.wait(&on_page("/pairs"));
-    // The field for an id is reached with Tab, and Enter opens the pair.
-    tab.eval("document.querySelector('#main').focus(), null");
-    tab.eval("document.querySelector('#jump-id').focus(), null");
+    tab.tab_to("#jump-id");
     tab.text("upright-0003");
-    tab.eval("document.querySelector('#jump-id').form.requestSubmit(), null");
+    tab.press("Enter", false);
     tab.wait(&on_pair("upright-0003"));
     tab.key("KeyB");
     tab.wait("document.querySelector('#blink').getAttribute('aria-pressed') === 'true'");
@@ -191,12 +199,11 @@ fn a_pair_is_found_and_seen_with_the_keyboard_alone() {
     tab.wait(&on_pair("upright-0004"));
     tab.key("ArrowLeft");
     tab.wait(&on_pair("upright-0003"));
-    let address = tab.eval("location.href");
-    tab.open(&format!("{}3d/", address.as_str().expect("a URL")));
+    tab.press_enter_on("main a[href='3d/']");
     tab.wait("document.querySelector('.scan-canvas canvas')");
     tab.eval("history.back(), null");
     tab.wait(&on_pair("upright-0003"));
-    // Every control can be reached.
+    // Also those that are not shown now can be reached.
     let unreachable = tab.eval(
         "[...document.querySelectorAll('a[href], button, input, select')].filter((one) => one.tabIndex < 0).length",
     );

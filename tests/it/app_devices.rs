@@ -1,9 +1,9 @@
-//! The app with one kind of device: from a folder of files to the report by touch alone on a phone, and by keys alone.
+//! The app with one kind of device: from a folder of files to an export by touch alone on a phone, and by keys alone.
 
 use std::path::Path;
 
 use crate::app::app;
-use crate::app_browser::{enter, on_page};
+use crate::app_browser::{enter, fits_width, on_page};
 use crate::app_controls::SHOWN;
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
@@ -12,8 +12,6 @@ use crate::review_browser::{ITEM, accepts_an_answer, judge, saved, shown, shown_
 
 /// Number of pairs, and of the items that are judged.
 const PAIRS: usize = 5;
-/// Most times that a person presses Tab to reach a control.
-const MOST_TABS: usize = 200;
 
 /// Makes a folder with scans, prints and a list of some of them.
 fn files(dir: &Path) {
@@ -53,8 +51,8 @@ impl Curator<'_, '_> {
         self.tab.wait(&value);
     }
 
-    /// Goes from a folder to the report of its pairs.
-    fn comes_to_the_report(&self, dir: &Path) {
+    /// Goes from a folder to the report of its pairs, and to an export.
+    fn comes_to_an_export(&self, dir: &Path) {
         let on_page = |section: &str| format!("{} && {SHOWN}", on_page(section));
         self.use_control("main a[href=import]", &on_page("/import"));
         let folder = "main a[href$='data'][href*='path=']";
@@ -83,6 +81,13 @@ impl Curator<'_, '_> {
         self.use_control("header a", &on_page("/p/p/"));
         self.use_control("nav a[href$='/report']", &on_page("/report"));
         self.tab.wait("document.querySelector('#numbers table')");
+        fits_width(self.tab, "the report");
+        let on_export = on_page("/export");
+        self.use_control("nav a[href$='/export']", &on_export);
+        let file = "main a[href^='exports/excel/']";
+        let is_exported = format!("{on_export} && document.querySelector(`{file}`)");
+        self.use_control("#export", &is_exported);
+        assert!(dir.join("p/exports/excel").is_dir(), "the export is stored");
         let status = mocban(&dir.join("p"), &["status", "--json"]).expect(0);
         let status = status.json();
         assert_eq!(status["jobs"]["done"], PAIRS);
@@ -101,7 +106,7 @@ fn tap_pass(tab: &Tab<'_>) {
 }
 
 #[test]
-fn a_folder_comes_to_its_report_by_touch_alone_on_a_phone() {
+fn a_folder_comes_to_an_export_by_touch_alone_on_a_phone() {
     let Some(browser) = Browser::start() else {
         return;
     };
@@ -120,31 +125,11 @@ fn a_folder_comes_to_its_report_by_touch_alone_on_a_phone() {
         close_guide: |tab| tab.tap("#guide form.title button"),
         pass: tap_pass,
     };
-    curator.comes_to_the_report(dir.path());
-    let aside = tab.eval("document.documentElement.scrollWidth - innerWidth");
-    assert_eq!(aside, 0, "the report scrolls sideways");
-}
-
-/// Presses Tab until a control has the focus.
-pub(crate) fn tab_to(tab: &Tab<'_>, control: &str) {
-    let is_there = format!("Boolean(document.activeElement?.matches(`{control}`))");
-    for _ in 0..MOST_TABS {
-        if tab.eval(&is_there) == true {
-            return;
-        }
-        tab.press("Tab", false);
-    }
-    unreachable!("{control} is not reached with the key Tab");
-}
-
-/// Moves to a control with Tab, and presses Enter.
-pub(crate) fn press_enter(tab: &Tab<'_>, control: &str) {
-    tab_to(tab, control);
-    tab.press("Enter", false);
+    curator.comes_to_an_export(dir.path());
 }
 
 #[test]
-fn a_folder_comes_to_its_report_with_the_keyboard_alone() {
+fn a_folder_comes_to_an_export_with_the_keyboard_alone() {
     let Some(browser) = Browser::start() else {
         return;
     };
@@ -154,10 +139,10 @@ fn a_folder_comes_to_its_report_with_the_keyboard_alone() {
     let (tab, _) = enter(&browser, &page, [1280, 800]);
     let curator = Curator {
         tab: &tab,
-        activate: press_enter,
-        focus: tab_to,
+        activate: |tab, control| tab.press_enter_on(control),
+        focus: |tab, field| tab.tab_to(field),
         close_guide: |tab| tab.key("Escape"),
         pass: |tab| judge(tab, "KeyP"),
     };
-    curator.comes_to_the_report(dir.path());
+    curator.comes_to_an_export(dir.path());
 }

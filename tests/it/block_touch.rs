@@ -4,7 +4,6 @@ use std::path::Path;
 
 use crate::app::app;
 use crate::app_browser::enter;
-use crate::app_devices::{press_enter, tab_to};
 use crate::block_boxes::{SAVED, SHOWN, chosen, on_screen};
 use crate::block_correction::{on_picture, true_points};
 use crate::block_view::finished_block;
@@ -124,7 +123,7 @@ fn touch_block(tab: &Tab<'_>) {
 /// Adds, names and deletes boxes by keys, and saves them.
 fn key_boxes(tab: &Tab<'_>) {
     let count = "mocbanBoxes.edits.list.length";
-    tab_to(tab, ".block-canvas");
+    tab.tab_to(".block-canvas");
     for selected in [0, 1] {
         tab.key("PageDown");
         assert_eq!(tab.eval("mocbanBoxes.selected"), selected);
@@ -136,10 +135,10 @@ fn key_boxes(tab: &Tab<'_>) {
     let [left, top, right, bottom] = chosen(tab);
     tab.key("ArrowRight");
     assert_eq!(chosen(tab), [left + 1.0, top, right + 1.0, bottom]);
-    tab_to(tab, "label:first-of-type input");
+    tab.tab_to("label:first-of-type input");
     tab.text("by-key");
     assert_eq!(tab.eval("mocbanBoxes.box().name"), "by-key");
-    press_enter(tab, "[aria-label=Save]");
+    tab.press_enter_on("[aria-label=Save]");
     tab.wait(SAVED);
 }
 
@@ -151,16 +150,13 @@ fn key_points(tab: &Tab<'_>) {
         assert_eq!(tab.eval(count), left);
     }
     for side in 1..=2 {
-        tab_to(
-            tab,
-            &format!(".block-side:nth-of-type({side}) .block-canvas"),
-        );
+        tab.tab_to(&format!(".block-side:nth-of-type({side}) .block-canvas"));
         tab.key("Equal");
         tab.key("ArrowRight");
         tab.key("Enter");
     }
     assert_eq!(tab.eval("mocbanCorrection.complete().length"), 1);
-    press_enter(tab, ".block-point");
+    tab.press_enter_on(".block-point");
     assert_eq!(tab.eval(count), 0);
 }
 

@@ -9,6 +9,8 @@ use crate::browser::Tab;
 
 /// The key Shift in events.
 const SHIFT: u8 = 8;
+/// Most times that a person presses Tab to reach a control.
+const MOST_TABS: usize = 200;
 
 impl Tab<'_> {
     /// Presses and releases a key of the keyboard as a person does, with Shift or without, so that controls react to it.
@@ -39,6 +41,26 @@ impl Tab<'_> {
             }
             self.call("Input.dispatchKeyEvent", &event);
         }
+    }
+
+    /// Presses Tab until a control has the focus.
+    #[track_caller]
+    pub(crate) fn tab_to(&self, control: &str) {
+        let is_there = format!("Boolean(document.activeElement?.matches(`{control}`))");
+        for _ in 0..MOST_TABS {
+            if self.eval(&is_there) == true {
+                return;
+            }
+            self.press("Tab", false);
+        }
+        unreachable!("{control} is not reached with the key Tab");
+    }
+
+    /// Moves to a control with Tab, and presses Enter.
+    #[track_caller]
+    pub(crate) fn press_enter_on(&self, control: &str) {
+        self.tab_to(control);
+        self.press("Enter", false);
     }
 
     /// Presses and releases a physical key.
