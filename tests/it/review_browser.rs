@@ -85,6 +85,33 @@ pub(crate) fn judge(tab: &Tab<'_>, key: &str) {
     tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
 }
 
+/// Counts what the page asks the server for, and the items whose images its worker is asked for.
+const COUNT_REQUESTS: &str = "(() => {
+    window.asked = { requests: [], items: 0 };
+    const { fetch } = window;
+    window.fetch = (address, ...rest) => {
+        window.asked.requests.push(String(address));
+        return fetch(address, ...rest);
+    };
+    const { postMessage } = Worker.prototype;
+    Worker.prototype.postMessage = function (...message) {
+        window.asked.items += 1;
+        return postMessage.apply(this, message);
+    };
+})(), null";
+
+/// Fails if keys have cost more than one request and the images of one item each. Forgets the requests.
+fn one_request_a_key(tab: &Tab<'_>, keys: usize) {
+    saved(tab);
+    let asked = tab.eval("window.asked");
+    let requests = asked["requests"].as_array().expect("addresses");
+    let answers = requests.iter().filter(|address| *address == "api/answer");
+    assert_eq!((answers.count(), requests.len()), (keys, keys), "{asked}");
+    let items = asked["items"].as_u64().expect("a number");
+    assert!(items <= keys as u64, "{asked}");
+    tab.eval("window.asked = { requests: [], items: 0 }, null");
+}
+
 /// Records what the page announces, because it removes some announcements after seconds.
 pub(crate) fn record_announcements(tab: &Tab<'_>) {
     tab.eval(
@@ -144,12 +171,16 @@ fn fifty_items_are_judged_by_keys_with_a_reload_and_ten_undone() {
     on_a_page_of(made, &PLAIN, [1440, 900], |project, tab| {
         let keys = ["KeyP", "KeyP", "Digit1", "KeyU", "KeyF", "Digit6"];
         let mut paints = Vec::new();
+        accepts_an_answer(tab);
+        tab.eval(COUNT_REQUESTS);
         for i in 0..50 {
             if i == 25 {
-                saved(tab);
+                one_request_a_key(tab, 25);
                 tab.reload();
                 ready(tab);
                 assert_eq!(tab.eval("document.getElementById('bar').value"), 25);
+                accepts_an_answer(tab);
+                tab.eval(COUNT_REQUESTS);
             }
             judge(tab, keys[i % keys.len()]);
             let ms = tab.eval("document.body.dataset.paintMs");
@@ -159,7 +190,7 @@ fn fifty_items_are_judged_by_keys_with_a_reload_and_ten_undone() {
                     .expect("a time"),
             );
         }
-        saved(tab);
+        one_request_a_key(tab, 25);
         let said: Vec<_> = current_verdicts(project, "lan").into_values().collect();
         let wanted =
             |verdict: &str, reason: Option<&str>| (verdict.to_owned(), reason.map(str::to_owned));
