@@ -93,3 +93,92 @@ fn checked(file: &ZippedFile, at: &RelativePath) -> Result<RelativePath, Sentenc
     }
     Ok(path)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::ErrorKind;
+    use std::path::Path;
+    use std::sync::Arc;
+    use std::sync::atomic::Ordering;
+
+    use axum::body::Bytes;
+    use tokio::sync::mpsc;
+
+    use super::take_file;
+    use crate::app::received_files::{FilePiece, ReceivedFiles, check_room};
+    use crate::app::sentence::Sentence;
+    use crate::app::upload_sentence::{RESERVE_BYTES, no_room, not_written};
+    use mocban_lists::workbook::test_helpers::archive;
+    use mocban_store::NewFolder;
+
+    /// Bytes of a piece. The disk is looked at after 16 of them.
+    const PIECE: usize = 1 << 20;
+
+    /// Starts without files on a disk with this room.
+    fn on_disk(dir: &Path, free_bytes: fn(&Path) -> Option<u64>) -> ReceivedFiles {
+        let folder = NewFolder::begin(dir).expect("a folder");
+        let mut received = ReceivedFiles::new(folder, Arc::default());
+        received.free_bytes = free_bytes;
+        received
+    }
+
+    /// Takes a file that arrives whole, as a piece that comes this many times.
+    fn take(
+        received: &mut ReceivedFiles,
+        path: &str,
+        piece: &Bytes,
+        times: usize,
+    ) -> Result<(), Sentence> {
+        let (sender, arriving) = mpsc::channel(times + 1);
+        let pieces = (0..times).map(|_| FilePiece::Bytes(piece.clone()));
+        for piece in pieces.chain([FilePiece::End]) {
+            sender.try_send(piece).expect("room for all pieces");
+        }
+        take_file(received, path, Some(1), arriving)
+    }
+
+    #[test]
+    fn a_file_that_needs_the_reserve_is_removed_and_may_come_again() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let mut received = on_disk(dir.path(), |_| Some(RESERVE_BYTES - 1));
+        let piece = Bytes::from(vec![b'x'; PIECE]);
+        take(&mut received, "a.stl", &piece, 1).expect("the disk is not looked at");
+        let full = take(&mut received, "b.stl", &piece, 16).expect_err("the disk is nearly full");
+        let expected = not_written(&ErrorKind::StorageFull.into());
+        assert_eq!(full, expected);
+        assert_eq!(received.count.files.load(Ordering::Relaxed), 1);
+        assert_eq!(received.count.bytes.load(Ordering::Relaxed), PIECE as u64);
+        received.free_bytes = |_| Some(RESERVE_BYTES);
+        take(&mut received, "b.stl", &piece, 16).expect("there is room again");
+        let stored = received.place("x").expect("stored");
+        let sizes = ["a.stl", "b.stl"].map(|file| {
+            let file = std::fs::metadata(stored.join(file)).expect("a file");
+            file.len()
+        });
+        assert_eq!(sizes, [PIECE as u64, 16 * PIECE as u64]);
+    }
+
+    #[test]
+    fn an_archive_whose_files_need_the_reserve_is_not_unpacked() {
+        let files = [("a.stl", "solid a"), ("b.stl", "solid b")];
+        let zip = Bytes::from(archive(&files, true));
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let mut received = on_disk(dir.path(), |_| Some(RESERVE_BYTES + 13));
+        let why = take(&mut received, "x.zip", &zip, 1).expect_err("a byte is missing");
+        assert_eq!(why, no_room(14, RESERVE_BYTES + 13));
+        assert_eq!(received.count.files.load(Ordering::Relaxed), 0);
+        let mut received = on_disk(dir.path(), |_| Some(RESERVE_BYTES + 14));
+        take(&mut received, "x.zip", &zip, 1).expect("there is room");
+        assert_eq!(received.count.files.load(Ordering::Relaxed), 2);
+    }
+
+    #[test]
+    fn files_of_ten_gigabytes_are_refused_before_they_are_sent() {
+        const FILES: u64 = 10_000_000_000;
+        let why = check_room(Some(FILES), FILES).expect_err("nothing would stay free");
+        assert_eq!(why, no_room(FILES, FILES));
+        check_room(Some(FILES), u64::MAX).expect_err("no disk is so large");
+        check_room(Some(FILES + RESERVE_BYTES), FILES).expect("the reserve stays free");
+        check_room(None, FILES).expect("the room is not known");
+    }
+}

@@ -81,6 +81,8 @@ pub(super) struct ReceivedFiles {
     /// Names of files that were cut off, which may come again.
     cut_off: BTreeSet<String>,
     unlooked_bytes: u64,
+    /// Returns how many bytes the disk of a folder has room for.
+    pub(super) free_bytes: fn(&Path) -> Option<u64>,
     pub(super) count: Arc<ReceivedCount>,
 }
 
@@ -94,6 +96,7 @@ impl ReceivedFiles {
             has_unknown: false,
             cut_off: BTreeSet::new(),
             unlooked_bytes: 0,
+            free_bytes: platform::free_bytes,
             count,
         }
     }
@@ -221,7 +224,7 @@ impl ReceivedFiles {
             return Ok(());
         }
         self.unlooked_bytes = 0;
-        match platform::free_bytes(self.folder.path()) {
+        match (self.free_bytes)(self.folder.path()) {
             Some(free) if free < RESERVE_BYTES => Err(ErrorKind::StorageFull.into()),
             _ => Ok(()),
         }
@@ -238,7 +241,7 @@ impl ReceivedFiles {
     /// # Errors
     /// Returns the reason if less than the reserve would stay free.
     pub(super) fn check_room(&self, bytes: u64) -> Result<(), Sentence> {
-        check_room(self.folder.path(), bytes)
+        check_room((self.free_bytes)(self.folder.path()), bytes)
     }
 
     /// Gives the files their folder, and returns its path.
@@ -255,12 +258,12 @@ impl ReceivedFiles {
     }
 }
 
-/// Refuses files for which the disk of a folder has no room.
+/// Refuses files for which a disk has no room. `free` is the room, if it is known.
 ///
 /// # Errors
 /// Returns the reason if less than the reserve would stay free.
-pub(super) fn check_room(folder: &Path, bytes: u64) -> Result<(), Sentence> {
-    match platform::free_bytes(folder) {
+pub(super) fn check_room(free: Option<u64>, bytes: u64) -> Result<(), Sentence> {
+    match free {
         Some(free) if free < bytes.saturating_add(RESERVE_BYTES) => Err(no_room(bytes, free)),
         _ => Ok(()),
     }

@@ -79,7 +79,7 @@ impl Uploads {
         let bytes = files.bytes;
         let bytes = bytes.saturating_sub(arrived.map(|file| file.size).sum());
         if let Some(parent) = self.folder.parent()
-            && let Err(why) = check_room(parent, bytes)
+            && let Err(why) = check_room(platform::free_bytes(parent), bytes)
         {
             if let Some((id, _)) = resumed {
                 self.find(id)?.interrupt(why.clone());
