@@ -8,6 +8,7 @@ mod alignment_editor;
 mod all_pages;
 mod app;
 mod app_actions_browser;
+mod app_agreement;
 #[cfg(target_os = "linux")]
 mod app_backup;
 mod app_blocks;

@@ -12,7 +12,7 @@ use mocban_catalog::{
     AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, FaultyRow, MetricRecord, PairResults,
     SetApart,
 };
-use mocban_core::domain::{AttentionCheck, ContentHash, PairName, Verdict};
+use mocban_core::domain::{AttentionCheck, ContentHash, PairName, ThresholdMetric, Verdict};
 
 /// Version of the JSON form.
 const SCHEMA: u32 = 1;
@@ -33,6 +33,10 @@ pub struct ReviewerAgreement {
     pub schema: u32,
     /// Results on which reviewers disagree and that nobody adjudicated.
     pub conflicts: u64,
+    /// The same for each metric that has any. The sum is greater than `conflicts` if metrics have the same threshold and
+    /// alignment.
+    #[serde(skip)]
+    pub conflicts_by_metric: BTreeMap<ThresholdMetric, u64>,
     /// The pairs of these results, in the order of the catalog.
     pub conflicting_pairs: Vec<PairName>,
     /// Every two reviewers who judged the same results, by name.
@@ -195,6 +199,7 @@ impl VerdictTable {
 #[derive(Debug, Default)]
 struct AgreementCounts {
     conflicts: u64,
+    conflicts_by_metric: BTreeMap<ThresholdMetric, u64>,
     conflicting_pairs: Vec<PairName>,
     reviewer_pairs: BTreeMap<(String, String), VerdictTable>,
     reviewers: BTreeMap<String, ReviewerRecord>,
@@ -204,8 +209,12 @@ impl AgreementCounts {
     /// Counts the distinct results of one pair.
     fn add(&mut self, pair: &PairResults) {
         let conflicts_before = self.conflicts;
+        let is_conflict = |record: &&MetricRecord| Consensus::of(record) == Consensus::Conflict;
+        for record in pair.metrics.iter().filter(is_conflict) {
+            let of_metric = self.conflicts_by_metric.entry(record.outcome.metric);
+            *of_metric.or_default() += 1;
+        }
         for group in group_identical(&pair.metrics) {
-            let is_conflict = |record: &&MetricRecord| Consensus::of(record) == Consensus::Conflict;
             self.conflicts += u64::from(group.iter().any(is_conflict));
             for reviewer in reviewers_of(&group) {
                 self.record(reviewer).judged += 1;
@@ -253,6 +262,7 @@ impl AgreementCounts {
         ReviewerAgreement {
             schema: SCHEMA,
             conflicts: self.conflicts,
+            conflicts_by_metric: self.conflicts_by_metric,
             conflicting_pairs: self.conflicting_pairs,
             reviewer_pairs: reviewer_pairs
                 .map(|((a, b), table)| ReviewerPair {
@@ -294,6 +304,8 @@ fn independent_verdicts<'a>(group: &[&'a MetricRecord]) -> BTreeMap<&'a str, Ver
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::{AgreementCounts, MIN_RESULTS, OwnVerdicts, VerdictTable};
     use crate::test_fixtures;
     use mocban_catalog::{AttentionCheckAnswer, MetricRecord, ReviewContext, ReviewerVerdict};
@@ -331,6 +343,9 @@ mod tests {
         counts.add(&apart);
         let found = counts.finish();
         assert_eq!((found.conflicts, found.reviewers[0].judged), (1, 3));
+        // Whoever settles a conflict with one metric leaves that of another one, although they look the same.
+        let one_each = BTreeMap::from(ThresholdMetric::ALL.map(|metric| (metric, 1)));
+        assert_eq!(found.conflicts_by_metric, one_each);
         assert_eq!(found.conflicting_pairs, ["a".parse().expect("an id")]);
         let two = &found.reviewer_pairs[0];
         assert_eq!((two.a.as_str(), two.b.as_str()), ("r0", "r1"));

@@ -158,6 +158,7 @@ pub fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
         set_apart: mocban_catalog::SetApart::default(),
         schema: 1,
         conflicts: disputed,
+        conflicts_by_metric: BTreeMap::new(),
         conflicting_pairs: Vec::new(),
         reviewer_pairs: vec![ReviewerPair {
             a: "lan".to_owned(),

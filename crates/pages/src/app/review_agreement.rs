@@ -1,16 +1,18 @@
 //! The reviewers of a project: how much each has judged, and how far they agree.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::extract::{Path, State};
 use axum::response::Html;
 use maud::{Markup, html};
 
+use super::address::PageQuery;
 use super::components::{grouped, number_table, score};
 use super::failure::AppResult;
 use super::state::AppState;
 use super::visit::Visit;
-use mocban_core::domain::one_line;
+use mocban_core::domain::{ReviewOrder, ThresholdMetric, one_line};
 use mocban_results::{
     Rate, ReviewerAgreement, ReviewerPair, ReviewerRecord, agreement_of_verdicts,
 };
@@ -58,7 +60,27 @@ fn agreement_part(visit: &Visit, found: &ReviewerAgreement) -> Markup {
                     ],
                     "kết quả có bất đồng đang chờ người thứ ba: hãy chọn thứ tự \"chỗ hai người khác bất đồng\".",
                 )) }
+                (conflicts_by_metric(visit, &found.conflicts_by_metric))
             }
+        }
+    }
+}
+
+/// Links the conflicts of each metric to the form that settles them.
+fn conflicts_by_metric(visit: &Visit, conflicts: &BTreeMap<ThresholdMetric, u64>) -> Markup {
+    let settle = PageQuery::default().with("order", ReviewOrder::Adjudicate.name());
+    html! {
+        ul #conflicts-by-metric { @for (metric, conflicts) in conflicts {
+            li {
+                a href={ "review" (settle.with("metric", metric.name()).text()) } { (visit.metric(*metric)) }
+                ": " (grouped(*conflicts))
+            }
+        } }
+        @if conflicts.len() > 1 {
+            p.muted { (visit.t(
+                "Metrics that gave the same image count once in the sum. An answer settles only the chosen metric, so such an image still waits for the others. With \"all metrics\", one answer settles all that gave this image.",
+                "Các độ đo cho cùng một hình chỉ được tính một lần trong tổng. Câu trả lời chỉ quyết định cho độ đo đã chọn, nên hình đó vẫn chờ ở các độ đo khác. Với \"mọi độ đo\", một câu trả lời quyết định cho mọi độ đo cho hình đó.",
+            )) }
         }
     }
 }
