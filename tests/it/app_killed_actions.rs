@@ -102,7 +102,7 @@ fn fail_one(project: &Path) {
 }
 
 /// Writes a list of a pair that is not in the project.
-fn write_list(project: &Path) {
+pub(crate) fn write_list(project: &Path) {
     let list = std::fs::read_to_string(project.join("data/manifest.csv")).expect("a manifest");
     let rows: Vec<&str> = list.lines().take(2).collect();
     let [head, row] = rows.as_slice() else {
@@ -113,7 +113,7 @@ fn write_list(project: &Path) {
 }
 
 /// Returns the form that imports the list.
-fn list_of(to: &str, project: &Path) -> Value {
+pub(crate) fn list_of(to: &str, project: &Path) -> Value {
     json!({"project": to, "list": project.join(LIST)})
 }
 
@@ -142,7 +142,7 @@ fn act_before(project: &Path, path: &str, body: impl FnOnce(&Page) -> Value) {
 }
 
 /// Returns the button that undoes the newest import, or brings its pairs back.
-fn last_import(page: &Page, change: &str) -> Value {
+pub(crate) fn last_import(page: &Page, change: &str) -> Value {
     let part = text(&page.get("/p/p/last-import"));
     let at = part.split("name=\"at\" value=\"").nth(1);
     let at = at.and_then(|rest| rest.split('"').next());

@@ -133,9 +133,9 @@ fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
         (
             "/p/p/actions/setting",
             json!({"key": "run.workers", "value": "3"}),
-            "Permission denied",
+            "This project is read-only",
         ),
-        ("/actions/demo", Value::Null, "Permission denied"),
+        ("/actions/demo", Value::Null, "This folder is read-only"),
         (
             "/actions/upload",
             upload,

@@ -40,6 +40,8 @@ mod app_phone;
 mod app_print;
 #[cfg(unix)]
 mod app_read_only;
+#[cfg(target_os = "linux")]
+mod app_read_only_actions;
 mod app_report;
 mod app_restore;
 mod app_resume_browser;

@@ -153,7 +153,7 @@ fn grey8(export: &Path, line: &Value, role: &str) -> Grid<u8> {
 }
 
 /// Returns every file below a folder with its bytes.
-fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+pub(crate) fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![root.to_owned()];
     while let Some(folder) = folders.pop() {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use axum::Extension;
 use axum::extract::{Path, Request, State};
+use axum::http::Method;
 use axum::response::{Html, IntoResponse as _, Response};
 use maud::{Markup, html};
 
@@ -15,6 +16,7 @@ use super::components::{
 use super::failure::{AppFailure, AppResult};
 use super::pass_on::{in_chosen_language, pass_on, path_below};
 use super::projects::OpenProject;
+use super::read_only::refuse_read_only;
 use super::remedies::block_remedy;
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -30,6 +32,8 @@ use mocban_project::{details, input_warnings};
 
 /// Most characters that are listed.
 const SHOWN_CHARACTERS: usize = 1000;
+/// Path of the action that stores nothing, below the pages of a block.
+const TRY: &str = "correct/try";
 /// Most events of the history that are shown.
 const SHOWN_EVENTS: usize = 50;
 
@@ -74,6 +78,9 @@ pub(super) async fn pages(
         Err(plain) => return Ok(plain.into_response()),
     };
     let open = state.open(key).await?;
+    if request.method() == Method::POST && path_below(&request) != TRY {
+        refuse_read_only(&state, Some(key)).await?;
+    }
     // Only reviews have a third part.
     let id = [open.key.as_str(), block, ""].map(str::to_owned);
     if path_below(&request).is_empty() {

@@ -23,6 +23,7 @@ use super::import_preview::{changes_part, plan_part, warning};
 use super::plan_cache::PlanCache;
 use super::project_places::ProjectPlaces;
 use super::projects::FoundProject;
+use super::read_only::refuse_read_only;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::upload_form::upload_part;
@@ -277,6 +278,7 @@ pub(super) async fn import(
     State(state): State<Arc<AppState>>,
     ActionBody(chosen): ActionBody<ImportChoice>,
 ) -> AppResult<Json<Value>> {
+    refuse_read_only(&state, Some(&chosen.project)).await?;
     let read = {
         let (chosen, folder) = (chosen.clone(), state.options.folder.clone());
         move || {

@@ -2,6 +2,7 @@
 
 use axum::http::StatusCode;
 
+use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
 use super::state::AppState;
 use mocban_store::CATALOG_FILE;
@@ -16,6 +17,14 @@ pub(super) enum ReadOnlyPlace {
     Project,
     /// The database of a project, for this user or for everybody, such as a standby.
     Database,
+}
+
+/// Refuses an action in a project, or in the folder of all projects, if nothing can be stored there.
+pub(super) async fn refuse_read_only(state: &AppState, project: Option<&str>) -> AppResult<()> {
+    match ReadOnlyPlace::find(state, project).await {
+        Some(place) => Err(AppFailure::refused(place.sentence())),
+        None => Ok(()),
+    }
 }
 
 impl ReadOnlyPlace {

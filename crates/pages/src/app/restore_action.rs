@@ -15,6 +15,7 @@ use super::folder_picker::PickerRoots;
 use super::number_text::{english_count, english_form, file_size, grouped};
 use super::project_name::new_project_dir;
 use super::projects::is_project;
+use super::read_only::refuse_read_only;
 use super::restore_page::chosen_path;
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -51,6 +52,7 @@ pub(super) async fn start(
     State(state): State<Arc<AppState>>,
     ActionBody(body): ActionBody<RestoreBackupBody>,
 ) -> AppResult<Json<Value>> {
+    refuse_read_only(&state, None).await?;
     let folder = state.options.folder.clone();
     let name = body.name.trim().to_owned();
     let address = PageQuery::default()

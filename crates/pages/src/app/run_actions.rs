@@ -12,6 +12,7 @@ use super::child_run;
 use super::failure::{AppFailure, AppResult};
 use super::number_text::grouped;
 use super::projects::{OpenProject, is_project};
+use super::read_only::refuse_read_only;
 use super::sentence::Sentence;
 use super::state::AppState;
 use crate::on_thread::on_thread;
@@ -59,6 +60,7 @@ pub(super) async fn run(
     ActionBody(body): ActionBody<RunBody>,
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
+    refuse_read_only(&state, Some(&key)).await?;
     let mut args = Vec::new();
     if !body.jobs.is_empty() {
         let jobs = body.jobs.parse::<u16>().ok();
@@ -93,6 +95,7 @@ pub(super) async fn demo(State(state): State<Arc<AppState>>) -> AppResult<Json<V
             "thư mục này đã là một dự án",
         )));
     }
+    refuse_read_only(&state, None).await?;
     let dir = folder.join(DEMO);
     child_run::finish(
         &state.options.program,

@@ -13,6 +13,7 @@ use super::action_body::ActionBody;
 use super::address::PageQuery;
 use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
+use super::read_only::refuse_read_only;
 use super::sentence::Sentence;
 use super::setting_words::is_hidden;
 use super::state::AppState;
@@ -219,6 +220,7 @@ pub(super) async fn store(
         return Err(AppFailure::not_found());
     }
     let open = state.open(&key).await?;
+    refuse_read_only(&state, Some(&key)).await?;
     let (catalog, location) = (open.catalog.clone(), open.location());
     let go = PageQuery::default().with("saved", &body.key).text();
     let stored = on_thread(async move || {

@@ -1,0 +1,193 @@
+//! Every action of `mocban app` on a project that cannot be written: it is refused with a sentence in both languages, and
+//! changes nothing.
+
+use std::collections::BTreeMap;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::app::{act, html, text};
+use crate::app_choice::chosen;
+use crate::app_controls::varied_project;
+use crate::app_killed_actions::{last_import, list_of, write_list};
+use crate::block_view::finished_block;
+use crate::cli::binary_beside;
+use crate::odd::{as_other_user, set_writable};
+use crate::page::Page;
+use crate::report::contents;
+use crate::waiting::wait_until;
+
+/// What a refusal says of a place that cannot be written, in a language.
+const SAID: [(&str, [&str; 3]); 2] = [
+    (
+        "en",
+        [
+            "This project is read-only",
+            "This folder is read-only",
+            "cannot be written to: check its rights",
+        ],
+    ),
+    (
+        "vi",
+        [
+            "Dự án này chỉ đọc được",
+            "Thư mục này chỉ đọc được",
+            "không ghi được vào",
+        ],
+    ),
+];
+
+/// A folder with a project `p`, neither of which can be written.
+struct ReadOnlyFolder {
+    page: Page,
+    dir: PathBuf,
+    before: BTreeMap<PathBuf, Vec<u8>>,
+}
+
+impl ReadOnlyFolder {
+    /// Opens the app on the folder.
+    fn open(dir: &Path) -> Self {
+        let dir = dir.canonicalize().expect("a path");
+        let before = contents(&dir.join("p"));
+        let mut command = binary_beside(&dir.join("p"));
+        command.args(["--json", "app", "--no-open", "--lang", "en"]);
+        command.arg(&dir);
+        as_other_user(&mut command, &dir);
+        set_writable(&dir.join("p"), false);
+        set_mode(&dir, 0o555);
+        let page = Page::of(&mut command).entered();
+        Self { page, dir, before }
+    }
+
+    /// Sends actions, which are all refused in both languages.
+    fn refuses(&self, actions: &[(&str, Value)]) {
+        for (language, said) in SAID {
+            html(&self.page, &format!("/?language={language}"));
+            for (action, body) in actions {
+                let reply = act(&self.page, action, body, |_| {});
+                let why = text(&reply);
+                assert!([422, 503].contains(&reply.status), "{action}: {why}");
+                assert!(
+                    said.iter().any(|part| why.contains(part)),
+                    "{action} {body}: {why}"
+                );
+            }
+        }
+        html(&self.page, "/?language=en");
+    }
+}
+
+impl Drop for ReadOnlyFolder {
+    fn drop(&mut self) {
+        set_mode(&self.dir, 0o755);
+        set_writable(&self.dir.join("p"), true);
+        if !std::thread::panicking() {
+            let is_unchanged = contents(&self.dir.join("p")) == self.before;
+            assert!(is_unchanged, "nothing has changed");
+            let entries = std::fs::read_dir(&self.dir).expect("a folder").flatten();
+            let projects = entries.filter(|entry| entry.path().join("catalog.sqlite").exists());
+            assert_eq!(projects.count(), 1, "no project was added");
+        }
+    }
+}
+
+fn set_mode(path: &Path, mode: u32) {
+    let mode = std::fs::Permissions::from_mode(mode);
+    std::fs::set_permissions(path, mode).expect("set");
+}
+
+/// Returns a change of the saved view of [`varied_project`].
+fn view(action: &str, view: &str, name: &str) -> Value {
+    json!({"action": action, "view": view, "name": name, "list": "state=failed"})
+}
+
+#[test]
+fn no_action_changes_a_project_that_cannot_be_written() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    varied_project(&dir);
+    let project = dir.path().canonicalize().expect("a path").join("p");
+    write_list(&project);
+    let folder = ReadOnlyFolder::open(dir.path());
+    let review = |invite: &str| {
+        json!({
+            "reviewer": "lan", "metric": "density", "sample": "", "order": "random", "invite": invite,
+        })
+    };
+    let backup = project.join("backups/backup.sqlite");
+    folder.refuses(&[
+        ("/p/p/actions/run", json!({"which": "all"})),
+        ("/p/p/actions/run", json!({"which": "failed"})),
+        ("/p/p/actions/retry", json!({"class": "bad_input"})),
+        ("/p/p/actions/retry", json!({"pair": "broken"})),
+        ("/p/p/actions/retire", json!({"pair": "upright-0001"})),
+        ("/p/p/actions/restore", json!({"pair": "upright-0007"})),
+        ("/p/p/actions/chosen", chosen("retire", &["upright-0002"])),
+        ("/p/p/actions/chosen", chosen("resume", &["broken"])),
+        ("/p/p/actions/chosen", chosen("compute", &["upright-0002"])),
+        (
+            "/p/p/actions/last-import",
+            last_import(&folder.page, "retire"),
+        ),
+        ("/actions/import", list_of("p", &project)),
+        ("/actions/import", list_of("new", &project)),
+        ("/p/p/actions/view", view("save", "", "x")),
+        ("/p/p/actions/view", view("rename", "hỏng", "x")),
+        ("/p/p/actions/view", view("remove", "hỏng", "")),
+        (
+            "/p/p/actions/setting",
+            json!({"key": "run.workers", "value": "3"}),
+        ),
+        ("/p/p/actions/review", review("")),
+        ("/p/p/actions/review", review("yes")),
+        ("/actions/demo", Value::Null),
+        (
+            "/actions/restore",
+            json!({"backup": backup, "name": "new", "inputs": ""}),
+        ),
+    ]);
+    // What only reads still works; a repair says on its page that it cannot be done.
+    for (what, part) in [
+        ("check", "All are sound"),
+        ("repair", "cannot be written to: check its rights"),
+    ] {
+        let reply = act(
+            &folder.page,
+            "/p/p/actions/check",
+            &json!({ "what": what }),
+            |_| {},
+        );
+        assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
+        wait_until(part, || html(&folder.page, "/p/p/health").contains(part));
+    }
+}
+
+#[test]
+fn no_action_changes_a_block_that_cannot_be_written() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    finished_block(dir.path());
+    let folder = ReadOnlyFolder::open(dir.path());
+    let view = "/p/p/block/b1/view";
+    let boxes = folder.page.get(&format!("{view}/boxes/block.json")).json();
+    let shown = boxes["shown"].clone();
+    assert!(shown.is_string(), "{boxes}");
+    folder.refuses(&[
+        ("/p/p/actions/run", json!({"which": "all"})),
+        (
+            "/p/p/block/b1/view/boxes/save",
+            json!({"shown": shown, "edits": {"removed": [0], "edited": []}}),
+        ),
+        (
+            "/p/p/block/b1/view/boxes/earlier",
+            json!({ "shown": shown }),
+        ),
+        (
+            "/p/p/block/b1/view/correct/save",
+            json!({"id": 1, "saved_hash": null}),
+        ),
+        (
+            "/p/p/block/b1/view/correct/remove",
+            json!({ "saved_hash": null }),
+        ),
+    ]);
+}
