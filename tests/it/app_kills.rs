@@ -14,6 +14,7 @@ use crate::block_view::finished_block;
 use crate::cli::mocban;
 use crate::fault::Fault;
 use crate::page::{Page, read_project, send};
+use crate::project_dump::ProjectDump;
 use crate::small_block::stored_block;
 use crate::waiting::wait_until;
 
@@ -127,6 +128,10 @@ fn a_killed_demo_is_whole_after_the_next_click() {
     assert_eq!(status["pairs"], 24);
     assert_eq!(status["jobs"]["ready"], 24);
     mocban(&project, &["check"]).expect(0);
+    let other = tempfile::tempdir().expect("a temporary directory");
+    mocban(other.path(), &["demo", "mocban-demo", "--no-run"]).expect(0);
+    let other = ProjectDump::of(&other.path().join("mocban-demo"));
+    ProjectDump::of(&project).must_equal(&other, "a demo that was not killed");
 }
 
 #[test]

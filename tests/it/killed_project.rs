@@ -9,6 +9,7 @@ use crate::app_kills::{HeldApp, LOG, UNTIL_KILLED};
 use crate::cli::mocban;
 use crate::fault::Fault;
 use crate::page::{Page, read_project};
+use crate::project_dump::ProjectDump;
 use crate::waiting::wait_until;
 
 /// An action that is killed.
@@ -114,18 +115,38 @@ impl<'a> KilledProject<'a> {
     }
 
     /// Sends an action to the next app, and returns what it has changed in the end.
-    fn change(&self, next: &Page, path: &str, body: &Value) -> Value {
+    fn change(&self, next: &Page, path: &str, body: &Value) -> ActionOutcome {
         let (what, project) = (self.action.action, self.root().join("p"));
         let reply = act(next, path, body, |_| {});
         assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
         wait_until(what, || self.state() != self.before);
         wait_until("its run ends", || status(&project)["running"] == false);
+        if let Some([page, _]) = self.action.said {
+            let is_done = || {
+                let html = text(&next.get(&format!("/p/p/{page}")));
+                !html.contains("data-task=\"running\"")
+            };
+            wait_until("the page says that it is done", is_done);
+        }
         mocban(&project, &["check"]).expect(0);
-        self.state()
+        self.outcome()
+    }
+
+    fn outcome(&self) -> ActionOutcome {
+        ActionOutcome {
+            state: self.state(),
+            dump: ProjectDump::of(&self.root()),
+        }
+    }
+
+    /// Does the action with an app that is not killed.
+    fn not_killed(&self) -> ActionOutcome {
+        let page = open_app(&self.root());
+        self.change(&page, self.action.action, &self.body(&page))
     }
 
     /// Kills the app before anything is stored, and does the action with the next app. Returns what it has changed.
-    fn kill_before(&self) -> Value {
+    fn kill_before(&self) -> ActionOutcome {
         let what = format!("{} at {:?}", self.action.action, self.action.at);
         self.kill_at(self.action.at[0], 1);
         assert_eq!(self.state(), self.before, "{what}");
@@ -138,13 +159,13 @@ impl<'a> KilledProject<'a> {
     }
 
     /// Kills the app as soon as its first transaction is in the log. If the action needs more than that, the next app does it.
-    fn kill_after_transaction(&self, after: &Value) {
+    fn kill_after_transaction(&self, after: &ActionOutcome) {
         // The beginning of an empty log is synced before its first transaction.
         let log = std::fs::metadata(self.root().join(LOG));
         let has_log = log.is_ok_and(|log| log.len() > 0);
         self.kill_at("sync", if has_log { 1 } else { 2 });
-        let mut found = self.state();
-        if found == self.before {
+        let mut found = self.outcome();
+        if found.state == self.before {
             let next = open_app(&self.root());
             let jobs = status(&self.root().join("p"))["jobs"].clone();
             found = if jobs["ready"].as_u64() > Some(0) {
@@ -154,14 +175,31 @@ impl<'a> KilledProject<'a> {
                 self.change(&next, self.action.action, &self.body(&next))
             };
         }
-        assert_eq!(&found, after, "{} is half done", self.action.action);
+        found.must_equal(after, &format!("{} is half done", self.action.action));
     }
 }
 
-/// Kills an app in each of the actions, and does them with the next app.
+/// What an action has left.
+struct ActionOutcome {
+    state: Value,
+    dump: ProjectDump,
+}
+
+impl ActionOutcome {
+    /// Fails if an action that was killed has left anything else than one that was not.
+    fn must_equal(&self, not_killed: &Self, what: &str) {
+        assert_eq!(self.state, not_killed.state, "{what}");
+        self.dump.must_equal(&not_killed.dump, what);
+    }
+}
+
+/// Kills an app in each of the actions, and does them with the next app. The rows and files are then those of an app that was
+/// not killed.
 pub(crate) fn kill_each(actions: &[KilledAction]) {
     for action in actions {
-        let after = KilledProject::of(action).kill_before();
+        let after = KilledProject::of(action).not_killed();
+        let found = KilledProject::of(action).kill_before();
+        found.must_equal(&after, action.action);
         if action.at[1] == LOG {
             KilledProject::of(action).kill_after_transaction(&after);
         }

@@ -161,6 +161,8 @@ mod postgres_server;
 mod power;
 mod print_forms;
 mod processes;
+#[cfg(target_os = "linux")]
+mod project_dump;
 mod qr_decoder;
 mod queue;
 mod readers;
