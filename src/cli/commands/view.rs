@@ -1,5 +1,7 @@
 //! `view PAIR` shows a scan on its print in the browser, `view BLOCK` a whole page.
 
+use std::sync::Arc;
+
 use axum::Router;
 use clap::Args;
 
@@ -89,7 +91,8 @@ async fn block_page(
     catalog: &Catalog,
     context: &Context,
 ) -> ProjectResult<Router> {
-    let store = BlockAccess::new(&context.location, name, Some(context.command("run")));
+    let next = Some(context.command("run"));
+    let store = BlockAccess::new(&context.location, name, next, Arc::default());
     let limits = context.location.settings()?.config.limits;
     let language = args.language();
     let opened = open_block(catalog, project, name, args.metric, limits, store, language).await?;

@@ -89,14 +89,14 @@ pub(super) async fn pages(
     let router = if let Some(router) = state.blocks.get(&id, &open) {
         router
     } else {
-        let opened = opened(&open, block).await?;
+        let opened = opened(&state, &open, block).await?;
         state.blocks.keep(id, &open, opened)
     };
     pass_on(router, access, request).await
 }
 
 /// Reads a block and returns its pages.
-async fn opened(open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router> {
+async fn opened(state: &AppState, open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router> {
     let name = block.parse::<BlockName>().ok();
     let name = name.ok_or_else(AppFailure::not_found)?;
     if open.catalog.block(&name).await?.is_none() {
@@ -105,8 +105,9 @@ async fn opened(open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router>
     let open = Arc::clone(open);
     let location = open.location();
     let own = Arc::clone(&open);
+    let work = Arc::clone(&state.block_work);
     let read = read_on_thread(async move || {
-        let store = BlockAccess::new(&location, &name, None);
+        let store = BlockAccess::new(&location, &name, None, work);
         let limits = location.settings()?.config.limits;
         open_block(
             &own.catalog,

@@ -54,6 +54,8 @@ pub(super) struct AppState {
     pub(super) invitations: Invitations,
     /// The blocks that are open, each with its picture and heights.
     pub(super) blocks: OpenPages,
+    /// Draws the pictures of all blocks.
+    pub(super) block_work: Arc<WorkThread>,
     /// Exports, checks, backups and restores.
     pub(super) tasks: AppTasks,
     /// Why runs that the app started failed.
@@ -86,6 +88,7 @@ impl AppState {
             review_work: Arc::new(PictureWork::for_many()),
             reviews: OpenPages::new(32),
             blocks: OpenPages::new(2),
+            block_work: Arc::default(),
             tasks: AppTasks::default(),
             failed_runs: FailedRuns::default(),
             looked_inputs: LookedInputs::default(),

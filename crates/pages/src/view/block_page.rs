@@ -56,7 +56,7 @@ pub(super) fn block_page(
     store: BlockAccess,
     language: Option<Language>,
 ) -> Router {
-    let work = Arc::new(WorkThread::default());
+    let work = store.work();
     let pages = match view {
         Some(view) => page_routes(view, language, store.back(), Arc::clone(&work)),
         None => Router::new().route("/", get(async || Redirect::to("correct"))),
