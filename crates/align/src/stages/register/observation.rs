@@ -23,9 +23,6 @@ const CUTS: [f64; 3] = [0.5, 0.45, 0.55];
 /// not known there.
 const LEAST_IN_HALF: f64 = 0.2;
 
-/// Whether a pixel is in a part of a canvas.
-type InPart<'a> = &'a dyn Fn(usize, usize) -> bool;
-
 /// Something unusual about a pair that does not match.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Observation {
@@ -83,9 +80,8 @@ impl Observation {
     /// ink reaches depends on the print.
     pub(super) fn of_halves(canvas: &HalfCanvas, levels: impl IntoIterator<Item = u16>) -> Self {
         let at_level = |level| {
-            let strokes = canvas.mask(level);
-            CUTS.iter()
-                .find_map(|cut| agreeing_half(&strokes, &canvas.ink, *cut))
+            let lines = overlaps_of_lines(&canvas.mask(level), &canvas.ink);
+            CUTS.iter().find_map(|cut| agreeing_half(&lines, *cut))
         };
         let found = levels.into_iter().find_map(at_level);
         found.map_or(Self::Nothing, Self::Half)
@@ -102,24 +98,36 @@ impl Observation {
     }
 }
 
-/// Returns the half of two masks, divided at a fraction of their sides, in which they agree, if they do so in one only.
-fn agreeing_half(strokes: &Mask, ink: &Mask, cut: f64) -> Option<&'static str> {
-    let [x_cut, y_cut] = [ink.width(), ink.height()].map(|side| (cut * side as f64) as usize);
-    let halves: [(&'static str, InPart<'_>); 4] = [
-        ("left", &|x, _| x < x_cut),
-        ("right", &|x, _| x >= x_cut),
-        ("upper", &|_, y| y < y_cut),
-        ("lower", &|_, y| y >= y_cut),
-    ];
-    let overlaps = halves.map(|(_, is_inside)| HalfOverlap::of(strokes, ink, is_inside));
+/// Returns the half of two masks in which they agree, if they do so in one only. `lines` are the overlaps in their columns and
+/// rows, which are divided at the fraction `cut`.
+fn agreeing_half(lines: &[Vec<HalfOverlap>; 2], cut: f64) -> Option<&'static str> {
     let [agrees, exceeds] = HALF_IOU;
-    let is_alone = |half: &usize| {
-        let (one, other) = (overlaps[*half], overlaps[*half ^ 1]);
-        let is_filled = other.any as f64 >= LEAST_IN_HALF * one.any as f64;
-        one.iou() >= agrees && one.iou() - other.iou() >= exceeds && is_filled
-    };
-    let found = (0..4).find(is_alone)?;
-    Some(halves[found].0)
+    let names = [["left", "right"], ["upper", "lower"]];
+    lines.iter().zip(names).find_map(|(lines, names)| {
+        let (first, second) = lines.split_at((cut * lines.len() as f64) as usize);
+        let halves = [first, second].map(HalfOverlap::of_all);
+        let is_alone = |half: &usize| {
+            let (one, other) = (halves[*half], halves[1 - *half]);
+            let is_filled = other.any as f64 >= LEAST_IN_HALF * one.any as f64;
+            one.iou() >= agrees && one.iou() - other.iou() >= exceeds && is_filled
+        };
+        (0..2).find(is_alone).map(|half| names[half])
+    })
+}
+
+/// Returns the overlaps of two masks in their columns and in their rows.
+fn overlaps_of_lines(one: &Mask, other: &Mask) -> [Vec<HalfOverlap>; 2] {
+    let mut columns = vec![HalfOverlap::default(); one.width()];
+    let mut rows = vec![HalfOverlap::default(); one.height()];
+    for (y, row) in rows.iter_mut().enumerate() {
+        for (column, (a, b)) in columns.iter_mut().zip(one.row(y).iter().zip(other.row(y))) {
+            for line in [column, &mut *row] {
+                line.both += u64::from(*a && *b);
+                line.any += u64::from(*a || *b);
+            }
+        }
+    }
+    [columns, rows]
 }
 
 /// Numbers of pixels inside a part of two masks.
@@ -132,17 +140,11 @@ struct HalfOverlap {
 }
 
 impl HalfOverlap {
-    fn of(one: &Mask, other: &Mask, is_inside: InPart<'_>) -> Self {
-        let mut found = Self::default();
-        for y in 0..one.height() {
-            for (x, (a, b)) in one.row(y).iter().zip(other.row(y)).enumerate() {
-                if is_inside(x, y) {
-                    found.both += u64::from(*a && *b);
-                    found.any += u64::from(*a || *b);
-                }
-            }
-        }
-        found
+    /// Adds the overlaps of parts.
+    fn of_all(parts: &[Self]) -> Self {
+        let both = parts.iter().map(|part| part.both).sum();
+        let any = parts.iter().map(|part| part.any).sum();
+        Self { both, any }
     }
 
     /// Returns the `IoU`; 0 if both masks are empty there.
