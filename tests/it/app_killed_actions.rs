@@ -118,7 +118,7 @@ pub(crate) fn list_of(to: &str, project: &Path) -> Value {
 }
 
 /// Puts the files of a whole block into two folders.
-fn write_block(project: &Path) {
+pub(crate) fn write_block(project: &Path) {
     let files = [("meshes", "ply", "scan"), ("prints", "jpg", "page")];
     for (folder, ending, to) in files {
         let file = format!("data/{folder}/upright-0001.{ending}");
