@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use rustix::process::{Signal, kill_process};
 use serde_json::{Value, json};
 
 use crate::app::app;
@@ -101,6 +102,31 @@ fn only_the_missing_files_are_sent_when_the_same_are_chosen_again() {
     assert_eq!(kept(&tab, "sent"), sent);
     let said = "Files that had arrived before and are not sent again: 2";
     assert_eq!(kept(&tab, "arrived"), said);
+    are_stored(dir.path(), &files);
+}
+
+#[test]
+fn an_upload_says_that_the_app_was_stopped_and_the_next_app_takes_the_same_files() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let source = tempfile::tempdir().expect("a temporary directory");
+    let files = files(source.path());
+    let mut page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1366, 660]);
+    open_import(&tab, &home);
+    send_slowly(&tab, &files);
+    kill_process(page.pid(), Signal::TERM).expect("stopped");
+    page.exit_code();
+    tab.wait("!document.querySelector('#upload-problem').hidden");
+    let said = tab.eval("document.querySelector('#upload-problem').textContent");
+    assert!(said.to_string().contains("hoose them again"), "{said}");
+    let next = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &next, [1366, 660]);
+    open_import(&tab, &home);
+    tab.choose_files("#upload-files", &files);
+    tab.wait(STORED);
     are_stored(dir.path(), &files);
 }
 
