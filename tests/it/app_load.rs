@@ -140,7 +140,7 @@ fn answer_again(page: &Page, client: usize) {
 /// Sends a file, and removes it.
 fn send_file(page: &Page) {
     let upload = begun(page, "load", 1);
-    let sent = put(page, &upload, "1.stl", &[b'x'; 1 << 16]);
+    let sent = put(page, &upload, "1.stl", &vec![b'x'; 1 << 16]);
     assert_eq!(sent.status, 200, "{}", text(&sent));
     assert_eq!(end(page, &upload, "cancel").status, 200);
 }
