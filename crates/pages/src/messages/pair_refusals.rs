@@ -288,7 +288,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "it has {} columns between tabs, but others have {}",
-        "dòng này có {0} cột giữa các dấu tab, nhưng các dòng khác có {1}",
+        "dòng này có {0#} cột giữa các dấu tab, nhưng các dòng khác có {1#}",
     ),
     (
         "write one tab between columns",
@@ -296,7 +296,7 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
     ),
     (
         "it has {} columns, but most lines have {}",
-        "dòng này có {0} cột, nhưng hầu hết các dòng có {1}",
+        "dòng này có {0#} cột, nhưng hầu hết các dòng có {1#}",
     ),
     (
         "write numbers such as \"1 234\" without blanks",
