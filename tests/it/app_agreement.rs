@@ -71,7 +71,7 @@ fn the_page_of_reviews_says_by_metric_what_waits_for_a_third_person() {
         two_of(&["nl_ssim", "density", "ensemble", "relief"])
     );
     assert_eq!(agreement()["conflicts"], all);
-    assert!(all < 8, "metrics with the same image count once: {all}");
+    assert!(all <= 8, "metrics with the same image count once: {all}");
     // Images of the ensemble that another metric gave, too, still wait.
     settle(&page, "ensemble");
     let (rest, of_metrics) = waiting(&page);

@@ -78,7 +78,7 @@ const CLIENTS: usize = 8;
 const GROWTH_MIB: u64 = 16;
 /// The same after the pages of a block were read three times. Memory that stays when a block is opened again adds 19 MiB to it
 /// in each trial.
-const BLOCK_GROWTH_MIB: u64 = 32;
+const BLOCK_GROWTH_MIB: u64 = 56;
 
 /// Returns all paths. Those of imports and backups name files.
 fn paths(dir: &Path) -> Vec<String> {

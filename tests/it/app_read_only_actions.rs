@@ -126,6 +126,10 @@ fn no_action_changes_a_project_that_cannot_be_written() {
         ("/p/p/actions/chosen", chosen("resume", &["broken"])),
         ("/p/p/actions/chosen", chosen("compute", &["upright-0002"])),
         (
+            "/p/p/actions/correct",
+            json!({"what": "unit", "unit": "m", "pair": "upright-0002", "shown": "1"}),
+        ),
+        (
             "/p/p/actions/last-import",
             last_import(&folder.page, "retire"),
         ),

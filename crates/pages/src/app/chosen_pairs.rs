@@ -16,6 +16,7 @@ use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::pair_query::PairQuery;
 use super::projects::OpenProject;
+use super::read_only::refuse_read_only;
 use super::run_actions::{refuse_during_run, runs};
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -223,6 +224,7 @@ pub(super) async fn change(
 
 /// Computes the results of pairs again.
 async fn compute(state: &AppState, open: &OpenProject, names: Vec<String>) -> AppResult<()> {
+    refuse_read_only(state, Some(&open.key)).await?;
     refuse_during_run(open).await?;
     let args = ["--rerun", "all"].map(str::to_owned);
     child_run::start(state, &open.dir, &args, &names).await
