@@ -137,7 +137,8 @@ const CONTACT_SHEET: FaultScenario = FaultScenario {
     before: |comparison, root| {
         copy(comparison.expected.project(), &root.join("p"));
         std::fs::create_dir(root.join("sheet")).expect("a folder");
-        std::fs::write(root.join("sheet/out.png"), "an earlier sheet").expect("written");
+        // Any other file that is no sheet is refused.
+        std::fs::write(root.join("sheet/out.png"), "").expect("written");
     },
     command: contact_sheet,
     after: |_, root, done| {

@@ -73,7 +73,7 @@ pub(super) fn header_bytes(bytes: &[u8]) -> Option<usize> {
     Some(with_ends.min(bytes.len()))
 }
 
-/// Reads the points of all scans, in their common frame; those that were not measured are NaN. Returns `None` if the file
+/// Reads the points of all scans, in their common frame; a point that was not measured is NaN. Returns `None` if the file
 /// does not begin with a header of PTX.
 ///
 /// # Errors
