@@ -3,6 +3,7 @@
 //! A pose is refined on one side of each of several lines. If the other side fits a displaced pose, and both sides together
 //! fit much better than the whole print fits any pose, the line is placed where both poses predict the ink best.
 
+use super::print_side::Side;
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{ImagePyramid, Loss, PoseCandidate, PyramidLevel, Refiner, SoftMask};
 use mocban_core::domain::cancel::poll;
@@ -38,31 +39,8 @@ const LEAST_SCORES: [f64; 2] = [0.62, 0.5];
 const LEAST_GAIN: f64 = 0.3;
 /// The displaced pose brings the score of the smaller part closer to 1 by at least this fraction.
 const LEAST_GAIN_OF_SMALLER: f64 = 0.25;
-/// Numbers of directions and offsets among which the line is placed.
-const FINE_DIRECTIONS: usize = 48;
-const FINE_OFFSETS: usize = 40;
 /// Width of the strip beside the line that is left out, as a fraction of the print's longest side.
 const STRIP: f64 = 0.012;
-
-/// A side of a line across the print.
-#[derive(Debug, Clone, Copy)]
-struct Side {
-    /// Unit vector away from the side.
-    normal: [f64; 2],
-    /// Distance of the line from the origin along `normal`, pixels of the masks.
-    offset: f64,
-}
-
-impl Side {
-    fn contains(&self, point: [f64; 2]) -> bool {
-        self.beyond(point) < 0.0
-    }
-
-    /// Returns how far a point lies beyond the line, pixels.
-    fn beyond(&self, [x, y]: [f64; 2]) -> f64 {
-        self.normal[0] * x + self.normal[1] * y - self.offset
-    }
-}
 
 /// The larger part of a torn print.
 pub(super) struct LargerPart {
@@ -151,7 +129,7 @@ pub(super) fn find(
     if sum - of_whole < LEAST_GAIN * (1.0 - of_whole) {
         return None;
     }
-    let line = best_line(&whole, &fixed, &larger.pose, &smaller.pose)?;
+    let line = Side::between(&whole, &fixed, &larger.pose, &smaller.pose)?;
     let beyond = fixed.restricted(|point| !line.contains(point))?;
     let other = OtherPart {
         larger: line,
@@ -164,7 +142,7 @@ pub(super) fn find(
     };
     let kept = fixed.restricted(|point| side.contains(point))?;
     let pose = Refiner::new(&kept, &moving).refine(&larger.pose, STEPS, Loss::Tukey);
-    let masks = within(print, &side);
+    let masks = side.masks(print);
     let share = masks.ink.count() as f64 / print.ink.count().max(1) as f64;
     let is_cut = masks.known.count() < print.known.count();
     (is_cut && share >= LARGER[0]).then_some(LargerPart {
@@ -173,20 +151,6 @@ pub(super) fn find(
         share,
         other,
     })
-}
-
-/// Returns the masks of a print, unknown beyond a line.
-fn within(print: &PrintMasks, side: &Side) -> PrintMasks {
-    let mut part = print.clone();
-    for mask in [&mut part.ink, &mut part.specks, &mut part.known] {
-        let width = mask.width();
-        for (y, row) in mask.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
-            for (x, set) in row.iter_mut().enumerate() {
-                *set &= side.contains([x as f64, y as f64]);
-            }
-        }
-    }
-    part
 }
 
 /// Returns the larger sides of several lines, each with the best pose that is refined on it.
@@ -295,52 +259,6 @@ fn moving_middle(pose: &PoseCandidate, part: &PyramidLevel) -> Option<[f64; 2]> 
     })?;
     let middle = sum.map(|sum| sum / f64::max(all, 1e-9));
     Some(pose.fixed_from_moving.inverse()?.apply(middle))
-}
-
-/// Returns the side of the line on which `larger` predicts the ink, while `smaller` predicts it beyond the line, with the
-/// least squares of the differences. Only pixels count where the depth map has data in both poses.
-fn best_line(
-    whole: &Refiner,
-    fixed: &PyramidLevel,
-    larger: &PoseCandidate,
-    smaller: &PoseCandidate,
-) -> Option<Side> {
-    let mut points = Vec::new();
-    fixed.each_amount(|point, _| points.push(point))?;
-    let mut gains = Vec::new();
-    whole.each_difference([smaller, larger], |point, differences| {
-        let [of_smaller, of_larger] = differences.map(|of| f64::from(of).powi(2));
-        gains.push((point, of_smaller - of_larger));
-    })?;
-    let mut best: Option<(f64, Side)> = None;
-    for k in 0..FINE_DIRECTIONS {
-        poll();
-        let (sin, cos) = (k as f64 * std::f64::consts::TAU / FINE_DIRECTIONS as f64).sin_cos();
-        let along = |[x, y]: [f64; 2]| cos * x + sin * y;
-        let range = points
-            .iter()
-            .fold([f64::MAX, f64::MIN], |[low, high], point| {
-                let at = along(*point);
-                [low.min(at), high.max(at)]
-            });
-        let width = (range[1] - range[0]).max(1e-9);
-        let mut bins = [0.0; FINE_OFFSETS];
-        for (point, gain) in &gains {
-            let at = (along(*point) - range[0]) / width * FINE_OFFSETS as f64;
-            bins[(at as usize).min(FINE_OFFSETS - 1)] += gain;
-        }
-        // A pixel on the larger side saves the square of the other pose's difference.
-        let mut saved = 0.0;
-        for (bin, gain) in bins.iter().enumerate() {
-            saved += gain;
-            if best.as_ref().is_none_or(|(most, _)| saved > *most) {
-                let offset = range[0] + width * (bin + 1) as f64 / FINE_OFFSETS as f64;
-                let normal = [cos, sin];
-                best = Some((saved, Side { normal, offset }));
-            }
-        }
-    }
-    best.map(|(_, side)| side)
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ mod observation;
 mod params;
 mod pose_search;
 mod posed;
+mod print_side;
 mod refine;
 mod scoring;
 mod soft_thresholds;
