@@ -18,7 +18,7 @@ const MOST_TIMES: usize = 8;
 const MOST_PX: usize = 1 << 20;
 /// A print is reduced a whole number of times to at least this many pixels. They show the strokes of a character as well
 /// as more pixels do, and the time that all stages take is in proportion to their number.
-const ENOUGH_PX: usize = 1_000 * 1_000;
+const ENOUGH_PX: usize = 700 * 700;
 /// Pixels that the shorter side of a reduced print has at least.
 const REDUCED_SIDE_PX: usize = 500;
 
@@ -140,15 +140,15 @@ mod tests {
         assert_eq!(scale(12, 11), MaskScale::enlarged(6));
         assert_eq!(scale(1, 1), MaskScale::enlarged(8));
         assert_eq!(scale(300_000, 3), MaskScale::Same);
-        assert_eq!(scale(1999, 1999), MaskScale::Same);
+        assert_eq!(scale(1399, 1399), MaskScale::Same);
         assert_eq!(scale(8000, 900), MaskScale::Same);
         let masks = |width, height| {
             let scale = scale(width, height);
             assert!(matches!(scale, MaskScale::Reduced(_)), "{scale:?}");
             scale.mask_size([width, height])
         };
-        assert_eq!(masks(2000, 2000), Some([1000, 1000]));
-        assert_eq!(masks(2999, 3001), Some([1500, 1501]));
+        assert_eq!(masks(1400, 1400), Some([700, 700]));
+        assert_eq!(masks(2999, 3001), Some([750, 751]));
         assert_eq!(masks(8000, 1000), Some([4000, 500]));
     }
 

@@ -8,8 +8,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::background::{self, NARROW};
+use super::ink::sampled;
 use super::polarity::background_darkness;
-use mocban_core::domain::cancel::poll;
 use mocban_core::raster::otsu;
 use mocban_core::raster::{Grid, Mask, PrintImage};
 
@@ -116,28 +116,12 @@ fn colour(rgb: [u16; 3]) -> Vector3<f64> {
     Vector3::from(rgb.map(|c| (f64::from(c) / 65_535.0 + DARK).ln()))
 }
 
-/// Returns values of known pixels of a grid, at most about [`SAMPLES`], at equal distances in both directions.
-fn sampled<T: Copy, U>(grid: &Grid<T>, known: &Mask, value: impl Fn(T) -> U) -> Vec<U> {
-    let step = (known.count().div_ceil(SAMPLES) as f64)
-        .sqrt()
-        .ceil()
-        .max(1.0) as usize;
-    let mut values = Vec::new();
-    for y in (step / 2..grid.height()).step_by(step) {
-        poll();
-        let pixels = grid.row(y).iter().zip(known.row(y)).skip(step / 2);
-        let held = pixels.step_by(step).filter(|(_, known)| **known);
-        values.extend(held.map(|(pixel, _)| value(*pixel)));
-    }
-    values
-}
-
 fn samples(picture: &PrintImage, known: &Mask) -> Vec<Vector3<f64>> {
-    sampled(&picture.rgb, known, colour)
+    sampled(&picture.rgb, known, SAMPLES, colour)
 }
 
 fn held_sample(grid: &Grid<f32>, known: &Mask) -> Vec<f32> {
-    sampled(grid, known, |value| value)
+    sampled(grid, known, SAMPLES, |value| value)
 }
 
 /// Returns the standard deviation of the colours across the axis of the brightness.

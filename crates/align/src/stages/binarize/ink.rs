@@ -34,6 +34,9 @@ const NOISE: f64 = 0.012;
 /// Least fraction of ink in a print.
 const LEAST_INK: f64 = 0.002;
 
+/// Thresholds and medians of more values hardly differ, and sorting them takes as long as all else.
+const MOST_VALUES: usize = 1 << 17;
+
 /// Least longest side of the ink of a small print, in pixels of the print.
 const LEAST_CHARACTER_PX: f64 = 6.0;
 /// An image is small if its shorter side has fewer pixels. Small prints are enlarged to about half of it.
@@ -224,13 +227,25 @@ pub(super) fn binarize_even(
     })
 }
 
-/// Returns the values of the known pixels.
+/// Returns values of the known pixels, from which thresholds are found: all, or about [`MOST_VALUES`] of a large print.
 pub(super) fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
+    sampled(grey, known, MOST_VALUES, |value| value)
+}
+
+/// Returns values of known pixels of a grid, at most about `most`, at equal distances in both directions.
+pub(super) fn sampled<T: Copy, U>(
+    grid: &Grid<T>,
+    known: &Mask,
+    most: usize,
+    value: impl Fn(T) -> U,
+) -> Vec<U> {
+    let step = (known.count().div_ceil(most) as f64).sqrt().ceil().max(1.0) as usize;
     let mut values = Vec::new();
-    for (y, greys) in grey.data().chunks(grey.width().max(1)).enumerate() {
+    for y in (step / 2..grid.height()).step_by(step) {
         poll();
-        let pairs = greys.iter().zip(known.row(y));
-        values.extend(pairs.filter(|(_, k)| **k).map(|(g, _)| *g));
+        let pixels = grid.row(y).iter().zip(known.row(y)).skip(step / 2);
+        let held = pixels.step_by(step).filter(|(_, known)| **known);
+        values.extend(held.map(|(pixel, _)| value(*pixel)));
     }
     values
 }
@@ -252,8 +267,8 @@ pub(super) fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
         return all;
     };
     let is_light = |value: &&f32| f64::from(**value) > split.threshold;
-    let background = values.iter().filter(is_light).count() as f64;
-    let is_enough = background >= LEAST_BACKGROUND * all.data().len() as f64;
+    let light = values.iter().filter(is_light).count() as f64 / values.len() as f64;
+    let is_enough = light * inside.density() >= LEAST_BACKGROUND;
     if is_enough && split.high < DISTINCT_BACKGROUND {
         return inside;
     }
