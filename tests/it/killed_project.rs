@@ -12,6 +12,9 @@ use crate::page::{Page, read_project};
 use crate::project_dump::ProjectDump;
 use crate::waiting::wait_until;
 
+/// An action that stores something, and then starts a run.
+const STORES_AND_RUNS: &str = "/p/p/actions/correct";
+
 /// An action that is killed.
 pub(crate) struct KilledAction {
     /// Changes the project before.
@@ -165,10 +168,11 @@ impl<'a> KilledProject<'a> {
         let has_log = log.is_ok_and(|log| log.len() > 0);
         self.kill_at("sync", if has_log { 1 } else { 2 });
         let mut found = self.outcome();
-        if found.state == self.before {
+        let is_stored = found.state != self.before;
+        if !is_stored || self.action.action == STORES_AND_RUNS {
             let next = open_app(&self.root());
             let jobs = status(&self.root().join("p"))["jobs"].clone();
-            found = if jobs["ready"].as_u64() > Some(0) {
+            found = if is_stored || jobs["ready"].as_u64() > Some(0) {
                 // Its pairs wait for a run.
                 self.change(&next, "/p/p/actions/run", &json!({"which": "all"}))
             } else {

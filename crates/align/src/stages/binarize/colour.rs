@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn samples_spread_over_a_print_of_any_width() {
         let grid = Grid::from_fn(500, 500, |x, y| (x, y));
-        let found = sampled(&grid, &Mask::new(500, 500, true), |at| at);
+        let found = sampled(&grid, &Mask::new(500, 500, true), 2_500, |at| at);
         let distinct = |of: &dyn Fn(&(usize, usize)) -> usize| {
             let places: std::collections::BTreeSet<usize> = found.iter().map(of).collect();
             places.len()
