@@ -174,12 +174,22 @@ impl<'a> KilledProject<'a> {
             let jobs = status(&self.root().join("p"))["jobs"].clone();
             found = if is_stored || jobs["ready"].as_u64() > Some(0) {
                 // Its pairs wait for a run.
-                self.change(&next, "/p/p/actions/run", &json!({"which": "all"}))
+                self.run(&next)
             } else {
                 self.change(&next, self.action.action, &self.body(&next))
             };
         }
         found.must_equal(after, &format!("{} is half done", self.action.action));
+    }
+
+    /// Runs the pairs that wait; of a correction only its pair, as the action does.
+    fn run(&self, next: &Page) -> ActionOutcome {
+        if self.action.action != STORES_AND_RUNS {
+            return self.change(next, "/p/p/actions/run", &json!({"which": "all"}));
+        }
+        let pair = &self.body(next)["pair"];
+        let resume = json!({"change": "resume", "list": "view=table", "pairs": [pair]});
+        self.change(next, "/p/p/actions/chosen", &resume)
     }
 }
 

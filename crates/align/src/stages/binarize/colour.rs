@@ -8,8 +8,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::background::{self, NARROW};
-use super::ink::sampled;
 use super::polarity::background_darkness;
+use super::samples::sampled;
 use mocban_core::raster::otsu;
 use mocban_core::raster::{Grid, Mask, PrintImage};
 
@@ -208,7 +208,7 @@ fn discriminant(samples: &[Vector3<f64>], start: Vector3<f64>) -> Option<(Vector
 
 #[cfg(test)]
 mod tests {
-    use super::{contrast, sampled};
+    use super::contrast;
     use mocban_core::raster::{Grid, Mask, PrintImage};
 
     const SIDE: usize = 120;
@@ -253,19 +253,6 @@ mod tests {
         let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
         let wrong = pixels.filter(wrong).count();
         assert!(wrong < 150, "{wrong}");
-    }
-
-    #[test]
-    fn samples_spread_over_a_print_of_any_width() {
-        let grid = Grid::from_fn(500, 500, |x, y| (x, y));
-        let found = sampled(&grid, &Mask::new(500, 500, true), 2_500, |at| at);
-        let distinct = |of: &dyn Fn(&(usize, usize)) -> usize| {
-            let places: std::collections::BTreeSet<usize> = found.iter().map(of).collect();
-            places.len()
-        };
-        let (columns, rows) = (distinct(&|at| at.0), distinct(&|at| at.1));
-        assert!(columns >= 45 && rows >= 45, "{columns} x {rows}");
-        assert!(found.len() <= 2_500, "{}", found.len());
     }
 
     #[test]

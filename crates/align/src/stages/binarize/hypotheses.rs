@@ -4,9 +4,10 @@ use super::background::STROKE;
 use super::colour::{self, ColourContrast};
 use super::ground::dark_ground;
 use super::ink::{
-    BinarizeError, InkMask, binarize_even, binarize_narrow, by_brightness, grey_of, held, known,
+    BinarizeError, InkMask, binarize_even, binarize_narrow, by_brightness, grey_of, known,
     may_be_stained,
 };
+use super::samples::held;
 use mocban_core::raster::otsu;
 use mocban_core::raster::{Grid, Mask, PrintImage};
 

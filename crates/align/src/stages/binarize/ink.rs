@@ -3,8 +3,8 @@
 use super::background::{self, NARROW, STROKE};
 use super::colour;
 use super::polarity::polarity;
+use super::samples::held;
 use crate::stages::pose::SoftMask;
-use mocban_core::domain::cancel::poll;
 use mocban_core::raster::components::{ConnectedComponents, remove_specks};
 use mocban_core::raster::otsu::{self, Split};
 use mocban_core::raster::{Grid, Mask, PrintImage};
@@ -33,9 +33,6 @@ const LEAST_CONTRAST: f64 = 0.08;
 const NOISE: f64 = 0.012;
 /// Least fraction of ink in a print.
 const LEAST_INK: f64 = 0.002;
-
-/// Thresholds and medians of more values hardly differ, and sorting them takes as long as all else.
-const MOST_VALUES: usize = 1 << 17;
 
 /// Least longest side of the ink of a small print, in pixels of the print.
 const LEAST_CHARACTER_PX: f64 = 6.0;
@@ -225,29 +222,6 @@ pub(super) fn binarize_even(
         light_on_dark,
         even: (even.width().min(even.height()) < SMALL_PX).then(|| even.clone()),
     })
-}
-
-/// Returns values of the known pixels, from which thresholds are found: all, or about [`MOST_VALUES`] of a large print.
-pub(super) fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
-    sampled(grey, known, MOST_VALUES, |value| value)
-}
-
-/// Returns values of known pixels of a grid, at most about `most`, at equal distances in both directions.
-pub(super) fn sampled<T: Copy, U>(
-    grid: &Grid<T>,
-    known: &Mask,
-    most: usize,
-    value: impl Fn(T) -> U,
-) -> Vec<U> {
-    let step = (known.count().div_ceil(most) as f64).sqrt().ceil().max(1.0) as usize;
-    let mut values = Vec::new();
-    for y in (step / 2..grid.height()).step_by(step) {
-        poll();
-        let pixels = grid.row(y).iter().zip(known.row(y)).skip(step / 2);
-        let held = pixels.step_by(step).filter(|(_, known)| **known);
-        values.extend(held.map(|(pixel, _)| value(*pixel)));
-    }
-    values
 }
 
 /// Returns the mask of ink and background. White areas at the border are left out, unless the background is white too.

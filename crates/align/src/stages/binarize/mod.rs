@@ -8,6 +8,7 @@ mod ink;
 mod ink_shares;
 mod outlined;
 mod polarity;
+mod samples;
 #[cfg(test)]
 mod test_strokes;
 
