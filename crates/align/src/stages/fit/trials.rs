@@ -29,11 +29,6 @@ const MARGIN: f64 = 0.06;
 const CUT: f64 = 0.02;
 /// The floor and the ceiling of a widened box recede by this fraction of the growth, as the plane may be tilted.
 const TILT: f64 = 0.05;
-/// The surface leaves the height of a box if it reaches beyond this fraction of the floor's depth or the ceiling's height. The
-/// strokes and the ground beside them need the rest.
-const LEAVES: f64 = 0.5;
-/// Fraction of the ink that lies on the depth map unless the box cuts the character, or the wood is broken.
-const WELL_SEEN: f64 = 0.75;
 
 /// Factor of the confidence of a side whose faces point inward, for a small print: a few pixels resemble the back of a
 /// block by chance, and the faces of most files point outward.
@@ -151,31 +146,13 @@ impl<'a> Trials<'a> {
             region: Some(region),
             ..candidate.clone()
         };
-        let with_pose = |wider: FitOutcome| {
+        let with_confidence = |wider: FitOutcome| {
             let pose = self.registered(&wider);
-            (wider, pose)
+            (wider, pose.map_or(0.0, |pose| pose.confidence))
         };
-        let confidence = |pose: Option<&TrialPose>| pose.map_or(0.0, |pose| pose.confidence);
-        let again = self.fitted_again(&along).map(with_pose);
-        let along = with_pose(along);
-        let of_along = confidence(along.1.as_ref());
-        let (wider, pose) = again
-            .filter(|(_, pose)| confidence(pose.as_ref()) > of_along)
-            .unwrap_or(along);
-        let higher = pose.as_ref().and_then(|pose| self.higher(&wider, pose));
-        higher.unwrap_or((wider, confidence(pose.as_ref())))
-    }
-
-    /// Extends the floor and the ceiling of a candidate's box to its surface, if much of the ink lies where the depth map has
-    /// no data. The surface may be tilted against the box. Returns the candidate with its confidence, if it shows more ink.
-    fn higher(&self, candidate: &FitOutcome, pose: &TrialPose) -> Option<(FitOutcome, f64)> {
-        let region = pose.higher(candidate)?;
-        let higher = FitOutcome {
-            region: Some(region),
-            ..candidate.clone()
-        };
-        let found = self.registered(&higher)?;
-        (found.seen_ink > pose.seen_ink).then_some((higher, found.confidence))
+        let again = self.fitted_again(&along).map(with_confidence);
+        let along = with_confidence(along);
+        again.filter(|again| again.1 > along.1).unwrap_or(along)
     }
 
     /// Fits the surface of a candidate once more to all of its box.
@@ -226,31 +203,6 @@ impl<'a> Trials<'a> {
 }
 
 impl TrialPose {
-    /// Returns the corners of the ink on the surface of a candidate, in the frame of a box.
-    fn ink_in(&self, region: &ScanRegion, candidate: &FitOutcome) -> [[f64; 3]; 4] {
-        let box_from_plane = region
-            .box_from_mesh
-            .after(&candidate.plane_from_mesh.inverse());
-        self.ink.map(|corner| {
-            let [x, y] = self.plane_from_print.apply(corner);
-            box_from_plane.apply([x, y, 0.0])
-        })
-    }
-
-    /// Returns the box of a candidate with a lower floor and a higher ceiling, if much of the ink lies where the depth map has
-    /// no data, and the surface leaves the height of the box there.
-    fn higher(&self, candidate: &FitOutcome) -> Option<ScanRegion> {
-        let mut higher = candidate.region?;
-        let heights = self.ink_in(&higher, candidate).map(|corner| corner[2]);
-        let [low, high] = [0, 1].map(|k| higher.bounds[k][2]);
-        let lowest = heights.iter().copied().fold(0.0, f64::min);
-        let highest = heights.iter().copied().fold(0.0, f64::max);
-        let leaves = lowest < LEAVES * low || highest > LEAVES * high;
-        higher.bounds[0][2] += lowest;
-        higher.bounds[1][2] += highest;
-        (self.seen_ink < WELL_SEEN && leaves).then_some(higher)
-    }
-
     /// Returns a box widened to the ink, if it cuts through the ink and the scan extends beyond it.
     fn wider(
         &self,
@@ -258,8 +210,13 @@ impl TrialPose {
         candidate: &FitOutcome,
         scan: &Scan,
     ) -> Option<ScanRegion> {
+        let mesh_from_plane = candidate.plane_from_mesh.inverse();
         let mut ink = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        for at in self.ink_in(region, candidate) {
+        for corner in self.ink {
+            let [x, y] = self.plane_from_print.apply(corner);
+            let at = region
+                .box_from_mesh
+                .apply(mesh_from_plane.apply([x, y, 0.0]));
             for k in 0..2 {
                 ink[0][k] = ink[0][k].min(at[k]);
                 ink[1][k] = ink[1][k].max(at[k]);

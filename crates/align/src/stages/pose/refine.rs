@@ -169,19 +169,6 @@ impl<'a> Refiner<'a> {
         self.tiebreak_scores(pose, self, pose)[0]
     }
 
-    /// Returns the fraction of the fixed level's amount that lies where the moving level is valid at a pose.
-    pub(crate) fn seen_share(&self, pose: &PoseCandidate) -> f64 {
-        let (amount, valid) = (&self.fixed.amount, self.fixed_valid());
-        let seen = |placed: PlacedLevel| {
-            let common = placed.common_pixels(valid);
-            common.map(|(x, y, _)| f64::from(amount.at(x, y))).sum()
-        };
-        let seen: f64 = self.placed(pose).map_or(0.0, seen);
-        let amounts = amount.data().iter().zip(valid.data());
-        let all: f64 = amounts.map(|(of, valid)| f64::from(of * valid)).sum();
-        seen / all.max(1e-9)
-    }
-
     /// Calls a function with the position in the fixed image of each pixel that is valid in both levels at two poses, and
     /// with the differences of the amounts there, fixed minus moving.
     pub(crate) fn each_difference(

@@ -42,7 +42,7 @@ impl Doubts {
 /// Returns the probability, 0..=1, that print and relief come from the same block and not from another one with the same or
 /// a similar character. `smooth_misfit` is the displacement of whole strokes, as a fraction of the stroke width. It is 0.02 to
 /// 0.06 on right pairs, up to 0.077 if much wood is lost, and 0.078 to 0.12 on nearly all prints of another hand.
-pub(super) fn of_same_block(smooth_misfit: f64) -> f64 {
+fn of_same_block(smooth_misfit: f64) -> f64 {
     1.0 / (1.0 + ((smooth_misfit - OTHER_BLOCK) / OTHER_BLOCK_DEVIATION).exp())
 }
 

@@ -46,7 +46,7 @@ use pose_search::PoseSearch;
 use posed::{Levelled, Posed};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 32;
+pub const REVISION: u32 = 31;
 
 /// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
 /// symmetric character by a few percent.
@@ -57,8 +57,8 @@ const MIRROR_LIKELY: f64 = 1.04;
 /// have strokes without a partner too.
 const UNLIKELY: f64 = 0.05;
 
-/// A torn print is sought if the probability of the pose, multiplied by the probability of the same character and of the
-/// same block, is below this.
+/// A torn print is sought if the probability of the pose, multiplied by the probability of the same character, is below
+/// this.
 const DOUBTFUL: f64 = 0.75;
 
 /// A pair is refused if the probability of the pose, of the same character and of all doubts together is below this. Right
@@ -237,28 +237,19 @@ fn on_larger_part(
         return None;
     }
     let print = &normalized.prints[search.ink];
-    let parts = larger_part::find(depths, print, &search.poses).into_iter();
-    let fits = parts.filter_map(|part| {
-        let found = pose_search::search_part(depths, print, search, &part, params).ok()?;
-        let masks = normalized.with_masks(search.ink, part.masks);
-        let posed = Posed::new(depth, depths, &relief, &masks, &found, false, params).ok()?;
-        let probability = part.share * probability(&posed);
-        let part = TornPrint {
+    let part = larger_part::find(depths, print, &search.poses)?;
+    let found = pose_search::search_part(depths, print, search, &part, params).ok()?;
+    let masks = normalized.with_masks(search.ink, part.masks.clone());
+    let posed = Posed::new(depth, depths, &relief, &masks, &found, false, params).ok()?;
+    (part.share * probability(&posed) > of_whole).then_some(PartFit {
+        search: found,
+        posed,
+        part: TornPrint {
             masks,
             share: part.share,
             other: part.other,
-        };
-        (probability > of_whole).then_some((
-            probability,
-            PartFit {
-                search: found,
-                posed,
-                part,
-            },
-        ))
-    });
-    let best = fits.reduce(|best, other| if other.0 > best.0 { other } else { best });
-    best.map(|(_, fit)| fit)
+        },
+    })
 }
 
 /// Returns the fraction of the print's ink that lies where the depth map has data. `seen` is the ink with data on a canvas
@@ -268,12 +259,9 @@ fn seen_ink(canvas_print: &Mask, seen: &Mask) -> f64 {
     scale * seen.count() as f64 / canvas_print.count().max(1) as f64
 }
 
-/// Returns the probability that the pose is right and that print and relief show the same character of the same block, by
-/// the pair alone. The pose of a whole torn print lies between those of its parts, which displaces all of the strokes.
+/// Returns the probability that the pose is right and that print and relief show the same character, by the pair alone.
 fn probability(posed: &Posed) -> f64 {
-    confidence::of_pose(&posed.features, 0.0)
-        * confidence::of_character(&posed.features)
-        * doubts::of_same_block(posed.smooth_misfit)
+    confidence::of_pose(&posed.features, 0.0) * confidence::of_character(&posed.features)
 }
 
 /// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character. Also

@@ -1,10 +1,10 @@
 //! Candidates of a fit that are registered, widened and compared.
 
-use super::{TrialPose, Trials, factor_of_winding, replaces};
+use super::{Trials, factor_of_winding, replaces};
 use crate::stages::fit::fit;
 use crate::stages::testing::settings;
 use crate::stages::{Print, Scan};
-use mocban_core::domain::{Affine2, FitOutcome, Rigid3, ScanRegion};
+use mocban_core::domain::{FitOutcome, ScanRegion};
 use mocban_core::raster::{ImageLimits, decode};
 use mocban_demo::{DemoPair, PairGenerator, Tier};
 use nalgebra::Vector3;
@@ -43,42 +43,6 @@ fn a_box_that_cuts_through_the_character_is_widened() {
     let region = trials.into_best(true).and_then(|found| found.region);
     let [.., to] = region.expect("a box").bounds;
     assert!(to[0] > low[0] + 0.9 * width, "{to:?} {low:?} {width}");
-}
-
-/// Returns the floor and the ceiling of a box from -1.5 to 1 that are extended to a surface, which is tilted against the box.
-/// The ink reaches 5 units from the middle.
-fn extended(tilt_deg: f64, seen_ink: f64) -> Option<[f64; 2]> {
-    let pair = upright_pair();
-    let (scan, print) = read(&pair);
-    let whole = fit(&scan, Some(&print), None, &settings().fit).expect("a plane");
-    let (sin, cos) = tilt_deg.to_radians().sin_cos();
-    let axes = [[cos, 0.0, -sin], [0.0, 1.0, 0.0], [sin, 0.0, cos]];
-    let candidate = FitOutcome {
-        region: Some(ScanRegion {
-            box_from_mesh: Rigid3::to_frame(axes, [0.0; 3]).after(&whole.plane_from_mesh),
-            bounds: [[-6.0, -6.0, -1.5], [6.0, 6.0, 1.0]],
-        }),
-        ..whole
-    };
-    let pose = TrialPose {
-        confidence: 0.6,
-        plane_from_print: Affine2::IDENTITY,
-        seen_ink,
-        ink: [[-5.0, -5.0], [5.0, -5.0], [-5.0, 5.0], [5.0, 5.0]],
-    };
-    let [low, high] = pose.higher(&candidate)?.bounds;
-    Some([low[2], high[2]])
-}
-
-#[test]
-fn a_box_that_hides_ink_is_extended_to_a_tilted_surface() {
-    let [low, high] = extended(20.0, 0.5).expect("a higher box");
-    let reach = 5.0 * 20_f64.to_radians().sin();
-    assert!((low + 1.5 + reach).abs() < 1e-6, "{low}");
-    assert!((high - 1.0 - reach).abs() < 1e-6, "{high}");
-    // The ink is seen, or the surface is parallel to the box.
-    assert_eq!(extended(20.0, 0.9), None);
-    assert_eq!(extended(2.0, 0.5), None);
 }
 
 #[test]
