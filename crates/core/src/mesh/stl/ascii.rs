@@ -6,8 +6,8 @@ use crate::mesh::text;
 use crate::mesh::triangle_mesh::Mesh;
 use crate::mesh::xyz::is_comment;
 
-/// Reads an ASCII STL with one or more solids, and comments between them. A line may have several keywords. Loops of more than three corners are
-/// triangulated as fans.
+/// Reads an ASCII STL with one or more solids, and comments between them. A line may have several keywords. Loops of more
+/// than three corners are triangulated as fans.
 pub(crate) fn read_ascii(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     text::check_lines(bytes)?;
     let mut parser = AsciiParser::default();

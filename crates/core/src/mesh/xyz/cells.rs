@@ -5,8 +5,8 @@ use crate::mesh::decimal;
 /// Stands in place of an empty cell: a coordinate is missing there.
 pub(super) const MISSING: &[u8] = b"nan";
 
-/// Parses three numbers with simple separators, as in almost every line. Returns `None` for all other lines, and for those
-/// that go on after the third number if it `is_last`.
+/// Parses three numbers with simple separators, as in almost every line. Returns `None` for all other lines, and, if the
+/// third number `is_last`, for lines that continue after it.
 #[inline]
 pub(super) fn plain_position(line: &[u8], is_last: bool) -> Option<[f64; 3]> {
     let mut position = [0.0; 3];

@@ -227,7 +227,8 @@ impl PointLayout {
         text::position(with_points.iter().map(Vec::as_slice))
     }
 
-    /// Checks that the cells of a line with `count` columns can be told apart; the error is a message.
+    /// Refuses a line that has more columns than the others because of doubled tabs or of blanks within numbers. `count` is
+    /// the number of its columns; the error is a message.
     fn check_cells(&self, line: &[u8], count: usize) -> Result<(), String> {
         if count <= self.tabs.unwrap_or(self.width) {
             return Ok(());
