@@ -55,11 +55,7 @@ fn positions(
     limits: &MeshLimits,
 ) -> Result<Vec<[f64; 3]>, MeshError> {
     let mut points = Vec::with_capacity((bytes.len() / SHORTEST_LINE).min(1 << 16));
-    let lines = text::raw_lines(bytes).skip_while(|(line, _)| *line < layout.first_point);
-    for (line, raw) in lines {
-        let Some(row) = layout.row(raw) else {
-            continue;
-        };
+    for (line, row) in layout.rows(bytes) {
         let point = layout.position(row);
         let point = point.map_err(|reason| MeshError::Line { line, reason })?;
         limits.check_vertices(points.len() as u64 + 1)?;
@@ -86,9 +82,10 @@ impl SampledPoints {
         let head = &head[header..];
         let layout = PointLayout::of(head)?;
         let numbered = layout.numbered().filter(|_| {
-            let lines = text::raw_lines(head).filter(|(line, _)| *line >= layout.first_point);
-            let rows = lines.filter_map(|(_, raw)| layout.row(raw));
-            let points: Vec<_> = rows.filter_map(|row| layout.position(row).ok()).collect();
+            let rows = layout.rows(head);
+            let points: Vec<_> = rows
+                .filter_map(|(_, row)| layout.position(row).ok())
+                .collect();
             are_numbers(&points)
         });
         Ok(Self {

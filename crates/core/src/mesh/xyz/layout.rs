@@ -158,6 +158,12 @@ impl PointLayout {
         (self.width > 5).then_some(layout)
     }
 
+    /// Returns the rows from the first point on, with the numbers of their lines.
+    pub(super) fn rows<'a>(&'a self, bytes: &'a [u8]) -> impl Iterator<Item = (u64, &'a [u8])> {
+        let lines = text::raw_lines(bytes).skip_while(move |(line, _)| *line < self.first_point);
+        lines.filter_map(move |(line, raw)| Some((line, self.row(raw)?)))
+    }
+
     /// Returns the part of a line that may be a point. `None` if the line is empty or a comment.
     #[inline]
     pub(super) fn row<'a>(&self, raw: &'a [u8]) -> Option<&'a [u8]> {

@@ -2,7 +2,7 @@
 
 use super::layout::PointLayout;
 use crate::domain::cancel::polled;
-use crate::mesh::{MeshError, text};
+use crate::mesh::MeshError;
 
 /// Fewest points that show that a column holds their numbers.
 const NUMBERED_POINTS: usize = 10;
@@ -47,10 +47,9 @@ pub(super) fn check_grid(
         return Ok(());
     }
     let positions = |layout: PointLayout| -> Vec<[f64; 3]> {
-        let lines = text::raw_lines(bytes).filter(|(line, _)| *line >= layout.first_point);
-        let rows = lines.filter_map(|(_, raw)| layout.row(raw));
-        let positions = rows.take(COMPARED_LINES).map(|row| layout.position(row));
-        positions.filter_map(Result::ok).collect()
+        let rows = layout.rows(bytes).take(COMPARED_LINES);
+        rows.filter_map(|(_, row)| layout.position(row).ok())
+            .collect()
     };
     let found = positions(gridded);
     if found.len() < NUMBERED_POINTS || (0..3).any(|axis| is_whole(&found, axis)) {
