@@ -126,14 +126,18 @@ pub(super) fn position<'a>(mut words: impl Iterator<Item = &'a [u8]>) -> Result<
     Ok(out)
 }
 
+/// Replaces the first comma of a word by a point.
+pub(super) fn with_point(word: &[u8]) -> Vec<u8> {
+    let mut pointed = word.to_vec();
+    if let Some(comma) = pointed.iter_mut().find(|byte| **byte == b',') {
+        *comma = b'.';
+    }
+    pointed
+}
+
 /// Says that a word is not a number, and quotes its beginning.
 pub(super) fn not_a_number(word: &[u8]) -> String {
-    let is_decimal_comma = word.split(|byte| *byte == b',').count() == 2 && {
-        let pointed: Vec<u8> = polled(word)
-            .map(|byte| if *byte == b',' { b'.' } else { *byte })
-            .collect();
-        number(&pointed).is_some()
-    };
+    let is_decimal_comma = word.contains(&b',') && number(&with_point(word)).is_some();
     let advice = if is_decimal_comma {
         "; save the file with decimal points instead of commas"
     } else {

@@ -229,7 +229,7 @@ impl PointLayout {
         if let Some(reason) = points.into_iter().flatten().next() {
             return Err(reason);
         }
-        let with_points = coordinates.map(with_point);
+        let with_points = coordinates.map(text::with_point);
         text::position(with_points.iter().map(Vec::as_slice))
     }
 
@@ -302,7 +302,7 @@ fn most_frequent(widths: &[usize]) -> usize {
 
 /// Parses a number that may have a decimal comma.
 fn number_with_comma(cell: &[u8]) -> Option<f64> {
-    text::number(&with_point(cell))
+    text::number(&text::with_point(cell))
 }
 
 /// Returns what the commas of a point mean; `None` if it has none.
@@ -322,7 +322,7 @@ fn comma_use(line: &[u8]) -> Option<CommaUse> {
     let is_decimal = |word: &[u8]| {
         word.contains(&b',')
             && !word.contains(&b'.')
-            && text::parse::<f64>(&with_point(word)).is_some()
+            && text::parse::<f64>(&text::with_point(word)).is_some()
     };
     if outer_cells(line).any(is_decimal) {
         return Some(CommaUse::Decimal);
@@ -334,15 +334,6 @@ fn comma_use(line: &[u8]) -> Option<CommaUse> {
     } else {
         CommaUse::Separator
     })
-}
-
-/// Replaces a comma by a point.
-fn with_point(number: &[u8]) -> Vec<u8> {
-    let mut number = number.to_vec();
-    if let Some(comma) = number.iter_mut().find(|byte| **byte == b',') {
-        *comma = b'.';
-    }
-    number
 }
 
 const fn is_outer_separator(byte: u8) -> bool {

@@ -55,10 +55,8 @@ fn cells(line: &[u8], separator: u8) -> Vec<Vec<u8>> {
     trimmed.collect()
 }
 
-/// Returns a number with a decimal comma with a point instead.
+/// Replaces the decimal comma of a number by a point. Returns `None` for other cells.
 fn pointed(cell: &[u8]) -> Option<Vec<u8>> {
-    let mut pointed = cell.to_vec();
-    let comma = pointed.iter().position(|byte| *byte == b',')?;
-    pointed[comma] = b'.';
+    let pointed = cell.contains(&b',').then(|| text::with_point(cell))?;
     text::number(&pointed).is_some().then_some(pointed)
 }
