@@ -12,29 +12,18 @@ use image::metadata::Orientation;
 use super::colour_profile::FileProfile;
 use super::error::{DecodeError, broken};
 use super::limits::ImageLimits;
-use super::orientation::StatedOrientation;
 use super::print_image::widened;
 use crate::domain::FileKind;
 use crate::domain::cancel::run_aside;
 use crate::raster::Grid;
 use interleaved::{JpegColours, JpegSamples, interleaved};
-use segments::{JpegFrame, JpegSegments};
+use segments::{JpegFrame, JpegMetadata, JpegSegments};
 
 /// A decoded JPEG, as stored.
 pub(super) struct JpegImage {
     pub(super) rgb: Grid<[u16; 3]>,
     pub(super) orientation: Orientation,
     pub(super) profile: Option<FileProfile>,
-}
-
-/// What the segments of a JPEG say about its image.
-#[derive(Default)]
-pub(super) struct JpegMetadata<'b> {
-    /// The JFIF header behind its name.
-    pub(super) jfif: Option<&'b [u8]>,
-    /// The EXIF blocks.
-    pub(super) exif: Vec<&'b [u8]>,
-    pub(super) orientation: StatedOrientation,
 }
 
 const CMYK_COMPONENTS: usize = 4;
@@ -50,7 +39,7 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<JpegImage, De
     let image = samples(bytes, &segments, JpegColours::Usual)?;
     Ok(JpegImage {
         rgb: widened(image.width, image.height, image.channels, &image.samples),
-        orientation: segments.orientation.orientation(),
+        orientation: segments.metadata.orientation.orientation(),
         profile: segments.profile().map(|bytes| FileProfile {
             bytes,
             is_of_inks: frame.components.len() >= CMYK_COMPONENTS,
@@ -61,14 +50,7 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<JpegImage, De
 /// Returns what the segments say about the image; nothing if they cannot be read.
 pub(super) fn metadata(bytes: &[u8]) -> JpegMetadata<'_> {
     let segments = JpegSegments::read(bytes);
-    segments.map_or_else(
-        |_| JpegMetadata::default(),
-        |found| JpegMetadata {
-            jfif: found.jfif,
-            exif: found.exif,
-            orientation: found.orientation,
-        },
-    )
+    segments.map(|found| found.metadata).unwrap_or_default()
 }
 
 /// Decodes a part of a TIFF image. Luma and chroma samples are not converted.

@@ -36,6 +36,16 @@ pub(super) struct JpegScan {
     completes: u64,
 }
 
+/// What the segments of a file say about its image.
+#[derive(Debug, Clone, Default)]
+pub(in crate::raster::decode) struct JpegMetadata<'b> {
+    /// The JFIF header behind its name.
+    pub(in crate::raster::decode) jfif: Option<&'b [u8]>,
+    /// The EXIF blocks.
+    pub(in crate::raster::decode) exif: Vec<&'b [u8]>,
+    pub(in crate::raster::decode) orientation: StatedOrientation,
+}
+
 /// What the segments of a file say.
 #[derive(Debug, Clone, Default)]
 pub(super) struct JpegSegments<'b> {
@@ -43,11 +53,7 @@ pub(super) struct JpegSegments<'b> {
     pub(super) scans: Vec<JpegScan>,
     /// Segments of tables, with their markers, in their order.
     pub(super) tables: Vec<Range<usize>>,
-    /// The JFIF header behind its name.
-    pub(super) jfif: Option<&'b [u8]>,
-    /// The EXIF blocks.
-    pub(super) exif: Vec<&'b [u8]>,
-    pub(super) orientation: StatedOrientation,
+    pub(super) metadata: JpegMetadata<'b>,
     /// Numbers and bytes of the parts of the ICC profile.
     profile: Vec<(u8, &'b [u8])>,
     /// The colour transform that Adobe programs store.
@@ -112,7 +118,7 @@ impl<'b> JpegSegments<'b> {
             self.tables.len(),
             self.scans.len(),
             self.profile.len(),
-            self.exif.len(),
+            self.metadata.exif.len(),
         ];
         if kept.iter().sum::<usize>() >= MAX_SEGMENTS {
             let reason = format!("it has more than {MAX_SEGMENTS} segments");
@@ -131,10 +137,13 @@ impl<'b> JpegSegments<'b> {
                 });
                 self.scans.extend(scan);
             }
-            0xe0 if self.jfif.is_none() => self.jfif = body.strip_prefix(b"JFIF\0"),
+            0xe0 if self.metadata.jfif.is_none() => {
+                self.metadata.jfif = body.strip_prefix(b"JFIF\0");
+            }
             0xe1 => {
-                self.exif.extend(body.strip_prefix(b"Exif\0\0"));
-                self.orientation.add_segment(body);
+                let exif = body.strip_prefix(b"Exif\0\0");
+                self.metadata.exif.extend(exif);
+                self.metadata.orientation.add_segment(body);
             }
             0xe2 => {
                 let part = body.strip_prefix(b"ICC_PROFILE\0");
