@@ -78,7 +78,7 @@ fn light_curve(layout: &TiffLayout<'_>, lights: TagValues<'_>) -> LightCurve {
     );
     let count = 1 << layout.used_bits.min(16);
     let is_whole = [count, 3 * count].contains(&lights.len());
-    let is_read = is_of_light && is_whole && layout.used_bits <= 16 && count > 1;
+    let is_read = is_of_light && is_whole && layout.used_bits <= 16;
     let levels: Option<Vec<u16>> = is_read
         .then(|| {
             lights

@@ -85,7 +85,7 @@ impl<'b> FoundPages<'b> {
     fn add(&mut self, page: TagDirectory<'b>) -> Result<(), DecodeError> {
         self.count()?;
         let mut larger = Vec::new();
-        self.find_larger(page, [page; 2], 0, &mut larger)?;
+        self.find_larger([page; 2], 0, &mut larger)?;
         if larger.is_empty() && !is_auxiliary(&page) {
             let parents = None;
             self.full.push(PrintPage { page, parents });
@@ -94,15 +94,14 @@ impl<'b> FoundPages<'b> {
         Ok(())
     }
 
-    /// Finds full pictures in the subdirectories of a page, and in theirs. `parents` are the page and the one at the top.
+    /// Finds full pictures in the subdirectories of a page, and in theirs. `parents` are this page and the one at the top.
     fn find_larger(
         &mut self,
-        page: TagDirectory<'b>,
         parents: [TagDirectory<'b>; 2],
         depth: usize,
         larger: &mut Vec<PrintPage<'b>>,
     ) -> Result<(), DecodeError> {
-        let [_, top] = parents;
+        let [page, top] = parents;
         let of_same = if is_auxiliary(&page) { top } else { page };
         let offsets = page.values(SUB_DIRECTORIES);
         for offset in offsets.iter().flat_map(|offsets| offsets.iter().flatten()) {
@@ -119,7 +118,7 @@ impl<'b> FoundPages<'b> {
                 });
             }
             if depth < MAX_DEPTH {
-                self.find_larger(picture, [picture, top], depth + 1, larger)?;
+                self.find_larger([picture, top], depth + 1, larger)?;
             }
         }
         Ok(())
