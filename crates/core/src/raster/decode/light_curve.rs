@@ -109,6 +109,7 @@ pub(super) fn srgb_level(light: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{LightCurve, srgb_level};
+    use crate::raster::test_images::encoded_chunk;
     use crate::raster::{Grid, ImageLimits, PrintImage, decode, png_rgb8};
 
     /// Returns a PNG of one row with chunks before its pixels.
@@ -117,21 +118,10 @@ mod tests {
         let plain = png_rgb8(&row);
         let mut bytes = plain[..33].to_vec();
         for (kind, content) in chunks {
-            bytes.extend((content.len() as u32).to_be_bytes());
-            let body = [&kind[..], content].concat();
-            bytes.extend(&body);
-            bytes.extend(crc32(&body).to_be_bytes());
+            bytes.extend(encoded_chunk(**kind, content));
         }
         bytes.extend(&plain[33..]);
         bytes
-    }
-
-    fn crc32(bytes: &[u8]) -> u32 {
-        !bytes.iter().fold(!0, |crc, byte| {
-            (0..8).fold(crc ^ u32::from(*byte), |c, _| {
-                (c >> 1) ^ (0xedb8_8320 & (c & 1).wrapping_neg())
-            })
-        })
     }
 
     const LEVELS: [u8; 5] = [0, 30, 100, 200, 255];

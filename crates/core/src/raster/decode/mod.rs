@@ -169,6 +169,7 @@ mod tests {
 
     use crate::domain::FileKind;
     use crate::raster::ImageLimits;
+    use crate::raster::test_images::encoded_chunk;
 
     const LIMITS: ImageLimits = ImageLimits {
         max_bytes: 1 << 20,
@@ -186,30 +187,16 @@ mod tests {
     }
 
     fn png_header(width: u32, height: u32) -> Vec<u8> {
-        let mut body = b"IHDR".to_vec();
-        body.extend(width.to_be_bytes());
-        body.extend(height.to_be_bytes());
-        body.extend([8, 0, 0, 0, 0]);
-        let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0d".to_vec();
-        bytes.extend(&body);
-        bytes.extend(crc32(&body).to_be_bytes());
-        bytes
-    }
-
-    fn crc32(bytes: &[u8]) -> u32 {
-        !bytes.iter().fold(!0, |crc, byte| {
-            (0..8).fold(crc ^ u32::from(*byte), |c, _| {
-                (c >> 1) ^ (0xedb8_8320 & (c & 1).wrapping_neg())
-            })
-        })
+        let [width, height] = [width, height].map(u32::to_be_bytes);
+        let header = [&width[..], &height, &[8, 0, 0, 0, 0]].concat();
+        let chunk = encoded_chunk(*b"IHDR", &header);
+        [&b"\x89PNG\r\n\x1a\n"[..], &chunk].concat()
     }
 
     #[test]
     fn a_damaged_profile_of_a_png_is_named() {
         let plain = file(&DynamicImage::ImageLuma8(grey_ramp()), ImageFormat::Png);
-        let body = b"iCCPname\0\0no profile";
-        let len = (body.len() as u32 - 4).to_be_bytes();
-        let chunk = [&len[..], body, &crc32(body).to_be_bytes()].concat();
+        let chunk = encoded_chunk(*b"iCCP", b"name\0\0no profile");
         // The first chunk, with the size, ends here.
         let (head, rest) = plain.split_at(33);
         let read = decode(&[head, &chunk, rest].concat(), &LIMITS).expect("decodes");

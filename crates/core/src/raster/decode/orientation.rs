@@ -151,19 +151,14 @@ pub(super) fn upright<T: Copy>(stored: Grid<T>, orientation: Orientation) -> Gri
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write as _;
+
     use image::DynamicImage;
     use image::metadata::Orientation;
 
-    use std::io::Write as _;
-
     use super::{RAW_PROFILES, StatedOrientation, XMP_KEYWORD, XMP_PREFIX, of_tag, upright};
     use crate::raster::Grid;
-
-    /// Returns the chunk of a PNG, whose checksum nobody compares here.
-    fn chunk(kind: &[u8], content: &[u8]) -> Vec<u8> {
-        let len = (content.len() as u32).to_be_bytes();
-        [&len[..], kind, content, &[0; 4]].concat()
-    }
+    use crate::raster::test_images::encoded_chunk;
 
     fn of_chunks(chunks: &[Vec<u8>]) -> Orientation {
         let png = [b"\x89PNG\r\n\x1a\n".to_vec(), chunks.concat()].concat();
@@ -243,8 +238,8 @@ mod tests {
                 let prefixed = [b"Exif\0\0", &block[..]].concat();
                 for found in [
                     of_segments(&[&prefixed]),
-                    of_chunks(&[chunk(b"eXIf", &block)]),
-                    of_chunks(&[chunk(b"eXIf", &prefixed)]),
+                    of_chunks(&[encoded_chunk(*b"eXIf", &block)]),
+                    of_chunks(&[encoded_chunk(*b"eXIf", &prefixed)]),
                 ] {
                     assert_eq!(found, Orientation::Rotate90, "type {kind}");
                 }
@@ -256,7 +251,7 @@ mod tests {
             b"",
             b"II",
         ] {
-            let found = of_chunks(&[chunk(b"eXIf", unreadable)]);
+            let found = of_chunks(&[encoded_chunk(*b"eXIf", unreadable)]);
             assert_eq!(found, Orientation::NoTransforms);
         }
     }
@@ -302,21 +297,21 @@ mod tests {
         let xmp = [XMP_KEYWORD, b"\0\0\0\0\0", &packet[..]].concat();
         let packed_xmp = [XMP_KEYWORD, b"\0\x01\0en\0\0", &compressed(packet)].concat();
         let texts = [
-            chunk(b"tEXt", &plain),
-            chunk(b"zTXt", &packed),
-            chunk(b"iTXt", &xmp),
-            chunk(b"iTXt", &packed_xmp),
+            encoded_chunk(*b"tEXt", &plain),
+            encoded_chunk(*b"zTXt", &packed),
+            encoded_chunk(*b"iTXt", &xmp),
+            encoded_chunk(*b"iTXt", &packed_xmp),
         ];
-        let stated = |number| chunk(b"eXIf", &exif(false, 3, 2, number));
+        let stated = |number| encoded_chunk(*b"eXIf", &exif(false, 3, 2, number));
         for text in texts {
-            let other = chunk(b"tEXt", b"Title\0tiff:Orientation=\"3\"");
+            let other = encoded_chunk(*b"tEXt", b"Title\0tiff:Orientation=\"3\"");
             let found = of_chunks(&[other, text.clone()]);
             assert_eq!(found, Orientation::Rotate90);
             assert_eq!(of_chunks(&[stated(0), text.clone()]), found);
             assert_eq!(of_chunks(&[text, stated(3)]), Orientation::Rotate180);
         }
         let damaged = [RAW_PROFILES[0], b"\0\nexif\n 9\n45xx"].concat();
-        let found = of_chunks(&[chunk(b"tEXt", &damaged)]);
+        let found = of_chunks(&[encoded_chunk(*b"tEXt", &damaged)]);
         assert_eq!(found, Orientation::NoTransforms);
     }
 

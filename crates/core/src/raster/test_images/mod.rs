@@ -2,10 +2,12 @@
 
 mod fax_rows;
 mod jpeg;
+mod png_chunk;
 mod tiff;
 
 pub use fax_rows::{END_OF_LINE, bytes_of, rows_at_bits, rows_with_lines, run_codes};
 pub use jpeg::{TestJpeg, TestScans};
+pub use png_chunk::encoded_chunk;
 pub use tiff::{TestPage, TestTiff, TestValues};
 
 /// Packs numbers of some bits, each row from a new byte.
