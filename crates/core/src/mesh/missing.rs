@@ -130,19 +130,17 @@ impl PositionCheck {
 
 /// A coordinate of 32 or 64 bits, which is 0 by default.
 pub(super) trait CoordinateValue: Copy + Into<f64> + PartialEq + Default {
-    /// Returns whether a value is a coordinate other than 0.
-    fn is_usual(self) -> bool;
-
     /// Returns whether a value does not stand for a missing coordinate.
     fn is_coordinate(self) -> bool;
+
+    /// Returns whether a value is a coordinate other than 0.
+    #[inline]
+    fn is_usual(self) -> bool {
+        (self != Self::default()) & self.is_coordinate()
+    }
 }
 
 impl CoordinateValue for f32 {
-    #[inline]
-    fn is_usual(self) -> bool {
-        (self.abs() > 0.0) & (self.abs() < MISSING_FROM as Self)
-    }
-
     #[inline]
     fn is_coordinate(self) -> bool {
         self.abs() < MISSING_FROM as Self
@@ -150,11 +148,6 @@ impl CoordinateValue for f32 {
 }
 
 impl CoordinateValue for f64 {
-    #[inline]
-    fn is_usual(self) -> bool {
-        (self.abs() > 0.0) & (self.abs() < MISSING_FROM)
-    }
-
     #[inline]
     fn is_coordinate(self) -> bool {
         self.abs() < MISSING_FROM
