@@ -10,17 +10,13 @@ const ORIENTATION: u64 = 274;
 /// Begins a segment of XMP in a JPEG.
 const XMP_PREFIX: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
 const XMP_KEYWORD: &[u8] = b"XML:com.adobe.xmp";
-/// Keywords of texts that are the hexadecimal digits of a segment of a JPEG, as `ImageMagick` writes them.
-const RAW_PROFILES: [&[u8]; 3] = [
+/// Keywords of texts that may state an orientation: that of XMP, and those of the hexadecimal digits of a segment of a JPEG, as
+/// `ImageMagick` writes them.
+const KEYWORDS: [&[u8]; 4] = [
+    XMP_KEYWORD,
     b"Raw profile type exif",
     b"Raw profile type APP1",
     b"Raw profile type xmp",
-];
-const KEYWORDS: [&[u8]; 4] = [
-    XMP_KEYWORD,
-    RAW_PROFILES[0],
-    RAW_PROFILES[1],
-    RAW_PROFILES[2],
 ];
 
 /// The EXIF orientations, 1 to 8, that parts of a file state.
@@ -156,7 +152,7 @@ mod tests {
     use image::DynamicImage;
     use image::metadata::Orientation;
 
-    use super::{RAW_PROFILES, StatedOrientation, XMP_KEYWORD, XMP_PREFIX, of_tag, upright};
+    use super::{KEYWORDS, StatedOrientation, XMP_KEYWORD, XMP_PREFIX, of_tag, upright};
     use crate::raster::Grid;
     use crate::raster::test_images::encoded_chunk;
 
@@ -292,8 +288,8 @@ mod tests {
         let segment = [b"Exif\0\0", &exif(true, 3, 2, 6)[..]].concat();
         let raw = raw_text(&segment);
         let packet = b"<rdf:Description tiff:Orientation=\"6\"/>";
-        let plain = [RAW_PROFILES[0], b"\0", &raw].concat();
-        let packed = [RAW_PROFILES[1], b"\0\0", &compressed(&raw)].concat();
+        let plain = [KEYWORDS[1], b"\0", &raw].concat();
+        let packed = [KEYWORDS[2], b"\0\0", &compressed(&raw)].concat();
         let xmp = [XMP_KEYWORD, b"\0\0\0\0\0", &packet[..]].concat();
         let packed_xmp = [XMP_KEYWORD, b"\0\x01\0en\0\0", &compressed(packet)].concat();
         let texts = [
@@ -310,7 +306,7 @@ mod tests {
             assert_eq!(of_chunks(&[stated(0), text.clone()]), found);
             assert_eq!(of_chunks(&[text, stated(3)]), Orientation::Rotate180);
         }
-        let damaged = [RAW_PROFILES[0], b"\0\nexif\n 9\n45xx"].concat();
+        let damaged = [KEYWORDS[1], b"\0\nexif\n 9\n45xx"].concat();
         let found = of_chunks(&[encoded_chunk(*b"tEXt", &damaged)]);
         assert_eq!(found, Orientation::NoTransforms);
     }
