@@ -19,7 +19,7 @@ use super::print::Print;
 use mocban_core::raster::{DepthMap, Mask, mask_of_print};
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 22;
+pub const REVISION: u32 = 23;
 
 /// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///
