@@ -3,7 +3,7 @@
 use mocban_core::domain::cancel::poll;
 use mocban_core::raster::{Grid, Mask};
 
-/// Thresholds and medians of more values hardly differ, and sorting them takes as long as all else.
+/// Most values that are sorted for a threshold or a median, which more values hardly change.
 const MOST_VALUES: usize = 1 << 17;
 
 /// Returns values of the known pixels, from which thresholds are found: all, or about [`MOST_VALUES`] of a large print.

@@ -14,8 +14,7 @@ const MOST_PIECES: usize = 3;
 /// A relief that is less deep than this fraction of the longer side of the scan is no carving. Carvings have several percent.
 const FLAT: f64 = 0.012;
 /// One half of the print agrees with the relief, and the other one does not, if its `IoU` is at least the first value and
-/// exceeds that of the other half by the second. It is 0.82 to 0.94 and exceeds by 0.5 to 0.67 on folded and half covered
-/// prints. On prints of other characters, it exceeds by at most 0.42 where it is above 0.55.
+/// exceeds that of the other half by the second.
 const HALF_IOU: [f64; 2] = [0.75, 0.46];
 /// Where a print is divided, as fractions of the canvas, which is centred on the ink.
 const CUTS: [f64; 3] = [0.5, 0.45, 0.55];
