@@ -99,12 +99,12 @@ impl Observation {
 
 /// Returns the half of two masks in which they agree, if they do so in one only. `lines` are the overlaps in their columns and
 /// rows, which are divided at the fraction `cut`.
-fn agreeing_half(lines: &[Vec<HalfOverlap>; 2], cut: f64) -> Option<&'static str> {
+fn agreeing_half(lines: &[Vec<PartOverlap>; 2], cut: f64) -> Option<&'static str> {
     let [agrees, exceeds] = HALF_IOU;
     let names = [["left", "right"], ["upper", "lower"]];
     lines.iter().zip(names).find_map(|(lines, names)| {
         let (first, second) = lines.split_at((cut * lines.len() as f64) as usize);
-        let halves = [first, second].map(HalfOverlap::of_all);
+        let halves = [first, second].map(PartOverlap::of_all);
         let is_alone = |half: &usize| {
             let (one, other) = (halves[*half], halves[1 - *half]);
             let is_filled = other.any as f64 >= LEAST_IN_HALF * one.any as f64;
@@ -115,9 +115,9 @@ fn agreeing_half(lines: &[Vec<HalfOverlap>; 2], cut: f64) -> Option<&'static str
 }
 
 /// Returns the overlaps of two masks in their columns and in their rows.
-fn overlaps_of_lines(one: &Mask, other: &Mask) -> [Vec<HalfOverlap>; 2] {
-    let mut columns = vec![HalfOverlap::default(); one.width()];
-    let mut rows = vec![HalfOverlap::default(); one.height()];
+fn overlaps_of_lines(one: &Mask, other: &Mask) -> [Vec<PartOverlap>; 2] {
+    let mut columns = vec![PartOverlap::default(); one.width()];
+    let mut rows = vec![PartOverlap::default(); one.height()];
     for (y, row) in rows.iter_mut().enumerate() {
         for (column, (a, b)) in columns.iter_mut().zip(one.row(y).iter().zip(other.row(y))) {
             for line in [column, &mut *row] {
@@ -129,17 +129,17 @@ fn overlaps_of_lines(one: &Mask, other: &Mask) -> [Vec<HalfOverlap>; 2] {
     [columns, rows]
 }
 
-/// Numbers of pixels inside a part of two masks.
+/// Numbers of pixels in a part of two masks: a row, a column, or a half.
 #[derive(Clone, Copy, Default)]
-struct HalfOverlap {
+struct PartOverlap {
     /// Set in both.
     both: u64,
     /// Set in one or both.
     any: u64,
 }
 
-impl HalfOverlap {
-    /// Adds the overlaps of parts.
+impl PartOverlap {
+    /// Adds the overlaps of all parts.
     fn of_all(parts: &[Self]) -> Self {
         let both = parts.iter().map(|part| part.both).sum();
         let any = parts.iter().map(|part| part.any).sum();
