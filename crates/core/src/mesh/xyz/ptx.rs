@@ -16,7 +16,7 @@ struct PtxHeader {
 }
 
 impl PtxHeader {
-    /// Reads the header that lines are.
+    /// Reads a header from its lines. Returns `None` if they are no header.
     fn of(lines: &[&[u8]]) -> Option<Self> {
         let &[columns, rows, ref rest @ ..] = lines else {
             return None;

@@ -15,7 +15,7 @@ const LEVEL_TOLERANCE: f64 = 3.0 / 255.0;
 pub(super) enum LightCurve {
     /// A level is the light to this power.
     Gamma(f64),
-    /// The light of evenly spaced levels up to 65535, for all colours or for red, green and blue.
+    /// The light of evenly spaced levels, 0 to 65535: one table for all colours, or one each for red, green and blue.
     Tables(Vec<Vec<u16>>),
     /// In a way that is not applied, with its name.
     Unread(String),
@@ -25,12 +25,12 @@ impl LightCurve {
     /// Returns the curve of a PNG without an ICC profile; `None` for sRGB.
     pub(super) fn of_png(bytes: &[u8]) -> Option<Self> {
         if let Some(&[primaries, transfer, _, full_range]) = png_chunk(bytes, *b"cICP") {
-            return match (primaries, transfer) {
-                // Those of sRGB or unspecified ones, with the curve of sRGB or of television.
-                (1 | 2, 1 | 2 | 6 | 13..=15) if full_range == 1 => None,
-                (1 | 2, 4) if full_range == 1 => Some(Self::Gamma(USUAL_GAMMA)),
-                (1 | 2, 5) if full_range == 1 => Some(Self::Gamma(1.0 / 2.8)),
-                (1 | 2, 8) if full_range == 1 => Some(Self::Gamma(1.0)),
+            return match (primaries, transfer, full_range) {
+                // The primaries of sRGB or unspecified ones, with the curve of sRGB or of television.
+                (1 | 2, 1 | 2 | 6 | 13..=15, 1) => None,
+                (1 | 2, 4, 1) => Some(Self::Gamma(USUAL_GAMMA)),
+                (1 | 2, 5, 1) => Some(Self::Gamma(1.0 / 2.8)),
+                (1 | 2, 8, 1) => Some(Self::Gamma(1.0)),
                 _ => Some(Self::Unread(format!("cICP {primaries}/{transfer}"))),
             };
         }
@@ -73,7 +73,7 @@ impl LightCurve {
     }
 }
 
-/// Returns the level of sRGB for each level, whose light a function returns. All are parts of 1, but 65535 is 1 in the result.
+/// Returns the level of sRGB, 0 to 65535, for each level of a file. `light` maps a level to its light, both 0 to 1.
 fn levels(light: impl Fn(f64) -> f64) -> Vec<u16> {
     let full = f64::from(u16::MAX);
     let of = |level: u16| (srgb_level(light(f64::from(level) / full)) * full).round() as u16;

@@ -33,7 +33,7 @@ pub(super) fn png_chunk(bytes: &[u8], wanted: [u8; 4]) -> Option<&[u8]> {
     found.map(|(_, content)| content)
 }
 
-/// Returns keyword and text of a chunk of text whose keyword is one of some. Returns `None` for other chunks, and if the text
+/// Returns the keyword and the text of a text chunk with one of the keywords. Returns `None` for other chunks, and if the text
 /// cannot be decompressed.
 pub(super) fn png_text<'b>(
     kind: [u8; 4],

@@ -102,7 +102,7 @@ impl TiffLayout<'_> {
         Ok(bytes)
     }
 
-    /// Returns whether the first strip or tile, which has some rows, holds at least `len` bytes when it is decompressed.
+    /// Returns whether the first strip or tile, of `rows` rows, has at least `len` bytes when it is decompressed.
     pub(super) fn unpacks_to(&self, file: &[u8], len: usize, rows: usize) -> bool {
         let stored = self.stored(file, 0);
         stored.is_ok_and(|stored| self.decompress(stored, len, rows).is_ok())

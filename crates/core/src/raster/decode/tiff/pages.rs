@@ -11,7 +11,7 @@ const MASK: u64 = 4;
 const OLD_REDUCED: u64 = 2;
 /// Most pages that are counted.
 const MAX_PAGES: usize = 1000;
-/// Most subdirectories that are one within the other, below one of a page.
+/// Most levels of subdirectories below the subdirectories of a page.
 const MAX_DEPTH: usize = 4;
 
 const NEW_SUBFILE_TYPE: u64 = 254;
