@@ -151,11 +151,11 @@ impl FileKind {
             .iter()
             .find(|(signature, kind)| bytes.starts_with(signature) && !is_text(kind, bytes))
             .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind);
-        Self::scene_within(found, bytes).unwrap_or(found)
+        Self::format_within(found, bytes).unwrap_or(found)
     }
 
     /// Returns the format of images or 3D files that are archives, XML or text.
-    fn scene_within(outer: Self, bytes: &[u8]) -> Option<Self> {
+    fn format_within(outer: Self, bytes: &[u8]) -> Option<Self> {
         let part = bytes.len().min(SEARCHED_BYTES);
         let (head, tail) = (&bytes[..part], &bytes[bytes.len() - part..]);
         let has = |word: &str| {
