@@ -126,6 +126,7 @@ fn exact_singles(all: &[[f64; 3]]) -> Option<PageVec<[f32; 3]>> {
 fn check_finite<T: CoordinateValue>(positions: &[[T; 3]]) -> Result<(), MeshArrayError> {
     for (block, part) in positions.chunks(1 << 10).enumerate() {
         poll();
+        // A fast check. Numbers that stand for missing positions in files are positions here.
         if are_positions(part) {
             continue;
         }
