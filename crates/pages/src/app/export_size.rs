@@ -8,7 +8,7 @@ use maud::{Markup, html};
 
 use super::components::number_table;
 use super::exports::{PURPOSES, Purpose, exports_dir, pictures_side};
-use super::failure::{AppFailure, AppResult};
+use super::failure::AppResult;
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_project::backup_checks::free_beside;
@@ -35,13 +35,7 @@ pub(super) async fn part(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let location = open.location();
-    let settings = location.settings();
-    let limits = settings
-        .map_err(|error| AppFailure::of(error, &open.dir))?
-        .config
-        .limits
-        .image;
+    let limits = open.settings()?.config.limits.image;
     let forecast = ExportForecast::read(&open.project, &open.catalog, limits).await?;
     let folder = exports_dir(&open.dir);
     let free = blocking(move || free_beside(&folder)).await?;

@@ -69,9 +69,8 @@ impl PaperMethod {
     ) -> AppResult<Arc<PaperOutcome>> {
         let stored = pair.metric(ThresholdMetric::Relief);
         let stored = stored.ok_or_else(|| AppFailure::refused(not_comparable()))?;
-        let settings = open.location().settings();
-        let settings = settings.map_err(|error| AppFailure::of(error, &open.dir))?;
-        let (mut stages, limits) = (settings.config.stages, settings.config.limits);
+        let config = open.settings()?.config;
+        let (mut stages, limits) = (config.stages, config.limits);
         stages.pipeline.method = AlignmentMethod::Paper;
         let text =
             serde_json::to_string(&stages).map_err(|error| AppFailure::of(error, &open.dir))?;
@@ -89,7 +88,7 @@ impl PaperMethod {
         let computed = self
             .work
             .call(move || compute(&own, &pair, &stages, &limits));
-        let longest = Duration::from_secs(settings.config.run.stage_timeout_s);
+        let longest = Duration::from_secs(config.run.stage_timeout_s);
         // The work ends when nobody waits for it any more.
         let computed = timeout(longest, computed).await;
         let computed = computed.map_err(|_elapsed| AppFailure::refused(too_long(longest)))??;

@@ -61,7 +61,7 @@ pub(super) async fn picture(
     let metric = metric.parse().unwrap_or(ThresholdMetric::DEFAULT);
     let open = state.open(&key).await?;
     let results = results(&open, &pair).await?;
-    let limits = limits(&open)?;
+    let limits = open.settings()?.config.limits;
     let shown = results
         .metric(metric)
         .map(|record| record.result_hash.to_hex());
@@ -89,7 +89,7 @@ pub(super) async fn scan(
 ) -> AppResult<Response> {
     let open = state.open(&key).await?;
     let results = results(&open, &pair).await?;
-    let limits = limits(&open)?;
+    let limits = open.settings()?.config.limits;
     let dir = open.dir.clone();
     let read = move || -> Result<Vec<u8>, PictureError> {
         let metric = results.metric(ThresholdMetric::DEFAULT);
@@ -112,12 +112,6 @@ pub(super) async fn results(open: &OpenProject, pair: &str) -> AppResult<PairRes
     let name: PairName = pair.parse().map_err(|_invalid| AppFailure::not_found())?;
     let detail = open.catalog.pair(&name).await?;
     Ok(detail.ok_or_else(AppFailure::not_found)?.results)
-}
-
-fn limits(open: &OpenProject) -> AppResult<InputLimits> {
-    let settings = open.location().settings();
-    let settings = settings.map_err(|error| AppFailure::of(error, &open.dir))?;
-    Ok(settings.config.limits)
 }
 
 /// Draws a picture. `None` if there is none, because a file cannot be read or the pair has no result yet.

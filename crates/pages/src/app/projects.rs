@@ -8,6 +8,7 @@ use super::moved_blocks::MovedFiles;
 use crate::local_server::WorkThread;
 use crate::on_thread::on_thread;
 use mocban_catalog::Catalog;
+use mocban_config::Loaded;
 use mocban_project::location::Location;
 use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};
 use mocban_system::platform;
@@ -62,6 +63,12 @@ impl OpenProject {
     /// Returns the folder with its current settings, which are read again for each use.
     pub(super) fn location(&self) -> Location {
         Location::new(&self.dir)
+    }
+
+    /// Returns its current settings.
+    pub(super) fn settings(&self) -> AppResult<Loaded> {
+        let settings = self.location().settings();
+        settings.map_err(|error| AppFailure::of(error, &self.dir))
     }
 }
 

@@ -42,10 +42,7 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let location = open.location();
-    let settings = location.settings();
-    let settings = settings.map_err(|error| AppFailure::of(error, &open.dir))?;
-    let current = settings.tree.settings();
+    let current = open.settings()?.tree.settings();
     let change = match (visit.query.get("key"), visit.query.given("value")) {
         (Some(name), Some(_)) if is_hidden(name) => return Err(AppFailure::not_found()),
         (Some(name), Some(value)) => {
@@ -53,7 +50,7 @@ pub(super) async fn page(
                 key: name.to_owned(),
                 value: value.to_owned(),
             };
-            Some(looked_at(body, open.catalog.clone(), location).await)
+            Some(looked_at(body, open.catalog.clone(), open.location()).await)
         }
         _ => None,
     };
