@@ -1,6 +1,6 @@
 // Requests that change something.
 
-import { parseReply } from "./reply.js";
+import { parseReply, refusalIn } from "./reply.js";
 
 /** The token that they carry. */
 export const token = document.querySelector('meta[name="csrf-token"]').content;
@@ -27,7 +27,7 @@ export function showProblem(problem, text, hasFocus = true) {
 export function read(status, text) {
   const reply = parseReply(text);
   if (status !== 200) {
-    const why = (document.documentElement.lang === "vi" && reply.error_vi) || reply.error || text || String(status);
+    const why = refusalIn(document.documentElement.lang, text, status);
     throw Object.assign(new Error(why), { status, retired: reply.retired ?? [] });
   }
   return reply;

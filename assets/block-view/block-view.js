@@ -3,6 +3,7 @@
 import { followPage, PageCamera } from "./block-camera.js";
 import { blockText } from "./block-messages.js";
 import { smallestAround, STROKE_PX, svg } from "./block-shapes.js";
+import { refusalIn } from "./reply.js";
 import { localNumber, preferredLanguage } from "./scan-messages.js";
 import { element } from "./scan-panel.js";
 import { mountScanViewer } from "./scan-viewer.js";
@@ -218,7 +219,7 @@ class BlockPage {
     if (!one.has_scan) return this.showParts(container, one, text("no_result"));
     try {
       const response = await fetch(`scan/${index}`);
-      if (!response.ok) throw new Error(await response.text());
+      if (!response.ok) throw new Error(refusalIn(language, await response.text(), response.status));
       const data = await response.arrayBuffer();
       // The dialog may have been closed while the data arrived.
       if (!container.isConnected) return;
@@ -262,7 +263,7 @@ document.documentElement.lang = language;
 const container = document.getElementById("block-view");
 try {
   const response = await fetch("block.json");
-  if (!response.ok) throw new Error(await response.text());
+  if (!response.ok) throw new Error(refusalIn(language, await response.text(), response.status));
   window.mocbanBlock = new BlockPage(container, await response.json());
 } catch (error) {
   container.textContent = text("no_data", { why: error.message });

@@ -9,3 +9,9 @@ export function parseReply(text) {
     return { error, error_vi: vietnamese };
   }
 }
+
+/** Returns why a request was refused, in a language if the reply has it; the status if the reply says nothing. */
+export function refusalIn(language, text, status) {
+  const reply = parseReply(text);
+  return reply[`error_${language}`] || reply.error || text || String(status);
+}

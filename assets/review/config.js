@@ -1,6 +1,6 @@
 // Configuration from the server: CSRF token, key bindings, messages.
 
-import { parseReply } from "./reply.js";
+import { refusalIn } from "./reply.js";
 import { withValues } from "./scan-messages.js";
 
 export const language = document.documentElement.lang;
@@ -31,6 +31,5 @@ export function translate(key, values = {}) {
 /** Returns why a request was refused, in the language of the page if the server says it. */
 export async function refusalOf(response) {
   const text = await response.text().catch(() => "");
-  const reply = parseReply(text);
-  return reply[`error_${language}`] ?? (reply.error || String(response.status));
+  return refusalIn(language, text, response.status);
 }

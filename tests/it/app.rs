@@ -126,7 +126,7 @@ fn every_page_is_shown_and_links_only_to_this_server() {
             "{picture}: {kind}"
         );
     }
-    for asset in ["view.js", "scan-viewer.css", "three.min.js"] {
+    for asset in ["view.js", "reply.js", "scan-viewer.css", "three.min.js"] {
         let reply = page.get(&format!("/p/p/pair/upright-0000/3d/assets/{asset}"));
         assert_eq!(reply.status, 200, "{asset}");
     }
