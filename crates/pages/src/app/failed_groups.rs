@@ -22,7 +22,7 @@ pub(super) struct FailedGroup {
     class: FailureClass,
     number: u64,
     examples: Vec<PairResults>,
-    /// Whether the message of one of the first pairs names the unit.
+    /// Whether the message of one of the first pairs names the unit. Searched only where it decides what is offered.
     names_unit: bool,
 }
 
@@ -40,32 +40,36 @@ impl FailedGroup {
             };
             let metric = ThresholdMetric::DEFAULT;
             let list = catalog.pair_list(&filter, PairOrder::Imported, metric, None, EXAMPLES);
-            let examples = list.await?.pairs;
-            let unit = catalog.failed_scans(class, true, [SEARCHED, 1]).await?;
-            groups.push(Self {
+            let mut group = Self {
                 class,
                 number,
-                examples,
-                names_unit: !unit.is_empty(),
-            });
+                examples: list.await?.pairs,
+                names_unit: false,
+            };
+            if !group.are_cut() && class != FailureClass::NoSolution {
+                let unit = catalog.failed_scans(class, true, [SEARCHED, 1]).await?;
+                group.names_unit = !unit.is_empty();
+            }
+            groups.push(group);
         }
         Ok(groups)
     }
 
+    fn are_cut(&self) -> bool {
+        self.examples.iter().all(is_cut)
+    }
+
     /// Returns what a person may correct in the scans of all pairs of the group. Pairs that were cut from a block have its unit
     /// and its side.
-    fn questions(&self) -> Vec<ScanQuestion> {
+    fn questions(&self) -> &'static [ScanQuestion] {
         let is_unsolved = self.class == FailureClass::NoSolution;
-        let are_cut = self.examples.iter().all(is_cut);
-        let offered = [
-            (ScanQuestion::Unit, is_unsolved || self.names_unit),
-            (ScanQuestion::Side, is_unsolved),
-        ];
-        let offered = offered.into_iter().filter(|(_, is_likely)| *is_likely);
-        offered
-            .map(|(question, _)| question)
-            .filter(|_| !are_cut)
-            .collect()
+        if self.are_cut() || !(is_unsolved || self.names_unit) {
+            &[]
+        } else if is_unsolved {
+            &ScanQuestion::ALL
+        } else {
+            &[ScanQuestion::Unit]
+        }
     }
 }
 
@@ -111,13 +115,11 @@ fn group_part(visit: &Visit, key: &str, group: &FailedGroup) -> Markup {
 fn example(visit: &Visit, key: &str, class: FailureClass, pair: &PairResults) -> Markup {
     let name = pair.attributes.name.as_str();
     let message = pair.failure.as_ref().map(|stored| &stored.failure.message);
-    let (has_file, replace) = (
-        matches!(
-            class,
-            FailureClass::BadInput | FailureClass::NoSolution | FailureClass::Io
-        ) && !is_cut(pair),
-        visit.t("Replace the scan or the print", "Thay bản quét hoặc bản in"),
+    let is_of_file = matches!(
+        class,
+        FailureClass::BadInput | FailureClass::NoSolution | FailureClass::Io
     );
+    let replace = visit.t("Replace the scan or the print", "Thay bản quét hoặc bản in");
     html! {
         li {
             p {
@@ -125,7 +127,7 @@ fn example(visit: &Visit, key: &str, class: FailureClass, pair: &PairResults) ->
                 @if let Some(message) = message { ": " (stored_message(visit, message)) }
             }
             div.row { (pictures(visit, pair)) }
-            @if has_file {
+            @if is_of_file && !is_cut(pair) {
                 p.row { a href={ (visit.root) "import?project=" (encoded(key)) "&mend=" (encoded(name)) } aria-label={ (replace) ": " (one_line(name)) } { (replace) } }
             }
         }
