@@ -24,7 +24,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
 use mocban_catalog::ScanCorrection;
-use mocban_core::domain::{FailureClass, LengthUnit, PairName, one_line};
+use mocban_core::domain::{FailureClass, LengthUnit, PairName, enum_names, one_line};
 use mocban_project::scan_corrections::correct_scans;
 
 /// Most pairs that are corrected at a time.
@@ -36,7 +36,7 @@ const NAMED: usize = 12;
 /// Value of the field for a unit that is not known: an empty one asks for a choice.
 const UNKNOWN_UNIT: &str = "unknown";
 
-/// What is corrected of scans.
+/// What is corrected of scans, in the order in which a page offers it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum ScanQuestion {
@@ -46,18 +46,9 @@ pub(super) enum ScanQuestion {
     Side,
 }
 
+enum_names! { pub ScanQuestion, "a question about scans": Unit = "unit", Side = "side" }
+
 impl ScanQuestion {
-    /// Both, in the order in which a page offers them.
-    pub(super) const ALL: [Self; 2] = [Self::Unit, Self::Side];
-
-    /// Returns its name in addresses.
-    pub(super) const fn name(self) -> &'static str {
-        match self {
-            Self::Unit => "unit",
-            Self::Side => "side",
-        }
-    }
-
     /// Returns what the link to the page and its button say of a number of pairs.
     pub(super) const fn title(self, visit: &Visit, pairs: u64) -> &'static str {
         match self {
@@ -112,9 +103,7 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let asked = visit.query.get("what");
-    let mut known = ScanQuestion::ALL.into_iter();
-    let what = known.find(|what| Some(what.name()) == asked);
+    let what = visit.query.parsed::<ScanQuestion>("what");
     let what = what.ok_or_else(AppFailure::not_found)?;
     let (pair, class) = (visit.query.get("pair"), visit.query.parsed("class"));
     let names = corrected_pairs(&open, what, pair, class).await?;
@@ -235,16 +224,15 @@ pub(super) async fn correct(
     }
     refuse_read_only(&state, Some(&key)).await?;
     refuse_during_run(&open).await?;
-    let (corrected, location) = (names.clone(), open.location());
-    let changed =
-        on_thread(async move || correct_scans(corrected, correction, &location).await).await;
+    let ids: Vec<String> = names.iter().map(PairName::to_string).collect();
+    let location = open.location();
+    let changed = on_thread(async move || correct_scans(names, correction, &location).await).await;
     if changed.map_err(|error| AppFailure::of(error, &open.dir))? == 0 {
         return Err(AppFailure::refused(Sentence::new(
             "nothing was changed: the scans have this unit or side already, or were cut from a whole block, which is then imported again",
             "chưa thay đổi gì: các bản quét đã có đơn vị hoặc mặt này, hoặc được cắt từ ván nguyên; khi đó hãy nhập lại ván",
         )));
     }
-    let ids: Vec<String> = names.iter().map(PairName::to_string).collect();
     child_run::start(&state, &open.dir, &[], &ids).await?;
     let go = match (&body.pair, ids.as_slice()) {
         (Some(_), [id]) => format!("pair/{}/", encoded(id)),
