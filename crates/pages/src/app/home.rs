@@ -36,7 +36,7 @@ struct ProjectState {
     failed_blocks: u64,
     /// Number of blocks that a run would work on or works on.
     open_blocks: u64,
-    /// Number of finished pairs and blocks that an import gave other files, at which the next run looks.
+    /// Number of finished pairs and blocks that an import gave other files. The next run compares their content.
     other_files: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Blocks of which an import moved files: a run cuts only those again whose files have other content.
+//! Blocks whose files an import moved. A run cuts such a block again only if the content of a file is different.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use mocban_project::block_status::BlockStatus;
 use mocban_project::blocking::blocking;
 use mocban_store::{Input, Project, hash_input, stat_input};
 
-/// Most bytes of files that are hashed for a page. Other files are hashed for later pages; longer ones are not compared.
+/// Most bytes of files that are hashed for a page. The others are hashed for later pages; a longer file is never compared.
 const MAX_BYTES: u64 = 32 << 20;
 /// Most versions of files that are kept.
 const MAX_KEPT: usize = 10_000;
@@ -45,12 +45,12 @@ impl MovedFiles {
         let mut left = MAX_BYTES;
         let changed = blocks
             .iter()
-            .filter(|block| self.have_changed(project, block, &mut left));
+            .filter(|block| self.has_changed_file(project, block, &mut left));
         changed.count() as u64
     }
 
     /// Returns whether one of the moved files of a block is known to have other content.
-    fn have_changed(&self, project: &Project, block: &KnownBlock, left: &mut u64) -> bool {
+    fn has_changed_file(&self, project: &Project, block: &KnownBlock, left: &mut u64) -> bool {
         let KnownBlock {
             attributes, inputs, ..
         } = block;
@@ -87,9 +87,12 @@ impl MovedFiles {
             return None;
         }
         let stat = stat_input(input).ok()?;
-        let kept = locked(&self.0).get(input.path()).cloned();
-        if let Some(kept) = kept.filter(|kept| kept.stat == stat) {
-            return Some(kept.hash);
+        let kept = locked(&self.0)
+            .get(input.path())
+            .filter(|kept| kept.stat == stat)
+            .map(|kept| kept.hash);
+        if kept.is_some() {
+            return kept;
         }
         *left = left.checked_sub(input.size())?;
         let read = hash_input(input).ok()?;
@@ -169,10 +172,10 @@ mod tests {
         let (project, files) = (Project::at(dir.path()), MovedFiles::default());
         let block = block("new.ply", "another scan", None);
         let mut left = 3;
-        assert!(!files.have_changed(&project, &block, &mut left));
+        assert!(!files.has_changed_file(&project, &block, &mut left));
         left = 4;
-        assert!(files.have_changed(&project, &block, &mut left));
+        assert!(files.has_changed_file(&project, &block, &mut left));
         assert_eq!(left, 0);
-        assert!(files.have_changed(&project, &block, &mut left), "kept");
+        assert!(files.has_changed_file(&project, &block, &mut left), "kept");
     }
 }
