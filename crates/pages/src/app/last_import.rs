@@ -44,16 +44,16 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
     let (text, number) = if has_jobs {
         (
             visit.t(
-                "Pairs of the newest import that added pairs, which are counted",
-                "Số cặp của lần nhập gần nhất có thêm cặp, hiện được tính",
+                "Pairs of this import that are counted",
+                "Số cặp của lần nhập này hiện được tính",
             ),
             added.jobs,
         )
     } else {
         (
             visit.t(
-                "Pairs of the newest import that added pairs, which are in no count",
-                "Số cặp của lần nhập gần nhất có thêm cặp, hiện không được tính",
+                "Pairs of this import that are in no count",
+                "Số cặp của lần nhập này hiện không được tính",
             ),
             added.pairs,
         )
@@ -71,7 +71,7 @@ fn undo_part(visit: &Visit, key: &str, added: LastImport) -> Markup {
                 (count(added.retired_last)) ". "
             }
             @if has_jobs && added.jobs < added.pairs {
-                (visit.t("Pairs of it that are in no count already", "Số cặp của lần nhập này đã không được tính từ trước")) ": "
+                (visit.t("Pairs of this import that were in no count before", "Số cặp của lần nhập này đã không được tính từ trước")) ": "
                 (count(added.pairs - added.jobs)) ". "
             }
             span.muted { (visit.t("Files, results and verdicts are kept.", "Tệp, kết quả và đánh giá vẫn được giữ.")) }
@@ -196,7 +196,7 @@ mod tests {
         let added = shown(5, 1);
         assert!(added.contains("counted ("), "{added}");
         assert!(added.contains("<b>5</b>"), "{added}");
-        assert!(added.contains("already: <b>1</b>"), "{added}");
+        assert!(added.contains("before: <b>1</b>"), "{added}");
         for simple in [shown(6, 0), shown(0, 6)] {
             assert_eq!(simple.matches("<b>").count(), 1, "{simple}");
         }
