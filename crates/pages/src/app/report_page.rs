@@ -295,6 +295,11 @@ mod tests {
             "The project has no pairs yet; `mocban import` adds them.",
         );
         assert!(empty.contains("../../import?project="), "{empty}");
+        let damaged = of(
+            Language::English,
+            "1 stored row that is damaged or missing is set apart and not counted, first: row 3; `check` lists them.",
+        );
+        assert_eq!(damaged, " <a href=\"health\">Health</a>");
         assert_eq!(of(Language::English, "All 2 pairs are aligned."), "");
     }
 }
