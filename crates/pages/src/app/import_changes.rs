@@ -266,6 +266,7 @@ impl ColumnChanges {
             COLUMNS.as_slice()
         };
         let named = self.names.each_ref().map(ColumnNames::text);
+        // Only the last row, that of the other columns, has names.
         let unnamed = texts.len().saturating_sub(1);
         let names = std::iter::repeat_n("", 2 * unnamed).chain(named.iter().map(String::as_str));
         let counts = self.columns.as_flattened().iter();

@@ -70,10 +70,10 @@ fn agreement_part(visit: &Visit, found: &ReviewerAgreement) -> Markup {
 fn conflicts_by_metric(visit: &Visit, conflicts: &BTreeMap<ThresholdMetric, u64>) -> Markup {
     let settle = PageQuery::default().with("order", ReviewOrder::Adjudicate.name());
     html! {
-        ul #conflicts-by-metric { @for (metric, conflicts) in conflicts {
+        ul #conflicts-by-metric { @for (metric, number) in conflicts {
             li {
                 a href={ "review" (settle.with("metric", metric.name()).text()) } { (visit.metric(*metric)) }
-                ": " (grouped(*conflicts))
+                ": " (grouped(*number))
             }
         } }
         @if conflicts.len() > 1 {
