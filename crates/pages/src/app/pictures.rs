@@ -61,7 +61,6 @@ pub(super) async fn picture(
     let metric = metric.parse().unwrap_or(ThresholdMetric::DEFAULT);
     let open = state.open(&key).await?;
     let results = results(&open, &pair).await?;
-    let limits = open.settings()?.config.limits;
     let shown = results
         .metric(metric)
         .map(|record| record.result_hash.to_hex());
@@ -71,6 +70,7 @@ pub(super) async fn picture(
     if let Some(jpeg) = cached.as_ref().and_then(|id| state.thumbs.get(id)) {
         return Ok(([(header::CONTENT_TYPE, JPEG)], jpeg).into_response());
     }
+    let limits = open.settings()?.config.limits;
     let drawn = state
         .work
         .call(move || draw(&open, &results, metric, picture, limits))
