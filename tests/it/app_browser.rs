@@ -203,7 +203,7 @@ fn a_pair_is_found_and_seen_with_the_keyboard_alone() {
     tab.wait("document.querySelector('.scan-canvas canvas')");
     tab.eval("history.back(), null");
     tab.wait(&on_pair("upright-0003"));
-    // Also those that are not shown now can be reached.
+    // No control has a negative tab index, not even a hidden one.
     let unreachable = tab.eval(
         "[...document.querySelectorAll('a[href], button, input, select')].filter((one) => one.tabIndex < 0).length",
     );

@@ -1,4 +1,4 @@
-//! The archive of a release has the files that the guides tell people to copy from it.
+//! Checks that the archive of a release contains the files that the guides tell people to install from it.
 
 use std::collections::BTreeSet;
 

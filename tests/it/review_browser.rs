@@ -85,7 +85,7 @@ pub(crate) fn judge(tab: &Tab<'_>, key: &str) {
     tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
 }
 
-/// Counts what the page asks the server for, and the items whose images its worker is asked for.
+/// Records the addresses that the page fetches, and counts the messages to its worker: each asks for the images of one item.
 const COUNT_REQUESTS: &str = "(() => {
     window.asked = { requests: [], items: 0 };
     const { fetch } = window;
