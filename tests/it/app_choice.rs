@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::app::{act, app, open_app, text, with_project};
+use crate::app_export_zip::export;
 use crate::cli::mocban;
 use crate::page::{Page, Site, answer, read_project};
 use crate::waiting::wait_until;
@@ -314,21 +315,16 @@ fn waiting_and_failed_ones_of_the_chosen_pairs_run() {
 #[test]
 fn chosen_pairs_are_exported_beside_the_export_of_all() {
     let (dir, page) = with_project();
-    let export = |pairs: Value| {
+    let export_pairs = |pairs: Value| {
         let mut body = json!({"purpose": "excel", "only": "all", "metric": "ensemble"});
         if !pairs.is_null() {
             body["pairs"] = pairs;
         }
-        let reply = act(&page, "/p/p/actions/export", &body, |_| {});
-        assert_eq!(reply.status, 200, "{}", text(&reply));
-        wait_until("the export is done", || {
-            text(&page.get("/p/p/export")).contains("data-task=\"done\"")
-        });
-        reply.json()
+        export(&page, &body)
     };
-    assert_eq!(export(Value::Null)["reload"], true);
+    assert_eq!(export_pairs(Value::Null)["reload"], true);
     let chosen = json!(["upright-0003", "upright-0001"]);
-    assert_eq!(export(chosen)["go"], "export");
+    assert_eq!(export_pairs(chosen)["go"], "export");
     let ids = |folder: &str| {
         let table = dir.path().join("p/exports").join(folder).join("pairs.csv");
         let table = std::fs::read_to_string(table).expect("a table");
@@ -351,11 +347,7 @@ fn an_export_of_chosen_pairs_has_only_their_verdicts() {
         mocban(&project, &set).expect(0);
     }
     let body = json!({"purpose": "all", "only": "all", "metric": "", "pairs": ["upright-0001"]});
-    let reply = act(&page, "/p/p/actions/export", &body, |_| {});
-    assert_eq!(reply.status, 200, "{}", text(&reply));
-    wait_until("the export is done", || {
-        text(&page.get("/p/p/export")).contains("data-task=\"done\"")
-    });
+    export(&page, &body);
     let log = std::fs::read_to_string(project.join("exports/all-chosen/verdicts.jsonl"));
     let log = log.expect("a log");
     assert!(

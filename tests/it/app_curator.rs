@@ -7,10 +7,10 @@ use mocban::raster::{Grid, png_grey8};
 use serde_json::{Value, json};
 
 use crate::app::{act, html, open_app, text, with_project};
+use crate::app_export_zip::{export, export_table};
 use crate::app_uploads::{begun, encode, end, put};
 use crate::block_correction::refused_block;
 use crate::cli::mocban;
-use crate::waiting::wait_until;
 
 /// Stores a verdict on the ensemble's result of a pair.
 fn judge(project: &Path, pair: &str, verdict: &str, reviewer: &str, more: &[&str]) {
@@ -203,15 +203,7 @@ fn a_failed_block_is_named_on_every_page() {
         "{}",
         text(&refused)
     );
-    let export = json!({"purpose": "excel", "only": "all", "metric": ""});
-    assert_eq!(
-        act(&page, "/p/p/actions/export", &export, |_| {}).status,
-        200
-    );
-    let done = "data-task=\"done\"";
-    wait_until("the export is done", || {
-        html(&page, "/p/p/export").contains(done)
-    });
+    export_table(&page);
     let exported = html(&page, "/p/p/export");
     assert!(
         exported.contains("a table for Excel: no pair has a result"),
@@ -227,16 +219,9 @@ fn a_failed_block_is_named_on_every_page() {
 #[test]
 fn an_export_says_which_one_was_made() {
     let (_dir, page) = with_project();
-    let export =
+    let body =
         json!({"purpose": "mesh", "only": "all", "metric": "ensemble", "pairs": ["upright-0000"]});
-    assert_eq!(
-        act(&page, "/p/p/actions/export", &export, |_| {}).status,
-        200
-    );
-    let done = "data-task=\"done\"";
-    wait_until("the export is done", || {
-        html(&page, "/p/p/export").contains(done)
-    });
+    export(&page, &body);
     let shown = html(&page, "/p/p/export");
     let title = "scans with their prints for MeshLab or CloudCompare (chosen pairs)";
     assert!(

@@ -1,29 +1,13 @@
 //! The size that the app shows before an export, compared with the export.
 
-use std::path::Path;
-
 use serde_json::json;
 
-use crate::app::{act, html, text, with_project};
-use crate::waiting::wait_until;
+use crate::app::{html, with_project};
+use crate::app_export_zip::export;
+use crate::report::contents;
 
 /// Largest ratio of the size before and the size of the export.
 const FACTOR: f64 = 1.3;
-
-/// Returns the length of all files below a folder.
-fn bytes_below(folder: &Path) -> u64 {
-    let entries = std::fs::read_dir(folder).expect("a folder");
-    let paths = entries.map(|entry| entry.expect("an entry").path());
-    paths
-        .map(|path| {
-            if path.is_dir() {
-                bytes_below(&path)
-            } else {
-                path.metadata().expect("a file").len()
-            }
-        })
-        .sum()
-}
 
 /// Returns the purposes of a page with the sizes that it shows.
 fn shown_sizes(part: &str) -> Vec<(String, u64)> {
@@ -51,12 +35,9 @@ fn the_size_of_every_purpose_is_about_that_of_its_export() {
     assert_eq!(sizes.len(), purposes.matches("<option").count());
     for (purpose, expected) in sizes {
         let body = json!({"purpose": purpose, "only": "all", "metric": ""});
-        let reply = act(&page, "/p/p/actions/export", &body, |_| {});
-        assert_eq!(reply.status, 200, "{}", text(&reply));
-        wait_until("the export is done", || {
-            html(&page, "/p/p/export").contains("data-task=\"done\"")
-        });
-        let written = bytes_below(&dir.path().join("p/exports").join(&purpose));
+        export(&page, &body);
+        let files = contents(&dir.path().join("p/exports").join(&purpose));
+        let written: usize = files.values().map(Vec::len).sum();
         let ratio = expected as f64 / written as f64;
         assert!(
             (1.0 / FACTOR..FACTOR).contains(&ratio),

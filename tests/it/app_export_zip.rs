@@ -6,9 +6,9 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::app::{act, open_app, text, with_project};
+use crate::app::{act, html, open_app, text, with_project};
 use crate::page::{Page, Reply, read_project};
 use crate::skipped::say_skipped;
 use crate::waiting::wait_until;
@@ -43,14 +43,28 @@ fn listed(archive: &[u8], dir: &Path) -> Option<Vec<(u64, String)>> {
     Some(files)
 }
 
-/// Exports a table, and returns the folder of the export.
-fn export(dir: &Path, page: &Page) -> PathBuf {
-    let body = json!({"purpose": "excel", "only": "all", "metric": ""});
-    let reply = act(page, "/p/p/actions/export", &body, |_| {});
+/// Starts an export, waits until it is done, and returns the reply to the action.
+#[track_caller]
+pub(crate) fn export(page: &Page, body: &Value) -> Value {
+    let reply = act(page, "/p/p/actions/export", body, |_| {});
     assert_eq!(reply.status, 200, "{}", text(&reply));
     wait_until("the export is done", || {
-        text(&page.get("/p/p/export")).contains("data-task=\"done\"")
+        html(page, "/p/p/export").contains("data-task=\"done\"")
     });
+    reply.json()
+}
+
+/// Exports a table of all pairs.
+pub(crate) fn export_table(page: &Page) {
+    export(
+        page,
+        &json!({"purpose": "excel", "only": "all", "metric": ""}),
+    );
+}
+
+/// Exports a table, and returns the folder of the export.
+fn table_folder(dir: &Path, page: &Page) -> PathBuf {
+    export_table(page);
     dir.join("p/exports/excel")
 }
 
@@ -86,7 +100,7 @@ fn zeros(path: &Path, length: u64) {
 #[test]
 fn an_export_is_downloaded_as_one_archive_of_the_forecast_size() {
     let (dir, page) = with_project();
-    let folder = export(dir.path(), &page);
+    let folder = table_folder(dir.path(), &page);
     let long = folder.join("chữ".repeat(40)).join("ữ".repeat(70));
     fs::create_dir_all(&long).expect("folders");
     fs::write(long.join("tên dài.txt"), "abc").expect("written");
@@ -116,7 +130,7 @@ fn an_export_is_downloaded_as_one_archive_of_the_forecast_size() {
 #[test]
 fn the_size_before_is_that_of_the_download() {
     let (dir, page) = with_project();
-    let folder = export(dir.path(), &page);
+    let folder = table_folder(dir.path(), &page);
     zeros(&folder.join("zeros.bin"), 20_000_000);
     // The app that is opened next works the size out anew.
     drop(page);
@@ -161,7 +175,7 @@ fn the_name_of_an_archive_keeps_the_letters_of_its_project() {
 #[test]
 fn only_exports_are_downloaded() {
     let (dir, page) = with_project();
-    export(dir.path(), &page);
+    export_table(&page);
     fs::create_dir(dir.path().join("p/exports/other")).expect("a folder");
     for path in [
         "/p/p/exports/excel",
@@ -214,7 +228,7 @@ fn rest(mut stream: TcpStream) -> usize {
 #[test]
 fn a_download_is_cut_off_if_the_export_is_replaced_or_loses_a_file() {
     let (dir, page) = with_project();
-    let folder = export(dir.path(), &page);
+    let folder = table_folder(dir.path(), &page);
     // The next export replaces only files that this one wrote.
     zeros(&folder.join("pairs.csv"), 40 << 20);
     let (stream, length, _) = begin(&page);
@@ -225,7 +239,7 @@ fn a_download_is_cut_off_if_the_export_is_replaced_or_loses_a_file() {
     assert!(rest(stream) < length);
     fs::rename(folder.join("moved.json"), folder.join("export.json")).expect("moved back");
     let (stream, length, _) = begin(&page);
-    export(dir.path(), &page);
+    export_table(&page);
     assert!(rest(stream) < length);
     assert_eq!(download(&page).status, 200, "the new export is whole");
 }
@@ -245,7 +259,7 @@ fn a_folder_without_a_manifest_has_no_link_to_an_archive() {
 fn downloads_at_the_same_time_are_equal_and_take_little_memory() {
     const FILE: u64 = 100 << 20;
     let (dir, page) = with_project();
-    let folder = export(dir.path(), &page);
+    let folder = table_folder(dir.path(), &page);
     zeros(&folder.join("zeros.bin"), FILE);
     let peak_kib = || {
         let status = fs::read_to_string(format!("/proc/{}/status", page.pid().as_raw_nonzero()));

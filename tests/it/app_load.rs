@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use serde_json::json;
-
-use crate::app::{act, html, open_app, text};
+use crate::app::{act, open_app, text};
+use crate::app_export_zip::export_table;
 use crate::app_killed_actions::write_block;
 use crate::app_uploads::{begun, end, put};
 use crate::block_view::finished_block;
@@ -12,7 +11,6 @@ use crate::cli::mocban;
 use crate::page::{Page, answer, read_project};
 use crate::review_load::peak_mib;
 use crate::test_size::trials;
-use crate::waiting::wait_until;
 
 /// Pages, parts of pages, pictures and data, each for every client in every trial.
 const PATHS: [&str; 36] = [
@@ -112,12 +110,7 @@ fn project_with_exports() -> (tempfile::TempDir, Page) {
     std::fs::write(project.join("saved-views.json"), views).expect("written");
     mocban(&project, &["backup", "backups/backup.sqlite"]).expect(0);
     let page = open_app(dir.path());
-    let body = json!({"purpose": "excel", "only": "all", "metric": ""});
-    let reply = act(&page, "/p/p/actions/export", &body, |_| {});
-    assert_eq!(reply.status, 200, "{}", text(&reply));
-    wait_until("the export is done", || {
-        html(&page, "/p/p/export").contains("data-task=\"done\"")
-    });
+    export_table(&page);
     (dir, page)
 }
 
