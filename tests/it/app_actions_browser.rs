@@ -8,24 +8,14 @@ use serde_json::Value;
 use crate::app::app;
 use crate::app_browser::{enter, on_page};
 use crate::browser::{Browser, Tab};
-use crate::cli::mocban;
+use crate::cli::{mocban, status};
 use crate::page::{Page, read_project};
 use crate::review_browser::{ITEM, judge, saved, shown_long_enough};
-use crate::waiting::wait_until;
+use crate::waiting::{run_ends, wait_until};
 
 /// The pairs of the page can be chosen.
 const LISTED: &str =
     "document.body?.dataset.ready && document.querySelector('#choice')?.dataset.ready";
-
-/// Returns what `status --json` says of the project.
-fn status(project: &Path) -> Value {
-    mocban(project, &["status", "--json"]).expect(0).json()
-}
-
-/// Waits until no run works on the project.
-fn run_ends(project: &Path) {
-    wait_until("the run ends", || status(project)["running"] == false);
-}
 
 /// Opens a page of the project.
 fn open(tab: &Tab<'_>, home: &str, path: &str) {

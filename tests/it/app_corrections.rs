@@ -9,7 +9,7 @@ use crate::app_choice::import_more;
 use crate::block_view::finished_block;
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
-use crate::waiting::wait_until;
+use crate::waiting::{run_ends, wait_until};
 
 const CORRECT: &str = "/p/p/actions/correct";
 
@@ -78,10 +78,7 @@ fn a_correction_waits_for_the_end_of_a_run() {
     assert!(shown.contains("id=\"running\""), "{shown}");
     assert_eq!(said(&project, "upright-0001"), before);
     std::fs::remove_file(&hold).expect("the run waits");
-    wait_until("the run ends", || {
-        let status = mocban(&project, &["status", "--json"]).expect(0);
-        status.json()["running"] == false
-    });
+    run_ends(&project);
     mocban(&project, &["check"]).expect(0);
 }
 

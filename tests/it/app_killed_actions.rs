@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 
 use crate::app::{act, open_app, text};
 use crate::app_choice::chosen;
-use crate::cli::mocban;
-use crate::killed_project::{KilledAction, kill_each, status};
+use crate::cli::{mocban, status};
+use crate::killed_project::{KilledAction, kill_each};
 use crate::page::{Page, answer};
 use crate::review_page::{ask, check_answers};
 

@@ -11,12 +11,12 @@ use crate::app_killed_actions::killed_actions;
 use crate::app_routes::{REVIEW_ROUTES, ROUTES, writes};
 use crate::block_correction::{CorrectionSession, printed_side, refused_block, true_points};
 use crate::block_view::finished_block;
-use crate::cli::mocban;
+use crate::cli::{mocban, status};
 use crate::fault::Fault;
 use crate::page::{Page, read_project, send};
 use crate::project_dump::ProjectDump;
 use crate::small_block::stored_block;
-use crate::waiting::wait_until;
+use crate::waiting::{run_ends, wait_until};
 
 /// How long the interrupted call takes, in milliseconds: until the app is killed.
 pub(crate) const UNTIL_KILLED: u32 = 600_000;
@@ -65,8 +65,7 @@ fn a_killed_repair_leaves_the_damage_and_is_done_by_the_next_app() {
     read_project(&dir);
     let root = dir.path().canonicalize().expect("a path");
     let project = root.join("p");
-    let status = || mocban(&project, &["status", "--json"]).expect(0).json();
-    let results = status()["jobs"]["done"].clone();
+    let results = status(&project)["jobs"]["done"].clone();
     let mut folders = std::fs::read_dir(project.join("artifacts")).expect("artifacts");
     let folder = folders.find_map(|entry| Some(entry.ok()?.path()).filter(|path| path.is_dir()));
     let mut files = std::fs::read_dir(folder.expect("a folder")).expect("files");
@@ -77,7 +76,11 @@ fn a_killed_repair_leaves_the_damage_and_is_done_by_the_next_app() {
     let held = HeldApp::start(&root, Fault::slow("write", LOG, UNTIL_KILLED), 1);
     let (body, token) = (json!({"what": "repair"}), token(&held.page));
     held.kill_in("/p/p/actions/check", token, &body);
-    assert_eq!(status()["jobs"]["done"], results, "nothing is half mended");
+    assert_eq!(
+        status(&project)["jobs"]["done"],
+        results,
+        "nothing is half mended"
+    );
     assert_eq!(check()["damage"], found["damage"]);
     let next = open_app(&root);
     let reply = act(&next, "/p/p/actions/check", &body, |_| {});
@@ -87,7 +90,7 @@ fn a_killed_repair_leaves_the_damage_and_is_done_by_the_next_app() {
     });
     mocban(&project, &["run", "-q"]).expect(0);
     mocban(&project, &["check"]).expect(0);
-    assert_eq!(status()["jobs"]["done"], results);
+    assert_eq!(status(&project)["jobs"]["done"], results);
 }
 
 /// Returns the processes whose command lines have a text.
@@ -124,7 +127,7 @@ fn a_killed_demo_is_whole_after_the_next_click() {
         act(&next, "/actions/demo", &json!({}), |_| {}).status == 200
     });
     let project = root.join("mocban-demo");
-    let status = mocban(&project, &["status", "--json"]).expect(0).json();
+    let status = status(&project);
     assert_eq!(status["pairs"], 24);
     assert_eq!(status["jobs"]["ready"], 24);
     mocban(&project, &["check"]).expect(0);
@@ -154,16 +157,17 @@ fn a_run_outlives_a_killed_app_and_is_stopped_and_resumed_by_the_next() {
     wait_until("the run is held", || hold.exists());
     page.kill();
     let project = root.join("p");
-    let status = || mocban(&project, &["status", "--json"]).expect(0).json();
-    assert_eq!(status()["running"], true, "the run goes on");
+    assert_eq!(status(&project)["running"], true, "the run goes on");
     let next = open_app(&root);
     send(&next, "stop", &json!({}));
     std::fs::remove_file(&hold).expect("the run waits");
-    wait_until("the run ends", || status()["running"] == false);
-    assert_eq!(status()["jobs"]["leased"], 0);
+    run_ends(&project);
+    assert_eq!(status(&project)["jobs"]["leased"], 0);
     send(&next, "run", &all);
-    wait_until("all pairs are done", || status()["jobs"]["done"] == 16);
-    wait_until("the run ends", || status()["running"] == false);
+    wait_until("all pairs are done", || {
+        status(&project)["jobs"]["done"] == 16
+    });
+    run_ends(&project);
     mocban(&project, &["check"]).expect(0);
 }
 

@@ -47,6 +47,12 @@ pub(crate) fn mocban(dir: &Path, args: &[&str]) -> Call {
     call(binary().current_dir(dir).args(args))
 }
 
+/// Returns what `status --json` says of a project.
+#[track_caller]
+pub(crate) fn status(project: &Path) -> Value {
+    mocban(project, &["status", "--json"]).expect(0).json()
+}
+
 /// Returns a command that calls the binary.
 pub(crate) fn binary() -> Command {
     without_settings(Command::new(BINARY))

@@ -6,11 +6,11 @@ use serde_json::{Value, json};
 
 use crate::app::{act, open_app, text, token};
 use crate::app_kills::{HeldApp, LOG, UNTIL_KILLED};
-use crate::cli::mocban;
+use crate::cli::{mocban, status};
 use crate::fault::Fault;
 use crate::page::{Page, read_project};
 use crate::project_dump::ProjectDump;
-use crate::waiting::wait_until;
+use crate::waiting::{run_ends, wait_until};
 
 /// An action that stores something, and then starts a run.
 const STORES_AND_RUNS: &str = "/p/p/actions/correct";
@@ -67,11 +67,6 @@ impl KilledAction {
     }
 }
 
-/// Returns what `status --json` says of a project.
-pub(crate) fn status(project: &Path) -> Value {
-    mocban(project, &["status", "--json"]).expect(0).json()
-}
-
 /// A copy of the shared project in which an action is killed.
 struct KilledProject<'a> {
     action: &'a KilledAction,
@@ -123,7 +118,7 @@ impl<'a> KilledProject<'a> {
         let reply = act(next, path, body, |_| {});
         assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
         wait_until(what, || self.state() != self.before);
-        wait_until("its run ends", || status(&project)["running"] == false);
+        run_ends(&project);
         if let Some([page, _]) = self.action.said {
             let is_done = || {
                 let html = text(&next.get(&format!("/p/p/{page}")));

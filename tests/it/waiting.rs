@@ -1,7 +1,10 @@
 //! Waits for other processes.
 
+use std::path::Path;
 use std::process::Child;
 use std::time::{Duration, Instant};
+
+use crate::cli::status;
 
 /// Longest wait for what other processes, servers and browsers do. It only ends a test that would wait without end, so it is
 /// longer than a busy machine needs.
@@ -44,4 +47,10 @@ pub(crate) fn wait_until(what: &str, is_so: impl Fn() -> bool) {
         assert!(Instant::now() < deadline, "never: {what}");
         pause();
     }
+}
+
+/// Waits until no run works on a project.
+#[track_caller]
+pub(crate) fn run_ends(project: &Path) {
+    wait_until("the run ends", || status(project)["running"] == false);
 }
