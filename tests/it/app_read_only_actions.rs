@@ -2,7 +2,6 @@
 //! changes nothing.
 
 use std::collections::BTreeMap;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -11,9 +10,9 @@ use crate::app::{act, html, text};
 use crate::app_choice::chosen;
 use crate::app_controls::varied_project;
 use crate::app_killed_actions::{last_import, list_of, write_list};
+use crate::app_shared::app_as_other_user;
 use crate::block_view::finished_block;
-use crate::cli::binary_beside;
-use crate::odd::{as_other_user, set_writable};
+use crate::odd::{set_mode, set_writable};
 use crate::page::Page;
 use crate::report::contents;
 use crate::waiting::wait_until;
@@ -50,10 +49,7 @@ impl ReadOnlyFolder {
     fn open(dir: &Path) -> Self {
         let dir = dir.canonicalize().expect("a path");
         let before = contents(&dir.join("p"));
-        let mut command = binary_beside(&dir.join("p"));
-        command.args(["--json", "app", "--no-open", "--lang", "en"]);
-        command.arg(&dir);
-        as_other_user(&mut command, &dir);
+        let mut command = app_as_other_user(&dir);
         set_writable(&dir.join("p"), false);
         set_mode(&dir, 0o555);
         let page = Page::of(&mut command).entered();
@@ -90,11 +86,6 @@ impl Drop for ReadOnlyFolder {
             assert_eq!(projects.count(), 1, "no project was added");
         }
     }
-}
-
-fn set_mode(path: &Path, mode: u32) {
-    let mode = std::fs::Permissions::from_mode(mode);
-    std::fs::set_permissions(path, mode).expect("set");
 }
 
 /// Returns a change of the saved view of [`varied_project`].

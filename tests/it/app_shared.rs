@@ -1,18 +1,28 @@
 //! Two apps on one project, and an app on a project that cannot be written.
 
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
+use std::process::Command;
 
 use serde_json::{Value, json};
 
 use crate::app::{act, html, open_app, text, with_project};
 use crate::app_choice::{chosen, import_more};
 use crate::cli::{binary_beside, mocban};
-use crate::odd::{as_other_user, set_writable};
+use crate::odd::{as_other_user, set_mode, set_writable};
 use crate::page::{Page, read_project};
 use crate::waiting::wait_until;
 
 const CHOSEN: &str = "/p/p/actions/chosen";
+
+/// Returns the command of the app on a folder with the project `p`, run without the rights of root.
+pub(crate) fn app_as_other_user(folder: &Path) -> Command {
+    let project = folder.join("p");
+    let mut command = binary_beside(&project);
+    command.args(["--json", "app", "--no-open", "--lang", "en"]);
+    command.arg(folder);
+    as_other_user(&mut command, &project);
+    command
+}
 
 #[test]
 fn two_apps_on_one_project_show_and_change_the_same() {
@@ -83,19 +93,12 @@ fn two_apps_on_one_project_show_and_change_the_same() {
 #[test]
 fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let set_mode = |mode: u32| {
-        let mode = std::fs::Permissions::from_mode(mode);
-        std::fs::set_permissions(dir.path(), mode).expect("set");
-    };
     let project = read_project(&dir).dir().to_owned();
     let catalog = || std::fs::read(project.join("catalog.sqlite")).expect("a catalog");
     let before = catalog();
-    let mut command = binary_beside(&project);
-    command.args(["--json", "app", "--no-open", "--lang", "en"]);
-    command.arg(dir.path());
+    let mut command = app_as_other_user(dir.path());
     set_writable(&project, false);
-    set_mode(0o555);
-    as_other_user(&mut command, &project);
+    set_mode(dir.path(), 0o555);
     let page = Page::of(&mut command).entered();
     html(&page, "/p/p/report/numbers");
     // Every page says it before anybody types.
@@ -171,7 +174,7 @@ fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
     let judged = html(&page, &format!("/p/p/{go}"));
     let part = "Only the chosen pairs are judged: <b>2</b>";
     assert!(judged.contains(part), "{judged}");
-    set_mode(0o755);
+    set_mode(dir.path(), 0o755);
     set_writable(&project, true);
     assert!(catalog() == before, "nothing has changed");
 }
@@ -180,17 +183,10 @@ fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
 fn a_review_of_a_read_only_catalog_is_refused_before_the_first_answer() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir).dir().to_owned();
-    let set_mode = |path: &Path, mode: u32| {
-        let mode = std::fs::Permissions::from_mode(mode);
-        std::fs::set_permissions(path, mode).expect("set");
-    };
     // SQLite can make its other files, and so opens the catalog.
     set_mode(dir.path(), 0o755);
     set_mode(&project, 0o777);
-    let mut command = binary_beside(&project);
-    command.args(["--json", "app", "--no-open", "--lang", "en"]);
-    command.arg(dir.path());
-    as_other_user(&mut command, &project);
+    let mut command = app_as_other_user(dir.path());
     set_mode(&project.join("catalog.sqlite"), 0o444);
     let page = Page::of(&mut command).entered();
     let start = json!({"reviewer": "lan", "metric": "density", "sample": "", "order": "random"});

@@ -2,7 +2,6 @@
 //! level of headings, is wider than its window or logs an error.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
 use serde_json::json;
@@ -11,9 +10,10 @@ use crate::accessible::{axe, no_violation};
 use crate::app::app;
 use crate::app_browser::{enter, fits_width};
 use crate::app_controls::{SHOWN, varied_project};
+use crate::app_shared::app_as_other_user;
 use crate::browser::{Browser, Tab};
-use crate::cli::{binary_beside, mocban};
-use crate::odd::{as_other_user, set_writable};
+use crate::cli::mocban;
+use crate::odd::{set_mode, set_writable};
 use crate::page::Page;
 use crate::waiting::wait_until;
 
@@ -197,16 +197,9 @@ fn every_state_is_accessible_and_logs_no_error() {
     drop(page);
     // A command that ends well leaves no log, which only a user who may write could read.
     mocban(&project, &["retire", "upright-0003"]).expect(0);
-    let set_mode = |mode: u32| {
-        let mode = fs::Permissions::from_mode(mode);
-        fs::set_permissions(dir.path(), mode).expect("set");
-    };
-    let mut command = binary_beside(&project);
-    command.args(["--json", "app", "--no-open", "--lang", "en"]);
-    command.arg(dir.path());
+    let mut command = app_as_other_user(dir.path());
     set_writable(&project, false);
-    set_mode(0o555);
-    as_other_user(&mut command, &project);
+    set_mode(dir.path(), 0o555);
     let page = Page::of(&mut command);
     let (tab, home) = enter(&browser, &page, WINDOWS[0].0);
     (states.tab, states.home) = (tab, home);
@@ -219,6 +212,6 @@ fn every_state_is_accessible_and_logs_no_error() {
         states.tab.wait("document.querySelector('#read-only')");
         states.check(what);
     }
-    set_mode(0o755);
+    set_mode(dir.path(), 0o755);
     set_writable(&project, true);
 }

@@ -1,6 +1,6 @@
 //! Unusual states of the disk. Each gives one clear sentence that names the file and the remedy, and no data is lost.
 
-use std::os::unix::fs::MetadataExt as _;
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 
@@ -180,27 +180,27 @@ pub(crate) fn as_other_user(command: &mut std::process::Command, dir: &Path) {
 
 /// Removes the write permission below a directory, or restores it for the owner.
 pub(crate) fn set_writable(dir: &Path, writable: bool) {
-    use std::os::unix::fs::PermissionsExt as _;
     for entry in std::fs::read_dir(dir).expect("a folder") {
         let path = entry.expect("an entry").path();
         if path.is_dir() {
             set_writable(&path, writable);
         } else {
-            let mode = if writable { 0o644 } else { 0o444 };
-            let mode = std::fs::Permissions::from_mode(mode);
-            std::fs::set_permissions(path, mode).expect("set");
+            set_mode(&path, if writable { 0o644 } else { 0o444 });
         }
     }
-    let mode = if writable { 0o755 } else { 0o555 };
-    std::fs::set_permissions(dir, std::fs::Permissions::from_mode(mode)).expect("set");
+    set_mode(dir, if writable { 0o755 } else { 0o555 });
+}
+
+/// Sets the permissions of a file or folder.
+pub(crate) fn set_mode(path: &Path, mode: u32) {
+    let mode = std::fs::Permissions::from_mode(mode);
+    std::fs::set_permissions(path, mode).expect("set");
 }
 
 #[test]
 fn read_only_project_can_be_read() {
-    use std::os::unix::fs::PermissionsExt as _;
     let dir = empty();
-    let open = std::fs::Permissions::from_mode(0o755);
-    std::fs::set_permissions(dir.path(), open).expect("set");
+    set_mode(dir.path(), 0o755);
     let project = done(dir.path());
     let wanted = at(&project, &["report", "--json"]).expect(0).out;
     set_writable(project.dir(), false);
