@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::source_text::{package_dir, source_files};
+use crate::source_text::{code_spans, package_dir, source_files};
 
 /// Commands with commands of their own, whose options the reference does not list.
 const WITH_COMMANDS: [&str; 3] = ["db", "verdict", "config"];
@@ -34,7 +34,7 @@ fn options_in_advice_belong_to_their_command() {
     for file in source_files() {
         let lines = file.text.lines().map(str::trim_start);
         for line in lines.filter(|line| !line.starts_with("//")) {
-            for quoted in line.split('`').skip(1).step_by(2) {
+            for quoted in code_spans(line) {
                 let unknown = unknown_options(quoted, &known, global);
                 count += usize::from(unknown.is_some());
                 let unknown = unknown.unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::source_text::{package_dir, source_files};
+use crate::source_text::{code_spans, package_dir, source_files};
 
 /// The headings of the guide in English and Vietnamese, in their order.
 const HEADINGS: [[&str; 2]; 11] = [
@@ -41,11 +41,6 @@ fn sections(page: &str) -> Vec<(&str, &str)> {
     parts
         .map(|(heading, body)| (heading.trim_start_matches("# "), body))
         .collect()
-}
-
-/// Returns what stands between backquotes.
-fn code_spans(text: &str) -> Vec<&str> {
-    text.split('`').skip(1).step_by(2).collect()
 }
 
 /// Returns the options that a text names.

@@ -1,8 +1,6 @@
 //! Style sheets take their colours from custom properties, so that a colour is changed, and has its dark form, in one place.
 
-use std::path::{Path, PathBuf};
-
-use crate::source_text::package_dir;
+use crate::source_text::{files_with_extension, package_dir, slashed};
 
 /// Style sheets that give custom properties a colour, and why they do not only use those of the app.
 const WITH_COLOURS: [(&str, &str); 7] = [
@@ -63,16 +61,6 @@ const NAMES: [&str; 12] = [
     "brown",
 ];
 
-/// Returns the style sheets below a folder.
-fn style_sheets(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).expect("a folder");
-    let paths = entries.map(|entry| entry.expect("an entry").path());
-    let (folders, mut files): (Vec<_>, Vec<_>) = paths.partition(|path| path.is_dir());
-    files.retain(|path| path.extension().is_some_and(|extension| extension == "css"));
-    files.extend(folders.iter().flat_map(|folder| style_sheets(folder)));
-    files
-}
-
 /// Returns a style sheet without comments.
 fn without_comments(text: &str) -> String {
     let mut parts = text.split("/*");
@@ -105,12 +93,11 @@ fn has_literal_colour(value: &str) -> bool {
 #[test]
 fn colours_are_custom_properties() {
     let assets = package_dir().join("assets");
-    let sheets = style_sheets(&assets);
+    let sheets = files_with_extension(&assets, "css");
     assert!(sheets.len() >= WITH_COLOURS.len(), "{sheets:?}");
     let (mut wrong, mut defining, mut used) = (Vec::new(), Vec::new(), [false; LITERALS.len()]);
     for path in &sheets {
-        let name = path.strip_prefix(&assets).expect("a path below the assets");
-        let name = name.to_string_lossy().replace('\\', "/");
+        let name = slashed(path, &assets);
         let text = without_comments(&std::fs::read_to_string(path).expect("UTF-8"));
         for (property, value) in declarations(&text) {
             if !has_literal_colour(value) {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::import_graph::ImportGraph;
-use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
+use crate::source_text::{SourceFile, code_spans, package_dir, paths_after, source_files};
 
 /// Dependencies that only these crates may have.
 const ONLY_IN: &[(&str, &[&str])] = &[
@@ -138,11 +138,6 @@ fn folders_do_not_import_each_other_in_cycles() {
 const MAX_ENTRANCE_WORDS: usize = 1500;
 const MAX_PAGE_LINES: usize = 60;
 
-/// Returns the names between backticks in a text.
-fn quoted_names(text: &str) -> Vec<&str> {
-    text.split('`').skip(1).step_by(2).collect()
-}
-
 #[test]
 fn files_named_in_the_entrance_exist() {
     let mut missing = Vec::new();
@@ -153,7 +148,7 @@ fn files_named_in_the_entrance_exist() {
             page == "CONTRIBUTING.md" || words <= MAX_ENTRANCE_WORDS,
             "{words} words"
         );
-        for name in quoted_names(&text) {
+        for name in code_spans(&text) {
             let is_path = ["crates/", "src/", "tests/", "docs/"]
                 .iter()
                 .any(|top| name.starts_with(top));
@@ -186,7 +181,7 @@ fn each_crate_begins_with_a_short_page_that_names_its_files_and_its_invariant() 
         );
         let page = page.join("\n");
         assert!(page.contains("**Invariant:**"), "{}", file.name);
-        for name in quoted_names(&page)
+        for name in code_spans(&page)
             .into_iter()
             .filter(|name| Path::new(name).extension().is_some_and(|end| end == "rs"))
         {

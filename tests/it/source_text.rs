@@ -58,6 +58,11 @@ pub(crate) fn package_dir() -> PathBuf {
 
 /// Lists all Rust files below a directory.
 pub(crate) fn rust_files(dir: &Path) -> Vec<PathBuf> {
+    files_with_extension(dir, "rs")
+}
+
+/// Lists all files with an extension below a directory.
+pub(crate) fn files_with_extension(dir: &Path, wanted: &str) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut dirs = vec![dir.to_owned()];
     while let Some(dir) = dirs.pop() {
@@ -65,7 +70,10 @@ pub(crate) fn rust_files(dir: &Path) -> Vec<PathBuf> {
             let path = entry.expect("a readable entry").path();
             if path.is_dir() {
                 dirs.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
+            } else if path
+                .extension()
+                .is_some_and(|extension| extension == wanted)
+            {
                 files.push(path);
             }
         }
@@ -125,7 +133,7 @@ fn crate_files(crate_name: &str, src: &Path) -> Vec<SourceFile> {
 }
 
 /// Returns a path relative to a folder, with forward slashes.
-fn slashed(path: &Path, folder: &Path) -> String {
+pub(crate) fn slashed(path: &Path, folder: &Path) -> String {
     let path = path.strip_prefix(folder).expect("a path below the folder");
     path.to_string_lossy().replace('\\', "/")
 }
@@ -172,6 +180,11 @@ fn test_module_start(text: &str) -> usize {
 fn without_comments(text: &str) -> String {
     let is_code = |line: &&str| !line.trim_start().starts_with("//");
     text.lines().filter(is_code).collect::<Vec<_>>().join("\n")
+}
+
+/// Returns what stands between backticks in a text.
+pub(crate) fn code_spans(text: &str) -> Vec<&str> {
+    text.split('`').skip(1).step_by(2).collect()
 }
 
 /// Returns the leading identifier of a text.
