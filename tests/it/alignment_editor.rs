@@ -9,15 +9,14 @@ use crate::waiting::wait_until;
 
 /// Returns the middle of an element on the screen.
 fn middle(tab: &Tab<'_>, element: &str) -> [f64; 2] {
-    let middle = tab.eval(&format!(
+    tab.point(&format!(
         "(() => {{
             const one = document.querySelector(`{element}`);
             one.scrollIntoView({{ block: 'nearest' }});
             const {{ left, top, width, height }} = one.getBoundingClientRect();
             return [left + width / 2, top + height / 2];
         }})()"
-    ));
-    [0, 1].map(|i| middle[i].as_f64().expect("a number"))
+    ))
 }
 
 fn click(tab: &Tab<'_>, element: &str) {
@@ -115,11 +114,10 @@ fn a_relief_is_aligned_by_keys_and_mouse() {
         }
         let rotated = iou();
         assert!(rotated < before, "{rotated} {before}");
-        let middle = tab.eval(
+        let at = tab.point(
             "(({ left, top, width, height }) => [left + width / 2, top + height / 2])
             (document.getElementById('canvas').getBoundingClientRect())",
         );
-        let at = [0, 1].map(|i| middle[i].as_f64().expect("a number"));
         tab.drag(at, [at[0] + 60.0, at[1]]);
         assert!(iou() < rotated);
         tab.screenshot("alignment");

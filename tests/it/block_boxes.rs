@@ -110,14 +110,12 @@ fn boxes_are_checked_before_they_are_stored() {
 
 /// Returns where a place of the page is on the screen, once the page has its final layout.
 pub(crate) fn on_screen(tab: &Tab<'_>, [x, y]: [f64; 2]) -> [f64; 2] {
-    let frame = "new Promise((done) => requestAnimationFrame(() => setTimeout(done)))";
-    let found = tab.eval(&format!(
-        "{frame}.then(() => {frame}).then(() => {{
+    tab.point_after_layout(&format!(
+        "(() => {{
             const {{ camera, canvas }} = mocbanBoxes, {{ left, top }} = canvas.getBoundingClientRect();
             return [left + camera.x + ({x} + 0.5) * camera.zoom, top + camera.y + ({y} + 0.5) * camera.zoom];
-        }})"
-    ));
-    [0, 1].map(|axis: usize| found[axis].as_f64().expect("a number"))
+        }})()"
+    ))
 }
 
 /// Returns left, top, right and bottom of the chosen box.

@@ -305,18 +305,15 @@ fn check_conflicts(dir: &Path) {
     assert_eq!(other.save(id, &hash).status, 200);
 }
 
-/// Returns where a pixel of one of the two pictures is on the screen, once the page has its final layout: a sentence of another
-/// length changes the size of the pictures, which their positions follow in the next frame.
+/// Returns where a pixel of one of the two pictures is on the screen, once the page has its final layout.
 pub(crate) fn on_picture(tab: &Tab<'_>, part: &str, at: &Value) -> [f64; 2] {
-    let frame = "new Promise((done) => requestAnimationFrame(() => setTimeout(done)))";
-    let found = tab.eval(&format!(
-        "{frame}.then(() => {frame}).then(() => {{
+    tab.point_after_layout(&format!(
+        "(() => {{
             const {{ camera, canvas }} = mocbanCorrection.{part}, {{ left, top }} = canvas.getBoundingClientRect();
             const [x, y] = mocbanCorrection.{part}.shown({at});
             return [left + camera.x + (x + 0.5) * camera.zoom, top + camera.y + (y + 0.5) * camera.zoom];
-        }})"
-    ));
-    [0, 1].map(|k: usize| found[k].as_f64().expect("a number"))
+        }})()"
+    ))
 }
 
 /// Chooses the points as a person does.

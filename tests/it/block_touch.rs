@@ -6,7 +6,7 @@ use crate::app::app;
 use crate::app_browser::enter;
 use crate::block_boxes::{SAVED, SHOWN, chosen, on_screen};
 use crate::block_correction::{on_picture, true_points};
-use crate::block_view::finished_block;
+use crate::block_view::{finished_block, third_box};
 use crate::browser::{Browser, Tab};
 use crate::page::Page;
 use crate::small_block::{CHARACTERS, stored_block};
@@ -43,13 +43,12 @@ fn touch_boxes(tab: &Tab<'_>) {
     has_changes(tab, 1);
     tab.tap("[aria-label=Delete]");
     has_changes(tab, 2);
-    let second = tab.eval(
+    let second = tab.point(
         "(() => {
             const [corner, , other] = mocbanBoxes.edits.list[1].outline;
             return [0, 1].map((axis) => (corner[axis] + other[axis]) / 2);
         })()",
     );
-    let second = [0, 1].map(|axis: usize| second[axis].as_f64().expect("a number"));
     tap_at(tab, on_screen(tab, second));
     tab.wait("mocbanBoxes.selected === 1");
     let before = chosen(tab);
@@ -100,19 +99,10 @@ fn touch_points(dir: &Path, tab: &Tab<'_>) {
 
 /// Opens the 3D view of a character with a finger, and closes it.
 fn touch_block(tab: &Tab<'_>) {
-    let place = tab.eval(
-        "(() => {
-            window.clicks = 0;
-            addEventListener('click', () => (window.clicks += 1), true);
-            const { camera, canvas, block } = mocbanBlock, [x0, y0, x1, y1] = block.characters[2].box;
-            const { left, top } = canvas.getBoundingClientRect();
-            return [left + camera.x + camera.zoom * (x0 + x1) / 2, top + camera.y + camera.zoom * (y0 + y1) / 2];
-        })()",
+    tab.eval(
+        "window.clicks = 0, addEventListener('click', () => (window.clicks += 1), true), null",
     );
-    tap_at(
-        tab,
-        [0, 1].map(|axis: usize| place[axis].as_f64().expect("a number")),
-    );
+    tap_at(tab, third_box(tab));
     tab.wait("mocbanBlock.dialog.open");
     tab.tap("dialog button");
     tab.wait("!mocbanBlock.dialog.open");

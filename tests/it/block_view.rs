@@ -163,6 +163,17 @@ fn number(tab: &Tab<'_>, expression: &str) -> f64 {
         .unwrap_or_else(|| unreachable!("{expression}: {value}"))
 }
 
+/// Returns where the middle of the third box is on the screen.
+pub(crate) fn third_box(tab: &Tab<'_>) -> [f64; 2] {
+    tab.point(
+        "(() => {
+            const { camera, canvas, block } = mocbanBlock, [x0, y0, x1, y1] = block.characters[2].box;
+            const { left, top } = canvas.getBoundingClientRect();
+            return [left + camera.x + camera.zoom * (x0 + x1) / 2, top + camera.y + camera.zoom * (y0 + y1) / 2];
+        })()",
+    )
+}
+
 /// Uses the page as a person does.
 fn use_page(tab: &Tab<'_>) {
     let zoom = |tab: &Tab<'_>| number(tab, "mocbanBlock.camera.zoom");
@@ -200,15 +211,7 @@ fn use_page(tab: &Tab<'_>) {
     assert!((number(tab, "mocbanBlock.camera.x") - before + 60.0).abs() < 1.0);
     tab.key("Digit0");
     assert!((zoom(tab) - whole).abs() < 1e-9);
-    // The middle of the third box on the screen.
-    let place = tab.eval(
-        "(() => {
-            const { camera, canvas, block } = mocbanBlock, [x0, y0, x1, y1] = block.characters[2].box;
-            const { left, top } = canvas.getBoundingClientRect();
-            return [left + camera.x + camera.zoom * (x0 + x1) / 2, top + camera.y + camera.zoom * (y0 + y1) / 2];
-        })()",
-    );
-    let [x, y] = [0, 1].map(|k: usize| place[k].as_f64().expect("a number"));
+    let [x, y] = third_box(tab);
     let label = tab.eval("mocbanBlock.block.characters[2].label");
     let label = label.as_str().expect("a label");
     tab.eval(&format!(

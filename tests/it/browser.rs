@@ -282,6 +282,23 @@ impl Tab<'_> {
         response["result"]["value"].clone()
     }
 
+    /// Evaluates an expression that gives x and y.
+    #[track_caller]
+    pub(crate) fn point(&self, expression: &str) -> [f64; 2] {
+        let point = self.eval(expression);
+        [0, 1].map(|axis: usize| point[axis].as_f64().expect("a number"))
+    }
+
+    /// Evaluates an expression that gives x and y once the page has its final layout: a sentence of another length changes
+    /// the size of pictures, which their positions follow in the next frame.
+    #[track_caller]
+    pub(crate) fn point_after_layout(&self, expression: &str) -> [f64; 2] {
+        let frame = "new Promise((done) => requestAnimationFrame(() => setTimeout(done)))";
+        self.point(&format!(
+            "{frame}.then(() => {frame}).then(() => {expression})"
+        ))
+    }
+
     /// Chooses files in an input, as a person does in the dialog of the browser.
     pub(crate) fn choose_files(&self, query: &str, files: &[PathBuf]) {
         let element = json!({ "expression": format!("document.querySelector('{query}')") });

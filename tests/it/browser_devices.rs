@@ -114,15 +114,14 @@ impl Tab<'_> {
 
     /// Returns the middle of an element after it was scrolled into the middle of the window.
     fn middle(&self, element: &str) -> [f64; 2] {
-        let middle = self.eval(&format!(
+        self.point(&format!(
             "(() => {{
                 const element = document.querySelector(`{element}`);
                 element.scrollIntoView({{ block: 'center' }});
                 const bounds = element.getBoundingClientRect();
                 return [bounds.x + bounds.width / 2, bounds.y + bounds.height / 2];
             }})()"
-        ));
-        [0, 1].map(|index| middle[index].as_f64().expect("a number"))
+        ))
     }
 
     /// Types text into the focused element.
