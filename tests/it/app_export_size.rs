@@ -6,7 +6,7 @@ use crate::app::{html, with_project};
 use crate::app_export_zip::export;
 use crate::report::contents;
 
-/// Largest ratio of the size before and the size of the export.
+/// Largest ratio of the size that is shown to that of the export, or the other way round.
 const FACTOR: f64 = 1.3;
 
 /// Returns the purposes of a page with the sizes that it shows.

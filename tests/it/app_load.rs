@@ -72,7 +72,7 @@ const REVIEW: &str = "/p/p/review/lan/metric%3Drelief%26order%3Drandom/api";
 /// Clients at the same time.
 const CLIENTS: usize = 8;
 /// Most memory by which the peak may grow after every path was read twice by all clients, MiB, whatever the number of trials.
-/// It was 7 MiB for 15,000 requests, because large replies may be made at the same time later on.
+/// It was 7 MiB for 15,000 requests: later on, more large replies may be made at the same time than before.
 const GROWTH_MIB: u64 = 16;
 /// The same after the pages of a block were read three times. Memory that stays when a block is opened again adds 19 MiB to it
 /// in each trial.

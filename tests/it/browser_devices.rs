@@ -153,8 +153,8 @@ impl Tab<'_> {
         }
     }
 
-    /// Puts fingers on the screen at the first points, moves them to the second, and lifts them. A movement is slow, because
-    /// the browser takes a tap that follows a fast one for its end.
+    /// Puts fingers on the screen at the first points, moves them to the second, and lifts them. By its timestamps, a
+    /// movement takes a second: the browser takes a tap after a fast one for the end of a fling.
     pub(crate) fn touch(&self, from: &[[f64; 2]], to: &[[f64; 2]]) {
         let points = |places: &[[f64; 2]]| {
             let places = places.iter().enumerate();

@@ -137,7 +137,7 @@ const CONTACT_SHEET: FaultScenario = FaultScenario {
     before: |comparison, root| {
         copy(comparison.expected.project(), &root.join("p"));
         std::fs::create_dir(root.join("sheet")).expect("a folder");
-        // Any other file that is no sheet is refused.
+        // An empty file may be replaced; any other that is no sheet is refused.
         std::fs::write(root.join("sheet/out.png"), "").expect("written");
     },
     command: contact_sheet,
