@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::accessible::{axe, no_violation};
-use crate::block_view::finished_block;
+use crate::block_view::{BLOCK_SHOWN, finished_block};
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
 use crate::page::{Page, read_project};
@@ -102,7 +102,7 @@ fn no_page_of_a_block_has_a_fault() {
     let page = view(dir.path(), "p", "b1");
     let tab = browser.tab(1280, 900);
     tab.open(&page.url);
-    tab.wait("window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100");
+    tab.wait(BLOCK_SHOWN);
     check(&browser, &tab, axe.as_ref(), "view_block");
     tab.resize([1280, 900]);
     tab.eval("mocbanBlock.open(0), null");

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use crate::app::app;
 use crate::app_browser::{enter, fits_width};
-use crate::block_view::finished_block;
+use crate::block_view::{BLOCK_SHOWN, finished_block};
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
@@ -132,13 +132,12 @@ fn every_control_of_the_views_of_a_block_fits_a_finger() {
     finished_block(dir.path());
     let page = Page::of(app(dir.path()).args(["--lang", "en"]));
     let (tab, home) = enter(&browser, &page, [1024, 768]);
-    let block = "window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100";
     for size in [[400, 800], [1024, 768]] {
         tab.use_fingers(size);
         for (path, shown) in [
             ("p/p/blocks", SHOWN),
             ("p/p/block/b1/", SHOWN),
-            ("p/p/block/b1/view/", block),
+            ("p/p/block/b1/view/", BLOCK_SHOWN),
             ("p/p/block/b1/view/correct", "window.mocbanCorrection"),
             ("p/p/block/b1/view/boxes", "window.mocbanBoxes"),
         ] {

@@ -6,7 +6,7 @@ use crate::app::app;
 use crate::app_browser::enter;
 use crate::block_boxes::{SAVED, SHOWN, chosen, on_screen};
 use crate::block_correction::{on_picture, true_points};
-use crate::block_view::{finished_block, third_box};
+use crate::block_view::{BLOCK_SHOWN, finished_block, third_box};
 use crate::browser::{Browser, Tab};
 use crate::page::Page;
 use crate::small_block::{CHARACTERS, stored_block};
@@ -15,8 +15,6 @@ use crate::small_block::{CHARACTERS, stored_block};
 const WINDOWS: [[u32; 2]; 2] = [[400, 800], [1024, 768]];
 /// Both pictures of a correction are shown.
 const BOTH_SHOWN: &str = "window.mocbanCorrection && ['face', 'page'].every((part) => mocbanCorrection[part].image.naturalWidth > 100)";
-/// The page of a block is shown.
-const BLOCK_SHOWN: &str = "window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100";
 
 fn tap_at(tab: &Tab<'_>, at: [f64; 2]) {
     tab.touch(&[at], &[at]);

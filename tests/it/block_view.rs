@@ -12,6 +12,9 @@ use crate::made_once::copy_of;
 use crate::page::Page;
 use crate::small_block::{demo_block, few_labels};
 
+/// The page of a block is shown.
+pub(crate) const BLOCK_SHOWN: &str =
+    "window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100";
 /// Vermillion and blue of the overlays.
 const STROKE_ONLY: [u8; 3] = [213, 94, 0];
 const INK_ONLY: [u8; 3] = [0, 114, 178];
@@ -267,7 +270,7 @@ fn a_block_is_drawn_and_shown_in_the_browser() {
     let tab = browser.tab(1000, 750);
     tab.before_scripts(HOLD_RELIEF);
     tab.open(&page.url);
-    tab.wait("window.mocbanBlock && mocbanBlock.overview.naturalWidth > 100");
+    tab.wait(BLOCK_SHOWN);
     use_page(&tab);
 }
 
