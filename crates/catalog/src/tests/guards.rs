@@ -1,30 +1,17 @@
 //! Failure modes of job queues: late workers, reused ids, busy databases, clock jumps.
 
-use super::{World, done, enter, fingerprints, inputs, name, register, row};
+use super::{World, enter, fingerprints, inputs, name, register, row, slow_disk};
 use crate::db::query::query;
 use crate::lease_recovery::CRASH_LIMIT;
 use crate::{
-    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction, FingerprintIds, Lease,
-    RerunPolicy, StageFailure,
+    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction, Lease, RerunPolicy,
+    StageFailure,
 };
-use mocban_core::domain::{Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
+use mocban_core::domain::{JobStatus, PairId, Stage, WorkerId};
 
 async fn status(world: &World) -> JobStatus {
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     detail.expect("the pair").results.status
-}
-
-fn failed(fingerprints: FingerprintIds, action: FailureAction) -> StageFailure {
-    StageFailure {
-        stage: Stage::Fit,
-        failure: Failure::new(FailureClass::Io, "the disk is slow"),
-        action,
-        provenance: done(fingerprints, Stage::Fit).provenance,
-        inputs: inputs(Stage::Fit),
-        ms: None,
-        at: 50,
-        alive_since: 0,
-    }
 }
 
 /// Worker ids are not reused, even if the newest worker was deleted.
@@ -114,7 +101,7 @@ async fn a_late_checkpoint_in_the_same_commit_changes_nothing() {
 async fn a_late_failure_under_an_older_lease_of_the_same_worker_changes_nothing() {
     let world = World::new(1).await;
     let [late, again] = leased_twice(&world).await;
-    let quarantine = || failed(world.fingerprints, FailureAction::Quarantine);
+    let quarantine = || slow_disk(world.fingerprints, FailureAction::Quarantine);
     assert!(
         !world
             .catalog
@@ -168,7 +155,7 @@ async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
     assert!(matches!(kept, Ok(CheckpointOutcome::Refused)));
     let late = StageFailure {
         alive_since: 2,
-        ..failed(world.fingerprints, FailureAction::Quarantine)
+        ..slow_disk(world.fingerprints, FailureAction::Quarantine)
     };
     assert!(!world.catalog.fail(second, late).await.expect("an answer"));
     let heartbeat = world.catalog.heartbeat(world.worker, 90, 2, None).await;
@@ -213,7 +200,7 @@ async fn busy_errors_do_not_reach_callers() {
             let CheckpointOutcome::Lease(lease) = kept.expect("stored") else {
                 panic!("not the last stage")
             };
-            let fail = failed(fingerprints, FailureAction::Quarantine);
+            let fail = slow_disk(fingerprints, FailureAction::Quarantine);
             assert!(catalog.fail(lease, fail).await.expect("stored"));
             done += 1;
         }
@@ -250,7 +237,7 @@ async fn a_backoff_survives_the_death_of_its_process() {
         let worker = register(&world.catalog).await;
         let lease = world.claim_as(worker, 1).await.remove(0);
         assert_eq!(lease.attempt(), attempt);
-        let back_off = failed(world.fingerprints, FailureAction::BackOff { run_at: 2_000 });
+        let back_off = slow_disk(world.fingerprints, FailureAction::BackOff { run_at: 2_000 });
         assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
         let next = register(&world.catalog).await;
         let recovered = world.catalog.recover(DeadWorker::AllExcept(next), 60).await;
@@ -303,7 +290,7 @@ async fn clock_jumps_neither_block_pairs_nor_cost_leases() {
     // The worker with the early clock ends the back-off of the other one.
     let lease = world.claim_as(future, 1).await.remove(0);
     let run_at = YEARS + 1_000;
-    let back_off = failed(world.fingerprints, FailureAction::BackOff { run_at });
+    let back_off = slow_disk(world.fingerprints, FailureAction::BackOff { run_at });
     assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
     let due = world.catalog.release_due_backoffs(25, 90_000).await;
     assert_eq!(due.expect("stored"), 1);

@@ -39,13 +39,14 @@ use serde_json::{Map, json};
 pub(crate) use self::place::CatalogPlace;
 use super::db::query::query_scalar;
 use super::{
-    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
-    InputVersion, InputVersions, Lease, LeaseHolder, MetricResult, PairProvenance, RerunPolicy,
-    Result, RetrySelection, StageCheckpoint, WorkerInfo, WorkerSettings,
+    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction, FingerprintIds,
+    Fingerprints, ImportRow, InputVersion, InputVersions, Lease, LeaseHolder, MetricResult,
+    PairProvenance, RerunPolicy, Result, RetrySelection, StageCheckpoint, StageFailure, WorkerInfo,
+    WorkerSettings,
 };
 use mocban_core::domain::{
-    Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
-    Scores, Stage, ThresholdMetric, UnixMillis, WorkerId,
+    Affine2, ArtifactSet, ContentHash, Disagreement, Failure, FailureClass, MetricOutcome,
+    PairName, RegisterOutcome, Scores, Stage, ThresholdMetric, UnixMillis, WorkerId,
 };
 
 /// A catalog with a worker.
@@ -264,6 +265,34 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
         alive_since: 0,
         write_began: Instant::now(),
     }
+}
+
+/// Returns a failure of a stage that read its inputs.
+fn failed(
+    fingerprints: FingerprintIds,
+    stage: Stage,
+    failure: Failure,
+    action: FailureAction,
+) -> StageFailure {
+    let StageCheckpoint {
+        provenance, inputs, ..
+    } = done(fingerprints, stage);
+    StageFailure {
+        stage,
+        failure,
+        action,
+        provenance,
+        inputs,
+        ms: Some(3),
+        at: 50,
+        alive_since: 0,
+    }
+}
+
+/// Returns a failure of the first stage at its files.
+fn slow_disk(fingerprints: FingerprintIds, action: FailureAction) -> StageFailure {
+    let failure = Failure::new(FailureClass::Io, "the disk is slow");
+    failed(fingerprints, Stage::Fit, failure, action)
 }
 
 fn inputs(stage: Stage) -> InputVersions {

@@ -2,28 +2,15 @@
 
 use std::time::{Duration, Instant};
 
-use super::{World, blocks, done, name, register, row};
+use super::{World, blocks, done, name, register, row, slow_disk};
 use crate::db::query::query;
 use crate::{
     Catalog, CatalogError, CheckpointOutcome, ClaimRequest, FailureAction, RerunPolicy,
-    RetrySelection, StageCheckpoint, StageFailure,
+    RetrySelection, StageCheckpoint,
 };
 use mocban_core::domain::{
-    BlockStage, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage, ThresholdMetric,
+    BlockStage, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage, ThresholdMetric,
 };
-
-fn failed(world: &World, stage: Stage, action: FailureAction) -> StageFailure {
-    StageFailure {
-        stage,
-        failure: Failure::new(FailureClass::Io, "the disk is slow"),
-        action,
-        provenance: done(world.fingerprints, stage).provenance,
-        inputs: super::inputs(stage),
-        ms: Some(3),
-        at: 50,
-        alive_since: 0,
-    }
-}
 
 pub(super) async fn status(world: &World, pair: &str) -> JobStatus {
     let detail = world.catalog.pair(&name(pair)).await.expect("a read");
@@ -147,7 +134,7 @@ async fn a_late_failure_and_a_late_release_change_nothing() {
     let mut leases = world.claim(2).await;
     world.recovered_by_another(2).await;
     let (first, second) = (leases.remove(0), leases.remove(0));
-    let kept = failed(&world, Stage::Fit, FailureAction::Quarantine);
+    let kept = slow_disk(world.fingerprints, FailureAction::Quarantine);
     assert!(!world.catalog.fail(first, kept).await.expect("an answer"));
     assert!(!world.catalog.release(second).await.expect("an answer"));
     assert_eq!(status(&world, "p0").await, JobStatus::Ready);
@@ -181,7 +168,7 @@ async fn a_server_does_not_store_a_stage_whose_files_are_old() {
 async fn a_backoff_ends_when_it_is_due_and_after_a_clock_jump() {
     let world = World::new(2).await;
     for (lease, run_at) in world.claim(2).await.into_iter().zip([2_000, 9_000_000]) {
-        let back_off = failed(&world, Stage::Fit, FailureAction::BackOff { run_at });
+        let back_off = slow_disk(world.fingerprints, FailureAction::BackOff { run_at });
         assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
     }
     assert!(world.claim(2).await.is_empty());
@@ -201,7 +188,7 @@ async fn a_backoff_ends_when_it_is_due_and_after_a_clock_jump() {
 async fn a_failure_keeps_class_and_message_and_can_be_retried() {
     let world = World::new(3).await;
     for lease in world.claim(2).await {
-        let quarantine = failed(&world, Stage::Fit, FailureAction::Quarantine);
+        let quarantine = slow_disk(world.fingerprints, FailureAction::Quarantine);
         assert!(world.catalog.fail(lease, quarantine).await.expect("stored"));
     }
     assert_eq!(world.claim(5).await.len(), 1);
@@ -226,7 +213,7 @@ async fn a_failure_keeps_class_and_message_and_can_be_retried() {
 async fn an_exclusive_pair_is_claimed_only_exclusively() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
-    let alone = failed(&world, Stage::Fit, FailureAction::RetryExclusive);
+    let alone = slow_disk(world.fingerprints, FailureAction::RetryExclusive);
     assert!(world.catalog.fail(lease, alone).await.expect("stored"));
     assert!(world.claim(1).await.is_empty());
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");

@@ -1,23 +1,19 @@
 //! Units and sides of scans that a person corrects.
 
 use super::blocks::{character, world};
-use super::{World, fingerprints, name, row};
-use crate::{FailureAction, PairAttributes, RerunPolicy, ScanCorrection, StageFailure};
+use super::{World, failed, fingerprints, name, row};
+use crate::{FailureAction, PairAttributes, RerunPolicy, ScanCorrection};
 use mocban_core::domain::{Failure, FailureClass, JobStatus, LengthUnit, PairName, Stage};
 
 /// Lets the next pair fail at its first stage, and returns its name.
 async fn fail_next(world: &World, class: FailureClass, message: &str) -> PairName {
     let lease = world.claim(1).await.pop().expect("a ready pair");
-    let failed = StageFailure {
-        stage: Stage::Fit,
-        failure: Failure::new(class, message),
-        action: FailureAction::Quarantine,
-        provenance: super::done(world.fingerprints, Stage::Fit).provenance,
-        inputs: super::inputs(Stage::Fit),
-        ms: None,
-        at: 5,
-        alive_since: 0,
-    };
+    let failed = failed(
+        world.fingerprints,
+        Stage::Fit,
+        Failure::new(class, message),
+        FailureAction::Quarantine,
+    );
     assert!(world.catalog.fail(lease, failed).await.expect("stored"));
     let failed = world.catalog.failed_scans(class, false, [9, 9]).await;
     failed.expect("a read").pop().expect("a failed pair")

@@ -142,15 +142,15 @@ async fn a_changed_path_is_read_again_and_changed_metadata_reruns_nothing() {
 async fn a_failed_pair_runs_again_after_an_import_with_another_path() {
     let world = World::new(2).await;
     for lease in world.claim(2).await {
+        let gone = Failure::new(FailureClass::Io, "p0.stl is not there");
         let failed = StageFailure {
-            stage: Stage::Fit,
-            failure: Failure::new(FailureClass::Io, "p0.stl is not there"),
-            action: FailureAction::Quarantine,
-            provenance: super::done(world.fingerprints, Stage::Fit).provenance,
             inputs: InputVersions::default(),
-            ms: None,
-            at: 5,
-            alive_since: 0,
+            ..super::failed(
+                world.fingerprints,
+                Stage::Fit,
+                gone,
+                FailureAction::Quarantine,
+            )
         };
         assert!(world.catalog.fail(lease, failed).await.expect("stored"));
     }
@@ -178,15 +178,16 @@ async fn failed_on_its_mesh() -> World {
     let mut inputs = super::inputs(Stage::Depth);
     inputs.mesh = Some(InputVersion::gone());
     let attributes = world.done(Stage::Depth).provenance.attributes;
+    let gone = Failure::new(FailureClass::Io, "p0.stl is not there");
     let failed = StageFailure {
-        stage: Stage::Depth,
-        failure: Failure::new(FailureClass::Io, "p0.stl is not there"),
-        action: FailureAction::Quarantine,
         provenance: PairProvenance::new(world.fingerprints.of(Stage::Depth), &inputs, attributes),
         inputs,
-        ms: None,
-        at: 5,
-        alive_since: 0,
+        ..super::failed(
+            world.fingerprints,
+            Stage::Depth,
+            gone,
+            FailureAction::Quarantine,
+        )
     };
     assert!(world.catalog.fail(lease, failed).await.expect("stored"));
     world
@@ -272,16 +273,12 @@ async fn a_retry_keeps_the_finished_stages_of_a_block_whose_file_is_missing() {
 async fn a_failed_pair_is_requeued_when_its_settings_change() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
-    let failed = StageFailure {
-        stage: Stage::Fit,
-        failure: Failure::new(FailureClass::NoSolution, "no relief"),
-        action: FailureAction::Quarantine,
-        provenance: super::done(world.fingerprints, Stage::Fit).provenance,
-        inputs: super::inputs(Stage::Fit),
-        ms: None,
-        at: 5,
-        alive_since: 0,
-    };
+    let failed = super::failed(
+        world.fingerprints,
+        Stage::Fit,
+        Failure::new(FailureClass::NoSolution, "no relief"),
+        FailureAction::Quarantine,
+    );
     assert!(world.catalog.fail(lease, failed).await.expect("stored"));
     assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
     assert_eq!(requeue_stale(&world, &fingerprints([1, 2, 1, 1])).await, 0);
