@@ -243,12 +243,9 @@ impl<B: AsRef<[u8]>> LineCounter<B> {
         let at = self.at;
         let passed = &bytes[at..from + blank];
         // Old programs for the Macintosh end lines with a carriage return alone.
-        let is_end = |(k, byte): &(usize, &u8)| match **byte {
-            b'\n' => true,
-            b'\r' => bytes.get(at + k + 1) != Some(&b'\n'),
-            _ => false,
-        };
-        self.line += passed.iter().enumerate().filter(is_end).count();
+        let is_alone = |k: &usize| bytes.get(at + k + 1) != Some(&b'\n');
+        let returns = memchr_iter(b'\r', passed).filter(is_alone).count();
+        self.line += memchr_iter(b'\n', passed).count() + returns;
         self.at = from + blank;
         self.line
     }
