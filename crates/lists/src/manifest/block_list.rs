@@ -11,7 +11,7 @@ use super::cell_errors::{FormulaErrors, id_error};
 use super::cell_forms::UnusualCells;
 use super::changed_ids::ChangedIds;
 use super::column_names::missing_column;
-use super::csv::{ListedColumn, column_names, draft_of, row_reader};
+use super::csv::{ListedColumn, column_names, draft_of, is_blank, row_reader};
 use super::draft::{
     DraftRow, MAX_PATH_BYTES, check_length, check_meta, record, refuse_cell_errors,
 };
@@ -116,7 +116,7 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             header = Some(columns.into_iter().zip(names).collect());
             continue;
         };
-        if record.iter().all(<[u8]>::is_empty) {
+        if is_blank(&record) {
             continue;
         }
         let place = (line, text.delimiter);
@@ -267,7 +267,6 @@ fn columns_of(
 
 /// Returns a row, or records why it is not valid.
 fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
-    draft.cells.retain(|_, cell| !cell.is_empty());
     for (column, cell) in &draft.cells {
         check_length(column, cell.len(), MAX_PATH_BYTES, reasons);
     }

@@ -20,6 +20,10 @@ const MAX_COLUMN_CHARS: usize = 60;
 /// ```
 pub fn plain_cell(cell: &str) -> &str {
     let cell = trimmed(cell);
+    // Few cells are formulas.
+    if cell.as_bytes().first() != Some(&b'=') {
+        return cell;
+    }
     let inner = cell.strip_prefix("=\"");
     let inner = inner.and_then(|rest| rest.strip_suffix('"'));
     inner

@@ -82,11 +82,10 @@ pub fn read_csv_as(
     rows.finish()
 }
 
-/// Reads the rows of a list, the header too, without blanks at the ends of cells.
+/// Reads the rows of a list, the header too. Cells keep blanks at their ends: to remove them, the parser would copy each row.
 pub(super) fn row_reader(bytes: &[u8], delimiter: u8) -> ::csv::Reader<BoundedRows<'_>> {
     ::csv::ReaderBuilder::new()
         .delimiter(delimiter)
-        .trim(::csv::Trim::All)
         .flexible(true)
         .has_headers(false)
         .from_reader(BoundedRows::new(bytes))
@@ -144,13 +143,14 @@ pub(super) fn column_names<'r>(
             undecoded.push(number);
             continue;
         };
+        let name = trimmed(name);
         if name.len() > MAX_NAME_BYTES {
             let (len, limit) = (name.len(), MAX_NAME_BYTES);
             let reason =
                 format!("the name of column {number} has {len} bytes, over the limit of {limit}");
             problems.add(at_line(line, &reason));
         }
-        names.push(trimmed(name));
+        names.push(name);
     }
     problems
         .extend(not_utf8(&undecoded).map(|text| at_line(line, &format!("{text}{encoding_hint}"))));
@@ -251,17 +251,22 @@ impl CsvHeader {
         })
     }
 
-    /// Returns a row's cells. Returns `None` if all cells are empty, because spreadsheet programs append such rows.
+    /// Returns a row's cells. Returns `None` if the row is blank.
     ///
     /// # Errors
     /// Returns an error if the number of cells is wrong or a cell is not UTF-8.
     fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<DraftRow>, String> {
-        if record.iter().all(<[u8]>::is_empty) {
+        if is_blank(record) {
             return Ok(None);
         }
         let place = (line, self.delimiter);
         draft_of(place, &self.columns, record, &self.encoding_hint).map(Some)
     }
+}
+
+/// Returns whether all cells of a row are blank. Spreadsheet programs append such rows.
+pub(super) fn is_blank(record: &::csv::ByteRecord) -> bool {
+    record.as_slice().trim_ascii_start().is_empty()
 }
 
 /// Returns whether a row can be read below a header with `columns` columns: its cells behind the last column are empty, and the
@@ -273,7 +278,8 @@ pub fn fits_header(
 ) -> bool {
     let is_empty =
         |cell: &[u8]| std::str::from_utf8(cell).is_ok_and(|cell| trimmed(cell).is_empty());
-    record.iter().skip(columns).all(is_empty) && (record.len()..columns).all(is_unnamed)
+    (columns..record.len()).all(|cell| is_empty(&record[cell]))
+        && (record.len()..columns).all(is_unnamed)
 }
 
 /// Returns the cells of a row on a line.
@@ -301,6 +307,9 @@ pub(super) fn draft_of(
             ));
         };
         let cell = plain_cell(cell);
+        if cell.is_empty() {
+            continue;
+        }
         if CellForm::has_apostrophe(cell) {
             let column = known.unwrap_or(name).to_owned();
             draft.unusual.push((CellForm::Apostrophe, column));
@@ -316,10 +325,10 @@ pub(super) fn draft_of(
                 ));
             }
             draft.cells.insert(known, cell.to_owned());
-        } else if !cell.is_empty() && !name.is_empty() {
-            draft.meta.insert(name.clone(), cell.into());
-        } else if !cell.is_empty() {
+        } else if name.is_empty() {
             draft.unnamed += 1;
+        } else {
+            draft.meta.insert(name.clone(), cell.into());
         }
     }
     Ok(draft)

@@ -11,7 +11,7 @@ use super::row::{ManifestRow, REQUIRED, ReadRows};
 use mocban_core::domain::spelling::{plain_form, quoted};
 use mocban_core::domain::{LengthUnit, PairName, PairNameError, any_case, sanitize, value_text};
 
-/// The cells of one row by lower-case column name, and its other columns.
+/// The cells of one row by lower-case column name, and its other columns, without empty cells.
 #[derive(Debug, Default)]
 pub(super) struct DraftRow {
     pub(super) line: usize,
@@ -131,7 +131,6 @@ fn complete(
     name: Option<PairName>,
     reasons: &mut Vec<String>,
 ) -> Option<ManifestRow> {
-    draft.cells.retain(|_, cell| !cell.is_empty());
     for column in REQUIRED.into_iter().filter(|column| *column != "id") {
         if !draft.cells.contains_key(column) {
             reasons.push(format!("{column} is empty"));

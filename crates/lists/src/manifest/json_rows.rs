@@ -166,7 +166,10 @@ fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, St
         match (*known, value) {
             (_, Value::Null) => {}
             (Some(name), value) => {
-                draft.cells.insert(name, cell(name, value)?);
+                let cell = cell(name, value)?;
+                if !cell.is_empty() {
+                    draft.cells.insert(name, cell);
+                }
             }
             (None, Value::String(text)) => {
                 // As a cell of CSV.

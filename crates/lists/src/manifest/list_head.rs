@@ -1,7 +1,7 @@
 //! The header of a list and its first rows, which help to choose its columns.
 
 use super::chosen_columns::ChosenColumns;
-use super::csv::{column_names, row_reader};
+use super::csv::{column_names, is_blank, row_reader};
 use super::text::CsvText;
 use mocban_core::domain::sanitize;
 
@@ -60,11 +60,12 @@ pub fn read_head(bytes: &[u8], chosen: &ChosenColumns, rows: usize) -> Option<Li
     };
     head.header.truncate(MAX_COLUMNS);
     while head.rows.len() < rows && matches!(reader.read_byte_record(&mut record), Ok(true)) {
-        if record.iter().all(<[u8]>::is_empty) {
+        if is_blank(&record) {
             continue;
         }
         let cells = record.iter().take(head.header.len());
-        let cells = cells.map(|cell| sanitize(&String::from_utf8_lossy(cell), MAX_SHOWN));
+        let cells =
+            cells.map(|cell| sanitize(&String::from_utf8_lossy(cell.trim_ascii()), MAX_SHOWN));
         head.rows.push(cells.collect());
     }
     Some(head)
