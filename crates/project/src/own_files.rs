@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::empty_import::EMPTY_IMPORT_FILE;
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use crate::files::is_backup;
+use crate::files::{HEAD_BYTES, is_backup};
 use mocban_catalog::Catalog;
 use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE, open_regular};
 
@@ -25,21 +25,45 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     )))
 }
 
-/// Bytes of an earlier output by which it is recognized. No report is longer.
-const MAX_EARLIER_BYTES: u64 = 64 << 20;
+/// Bytes of an earlier report by which it is recognized. No report is longer.
+const MAX_REPORT_BYTES: u64 = 64 << 20;
 
-/// Refuses to write over a file that is not empty and that `is_ours` does not recognize by its content. `what` is the output,
-/// such as `a report of this program`. Anything but a regular file is left to the function that writes.
+/// Refuses to write over a file that is not empty and that `is_ours` does not recognize by its first bytes. `what` is the
+/// output, such as `a log file of this program`. Anything but a regular file is left to the function that writes.
 pub fn refuse_foreign_file(
     path: &Path,
     what: &str,
+    is_ours: impl FnOnce(&[u8]) -> bool,
+) -> Result<(), Refusal> {
+    refuse_foreign(path, what, HEAD_BYTES as u64, is_ours)
+}
+
+/// Refuses to write a report over a file like [`refuse_foreign_file`], but passes the whole file to `is_report`: the program is
+/// named anywhere in a report.
+pub(crate) fn refuse_foreign_report(
+    path: &Path,
+    is_report: impl FnOnce(&[u8]) -> bool,
+) -> Result<(), Refusal> {
+    refuse_foreign(
+        path,
+        "a report of this program",
+        MAX_REPORT_BYTES,
+        is_report,
+    )
+}
+
+/// Refuses to write over a file that is not recognized by its first `most` bytes.
+fn refuse_foreign(
+    path: &Path,
+    what: &str,
+    most: u64,
     is_ours: impl FnOnce(&[u8]) -> bool,
 ) -> Result<(), Refusal> {
     let is_free = path
         .metadata()
         .map_or(true, |meta| !meta.is_file() || meta.len() == 0);
     // A file that cannot be read may be anything.
-    if is_free || beginning(path).is_some_and(|earlier| is_ours(&earlier)) {
+    if is_free || beginning(path, most).is_some_and(|earlier| is_ours(&earlier)) {
         return Ok(());
     }
     Err(Refusal::Usage(format!(
@@ -48,11 +72,11 @@ pub fn refuse_foreign_file(
     )))
 }
 
-/// Returns the first bytes of a regular file, or `None` if it cannot be read.
-fn beginning(path: &Path) -> Option<Vec<u8>> {
+/// Returns the first bytes of a regular file, up to `most`, or `None` if it cannot be read.
+fn beginning(path: &Path, most: u64) -> Option<Vec<u8>> {
     let (file, _) = open_regular(path).ok()?;
     let mut bytes = Vec::new();
-    let read = file.take(MAX_EARLIER_BYTES).read_to_end(&mut bytes);
+    let read = file.take(most).read_to_end(&mut bytes);
     read.ok().map(|_| bytes)
 }
 
@@ -150,7 +174,7 @@ fn file_name(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::refuse_foreign_file;
+    use super::{HEAD_BYTES, refuse_foreign_file, refuse_foreign_report};
 
     #[test]
     fn only_a_file_that_is_recognized_is_replaced() {
@@ -166,5 +190,17 @@ mod tests {
         let refused = check().expect_err("another file").to_string();
         let reason = "a.txt exists and is not a report of this program; choose another name";
         assert!(refused.contains(reason), "{refused}");
+    }
+
+    #[test]
+    fn only_a_report_is_recognized_by_more_than_its_first_bytes() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("a.txt");
+        let end = b"ours";
+        let content = [vec![b' '; HEAD_BYTES], end.to_vec()].concat();
+        std::fs::write(&path, content).expect("written");
+        let is_ours = |bytes: &[u8]| bytes.ends_with(end);
+        assert!(refuse_foreign_report(&path, is_ours).is_ok());
+        assert!(refuse_foreign_file(&path, "a log", is_ours).is_err());
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::location::{Location, now};
-use crate::own_files::{refuse_foreign_file, refuse_used_file};
+use crate::own_files::{refuse_foreign_report, refuse_used_file};
 use crate::status::warn_about_stale;
 use mocban_config::{Sources, load};
 use mocban_export::{GallerySelection, draw_gallery};
@@ -51,7 +51,7 @@ pub async fn report(
     let (project, catalog) = location.open_read_only().await?;
     if let Some(path) = output {
         refuse_used_file(path, &project, &catalog).await?;
-        refuse_foreign_file(path, "a report of this program", is_report)?;
+        refuse_foreign_report(path, is_report)?;
     }
     warn_about_stale(&catalog, location, listener).await?;
     let _work = LongWork::begin(listener, "reading the results");

@@ -21,14 +21,10 @@ use mocban_store::Project;
 /// What the pictures name as their program, and what an earlier one is recognized by.
 const SOFTWARE: &str = "mocban contact-sheet";
 
-/// Returns whether a file is a picture of this module.
+/// Returns whether the first bytes of a file are those of a picture of this module.
 fn is_sheet(bytes: &[u8]) -> bool {
-    let head = &bytes[..bytes.len().min(files::HEAD_BYTES)];
-    let is_named = || {
-        head.windows(SOFTWARE.len())
-            .any(|part| part == SOFTWARE.as_bytes())
-    };
-    head.starts_with(b"\x89PNG") && is_named()
+    let mut parts = bytes.windows(SOFTWARE.len());
+    bytes.starts_with(b"\x89PNG") && parts.any(|part| part == SOFTWARE.as_bytes())
 }
 
 /// Draws the pairs with these ids, or all, and writes the sheet. By default, it is `sheet.png` in the project. Returns its
