@@ -66,30 +66,4 @@ mod tests {
             "hidden rows are read, too: 2, the first is row 3; remove them if they are not meant";
         assert_eq!(hidden(&[3, 5]).as_deref(), Some(expected));
     }
-
-    #[test]
-    fn ids_have_the_text_of_their_format() {
-        let styles = "<styleSheet><numFmts><numFmt numFmtId=\"164\" formatCode=\"&quot;B&quot;000\"/>\
-            <numFmt numFmtId=\"165\" formatCode=\"000\\-000\"/></numFmts><cellXfs><xf numFmtId=\"0\"/>\
-            <xf numFmtId=\"164\"/><xf numFmtId=\"165\"/></cellXfs></styleSheet>";
-        let sheet = |header: &str, style: u32| {
-            let rows = format!(
-                "{}<row><c s=\"{style}\"><v>17</v></c></row>",
-                text_rows(&[&[header, "mesh", "print"]])
-            );
-            workbook(&[("a", &rows)], "", styles)
-        };
-        let csv = |header: &str, style| {
-            let table = read_sheet(&sheet(header, style), None).expect("a sheet");
-            String::from_utf8(table.csv).expect("UTF-8")
-        };
-        assert!(csv("id", 1).contains("\n\"B017\""), "{}", csv("id", 1));
-        assert!(csv("note", 1).contains("\n\"17\""), "{}", csv("note", 1));
-        let refused = read_sheet(&sheet("id", 2), None).expect_err("a format");
-        assert_eq!(
-            refused.to_string(),
-            "cell A2 of column \"id\" shows its number in the format 000\\-000, which is not read; give the column the \
-             format Text and write the cell again"
-        );
-    }
 }
