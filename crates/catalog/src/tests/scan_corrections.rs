@@ -1,9 +1,13 @@
 //! Units and sides of scans that a person corrects.
 
+use serde_json::json;
+
 use super::blocks::{character, world};
 use super::{World, failed, fingerprints, name, row};
-use crate::{FailureAction, PairAttributes, RerunPolicy, ScanCorrection};
-use mocban_core::domain::{Failure, FailureClass, JobStatus, LengthUnit, PairName, Stage};
+use crate::{CheckpointOutcome, FailureAction, PairAttributes, RerunPolicy, ScanCorrection};
+use mocban_core::domain::{
+    Failure, FailureClass, FitOutcome, JobStatus, LengthUnit, PairName, Rigid3, SideEvidence, Stage,
+};
 
 /// Lets the next pair fail at its first stage, and returns its name.
 async fn fail_next(world: &World, class: FailureClass, message: &str) -> PairName {
@@ -96,6 +100,53 @@ async fn the_other_side_is_that_which_was_not_said() {
         assert_eq!(changed, 1);
         let side = attributes_of(&world, &pairs[0]).await.scanned_face_down;
         assert_eq!(side, Some(expected));
+    }
+}
+
+#[tokio::test]
+async fn the_other_side_is_that_which_fit_has_not_found() {
+    for (up, expected) in [(1.0, true), (-1.0, false)] {
+        let world = World::new(1).await;
+        let lease = world.claim(1).await.remove(0);
+        let mut fitted = world.done(Stage::Fit);
+        fitted.outcome = json!(fit_with_up(up)).to_string();
+        let stored = world.catalog.checkpoint_now(lease, fitted).await;
+        let Ok(CheckpointOutcome::Lease(lease)) = stored else {
+            unreachable!("the pair has more stages");
+        };
+        assert!(world.catalog.release(lease).await.expect("released"));
+        let pairs = [name("p0")];
+        // Until the pair runs again, the same side is the other one.
+        for changed in [1, 0] {
+            let found = correct(&world, &pairs, ScanCorrection::OtherSide).await;
+            assert_eq!(found, changed);
+            let side = attributes_of(&world, &pairs[0]).await.scanned_face_down;
+            assert_eq!(side, Some(expected));
+        }
+    }
+}
+
+/// Returns a fit whose plane has this z axis in the scan: 1 for up, -1 for down.
+fn fit_with_up(up: f64) -> FitOutcome {
+    let axes = [[1.0, 0.0, 0.0], [0.0, up, 0.0], [0.0, 0.0, up]];
+    FitOutcome {
+        plane_from_mesh: Rigid3::to_frame(axes, [0.0; 3]),
+        curvature: None,
+        curvature_height: 0.0,
+        inlier_ratio: 1.0,
+        rms: 0.1,
+        relief: 2.0,
+        side: SideEvidence {
+            winding: None,
+            flatness: 1.0,
+            confidence: 1.0,
+        },
+        region: None,
+        print_outline: None,
+        vertices: 3,
+        triangles: 1,
+        missing_vertices: None,
+        incomplete_faces: None,
     }
 }
 
