@@ -25,6 +25,10 @@ pub struct HeaderColumns {
     pub unread: Vec<(String, &'static str)>,
 }
 
+/// What a message says of two columns or keys that are written differently and are the same.
+pub const HAVE_SAME_NAME: &str =
+    "have the same name (upper and lower case, accents and blanks do not count)";
+
 /// Two columns of a header, counted from 1, that are the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SameColumn {
@@ -44,7 +48,7 @@ impl SameColumn {
             format!("columns {first} and {second} are both named {shown_other}")
         } else {
             format!(
-                "columns {first} and {second}, {shown} and {shown_other}, have the same name (upper and lower case, accents and blanks do not count); rename one of them"
+                "columns {first} and {second}, {shown} and {shown_other}, {HAVE_SAME_NAME}; rename one of them"
             )
         }
     }

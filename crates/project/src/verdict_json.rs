@@ -15,6 +15,7 @@ use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
+use mocban_lists::columns::HAVE_SAME_NAME;
 use mocban_lists::json_numbers::{nan_as_null, number_text};
 use mocban_lists::manifest::{ArrayCursor, place_in_row, trimmed};
 
@@ -162,9 +163,7 @@ fn with_known_names(fields: Map<String, Value>) -> Result<Map<String, Value>, St
     let names: Vec<&str> = fields.keys().map(|name| name.trim()).collect();
     let found = COLUMNS.assign(&names).map_err(|same| {
         let [one, other] = [same.first, same.second].map(|number| quoted(names[number - 1]));
-        format!(
-            "the fields {one} and {other} have the same name (upper and lower case, accents and blanks do not count); leave one of them out"
-        )
+        format!("the fields {one} and {other} {HAVE_SAME_NAME}; leave one of them out")
     })?;
     let named = fields.into_iter().zip(found.columns);
     Ok(named

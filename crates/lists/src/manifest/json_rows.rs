@@ -10,7 +10,7 @@ use super::draft::{DraftRow, MAX_ROW_BYTES};
 use super::error::{Problem, at_line, of_list};
 use super::json_array::{ArrayCursor, DamagedArray, is_array, place_in_row};
 use super::text::{as_utf8, trimmed};
-use crate::columns::{HeaderColumns, KnownColumns};
+use crate::columns::{HAVE_SAME_NAME, HeaderColumns, KnownColumns};
 use crate::json_numbers::{nan_as_null, number_text, unknown_number};
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{KEY_TWICE, UniqueKeys, sanitize, value_error_text};
@@ -130,9 +130,7 @@ impl RowKeys {
                 return twice(same.second - 1);
             }
             let [one, other] = [one, other].map(quoted);
-            format!(
-                "the keys {one} and {other} have the same name (upper and lower case, accents and blanks do not count); leave one of them out"
-            )
+            format!("the keys {one} and {other} {HAVE_SAME_NAME}; leave one of them out")
         })?;
         let mut others = BTreeSet::new();
         let is_twice = |k: &usize| found.columns[*k].is_none() && !others.insert(&object[*k].0);
