@@ -4,11 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use mocban_core::domain::sanitize;
-use mocban_core::domain::spelling::quoted;
-
-/// Longest name of a column in a message, in characters.
-const MAX_COLUMN_CHARS: usize = 60;
+use super::column_names::shown_column;
 
 /// Texts of failed formulas.
 const ERRORS: [&str; 16] = [
@@ -84,7 +80,7 @@ impl FormulaErrors {
                 return true;
             };
             if self.count == 0 {
-                let column = quoted(&sanitize(column, MAX_COLUMN_CHARS));
+                let column = shown_column(column);
                 self.first = format!("{error} in column {column} on line {line}");
             }
             self.count += 1;

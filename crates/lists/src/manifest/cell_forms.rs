@@ -2,12 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use super::column_names::shown_column;
 use super::text::trimmed;
-use mocban_core::domain::sanitize;
-use mocban_core::domain::spelling::quoted;
-
-/// Longest name of a column in a message, in characters.
-const MAX_COLUMN_CHARS: usize = 60;
 
 /// Returns the text of a cell without blanks at its ends. A formula that is a text alone, such as `="0117"`, with which
 /// spreadsheet programs keep zeros, is this text.
@@ -71,7 +67,7 @@ impl UnusualCells {
         for (form, column) in cells {
             let found = self.0.entry(*form).or_default();
             if found.count == 0 {
-                found.column = quoted(&sanitize(column, MAX_COLUMN_CHARS));
+                found.column = shown_column(column);
                 found.line = line;
             }
             found.count += 1;

@@ -1,7 +1,16 @@
-//! Missing columns, and which names are similar.
+//! Names of columns: which are similar, which are missing, and how messages show them.
 
 use crate::columns::{KnownColumns, plain_name};
+use mocban_core::domain::sanitize;
 use mocban_core::domain::spelling::{composed, quoted};
+
+/// Longest name of a column in a message, in characters.
+const MAX_NAME_CHARS: usize = 60;
+
+/// Returns the name of a column as written, as a message shows it.
+pub(super) fn shown_column(written: &str) -> String {
+    quoted(&sanitize(written, MAX_NAME_CHARS))
+}
 
 /// Returns whether a name may be a misspelt or abbreviated name of a column: in short names one letter may be wrong,
 /// missing or swapped with the next, in longer names two.

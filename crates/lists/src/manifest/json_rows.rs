@@ -6,6 +6,7 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::Value;
 
+use super::column_names::shown_column;
 use super::draft::{DraftRow, MAX_ROW_BYTES};
 use super::error::{Problem, at_line, of_list};
 use super::json_array::{ArrayCursor, DamagedArray, is_array, place_in_row};
@@ -13,7 +14,7 @@ use super::text::{as_utf8, trimmed};
 use crate::columns::{HAVE_SAME_NAME, HeaderColumns, KnownColumns};
 use crate::json_numbers::{nan_as_null, number_text, unknown_number};
 use mocban_core::domain::spelling::quoted;
-use mocban_core::domain::{KEY_TWICE, UniqueKeys, sanitize, value_error_text};
+use mocban_core::domain::{KEY_TWICE, UniqueKeys, value_error_text};
 
 /// A row of a list in JSON.
 #[derive(Debug)]
@@ -143,9 +144,6 @@ impl RowKeys {
     }
 }
 
-/// Longest name of a key in a message, in characters.
-const MAX_KEY_CHARS: usize = 60;
-
 fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, String> {
     let text = std::str::from_utf8(content)
         .map_err(|error| format!("byte {} is not UTF-8", error.valid_up_to() + 1))?;
@@ -156,7 +154,7 @@ fn draft(line: usize, content: &[u8], keys: &mut RowKeys) -> Result<DraftRow, St
     {
         return Err(format!(
             "the rows are in the list {} of an object; save this list alone",
-            quoted(&sanitize(key, MAX_KEY_CHARS))
+            shown_column(key)
         ));
     }
     let mut draft = DraftRow::new(line);

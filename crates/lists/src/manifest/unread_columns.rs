@@ -2,13 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use mocban_core::domain::sanitize;
-use mocban_core::domain::spelling::quoted;
+use super::column_names::shown_column;
 
 /// Largest number of such columns that are named: each row of JSON may write them differently.
 const MAX_NAMED: usize = 12;
-/// Longest name of a column in a message, in characters.
-const MAX_COLUMN_CHARS: usize = 60;
 
 /// Such columns as written, each with the column that is read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -24,7 +21,7 @@ impl UnreadColumns {
     /// Returns a warning for each.
     pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         self.0.iter().map(|(written, name)| {
-            let written = quoted(&sanitize(written, MAX_COLUMN_CHARS));
+            let written = shown_column(written);
             format!(
                 "column {written} is kept as metadata, because another column is read as {name}"
             )
