@@ -104,14 +104,14 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
         }
         let line = lines.at(Some(record.position().unwrap_or(&start)));
         let Some(columns) = &header else {
+            let names = column_names(line, &record, &hint)?;
             let HeaderColumns {
                 columns,
                 renamed,
                 unread,
-            } = columns_of(line, &record, &hint)?;
+            } = columns_of(line, &names)?;
             rows.renamed.extend(renamed);
             rows.unread.add(unread);
-            let names = column_names(line, &record, &hint)?;
             let names = names.into_iter().map(str::to_owned);
             header = Some(columns.into_iter().zip(names).collect());
             continue;
@@ -241,26 +241,20 @@ fn similar_columns(rows: &[BlockRow]) -> Vec<String> {
     similar.warnings().collect()
 }
 
-/// Returns what the columns of a header are.
-fn columns_of(
-    line: usize,
-    record: &::csv::ByteRecord,
-    encoding_hint: &str,
-) -> Result<HeaderColumns, ManifestError> {
-    let names = column_names(line, record, encoding_hint)?;
+/// Returns what the columns of a header with these names are.
+fn columns_of(line: usize, names: &[&str]) -> Result<HeaderColumns, ManifestError> {
     let found = COLUMNS
-        .assign(&names)
-        .map_err(|same| at_line(line, &same.reason(&names)))?;
-    if let Some(same) = found.same_others(&names) {
-        return Err(at_line(line, &same.reason(&names)).into());
+        .assign(names)
+        .map_err(|same| at_line(line, &same.reason(names)))?;
+    if let Some(same) = found.same_others(names) {
+        return Err(at_line(line, &same.reason(names)).into());
     }
     let columns = &found.columns;
     let mut problems = ManifestError::default();
     let required = COLUMNS.names[..REQUIRED].iter();
     let missing = required.filter(|name| !columns.contains(&Some(**name)));
-    problems.extend(
-        missing.map(|name| at_line(line, &missing_column(name, &COLUMNS, &names, columns))),
-    );
+    problems
+        .extend(missing.map(|name| at_line(line, &missing_column(name, &COLUMNS, names, columns))));
     problems.check(false)?;
     Ok(found)
 }
