@@ -34,7 +34,7 @@ pub fn number_text(number: &Number) -> String {
 }
 
 /// Whole numbers below this one are exact as floating-point numbers.
-const MAX_EXACT: f64 = 9e15;
+pub(crate) const MAX_EXACT: f64 = 9e15;
 
 /// Replaces each `NaN` outside texts by `null`. Returns `None` if there is none.
 pub fn nan_as_null(json: &str) -> Option<String> {

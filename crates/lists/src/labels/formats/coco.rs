@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use serde_json::{Map, Value};
 
+use crate::json_numbers::MAX_EXACT;
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::boxes;
 use crate::labels::model::PageFile;
@@ -154,9 +155,6 @@ fn similar_form(id: &str) -> String {
         Err(_) => comparable(id),
     }
 }
-
-/// Whole numbers below this one are exact as floating-point numbers.
-const MAX_EXACT: f64 = 9e15;
 
 fn is_number(text: &str) -> bool {
     text.parse::<f64>().is_ok()
