@@ -63,14 +63,13 @@ impl GeneratedFolder<'_> {
         if !self.dir.is_dir() {
             return Err(Refusal::Usage(format!("{shown} is not a directory")).into());
         }
-        let foreign = match foreign_file(self.dir, Path::new(""), names)? {
-            Some(foreign) => foreign,
-            None if self.is_marked() => return Ok(()),
+        let mut foreign = foreign_file(self.dir, Path::new(""), names)?;
+        if foreign.is_none() && !self.is_marked() {
             // Without a marker, every file is foreign.
-            None => match foreign_file(self.dir, Path::new(""), &[])? {
-                Some(foreign) => foreign,
-                None => return Ok(()),
-            },
+            foreign = foreign_file(self.dir, Path::new(""), &[])?;
+        }
+        let Some(foreign) = foreign else {
+            return Ok(());
         };
         let (foreign, content) = (foreign.display(), self.content);
         Err(Refusal::Usage(format!(
