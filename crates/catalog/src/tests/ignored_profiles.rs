@@ -3,8 +3,8 @@
 use serde_json::json;
 
 use super::blocks::{continued, done};
-use super::{CheckpointOutcome, World, name};
-use crate::{IgnoredProfiles, ProfileCount};
+use super::{World, name};
+use crate::{IgnoredProfiles, ProfileCount, StageCheckpoint};
 use mocban_core::domain::{BlockStage, Stage};
 
 fn count(id: &str, count: u64) -> ProfileCount {
@@ -20,18 +20,12 @@ async fn prints_with_an_ignored_profile_are_counted_while_their_pairs_are() {
     let profiles = async || world.catalog.ignored_profiles().await.expect("a read");
     assert_eq!(profiles().await, IgnoredProfiles::default());
     for is_ignored in [false, true, true] {
-        let mut lease = world.claim(1).await.remove(0);
-        loop {
-            let mut done = world.done(lease.cursor());
+        let set_outcome = |done: &mut StageCheckpoint| {
             if is_ignored && done.stage == Stage::Normalize {
                 done.outcome = json!({ "ignored_profile": "test" }).to_string();
             }
-            match world.catalog.checkpoint_now(lease, done).await {
-                Ok(CheckpointOutcome::Lease(next)) => lease = next,
-                Ok(CheckpointOutcome::Done) => break,
-                other => panic!("the checkpoint was not stored: {other:?}"),
-            }
-        }
+        };
+        world.finish_with(set_outcome).await;
     }
     assert_eq!(profiles().await.pairs, Some(count("p1", 2)));
     let retired = world.catalog.retire_pairs(&[name("p1")], 3).await;

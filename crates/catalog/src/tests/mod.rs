@@ -140,10 +140,16 @@ impl World {
 
     /// Takes the next pair through all stages.
     async fn finish_one(&self) {
+        self.finish_with(|_| ()).await;
+    }
+
+    /// Takes the next pair through all stages, with results that a function changes.
+    async fn finish_with(&self, change: impl Fn(&mut StageCheckpoint)) {
         let mut lease = self.claim(1).await.pop().expect("a ready pair");
         loop {
-            let stage = lease.cursor();
-            match self.catalog.checkpoint_now(lease, self.done(stage)).await {
+            let mut done = self.done(lease.cursor());
+            change(&mut done);
+            match self.catalog.checkpoint_now(lease, done).await {
                 Ok(CheckpointOutcome::Lease(next)) => lease = next,
                 Ok(CheckpointOutcome::Done) => return,
                 other => panic!("the checkpoint was not stored: {other:?}"),

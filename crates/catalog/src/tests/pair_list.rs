@@ -1,13 +1,13 @@
 //! Lists of pairs: filters, orders and pages.
 
-use super::{CatalogPlace, World, done, fingerprints, name, row};
+use super::{CatalogPlace, World, fingerprints, name, row};
 use crate::{
-    CheckpointOutcome, ImportRow, ListedNames, MetricDifference, NewVerdict, PairCursor,
-    PairFilter, PairOrder, RerunPolicy, ReviewContext, StageCheckpoint,
+    ImportRow, ListedNames, MetricDifference, NewVerdict, PairCursor, PairFilter, PairOrder,
+    RerunPolicy, ReviewContext, StageCheckpoint,
 };
 use mocban_core::domain::{FailureClass, JobStatus, ReviewOrder, Stage, ThresholdMetric, Verdict};
 
-/// Imports `count` pairs of two blocks and gives the first `done` of them results whose confidence falls and then rises.
+/// Imports `count` pairs of two blocks and gives the first `finished` of them results whose confidence falls and then rises.
 async fn world(count: usize, finished: usize) -> World {
     let world = World::at(CatalogPlace::new(), 0).await;
     let rows = (0..count).map(|n| ImportRow {
@@ -18,16 +18,7 @@ async fn world(count: usize, finished: usize) -> World {
     let rows = rows.collect();
     world.catalog.import(rows, 1).await.expect("imported");
     for n in 0..finished {
-        let mut lease = world.claim(1).await.pop().expect("a ready pair");
-        loop {
-            let stage = lease.cursor();
-            let checkpoint = with_scores(done(world.fingerprints, stage), n);
-            match world.catalog.checkpoint_now(lease, checkpoint).await {
-                Ok(CheckpointOutcome::Lease(next)) => lease = next,
-                Ok(CheckpointOutcome::Done) => break,
-                other => panic!("the checkpoint was not stored: {other:?}"),
-            }
-        }
+        world.finish_with(|done| set_scores(done, n)).await;
     }
     world
 }
@@ -36,13 +27,12 @@ fn confidence(n: usize) -> f64 {
     ((n as f64) - 5.0).abs() / 10.0
 }
 
-fn with_scores(mut checkpoint: StageCheckpoint, n: usize) -> StageCheckpoint {
+fn set_scores(checkpoint: &mut StageCheckpoint, n: usize) {
     for metric in &mut checkpoint.metrics {
         metric.outcome.confidence = Some(confidence(n));
         let is_other = metric.outcome.metric == ThresholdMetric::Density;
         metric.outcome.scores.iou = n as f64 / if is_other { 50.0 } else { 100.0 };
     }
-    checkpoint
 }
 
 /// Reads a whole list in pages and returns the numbers of its pairs.

@@ -57,19 +57,13 @@ async fn pairs_of_low_confidence_are_counted() {
     let limit = MetricOutcome::LOW_CONFIDENCE;
     let world = World::new(4).await;
     for confidence in [Some(limit - 1e-9), Some(limit), Some(1.0), None] {
-        let mut lease = world.claim(1).await.remove(0);
-        loop {
-            let mut done = world.done(lease.cursor());
+        let set_confidence = |done: &mut StageCheckpoint| {
             for metric in &mut done.metrics {
                 let is_default = metric.outcome.metric == ThresholdMetric::DEFAULT;
                 metric.outcome.confidence = if is_default { confidence } else { Some(0.0) };
             }
-            match world.catalog.checkpoint_now(lease, done).await {
-                Ok(CheckpointOutcome::Lease(next)) => lease = next,
-                Ok(CheckpointOutcome::Done) => break,
-                other => panic!("the checkpoint was not stored: {other:?}"),
-            }
-        }
+        };
+        world.finish_with(set_confidence).await;
     }
     let status = world.catalog.status(&super::fingerprints([1; 4])).await;
     assert_eq!(status.expect("counts").low_confidence, 1);

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::blocks::{character, world};
 use super::{World, failed, fingerprints, name, row};
-use crate::{CheckpointOutcome, FailureAction, PairAttributes, RerunPolicy, ScanCorrection};
+use crate::{FailureAction, PairAttributes, RerunPolicy, ScanCorrection, StageCheckpoint};
 use mocban_core::domain::{
     Failure, FailureClass, FitOutcome, JobStatus, LengthUnit, PairName, Rigid3, SideEvidence, Stage,
 };
@@ -107,14 +107,12 @@ async fn the_other_side_is_that_which_was_not_said() {
 async fn the_other_side_is_that_which_fit_has_not_found() {
     for (up, expected) in [(1.0, true), (-1.0, false)] {
         let world = World::new(1).await;
-        let lease = world.claim(1).await.remove(0);
-        let mut fitted = world.done(Stage::Fit);
-        fitted.outcome = json!(fit_with_up(up)).to_string();
-        let stored = world.catalog.checkpoint_now(lease, fitted).await;
-        let Ok(CheckpointOutcome::Lease(lease)) = stored else {
-            unreachable!("the pair has more stages");
+        let set_fit = |done: &mut StageCheckpoint| {
+            if done.stage == Stage::Fit {
+                done.outcome = json!(fit_with_up(up)).to_string();
+            }
         };
-        assert!(world.catalog.release(lease).await.expect("released"));
+        world.finish_with(set_fit).await;
         let pairs = [name("p0")];
         // Until the pair runs again, the same side is the other one.
         for changed in [1, 0] {
