@@ -139,6 +139,10 @@ mod tests {
         let long = format!("a,b\n{},2\n", "x".repeat(500));
         let head = read_head(long.as_bytes(), &all, 1).expect("a header");
         assert!(head.rows[0][0].len() < 70);
+        let blanks = " a ,b\n , \n  x\t,\" 2 \"\n";
+        let head = read_head(blanks.as_bytes(), &all, 2).expect("a header");
+        assert_eq!(head.header, ["a", "b"]);
+        assert_eq!(head.rows, [["x", "2"]]);
         assert_eq!(read_head(b"", &all, 1), None);
         assert_eq!(read_head(b"PK\x03\x04", &all, 1), None);
     }

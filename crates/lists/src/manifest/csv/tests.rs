@@ -47,6 +47,7 @@ fn order_case_spaces_bom_and_separators_do_not_matter() {
         " Mesh ; ID ; PRINT\nb;a;c",
         "print\tid\tmesh\nc\ta\tb\n",
         "id,mesh,print\na,\"b\",c\n,,\n",
+        "\"id \",mesh,print\n a,\" b\t\",c \n , \t,\"  \"\n",
     ];
     assert_same_rows("id,mesh,print\na,b,c\n", &others);
 }
