@@ -11,10 +11,11 @@ use crate::resume::{copy, pairs, project};
 
 /// Pairs with large prints.
 const PAIRS: u64 = 4;
-/// Most pixels of each print; each has only a few less.
-const PIXELS: usize = 2_500_000;
-/// Memory limit of a run. A pair is estimated to need 50 bytes per pixel and 32 MiB, so one pair fits, but not two.
-const MEMORY_MIB: u64 = 240;
+/// Most pixels of each print; each has only a few less. Masks of more pixels would be smaller than the print.
+const PIXELS: usize = 1_900_000;
+/// Memory limit of a run. A pair is estimated to need 30 bytes per pixel, 32 MiB and the memory of its mesh, so one pair
+/// fits, but not two.
+const MEMORY_MIB: u64 = 170;
 
 /// Scales a print up to nearly the given number of pixels.
 pub(crate) fn enlarge(path: &Path, pixels: usize) {

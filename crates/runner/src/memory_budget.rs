@@ -153,7 +153,7 @@ mod tests {
             ..raster::ImageLimits::SUGGESTED
         };
         let from = |stage, limits| input_bytes(&project, &attributes, stage, limits);
-        let print = 100 * 8 * 50 + 100;
+        let print = 100 * 8 * 30 + 100;
         assert_eq!(
             from(Stage::Fit, &raster::ImageLimits::SUGGESTED),
             6000 + print
@@ -162,7 +162,7 @@ mod tests {
             from(Stage::Normalize, &raster::ImageLimits::SUGGESTED),
             print
         );
-        assert_eq!(from(Stage::Normalize, &few), 10 * 50 + 100);
+        assert_eq!(from(Stage::Normalize, &few), 10 * 30 + 100);
         assert_eq!(from(Stage::Register, &few), 0);
     }
 

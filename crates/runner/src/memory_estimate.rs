@@ -21,8 +21,9 @@ const USUAL_MM: f64 = 50.0;
 /// normals or texture coordinates.
 const MESH_FACTOR: f64 = 3.5;
 const OBJ_FACTOR: f64 = 6.0;
-/// Bytes needed per pixel of a print. Measured: 32 to 39, with grey and colour images of 10 and 28 million pixels.
-const PIXEL_BYTES: u64 = 50;
+/// Bytes needed per pixel of a print. Measured with grey and colour images: 27 with 1.9 million pixels, 7 to 12 with
+/// 2.5 to 28 million, whose masks are smaller. A long, narrow print has masks of its own size.
+const PIXEL_BYTES: u64 = 30;
 /// Pixels assumed for each byte of an image file whose header cannot be read.
 const PIXELS_PER_BYTE: u64 = 1;
 const JPEG_PIXELS_PER_BYTE: u64 = 8;
@@ -101,6 +102,6 @@ mod tests {
     #[test]
     fn data_in_memory_counts_like_its_file() {
         assert_eq!(mesh_bytes_of(1000, 2000), 133_000);
-        assert_eq!(print_bytes_of(8_000_000), 400_000_000);
+        assert_eq!(print_bytes_of(8_000_000), 240_000_000);
     }
 }
