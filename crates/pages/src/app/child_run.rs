@@ -8,7 +8,7 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use super::failure::{AppFailure, AppResult};
-use super::sentence::{Sentence, without_commands};
+use super::sentence::{Sentence, system_reasons, without_commands};
 use super::state::AppState;
 use crate::messages;
 use mocban_catalog::{Catalog, WorkerRecord, WorkerState};
@@ -35,9 +35,10 @@ pub(super) async fn start(
     names: &[String],
 ) -> AppResult<()> {
     let failed = |error: io::Error| {
+        let [english, vietnamese] = system_reasons(&error);
         AppFailure::refused(Sentence::new(
-            format!("the run cannot start: {error}"),
-            format!("không bắt đầu chạy được: {error}"),
+            format!("the run cannot start: {english}"),
+            format!("không bắt đầu chạy được: {vietnamese}"),
         ))
     };
     state.failed_runs.set(dir, None);
@@ -149,14 +150,15 @@ pub(super) async fn finish(program: &Path, args: &[&OsStr]) -> AppResult<()> {
         .args(args);
     command.stdin(Stdio::null());
     let ended = tokio::task::spawn_blocking(move || command.output()).await;
-    let failed = |error: String| {
+    let failed = |error: io::Error| {
+        let [english, vietnamese] = system_reasons(&error);
         AppFailure::refused(Sentence::new(
-            format!("the program cannot start: {error}"),
-            format!("không khởi động được chương trình: {error}"),
+            format!("the program cannot start: {english}"),
+            format!("không khởi động được chương trình: {vietnamese}"),
         ))
     };
-    let output = ended.map_err(|error| failed(error.to_string()))?;
-    let output = output.map_err(|error| failed(error.to_string()))?;
+    let output = ended.map_err(|error| failed(io::Error::other(error)))?;
+    let output = output.map_err(failed)?;
     if is_success(output.status) {
         return Ok(());
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::exports::exports_dir;
 use super::failure::{AppFailure, AppResult};
 use super::projects::is_project;
-use super::sentence::Sentence;
+use super::sentence::{Sentence, system_reasons};
 use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
 use mocban_project::input_list::is_inputs_folder;
@@ -117,9 +117,10 @@ impl PickerRoots {
         let path = self.allowed(path)?;
         let shown = path.display().to_string();
         let failed = |error: std::io::Error| {
+            let [english, vietnamese] = system_reasons(&error);
             AppFailure::refused(Sentence::new(
-                format!("{shown} cannot be read: {error}"),
-                format!("không đọc được {shown}: {error}"),
+                format!("{shown} cannot be read: {english}"),
+                format!("không đọc được {shown}: {vietnamese}"),
             ))
         };
         let mut budget = COUNTED;

@@ -12,10 +12,11 @@ use tokio::sync::Mutex;
 use super::failure::{AppFailure, AppResult};
 use super::open_pages::PagesId;
 use super::projects::OpenProject;
-use super::sentence::Sentence;
+use super::sentence::{Sentence, system_reasons};
 use crate::local_server::{Guest, GuestServer, ServerError, network_address};
 use crate::review::{QueueCounts, ReviewPages};
 use mocban_core::domain::UnixMillis;
+use mocban_project::error::without_error_numbers;
 use mocban_project::location::now;
 
 /// Most invitations at a time. Each has connections to the catalog, and keeps its queue in memory.
@@ -192,11 +193,14 @@ impl Invitations {
 }
 
 fn refused(error: &ServerError) -> AppFailure {
+    let (ServerError::Listen { source, .. } | ServerError::Token(source)) = error;
+    let [_, why] = system_reasons(source);
     let vietnamese = match error {
-        ServerError::Listen { address, source } => {
-            format!("không mở được địa chỉ {}: {source}", address.ip())
+        ServerError::Listen { address, .. } => {
+            format!("không mở được địa chỉ {}: {why}", address.ip())
         }
-        ServerError::Token(source) => format!("không tạo được liên kết: {source}"),
+        ServerError::Token(_) => format!("không tạo được liên kết: {why}"),
     };
-    AppFailure::refused(Sentence::new(error.to_string(), vietnamese))
+    let english = without_error_numbers(&error.to_string());
+    AppFailure::refused(Sentence::new(english, vietnamese))
 }

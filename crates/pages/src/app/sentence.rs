@@ -4,6 +4,8 @@ use crate::messages;
 use crate::review::Language;
 use mocban_core::domain::ErrorCode;
 use mocban_project::ProjectError;
+use mocban_project::error::without_error_numbers;
+use std::io;
 use std::path::Path;
 
 /// A sentence in English and Vietnamese.
@@ -107,8 +109,15 @@ impl Sentence {
     }
 }
 
-/// Returns a text without the remarks in brackets and the clauses that name commands or options, and without lines that have
-/// nothing else.
+/// Returns what the system says of an error in English and Vietnamese.
+pub(super) fn system_reasons(error: &io::Error) -> [String; 2] {
+    let english = without_error_numbers(&error.to_string());
+    let vietnamese = messages::vietnamese(&english).unwrap_or_else(|| english.clone());
+    [english, vietnamese]
+}
+
+/// Returns a text without the remarks in brackets and the clauses that name commands or options, without lines that have
+/// nothing else, and without the numbers of the system's errors.
 pub(super) fn without_commands(text: &str) -> String {
     // The pages send settings as the program takes them with this option.
     let text = text.strip_prefix("--set: ").unwrap_or(text);
@@ -118,7 +127,7 @@ pub(super) fn without_commands(text: &str) -> String {
     } else {
         lines.join("\n")
     };
-    plain.replace('`', "")
+    without_error_numbers(&plain.replace('`', ""))
 }
 
 fn line_without_commands(line: &str) -> Option<String> {
@@ -166,9 +175,10 @@ fn without_remarks(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Sentence, without_commands};
+    use super::{Sentence, system_reasons, without_commands};
     use crate::review::Language;
     use mocban_project::{ProjectError, Refusal};
+    use std::io;
     use std::path::Path;
 
     #[test]
@@ -216,6 +226,10 @@ mod tests {
                 "2 files are missing, nothing was imported:\n  line 2: a.stl",
             ),
             ("a (b", "a (b"),
+            (
+                "p/exports: Permission denied (os error 13)",
+                "p/exports: Permission denied",
+            ),
         ] {
             assert_eq!(without_commands(text), plain);
         }
@@ -253,5 +267,21 @@ mod tests {
         let known = Sentence::of_program("there is no pair b4; `show` lists all");
         assert_eq!(known.text(Language::Vietnamese), "không có cặp b4");
         assert_eq!(known.text(Language::English), "there is no pair b4");
+    }
+
+    #[test]
+    fn reasons_of_the_system_are_in_the_language_of_the_page() {
+        let read_only = || io::Error::from(io::ErrorKind::ReadOnlyFilesystem);
+        let [english, vietnamese] = system_reasons(&read_only());
+        assert_eq!(english, "read-only filesystem or storage medium");
+        assert_eq!(vietnamese, "ổ đĩa chỉ đọc được");
+        let unknown = system_reasons(&io::Error::other("odd"));
+        assert_eq!(unknown, ["odd", "odd"]);
+        let error = ProjectError::from(read_only()).context("cannot write the backup p/b.sqlite");
+        let sentence = Sentence::of_error(&error, Path::new("p"));
+        assert_eq!(
+            sentence.text(Language::Vietnamese),
+            "không ghi được bản sao lưu p/b.sqlite: ổ đĩa chỉ đọc được"
+        );
     }
 }

@@ -3,7 +3,7 @@
 use std::io::{self, ErrorKind};
 
 use super::number_text::{english_form, file_size, grouped};
-use super::sentence::Sentence;
+use super::sentence::{Sentence, system_reasons};
 use crate::review::Language;
 use mocban_core::domain::sanitize;
 use mocban_core::domain::spelling::quoted;
@@ -61,14 +61,17 @@ pub(super) fn not_written(error: &io::Error) -> Sentence {
                 file_size(Language::Vietnamese, RESERVE_BYTES)
             ),
         ),
-        _ => Sentence::new(
-            format!(
-                "the files cannot be written ({error}), so nothing of them was kept: check the folder and its disk, and choose them again"
-            ),
-            format!(
-                "không ghi được các tệp ({error}), nên không tệp nào được giữ lại: hãy kiểm tra thư mục và ổ đĩa, rồi chọn lại các tệp"
-            ),
-        ),
+        _ => {
+            let [english, vietnamese] = system_reasons(error);
+            Sentence::new(
+                format!(
+                    "the files cannot be written ({english}), so nothing of them was kept: check the folder and its disk, and choose them again"
+                ),
+                format!(
+                    "không ghi được các tệp ({vietnamese}), nên không tệp nào được giữ lại: hãy kiểm tra thư mục và ổ đĩa, rồi chọn lại các tệp"
+                ),
+            )
+        }
     }
 }
 
@@ -239,10 +242,13 @@ pub(super) fn refused_archive(archive: &str, error: &ZipError) -> Sentence {
     };
     match error {
         ZipError::Write(error) => not_written(error),
-        ZipError::Io(error) => because(
-            &format!("it cannot be read ({error}); choose it again"),
-            &format!("không đọc được ({error}); hãy chọn lại"),
-        ),
+        ZipError::Io(error) => {
+            let [english, vietnamese] = system_reasons(error);
+            because(
+                &format!("it cannot be read ({english}); choose it again"),
+                &format!("không đọc được ({vietnamese}); hãy chọn lại"),
+            )
+        }
         ZipError::TooManyFiles => because(
             &format!("it has more than {} files; pack fewer", grouped(MAX_FILES)),
             &format!("có hơn {} tệp; hãy nén ít tệp hơn", grouped(MAX_FILES)),

@@ -46,6 +46,24 @@ pub(super) const HELD_MESSAGES: &[(&str, &str)] = &[
         "wait until that process has ended, or choose another name",
         "hãy chờ tiến trình đó kết thúc, hoặc chọn tên khác",
     ),
+    (
+        "the earlier folder is {}, and the next call of this command restores it",
+        "thư mục trước đó là {0}, và lần sau khi làm lại việc này, thư mục đó được khôi phục",
+    ),
+    (
+        "free some space and try again, everything stored so far is safe",
+        "hãy giải phóng chỗ trống rồi thử lại, mọi thứ đã lưu vẫn an toàn",
+    ),
+    (
+        "{} was changed or replaced meanwhile",
+        "{0} vừa bị thay đổi hoặc thay thế",
+    ),
+    ("download again", "hãy tải lại"),
+    (
+        "the folders in {} are nested too deeply",
+        "các thư mục trong {0} lồng nhau quá sâu",
+    ),
+    ("remove it or export again", "hãy xóa nó hoặc xuất lại"),
     // Blocks without an alignment.
     (
         "block {} is not aligned with its page, so there is nothing to show",

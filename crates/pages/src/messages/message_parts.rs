@@ -4,6 +4,7 @@ use super::left_out_words::left_out_reasons;
 use super::message_numbers::number_text;
 use super::message_patterns::{day_first, filled_by, parts_of};
 use super::stage_words::stage_text;
+use super::system_messages::SYSTEM_MESSAGES;
 use crate::digit_groups::grouped;
 
 /// Places before a message with their Vietnamese texts. What stands for `{}` is a number, a list of lines, one word or a
@@ -76,12 +77,6 @@ const PARTS: &[(&str, &str)] = &[
         "MeshLab, Blender or CloudCompare",
         "MeshLab, Blender hoặc CloudCompare",
     ),
-    // What systems say.
-    ("No such file or directory", "không có tệp hoặc thư mục này"),
-    ("Permission denied", "không có quyền"),
-    ("Is a directory", "đó là thư mục"),
-    ("Input/output error", "ổ đĩa báo lỗi"),
-    ("No space left on device", "đĩa đã đầy"),
 ];
 
 /// Returns a pattern with `{0}` replaced by the first part, and so on. `{0#}` is the same for a number, which is written as in
@@ -127,7 +122,7 @@ fn is_of_place(part: &str) -> bool {
 
 /// Returns a part of a message: kinds of files and values by their Vietnamese names, and all else as it is.
 fn part_text(part: &str) -> String {
-    let mut known = PARTS.iter();
+    let mut known = PARTS.iter().chain(SYSTEM_MESSAGES);
     if let Some((_, vietnamese)) = known.find(|(english, _)| *english == part) {
         return (*vietnamese).to_owned();
     }

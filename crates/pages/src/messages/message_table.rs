@@ -260,6 +260,10 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     ("the file is empty (0 bytes)", "tệp rỗng (0 byte)"),
     (
+        "the file is complete, but the disk did not confirm its name: {}",
+        "tệp đã ghi xong, nhưng ổ đĩa chưa xác nhận tên tệp: {!0}",
+    ),
+    (
         "the file is {} and does not hold the {}",
         "tệp là {0} và không chứa nội dung thật",
     ),

@@ -15,6 +15,8 @@ use super::message_table::MESSAGES;
 use super::pair_refusals::PAIR_REFUSALS;
 use super::parser_messages::PARSER_MESSAGES;
 use super::review_messages::REVIEW_MESSAGES;
+use super::system_messages::SYSTEM_MESSAGES;
+use mocban_project::error::without_error_numbers;
 
 /// A message with its Vietnamese text.
 type MessageRow = (&'static str, &'static str);
@@ -37,8 +39,46 @@ const TABLES: [&[MessageRow]; 12] = [
 
 /// Messages that end with a reason that no table has.
 const OPEN_ENDED: &[MessageRow] = &[
-    ("cannot read {}: {}", "không đọc được {0}: {1}"),
-    ("cannot list {}: {}", "không liệt kê được {0}: {1}"),
+    (
+        "cannot read settings from {}: {}",
+        "không đọc được thiết lập từ {0}: {!1}",
+    ),
+    (
+        "cannot read the temporary file of the list: {}",
+        "không đọc được tệp tạm của danh sách: {!0}",
+    ),
+    ("cannot read {}: {}", "không đọc được {0}: {!1}"),
+    ("cannot list {}: {}", "không liệt kê được {0}: {!1}"),
+    (
+        "cannot write {}, because the folder {} cannot be created: {}",
+        "không ghi được {0} vì không tạo được thư mục {1}: {!2}",
+    ),
+    (
+        "cannot write a temporary file for the list: {}",
+        "không ghi được tệp tạm cho danh sách: {!0}",
+    ),
+    (
+        "cannot write the backup {}: {}",
+        "không ghi được bản sao lưu {0}: {!1}",
+    ),
+    ("cannot write to {}: {}", "không ghi được vào {0}: {!1}"),
+    ("cannot write {}: {}", "không ghi được {0}: {!1}"),
+    (
+        "cannot copy {} to {}: {}",
+        "không chép được {0} vào {1}: {!2}",
+    ),
+    (
+        "cannot restore {} to {}: {}",
+        "không khôi phục được {0} vào {1}: {!2}",
+    ),
+    (
+        "the backup {} is complete, but not its scans and prints: {}",
+        "bản sao lưu {0} đã xong, nhưng các bản quét và bản in thì chưa: {!1}",
+    ),
+    (
+        "{} is complete, but the disk did not confirm its name: {}",
+        "{0} đã ghi xong, nhưng ổ đĩa chưa xác nhận tên: {!1}",
+    ),
     ("drawing stopped: {}", "việc vẽ bị dừng: {0}"),
     (
         "the stored heights of the face: {}",
@@ -46,8 +86,10 @@ const OPEN_ENDED: &[MessageRow] = &[
     ),
 ];
 
-/// Returns a message of the program in Vietnamese if its beginning is known. Parts that are not known stay as they are.
+/// Returns a message of the program in Vietnamese if its beginning is known. Parts that are not known stay as they are, without
+/// the numbers of the system's errors.
 pub(crate) fn vietnamese(text: &str) -> Option<String> {
+    let text = without_error_numbers(text);
     let mut lines = text.lines();
     let first = line(lines.next()?)?;
     let rest = lines.map(|one| line(one).unwrap_or_else(|| one.to_owned()));
@@ -74,6 +116,7 @@ fn clause(text: &str) -> Option<String> {
     clause_among(text, &TABLES)
         .or_else(|| clause_before_line(text))
         .or_else(|| clause_among(text, &[OPEN_ENDED]))
+        .or_else(|| clause_among(text, &[SYSTEM_MESSAGES]))
 }
 
 /// Returns a clause of a parser in Vietnamese, which ends with the line, and perhaps the column, of the fault.

@@ -27,6 +27,7 @@ mod review_messages;
 #[cfg(test)]
 mod source_texts;
 mod stage_words;
+mod system_messages;
 
 pub(crate) use left_out_words::left_out_reasons;
 pub(crate) use message_parts::with_more;

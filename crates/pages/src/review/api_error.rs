@@ -16,6 +16,7 @@ use super::state::ServerState;
 use super::unstored::Unconfirmed;
 use crate::messages::vietnamese;
 use mocban_catalog::{CatalogError, CatalogErrorKind};
+use mocban_project::error::without_error_numbers;
 use mocban_results::pair_artifacts::PairArtifactsError;
 
 /// Why a request fails.
@@ -114,7 +115,7 @@ pub(super) async fn explain(
     if status.is_server_error() {
         tracing::warn!(%error, "a request of the review page failed");
     }
-    let text = error.text(&state);
+    let text = without_error_numbers(&error.text(&state));
     let vietnamese = vietnamese(&text);
     (
         status,
