@@ -157,9 +157,19 @@ fn clause_among(text: &str, tables: &[&[MessageRow]]) -> Option<String> {
 fn before_text(before: &str) -> String {
     let parts = before.split(": ").map(|part| {
         let known = clause(part).or_else(|| place_text(part));
+        let known = known.or_else(|| beginning(part));
         known.unwrap_or_else(|| part.to_owned())
     });
     clause(before).unwrap_or_else(|| parts.collect::<Vec<_>>().join(": "))
+}
+
+/// Returns what failed, without the reason behind it, in Vietnamese.
+fn beginning(text: &str) -> Option<String> {
+    OPEN_ENDED.iter().find_map(|(english, vietnamese)| {
+        let parts = parts_of(text, english.strip_suffix(": {}")?)?;
+        let (vietnamese, _reason) = vietnamese.rsplit_once(": ")?;
+        Some(filled(vietnamese, &parts, clause))
+    })
 }
 
 #[cfg(test)]

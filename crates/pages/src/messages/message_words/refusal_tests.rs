@@ -147,6 +147,39 @@ fn places_behind_messages_of_parsers_are_translated() {
 }
 
 #[test]
+fn files_that_cannot_be_read_or_written_are_named_with_the_reason_of_the_system() {
+    assert_translated(&[
+        (
+            "/x/p/exports: Permission denied (os error 13)",
+            "/x/p/exports: không có quyền",
+        ),
+        (
+            "cannot write /x/p/backups/b.sqlite, because the folder /x/p/backups cannot be created: Read-only file system",
+            "không ghi được /x/p/backups/b.sqlite vì không tạo được thư mục /x/p/backups: ổ đĩa chỉ đọc được",
+        ),
+        (
+            "cannot write the backup /x/b: the file is complete, but the disk did not confirm its name: Input/output error",
+            "không ghi được bản sao lưu /x/b: tệp đã ghi xong, nhưng ổ đĩa chưa xác nhận tên tệp: ổ đĩa báo lỗi",
+        ),
+        (
+            "the backup /x/b is complete, but not its scans and prints: cannot copy 1.ply to /y/1.ply: No space left on device; \
+             free some space and try again, everything stored so far is safe",
+            "bản sao lưu /x/b đã xong, nhưng các bản quét và bản in thì chưa: không chép được 1.ply vào /y/1.ply: đĩa đã đầy; \
+             hãy giải phóng chỗ trống rồi thử lại, mọi thứ đã lưu vẫn an toàn",
+        ),
+        (
+            "the temporary file of the cut cannot be written or read: No space left on device",
+            "không ghi hoặc đọc được tệp tạm của bước cắt: đĩa đã đầy",
+        ),
+        (
+            "cannot read settings from p/mocban.toml: Permission denied",
+            "không đọc được thiết lập từ p/mocban.toml: không có quyền",
+        ),
+    ]);
+    assert_eq!(vietnamese("Permission denied by odd"), None);
+}
+
+#[test]
 fn failures_of_a_run_are_translated() {
     assert_translated(&[
         (
