@@ -135,6 +135,12 @@ fn no_action_changes_a_project_that_cannot_be_written() {
         ),
         ("/p/p/actions/review", review("")),
         ("/p/p/actions/review", review("yes")),
+        (
+            "/p/p/actions/export",
+            json!({"purpose": "excel", "only": "all", "metric": ""}),
+        ),
+        ("/p/p/actions/backup", json!({})),
+        ("/p/p/actions/backup", json!({"inputs": "yes"})),
         ("/actions/demo", Value::Null),
         (
             "/actions/restore",

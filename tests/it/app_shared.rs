@@ -150,23 +150,6 @@ fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
         assert!([422, 503].contains(&reply.status), "{action}: {said}");
         assert!(said.contains(part), "{action}: {said}");
     }
-    // Long work says it on its page.
-    for (action, body) in [
-        (
-            "export",
-            json!({"purpose": "excel", "only": "all", "metric": ""}),
-        ),
-        ("backup", json!({})),
-    ] {
-        let path = format!("/p/p/actions/{action}");
-        assert_eq!(act(&page, &path, &body, |_| {}).status, 200, "{action}");
-    }
-    for path in ["/p/p/export", "/p/p/health"] {
-        wait_until(path, || {
-            let shown = html(&page, path);
-            shown.contains("data-task=\"failed\"") && shown.contains("Permission denied")
-        });
-    }
     // Chosen pairs are kept until the app ends.
     let pairs = ["upright-0001", "upright-0004"];
     let reply = act(&page, CHOSEN, &chosen("review", &pairs), |_| {}).json();

@@ -14,6 +14,7 @@ use super::attachment::attachment;
 use super::components::{action_form, grouped};
 use super::failure::{AppFailure, AppResult};
 use super::number_text::{english_count, english_form, file_size};
+use super::read_only::refuse_read_only_output;
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::tasks::{FinishedTask, TaskKind, TaskLines};
@@ -134,6 +135,8 @@ pub(super) async fn start(
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
     let with_inputs = body.inputs == "yes";
+    let file = open.dir.join(BACKUP);
+    refuse_read_only_output(file.parent().unwrap_or(&open.dir))?;
     let work = move |location| backup_lines(location, with_inputs);
     state.tasks.start(TaskKind::Backup, &open, work)?;
     Ok(Json(json!({ "reload": true })))

@@ -25,6 +25,7 @@ use super::exports::{
 };
 use super::failure::{AppFailure, AppResult};
 use super::number_text::english_count;
+use super::read_only::refuse_read_only_output;
 use super::run_blocks::{failed_blocks, failed_blocks_part};
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -224,6 +225,7 @@ pub(super) async fn start(
         json!({ "reload": true })
     };
     let pairs = pairs.map(BTreeSet::from_iter);
+    refuse_read_only_output(&exports_dir(&open.dir))?;
     let work = move |location| run(purpose, only, metric, pairs, location);
     state.tasks.start(TaskKind::Export, &open, work)?;
     Ok(Json(reply))

@@ -1,5 +1,7 @@
 //! Places in which nothing can be stored, so that pages say it before anybody types.
 
+use std::path::Path;
+
 use axum::http::StatusCode;
 
 use super::failure::{AppFailure, AppResult};
@@ -25,6 +27,20 @@ pub(super) async fn refuse_read_only(state: &AppState, project: Option<&str>) ->
         Some(place) => Err(AppFailure::refused(place.sentence())),
         None => Ok(()),
     }
+}
+
+/// Refuses to write an output to a folder of a project, which need not exist yet, if nothing can be stored there. A database of
+/// the project that takes no changes does not matter.
+pub(super) fn refuse_read_only_output(folder: &Path) -> AppResult<()> {
+    let mut places = folder.ancestors();
+    let existing = places.find(|place| place.exists());
+    if existing.is_none_or(platform::may_write) {
+        return Ok(());
+    }
+    Err(AppFailure::refused(Sentence::new(
+        "This project is read-only, so no export and no backup can be stored in its folder: change the rights of the folder, or copy it to a place where you may write.",
+        "Dự án này chỉ đọc được nên không thể lưu bản xuất hay bản sao lưu nào trong thư mục dự án: hãy đổi quyền của thư mục, hoặc sao chép thư mục đến nơi bạn có quyền ghi.",
+    )))
 }
 
 impl ReadOnlyPlace {
