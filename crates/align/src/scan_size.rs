@@ -222,7 +222,9 @@ pub fn length_of_outcome(depth: &DepthOutcome) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{advice, doubtful_characters, doubtful_surface, length_of, short_face, wrong_unit};
-    use mocban_core::domain::LengthUnit;
+    use crate::stages::depth::DepthError;
+    use crate::stages::fit::FitError;
+    use mocban_core::domain::{LengthUnit, UNIT_CLAUSES};
     use mocban_core::mesh::Vertices;
 
     #[test]
@@ -253,6 +255,27 @@ mod tests {
             (0.0, Some(LengthUnit::M)),
         ] {
             assert_eq!(wrong_unit(length, unit), None);
+        }
+    }
+
+    #[test]
+    fn failures_because_of_the_unit_have_a_clause_that_says_so() {
+        let long = wrong_unit(12.5, Some(LengthUnit::M)).expect("12.5 m");
+        let names_unit = |message: &str| UNIT_CLAUSES.iter().any(|clause| message.contains(clause));
+        for message in [
+            long,
+            FitError::TooLarge(3).to_string(),
+            DepthError::UnitUnknown.to_string(),
+            DepthError::TooLarge { longest_px: 1e6 }.to_string(),
+        ] {
+            assert!(names_unit(&message), "{message}");
+        }
+        for message in [
+            FitError::OneLine(3).to_string(),
+            DepthError::Overlap(3).to_string(),
+            advice(345.0, Some(LengthUnit::In)),
+        ] {
+            assert!(!names_unit(&message), "{message}");
         }
     }
 

@@ -9,17 +9,19 @@ use crate::queue::counters::Deltas;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::records::model::PairAttributes;
 use crate::{Catalog, Result};
-use mocban_core::domain::{FailureClass, FitOutcome, LengthUnit, PairName, UnixMillis};
+use mocban_core::domain::{
+    FailureClass, FitOutcome, LengthUnit, PairName, UNIT_CLAUSES, UnixMillis,
+};
 
 /// Number of pairs in one statement.
 const CHUNK: usize = 2_000;
 
-/// Pairs that failed with a class, in the order of import. With `?2`, only those whose messages name the unit. The first `?3`
-/// failures of the class are searched. Pairs that were cut from a block have its unit and its side.
+/// Pairs that failed with a class, in the order of import. With `?2`, only those whose messages have one of the clauses `?5` to
+/// `?7`. The first `?3` failures of the class are searched. Pairs that were cut from a block have its unit and its side.
 const FAILED_SCANS: &str = "
 SELECT p.name FROM (SELECT pair, message FROM failure WHERE class = ?1 ORDER BY pair LIMIT ?3) AS f
     CROSS JOIN job AS j ON j.pair = f.pair CROSS JOIN pair AS p ON p.id = f.pair
-WHERE j.status = 4 AND (?2 = 0 OR f.message LIKE '%the unit%')
+WHERE j.status = 4 AND (?2 = 0 OR f.message LIKE ?5 OR f.message LIKE ?6 OR f.message LIKE ?7)
     AND NOT EXISTS (SELECT 1 FROM block_character AS c WHERE c.pair = f.pair)
 ORDER BY f.pair LIMIT ?4";
 
@@ -55,7 +57,7 @@ pub enum ScanCorrection {
 
 impl Catalog {
     /// Returns pairs that failed with a class, up to `limit`, in the order of import. With `names_unit`, only those whose
-    /// messages name the unit. Searches only the first `searched` failures. Leaves out pairs that were cut from blocks.
+    /// messages have one of the [`UNIT_CLAUSES`]. Searches only the first `searched` failures. Leaves out pairs that were cut from blocks.
     pub async fn failed_scans(
         &self,
         class: FailureClass,
@@ -63,11 +65,14 @@ impl Catalog {
         [searched, limit]: [usize; 2],
     ) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
-        let names = query_scalar(FAILED_SCANS)
+        let mut names = query_scalar(FAILED_SCANS)
             .bind(class.name())
             .bind(i64::from(names_unit))
             .bind(searched as i64)
             .bind(limit as i64);
+        for clause in UNIT_CLAUSES {
+            names = names.bind(format!("%{clause}%"));
+        }
         names.fetch_all(&mut conn).await
     }
 

@@ -6,7 +6,8 @@ use super::blocks::{character, world};
 use super::{World, failed, fingerprints, name, row};
 use crate::{FailureAction, PairAttributes, RerunPolicy, ScanCorrection, StageCheckpoint};
 use mocban_core::domain::{
-    Failure, FailureClass, FitOutcome, JobStatus, LengthUnit, PairName, Rigid3, SideEvidence, Stage,
+    Failure, FailureClass, FitOutcome, JobStatus, LengthUnit, PairName, Rigid3, SideEvidence,
+    Stage, UNIT_CLAUSES,
 };
 
 /// Lets the next pair fail at its first stage, and returns its name.
@@ -73,18 +74,21 @@ async fn a_corrected_unit_lets_failed_and_finished_pairs_run_again() {
 
 #[tokio::test]
 async fn only_failures_that_name_the_unit_are_found_if_asked() {
-    let world = World::new(2).await;
+    let world = World::new(1 + UNIT_CLAUSES.len()).await;
     let class = FailureClass::BadInput;
-    let first = fail_next(&world, class, "p.stl: the mesh has no faces").await;
+    let message = "the unit.stl: the mesh has no faces";
+    let first = fail_next(&world, class, message).await;
     let found = async |names_unit, limits| {
         let found = world.catalog.failed_scans(class, names_unit, limits).await;
         found.expect("a read")
     };
     assert_eq!(found(false, [9, 9]).await, [first]);
     assert_eq!(found(true, [9, 9]).await.len(), 0);
-    fail_next(&world, class, "p.stl: correct the unit").await;
-    assert_eq!(found(true, [9, 9]).await.len(), 1);
-    assert_eq!(found(false, [9, 9]).await.len(), 2);
+    for (number, clause) in (1..).zip(UNIT_CLAUSES) {
+        fail_next(&world, class, &format!("p.stl: odd; {clause}, and more")).await;
+        assert_eq!(found(true, [9, 9]).await.len(), number, "{clause}");
+        assert_eq!(found(false, [9, 9]).await.len(), number + 1);
+    }
     assert_eq!(found(false, [9, 1]).await.len(), 1, "the limit");
     let other = FailureClass::NoSolution;
     let other = world.catalog.failed_scans(other, false, [9, 9]).await;

@@ -8,6 +8,13 @@ use super::enum_names;
 /// Ends the message of an input file that does not exist, behind its path.
 pub const NOT_THERE: &str = " is not there";
 
+/// Clauses, one of which every message of a pair has that fails because of the unit of its scan.
+pub const UNIT_CLAUSES: [&str; 3] = [
+    "correct the unit",
+    "check the unit",
+    "the unit of the mesh is not known",
+];
+
 /// Class of a failure. It decides between retry and quarantine.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
