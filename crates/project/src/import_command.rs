@@ -36,7 +36,7 @@ impl ImportCommand {
         let (mesh, print) = (stem(&pair.mesh_path), stem(&pair.print_path));
         let id = pair.name.folded();
         let is_paired = mesh == print && (id == mesh || id.ends_with(&format!("_{mesh}")));
-        if is_paired && !pair.is_listed() {
+        if is_paired && !pair.has_more_than_folders_give() {
             Self::Folders {
                 has_unit: pair.unit.is_some(),
             }

@@ -176,8 +176,15 @@ pub struct PairAttributes {
 }
 
 impl PairAttributes {
-    /// Returns whether a list named the pair: folders give no columns but a block, whose pairs are named `BLOCK_STEM`.
+    /// Returns whether a list has certainly named the pair. Its block, its unit and its side may have been typed, and a pair that
+    /// was cut from a block has the character of its box.
     pub fn is_listed(&self) -> bool {
+        self.prior.is_none() && (self.character.is_some() || !self.meta.is_empty())
+    }
+
+    /// Returns whether an import of folders would take something from the pair: folders give no columns but a block, whose pairs
+    /// are named `BLOCK_STEM`.
+    pub fn has_more_than_folders_give(&self) -> bool {
         let is_of_folder = |block: &str| {
             let stem = self.name.as_str().strip_prefix(block);
             stem.is_some_and(|stem| stem.starts_with('_'))

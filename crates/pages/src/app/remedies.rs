@@ -21,10 +21,8 @@ enum FileOrigin {
 }
 
 impl FileOrigin {
-    /// Returns the origin of a pair. Its block, its unit and its side may have been typed in the app.
     fn of_pair(pair: &PairAttributes) -> Self {
-        let is_listed = pair.character.is_some() || !pair.meta.is_empty();
-        match (&pair.prior, is_listed) {
+        match (&pair.prior, pair.is_listed()) {
             (Some(_), _) => Self::Block,
             (None, true) => Self::List,
             (None, false) => Self::Unknown,
@@ -212,6 +210,9 @@ mod tests {
         assert_eq!(FileOrigin::of_pair(&typed), FileOrigin::Unknown);
         typed.meta.insert("folio".to_owned(), "3a".into());
         assert_eq!(FileOrigin::of_pair(&typed), FileOrigin::List);
+        typed.prior = Some("{}".to_owned());
+        assert_eq!(FileOrigin::of_pair(&typed), FileOrigin::Block);
+        assert!(!typed.is_listed(), "it was cut from a block");
     }
 
     #[test]
