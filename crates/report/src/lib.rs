@@ -16,6 +16,7 @@ mod fail_reasons;
 mod headline;
 mod intervals;
 mod model;
+mod named_commands;
 mod provenance;
 pub mod quality_gate;
 mod render;
@@ -39,6 +40,7 @@ pub use fail_reasons::FailReasonCount;
 pub use model::{
     BlockCounts, FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA,
 };
+pub use named_commands::{CommandPage, NAMED_COMMANDS, NamedCommand, command_page};
 pub use provenance::{ChangedSetting, Provenance, UsedSettings};
 pub use render::{
     Cover, MAX_PAGE_BYTES, RESERVED_BYTES, ReportFormat, agreement_text, is_report, page, render,

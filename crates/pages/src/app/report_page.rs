@@ -25,7 +25,7 @@ use mocban_core::domain::{ThresholdMetric, one_line};
 use mocban_project::ProjectError;
 use mocban_project::location::now;
 use mocban_project::report::{ReportOptions, read, report};
-use mocban_report::{MetricRow, Report, ReportFormat};
+use mocban_report::{CommandPage, MetricRow, Report, ReportFormat, command_page};
 use mocban_results::IntervalMethod;
 
 /// Formats that can be saved: format, extension, content type and name.
@@ -111,33 +111,20 @@ fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
 /// Returns the link to the page that does what a command in sentences of the report does, if they name one that is not on the
 /// page anyway. Addresses are relative to that of the report.
 fn remedy_link(visit: &Visit, key: &str, text: &str) -> Markup {
-    let see_why = visit.t("See why", "Xem lý do");
-    let links = [
-        (
-            "`mocban review ",
-            "review".to_owned(),
-            visit.t("Review", "Đánh giá"),
-        ),
-        (
-            "`mocban import`",
+    let link = match command_page(text) {
+        Some(CommandPage::Review) => Some(("review".to_owned(), visit.t("Review", "Đánh giá"))),
+        Some(CommandPage::Import) => Some((
             format!("../../import?project={}", encoded(key)),
             visit.t("Import", "Nhập dữ liệu"),
-        ),
-        (
-            "`mocban status --retired`",
+        )),
+        Some(CommandPage::Retired) => Some((
             format!("pairs?state={RETIRED}"),
-            see_why,
-        ),
-        (
-            "`check`",
-            "health".to_owned(),
-            visit.t("Health", "Tình trạng"),
-        ),
-    ];
-    let found = links
-        .into_iter()
-        .find(|(command, ..)| text.contains(*command));
-    html! { @if let Some((_, address, name)) = found { " " a href=(address) { (name) } } }
+            visit.t("See why", "Xem lý do"),
+        )),
+        Some(CommandPage::Health) => Some(("health".to_owned(), visit.t("Health", "Tình trạng"))),
+        Some(CommandPage::Run | CommandPage::Failures) | None => None,
+    };
+    html! { @if let Some((address, name)) = link { " " a href=(address) { (name) } } }
 }
 
 /// Returns sentences of the report, which are in English, in the language of the page and without commands.
@@ -269,7 +256,9 @@ pub(super) async fn download(
 mod tests {
     use super::remedy_link;
     use crate::app::visit::Visit;
+    use crate::messages;
     use crate::review::Language;
+    use mocban_report::{CommandPage, NAMED_COMMANDS};
 
     #[test]
     fn a_sentence_with_a_command_has_a_link_instead() {
@@ -301,5 +290,16 @@ mod tests {
         );
         assert_eq!(damaged, " <a href=\"health\">Health</a>");
         assert_eq!(of(Language::English, "All 2 pairs are aligned."), "");
+    }
+
+    #[test]
+    fn what_a_sentence_says_without_its_command_is_translated_and_linked() {
+        for command in NAMED_COMMANDS {
+            let said = command.without.trim_start_matches(". ");
+            assert_ne!(messages::report_text(said), said);
+            let link = remedy_link(&Visit::in_language(Language::English), "p", command.clause);
+            let is_on_page = [CommandPage::Run, CommandPage::Failures].contains(&command.page);
+            assert_eq!(link.into_string().is_empty(), is_on_page, "{command:?}");
+        }
     }
 }

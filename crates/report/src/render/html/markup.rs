@@ -2,36 +2,9 @@
 
 use maud::{Markup, html};
 
+use crate::named_commands::without_named_commands;
 use crate::render::code_spans::{SentencePart, parts};
 use crate::render::table::{ColumnFormat, Table, TableColumn};
-
-/// Parts of sentences that name a command, and what the page says in their place: its readers may have no terminal.
-const WITHOUT_COMMANDS: [(&str, &str); 6] = [
-    (
-        "; `mocban status --retired` says why.",
-        ". In the app, the page Pairs has the reason.",
-    ),
-    (
-        "; `mocban import` adds them.",
-        ". In the app, the page Import adds them.",
-    ),
-    (
-        "; `mocban run` continues the work.",
-        ". In the app, the page Run continues the work.",
-    ),
-    (
-        "; `mocban status` lists the reasons.",
-        ". Failed pairs are listed below with their reasons.",
-    ),
-    (
-        " (`mocban review --reviewer NAME` starts judging).",
-        ". In the app, results are judged on the page Review.",
-    ),
-    (
-        "; `check` lists them.",
-        ". In the app, the page Health lists them.",
-    ),
-];
 
 /// Returns a text of the report with narrow spaces before signs of percent, which stay on the line of their number.
 pub(super) fn prose(text: &str) -> String {
@@ -40,10 +13,7 @@ pub(super) fn prose(text: &str) -> String {
 
 /// Returns a sentence that says what to do without a command. Other commands are code.
 pub(super) fn sentence(text: &str) -> Markup {
-    let known = WITHOUT_COMMANDS.iter();
-    let text = known.fold(text.to_owned(), |text, (command, said)| {
-        text.replace(command, said)
-    });
+    let text = without_named_commands(text);
     html! {
         @for part in parts(&text) {
             @match part {
