@@ -200,12 +200,14 @@ const IN_CATALOG: [KilledAction; 15] = [
         "/p/p/actions/correct",
         |_, _| json!({"what": "unit", "pair": "upright-0001", "unit": "cm", "shown": "1"}),
         said_of_scan,
-    ),
+    )
+    .computing_again("upright-0001"),
     KilledAction::in_catalog(
         "/p/p/actions/correct",
         |_, _| json!({"what": "side", "pair": "upright-0001", "shown": "1"}),
         said_of_scan,
-    ),
+    )
+    .computing_again("upright-0001"),
     KilledAction::in_catalog(
         "/p/p/actions/retire",
         |_, _| json!({"pair": "upright-0001"}),

@@ -5,15 +5,13 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use crate::app::{act, open_app, text, token};
+use crate::app_choice::chosen;
 use crate::app_kills::{HeldApp, LOG, UNTIL_KILLED};
 use crate::cli::{mocban, status};
 use crate::fault::Fault;
 use crate::page::{Page, read_project};
 use crate::project_dump::ProjectDump;
 use crate::waiting::{run_ends, wait_until};
-
-/// An action that stores something, and then starts a run.
-const STORES_AND_RUNS: &str = "/p/p/actions/correct";
 
 /// An action that is killed.
 pub(crate) struct KilledAction {
@@ -29,6 +27,8 @@ pub(crate) struct KilledAction {
     pub(crate) state: fn(&Path) -> Value,
     /// The page that says of long work that it was killed, and what it says.
     pub(crate) said: Option<[&'static str; 2]>,
+    /// The pair of which the first transaction makes the results stale, so that only a run completes the action.
+    pub(crate) makes_stale: Option<&'static str>,
 }
 
 impl KilledAction {
@@ -45,6 +45,7 @@ impl KilledAction {
             at: ["write", LOG],
             state,
             said: None,
+            makes_stale: None,
         }
     }
 
@@ -58,6 +59,14 @@ impl KilledAction {
         Self {
             at: ["rename", file],
             ..Self::in_catalog(action, body, state)
+        }
+    }
+
+    /// Returns the action, which makes the results of a pair stale and computes them again.
+    pub(crate) const fn computing_again(self, pair: &'static str) -> Self {
+        Self {
+            makes_stale: Some(pair),
+            ..self
         }
     }
 
@@ -164,7 +173,7 @@ impl<'a> KilledProject<'a> {
         self.kill_at("sync", if has_log { 1 } else { 2 });
         let mut found = self.outcome();
         let is_stored = found.state != self.before;
-        if !is_stored || self.action.action == STORES_AND_RUNS {
+        if !is_stored || self.action.makes_stale.is_some() {
             let next = open_app(&self.root());
             let jobs = status(&self.root().join("p"))["jobs"].clone();
             found = if is_stored || jobs["ready"].as_u64() > Some(0) {
@@ -177,14 +186,12 @@ impl<'a> KilledProject<'a> {
         found.must_equal(after, &format!("{} is half done", self.action.action));
     }
 
-    /// Runs the pairs that wait; of a correction only its pair, as the action does.
+    /// Runs the pairs that wait, or the only one whose results are stale, as the action does.
     fn run(&self, next: &Page) -> ActionOutcome {
-        if self.action.action != STORES_AND_RUNS {
-            return self.change(next, "/p/p/actions/run", &json!({"which": "all"}));
+        match self.action.makes_stale {
+            None => self.change(next, "/p/p/actions/run", &json!({"which": "all"})),
+            Some(pair) => self.change(next, "/p/p/actions/chosen", &chosen("resume", &[pair])),
         }
-        let pair = &self.body(next)["pair"];
-        let resume = json!({"change": "resume", "list": "view=table", "pairs": [pair]});
-        self.change(next, "/p/p/actions/chosen", &resume)
     }
 }
 
