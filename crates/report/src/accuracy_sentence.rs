@@ -12,8 +12,7 @@ use mocban_results::stats::Rate;
 /// Returns the sentences on Acc of the default metric, or of the first metric with an Acc, and on ground truth.
 pub(super) fn accuracy(report: &Report) -> String {
     let by_default = report.row(ThresholdMetric::DEFAULT);
-    let judged = by_default.filter(|row| row.acc.is_some());
-    let judged = judged.or_else(|| report.rows.iter().find(|row| row.acc.is_some()));
+    let judged = report.row_with_acc();
     let mut sentence = match judged.and_then(|row| Some((row, row.acc?, row.acc_ci95?))) {
         Some((row, acc, bounds)) => format!(
             "Acc of {} is {} % ({}, {} interval): reviewers passed {} of {}.",

@@ -273,4 +273,12 @@ impl Report {
     pub fn row(&self, metric: ThresholdMetric) -> Option<&MetricRow> {
         self.rows.iter().find(|row| row.metric == metric)
     }
+
+    /// Returns the row whose Acc is in the headline: that of the default metric, or the first with an Acc. `None` if there is
+    /// none.
+    pub fn row_with_acc(&self) -> Option<&MetricRow> {
+        let by_default = self.row(ThresholdMetric::DEFAULT);
+        let judged = by_default.filter(|row| row.acc.is_some());
+        judged.or_else(|| self.rows.iter().find(|row| row.acc.is_some()))
+    }
 }

@@ -46,6 +46,7 @@ mod invitation_cards;
 mod invitations;
 mod last_import;
 mod latest_results;
+mod linked_counts;
 mod looked_inputs;
 mod looked_part;
 mod moved_blocks;

@@ -12,7 +12,10 @@ use super::components::{
     NavSection, empty, figure, frame, grouped, number_table, score, stored_message,
 };
 use super::failure::{AppFailure, AppResult};
-use super::pair_query::RETIRED;
+use super::linked_counts::{
+    ALIGNED_PAIRS, ALL_PAIRS, FAILED_PAIRS, LOW_CONFIDENCE_PAIRS, LinkedCounts, RETIRED_PAIRS,
+    UNFINISHED_PAIRS,
+};
 use super::run_blocks::failed_blocks_part;
 use super::sentence::without_commands;
 use super::state::AppState;
@@ -87,8 +90,10 @@ pub(super) async fn numbers(
 }
 
 fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
+    let counts_in_sentences = LinkedCounts::of(report, visit.language);
+    let sentences = |text: &str| counts_in_sentences.markup(&shown_sentences(visit, text));
     html! {
-        @for text in &report.headline { p { (shown_sentences(visit, text)) (remedy_link(visit, key, text)) } }
+        @for text in &report.headline { p { (sentences(text)) (remedy_link(visit, key, text)) } }
         @if report.pairs + report.retired > 0 { (counts(visit, report)) }
         (failed_blocks_part(visit, "./", report.block_progress.map_or(0, |blocks| blocks.failed)))
         @if report.rows.iter().all(|row| row.n == 0) {
@@ -103,7 +108,7 @@ fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
         (reasons(visit, report))
         @if !report.warnings.is_empty() {
             h2 { (visit.t("What limits these numbers", "Những giới hạn của các con số này")) }
-            ul { @for text in &report.warnings { li { (shown_sentences(visit, text)) (remedy_link(visit, key, text)) } } }
+            ul { @for text in &report.warnings { li { (sentences(text)) (remedy_link(visit, key, text)) } } }
         }
     }
 }
@@ -117,10 +122,9 @@ fn remedy_link(visit: &Visit, key: &str, text: &str) -> Markup {
             format!("../../import?project={}", encoded(key)),
             visit.t("Import", "Nhập dữ liệu"),
         )),
-        Some(CommandPage::Retired) => Some((
-            format!("pairs?state={RETIRED}"),
-            visit.t("See why", "Xem lý do"),
-        )),
+        Some(CommandPage::Retired) => {
+            Some((RETIRED_PAIRS.to_owned(), visit.t("See why", "Xem lý do")))
+        }
         Some(CommandPage::Health) => Some(("health".to_owned(), visit.t("Health", "Tình trạng"))),
         Some(CommandPage::Run | CommandPage::Failures) | None => None,
     };
@@ -143,15 +147,15 @@ fn counts(visit: &Visit, report: &Report) -> Markup {
     let low = row.and_then(|row| row.low_confidence);
     html! {
         div.figures #counts {
-            (figure(report.pairs, visit.form(report.pairs, ["pair", "pairs"], "cặp"), Some("pairs"), ""))
-            (figure(progress.done, visit.t("aligned", "đã căn chỉnh"), Some("pairs?state=aligned"), "good"))
+            (figure(report.pairs, visit.form(report.pairs, ["pair", "pairs"], "cặp"), Some(ALL_PAIRS), ""))
+            (figure(progress.done, visit.t("aligned", "đã căn chỉnh"), Some(ALIGNED_PAIRS), "good"))
             @if let Some(low) = low {
-                (figure(low, visit.t("low confidence", "độ tin cậy thấp"), Some("pairs?confidence=low&sort=confidence"), "warn"))
+                (figure(low, visit.t("low confidence", "độ tin cậy thấp"), Some(LOW_CONFIDENCE_PAIRS), "warn"))
             }
-            (figure(progress.failed, visit.t("failed", "lỗi"), Some("pairs?state=failed&view=table"), "bad"))
-            (figure(progress.pending, visit.t("not finished", "chưa xong"), Some("pairs?state=unfinished"), ""))
+            (figure(progress.failed, visit.t("failed", "lỗi"), Some(FAILED_PAIRS), "bad"))
+            (figure(progress.pending, visit.t("not finished", "chưa xong"), Some(UNFINISHED_PAIRS), ""))
             @if report.retired > 0 {
-                (figure(report.retired, visit.t("retired", "đã đưa ra khỏi thống kê"), Some("pairs?state=retired"), ""))
+                (figure(report.retired, visit.t("retired", "đã đưa ra khỏi thống kê"), Some(RETIRED_PAIRS), ""))
             }
         }
     }
