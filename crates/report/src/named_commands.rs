@@ -1,4 +1,4 @@
-//! Commands in sentences of the report, and what readers without a terminal are told in their place.
+//! Commands in sentences of the report, and what readers without a terminal see in their place.
 
 /// A page of the app that does what a command does, or shows what it prints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

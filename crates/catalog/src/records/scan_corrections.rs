@@ -57,7 +57,8 @@ pub enum ScanCorrection {
 
 impl Catalog {
     /// Returns pairs that failed with a class, up to `limit`, in the order of import. With `names_unit`, only those whose
-    /// messages have one of the [`UNIT_CLAUSES`]. Searches only the first `searched` failures. Leaves out pairs that were cut from blocks.
+    /// messages have one of the [`UNIT_CLAUSES`]. Searches only the first `searched` failures. Leaves out pairs that were cut
+    /// from blocks.
     pub async fn failed_scans(
         &self,
         class: FailureClass,
