@@ -13,6 +13,7 @@ use super::block_access::BlockAccess;
 use super::boxes_page;
 use super::correction_page;
 use super::page;
+use super::refusal::refused;
 use super::scan_page::jpeg;
 use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE, embedded_asset};
 use crate::local_server::WorkThread;
@@ -164,7 +165,7 @@ async fn region(
 async fn scan(State(shown): State<Arc<ShownBlock>>, Path(index): Path<usize>) -> Response {
     let work = Arc::clone(&shown.work);
     let read = work.call(move || shown.view.scan(index));
-    let failed = |why: String| (StatusCode::INTERNAL_SERVER_ERROR, why).into_response();
+    let failed = |why: String| refused(StatusCode::INTERNAL_SERVER_ERROR, &why);
     match read.await {
         Ok(Ok(Some(bytes))) => {
             let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
