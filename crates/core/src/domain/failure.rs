@@ -57,4 +57,11 @@ impl Failure {
             message: message.into(),
         }
     }
+
+    /// Returns whether a pair failed because of the unit of its scan.
+    pub fn names_unit(&self) -> bool {
+        UNIT_CLAUSES
+            .iter()
+            .any(|clause| self.message.contains(clause))
+    }
 }

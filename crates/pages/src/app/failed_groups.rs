@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::address::encoded;
 use super::components::{action_form, grouped, stored_message};
-use super::remedies::pair_remedy;
+use super::remedies::{pair_remedy, unit_link};
 use super::scan_correction::ScanQuestion;
 use super::visit::Visit;
 use mocban_catalog::{Catalog, PairFilter, PairOrder, PairResults, Result};
@@ -128,7 +128,10 @@ fn example(visit: &Visit, key: &str, class: FailureClass, pair: &PairResults) ->
             }
             div.row { (pictures(visit, pair)) }
             @if is_of_file && !is_cut(pair) {
-                p.row { a href={ (visit.root) "import?project=" (encoded(key)) "&mend=" (encoded(name)) } aria-label={ (replace) ": " (one_line(name)) } { (replace) } }
+                p.row {
+                    @if let Some(link) = unit_link(visit, "", pair) { (link) }
+                    a href={ (visit.root) "import?project=" (encoded(key)) "&mend=" (encoded(name)) } aria-label={ (replace) ": " (one_line(name)) } { (replace) }
+                }
             }
         }
     }
@@ -162,7 +165,7 @@ mod tests {
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_core::domain::FailureClass;
-    use mocban_results::test_fixtures::with_confidence;
+    use mocban_results::test_fixtures::{self as fixtures, with_confidence};
 
     fn group(class: FailureClass, names_unit: bool) -> FailedGroup {
         FailedGroup {
@@ -193,6 +196,18 @@ mod tests {
         }
         let shown = shown(Language::English, group(FailureClass::Bug, false));
         assert!(!shown.contains("mend="), "{shown}");
+    }
+
+    #[test]
+    fn an_example_that_failed_because_of_its_unit_leads_to_another_one() {
+        let message = "with the unit m, the scan is 13.4 m long; correct the unit (perhaps mm), and import it again";
+        let link = "correct?what=unit&amp;pair=ch%E1%BB%AF%201";
+        for language in Language::ALL {
+            let mut failed = group(FailureClass::BadInput, true);
+            failed.examples = vec![fixtures::failed("chữ 1", FailureClass::BadInput, message)];
+            let shown = shown(language, failed);
+            assert!(shown.contains(link), "{shown}");
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::failure::AppResult;
 use super::pair_history::{history, verdict_line};
 use super::pair_numbers::numbers;
 use super::paper_method::{PAPER, is_comparable};
-use super::remedies::{failed_part, pair_remedy};
+use super::remedies::{failed_part, pair_remedy, unit_link};
 use super::retired_pairs::retired_band;
 use super::scan_correction::ScanQuestion;
 use super::sentence::Sentence;
@@ -154,7 +154,12 @@ fn state_line(visit: &Visit, key: &str, overview: &PairOverview) -> Markup {
         @if let Some(stored) = &results.failure {
             div.notice.bad {
                 p { b { (visit.class(stored.failure.class)) } " (" (failed_part(visit, &results.attributes, stored.stage, &stored.failure.message)) "): " (stored_message(visit, &stored.failure.message)) }
-                (pair_remedy(visit, key, stored.failure.class, &[results]))
+                @if let Some(link) = unit_link(visit, "../../", results) {
+                    p { (visit.t("If this unit is wrong, set another one. The pair is then computed again.", "Nếu đơn vị này sai, hãy đặt đơn vị khác. Sau đó cặp này được tính lại.")) }
+                    p.row { (link) }
+                } @else {
+                    (pair_remedy(visit, key, stored.failure.class, &[results]))
+                }
             }
         }
         @for warning in input_warnings::of_pair(results) {

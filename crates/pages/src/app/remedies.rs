@@ -5,9 +5,10 @@ use std::path::Path;
 use maud::{Markup, html};
 
 use super::address::encoded;
+use super::scan_correction::ScanQuestion;
 use super::visit::Visit;
 use mocban_catalog::{BlockAttributes, PairAttributes, PairResults};
-use mocban_core::domain::{BlockStage, FailureClass, NOT_THERE, Stage};
+use mocban_core::domain::{BlockStage, FailureClass, NOT_THERE, Stage, one_line};
 
 /// Where the files of pairs or blocks were named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,6 +92,21 @@ pub(super) fn pair_remedy(
         (!all_missing).then(|| visit.remedy(class)),
         missing > 0,
     )
+}
+
+/// Returns the link to the page that sets the unit of a pair's scan, if the pair failed because of it. A pair that was cut
+/// from a block has the block's unit. `project` is the relative address of the project's pages.
+pub(super) fn unit_link(visit: &Visit, project: &str, pair: &PairResults) -> Option<Markup> {
+    let names_unit = (pair.failure.as_ref()).is_some_and(|stored| stored.failure.names_unit());
+    if !names_unit || pair.attributes.prior.is_some() {
+        return None;
+    }
+    let name = pair.attributes.name.as_str();
+    let question = ScanQuestion::Unit;
+    let title = question.title(visit, 1);
+    Some(html! {
+        a href={ (project) "correct?what=" (question.name()) "&pair=" (encoded(name)) } aria-label={ (title) ": " (one_line(name)) } { (title) }
+    })
 }
 
 /// Returns what helps after a stage of a block failed. `key` names the project.
