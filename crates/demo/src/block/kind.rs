@@ -54,6 +54,8 @@ pub enum BlockKind {
     Stamped,
     /// Any of the faults of the kinds from `coarse` on at once, as in the scans of libraries.
     Library,
+    /// An intact small block with 30 to 90 characters.
+    Small,
 }
 
 enum_names! { pub BlockKind, "a kind of block":
@@ -61,7 +63,7 @@ enum_names! { pub BlockKind, "a kind of block":
     HalfPage = "half-page", OpenedBook = "opened-book", Broken = "broken", Holder = "holder",
     Turntable = "turntable", ScannerBed = "scanner-bed", Fine = "fine", WrongPage = "wrong-page", Mixed = "mixed",
     Coarse = "coarse", TallNotes = "tall-notes", BrokenRules = "broken-rules", Sparse = "sparse",
-    Registers = "registers", Stamped = "stamped", Library = "library",
+    Registers = "registers", Stamped = "stamped", Library = "library", Small = "small",
 }
 
 /// Which part of the page an image shows.
@@ -89,6 +91,8 @@ pub(super) enum BlockSupport {
 /// Ranges from which the conditions of a block and its page are drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockRanges {
+    /// Width and height of the text, from which the numbers of columns and rows follow, mm.
+    pub text_mm: [NumberRange; 2],
     /// Size of the characters as a fraction of the usual size.
     pub scale: NumberRange,
     /// Fraction of the columns that contain notes.
@@ -143,6 +147,7 @@ pub(super) struct BlockRanges {
 
 /// An intact block with a page scanned almost straight.
 const PLAIN: BlockRanges = BlockRanges {
+    text_mm: [[235.0, 300.0], [175.0, 222.0]],
     scale: [1.0, 1.0],
     notes: [0.0, 0.0],
     appearance: AppearanceRanges::CLEAN,
@@ -340,6 +345,16 @@ const LIBRARY: BlockRanges = BlockRanges {
     ..PLAIN
 };
 
+const SMALL: BlockRanges = BlockRanges {
+    text_mm: [[70.0, 90.0], [110.0, 130.0]],
+    folded: 0.0,
+    double_faced: 0.0,
+    lost: [0.0, 0.0],
+    cracks: [0.0, 0.0],
+    bow_mm: [0.1, 0.5],
+    ..PLAIN
+};
+
 /// Which block is made. The same options give the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BlockOptions {
@@ -388,6 +403,7 @@ impl BlockKind {
             Self::Registers => &REGISTERS,
             Self::Stamped => &STAMPED,
             Self::Library => &LIBRARY,
+            Self::Small => &SMALL,
         }
     }
 }

@@ -346,6 +346,20 @@ mod tests {
     }
 
     #[test]
+    fn pages_of_small_blocks_hold_few_characters() {
+        for page in layouts(BlockKind::Small) {
+            assert!(
+                (12..=105).contains(&page.cells.len()),
+                "{}",
+                page.cells.len()
+            );
+            let [width, height] = page.outer.size();
+            assert!((55.0..105.0).contains(&width), "{width}");
+            assert!((95.0..142.0).contains(&height), "{height}");
+        }
+    }
+
+    #[test]
     fn notes_have_half_the_size_and_do_not_overlap() {
         let mut notes = 0;
         for page in layouts(BlockKind::Notes) {

@@ -9,9 +9,9 @@ use crate::draw::within;
 /// Most characters of a page, without notes.
 const MAX_CELLS: usize = 520;
 /// Fewest and most rows of a column.
-const ROWS: [usize; 2] = [10, 22];
+const ROWS: [usize; 2] = [7, 22];
 /// Fewest columns.
-const MIN_COLUMNS: usize = 7;
+const MIN_COLUMNS: usize = 4;
 
 /// Sizes of the parts of a page, mm.
 #[derive(Debug, Clone, Copy)]
@@ -42,9 +42,10 @@ impl PageMeasures {
 
     /// Draws the sizes of a page.
     pub(super) fn draw(ranges: &BlockRanges, is_folded: bool, rng: &mut ChaCha8Rng) -> Self {
+        let [width_mm, height_mm] = ranges.text_mm.map(|[low, high]| low..high);
         let scale = within(ranges.scale, rng);
         let row_pitch = scale * rng.random_range(10.0..13.6);
-        let height = rng.random_range(175.0..222.0);
+        let height = rng.random_range(height_mm);
         let rows = ((height / row_pitch) as usize).clamp(ROWS[0], ROWS[1]);
         let column_pitch = row_pitch * rng.random_range(1.1..1.42);
         let strip = if is_folded {
@@ -52,7 +53,7 @@ impl PageMeasures {
         } else {
             0.0
         };
-        let width = rng.random_range(235.0..300.0);
+        let width = rng.random_range(width_mm);
         let fitting = ((width - strip) / column_pitch) as usize;
         let columns = fitting.clamp(MIN_COLUMNS, (MAX_CELLS / rows).max(MIN_COLUMNS));
         Self {
