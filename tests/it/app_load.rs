@@ -6,7 +6,7 @@ use crate::app::{act, open_app, text};
 use crate::app_export_zip::export_table;
 use crate::app_killed_actions::write_block;
 use crate::app_uploads::{begun, end, put};
-use crate::block_view::finished_block;
+use crate::block_view::finished_page;
 use crate::cli::mocban;
 use crate::page::{Page, answer, read_project};
 use crate::review_load::peak_mib;
@@ -170,7 +170,7 @@ fn the_memory_of_the_app_does_not_grow_with_the_number_of_requests() {
 #[test]
 fn the_memory_of_the_app_does_not_grow_when_a_block_is_opened_again() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    finished_block(dir.path());
+    finished_page(dir.path());
     let page = open_app(dir.path());
     let round = |trials: usize| {
         for _ in 0..trials {

@@ -9,14 +9,14 @@ use serde_json::{Value, json};
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
 use crate::page::{Page, Reply, send};
-use crate::small_block::{demo_block, stored_block};
+use crate::small_block::{demo_page, stored_block};
 
 /// Part of the page's width and height that the fragment shows.
 const FRAGMENT: f64 = 0.42;
 
 /// Creates a project `p` with the block `b1` of a fragment of its page, which is too small for the search.
 pub(crate) fn refused_block(dir: &Path) {
-    demo_block(dir);
+    demo_page(dir);
     let page = fs::read(dir.join("d/data/page.jpg")).expect("the page");
     let page = decode(&page, &ImageLimits::SUGGESTED)
         .expect("an image")

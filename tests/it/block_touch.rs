@@ -6,7 +6,7 @@ use crate::app::app;
 use crate::app_browser::enter;
 use crate::block_boxes::{SAVED, SHOWN, chosen, on_screen};
 use crate::block_correction::{on_picture, true_points};
-use crate::block_view::{BLOCK_SHOWN, finished_block, third_box};
+use crate::block_view::{BLOCK_SHOWN, finished_page, third_box};
 use crate::browser::{Browser, Tab};
 use crate::page::Page;
 use crate::small_block::{CHARACTERS, stored_block};
@@ -155,7 +155,7 @@ fn a_block_is_corrected_by_touch_alone_and_by_keys_alone() {
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let dir = dir.path();
-    finished_block(dir);
+    finished_page(dir);
     let page = Page::of(app(dir).args(["--lang", "en"]));
     let (tab, home) = enter(&browser, &page, WINDOWS[0]);
     let open = |tab: &Tab<'_>, path: &str, shown: &str| {

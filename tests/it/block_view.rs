@@ -10,7 +10,7 @@ use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
 use crate::made_once::copy_of;
 use crate::page::Page;
-use crate::small_block::{demo_block, few_labels};
+use crate::small_block::{demo_block, demo_page, few_labels};
 
 /// The page of a block is shown.
 pub(crate) const BLOCK_SHOWN: &str =
@@ -33,12 +33,28 @@ const HOLD_RELIEF: &str = "(() => {
 
 /// Creates a project `p` with a finished block `b1` of six characters. The truth is in `d/data/truth.json`.
 pub(crate) fn finished_block(dir: &Path) {
-    copy_of("a finished block", dir, finish_block);
+    copy_of("a finished block", dir, |dir| {
+        import_block(dir);
+        mocban(dir, &["-C", "p", "run"]).expect(0);
+    });
 }
 
-/// Makes the project of [`finished_block`] with its inputs in this folder.
-pub(crate) fn finish_block(dir: &Path) {
+/// Like [`finished_block`], with a block of a whole page.
+pub(crate) fn finished_page(dir: &Path) {
+    copy_of("a finished block of a page", dir, |dir| {
+        demo_page(dir);
+        import(dir);
+        mocban(dir, &["-C", "p", "run"]).expect(0);
+    });
+}
+
+/// Makes the project of [`finished_block`] with its inputs in this folder, before its run.
+pub(crate) fn import_block(dir: &Path) {
     demo_block(dir);
+    import(dir);
+}
+
+fn import(dir: &Path) {
     few_labels(dir, &dir.join("few.json"));
     let import = [
         "-C",
@@ -54,7 +70,6 @@ pub(crate) fn finish_block(dir: &Path) {
         "b1",
     ];
     mocban(dir, &import).expect(0);
-    mocban(dir, &["-C", "p", "run"]).expect(0);
 }
 
 fn picture(file: &Path) -> Grid<[u8; 3]> {
@@ -88,7 +103,7 @@ fn check_pictures(dir: &Path) {
     let overlay = [&args[..], &["--overlay", "-o", "relief.png"]].concat();
     mocban(dir, &overlay).expect(0);
     let overlay = picture(&dir.join("relief.png"));
-    // The page of 10 px/mm is drawn with 12 and with 6 px/mm.
+    // The page of 9 px/mm is drawn with 12 and with 6 px/mm.
     let ratio = page.width() as f64 / overlay.width() as f64;
     assert!((1.99..2.01).contains(&ratio), "{ratio}");
     let both = pixels(&overlay, [40; 3]);

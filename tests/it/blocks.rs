@@ -8,7 +8,7 @@ use mocban::mesh::{self, MeshLimits};
 use serde_json::Value;
 
 use crate::cli::{Call, mocban};
-use crate::small_block::{demo_block, few_labels, few_labels_with};
+use crate::small_block::{demo_block, demo_page, few_labels, few_labels_with};
 
 /// A file that is a mesh of one triangle, which no page belongs to.
 const TRIANGLE: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 300 0 0\nvertex 0 200 0\nendloop\nendfacet\nendsolid a\n";
@@ -310,7 +310,8 @@ fn replaced_labels_give_the_results_of_a_new_import() {
 fn doubts_about_the_unit_and_the_colours_of_a_block_are_told_by_run_and_kept() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let dir = dir.path();
-    demo_block(dir);
+    // A small block would be too short for a block in this unit.
+    demo_page(dir);
     few_labels(dir, &dir.join("few.json"));
     let bytes = fs::read(dir.join("d/data/block.ply")).expect("the scan");
     let mesh = mesh::read(&bytes, "block.ply", &MeshLimits::SUGGESTED);

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::block_view::finish_block;
+use crate::block_view::import_block;
 use crate::browser::Browser;
 use crate::check::{at, done};
 use crate::cli::{binary, empty, mocban};
@@ -200,7 +200,7 @@ fn reports_sheets_and_logs_replace_only_their_own_earlier_files() {
 #[test]
 fn files_of_a_block_are_never_an_output() {
     let dir = empty();
-    finish_block(dir.path());
+    import_block(dir.path());
     for (name, reason) in [
         ("d/data/page.jpg", "cannot be written as jpg"),
         ("d/data/block.ply", "is an input of b1"),

@@ -1,4 +1,4 @@
-//! A generated block that several tests use.
+//! Generated blocks that several tests use.
 
 use std::fs;
 use std::path::Path;
@@ -11,26 +11,26 @@ use crate::made_once::copy_of;
 /// Number of characters that [`few_labels`] names.
 pub(crate) const CHARACTERS: usize = 6;
 
-/// Creates the folder `d/data` with the files of `demo --block`, at a spacing of 0.5 mm. All tests copy the same files.
+/// Creates the folder `d/data` with the files of a small block, at a spacing of 0.5 mm. All tests copy the same files.
 pub(crate) fn demo_block(dir: &Path) {
-    copy_of("a block", dir, |dir| {
-        let demo = [
-            "demo",
-            "d",
-            "--block=plain",
-            "--seed",
-            "3",
-            "--spacing",
-            "0.5",
-            "--no-run",
-        ];
-        mocban(dir, &demo).expect(0);
-        // Tests make projects of their own from the files.
-        fs::remove_file(dir.join("d/catalog.sqlite")).expect("removed");
+    copy_of("a small block", dir, |dir| make(dir, "--block=small", "4"));
+}
+
+/// Like [`demo_block`], with a block of a whole page, whose work takes four times as long.
+pub(crate) fn demo_page(dir: &Path) {
+    copy_of("a block of a page", dir, |dir| {
+        make(dir, "--block=plain", "3");
     });
 }
 
-/// Writes labels of a few characters of the block that [`demo_block`] has created.
+/// Makes the files of a block without a project, because tests make projects of their own from the files.
+fn make(dir: &Path, kind: &str, seed: &str) {
+    let demo = ["demo", "d", kind, "--seed", seed, "--spacing", "0.5"];
+    mocban(dir, &[&demo[..], &["--no-run"]].concat()).expect(0);
+    fs::remove_file(dir.join("d/catalog.sqlite")).expect("removed");
+}
+
+/// Writes labels of a few characters of the block that [`demo_block`] or [`demo_page`] has created, from all over its page.
 pub(crate) fn few_labels(dir: &Path, file: &Path) {
     few_labels_with(dir, file, |_| ());
 }
@@ -41,8 +41,10 @@ pub(crate) fn few_labels_with(dir: &Path, file: &Path, change: impl FnOnce(&mut 
     let mut labels: Value = serde_json::from_str(&labels).expect("JSON");
     let files = labels["_via_img_metadata"].as_object_mut().expect("files");
     let of_page = files.values_mut().next().expect("a file");
-    let regions = of_page["regions"].as_array().expect("regions").iter();
-    let mut few: Vec<Value> = regions.step_by(30).take(CHARACTERS).cloned().collect();
+    let regions = of_page["regions"].as_array().expect("regions");
+    let few = regions.iter().step_by(regions.len() / (CHARACTERS + 1));
+    let few = few.take(CHARACTERS);
+    let mut few: Vec<Value> = few.cloned().collect();
     assert_eq!(few.len(), CHARACTERS);
     change(&mut few);
     of_page["regions"] = json!(few);
