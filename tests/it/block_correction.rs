@@ -8,14 +8,21 @@ use serde_json::{Value, json};
 
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
+use crate::made_once::copy_of;
 use crate::page::{Page, Reply, send};
 use crate::small_block::{demo_page, stored_block};
 
 /// Part of the page's width and height that the fragment shows.
 const FRAGMENT: f64 = 0.42;
 
-/// Creates a project `p` with the block `b1` of a fragment of its page, which is too small for the search.
+/// Creates a project `p` with the block `b1` of a fragment of its page, which is too small for the search. The truth is in
+/// `d/data/truth.json`.
 pub(crate) fn refused_block(dir: &Path) {
+    copy_of("a refused block", dir, refuse_block);
+}
+
+/// Makes the project of [`refused_block`] with its inputs in this folder.
+fn refuse_block(dir: &Path) {
     demo_page(dir);
     let page = fs::read(dir.join("d/data/page.jpg")).expect("the page");
     let page = decode(&page, &ImageLimits::SUGGESTED)
@@ -362,7 +369,7 @@ fn use_page(dir: &Path, tab: &Tab<'_>) {
 fn a_fragment_of_a_page_is_aligned_from_points_that_a_person_chooses() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let dir = dir.path();
-    refused_block(dir);
+    refuse_block(dir);
     let start = || {
         Page::of(
             binary()
