@@ -8,7 +8,8 @@ use mocban::store::Project;
 
 use crate::check::{at, done, exported, sql};
 use crate::cli::mocban;
-use crate::resume::{copy_folder, pairs_done, project, run};
+use crate::made_once::copy_folder;
+use crate::resume::{pairs_done, project, run};
 use crate::waiting::until;
 
 pub(crate) fn files(dir: &Path) -> Vec<String> {

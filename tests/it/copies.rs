@@ -11,8 +11,8 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::check::done;
 use crate::cli::{Call, binary, call, empty, mocban};
+use crate::made_once::copy_folder;
 use crate::postgres_server::url;
-use crate::resume::copy_folder;
 use crate::test_size::trials;
 
 /// Pairs of a list without files.

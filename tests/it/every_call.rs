@@ -35,7 +35,7 @@ fn prepare(comparison: &Comparison, root: &Path, write: fn(&Path) -> Command) {
     let output = root.join("out");
     let kept = root.join(EARLIER);
     if output.is_dir() {
-        crate::resume::copy_folder(&output, &kept);
+        crate::made_once::copy_folder(&output, &kept);
     } else {
         std::fs::copy(output, kept).expect("copied");
     }

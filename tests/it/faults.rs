@@ -11,7 +11,8 @@ use crate::backup::files as names;
 use crate::cli::{binary, call, mocban};
 use crate::fault::{EAGAIN, EIO, ENOSPC, Fault};
 use crate::fault_scenario::{End, FaultScenario, fault_points};
-use crate::resume::{copy, copy_folder, run};
+use crate::made_once::copy_folder;
+use crate::resume::{copy, run};
 use crate::uninterrupted::{Comparison, files};
 
 const WAL: &str = "p/catalog.sqlite-wal";

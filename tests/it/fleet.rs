@@ -10,9 +10,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use crate::cli::{Call, binary, call, empty, mocban};
-use crate::made_once::copy_of;
+use crate::made_once::{copy_folder, copy_of};
 use crate::postgres_server::Server;
-use crate::resume::{copy_folder, project};
+use crate::resume::project;
 use crate::test_size::size_from_env;
 use crate::uninterrupted::files;
 use crate::waiting::{PATIENT_CONNECT, pause, until};

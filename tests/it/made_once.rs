@@ -4,8 +4,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock};
 
-use crate::resume::copy_folder;
-
 /// The folders by name. Each has a lock of its own, so that two can be made at the same time.
 static MADE: Mutex<BTreeMap<String, Arc<OnceLock<tempfile::TempDir>>>> =
     Mutex::new(BTreeMap::new());
@@ -21,4 +19,21 @@ pub(crate) fn copy_of(name: &str, to: &Path, make: impl FnOnce(&Path)) {
         dir
     });
     copy_folder(made.path(), to);
+}
+
+/// Copies a folder with everything below it.
+pub(crate) fn copy_folder(from: &Path, to: &Path) {
+    let mut folders = vec![(from.to_owned(), to.to_owned())];
+    while let Some((from, to)) = folders.pop() {
+        std::fs::create_dir_all(&to).expect("a folder");
+        for entry in std::fs::read_dir(from).expect("a folder") {
+            let from = entry.expect("an entry").path();
+            let to = to.join(from.file_name().expect("a name"));
+            if from.is_dir() {
+                folders.push((from, to));
+            } else {
+                std::fs::copy(from, to).expect("copied");
+            }
+        }
+    }
 }

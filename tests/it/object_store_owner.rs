@@ -4,9 +4,9 @@
 use std::process::Command;
 
 use crate::cli::{call, mocban};
+use crate::made_once::copy_folder;
 use crate::object_store::Remote;
 use crate::own_port::own_port;
-use crate::resume::copy_folder;
 
 /// A backup restored beside the original, and a copied folder, name the same bucket.
 #[test]

@@ -7,7 +7,7 @@ use mocban::store::Project;
 
 use crate::check::{at, below, done};
 use crate::cli::mocban;
-use crate::resume::copy_folder;
+use crate::made_once::copy_folder;
 
 /// The commands that write or remove artifacts.
 const CHANGING: [&[&str]; 4] = [

@@ -8,8 +8,9 @@ use sqlx::postgres::PgConnectOptions;
 use sqlx::{ConnectOptions as _, Row as _};
 
 use crate::cli::{Call, binary, call, empty, mocban};
+use crate::made_once::copy_folder;
 use crate::postgres_server::{Server, other_user};
-use crate::resume::{copy_folder, project};
+use crate::resume::project;
 use crate::skipped::say_skipped;
 use crate::waiting::wait_until;
 

@@ -12,7 +12,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use mocban::store::Project;
 
 use crate::cli::{binary, call, mocban};
-use crate::resume::{attempts, copy, copy_folder, run, stages_done};
+use crate::made_once::copy_folder;
+use crate::resume::{attempts, copy, run, stages_done};
 use crate::shim::SHADOW;
 use crate::test_size::size_from_env;
 use crate::uninterrupted::Comparison;

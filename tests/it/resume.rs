@@ -9,6 +9,7 @@ use mocban::domain::{JobStatus, Stage};
 use mocban::store::Project;
 
 use crate::cli::{binary, call, mocban};
+use crate::made_once::copy_folder;
 
 /// Small depth maps, because these tests are not about the alignment.
 const SMALL_DEPTH: [&str; 2] = ["--set", "depth.longest_px=96"];
@@ -43,23 +44,6 @@ pub(crate) fn project(dir: &Path, name: &str, pairs: &str) -> Project {
 pub(crate) fn copy(project: &Project, to: &Path) -> Project {
     copy_folder(project.dir(), to);
     Project::open(to).expect("a project")
-}
-
-/// Copies a folder with everything below it.
-pub(crate) fn copy_folder(from: &Path, to: &Path) {
-    let mut folders = vec![(from.to_owned(), to.to_owned())];
-    while let Some((from, to)) = folders.pop() {
-        std::fs::create_dir_all(&to).expect("a folder");
-        for entry in std::fs::read_dir(from).expect("a folder") {
-            let from = entry.expect("an entry").path();
-            let to = to.join(from.file_name().expect("a name"));
-            if from.is_dir() {
-                folders.push((from, to));
-            } else {
-                std::fs::copy(from, to).expect("copied");
-            }
-        }
-    }
 }
 
 /// Returns the command `run` with these arguments.
