@@ -9,7 +9,7 @@ use mocban::domain::{JobStatus, Stage};
 use mocban::store::Project;
 
 use crate::cli::{binary, call, mocban};
-use crate::made_once::copy_folder;
+use crate::made_once::{copy_folder, copy_of};
 
 /// Small depth maps, because these tests are not about the alignment.
 const SMALL_DEPTH: [&str; 2] = ["--set", "depth.longest_px=96"];
@@ -34,10 +34,13 @@ const POINTS: [(&str, Option<&str>); 14] = [
     ("register:committed", None),
 ];
 
-/// Creates a demo project whose pairs have not run.
+/// Creates a demo project whose pairs have not run. All tests copy the same project of each number of pairs.
 pub(crate) fn project(dir: &Path, name: &str, pairs: &str) -> Project {
-    mocban(dir, &["demo", name, "--pairs", pairs, "--no-run"]).expect(0);
-    Project::open(&dir.join(name)).expect("a project")
+    let to = dir.join(name);
+    copy_of(&format!("{pairs} pairs of the demo"), &to, |made| {
+        mocban(made, &["demo", ".", "--pairs", pairs, "--no-run"]).expect(0);
+    });
+    Project::open(&to).expect("a project")
 }
 
 /// Copies a project to another folder.
