@@ -16,10 +16,22 @@ const FOLDERS: [&str; 7] = [
     "/usr/pgsql/bin",
 ];
 
-/// Creates a database cluster in the folder `$1` with the programs in `$2`, and starts the server. Then stops it at once,
-/// as in a crash, for each line `stop`, and starts it for each line `start`. Prints a line after each. Ends, and removes
-/// the folder, when its standard input ends. The server refuses to run as root, so `$3` may hold a command that changes
-/// the user. `$4` may hold more options of the server. The user `guarded` needs a password.
+/// Creates the files of a database cluster in the folder `$1` with the programs in `$2`, and prints a line. Removes the
+/// folder when its standard input ends. The programs refuse to run as root, so `$3` may hold a command that changes the
+/// user. The user `guarded` needs a password.
+const CLUSTER_SCRIPT: &str = r#"
+cd "$1" || exit 1
+$3 "$2/initdb" -D "$1/data" -U mocban -A trust --no-sync --locale=C -E UTF8 >"$1/log" 2>&1 || exit 1
+printf 'local all guarded scram-sha-256\nlocal all all trust\nhost all all 127.0.0.1/32 trust\n' | $3 tee "$1/data/pg_hba.conf" >/dev/null
+echo ready
+read -r _
+rm -rf "$1"
+"#;
+
+/// Copies the cluster of the folder `$5` to the folder `$1`, and starts the server with the programs in `$2`. Then stops
+/// it at once, as in a crash, for each line `stop`, and starts it for each line `start`. Prints a line after each. Ends, and
+/// removes the folder, when its standard input ends. `$3` is that of [`CLUSTER_SCRIPT`]. `$4` may hold more options of the
+/// server.
 const SCRIPT: &str = r#"
 cd "$1" || exit 1
 start() {
@@ -31,8 +43,7 @@ start() {
     done
     echo ready
 }
-$3 "$2/initdb" -D "$1/data" -U mocban -A trust --no-sync --locale=C -E UTF8 >"$1/log" 2>&1 || exit 1
-printf 'local all guarded scram-sha-256\nlocal all all trust\nhost all all 127.0.0.1/32 trust\n' | $3 tee "$1/data/pg_hba.conf" >/dev/null
+$3 cp -R "$5/data" "$1/data" || exit 1
 start "$1" "$2" "$3" "$4"
 while read -r command; do
     case $command in
@@ -48,12 +59,15 @@ rm -rf "$1"
 /// The port in the name of a server's socket, unless it listens on a port of its own.
 const DEFAULT_PORT: u16 = 5432;
 
+/// Standard input and output of a script. It ends with this process, so nobody waits for it.
+type ScriptPipes = (ChildStdin, BufReader<ChildStdout>);
+
 /// A running server.
 #[derive(Debug)]
 pub(crate) struct Server {
     /// Address of its database, to which parameters can be added with `&`.
     url: String,
-    commands: Mutex<(ChildStdin, BufReader<ChildStdout>)>,
+    commands: Mutex<ScriptPipes>,
 }
 
 /// Returns the address of a server that all tests of this process share, unless `MOCBAN_TEST_POSTGRES` names one.
@@ -87,23 +101,14 @@ impl Server {
             SKIPPED.call_once(|| drop(std::io::stderr().write_all(text.as_bytes())));
             return None;
         };
-        let dir = tempfile::Builder::new().prefix("mocban-pg-").tempdir();
-        let dir = dir.expect("a temporary directory").keep();
+        let cluster = cluster(&programs);
+        let dir = new_folder();
         prepare(&dir);
         let user = other_user(&dir);
-        // It ends with this process, so nobody waits for it.
-        #[allow(clippy::zombie_processes, reason = "the script ends with this process")]
-        let mut script = Command::new("sh")
-            .args(["-c", SCRIPT, "sh"])
-            .args([&dir, &programs])
-            .args([user, options])
-            .env("PGPORT", port.to_string())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("a shell");
-        let input = script.stdin.take().expect("a pipe");
-        let output = script.stdout.take().expect("a pipe");
+        let mut script = Command::new("sh");
+        script.args(["-c", SCRIPT, "sh"]).args([&dir, &programs]);
+        script.args([user, options]).arg(cluster);
+        script.env("PGPORT", port.to_string());
         let place = match port {
             DEFAULT_PORT => String::new(),
             port => format!(":{port}"),
@@ -113,7 +118,7 @@ impl Server {
                 "postgres://mocban@localhost{place}/postgres?host={}",
                 dir.display()
             ),
-            commands: Mutex::new((input, BufReader::new(output))),
+            commands: Mutex::new(started(&mut script)),
         };
         assert!(
             server.is_ready(),
@@ -156,10 +161,50 @@ impl Server {
 
     /// Reads the script's answer.
     fn is_ready(&self) -> bool {
-        let mut line = String::new();
-        let mut commands = self.commands.lock().expect("no panic");
-        commands.1.read_line(&mut line).is_ok() && line == "ready\n"
+        is_ready(&mut self.commands.lock().expect("no panic"))
     }
+}
+
+/// Creates a temporary folder, which a script removes.
+fn new_folder() -> PathBuf {
+    let dir = tempfile::Builder::new().prefix("mocban-pg-").tempdir();
+    dir.expect("a temporary directory").keep()
+}
+
+/// Starts a script that ends when its standard input does.
+fn started(script: &mut Command) -> ScriptPipes {
+    #[allow(clippy::zombie_processes, reason = "the script ends with this process")]
+    let mut script = script
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("a shell");
+    let input = script.stdin.take().expect("a pipe");
+    let output = script.stdout.take().expect("a pipe");
+    (input, BufReader::new(output))
+}
+
+/// Reads a script's answer.
+fn is_ready((_, output): &mut ScriptPipes) -> bool {
+    let mut line = String::new();
+    output.read_line(&mut line).is_ok() && line == "ready\n"
+}
+
+/// Returns the folder with the files of a new cluster, which all servers of this process copy.
+fn cluster(programs: &Path) -> &'static Path {
+    static MADE: OnceLock<(PathBuf, Mutex<ScriptPipes>)> = OnceLock::new();
+    let (dir, _) = MADE.get_or_init(|| {
+        let dir = new_folder();
+        let user = other_user(&dir);
+        let mut script = Command::new("sh");
+        script.args(["-c", CLUSTER_SCRIPT, "sh"]);
+        script.args([dir.as_path(), programs]).arg(user);
+        let mut pipes = started(&mut script);
+        let is_made = is_ready(&mut pipes);
+        assert!(is_made, "initdb failed: see {}", dir.display());
+        (dir, Mutex::new(pipes))
+    });
+    dir
 }
 
 /// Returns a command that changes the user if this process is root's, and gives the folder and its files to that user.
