@@ -171,7 +171,7 @@ mod tests {
 
     use super::{BlockOptions, block_options, find_block, write_block};
     use crate::DatasetError;
-    use crate::block::BlockKind;
+    use crate::block::{BlockKind, BlockTruth};
     use mocban_core::mesh::{MeshLimits, read};
 
     const OPTIONS: BlockOptions = BlockOptions {
@@ -194,6 +194,10 @@ mod tests {
         let mesh = std::fs::read(&written.mesh).expect("the mesh");
         let mesh = read(&mesh, "block.ply", &MeshLimits::SUGGESTED).expect("a mesh");
         assert_eq!(mesh.triangles.len(), written.triangles);
+        let truth = std::fs::read(&written.truth).expect("the truth");
+        let truth: BlockTruth = serde_json::from_slice(&truth).expect("JSON");
+        assert_eq!(truth.characters.len(), written.characters);
+        assert!(truth.characters.iter().any(|character| character.part.note));
         let found = write_block(&data, &OPTIONS, &|| true).expect("nothing to write");
         assert!(found.already_existed && found.page == written.page && found.page.exists());
         let other = BlockOptions { seed: 5, ..OPTIONS };
