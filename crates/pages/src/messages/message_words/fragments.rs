@@ -3,6 +3,9 @@
 /// Literals that are parts of sentences, or no messages: names of columns, values and notes of the code.
 pub(super) const FRAGMENTS: &[&str] = &[
     "the file {}",
+    "have the same name (upper and lower case, accents and blanks do not count)",
+    "columns {first} and {second}, {shown} and {shown_other}, {HAVE_SAME_NAME}; rename one of them",
+    "the keys {one} and {other} {HAVE_SAME_NAME}; leave one of them out",
     "{place}: {}; correct or remove it",
     "the file has no boxes{}; draw at least one",
     "the labels are for an image of {} x {} px, the page is {} x {} px{}; take the image that was labelled",
@@ -125,6 +128,8 @@ pub(super) const FRAGMENTS: &[&str] = &[
 
 /// Sentences as pages get them, with each kind of these parts.
 pub(super) const SENTENCES: &[&str] = &[
+    "line 1: columns 3 and 4, \"a\" and \"A\", have the same name (upper and lower case, accents and blanks do not count); rename one of them",
+    "line 2: the keys \"a\" and \"A\" have the same name (upper and lower case, accents and blanks do not count); leave one of them out",
     "b.json: the file is a PNG image; labels are VIA (JSON or CSV), COCO, labelme, YOLO, PAGE-XML or {\"bboxes\": [{\"x_min\": ...}]}, in UTF-8",
     "b.json: the file is text in another encoding; labels are VIA (JSON or CSV), COCO, labelme, YOLO, PAGE-XML or {\"bboxes\": [{\"x_min\": ...}]}, in UTF-8",
     "b.json: JSON with the keys \"c\", \"d\" and 3 more is not a known format; labels are VIA (JSON or CSV), COCO, labelme, YOLO, PAGE-XML or {\"bboxes\": [{\"x_min\": ...}]}",
