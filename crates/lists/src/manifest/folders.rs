@@ -3,52 +3,21 @@
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use super::error::{ManifestError, at_file, of_list};
+use super::folder_file::FolderFile;
 use super::row::ManifestRow;
-use crate::columns::plain_name;
+use super::similar_files::{no_equal_name, similar};
 use mocban_core::domain::PairName;
-use mocban_core::domain::spelling::{composed, fold_case, plain_form, quoted};
+use mocban_core::domain::spelling::{fold_case, quoted};
 
 /// Extensions of meshes.
 pub const MESH_EXTENSIONS: [&str; 6] = ["obj", "ply", "stl", "xyz", "pts", "ptx"];
 /// Extensions of prints.
 pub const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
-
-/// Folders that name a kind of file, such as `stl` in `block-4/stl/12.stl`, as [`plain_name`] writes them. They are no part
-/// of ids.
-const KIND_FOLDERS: [&str; 24] = [
-    "image",
-    "images",
-    "img",
-    "jpeg",
-    "jpg",
-    "mesh",
-    "meshes",
-    "obj",
-    "ply",
-    "png",
-    "print",
-    "prints",
-    "scan",
-    "scans",
-    "stl",
-    "tif",
-    "tiff",
-    "quet",
-    "ban_quet",
-    "luoi",
-    "in",
-    "ban_in",
-    "anh_in",
-    "anh_ban_in",
-];
-
-/// Longest list of similar files in a message.
-const MAX_SIMILAR: usize = 5;
 
 /// Returns whether the extension of a path is that of a mesh.
 pub fn is_named_like_mesh(path: &Path) -> bool {
@@ -273,51 +242,6 @@ fn without_files(roots: [&PathBuf; 2], are_empty: [bool; 2]) -> Option<String> {
     }
 }
 
-/// Says that no names are equal, or that only the folders of files with equal names differ.
-fn no_equal_name(meshes: &[FolderFile], prints: &[FolderFile], similar: &[String]) -> String {
-    let reason = "no mesh has the same file name as a print";
-    if let Some(first) = similar.first() {
-        return format!("{reason}; {first}");
-    }
-    let prints = grouped(prints, |print| fold_case(&print.stem));
-    let other_folder = meshes.iter().find_map(|mesh| {
-        let prints = prints.get(&fold_case(&mesh.stem))?.iter().copied();
-        // Of equally near ones the first.
-        let print = prints.rev().max_by_key(|print| mesh.shared_folders(print))?;
-        let [mesh_folder, print_folder] = [mesh, print].map(|file| quoted(&file.folders.join("/")));
-        let (mesh, print) = (mesh.path.display(), print.path.display());
-        Some(format!(
-            "{mesh} and {print} have the same name, but their folders {mesh_folder} and {print_folder} differ; give both one name, or name them scans and prints, or quét and in"
-        ))
-    });
-    other_folder.unwrap_or_else(|| reason.to_owned())
-}
-
-/// Returns files by a key.
-fn grouped(
-    files: &[FolderFile],
-    key: impl Fn(&FolderFile) -> String,
-) -> BTreeMap<String, Vec<&FolderFile>> {
-    let mut groups: BTreeMap<String, Vec<&FolderFile>> = BTreeMap::new();
-    for file in files {
-        groups.entry(key(file)).or_default().push(file);
-    }
-    groups
-}
-
-/// Describes meshes and prints without each other whose ids differ only in accents or in zeros before a number.
-fn similar(meshes: &[FolderFile], prints: &[FolderFile]) -> Vec<String> {
-    let prints = grouped(prints, |print| plain_form(&print.id()));
-    let similar = meshes.iter().flat_map(|mesh| {
-        let prints = prints.get(&plain_form(&mesh.id())).into_iter().flatten();
-        prints.map(move |print| {
-            let (mesh, print) = (mesh.path.display(), print.path.display());
-            format!("{mesh} and {print} have similar names; rename one if they are a pair")
-        })
-    });
-    similar.take(MAX_SIMILAR).collect()
-}
-
 fn row(line: usize, name: PairName, mesh: FolderFile, print: FolderFile) -> ManifestRow {
     ManifestRow {
         line,
@@ -329,66 +253,6 @@ fn row(line: usize, name: PairName, mesh: FolderFile, print: FolderFile) -> Mani
         unit: None,
         scanned_face_down: None,
         meta: BTreeMap::new(),
-    }
-}
-
-/// A file with the folders between it and the root.
-#[derive(Debug, Clone)]
-struct FolderFile {
-    path: PathBuf,
-    /// Names of the folders, without those of kinds of files.
-    folders: Vec<String>,
-    stem: String,
-}
-
-/// Part of a path for sorting: numbers are ordered by value, before all others.
-type SortedPart = (bool, u64, String);
-
-impl FolderFile {
-    /// Splits a path below a root into its parts, in composed letters: a mesh named on macOS and a print named on Windows
-    /// may have different forms of the same letters.
-    fn new(path: &Path, root: &Path) -> Option<Self> {
-        let text =
-            |name: &std::ffi::OsStr| -> String { composed(&name.to_string_lossy()).into_owned() };
-        let below = path.strip_prefix(root).unwrap_or(path);
-        let folders = below.parent().into_iter().flat_map(Path::components);
-        let folders = folders.filter_map(|part| match part {
-            Component::Normal(name) => Some(text(name)),
-            _ => None,
-        });
-        let is_kind = |name: &String| KIND_FOLDERS.contains(&plain_name(name).as_str());
-        Some(Self {
-            folders: folders.filter(|name| !is_kind(name)).collect(),
-            stem: text(path.file_stem()?),
-            path: path.to_owned(),
-        })
-    }
-
-    fn block(&self) -> Option<String> {
-        (!self.folders.is_empty()).then(|| self.folders.join("_"))
-    }
-
-    fn id(&self) -> String {
-        let block = self.block().map_or_else(String::new, |block| block + "_");
-        block + &self.stem
-    }
-
-    /// Returns how many folders of another file have the name of one of this file.
-    fn shared_folders(&self, other: &Self) -> usize {
-        let is_shared = |folder: &&String| {
-            let folded = fold_case(folder);
-            self.folders.iter().any(|own| fold_case(own) == folded)
-        };
-        other.folders.iter().filter(is_shared).count()
-    }
-
-    fn place(&self) -> Vec<SortedPart> {
-        let parts = self.folders.iter().chain([&self.stem]);
-        let sorted = parts.map(|part| {
-            let number = part.parse().ok();
-            (number.is_none(), number.unwrap_or(0), part.clone())
-        });
-        sorted.collect()
     }
 }
 
