@@ -73,6 +73,9 @@ const MAX_ENTRIES: usize = 10_000;
 /// Largest number of missing files for which a similar one is searched: a search lists folders.
 const MAX_SEARCHES: usize = 10;
 
+/// Largest number of folders with similar names in which a similar file is searched.
+const MAX_FOLDERS: usize = 10;
+
 /// Searches files with similar names in place of the first missing ones.
 #[derive(Debug, Default)]
 pub struct SimilarFiles {
@@ -80,34 +83,45 @@ pub struct SimilarFiles {
 }
 
 impl SimilarFiles {
-    /// Returns the path of a file that differs from a missing one only in accents, in upper and lower case, in zeros before
-    /// a number, or in the kind of file, from the first part that differs.
-    pub fn find(&mut self, missing: &Path) -> Option<String> {
+    /// Returns the paths of the files that differ from a missing one only in accents, in upper and lower case, in zeros before
+    /// a number, or in the kind of file, each from the first part that differs.
+    pub fn find(&mut self, missing: &Path) -> Vec<String> {
         self.searches += 1;
         if self.searches > MAX_SEARCHES {
-            return None;
+            return Vec::new();
         }
-        let mut found = PathBuf::new();
-        let mut shown: Option<PathBuf> = None;
+        // Each with its path from the first part that differs.
+        let mut found = vec![(PathBuf::new(), PathBuf::new())];
         for part in missing.components() {
-            let mut next = found.join(part);
-            if let Component::Normal(name) = part
-                && (shown.is_some() || !next.exists())
-            {
-                let name = similar_entry(&found, name.to_str()?)?;
-                next = found.join(&name);
-                shown.get_or_insert_default().push(name);
-            }
-            found = next;
+            found.truncate(MAX_FOLDERS);
+            let next = found.into_iter().flat_map(|(path, shown)| {
+                let exact = path.join(part);
+                let differs = shown != Path::new("");
+                match part {
+                    Component::Normal(name) if differs || !exact.exists() => {
+                        let entries = similar_entries(&path, name.to_str().unwrap_or_default());
+                        let entries = entries.into_iter();
+                        let found = entries.map(|entry| (path.join(&entry), shown.join(entry)));
+                        found.collect::<Vec<_>>()
+                    }
+                    _ => vec![(exact, shown)],
+                }
+            });
+            found = next.collect();
         }
-        shown?.to_str().map(str::to_owned)
+        let shown = found
+            .into_iter()
+            .filter_map(|(_, shown)| shown.into_os_string().into_string().ok());
+        shown.filter(|shown| !shown.is_empty()).collect()
     }
 }
 
-/// Returns the entry of a folder whose name is that given, or similar to it.
-fn similar_entry(folder: &Path, name: &str) -> Option<String> {
+/// Returns the entry of a folder whose name is that given, or those whose names are nearest to it, in order.
+fn similar_entries(folder: &Path, name: &str) -> Vec<String> {
     // The folder of a bare file name is empty.
-    let entries = std::fs::read_dir(Path::new(".").join(folder)).ok()?;
+    let Ok(entries) = std::fs::read_dir(Path::new(".").join(folder)) else {
+        return Vec::new();
+    };
     let names = entries.take(MAX_ENTRIES).flatten();
     let names = names.filter_map(|entry| entry.file_name().into_string().ok());
     let wanted = plain_form(name);
@@ -124,10 +138,13 @@ fn similar_entry(folder: &Path, name: &str) -> Option<String> {
             () => None,
         }
     };
-    names
-        .filter_map(|entry| Some((rank(&entry)?, entry)))
-        .min()
-        .map(|(_, entry)| entry)
+    let ranked = names.filter_map(|entry| Some((rank(&entry)?, entry)));
+    let mut ranked: Vec<(u8, String)> = ranked.collect();
+    ranked.sort();
+    let nearest = ranked.first().map(|(rank, _)| *rank);
+    let ranked = ranked.into_iter();
+    let nearest = ranked.take_while(|(rank, _)| Some(*rank) == nearest);
+    nearest.map(|(_, entry)| entry).collect()
 }
 
 /// Returns whether a part of a path begins like an absolute path of Windows, such as `C:\scans\1.stl`, on another system.
@@ -150,8 +167,14 @@ mod tests {
 
     use super::{SimilarFiles, find_on_disk};
 
-    fn similar_file(path: &Path) -> Option<String> {
+    fn similar_files(path: &Path) -> Vec<String> {
         SimilarFiles::default().find(path)
+    }
+
+    fn similar_file(path: &Path) -> Option<String> {
+        let mut found = similar_files(path);
+        assert!(found.len() < 2, "{found:?}");
+        found.pop()
     }
 
     #[test]
@@ -196,7 +219,27 @@ mod tests {
         assert_eq!(similar("stl/nét 07.stl").as_deref(), Some("STL/Nét 7.PLY"));
         assert_eq!(similar("stl/nét 7.txt"), None);
         let mut many = SimilarFiles::default();
-        let found = (0..12).filter_map(|_| many.find(&dir.path().join("CHU SO 1.STL")));
+        let found = (0..12).flat_map(|_| many.find(&dir.path().join("CHU SO 1.STL")));
         assert_eq!(found.count(), 10);
+    }
+
+    #[test]
+    fn all_files_that_are_equally_near_are_similar() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        for name in ["0117.stl", "00117.stl", "117.ply", "118.stl"] {
+            fs::write(dir.path().join(name), "").expect("written");
+        }
+        let similar = |name: &str| similar_files(&dir.path().join(name));
+        assert_eq!(similar("117.stl"), ["00117.stl", "0117.stl"]);
+        assert_eq!(similar("117.obj"), ["00117.stl", "0117.stl", "117.ply"]);
+        assert_eq!(similar("0118.stl"), ["118.stl"]);
+        for folder in ["7", "07"] {
+            fs::create_dir(dir.path().join(folder)).expect("a folder");
+            fs::write(dir.path().join(folder).join("a.stl"), "").expect("written");
+        }
+        fs::write(dir.path().join("07/à.stl"), "").expect("written");
+        assert_eq!(similar("007/a.stl"), ["07/a.stl", "7/a.stl"]);
+        assert_eq!(similar("07/á.stl"), ["a.stl", "à.stl"]);
+        assert_eq!(similar("007/b.stl"), [""; 0]);
     }
 }

@@ -7,7 +7,7 @@ use super::exit::Refusal;
 use super::files::listed;
 use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
 use super::pointer_files::FileSearches;
-use mocban_core::domain::sanitize;
+use mocban_core::domain::{first_names, sanitize};
 use mocban_store::Project;
 
 /// Maximum number of missing files that `--json` lists.
@@ -15,6 +15,9 @@ const MAX_MISSING: usize = 1000;
 
 /// Longest path in a message, in characters.
 pub(crate) const MAX_PATH_CHARS: usize = 300;
+
+/// Maximum number of files with similar names that a message names; the others are counted.
+const MAX_SIMILAR: usize = 3;
 
 /// Ends the message of a missing file whose path is one of Windows.
 const WINDOWS_HINT: &str = "; it is a path of a Windows computer: write paths relative to the list";
@@ -92,8 +95,14 @@ fn missing_hint(path: &Path, searches: &mut SimilarFiles) -> String {
         return hint.to_owned();
     }
     let similar = searches.find(path);
-    let similar = similar.map(|path| format!("; there is {}", sanitize(&path, MAX_PATH_CHARS)));
-    similar.unwrap_or_default()
+    let similar: Vec<String> = similar
+        .iter()
+        .map(|path| sanitize(path, MAX_PATH_CHARS))
+        .collect();
+    match similar.as_slice() {
+        [] => String::new(),
+        paths => format!("; there is {}", first_names(paths, MAX_SIMILAR)),
+    }
 }
 
 /// Returns what to do about a missing file whose path has a line break or a tab, or nothing. A file may have such a name.

@@ -6,7 +6,7 @@ use std::path::Path;
 use mocban_core::domain::sanitize;
 
 /// Longest text of a problem, in characters.
-const MAX_CHARS: usize = 300;
+const MAX_CHARS: usize = 600;
 
 /// Maximum number of problems, and of the places of each, that are kept and shown; the others are counted.
 const MAX_SHOWN: usize = 20;

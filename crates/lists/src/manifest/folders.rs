@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::error::{ManifestError, at_file, of_list};
 use super::folder_file::FolderFile;
 use super::row::ManifestRow;
-use super::similar_files::{no_equal_name, similar};
+use super::similar_files::{SimilarPairs, no_equal_name};
 use mocban_core::domain::PairName;
 use mocban_core::domain::spelling::{fold_case, quoted};
 
@@ -78,7 +78,8 @@ pub struct FolderPairs {
     pub prints_alone: Vec<PathBuf>,
     /// Files with other extensions.
     pub ignored: Vec<PathBuf>,
-    /// Meshes and prints whose names differ only in accents or in zeros before a number: the first ones, as text.
+    /// Meshes and prints whose names differ only in accents or in zeros before a number: the first ones and the number of
+    /// the others, as text.
     pub similar: Vec<String>,
     /// Says why there is no pair.
     pub no_pair: Option<ManifestError>,
@@ -122,7 +123,7 @@ pub fn pair_folders(
     problems.check(false)?;
     let is_swapped = other_meshes.iter().any(|path| is_named_like_print(path))
         && other_prints.iter().any(|path| is_named_like_mesh(path));
-    let similar = similar(&meshes_alone, &prints_alone);
+    let similar = SimilarPairs::of(&meshes_alone, &prints_alone);
     let no_pair = rows.is_empty().then(|| {
         let is_swapped = is_swapped && meshes_alone.is_empty();
         let without = without_files(roots, are_empty);
@@ -152,7 +153,7 @@ pub fn pair_folders(
         } else {
             [other_meshes, other_prints].concat()
         },
-        similar,
+        similar: similar.warnings(),
         no_pair,
     })
 }

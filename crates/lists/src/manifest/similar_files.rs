@@ -3,18 +3,75 @@
 use super::folder_file::{FolderFile, grouped};
 use mocban_core::domain::spelling::{fold_case, plain_form, quoted};
 
-/// Longest list of similar files in a message.
-const MAX_SIMILAR: usize = 5;
+/// Maximum number of similar files that a message or the warnings name; the others are counted.
+const MAX_SIMILAR: usize = 3;
+
+/// Meshes and prints without each other whose ids differ only in accents or in zeros before a number.
+#[derive(Debug, Default)]
+pub(super) struct SimilarPairs {
+    /// The first ones, each as a clause.
+    first: Vec<String>,
+    /// Number of all.
+    count: usize,
+}
+
+/// What to do about similar names.
+const RENAME: &str = "rename one if they are a pair";
+
+impl SimilarPairs {
+    /// Finds the pairs.
+    pub(super) fn of(meshes: &[FolderFile], prints: &[FolderFile]) -> Self {
+        let prints = grouped(prints, |print| plain_form(&print.id()));
+        let mut found = Self::default();
+        for mesh in meshes {
+            for print in prints.get(&plain_form(&mesh.id())).into_iter().flatten() {
+                found.count += 1;
+                if found.first.len() < MAX_SIMILAR {
+                    let (mesh, print) = (mesh.path.display(), print.path.display());
+                    let clause = format!("{mesh} and {print} have similar names");
+                    found.first.push(clause);
+                }
+            }
+        }
+        found
+    }
+
+    /// Returns a warning for each of the first pairs, and one for the others.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let first = self.first.iter();
+        let mut warnings: Vec<String> = first.map(|clause| format!("{clause}; {RENAME}")).collect();
+        match self.more() {
+            0 => {}
+            1 => warnings.push("1 more mesh and print have similar names".to_owned()),
+            more => warnings.push(format!("{more} more meshes and prints have similar names")),
+        }
+        warnings
+    }
+
+    /// Returns the first pairs as clauses of a sentence, the number of the others and what to do. `None` if there are none.
+    fn clauses(&self) -> Option<String> {
+        let more = match self.more() {
+            0 => String::new(),
+            more => format!("; and {more} more"),
+        };
+        let first = self.first.join("; ");
+        (self.count > 0).then(|| format!("{first}{more}; {RENAME}"))
+    }
+
+    const fn more(&self) -> usize {
+        self.count - self.first.len()
+    }
+}
 
 /// Says that no names are equal, or that only the folders of files with equal names differ.
 pub(super) fn no_equal_name(
     meshes: &[FolderFile],
     prints: &[FolderFile],
-    similar: &[String],
+    similar: &SimilarPairs,
 ) -> String {
     let reason = "no mesh has the same file name as a print";
-    if let Some(first) = similar.first() {
-        return format!("{reason}; {first}");
+    if let Some(similar) = similar.clauses() {
+        return format!("{reason}; {similar}");
     }
     let prints = grouped(prints, |print| fold_case(&print.stem));
     let other_folder = meshes.iter().find_map(|mesh| {
@@ -28,17 +85,4 @@ pub(super) fn no_equal_name(
         ))
     });
     other_folder.unwrap_or_else(|| reason.to_owned())
-}
-
-/// Describes meshes and prints without each other whose ids differ only in accents or in zeros before a number.
-pub(super) fn similar(meshes: &[FolderFile], prints: &[FolderFile]) -> Vec<String> {
-    let prints = grouped(prints, |print| plain_form(&print.id()));
-    let similar = meshes.iter().flat_map(|mesh| {
-        let prints = prints.get(&plain_form(&mesh.id())).into_iter().flatten();
-        prints.map(move |print| {
-            let (mesh, print) = (mesh.path.display(), print.path.display());
-            format!("{mesh} and {print} have similar names; rename one if they are a pair")
-        })
-    });
-    similar.take(MAX_SIMILAR).collect()
 }

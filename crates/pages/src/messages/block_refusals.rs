@@ -120,6 +120,7 @@ pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
         "mặt nạ đỉnh nét có cỡ {0#} px, bản in {1#} px",
     ),
     ("the tops mask {}", "mặt nạ đỉnh nét {!0}"),
-    // The path of a file. It is the last row, because other messages with paths begin like it.
+    // Paths of files. They are the last rows, because other messages with paths begin like them.
     ("there is {}/{}", "có tệp {0}/{1}"),
+    ("there is {}.{}", "có tệp {0}.{1}"),
 ];

@@ -157,6 +157,14 @@ pub(super) const IMPORT_MESSAGES: &[(&str, &str)] = &[
         "hãy đặt cùng một tên cho hai thư mục, hoặc đặt là scans và prints, hoặc quét và in",
     ),
     (
+        "1 more mesh and print have similar names",
+        "còn 1 bản quét và bản in có tên gần giống nhau",
+    ),
+    (
+        "{} more meshes and prints have similar names",
+        "còn {0#} cặp bản quét và bản in có tên gần giống nhau",
+    ),
+    (
         "{} and {} have similar names",
         "{0} và {1} có tên gần giống nhau",
     ),

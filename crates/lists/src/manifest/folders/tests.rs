@@ -290,6 +290,47 @@ fn every_near_name_is_offered() {
 }
 
 #[test]
+fn the_first_near_names_are_named_and_the_others_counted() {
+    let of = |mesh: &str, print: &str| format!("{mesh} and {print} have similar names");
+    let rename = "rename one if they are a pair";
+    let start = "no mesh has the same file name as a print";
+    let refused = |prints: &[&str]| {
+        let found = pair_folders(&files(&["m/7.stl"]), &files(prints));
+        found.expect_err("no pair").to_string()
+    };
+    let [first, second, third] =
+        ["p/007.png", "p/07.png", "p/0007.png"].map(|print| of("m/7.stl", print));
+    assert_eq!(
+        refused(&["p/07.png", "p/007.png"]),
+        format!("{start}; {first}; {second}; {rename}")
+    );
+    let prints = [
+        "p/07.png",
+        "p/007.png",
+        "p/0007.png",
+        "p/00007.png",
+        "p/000007.png",
+    ];
+    let [fifth, fourth] = ["p/000007.png", "p/00007.png"].map(|print| of("m/7.stl", print));
+    assert_eq!(
+        refused(&prints),
+        format!("{start}; {fifth}; {fourth}; {third}; and 2 more; {rename}")
+    );
+    let meshes = files(&["m/7.stl", "m/x.stl"]);
+    let prints = files(&[&prints[..], &["p/x.png"]].concat());
+    let found = pair_folders(&meshes, &prints).expect("a pair");
+    assert_eq!(
+        found.similar,
+        [
+            format!("{fifth}; {rename}"),
+            format!("{fourth}; {rename}"),
+            format!("{third}; {rename}"),
+            "2 more meshes and prints have similar names".to_owned()
+        ]
+    );
+}
+
+#[test]
 fn the_nearest_file_of_the_same_name_is_named_if_folders_differ() {
     let root = ListedFolder {
         root: "d".into(),

@@ -319,6 +319,10 @@ fn reasons_and_paths_of_messages_are_translated() {
             "a.csv: dòng 2: không có bản quét c.stl của 1; có tệp m/c.STL",
         ),
         (
+            "a.csv: line 2: mesh 7.stl of 1 does not exist; there is 007.stl, 07.stl, 7.ply and 2 more",
+            "a.csv: dòng 2: không có bản quét 7.stl của 1; có tệp 007.stl, 07.stl, 7.ply và 2 mục khác",
+        ),
+        (
             "a.xlsx: the workbook is damaged: xl/workbook.xml ends early; save it again",
             "a.xlsx: bảng tính bị hỏng: xl/workbook.xml kết thúc sớm; hãy lưu lại",
         ),
