@@ -11,13 +11,14 @@ use super::cell_errors::{FormulaErrors, id_error};
 use super::cell_forms::UnusualCells;
 use super::changed_ids::ChangedIds;
 use super::column_names::missing_column;
-use super::csv::{ListedColumn, column_names, draft_of, is_blank, row_reader};
+use super::csv::{ListedColumn, column_names, draft_of};
 use super::draft::{
     DraftRow, MAX_PATH_BYTES, check_length, check_meta, record, refuse_cell_errors,
 };
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::json_rows;
 use super::row::RowIds;
+use super::row_reader::{is_blank, row_reader};
 use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter, encoding_hint};
 use super::unnamed_values::UnnamedValues;

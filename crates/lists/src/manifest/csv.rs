@@ -4,10 +4,11 @@ use super::block_columns;
 use super::cell_forms::{CellForm, plain_cell};
 use super::chosen_columns::ChosenColumns;
 use super::column_names::missing_column;
-use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
+use super::draft::{DraftRow, RowCollector};
 use super::error::{ManifestError, Problem, at_line, of_list};
 use super::later_header::later_header;
 use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
+use super::row_reader::{is_blank, row_reader};
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
@@ -80,50 +81,6 @@ pub fn read_csv_as(
         }
     }
     rows.finish()
-}
-
-/// Reads the rows of a list, the header too. Cells keep blanks at their ends: to remove them, the parser would copy each row.
-pub(super) fn row_reader(bytes: &[u8], delimiter: u8) -> ::csv::Reader<BoundedRows<'_>> {
-    ::csv::ReaderBuilder::new()
-        .delimiter(delimiter)
-        .flexible(true)
-        .has_headers(false)
-        .from_reader(BoundedRows::new(bytes))
-}
-
-/// Reads a list, and fails in a row that is longer than [`MAX_ROW_BYTES`].
-pub(super) struct BoundedRows<'a> {
-    rest: &'a [u8],
-    /// Number of bytes that may still be read for the current row.
-    left: usize,
-}
-
-impl<'a> BoundedRows<'a> {
-    pub(super) const fn new(rest: &'a [u8]) -> Self {
-        Self {
-            rest,
-            left: MAX_ROW_BYTES,
-        }
-    }
-
-    /// Allows the bytes of another row.
-    pub(super) const fn begin_row(&mut self) {
-        self.left = MAX_ROW_BYTES;
-    }
-}
-
-impl std::io::Read for BoundedRows<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        if self.left == 0 && !self.rest.is_empty() {
-            return Err(std::io::Error::other(format!(
-                "the row has more than {MAX_ROW_BYTES} bytes; a closing quotation mark may be missing"
-            )));
-        }
-        let len = buffer.len().min(self.left);
-        let read = self.rest.read(&mut buffer[..len])?;
-        self.left -= read;
-        Ok(read)
-    }
 }
 
 /// Longest name of a column in bytes. Every row stores the names of its user-defined columns.
@@ -262,11 +219,6 @@ impl CsvHeader {
         let place = (line, self.delimiter);
         draft_of(place, &self.columns, record, &self.encoding_hint).map(Some)
     }
-}
-
-/// Returns whether all cells of a row are blank. Spreadsheet programs append such rows.
-pub(super) fn is_blank(record: &::csv::ByteRecord) -> bool {
-    record.as_slice().trim_ascii_start().is_empty()
 }
 
 /// Returns whether a row can be read below a header with `columns` columns: its cells behind the last column are empty, and the

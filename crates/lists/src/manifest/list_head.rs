@@ -1,7 +1,8 @@
 //! The header of a list and its first rows, which help to choose its columns.
 
 use super::chosen_columns::ChosenColumns;
-use super::csv::{column_names, is_blank, row_reader};
+use super::csv::column_names;
+use super::row_reader::{is_blank, row_reader};
 use super::text::CsvText;
 use mocban_core::domain::sanitize;
 

@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::block_columns;
-use super::csv::{column_names, row_reader};
+use super::csv::column_names;
 use super::folders::is_named_like_print;
 use super::json_rows::rows_while;
 use super::row;
+use super::row_reader::row_reader;
 use super::text::{CsvText, trimmed};
 use crate::columns::KnownColumns;
 use mocban_core::domain::spelling::quoted;

@@ -21,6 +21,7 @@ mod list_head;
 mod list_kind;
 mod misspelt_columns;
 mod row;
+mod row_reader;
 mod similar_columns;
 mod similar_files;
 mod text;
