@@ -21,17 +21,39 @@ pub fn unknown_number(line: &str, column: usize) -> Option<&'static str> {
 /// ```
 /// use mocban_lists::json_numbers::number_text;
 ///
-/// let text = |json: &str| number_text(&serde_json::from_str(json).expect("a number"));
-/// assert_eq!(["117.0", "1e3", "2.5", "117"].map(text), ["117", "1000", "2.5", "117"]);
+/// let text = |json: &str| number_text(&serde_json::from_str(json).expect("a number")).ok();
+/// let expected = ["117", "1000", "2.5", "117"].map(|text| Some(text.to_owned()));
+/// assert_eq!(["117.0", "1e3", "2.5", "117"].map(text), expected);
+/// assert_eq!(text("18446744073709551615").as_deref(), Some("18446744073709551615"));
+/// assert_eq!(text("9007199254740993.0"), None);
 /// ```
-pub fn number_text(number: &Number) -> String {
+///
+/// # Errors
+/// Returns an error if the number is so large that its last digits may be others than those written.
+pub fn number_text(number: &Number) -> Result<String, InexactNumber> {
     match number.as_f64() {
-        Some(whole) if number.is_f64() && whole.fract() == 0.0 && whole.abs() < MAX_EXACT => {
-            (whole as i64).to_string()
+        Some(float) if number.is_f64() && float.abs() >= MAX_EXACT => {
+            Err(InexactNumber::new(&number.to_string()))
         }
-        _ => number.to_string(),
+        Some(whole) if number.is_f64() && whole.fract() == 0.0 => Ok((whole as i64).to_string()),
+        _ => Ok(number.to_string()),
     }
 }
+
+/// A number whose last digits may be others than those written.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the number {0} is too large to be exact")]
+pub struct InexactNumber(String);
+
+impl InexactNumber {
+    /// Takes the text of the number.
+    pub(crate) fn new(text: &str) -> Self {
+        Self(text.to_owned())
+    }
+}
+
+/// What to do about a number in JSON that is too large.
+pub const AS_TEXT: &str = "write it as text, in quotation marks";
 
 /// Whole numbers below this one are exact as floating-point numbers.
 pub(crate) const MAX_EXACT: f64 = 9e15;

@@ -16,7 +16,7 @@ use mocban_core::domain::{
     ContentHash, Reason, ThresholdMetric, UniqueKeys, UnixMillis, Verdict, value_error_text,
 };
 use mocban_lists::columns::HAVE_SAME_NAME;
-use mocban_lists::json_numbers::{nan_as_null, number_text};
+use mocban_lists::json_numbers::{AS_TEXT, nan_as_null, number_text};
 use mocban_lists::manifest::{ArrayCursor, place_in_row, trimmed};
 
 /// The fields of the log of verdicts, which JSON Lines may have.
@@ -179,7 +179,9 @@ fn text_of(fields: &Map<String, Value>, field: &str) -> Result<Option<String>, S
         // Notes are stored as they were given.
         Some(Value::String(text)) if field == "note" => text.clone(),
         Some(Value::String(text)) => trimmed(text).to_owned(),
-        Some(Value::Number(number)) => number_text(number),
+        Some(Value::Number(number)) => {
+            number_text(number).map_err(|error| format!("{field}: {error}; {AS_TEXT}"))?
+        }
         Some(other) => return Err(format!("{field} is {other}, not text")),
     };
     Ok((!trimmed(&text).is_empty()).then_some(text))

@@ -1,10 +1,11 @@
 //! Regions as the formats give them: shapes and attributes, before they are fitted to the page.
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Number, Value};
 
 use super::error::LabelsProblem;
 use super::message::quoted;
 use super::model::{bounds, rectangle};
+use crate::json_numbers::number_text;
 
 /// Attributes that name a box, in order of preference. Upper and lower case are equal.
 pub const NAME_ATTRIBUTES: &[&str] = &["id", "name"];
@@ -87,17 +88,26 @@ pub(super) struct PageRegions {
 }
 
 /// Returns the first attribute in the order of `keys` that is a text, or also a whole number if `numbers`.
-fn attribute(attributes: &Map<String, Value>, keys: &[&str], numbers: bool) -> Option<String> {
+fn attribute<'a>(
+    attributes: &'a Map<String, Value>,
+    keys: &[&str],
+    numbers: bool,
+) -> Option<&'a Value> {
     let found = attributes.iter().filter_map(|(name, value)| {
         let rank = keys.iter().position(|key| name.eq_ignore_ascii_case(key))?;
-        let text = match value {
-            Value::String(text) => filled(text)?,
-            Value::Number(number) if numbers && !number.is_f64() => number.to_string(),
-            _ => return None,
+        let is_taken = match value {
+            Value::String(text) => filled(text).is_some(),
+            Value::Number(number) => numbers && is_whole(number),
+            _ => false,
         };
-        Some((rank, text))
+        is_taken.then_some((rank, value))
     });
-    found.min_by_key(|(rank, _)| *rank).map(|(_, text)| text)
+    found.min_by_key(|(rank, _)| *rank).map(|(_, value)| value)
+}
+
+/// Returns whether a number has no decimals, or only `.0`, as Python writes those of a column with gaps.
+fn is_whole(number: &Number) -> bool {
+    !number.is_f64() || number.as_f64().is_some_and(|whole| whole.fract() == 0.0)
 }
 
 /// Returns a text without spaces at its ends, or `None` if nothing is left.
@@ -107,13 +117,24 @@ pub(super) fn filled(text: &str) -> Option<String> {
 }
 
 /// Returns the name of a region: a text, or a whole number.
-pub(super) fn name_attribute(attributes: &Map<String, Value>) -> Option<String> {
-    attribute(attributes, NAME_ATTRIBUTES, true)
+///
+/// # Errors
+/// Returns an error if the number is too large to be exact.
+pub(super) fn name_attribute(attributes: &Map<String, Value>) -> Result<Option<String>, String> {
+    match attribute(attributes, NAME_ATTRIBUTES, true) {
+        Some(Value::String(text)) => Ok(filled(text)),
+        Some(Value::Number(number)) => {
+            let text = number_text(number).map_err(|error| error.to_string())?;
+            Ok(Some(text))
+        }
+        _ => Ok(None),
+    }
 }
 
 /// Returns the character of a region if it is a text.
 pub(super) fn text_attribute(attributes: &Map<String, Value>) -> Option<String> {
-    attribute(attributes, TEXT_ATTRIBUTES, false)
+    let value = attribute(attributes, TEXT_ATTRIBUTES, false)?;
+    value.as_str().and_then(filled)
 }
 
 /// Returns the name of a class as the character, unless it names a kind of thing, such as `character`.

@@ -12,7 +12,7 @@ use super::error::{Problem, at_line, of_list};
 use super::json_array::{ArrayCursor, DamagedArray, is_array, place_in_row};
 use super::text::{as_utf8, trimmed};
 use crate::columns::{HAVE_SAME_NAME, HeaderColumns, KnownColumns};
-use crate::json_numbers::{nan_as_null, number_text, unknown_number};
+use crate::json_numbers::{AS_TEXT, nan_as_null, number_text, unknown_number};
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{KEY_TWICE, UniqueKeys, value_error_text};
 
@@ -229,7 +229,9 @@ impl<'de> Visitor<'de> for EntriesVisitor {
 fn cell(name: &str, value: Value) -> Result<String, String> {
     match value {
         Value::String(text) => Ok(trimmed(&text).to_owned()),
-        Value::Number(number) => Ok(number_text(&number)),
+        Value::Number(number) => {
+            number_text(&number).map_err(|error| format!("{name:?}: {error}; {AS_TEXT}"))
+        }
         Value::Bool(flag) => Ok(flag.to_string()),
         Value::Null | Value::Array(_) | Value::Object(_) => {
             Err(format!("{name:?} is {value}, not text"))

@@ -64,6 +64,36 @@ mod tests {
     }
 
     #[test]
+    fn numbers_that_are_too_large_to_be_exact_are_refused_as_ids() {
+        let row = |id: &str| format!("{{\"id\":{id},\"mesh\":\"m\",\"print\":\"p\"}}");
+        for (id, shown) in [
+            ("9007199254740993.0", "9007199254740992.0"),
+            ("1e20", "1e+20"),
+            ("-1e20", "-1e+20"),
+        ] {
+            assert_eq!(
+                parse(&row(id)).expect_err(id).to_string(),
+                format!(
+                    "line 1: \"id\": the number {shown} is too large to be exact; write it as text, in quotation marks"
+                )
+            );
+        }
+        for id in [
+            "9007199254740993",
+            "18446744073709551615",
+            "-9223372036854775808",
+        ] {
+            assert_eq!(parse(&row(id)).expect(id)[0].name.as_str(), id);
+        }
+        let block = "{\"id\":\"a\",\"mesh\":\"m\",\"print\":\"p\",\"block\":1e20,\"year\":1e20}";
+        let refused = parse(block).expect_err("a block").to_string();
+        assert!(
+            refused.starts_with("line 1: \"block\": the number"),
+            "{refused}"
+        );
+    }
+
+    #[test]
     fn rows_equal_those_of_the_same_csv() {
         let json = parse(
             "{\"id\":\"a\",\"mesh\":\"m.stl\",\"print\":\"p.png\",\"unit\":\"cm\",\"scanned_face_down\":true,\"folio\":\" 3\"}\n\

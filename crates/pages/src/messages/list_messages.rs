@@ -257,6 +257,14 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "{0} không phải là số của JSON",
     ),
     ("write null or leave it out", "hãy viết null hoặc bỏ đi"),
+    (
+        "the number {} is too large to be exact",
+        "số {0} quá lớn nên có thể không đúng từng chữ số",
+    ),
+    (
+        "write it as text, in quotation marks",
+        "hãy viết nó dạng văn bản, trong dấu ngoặc kép",
+    ),
     ("{} is not an object", "{0} không phải là đối tượng"),
     ("{} is {}, not text", "{0} là {1}, không phải là văn bản"),
     // Errors of formulas.

@@ -22,7 +22,8 @@ pub(in crate::labels) fn read(boxes: &[Value]) -> Result<PageRegions, LabelsProb
         let [x0, y0, x1, y1] = edges.map_err(|reason| LabelsProblem::at(place(), reason))?;
         Ok(LabelRegion {
             number: k + 1,
-            name: name_attribute(attributes),
+            name: name_attribute(attributes)
+                .map_err(|reason| LabelsProblem::at(place(), reason))?,
             text: text_attribute(attributes),
             corners: Some(box_between([x0, y0], [x1, y1])),
         })

@@ -191,8 +191,9 @@ fn read_region(
     let own = |key: &str| annotation.get(key).and_then(Value::as_str).and_then(filled);
     let category = || id_key(annotation.get("category_id"));
     // The id of the annotation itself only counts annotations.
-    let name = attributes
-        .and_then(name_attribute)
+    let name = attributes.map_or(Ok(None), name_attribute);
+    let name = name
+        .map_err(|reason| LabelsProblem::at(place(), reason))?
         .or_else(|| own("name"))
         .or_else(|| own("pair"));
     let text = attributes

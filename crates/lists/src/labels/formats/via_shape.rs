@@ -14,12 +14,12 @@ pub(super) fn region(
     shape: &Map<String, Value>,
     attributes: &Map<String, Value>,
 ) -> Result<LabelRegion, LabelsProblem> {
-    let corners = corners(shape);
+    let problem = |reason| LabelsProblem::at(format!("box {number}"), reason);
     Ok(LabelRegion {
         number,
-        name: name_attribute(attributes),
+        corners: corners(shape).map_err(problem)?,
+        name: name_attribute(attributes).map_err(problem)?,
         text: text_attribute(attributes),
-        corners: corners.map_err(|reason| LabelsProblem::at(format!("box {number}"), reason))?,
     })
 }
 

@@ -151,6 +151,31 @@ fn attributes_are_texts_in_order_of_preference() {
 }
 
 #[test]
+fn whole_numbers_with_decimals_are_names_without() {
+    for (text, name) in [(BBOXES, "\"c01-r01\""), (VIA_2, "\"c01-r01\"")] {
+        let named = |number: &str| text.replacen(name, number, 1);
+        let labels = read_sample(&named("117.0"));
+        assert!(
+            labels
+                .boxes
+                .iter()
+                .any(|label| label.name.as_deref() == Some("117"))
+        );
+        assert_eq!(labels.boxes, read_sample(&named("117")).boxes);
+        let large = named("9007199254740993.0");
+        let refused = read(large.as_bytes(), "labels", &PAGE).expect_err("refused");
+        let reason =
+            "box 1: the number 9007199254740992.0 is too large to be exact; correct or remove it";
+        assert!(refused.to_string().contains(reason), "{refused}");
+    }
+    let coco = COCO.replacen("\"name\":\"c01-r01\"", "\"name\":117.0", 1);
+    assert_eq!(
+        read_sample(&coco).boxes,
+        read_sample(&coco.replace("117.0", "117")).boxes
+    );
+}
+
+#[test]
 fn coco_boxes_need_no_polygon_and_may_have_several() {
     let two = "[[1250,100,1350,150,1280,225],[1,1,5,5,9,2]]";
     let several = COCO.replace("[[1250,100,1350,150,1280,225]]", two);
