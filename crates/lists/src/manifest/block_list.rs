@@ -23,6 +23,7 @@ use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter, encoding_hint};
 use super::unnamed_values::UnnamedValues;
 use super::unread_columns::UnreadColumns;
+use super::whole_numbers::WholeNumbers;
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
@@ -88,7 +89,7 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
         let reason = format!("the list is not UTF-8{hint}");
         rows.problems.add(of_list(&reason));
     }
-    let mut header: Option<Vec<ListedColumn>> = None;
+    let mut header: Option<(Vec<ListedColumn>, WholeNumbers)> = None;
     loop {
         reader.get_mut().begin_row();
         let start = reader.position().clone();
@@ -104,7 +105,7 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             break;
         }
         let line = lines.at(Some(record.position().unwrap_or(&start)));
-        let Some(columns) = &header else {
+        let Some((columns, whole_numbers)) = &header else {
             let names = column_names(line, &record, &hint)?;
             let HeaderColumns {
                 columns,
@@ -114,14 +115,20 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             rows.renamed.extend(renamed);
             rows.unread.add(unread);
             let names = names.into_iter().map(str::to_owned);
-            header = Some(columns.into_iter().zip(names).collect());
+            let whole = WholeNumbers::find(bytes, text.delimiter, columns.iter().copied());
+            header = Some((columns.into_iter().zip(names).collect(), whole));
             continue;
         };
         if is_blank(&record) {
             continue;
         }
         let place = (line, text.delimiter);
-        rows.push(line, draft_of(place, columns, &record, &hint));
+        let draft = draft_of(place, columns, &record, &hint);
+        let draft = draft.and_then(|mut draft| {
+            whole_numbers.apply(&mut draft)?;
+            Ok(draft)
+        });
+        rows.push(line, draft);
     }
     rows.finish()
 }

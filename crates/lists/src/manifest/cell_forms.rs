@@ -34,6 +34,8 @@ pub(super) enum CellForm {
     Apostrophe,
     /// It has a line break, and as many separators as a row.
     TakesRow,
+    /// It is a whole number with the decimals `.0`, and is read without them.
+    WholeNumber,
 }
 
 impl CellForm {
@@ -90,6 +92,10 @@ impl UnusualCells {
                 CellForm::TakesRow => format!(
                     "cells in quotation marks with a line break and what seems to be another row: {count}, the first in column \
                      {column} on line {line}; close the quotation marks on their line if it is one"
+                ),
+                CellForm::WholeNumber => format!(
+                    "whole numbers that are written with .0: {count}, the first in column {column} on line {line}; they are \
+                     read without it, as in JSON and XLSX"
                 ),
             }
         })

@@ -10,6 +10,7 @@ use super::later_header::later_header;
 use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
 use super::row_reader::{is_blank, row_reader};
 use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
+use super::whole_numbers::WholeNumbers;
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use memchr::memchr2;
@@ -155,6 +156,8 @@ struct CsvHeader {
     renamed: Vec<(String, &'static str)>,
     /// Columns with other names of columns that are known.
     unread: Vec<(String, &'static str)>,
+    /// Columns whose whole numbers have decimals.
+    whole_numbers: WholeNumbers,
     /// What to do about cells that are not UTF-8.
     encoding_hint: String,
     delimiter: u8,
@@ -200,6 +203,7 @@ impl CsvHeader {
         }
         let names = names.into_iter().map(str::to_owned);
         Ok(Self {
+            whole_numbers: WholeNumbers::find(list, delimiter, columns.iter().copied()),
             columns: columns.into_iter().zip(names).collect(),
             renamed,
             unread,
@@ -211,13 +215,15 @@ impl CsvHeader {
     /// Returns a row's cells. Returns `None` if the row is blank.
     ///
     /// # Errors
-    /// Returns an error if the number of cells is wrong or a cell is not UTF-8.
+    /// Returns an error if the number of cells is wrong or a cell cannot be read.
     fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<DraftRow>, String> {
         if is_blank(record) {
             return Ok(None);
         }
         let place = (line, self.delimiter);
-        draft_of(place, &self.columns, record, &self.encoding_hint).map(Some)
+        let mut draft = draft_of(place, &self.columns, record, &self.encoding_hint)?;
+        self.whole_numbers.apply(&mut draft)?;
+        Ok(Some(draft))
     }
 }
 

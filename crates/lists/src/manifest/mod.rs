@@ -27,6 +27,7 @@ mod similar_files;
 mod text;
 mod unnamed_values;
 mod unread_columns;
+mod whole_numbers;
 
 pub use self::csv::{fits_header, parse_csv, read_csv, read_csv_as};
 pub use block_list::{BlockRow, ReadBlocks, parse_blocks, read_block_json, read_blocks};

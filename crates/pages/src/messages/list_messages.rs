@@ -262,6 +262,15 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "số {0} quá lớn nên có thể không đúng từng chữ số",
     ),
     (
+        "whole numbers that are written with .0: {}, the first in column {} on line {}",
+        "số ô là số nguyên nhưng có phần .0: {0#}, ô đầu tiên ở cột {1}, dòng {2}",
+    ),
+    (
+        "they are read without it, as in JSON and XLSX",
+        "phần này được bỏ khi đọc, như với JSON và XLSX",
+    ),
+    ("write it as text", "hãy viết nó dạng văn bản"),
+    (
         "write it as text, in quotation marks",
         "hãy viết nó dạng văn bản, trong dấu ngoặc kép",
     ),

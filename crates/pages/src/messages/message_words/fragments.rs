@@ -215,6 +215,7 @@ pub(super) const SENTENCES: &[&str] = &[
     "  pairs.csv: line 2: labels c.json of b1 cannot be read: Permission denied",
     "  pairs.csv: line 2: mesh c.stl of b1 does not exist; there is scans/c.STL",
     "list.jsonl: line 1: \"id\": the number 1e+20 is too large to be exact; write it as text, in quotation marks",
+    "list.csv: line 3: \"id\": the number 12345678901234567.0 is too large to be exact; write it as text",
     "b.json: box 1: the number 1e+20 is too large to be exact; correct or remove it",
     "  pairs.csv: line 2: mesh 117.stl of b1 does not exist; there is 00117.stl, 0117.stl",
     "no mesh has the same file name as a print; m/7.stl and p/07.png have similar names; m/7.stl and p/007.png have similar names; and 2 more; rename one if they are a pair",

@@ -1,0 +1,168 @@
+//! Ids of CSV that are whole numbers with the decimals `.0`. Python writes a column of numbers so if values are missing.
+
+use ::csv::ByteRecord;
+use memchr::memmem;
+
+use super::cell_forms::CellForm;
+use super::draft::DraftRow;
+use super::row_reader::row_reader;
+use super::text::trimmed;
+use crate::json_numbers::{InexactNumber, MAX_EXACT};
+
+/// Columns whose numbers are names.
+const NAMES: [&str; 3] = ["id", "block", "character"];
+
+/// Columns of names in which all values are whole numbers with `.0`.
+#[derive(Debug, Default)]
+pub(super) struct WholeNumbers(Vec<&'static str>);
+
+impl WholeNumbers {
+    /// Finds such columns of a list by the standard names of its columns.
+    pub(super) fn find(
+        list: &[u8],
+        delimiter: u8,
+        columns: impl Iterator<Item = Option<&'static str>>,
+    ) -> Self {
+        // Most lists have none, so their rows are not read twice.
+        if memmem::find(list, b".0").is_none() {
+            return Self::default();
+        }
+        let names = columns.enumerate();
+        let names = names.filter_map(|(at, name)| Some((at, name?)));
+        let mut found: Vec<(usize, &'static str, bool)> = names
+            .filter(|(_, name)| NAMES.contains(name))
+            .map(|(at, name)| (at, name, false))
+            .collect();
+        let mut reader = row_reader(list, delimiter);
+        let mut record = ByteRecord::new();
+        let mut is_header = true;
+        while !found.is_empty() {
+            reader.get_mut().begin_row();
+            // A row that cannot be read is refused later.
+            if !matches!(reader.read_byte_record(&mut record), Ok(true)) {
+                break;
+            }
+            if std::mem::take(&mut is_header) {
+                continue;
+            }
+            found.retain_mut(|(at, _, has_numbers)| {
+                let cell = record.get(*at).unwrap_or_default();
+                let Ok(cell) = std::str::from_utf8(cell) else {
+                    return false;
+                };
+                let cell = trimmed(cell);
+                let is_number = whole_part(cell).is_some();
+                *has_numbers |= is_number;
+                is_number || cell.is_empty()
+            });
+        }
+        let found = found.into_iter().filter(|(_, _, has_numbers)| *has_numbers);
+        Self(found.map(|(_, name, _)| name).collect())
+    }
+
+    /// Takes the decimals off the numbers of a row in these columns.
+    ///
+    /// # Errors
+    /// Returns an error if a number is too large to be exact.
+    pub(super) fn apply(&self, draft: &mut DraftRow) -> Result<(), String> {
+        for name in &self.0 {
+            let Some(cell) = draft.cells.get_mut(name) else {
+                continue;
+            };
+            let Some(whole) = whole_part(cell).map(str::to_owned) else {
+                continue;
+            };
+            let is_exact = whole
+                .parse::<f64>()
+                .is_ok_and(|number| number.abs() < MAX_EXACT);
+            if !is_exact {
+                let error = InexactNumber::new(cell);
+                return Err(format!("{name:?}: {error}; write it as text"));
+            }
+            *cell = whole;
+            draft
+                .unusual
+                .push((CellForm::WholeNumber, (*name).to_owned()));
+        }
+        Ok(())
+    }
+}
+
+/// Returns a whole number without its decimals, as Python writes it, such as `117` of `117.0`.
+fn whole_part(text: &str) -> Option<&str> {
+    let whole = text.strip_suffix(".0")?;
+    let digits = whole.strip_prefix('-').unwrap_or(whole);
+    let is_number = match digits.as_bytes() {
+        [b'0'] => digits.len() == whole.len(),
+        [b'0', ..] | [] => false,
+        bytes => bytes.iter().all(u8::is_ascii_digit),
+    };
+    is_number.then_some(whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{parse_csv, read_blocks, read_csv};
+
+    /// Returns the ids of a list, and the warnings about its cells.
+    fn read(list: &str) -> (Vec<String>, Vec<String>) {
+        let mut ids = Vec::new();
+        let read = read_csv(list.as_bytes(), &mut |row| {
+            ids.push(row.name.as_str().to_owned());
+        });
+        let read = read.expect(list);
+        (ids, read.unusual_cells.warnings().collect())
+    }
+
+    #[test]
+    fn a_column_of_whole_numbers_with_decimals_is_read_without() {
+        let list = "id,mesh,print,block,year\n117.0,a.stl,a.png,4.0,1872.0\n-2.0,b.stl,b.png,,\n0.0,c.stl,c.png,5.0,\n";
+        let (ids, warnings) = read(list);
+        assert_eq!(ids, ["117", "-2", "0"]);
+        assert_eq!(
+            warnings,
+            [
+                "whole numbers that are written with .0: 5, the first in column \"id\" on line 2; they are read without it, as in JSON and XLSX"
+            ]
+        );
+        let rows = parse_csv(list.replace(',', "\t").as_bytes()).expect("a list");
+        assert_eq!(rows[0].block.as_deref(), Some("4"));
+        assert_eq!(rows[0].meta["year"], "1872.0");
+        assert_eq!(rows[1].block, None);
+        let blocks = "block;mesh;page\n\n7.0;a.stl;a.png\n;;\n";
+        let read = read_blocks(blocks.as_bytes()).expect("a list");
+        assert_eq!(read.rows[0].name.as_str(), "7");
+        assert!(read.warnings[0].starts_with("whole numbers that are written with .0: 1"));
+    }
+
+    #[test]
+    fn a_column_with_other_values_stays_as_it_is() {
+        for ids in [
+            ["117.0", "117"],
+            ["117.0", "1.5"],
+            ["117.0", "a"],
+            ["117.0", "0118.0"],
+            ["117.0", "118.00"],
+            ["117.0", "=\"118.0\""],
+            ["1.0.0", "x.0"],
+            ["-0.0", "-.0"],
+        ] {
+            let rows = ids.map(|id| format!("{id},m,p\n"));
+            let (read, warnings) = read(&format!("id,mesh,print\n{}", rows.concat()));
+            let expected = ids.map(|id| id.trim_start_matches("=\"").trim_end_matches('"'));
+            assert_eq!(read, expected);
+            assert_eq!(warnings, [""; 0]);
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_too_large_to_be_exact_is_refused() {
+        let list = "id,mesh,print\n1.0,m,p\n12345678901234567.0,m,p\n";
+        assert_eq!(
+            parse_csv(list.as_bytes()).expect_err("refused").to_string(),
+            "line 3: \"id\": the number 12345678901234567.0 is too large to be exact; write it as text"
+        );
+        let (ids, _) = read("id,mesh,print\n12345678901234567,m,p\n");
+        assert_eq!(ids, ["12345678901234567"], "a text of digits is exact");
+    }
+}
