@@ -22,7 +22,7 @@ use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{
     CsvText, LineCounter, NotText, as_utf8, fits_header, is_array, later_header, plain_cell,
-    trimmed,
+    plain_header, trimmed,
 };
 use mocban_lists::quotes::check_quotes;
 use mocban_system::time_text::{day, duration};
@@ -256,7 +256,7 @@ fn columns_of(
     line: usize,
     below: Option<usize>,
 ) -> Result<CsvColumns, RefusedLine> {
-    let names: Vec<&str> = headers.iter().map(trimmed).collect();
+    let names: Vec<&str> = headers.iter().map(plain_header).collect();
     let refuse = |reason: &str| RefusedLine::new(line, reason);
     let same = |same: SameColumn| refuse(&same.reason(&names));
     let HeaderColumns { columns, .. } = COLUMNS.assign(&names).map_err(same)?;
@@ -309,12 +309,11 @@ fn row(
     line: usize,
     positions: &[Option<usize>; 8],
 ) -> Result<VerdictRow, RefusedLine> {
-    let cell = |column: usize| {
-        positions[column]
-            .and_then(|position| record.get(position))
-            .map(plain_cell)
-            .filter(|text| !text.is_empty())
-    };
+    let cells = positions.map(|position| {
+        let cell = position.and_then(|position| record.get(position));
+        cell.map(plain_cell).filter(|text| !text.is_empty())
+    });
+    let cell = |column: usize| cells[column].as_deref();
     let required = |column: usize| {
         cell(column)
             .ok_or_else(|| RefusedLine::new(line, &format!("{} is empty", COLUMNS.names[column])))

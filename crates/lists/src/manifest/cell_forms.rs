@@ -1,30 +1,48 @@
 //! Forms of cells of CSV: texts that are kept from becoming numbers, and cells that take in what seems to be another row.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::column_names::shown_column;
 use super::text::trimmed;
 
 /// Returns the text of a cell without blanks at its ends. A formula that is a text alone, such as `="0117"`, with which
-/// spreadsheet programs keep zeros, is this text.
+/// spreadsheet programs keep zeros, is this text; it has two quotation marks for one.
 ///
 /// ```
 /// use mocban_lists::manifest::plain_cell;
 ///
 /// assert_eq!(plain_cell(" =\"0117\""), "0117");
+/// assert_eq!(plain_cell("=\"a\"\"b\""), "a\"b");
 /// assert_eq!(plain_cell("=A1"), "=A1");
 /// ```
-pub fn plain_cell(cell: &str) -> &str {
+pub fn plain_cell(cell: &str) -> Cow<'_, str> {
     let cell = trimmed(cell);
     // Few cells are formulas.
     if cell.as_bytes().first() != Some(&b'=') {
-        return cell;
+        return Cow::Borrowed(cell);
     }
     let inner = cell.strip_prefix("=\"");
-    let inner = inner.and_then(|rest| rest.strip_suffix('"'));
-    inner
-        .filter(|inner| !inner.contains('"'))
-        .map_or(cell, trimmed)
+    match inner.and_then(|rest| rest.strip_suffix('"')) {
+        Some(inner) if !inner.contains('"') => Cow::Borrowed(trimmed(inner)),
+        Some(inner) if !inner.replace("\"\"", "").contains('"') => {
+            Cow::Owned(trimmed(&inner.replace("\"\"", "\"")).to_owned())
+        }
+        _ => Cow::Borrowed(cell),
+    }
+}
+
+/// Returns the name of a column from its cell like [`plain_cell`]. No name has a quotation mark.
+pub fn plain_header(cell: &str) -> &str {
+    match plain_cell(cell) {
+        Cow::Borrowed(name) => name,
+        Cow::Owned(_) => trimmed(cell),
+    }
+}
+
+/// Returns whether a cell begins like a formula. What a spreadsheet program shows for it is not known.
+pub(super) fn is_formula(cell: &str) -> bool {
+    cell.len() > 1 && cell.starts_with('=')
 }
 
 /// What is unusual about a cell that is read as it is.
@@ -34,6 +52,8 @@ pub(super) enum CellForm {
     Apostrophe,
     /// It has a line break, and as many separators as a row.
     TakesRow,
+    /// It begins like a formula.
+    Formula,
     /// It is a whole number with the decimals `.0`, and is read without them.
     WholeNumber,
 }
@@ -93,6 +113,10 @@ impl UnusualCells {
                     "cells in quotation marks with a line break and what seems to be another row: {count}, the first in column \
                      {column} on line {line}; close the quotation marks on their line if it is one"
                 ),
+                CellForm::Formula => format!(
+                    "cells that begin with = like formulas: {count}, the first in column {column} on line {line}; they are \
+                     kept as they are"
+                ),
                 CellForm::WholeNumber => format!(
                     "whole numbers that are written with .0: {count}, the first in column {column} on line {line}; they are \
                      read without it, as in JSON and XLSX"
@@ -120,7 +144,9 @@ mod tests {
             (" =\" a \" ", "a"),
             ("=\"\"", ""),
             ("=\"", "=\""),
-            ("=\"a\"\"b\"", "=\"a\"\"b\""),
+            ("=\"a\"\"b\"", "a\"b"),
+            ("=\"\"\"\"", "\""),
+            ("=\"a\"\"\"b\"", "=\"a\"\"\"b\""),
             ("=\"a\"&\"b\"", "=\"a\"&\"b\""),
             ("=1", "=1"),
             ("0117", "0117"),
@@ -138,6 +164,54 @@ mod tests {
         let read = read_blocks(blocks.as_bytes()).expect("a list");
         assert_eq!(read.rows[0].name.as_str(), "007");
         assert_eq!(read.rows[0].page.to_str(), Some("a.png"));
+    }
+
+    #[test]
+    fn names_of_columns_and_doubled_quotes_are_read_in_the_form_of_formulas() {
+        let list = "=\"id\",=\"mesh\",\"=\"\"print\"\"\",=\"character\",=\"note\"\n\
+            =\"0117\",a.stl,a.png,\"=\"\"x\"\"\"\"y\"\"\",=\"z\"\"\"\n";
+        let rows = parse_csv(list.as_bytes()).expect("a list");
+        assert_eq!(rows[0].name.as_str(), "0117");
+        assert_eq!(rows[0].character.as_deref(), Some("x\"y"));
+        assert_eq!(rows[0].meta["note"], "z\"");
+        let blocks = "=\"block\";=\"mesh\";=\"page\"\nb;m;p\n";
+        assert_eq!(
+            read_blocks(blocks.as_bytes()).expect("a list").rows.len(),
+            1
+        );
+    }
+
+    #[test]
+    fn formulas_are_refused_in_known_columns_and_named_in_others() {
+        for (row, column, shown) in [
+            ("=0117,m,p,x", "id", "=0117"),
+            ("a,=A1&\"\".stl\"\",p,x", "mesh", "=A1&\\\"\\\".stl\\\"\\\""),
+            ("a,m,=\"p\"\"\"q\",x", "print", "=\\\"p\\\"\\\"\\\"q\\\""),
+            ("a,m,p,=C2", "character", "=C2"),
+        ] {
+            let list = format!("id,mesh,print,character\n{row}\n");
+            assert_eq!(
+                parse_csv(list.as_bytes()).expect_err(row).to_string(),
+                format!(
+                    "line 2: column {column} has \"{shown}\", which begins like a formula; write the text itself"
+                )
+            );
+        }
+        let refused = read_blocks(b"block,mesh,page\n=7,m,p\n").expect_err("a formula");
+        assert!(
+            refused.to_string().contains("column block has \"=7\""),
+            "{refused}"
+        );
+        let list = "id,mesh,print,character,year\na,m,p,=,=A1\nb,n,q,,=\n";
+        assert_eq!(
+            warnings(list),
+            [
+                "cells that begin with = like formulas: 1, the first in column \"year\" on line 2; they are kept as they are"
+            ]
+        );
+        let rows = parse_csv(list.as_bytes()).expect("a list");
+        assert_eq!(rows[0].character.as_deref(), Some("="));
+        assert_eq!(rows[0].meta["year"], "=A1");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! CSV lists, separated by commas, semicolons or tabs.
 
 use super::block_columns;
-use super::cell_forms::{CellForm, plain_cell};
+use super::cell_forms::{CellForm, is_formula, plain_cell, plain_header};
 use super::chosen_columns::ChosenColumns;
 use super::column_names::missing_column;
 use super::draft::{DraftRow, RowCollector};
@@ -14,8 +14,8 @@ use super::whole_numbers::WholeNumbers;
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use memchr::memchr2;
-use mocban_core::domain::first_names;
 use mocban_core::domain::spelling::quoted;
+use mocban_core::domain::{first_names, sanitize};
 
 /// Parses a CSV list with a header line. Columns may be in any order, and their names in any case. Blank lines are
 /// ignored.
@@ -87,7 +87,7 @@ pub fn read_csv_as(
 /// Longest name of a column in bytes. Every row stores the names of its user-defined columns.
 const MAX_NAME_BYTES: usize = 1000;
 
-/// Returns the names of the columns of a header, without blanks at their ends.
+/// Returns the names of the columns of a header, without blanks at their ends, and of formulas that are texts these.
 pub(super) fn column_names<'r>(
     line: usize,
     record: &'r ::csv::ByteRecord,
@@ -101,7 +101,7 @@ pub(super) fn column_names<'r>(
             undecoded.push(number);
             continue;
         };
-        let name = trimmed(name);
+        let name = plain_header(name);
         if name.len() > MAX_NAME_BYTES {
             let (len, limit) = (name.len(), MAX_NAME_BYTES);
             let reason =
@@ -240,10 +240,14 @@ pub fn fits_header(
         && (record.len()..columns).all(is_unnamed)
 }
 
+/// Longest formula in a message, in characters.
+const MAX_FORMULA_CHARS: usize = 60;
+
 /// Returns the cells of a row on a line.
 ///
 /// # Errors
-/// Returns an error if the number of cells is wrong, a cell is not UTF-8, or a path or a character has a line break.
+/// Returns an error if the number of cells is wrong, a cell is not UTF-8, or one of a known column begins like a formula, or a
+/// path or a character has a line break.
 pub(super) fn draft_of(
     (line, delimiter): (usize, u8),
     columns: &[ListedColumn],
@@ -264,9 +268,20 @@ pub(super) fn draft_of(
                 "the cell of column {name} is not UTF-8{encoding_hint}"
             ));
         };
-        let cell = plain_cell(cell);
+        let cell = &*plain_cell(cell);
         if cell.is_empty() {
             continue;
+        }
+        if is_formula(cell) {
+            if let Some(known) = known {
+                let shown = quoted(&sanitize(cell, MAX_FORMULA_CHARS));
+                return Err(format!(
+                    "column {known} has {shown}, which begins like a formula; write the text itself"
+                ));
+            }
+            if !name.is_empty() {
+                draft.unusual.push((CellForm::Formula, name.clone()));
+            }
         }
         if CellForm::has_apostrophe(cell) {
             let column = known.unwrap_or(name).to_owned();

@@ -1,5 +1,6 @@
 //! Finds the header of a list below a title.
 
+use super::cell_forms::plain_header;
 use super::draft::MAX_ROW_BYTES;
 use super::text::trimmed;
 use crate::columns::KnownColumns;
@@ -17,7 +18,7 @@ pub fn later_header(
 ) -> Option<usize> {
     let has_columns = |text: &str, delimiter: u8| {
         let cells = text.split(char::from(delimiter));
-        let unquoted = |cell| trimmed(trimmed(cell).trim_matches('"'));
+        let unquoted = |cell| trimmed(plain_header(cell).trim_matches('"'));
         let names: Vec<&str> = cells.map(unquoted).collect();
         known.assign(&names).is_ok_and(|found| {
             let mut needed = known.names[..required].iter();

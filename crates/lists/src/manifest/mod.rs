@@ -32,7 +32,7 @@ mod whole_numbers;
 pub use self::csv::{fits_header, parse_csv, read_csv, read_csv_as};
 pub use block_list::{BlockRow, ReadBlocks, parse_blocks, read_block_json, read_blocks};
 pub use cell_errors::{FormulaErrors, cell_error, formula_error};
-pub use cell_forms::{UnusualCells, plain_cell};
+pub use cell_forms::{UnusualCells, plain_cell, plain_header};
 pub use changed_ids::ChangedIds;
 pub use chosen_columns::ChosenColumns;
 pub use error::ManifestError;

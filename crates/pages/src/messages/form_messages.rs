@@ -38,6 +38,16 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
         "nếu đúng vậy, hãy đóng ngoặc kép ngay trên dòng của nó",
     ),
     (
+        "column {} has {}, which begins like a formula",
+        "cột {0} có {1}, bắt đầu như một công thức",
+    ),
+    ("write the text itself", "hãy ghi chính nội dung cần dùng"),
+    (
+        "cells that begin with = like formulas: {}, the first in column {} on line {}",
+        "số ô bắt đầu bằng dấu = như công thức: {0#}, ô đầu tiên ở cột {1}, dòng {2}",
+    ),
+    ("they are kept as they are", "chúng được giữ nguyên"),
+    (
         "column {} is kept as metadata, because another column is read as {}",
         "cột {0} được giữ làm thông tin thêm, vì một cột khác được đọc là {1}",
     ),
