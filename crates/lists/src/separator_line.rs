@@ -4,16 +4,32 @@
 const MAX_LINE_BYTES: usize = 32;
 
 /// Returns the separator that the first line of a list names, and the number of bytes before the line break. Blanks do not
-/// matter, so the separator is none.
+/// matter, so the separator is none. The line may be in quotation marks, and separators of empty cells may follow, as a program
+/// writes them that saved the line as a cell.
 pub(crate) fn separator_line(list: &[u8]) -> Option<(u8, usize)> {
     let head = &list[..list.len().min(MAX_LINE_BYTES)];
     let end = head.iter().position(|byte| b"\r\n".contains(byte))?;
-    let (name, rest) = head[..end].split_at_checked(b"sep".len())?;
+    let line = without_blanks(&head[..end]);
+    let line = unquoted(line).unwrap_or(line);
+    let (name, rest) = line.split_at_checked(b"sep".len())?;
     let named = without_blanks(rest).strip_prefix(b"=")?;
-    match *without_blanks(named) {
-        [separator] if name.eq_ignore_ascii_case(b"sep") => Some((separator, end)),
+    match without_blanks(named) {
+        [separator, others @ ..]
+            if name.eq_ignore_ascii_case(b"sep") && others.iter().all(|byte| byte == separator) =>
+        {
+            Some((*separator, end))
+        }
         _ => None,
     }
+}
+
+/// Returns what stands in the quotation marks of a line, behind which there are only separators.
+fn unquoted(line: &[u8]) -> Option<&[u8]> {
+    let line = line.strip_prefix(b"\"")?;
+    let close = line.iter().position(|byte| *byte == b'"')?;
+    let mut rest = line[close + 1..].iter();
+    rest.all(|byte| b",;|\t ".contains(byte))
+        .then_some(&line[..close])
 }
 
 /// Returns a text without spaces at its ends. A tab may be the separator.
@@ -35,6 +51,12 @@ mod tests {
             ("Sep = ;\r\nid", Some((b';', 7))),
             ("SEP=, \rid", Some((b',', 6))),
             ("sep=\t\nid", Some((b'\t', 5))),
+            ("\"sep=,\"\nid", Some((b',', 7))),
+            (" \"Sep=\t\" \r\nid", Some((b'\t', 9))),
+            ("\"sep=;\";;\n", Some((b';', 9))),
+            ("sep=;;;\n", Some((b';', 7))),
+            ("\"sep=;\"x\n", None),
+            ("\"sep=;\n", None),
             ("sep=;", None),
             ("sep=;,\n", None),
             ("sep,mesh\n", None),

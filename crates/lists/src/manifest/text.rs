@@ -263,7 +263,11 @@ mod tests {
 
     #[test]
     fn a_first_line_may_name_the_separator() {
-        for list in ["sep=;\r\na;b,c,d\r\n", "\u{feff}SEP=;\na;b,c,d\n"] {
+        for list in [
+            "sep=;\r\na;b,c,d\r\n",
+            "\u{feff}SEP=;\na;b,c,d\n",
+            "\"sep=;\";;\na;b,c,d\n",
+        ] {
             let (text, separator) = text(list);
             assert_eq!((text.trim(), separator), ("a;b,c,d", ';'), "{list}");
             assert_eq!(text.lines().count(), 2, "lines are counted as in the file");
