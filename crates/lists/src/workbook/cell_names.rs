@@ -14,7 +14,7 @@ pub(super) fn column(place: &str) -> Option<usize> {
 }
 
 /// Returns the letters of a column.
-pub(super) fn letters(column: usize) -> String {
+fn letters(column: usize) -> String {
     let mut letters = Vec::new();
     let mut rest = column + 1;
     while rest > 0 {
@@ -23,6 +23,11 @@ pub(super) fn letters(column: usize) -> String {
         rest /= 26;
     }
     String::from_utf8_lossy(&letters).into_owned()
+}
+
+/// Returns the name of a cell such as `AB12` from its column, from 0, and its row, from 1.
+pub(super) fn cell_name(column: usize, row: usize) -> String {
+    format!("{}{row}", letters(column))
 }
 
 /// Returns the row of a cell such as `AB12`, from 1, and its column, from 0.

@@ -56,6 +56,26 @@ pub enum WorkbookError {
         /// The format.
         code: String,
     },
+    /// An id or a file name that is a text with text of its format.
+    #[error("cell {cell} of column \"{}\" shows its text in the format {}, which is not read; give the column the format Text and write the cell again", sanitize(.column, MAX_SHOWN), sanitize(.code, MAX_SHOWN))]
+    ShownText {
+        /// The cell, such as `B5`.
+        cell: String,
+        /// Name of its column.
+        column: String,
+        /// The format.
+        code: String,
+    },
+    /// An id or a file name that is a number with more digits than spreadsheet programs keep.
+    #[error("cell {cell} of column \"{}\" is the number {}, and spreadsheet programs keep only 15 digits of a number; give the column the format Text and write the cell again", sanitize(.column, MAX_SHOWN), sanitize(.number, MAX_SHOWN))]
+    LongNumber {
+        /// The cell, such as `B5`.
+        cell: String,
+        /// Name of its column.
+        column: String,
+        /// The number as it is stored.
+        number: String,
+    },
     /// A text longer than a spreadsheet program allows.
     #[error("cell {cell} has more than {limit} bytes of text; shorten it")]
     LongCell {
@@ -113,6 +133,8 @@ impl WorkbookError {
             self,
             Self::Converted { .. }
                 | Self::ShownNumber { .. }
+                | Self::ShownText { .. }
+                | Self::LongNumber { .. }
                 | Self::LongCell { .. }
                 | Self::NoResult { .. }
                 | Self::CellError { .. }

@@ -2,12 +2,14 @@
 
 mod archive;
 mod cell_names;
+mod cell_text;
 mod error;
 mod hidden_rows;
 mod merged;
 mod number_format;
 mod parts;
 mod shown_number;
+mod shown_text;
 mod table;
 #[cfg(any(test, feature = "test-helpers"))]
 pub mod test_helpers;

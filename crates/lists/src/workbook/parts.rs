@@ -8,6 +8,7 @@ use super::archive::{WorkbookArchive, damaged};
 use super::error::WorkbookError;
 use super::number_format::NumberFormat;
 use super::shown_number::ShownNumber;
+use super::shown_text::ShownText;
 use crate::xml::{XmlFault, XmlPart, attribute, local_name, read_xml};
 
 /// The file that names the sheets, and the folder of the others.
@@ -66,6 +67,8 @@ pub(super) struct Workbook {
     pub(super) formats: Vec<NumberFormat>,
     /// How styles show the numbers of ids, if not as numbers.
     pub(super) shown_numbers: HashMap<usize, ShownNumber>,
+    /// How styles show the texts of ids, if not as they are.
+    pub(super) shown_texts: HashMap<usize, ShownText>,
     /// Whether days are counted from 1904.
     pub(super) is_1904: bool,
 }
@@ -207,10 +210,32 @@ impl TextCollector {
     }
 }
 
+/// What a code does to the values of cells.
+#[derive(Clone)]
+struct CellFormat {
+    number: NumberFormat,
+    /// How numbers of ids are shown, if not as numbers.
+    shown: Option<ShownNumber>,
+    /// How texts of ids are shown, if not as they are.
+    text: Option<ShownText>,
+}
+
+impl CellFormat {
+    fn of_code(code: &str) -> Self {
+        let number = NumberFormat::of_code(code);
+        let is_plain = number == NumberFormat::Plain;
+        Self {
+            number,
+            shown: is_plain.then(|| ShownNumber::of_code(code)).flatten(),
+            text: ShownText::of_code(code),
+        }
+    }
+}
+
 impl Workbook {
     /// Reads the format of numbers of each style of cells.
     fn read_formats(&mut self, file: &str, text: &str) -> Result<(), WorkbookError> {
-        let mut codes: HashMap<u32, (NumberFormat, Option<ShownNumber>)> = HashMap::new();
+        let mut codes: HashMap<u32, CellFormat> = HashMap::new();
         let mut in_cells = false;
         let mut open = Vec::new();
         read_part(file, text, |part| {
@@ -221,21 +246,20 @@ impl Workbook {
                     match name.as_str() {
                         "numFmt" => {
                             let code = value(&element, "formatCode")?;
-                            let format = NumberFormat::of_code(&code);
-                            let is_plain = format == NumberFormat::Plain;
-                            let shown = is_plain.then(|| ShownNumber::of_code(&code)).flatten();
-                            codes.insert(id("numFmtId")?, (format, shown));
+                            codes.insert(id("numFmtId")?, CellFormat::of_code(&code));
                         }
                         "cellXfs" => in_cells = true,
                         "xf" if in_cells => {
                             let id = id("numFmtId")?;
-                            let (format, shown) = match codes.get(&id) {
-                                Some((format, shown)) => (*format, shown.clone()),
-                                None => (NumberFormat::built_in(id), None),
-                            };
                             let style = self.formats.len();
-                            self.shown_numbers.extend(shown.map(|shown| (style, shown)));
-                            self.formats.push(format);
+                            let format = codes.get(&id);
+                            let number = format.map(|format| format.number);
+                            if let Some(CellFormat { shown, text, .. }) = format.cloned() {
+                                self.shown_numbers.extend(shown.map(|shown| (style, shown)));
+                                self.shown_texts.extend(text.map(|text| (style, text)));
+                            }
+                            let number = number.unwrap_or_else(|| NumberFormat::built_in(id));
+                            self.formats.push(number);
                         }
                         _ => {}
                     }

@@ -1,15 +1,15 @@
 //! Numbers in formats with text of their own, such as `"B"000`: what a reader sees is the id, and the cell has only its number.
 
 /// Longest code of a format that Excel has, in characters.
-const MAX_CODE_CHARS: usize = 255;
+pub(super) const MAX_CODE_CHARS: usize = 255;
 
 /// How a format of numbers shows the whole number of an id.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum ShownNumber {
-    /// With at least this many digits between two texts.
-    Between(String, usize, String),
-    /// In a way that is not read; the code of the format.
-    Unread(String),
+pub(super) struct ShownNumber {
+    /// The code of the format.
+    code: String,
+    /// At least this many digits between two texts, or `None` if the code is not read.
+    between: Option<(String, usize, String)>,
 }
 
 /// Where the reader of a code is.
@@ -28,6 +28,8 @@ struct CodeParts {
     behind: String,
     /// Whether text stands between digits, or digits stand behind a point.
     is_divided: bool,
+    /// Whether the section is only for some numbers.
+    has_condition: bool,
 }
 
 impl CodeParts {
@@ -52,7 +54,10 @@ impl ShownNumber {
     /// is, but for separators of thousands.
     pub(super) fn of_code(code: &str) -> Option<Self> {
         if code.chars().count() > MAX_CODE_CHARS {
-            return Some(Self::Unread(code.chars().take(MAX_CODE_CHARS).collect()));
+            return Some(Self {
+                code: code.chars().take(MAX_CODE_CHARS).collect(),
+                between: None,
+            });
         }
         let mut parts = CodeParts {
             part: CodePart::Before,
@@ -60,6 +65,7 @@ impl ShownNumber {
             zeros: 0,
             behind: String::new(),
             is_divided: false,
+            has_condition: false,
         };
         let mut rest = code;
         while let Some(c) = rest.chars().next() {
@@ -85,6 +91,8 @@ impl ShownNumber {
                 }
                 '[' => {
                     let (inner, behind) = rest.split_once(']').unwrap_or((rest, ""));
+                    // Other numbers are shown in another way.
+                    parts.has_condition |= inner.starts_with(['<', '>', '=']);
                     // A currency, such as `[$€-407]`; all else is a colour or a condition.
                     let currency = inner.strip_prefix('$');
                     let currency = currency.and_then(|inner| inner.split('-').next());
@@ -113,14 +121,18 @@ const GENERAL: &str = "General";
 impl CodeParts {
     fn shown(self, code: &str) -> Option<ShownNumber> {
         let has_text = !self.before.trim().is_empty() || !self.behind.trim().is_empty();
-        if self.is_divided && has_text {
-            return Some(ShownNumber::Unread(code.to_owned()));
+        let shown = |between| ShownNumber {
+            code: code.to_owned(),
+            between,
+        };
+        if self.has_condition || self.is_divided && has_text {
+            return Some(shown(None));
         }
         let is_changed = !self.is_divided && (has_text || self.zeros > 1);
         is_changed.then(|| {
             let before = self.before.trim_start().to_owned();
             let behind = self.behind.trim_end().to_owned();
-            ShownNumber::Between(before, self.zeros, behind)
+            shown(Some((before, self.zeros, behind)))
         })
     }
 }
@@ -129,13 +141,12 @@ impl ShownNumber {
     /// Returns what a reader sees of a number, or the code of the format if that is not known.
     pub(super) fn text(&self, number: &str) -> Result<String, String> {
         let whole = number.trim().parse::<u64>().ok();
-        match (self, whole) {
-            (Self::Between(before, zeros, behind), Some(whole)) => {
+        match (&self.between, whole) {
+            (Some((before, zeros, behind)), Some(whole)) => {
                 let digits = format!("{whole:0>width$}", width = *zeros);
                 Ok([before, digits.as_str(), behind].concat())
             }
-            (Self::Between(before, _, behind), None) => Err(format!("{before}0{behind}")),
-            (Self::Unread(code), _) => Err(code.clone()),
+            _ => Err(self.code.clone()),
         }
     }
 }
@@ -179,12 +190,16 @@ mod tests {
         ] {
             assert_eq!(ShownNumber::of_code(code), None, "{code}");
         }
-        for code in ["00\"-\"00", "000\\-000", "\"B\"0.0"] {
+        for code in ["00\"-\"00", "000\\-000", "\"B\"0.0", "[>99]\"B\"0;\"C\"0"] {
             let shown = ShownNumber::of_code(code).expect(code);
             assert_eq!(shown.text("17"), Err(code.to_owned()));
         }
         let shown = ShownNumber::of_code("\"B\"000").expect("a code");
-        assert!(shown.text("1.5").is_err() && shown.text("-1").is_err());
+        assert_eq!(shown.text("1.5"), Err("\"B\"000".to_owned()));
+        let code = "\"B\"000;\"C\"000";
+        let shown = ShownNumber::of_code(code).expect(code);
+        assert_eq!(shown.text("-17"), Err(code.to_owned()));
+        assert_eq!(shown.text("17").as_deref(), Ok("B017"));
     }
 
     #[test]

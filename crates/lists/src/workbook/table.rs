@@ -3,30 +3,17 @@
 use std::collections::BTreeMap;
 
 use super::archive::damaged;
-use super::cell_names::{MAX_COLUMNS, MAX_ROWS, column, letters};
+use super::cell_names::{MAX_COLUMNS, MAX_ROWS, cell_name, column};
+use super::cell_text::{CellPlace, OpenCell};
 use super::error::WorkbookError;
 use super::hidden_rows::HiddenRows;
 use super::merged::{HiddenValues, MergedCells};
 use super::parts::{TextCollector, Workbook, read_part, value};
-use crate::manifest::{UnnamedValues, formula_error, is_id_or_path_column, is_text_column};
+use crate::manifest::{UnnamedValues, formula_error, is_text_column};
 use crate::xml::{XmlPart, local_name};
 
 /// Longest table, in bytes. Cells share texts, so a small workbook may hold a large one. Less in tests.
 const MAX_TABLE_BYTES: usize = if cfg!(test) { 4 << 20 } else { 512 << 20 };
-
-/// Longest text of a cell, in bytes. Excel allows 32,767 units of UTF-16, each of up to 3 bytes in UTF-8.
-const MAX_CELL_BYTES: usize = 3 * 32_767;
-
-/// A cell whose element is open.
-#[derive(Default)]
-struct OpenCell {
-    column: usize,
-    kind: String,
-    style: usize,
-    has_formula: bool,
-    /// Text of its value.
-    value: String,
-}
 
 /// Writes a sheet as CSV.
 struct TableWriter<'w> {
@@ -200,7 +187,8 @@ impl TableWriter<'_> {
             return Ok(());
         }
         let is_error = cell.kind == "e";
-        let text = match self.text(cell) {
+        let read = self.place(column).text(cell);
+        let text = match read {
             Err(error) if error.is_of_cell() => {
                 if !is_covered {
                     self.refuse(error);
@@ -254,101 +242,20 @@ impl TableWriter<'_> {
         shared.unwrap_or(&cell.value)
     }
 
-    /// Returns the text of a cell.
-    fn text(&self, cell: OpenCell) -> Result<String, WorkbookError> {
-        let OpenCell {
-            column,
-            kind,
-            style,
-            has_formula,
-            value,
-        } = cell;
-        Ok(match kind.as_str() {
-            "s" => {
-                let index = value.trim().parse::<usize>().ok();
-                let string = index.and_then(|index| self.workbook.strings.get(index));
-                let string =
-                    string.ok_or_else(|| damaged(&format!("there is no string {value}")))?;
-                self.check_text(column, string)?;
-                string.clone()
-            }
-            "b" if value.trim() == "1" => "true".to_owned(),
-            "b" => "false".to_owned(),
-            // Parsers decide by the column whether the error is refused.
-            "e" if self.width > 0 && formula_error(value.trim()).is_some() => {
-                value.trim().to_owned()
-            }
-            "e" => {
-                let cell = self.name(column);
-                return Err(WorkbookError::CellError { cell, value });
-            }
-            "str" | "inlineStr" | "d" => {
-                self.check_text(column, &value)?;
-                value
-            }
-            _ if value.trim().is_empty() && has_formula => {
-                let cell = self.name(column);
-                return Err(WorkbookError::NoResult { cell });
-            }
-            _ if value.trim().is_empty() => String::new(),
-            _ => {
-                let format = self.workbook.formats.get(style).copied();
-                let format = format.unwrap_or_default();
-                let text = format.text(&value, self.workbook.is_1904);
-                if let (Some((kind, example)), Some(header)) =
-                    (format.conversion(), self.text_columns.get(&column))
-                {
-                    return Err(WorkbookError::Converted {
-                        cell: self.name(column),
-                        column: header.clone(),
-                        kind,
-                        text,
-                        example,
-                    });
-                }
-                self.shown_number(column, style, &value)?.unwrap_or(text)
-            }
-        })
-    }
-
-    /// Returns what a reader sees of the number of an id or a file name, if its format has more than digits.
-    fn shown_number(
-        &self,
-        column: usize,
-        style: usize,
-        number: &str,
-    ) -> Result<Option<String>, WorkbookError> {
-        let shown = self.workbook.shown_numbers.get(&style);
-        let (Some(shown), Some(header)) = (shown, self.text_columns.get(&column)) else {
-            return Ok(None);
-        };
-        let text = shown.text(number);
-        text.map(Some).map_err(|code| WorkbookError::ShownNumber {
-            cell: self.name(column),
-            column: header.clone(),
-            code,
-        })
-    }
-
     /// Returns the name of a cell of the open row, such as `B5`.
     fn name(&self, column: usize) -> String {
-        format!("{}{}", letters(column), self.row)
+        cell_name(column, self.row)
     }
 
-    /// Refuses a text that is too long, and an id or a path on several lines.
-    fn check_text(&self, column: usize, text: &str) -> Result<(), WorkbookError> {
-        if text.len() > MAX_CELL_BYTES {
-            let (cell, limit) = (self.name(column), MAX_CELL_BYTES);
-            return Err(WorkbookError::LongCell { cell, limit });
+    /// Returns where a cell of the open row stands.
+    fn place(&self, column: usize) -> CellPlace<'_> {
+        CellPlace {
+            workbook: self.workbook,
+            row: self.row,
+            column,
+            header: self.text_columns.get(&column).map(String::as_str),
+            is_below_header: self.width > 0,
         }
-        if let Some(header) = self.text_columns.get(&column)
-            && text.trim().contains(['\n', '\r'])
-            && is_id_or_path_column(header)
-        {
-            let (cell, column) = (self.name(column), header.clone());
-            return Err(WorkbookError::LineBreak { cell, column });
-        }
-        Ok(())
     }
 
     /// Gives the cells of the open row, which is below the header, the values of those above with which they are merged.

@@ -57,6 +57,14 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
         "ô {0} của cột {1} hiện số theo định dạng {2} không đọc được",
     ),
     (
+        "cell {} of column {} shows its text in the format {}, which is not read",
+        "ô {0} của cột {1} hiện văn bản theo định dạng {2} không đọc được",
+    ),
+    (
+        "cell {} of column {} is the number {}, and spreadsheet programs keep only 15 digits of a number",
+        "ô {0} của cột {1} là số {2}, mà chương trình bảng tính chỉ giữ 15 chữ số của một số",
+    ),
+    (
         "hidden rows are read, too: {}, the first is row {}",
         "số dòng bị ẩn vẫn được đọc: {0#}, dòng đầu tiên là {1}",
     ),
