@@ -39,17 +39,23 @@ pub fn refuse_foreign_file(
 }
 
 /// Refuses to write a report over a file like [`refuse_foreign_file`], but passes the whole file to `is_report`: the program is
-/// named anywhere in a report.
+/// named anywhere in a report. Refuses a report, too, if `is_continued` finds that somebody wrote at its end.
 pub(crate) fn refuse_foreign_report(
     path: &Path,
     is_report: impl FnOnce(&[u8]) -> bool,
+    is_continued: impl FnOnce(&[u8]) -> bool,
 ) -> Result<(), Refusal> {
-    refuse_foreign(
-        path,
-        "a report of this program",
-        MAX_REPORT_BYTES,
-        is_report,
-    )
+    let what = "a report of this program";
+    refuse_foreign(path, what, MAX_REPORT_BYTES, is_report)?;
+    let earlier = path.metadata().is_ok_and(|meta| meta.is_file());
+    let earlier = earlier.then(|| beginning(path, MAX_REPORT_BYTES)).flatten();
+    if earlier.is_some_and(|earlier| !earlier.is_empty() && is_continued(&earlier)) {
+        return Err(Refusal::Usage(format!(
+            "{} is a report to which somebody added text; choose another name, or remove it if you do not need it",
+            path.display()
+        )));
+    }
+    Ok(())
 }
 
 /// Refuses to write over a file that is not recognized by its first `most` bytes.
@@ -200,7 +206,15 @@ mod tests {
         let content = [vec![b' '; HEAD_BYTES], end.to_vec()].concat();
         std::fs::write(&path, content).expect("written");
         let is_ours = |bytes: &[u8]| bytes.ends_with(end);
-        assert!(refuse_foreign_report(&path, is_ours).is_ok());
+        assert!(refuse_foreign_report(&path, is_ours, |_| false).is_ok());
+        let refused = refuse_foreign_report(&path, is_ours, |_| true).expect_err("added text");
+        assert!(
+            refused.to_string().contains("somebody added text"),
+            "{refused}"
+        );
+        std::fs::write(&path, "").expect("written");
+        assert!(refuse_foreign_report(&path, is_ours, |_| true).is_ok());
+        std::fs::write(&path, [vec![b' '; HEAD_BYTES], end.to_vec()].concat()).expect("written");
         assert!(refuse_foreign_file(&path, "a log", is_ours).is_err());
     }
 }

@@ -10,7 +10,9 @@ use crate::own_files::{refuse_foreign_report, refuse_used_file};
 use crate::status::warn_about_stale;
 use mocban_config::{Sources, load};
 use mocban_export::{GallerySelection, draw_gallery};
-use mocban_report::{Cover, Report, ReportFormat, build, build_with, is_report, page, render};
+use mocban_report::{
+    Cover, Report, ReportFormat, build, build_with, is_continued, is_report, page, render,
+};
 use mocban_results::IntervalMethod;
 use mocban_store::Project;
 use mocban_system::time_text::day;
@@ -41,7 +43,7 @@ pub struct RenderedReport {
 }
 
 /// Builds the report of a project. `output` is the file that it will be written to; a file that the project needs is refused,
-/// and so is every file that is not an earlier report.
+/// and so is every file that is not an earlier report as it was written.
 pub async fn report(
     options: ReportOptions,
     output: Option<&Path>,
@@ -51,7 +53,7 @@ pub async fn report(
     let (project, catalog) = location.open_read_only().await?;
     if let Some(path) = output {
         refuse_used_file(path, &project, &catalog).await?;
-        refuse_foreign_report(path, is_report)?;
+        refuse_foreign_report(path, is_report, is_continued)?;
     }
     warn_about_stale(&catalog, location, listener).await?;
     let _work = LongWork::begin(listener, "reading the results");

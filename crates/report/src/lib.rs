@@ -43,8 +43,8 @@ pub use model::{
 pub use named_commands::{CommandPage, NAMED_COMMANDS, NamedCommand, command_page};
 pub use provenance::{ChangedSetting, Provenance, UsedSettings};
 pub use render::{
-    Cover, MAX_PAGE_BYTES, RESERVED_BYTES, ReportFormat, agreement_text, is_report, page, render,
-    summary,
+    Cover, MAX_PAGE_BYTES, RESERVED_BYTES, ReportFormat, agreement_text, is_continued, is_report,
+    page, render, summary,
 };
 pub use report_error::ReportError;
 pub use risk_coverage::{

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
+use super::provenance_lines::{LABEL_WIDTH, LABELS};
 use super::{csv, html, latex};
 
 /// Fields of every report in JSON.
@@ -33,6 +34,63 @@ pub fn is_report(bytes: &[u8]) -> bool {
         || has(MARKDOWN_PROGRAM)
 }
 
+/// Returns whether somebody added something at the end of a report: each format ends in its own way, and CSV has nothing but
+/// rows of numbers. Changes in other places are not found.
+pub fn is_continued(report: &[u8]) -> bool {
+    // JSON with anything behind it is no report.
+    if report.trim_ascii_start().starts_with(b"{") {
+        return false;
+    }
+    let Ok(text) = std::str::from_utf8(report) else {
+        return true;
+    };
+    let text = text.trim();
+    let is_whole = if let Some(rows) = text.strip_prefix(csv::HEADER.trim_end()) {
+        rows.lines().skip(1).all(is_csv_row)
+    } else if text.starts_with(latex::PREAMBLE) {
+        let last = text.rsplit("\\begin{table}").next().unwrap_or_default();
+        last.contains("\\label{tab:mocban-provenance}") && last.ends_with("\\end{table}")
+    } else if text.starts_with("<!DOCTYPE html>") {
+        text.ends_with("</html>")
+    } else if let Some((_, end)) = text.rsplit_once(MARKDOWN_PROGRAM) {
+        let is_item = |line: &str| {
+            let mut labels = LABELS.iter();
+            let item = line.strip_prefix("- ").unwrap_or_default();
+            labels.any(|label| {
+                let rest = item.strip_prefix(label);
+                rest.is_some_and(|rest| rest.starts_with(": "))
+            })
+        };
+        end.lines().skip(1).all(is_item)
+    } else if let Some((_, end)) = text.rsplit_once(PLAIN_PROGRAM) {
+        // A long line goes on below its text.
+        let is_wrapped = |line: &str| line.starts_with(&" ".repeat(LABEL_WIDTH + 1));
+        let is_item = |line: &str| {
+            let mut labels = LABELS.iter();
+            labels.any(|label| line.starts_with(&format!("{label:<LABEL_WIDTH$} ")))
+        };
+        let mut lines = end.lines().skip(1);
+        lines.all(|line| is_item(line) || is_wrapped(line))
+    } else {
+        false
+    };
+    !is_whole
+}
+
+/// Returns whether a line is a row of a report in CSV: two names and four numbers, of which some may be missing.
+fn is_csv_row(line: &str) -> bool {
+    let cells: Vec<&str> = line.split(',').collect();
+    let [metric, quantity, numbers @ ..] = cells.as_slice() else {
+        return false;
+    };
+    let is_name = |name: &str| {
+        let mut bytes = name.bytes();
+        !name.is_empty() && bytes.all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+    };
+    let is_number = |cell: &&str| cell.is_empty() || cell.parse::<f64>().is_ok();
+    is_name(metric) && is_name(quantity) && numbers.len() == 4 && numbers.iter().all(is_number)
+}
+
 /// The line of a report as text that names the program.
 const PLAIN_PROGRAM: &str = "\nProgram      mocban ";
 /// The same in Markdown, with its title.
@@ -40,7 +98,7 @@ const MARKDOWN_PROGRAM: &str = "\n**Provenance**\n\n- Program: mocban ";
 
 #[cfg(test)]
 mod tests {
-    use super::is_report;
+    use super::{is_continued, is_report};
     use crate::{ReportAccumulator, ReportFormat, render, test_fixtures};
     use mocban_results::TruthEvaluation;
 
@@ -56,6 +114,19 @@ mod tests {
             for format in ReportFormat::ALL {
                 let text = render(&report, format);
                 assert!(is_report(text.as_bytes()), "{format}: {text}");
+                assert!(!is_continued(text.as_bytes()), "{format}: {text}");
+                if format == ReportFormat::Json {
+                    continue;
+                }
+                for note in [
+                    "My notes: good.\n",
+                    "\n- My note\n",
+                    "a,b,c\n",
+                    "<p>Note</p>\n",
+                ] {
+                    let continued = format!("{text}{note}");
+                    assert!(is_continued(continued.as_bytes()), "{format}: {note}");
+                }
             }
         }
         for other in [

@@ -23,7 +23,7 @@ use mocban_core::domain::{enum_names, visible, visible_json};
 use mocban_results::gallery::Gallery;
 
 pub use agreement_text::agreement_text;
-pub use earlier_report::is_report;
+pub use earlier_report::{is_continued, is_report};
 pub use html::{Cover, MAX_PAGE_BYTES, RESERVED_BYTES, page};
 pub use text::summary;
 

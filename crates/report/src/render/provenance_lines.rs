@@ -8,6 +8,20 @@ use mocban_results::number_format::{counted, format_count};
 /// A line: what it is about, and its text.
 pub(super) type ProvenanceLine = (&'static str, String);
 
+/// What lines are about.
+pub(super) const LABELS: [&str; 7] = [
+    "Program",
+    "Settings",
+    "Inputs",
+    "Results",
+    "Verdicts",
+    "Seed",
+    "Last result",
+];
+
+/// Width of these labels in aligned text.
+pub(super) const LABEL_WIDTH: usize = 12;
+
 /// Returns the lines, in order.
 pub(super) fn provenance_lines(report: &Report) -> Vec<ProvenanceLine> {
     let found = &report.provenance;
@@ -35,6 +49,10 @@ pub(super) fn provenance_lines(report: &Report) -> Vec<ProvenanceLine> {
             time.replace('T', " ").replace('Z', " +00:00"),
         )
     }));
+    debug_assert!(
+        lines.iter().all(|(what, _)| LABELS.contains(what)),
+        "an earlier report is recognized by its labels"
+    );
     lines
 }
 

@@ -1,7 +1,7 @@
 //! The report for a terminal of 80 columns.
 
 use super::comparison_tables::{comparison_sentences, comparisons, score_comparisons};
-use super::provenance_lines::provenance_lines;
+use super::provenance_lines::{LABEL_WIDTH, provenance_lines};
 use super::report_tables::{scores, tables, truth};
 use super::risk_coverage_tables::short_tables;
 use super::table::{ColumnFormat, Table, TableColumn};
@@ -49,7 +49,7 @@ pub(super) fn render(report: &Report) -> String {
     let provenance = provenance_lines(report).into_iter();
     blocks.push(
         provenance
-            .map(|(what, text)| wrapped(&format!("{what:<12} "), &text))
+            .map(|(what, text)| wrapped(&format!("{what:<LABEL_WIDTH$} "), &text))
             .collect(),
     );
     blocks.join("\n")
