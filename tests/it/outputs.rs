@@ -195,6 +195,17 @@ fn reports_sheets_and_logs_replace_only_their_own_earlier_files() {
     }
     at(&project, &["report", "--format", "text", "-o", &report]).expect(0);
     at(&project, &["report", "-o", &sheet]).expect(2);
+    for name in ["added.md", "added.csv"] {
+        let output = path(name);
+        at(&project, &["report", "-o", &output]).expect(0);
+        let mut content = std::fs::read(&output).expect("a report");
+        content.extend_from_slice(b"seen by lan\n");
+        std::fs::write(&output, &content).expect("written");
+        let refused = at(&project, &["report", "-o", &output]).expect(2);
+        let is_said = refused.err.contains("somebody added text");
+        assert!(is_said, "{name}: {}", refused.err);
+        assert_eq!(std::fs::read(&output).expect("a file"), content, "{name}");
+    }
 }
 
 #[test]
