@@ -1,4 +1,5 @@
-//! Ids of CSV that are whole numbers with the decimals `.0`. Python writes a column of numbers so if values are missing.
+//! Ids of CSV that are whole numbers with the decimals `.0`. Python writes them so if a value
+//! of the column is missing.
 
 use ::csv::ByteRecord;
 use memchr::memmem;

@@ -53,6 +53,7 @@ pub(super) const FRAGMENTS: &[&str] = &[
     "characters of a page",
     "the list is not UTF-8{hint}",
     "{column} is empty",
+    "{name:?}: {error}; write it as text",
     "mat truoc",
     "mat sau",
     "mesh file",
