@@ -73,7 +73,7 @@ pub enum WorkbookError {
         cell: String,
         /// Name of its column.
         column: String,
-        /// The number as it is stored.
+        /// The number as stored.
         number: String,
     },
     /// A text longer than a spreadsheet program allows.
