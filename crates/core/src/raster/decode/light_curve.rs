@@ -1,6 +1,6 @@
 //! Converts levels to sRGB if a file without a profile states how its levels stand for light.
 
-use super::png_chunks::png_chunk;
+use super::png_chunks::png_colour_chunk;
 use crate::domain::cancel::poll;
 use crate::raster::Grid;
 
@@ -24,7 +24,7 @@ pub(super) enum LightCurve {
 impl LightCurve {
     /// Returns the curve of a PNG without an ICC profile; `None` for sRGB.
     pub(super) fn of_png(bytes: &[u8]) -> Option<Self> {
-        if let Some(&[primaries, transfer, _, full_range]) = png_chunk(bytes, *b"cICP") {
+        if let Some(&[primaries, transfer, _, full_range]) = png_colour_chunk(bytes, *b"cICP") {
             return match (primaries, transfer, full_range) {
                 // The primaries of sRGB or unspecified ones, with the curve of sRGB or of television.
                 (1 | 2, 1 | 2 | 6 | 13..=15, 1) => None,
@@ -34,10 +34,10 @@ impl LightCurve {
                 _ => Some(Self::Unread(format!("cICP {primaries}/{transfer}"))),
             };
         }
-        if png_chunk(bytes, *b"sRGB").is_some() {
+        if png_colour_chunk(bytes, *b"sRGB").is_some() {
             return None;
         }
-        let stored = png_chunk(bytes, *b"gAMA")?.first_chunk()?;
+        let stored = png_colour_chunk(bytes, *b"gAMA")?.first_chunk()?;
         let gamma = f64::from(u32::from_be_bytes(*stored)) / 100_000.0;
         (gamma > 0.0).then_some(Self::Gamma(gamma))
     }
@@ -157,6 +157,33 @@ mod tests {
             &[(b"cICP", &[1, 13, 0, 1][..]), (b"gAMA", linear)],
         ] {
             assert_eq!(read(chunks), plain);
+        }
+    }
+
+    #[test]
+    fn what_colours_mean_counts_only_before_the_palette_and_the_pixels() {
+        let plain = read(&[]);
+        let colours = [
+            encoded_chunk(*b"gAMA", &100_000_u32.to_be_bytes()),
+            encoded_chunk(*b"cICP", &[1, 8, 0, 1]),
+            encoded_chunk(*b"iCCP", b"name\0\0no profile"),
+        ];
+        // The last chunk ends the file.
+        let bytes = png(&LEVELS, &[]);
+        let (pixels, end) = bytes.split_at(bytes.len() - 12);
+        let palette = encoded_chunk(*b"PLTE", &[9; 6]);
+        let (head, rest) = bytes.split_at(33);
+        for chunk in &colours {
+            for misplaced in [
+                [pixels, chunk, end].concat(),
+                [head, &palette, chunk, rest].concat(),
+            ] {
+                let found = decode(&misplaced, &ImageLimits::SUGGESTED).expect("decodes");
+                assert_eq!(found, plain);
+            }
+            let placed = [head, chunk, rest].concat();
+            let found = decode(&placed, &ImageLimits::SUGGESTED).expect("decodes");
+            assert_ne!(found, plain);
         }
     }
 

@@ -25,7 +25,7 @@ use colour_profile::FileProfile;
 use error::broken;
 use light_curve::LightCurve;
 use orientation::StatedOrientation;
-use png_chunks::png_chunk;
+use png_chunks::png_colour_chunk;
 use print_image::{colours_on_white, widen_narrow};
 use tags::TagFileWindow;
 
@@ -126,9 +126,9 @@ fn decode_png(
     memory.max_alloc = Some(limits.max_decoder_bytes());
     reader.limits(memory);
     let mut decoder = reader.into_decoder().map_err(|error| png_error(&error))?;
-    let profile = decoder.icc_profile().ok().flatten();
-    // The decoder skips a profile that it cannot decompress.
-    let profile = profile.or_else(|| png_chunk(bytes, *b"iCCP").map(|_| Vec::new()));
+    // The decoder skips a profile that it cannot decompress, and reads one behind the palette.
+    let profile = png_colour_chunk(bytes, *b"iCCP")
+        .map(|_| decoder.icc_profile().ok().flatten().unwrap_or_default());
     let pixels = DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error))?;
     let profile = profile.map(|bytes| FileProfile {
         bytes,

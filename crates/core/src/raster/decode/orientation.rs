@@ -84,7 +84,7 @@ fn exif_number(block: &[u8]) -> Option<u64> {
 }
 
 /// Returns the orientation in XMP: an attribute or an element of one digit.
-fn xmp_number(packet: &[u8]) -> Option<u64> {
+pub(super) fn xmp_number(packet: &[u8]) -> Option<u64> {
     const NAME: &[u8] = b"tiff:Orientation";
     let start = memchr::memmem::find(packet, NAME)? + NAME.len();
     let value = match packet[start..].trim_ascii_start() {

@@ -33,6 +33,14 @@ pub(super) fn png_chunk(bytes: &[u8], wanted: [u8; 4]) -> Option<&[u8]> {
     found.map(|(_, content)| content)
 }
 
+/// Returns the content of the first chunk of a kind that says what colours mean. Such a chunk counts only before the palette
+/// and the pixels.
+pub(super) fn png_colour_chunk(bytes: &[u8], wanted: [u8; 4]) -> Option<&[u8]> {
+    let mut before = png_chunks(bytes).take_while(|(kind, _)| !matches!(kind, b"PLTE" | b"IDAT"));
+    let found = before.find(|(kind, _)| *kind == wanted);
+    found.map(|(_, content)| content)
+}
+
 /// Returns the keyword and the text of a text chunk with one of the keywords. Returns `None` for other chunks, and if the text
 /// cannot be decompressed.
 pub(super) fn png_text<'b>(

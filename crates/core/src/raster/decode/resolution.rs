@@ -57,7 +57,7 @@ pub fn file_dpi(mut file: impl BufRead + Seek) -> Option<[f64; 2]> {
 fn of_tiff(file: &dyn TagSource) -> Option<StoredDpi> {
     let (stored, turned) = tiff::with_print_tags(file, |print| {
         let tag = |tag| print.inherited_values(tag);
-        (of_tags(tag), print.inherited(tiff::ORIENTATION))
+        (of_tags(tag), print.orientation())
     })?;
     Some((stored, orientation::of_tag(turned)))
 }

@@ -248,6 +248,16 @@ impl<'b> TagValues<'b> {
         Some(above? as f64 / below? as f64).filter(|ratio| ratio.is_finite())
     }
 
+    /// Returns the first bytes of all values, at most `most`.
+    pub(super) fn first_bytes(&self, most: usize) -> Option<Vec<u8>> {
+        let window = WINDOW_BYTES as usize;
+        let mut bytes = vec![0; (self.count * self.value_len).min(most)];
+        for (nth, part) in bytes.chunks_mut(window).enumerate() {
+            self.file.source.read(self.start + nth * window, part)?;
+        }
+        Some(bytes)
+    }
+
     /// Returns the bytes of all values, if the file is in memory.
     pub(super) fn bytes(&self) -> Option<&'b [u8]> {
         let source = self.file.source;

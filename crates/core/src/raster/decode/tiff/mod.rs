@@ -26,14 +26,13 @@ use layout::TiffLayout;
 use pages::PrintPage;
 use photometric::{Photometric, YCbCrCode};
 
-pub(super) const ORIENTATION: u64 = 274;
 const ICC_PROFILE: u64 = 34675;
 const TRANSFER_FUNCTION: u64 = 301;
 
 /// The print of a TIFF file, as stored.
 pub(super) struct TiffImage {
     pub(super) rgb: Grid<[u16; 3]>,
-    /// EXIF orientation, if the page has one.
+    /// EXIF orientation, if the file states one.
     pub(super) orientation: Option<u64>,
     pub(super) profile: Option<FileProfile>,
     pub(super) light_curve: Option<LightCurve>,
@@ -59,7 +58,7 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, De
     }
     Ok(TiffImage {
         rgb,
-        orientation: print.inherited(ORIENTATION),
+        orientation: print.orientation(),
         profile: print.inherited_bytes(ICC_PROFILE).map(|bytes| FileProfile {
             bytes: bytes.to_vec(),
             is_of_inks,
@@ -123,7 +122,7 @@ pub(super) fn stored_size(
         return Err(DecodeError::Truncated(FileKind::Tiff));
     }
     let size = [layout.width, layout.height].map(|side| side as u32);
-    Ok((size, print.inherited(ORIENTATION)))
+    Ok((size, print.orientation()))
 }
 
 fn pixels(layout: &TiffLayout<'_>, file: &[u8]) -> Result<Grid<[u16; 3]>, DecodeError> {

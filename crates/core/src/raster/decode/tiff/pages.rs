@@ -2,6 +2,7 @@
 
 use crate::domain::FileKind;
 use crate::raster::decode::error::{DecodeError, broken};
+use crate::raster::decode::orientation::xmp_number;
 use crate::raster::decode::tags::{TagDirectory, TagSource, TagValues, TaggedFile};
 
 /// Flags of `NewSubfileType`: a reduced copy of another page, and a mask.
@@ -18,7 +19,12 @@ const NEW_SUBFILE_TYPE: u64 = 254;
 const SUBFILE_TYPE: u64 = 255;
 const WIDTH: u64 = 256;
 const HEIGHT: u64 = 257;
+const ORIENTATION: u64 = 274;
 const SUB_DIRECTORIES: u64 = 330;
+const XMP: u64 = 700;
+
+/// Bytes at the beginning of XMP in which an orientation is searched.
+const MAX_XMP_BYTES: usize = 1 << 20;
 
 /// The page of a print.
 #[derive(Clone, Copy)]
@@ -30,8 +36,15 @@ pub(in crate::raster::decode) struct PrintPage<'b> {
 }
 
 impl<'b> PrintPage<'b> {
+    /// Returns the EXIF orientation of the page, or of its parents: that of the tag, or else that in XMP.
+    pub(in crate::raster::decode) fn orientation(&self) -> Option<u64> {
+        let stated = self.inherited(ORIENTATION);
+        let valid = stated.filter(|number| (1..=8).contains(number));
+        valid.or_else(|| xmp_number(&self.inherited_values(XMP)?.first_bytes(MAX_XMP_BYTES)?))
+    }
+
     /// Returns the first value of a tag of the page, or of its parents.
-    pub(in crate::raster::decode) fn inherited(&self, tag: u64) -> Option<u64> {
+    fn inherited(&self, tag: u64) -> Option<u64> {
         let own = self.page.number(tag);
         own.or_else(|| self.parents?.iter().find_map(|parent| parent.number(tag)))
     }

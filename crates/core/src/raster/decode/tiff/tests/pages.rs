@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::{colours, picture, plain_page, refusal, widened};
 use crate::raster::Grid;
-use crate::raster::decode::{ImageLimits, decode, header_pixel_count};
+use crate::raster::decode::{ImageLimits, decode, header_pixel_count, header_size};
 use crate::raster::test_images::{TestPage, TestTiff, TestValues};
 
 /// Returns a preview whose picture is in a subdirectory, as cameras and Photoshop write it.
@@ -56,6 +56,33 @@ fn the_orientation_of_a_preview_holds_for_its_picture() {
     );
     let image = image.expect("reads");
     assert_eq!((image.rgb.width(), image.turned), (14, Some(6)));
+}
+
+#[test]
+fn an_orientation_in_xmp_counts_without_that_of_the_tag() {
+    // The packet is longer than what is read of a file at once.
+    let packet = format!(
+        "<x:xmpmeta>{}<rdf:Description tiff:Orientation=\"6\"/></x:xmpmeta>",
+        " ".repeat(9000)
+    );
+    let limits = ImageLimits::SUGGESTED;
+    let read = |kind: TestTiff, page: TestPage| {
+        let file = kind.encode(&[page]);
+        let turned = decode(&file, &limits).expect("reads").turned;
+        let size = header_size(std::io::Cursor::new(&file), file.len() as u64, &limits);
+        (turned, size.expect("a size"))
+    };
+    let with_xmp = |page: TestPage| page.with(700, TestValues::Bytes(packet.clone().into_bytes()));
+    let page = with_xmp(plain_page(&picture()));
+    for kind in TestTiff::ALL {
+        let turned = (Some(6), [14, 20]);
+        assert_eq!(read(kind, page.clone()), turned, "{kind:?}");
+        assert_eq!(read(kind, page.clone().short(274, 0)), turned, "{kind:?}");
+        let parent = with_xmp(preview(vec![plain_page(&picture())]));
+        assert_eq!(read(kind, parent), turned, "{kind:?}");
+        let upright = read(kind, page.clone().short(274, 1));
+        assert_eq!(upright, (None, [20, 14]), "{kind:?}");
+    }
 }
 
 #[test]
