@@ -19,6 +19,8 @@ const CHECKED_FACETS: usize = 128;
 const READ_FACETS: usize = 1280;
 /// Facets that show whether all facets of a body have some length.
 const COMPARED_FACETS: usize = 1000;
+/// Most attribute bytes of each facet that are recognized before other bytes.
+const MAX_ATTRIBUTES: usize = 256;
 /// Parts of [`CHECKED_FACETS`] between two polls for a cancellation.
 const PARTS_PER_POLL: usize = 128;
 
@@ -153,10 +155,22 @@ fn uncounted(body: &[u8], count: u32) -> MeshError {
             want,
         };
     }
+    if let Some(each) = longer_facets(body, count).filter(|_| !has_facets) {
+        return MeshError::FacetBytes { bytes: each };
+    }
     MeshError::BytesAfterRows {
         format: FORMAT,
         bytes: bytes - facet * want,
     }
+}
+
+/// Returns the length of facets with attributes, after which a body goes on. `None` if no length fits.
+fn longer_facets(body: &[u8], count: u32) -> Option<u64> {
+    let count = count as usize;
+    let most = body.len().checked_div(count)?.min(FACET + MAX_ATTRIBUTES);
+    let mut lengths = (FACET + 1..=most).rev();
+    let found = lengths.find(|each| have_positions(&body[..each * count], *each));
+    found.map(|each| each as u64)
 }
 
 /// Returns whether the first facets of a body have positions, if each takes `each` bytes. Read from a wrong place, almost all

@@ -122,6 +122,10 @@ mod tests {
             said(&bytes[..bytes.len() - 1]),
             "the binary STL is truncated: it holds 19 of 20 triangles"
         );
+        for len in [1, 15, 90, 200] {
+            let with_text = [&bytes[..], &vec![b'a'; len]].concat();
+            assert_eq!(said(&with_text), said(&bytes), "{len}");
+        }
     }
 
     #[test]
