@@ -100,14 +100,25 @@ fn all_points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshEr
         })?;
         limits.check_vertices(header.points.saturating_add(points.len() as u64))?;
         for have in 0..header.points {
-            let (line, content) = lines.next().ok_or_else(|| MeshError::Truncated {
+            let truncated = || MeshError::Truncated {
                 format: "PTX scan",
                 what: "vertices".into(),
                 have,
                 want: header.points,
+            };
+            let (line, content) = lines.next().ok_or_else(truncated)?;
+            let position = text::position(text::words(content)).map_err(|reason| {
+                // Two lines of one number each begin the header of the next scan.
+                let next = lines.peek().map(|(_, next)| *next);
+                let is_header = [Some(content), next]
+                    .iter()
+                    .all(|of| of.and_then(count).is_some());
+                if is_header {
+                    truncated()
+                } else {
+                    MeshError::Line { line, reason }
+                }
             })?;
-            let position = text::position(text::words(content));
-            let position = position.map_err(|reason| MeshError::Line { line, reason })?;
             points.push(header.moved(position));
         }
     }
@@ -153,6 +164,8 @@ mod tests {
             open(cut).expect_err("cut"),
             "the PTX scan is truncated: it holds 3 of 4 vertices"
         );
+        let followed = open(&format!("{cut}{text}"));
+        assert_eq!(followed.expect_err("cut"), open(cut).expect_err("cut"));
         let more = open(&format!("{text}1 2 3 0.5\n")).expect_err("more");
         assert!(
             more.starts_with("line 15: no header of a PTX scan begins here; "),
