@@ -17,7 +17,6 @@ pub mod labels;
 pub mod manifest;
 pub mod quotes;
 pub mod relative_path;
-mod separator_line;
 pub mod workbook;
 mod xml;
 pub mod zip;

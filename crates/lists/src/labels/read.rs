@@ -12,8 +12,7 @@ use super::model::{LabelFormat, Labels, PageFile};
 use super::page_fit::fit_to_page;
 use super::region::{PageRegions, shown};
 use crate::json_numbers::unknown_number;
-use crate::separator_line::separator_line;
-use mocban_core::domain::{FileKind, UniqueKeys, sanitize};
+use mocban_core::domain::{FileKind, UniqueKeys, sanitize, separator_line};
 
 /// Largest file that is read, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use memchr::memchr_iter;
 
-use crate::separator_line::separator_line;
+use mocban_core::domain::separator_line;
 
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -267,6 +267,7 @@ mod tests {
             "sep=;\r\na;b,c,d\r\n",
             "\u{feff}SEP=;\na;b,c,d\n",
             "\"sep=;\";;\na;b,c,d\n",
+            "\"Sep = ;\"\na;b,c,d\n",
         ] {
             let (text, separator) = text(list);
             assert_eq!((text.trim(), separator), ("a;b,c,d", ';'), "{list}");

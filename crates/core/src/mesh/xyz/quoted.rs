@@ -1,6 +1,7 @@
 //! Points whose cells are in quotation marks, as spreadsheet programs write numbers with decimal commas.
 
 use crate::domain::cancel::polled;
+use crate::domain::named_separator;
 use crate::mesh::text;
 
 /// Returns the text of a file without quotation marks, with semicolons between cells and with decimal points, line by line.
@@ -11,6 +12,10 @@ pub(super) fn plain_text(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut plain = Vec::with_capacity(bytes.len());
     let (mut has_comma, mut has_point) = (false, false);
     for (_, line) in text::raw_lines(bytes) {
+        if named_separator(line.trim_ascii()).is_some() {
+            plain.push(b'\n');
+            continue;
+        }
         for (nth, cell) in cells(line, separator).into_iter().enumerate() {
             if nth > 0 {
                 plain.push(b';');

@@ -1,6 +1,7 @@
 //! Lines before the points: titles that name columns, counts, units and comments.
 
 use super::cells::cells;
+use crate::domain::named_separator;
 use crate::mesh::text;
 
 /// Most cells of a title that are read.
@@ -13,7 +14,7 @@ const UNITS: [&str; 5] = ["mm", "cm", "m", "in", "inch"];
 pub(in crate::mesh) fn is_data_or_title(line: &[u8]) -> bool {
     Title::of(line).is_some()
         || is_count(line)
-        || is_separator_name(line)
+        || named_separator(line).is_some()
         || text::position(cells(line)).is_ok()
 }
 
@@ -27,12 +28,6 @@ pub(super) fn is_count(line: &[u8]) -> bool {
     line.iter().all(u8::is_ascii_digit)
 }
 
-/// Returns whether a line names the separator for spreadsheet programs, as `sep=;`.
-fn is_separator_name(line: &[u8]) -> bool {
-    let (name, separator) = line.split_at_checked(4).unwrap_or_default();
-    name.eq_ignore_ascii_case(b"sep=") && separator.len() <= 1
-}
-
 /// Returns whether a line before the points is a count of them, units, a separator or a quoted text, which has no numbers if
 /// the columns are named before it.
 pub(super) fn is_other_title(line: &[u8], is_named: bool) -> bool {
@@ -42,7 +37,7 @@ pub(super) fn is_other_title(line: &[u8], is_named: bool) -> bool {
     unquoted.retain(|byte| !matches!(byte, b'"' | b'\''));
     is_count(line)
         || is_units
-        || is_separator_name(line)
+        || named_separator(line).is_some()
         || (is_quoted
             && text::position(cells(&unquoted)).is_err()
             && !(is_named && cells(&unquoted).any(|cell| text::number(cell).is_some())))

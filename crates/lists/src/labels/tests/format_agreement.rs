@@ -237,6 +237,7 @@ fn a_line_with_the_separator_and_old_line_ends_do_not_change_csv() {
     let plain = read(VIA_CSV.as_bytes(), "via.csv", &PAGE).expect("labels");
     for text in [
         format!("sep=,\n{VIA_CSV}"),
+        format!("\"sep=,\"\n{VIA_CSV}"),
         format!("Sep = ,\r\n{}", VIA_CSV.replace('\n', "\r\n")),
         VIA_CSV.replace('\n', "\r"),
     ] {

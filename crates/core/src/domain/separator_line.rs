@@ -1,26 +1,33 @@
-//! The first line of a list, such as `sep=;`, that names the separator of columns for Excel.
+//! The first line of a table, such as `sep=;`, that names the separator of columns for Excel.
 
 /// Longest such line with blanks.
 const MAX_LINE_BYTES: usize = 32;
 
-/// Returns the separator that the first line of a list names, and the number of bytes before the line break. Blanks do not
-/// matter, so the separator is none. The line may be in quotation marks, and separators of empty cells may follow, as a program
-/// writes them that saved the line as a cell.
-pub(crate) fn separator_line(list: &[u8]) -> Option<(u8, usize)> {
+/// Returns the separator that the first line of a list names, and the number of bytes before the line break.
+pub fn separator_line(list: &[u8]) -> Option<(u8, usize)> {
     let head = &list[..list.len().min(MAX_LINE_BYTES)];
     let end = head.iter().position(|byte| b"\r\n".contains(byte))?;
-    let line = without_blanks(&head[..end]);
-    let line = unquoted(line).unwrap_or(line);
+    Some((named_separator(&head[..end])?, end))
+}
+
+/// Returns the separator that a line without its line break names. Blanks and case do not matter. The line may be in quotation
+/// marks, and separators of empty cells may follow, as a program writes them that saved the line as a cell. Nothing after the
+/// equals sign stands for a tab that was removed with the blanks.
+pub fn named_separator(line: &[u8]) -> Option<u8> {
+    let line = without_blanks(line);
+    let line = without_blanks(unquoted(line).unwrap_or(line));
     let (name, rest) = line.split_at_checked(b"sep".len())?;
     let named = without_blanks(rest).strip_prefix(b"=")?;
-    match without_blanks(named) {
+    let separator = match without_blanks(named) {
+        [] => b'\t',
         [separator, others @ ..]
-            if name.eq_ignore_ascii_case(b"sep") && others.iter().all(|byte| byte == separator) =>
+            if *separator != b'"' && others.iter().all(|byte| byte == separator) =>
         {
-            Some((*separator, end))
+            *separator
         }
-        _ => None,
-    }
+        _ => return None,
+    };
+    name.eq_ignore_ascii_case(b"sep").then_some(separator)
 }
 
 /// Returns what stands in the quotation marks of a line, behind which there are only separators.
@@ -45,20 +52,23 @@ mod tests {
     use super::separator_line;
 
     #[test]
-    fn blanks_and_case_do_not_matter() {
+    fn blanks_quotes_and_case_do_not_matter() {
         for (list, expected) in [
             ("sep=;\nid", Some((b';', 5))),
             ("Sep = ;\r\nid", Some((b';', 7))),
             ("SEP=, \rid", Some((b',', 6))),
             ("sep=\t\nid", Some((b'\t', 5))),
+            ("sep=\nid", Some((b'\t', 4))),
             ("\"sep=,\"\nid", Some((b',', 7))),
+            (" \"Sep = ;\" \nid", Some((b';', 11))),
             (" \"Sep=\t\" \r\nid", Some((b'\t', 9))),
             ("\"sep=;\";;\n", Some((b';', 9))),
             ("sep=;;;\n", Some((b';', 7))),
             ("\"sep=;\"x\n", None),
-            ("\"sep=;\n", None),
             ("sep=;", None),
             ("sep=;,\n", None),
+            ("sep=\"\n", None),
+            ("\"sep=;\n", None),
             ("sep,mesh\n", None),
             ("id,mesh,print\n", None),
             ("", None),
