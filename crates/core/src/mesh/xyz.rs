@@ -1,6 +1,7 @@
 //! Reader of XYZ point sets: text files in which each line has the coordinates of a point.
 
 mod cells;
+mod grouped;
 mod layout;
 mod numbers;
 mod ptx;

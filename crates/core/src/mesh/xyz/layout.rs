@@ -1,9 +1,12 @@
 //! The layout of an XYZ file: its columns, what separates them, and what its commas mean.
 
+use std::borrow::Cow;
+
 use super::cells::{
     MISSING, cells, has_grouped_digits, outer_cells, plain_position, plain_tabbed_position,
     tab_cells, without_wide_spaces,
 };
+use super::grouped::{are_grouped_pairs, separator_of_grouped, without_groups};
 use super::title::{MAX_NAMES, Title, is_comment, is_other_title};
 use crate::mesh::MeshError;
 use crate::mesh::text;
@@ -42,6 +45,8 @@ pub(super) struct PointLayout {
     commas: CommaUse,
     /// Number of columns between tabs, if each tab ends a cell that may be empty. Otherwise tabs are white space.
     tabs: Option<usize>,
+    /// The separator of cells if blanks within cells group digits.
+    grouped: Option<u8>,
     /// Number of columns of most lines.
     width: usize,
     /// Whether a title names the columns.
@@ -73,6 +78,7 @@ impl PointLayout {
             columns: [0, 1, 2],
             commas: CommaUse::Separator,
             tabs: None,
+            grouped: None,
             width: 0,
             is_titled: false,
             may_be_numbered: false,
@@ -91,10 +97,23 @@ impl PointLayout {
             layout.commas = found.unwrap_or(layout.commas);
         }
         let named = title.as_ref().map(|(_, title)| title);
+        layout.grouped = separator_of_grouped(&sample);
+        let ungrouped = sample.iter().map(|line| layout.ungrouped(line));
+        let ungrouped: Vec<Cow<'_, [u8]>> = ungrouped.map(Option::unwrap_or_default).collect();
+        let sample: Vec<&[u8]> = ungrouped.iter().map(|line| &**line).collect();
         layout.tabs = tab_columns(&sample, named);
         let widths: Vec<usize> = sample.iter().map(|line| layout.width_of(line)).collect();
         layout.width = most_frequent(&widths);
-        let number = layout.cells(first).next().and_then(number_with_comma);
+        let is_pairs = |line: &&[u8]| are_grouped_pairs(layout.cells(line));
+        if layout.tabs.is_none() && sample.iter().all(is_pairs) {
+            let reason = "blanks may group the digits of its numbers or separate them; write numbers such as \"1 234.5\" without \
+                          blanks";
+            return Err(MeshError::Line {
+                line: first_point,
+                reason: reason.into(),
+            });
+        }
+        let number = layout.cells(sample[0]).next().and_then(number_with_comma);
         let is_whole = number.is_some_and(|number| number.fract() == 0.0);
         layout.may_be_numbered = layout.width > 3 && is_whole;
         if let Some((line, title)) = title {
@@ -106,8 +125,9 @@ impl PointLayout {
 
     /// Returns the layout with other columns of coordinates.
     fn with_columns(self, columns: [usize; 3]) -> Self {
+        let is_plain = self.commas == CommaUse::Separator && self.grouped.is_none();
         let fast_parser = match self.tabs {
-            _ if self.commas != CommaUse::Separator || columns != [0, 1, 2] => FastParser::None,
+            _ if !is_plain || columns != [0, 1, 2] => FastParser::None,
             None => FastParser::Words,
             Some(_) => FastParser::Tabs,
         };
@@ -186,9 +206,20 @@ impl PointLayout {
         plain.map_or_else(|| self.odd_position(row), Ok)
     }
 
+    /// Returns a line in which no blank groups digits. `None` if a cell has another blank.
+    fn ungrouped<'a>(&self, line: &'a [u8]) -> Option<Cow<'a, [u8]>> {
+        match self.grouped {
+            Some(separator) => without_groups(line, separator).map(Cow::Owned),
+            None => Some(Cow::Borrowed(line)),
+        }
+    }
+
     fn odd_position(&self, row: &[u8]) -> Result<[f64; 3], String> {
-        let found = self.position_of_cells(row);
-        match found.is_err().then(|| without_wide_spaces(row)).flatten() {
+        let row = self.ungrouped(row).ok_or_else(|| {
+            "a cell has a blank, but is not a number such as \"1 234\"".to_owned()
+        })?;
+        let found = self.position_of_cells(&row);
+        match found.is_err().then(|| without_wide_spaces(&row)).flatten() {
             Some(plain) => self.position_of_cells(&plain).or(found),
             None => found,
         }

@@ -216,10 +216,8 @@ fn blanks_within_numbers_are_refused_and_wide_spaces_are_read() {
         refused("1.5 2.5 3.5\n4.5 5.5 6.5\n2.5 1 234.5 3.5\n"),
         said(3)
     );
-    assert_eq!(
-        refused("1,5;2,5;3,5\n1 234,5;2,5;3,5\n4,5;5,5;6,5\n"),
-        said(2)
-    );
+    let many = "1,5;2,5;3,5\n".repeat(1000);
+    assert_eq!(refused(&format!("{many}1 234,5;2,5;3,5\n")), said(1001));
     // Lines with a further column are no such lines.
     assert_points("1 2.5 3\n4 5 6.25 255\n");
     for text in [
@@ -235,6 +233,36 @@ fn blanks_within_numbers_are_refused_and_wide_spaces_are_read() {
             "{text}"
         );
     }
+}
+
+#[test]
+fn blanks_group_digits_between_semicolons_and_tabs() {
+    let grouped = "-14 293,45;1 024 808,22;742,5\n1 234;2 345,6;-3 456\n";
+    let wanted: Vertices =
+        vec![[-14_293.45, 1_024_808.22, 742.5], [1234.0, 2345.6, -3456.0]].into();
+    for text in [
+        grouped.to_owned(),
+        grouped.replace(';', "\t"),
+        grouped.replace(',', "."),
+        grouped.replace(',', ".").replace(';', "\t"),
+        grouped.replace(';', " ; "),
+        format!("X;Y;Z\n{grouped}"),
+        grouped.replace('\n', ";a b;128\n"),
+    ] {
+        let read = open(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        assert_eq!(read.vertices, wanted, "{text}");
+    }
+    let (_, missing) = with_missing(&format!("{grouped}1 234;;2\n"));
+    assert_eq!(missing, 1);
+    assert_eq!(
+        refused(&format!("{}1 23;4;5\n", grouped.repeat(500))),
+        "line 1001: a cell has a blank, but is not a number such as \"1 234\""
+    );
+    // Blanks that may do both are refused.
+    assert_eq!(
+        refused("14 293,45 24 808,22 18 742,57\n14 293,46 24 808,22 18 742,58\n"),
+        "line 1: blanks may group the digits of its numbers or separate them; write numbers such as \"1 234.5\" without blanks"
+    );
 }
 
 #[test]
