@@ -27,18 +27,38 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     text::check_lines(bytes)?;
     let found = match ptx::points(bytes, limits) {
         Some(points) => points?,
-        None => points(bytes, limits).or_else(|fault| {
-            let MeshError::Line { .. } = fault else {
-                return Err(fault);
-            };
-            let plain = quoted::plain_text(bytes).map(|plain| points(&plain, limits));
-            plain.and_then(Result::ok).ok_or(fault)
-        })?,
+        None => plain_or_quoted_points(bytes, limits)?,
     };
     Ok(Mesh {
         vertices: found.into(),
         ..Mesh::default()
     })
+}
+
+/// Reads points, also with cells in quotation marks. Of two errors, returns that of the later line: what the line of the other
+/// one means was understood in the other way.
+fn plain_or_quoted_points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshError> {
+    let found = points(bytes, limits);
+    let is_understood = match &found {
+        Ok(points) => !points.is_empty(),
+        Err(fault) => !matches!(fault, MeshError::Line { .. }),
+    };
+    let unquoted = (!is_understood)
+        .then(|| quoted::plain_text(bytes))
+        .flatten();
+    let Some(unquoted) = unquoted else {
+        return found;
+    };
+    let plain = unquoted.and_then(|plain| points(&plain, limits));
+    let plain = plain.map_err(|fault| quoted::with_cell_of(bytes, fault));
+    let line = |fault: &MeshError| match fault {
+        MeshError::Line { line, .. } => *line,
+        _ => u64::MAX,
+    };
+    match (found, plain) {
+        (Err(fault), Err(of_plain)) if line(&fault) > line(&of_plain) => Err(fault),
+        (_, plain) => plain,
+    }
 }
 
 fn points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshError> {

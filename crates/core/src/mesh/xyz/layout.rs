@@ -6,7 +6,7 @@ use super::cells::{
     MISSING, cells, has_grouped_digits, outer_cells, plain_position, plain_tabbed_position,
     tab_cells, without_wide_spaces,
 };
-use super::grouped::{are_grouped_pairs, separator_of_grouped, without_groups};
+use super::grouped::{GroupedNumber, are_grouped_pairs, separator_of_grouped, without_groups};
 use super::title::{MAX_NAMES, Title, is_comment, is_other_title};
 use crate::mesh::MeshError;
 use crate::mesh::text;
@@ -260,8 +260,13 @@ impl PointLayout {
         if let Some(reason) = points.into_iter().flatten().next() {
             return Err(reason);
         }
-        let with_points = coordinates.map(text::with_point);
-        text::position(with_points.iter().map(Vec::as_slice))
+        let mut position = [0.0; 3];
+        for (value, cell) in position.iter_mut().zip(coordinates) {
+            let number = text::number(&text::with_point(cell));
+            let number = number.or_else(|| number_with_grouping_points(cell));
+            *value = number.ok_or_else(|| text::not_a_number(cell))?;
+        }
+        Ok(position)
     }
 
     /// Refuses a line that has more columns than the others because of doubled tabs or of blanks within numbers. `count` is
@@ -336,6 +341,14 @@ fn number_with_comma(cell: &[u8]) -> Option<f64> {
     text::number(&text::with_point(cell))
 }
 
+/// Parses a number with a decimal comma whose digits are grouped by points.
+fn number_with_grouping_points(cell: &[u8]) -> Option<f64> {
+    let number = GroupedNumber::of(cell)?;
+    (number.mark == Some(b','))
+        .then(|| text::number(&number.plain))
+        .flatten()
+}
+
 /// Returns what the commas of a point mean; `None` if it has none.
 fn comma_use(line: &[u8]) -> Option<CommaUse> {
     let first_comma = line.iter().position(|byte| *byte == b',')?;
@@ -352,8 +365,11 @@ fn comma_use(line: &[u8]) -> Option<CommaUse> {
     }
     let is_decimal = |word: &[u8]| {
         word.contains(&b',')
-            && !word.contains(&b'.')
-            && text::parse::<f64>(&text::with_point(word)).is_some()
+            && if word.contains(&b'.') {
+                number_with_grouping_points(word).is_some()
+            } else {
+                text::parse::<f64>(&text::with_point(word)).is_some()
+            }
     };
     if outer_cells(line).any(is_decimal) {
         return Some(CommaUse::Decimal);

@@ -1,35 +1,106 @@
 //! Points whose cells are in quotation marks, as spreadsheet programs write numbers with decimal commas.
 
+use super::grouped::GroupedNumber;
 use crate::domain::cancel::polled;
 use crate::domain::named_separator;
-use crate::mesh::text;
+use crate::mesh::{MeshError, text};
 
-/// Returns the text of a file without quotation marks, with semicolons between cells and with decimal points, line by line.
-/// Returns `None` if no cell is in quotation marks, or if some numbers have a comma and others a point.
-pub(super) fn plain_text(bytes: &[u8]) -> Option<Vec<u8>> {
+/// A number of a cell with a decimal point.
+struct PlainNumber {
+    text: Vec<u8>,
+    /// The decimal mark of the cell, as far as it shows it.
+    mark: Option<u8>,
+}
+
+impl PlainNumber {
+    /// Returns the number of a cell that has a mark or grouped digits. `None` for other cells.
+    fn of(cell: &[u8]) -> Option<Self> {
+        if let Some(GroupedNumber { plain: text, mark }) = GroupedNumber::of(cell) {
+            return Some(Self { text, mark });
+        }
+        let has_comma = cell.contains(&b',');
+        if !has_comma && !cell.contains(&b'.') {
+            return None;
+        }
+        let text = text::with_point(cell);
+        let mark = Some(if has_comma { b',' } else { b'.' });
+        text::number(&text).map(|_| Self { text, mark })
+    }
+}
+
+/// Returns the text of a file without quotation marks, with semicolons between cells, with decimal points and without what
+/// groups digits, line by line. Returns `None` if no cell is in quotation marks.
+///
+/// # Errors
+/// Returns an error that names the first line in which a number has another decimal mark than those before.
+pub(super) fn plain_text(bytes: &[u8]) -> Option<Result<Vec<u8>, MeshError>> {
     let mut quoted = text::raw_lines(bytes).filter(|(_, line)| line.contains(&b'"'));
     let separator = quoted.find_map(|(_, line)| separator_of(line))?;
+    Some(with_points(bytes, separator))
+}
+
+fn with_points(bytes: &[u8], separator: u8) -> Result<Vec<u8>, MeshError> {
     let mut plain = Vec::with_capacity(bytes.len());
-    let (mut has_comma, mut has_point) = (false, false);
-    for (_, line) in text::raw_lines(bytes) {
-        if named_separator(line.trim_ascii()).is_some() {
+    let mut common = None;
+    for (line, content) in text::raw_lines(bytes) {
+        if named_separator(content.trim_ascii()).is_some() {
             plain.push(b'\n');
             continue;
         }
-        for (nth, cell) in cells(line, separator).into_iter().enumerate() {
+        for (nth, cell) in cells(content, separator).into_iter().enumerate() {
             if nth > 0 {
                 plain.push(b';');
             }
-            let pointed = pointed(&cell);
-            has_comma |= pointed.is_some();
-            has_point |= cell.contains(&b'.') && text::number(&cell).is_some();
-            let is_joined = |byte: &u8| byte.is_ascii_whitespace() || b",;".contains(byte);
-            let joined = |byte: u8| if is_joined(&byte) { b'_' } else { byte };
-            plain.extend(pointed.unwrap_or(cell).into_iter().map(joined));
+            let Some(number) = PlainNumber::of(&cell) else {
+                plain.extend(joined(&cell));
+                continue;
+            };
+            if let Some(mark) = number.mark
+                && *common.get_or_insert(mark) != mark
+            {
+                let [has, others] = if mark == b',' {
+                    ["comma", "point"]
+                } else {
+                    ["point", "comma"]
+                };
+                let cell = text::quote(&cell);
+                let reason = format!("{cell} has a {has}, but others have a {others}");
+                return Err(MeshError::Line { line, reason });
+            }
+            plain.extend(number.text);
         }
         plain.push(b'\n');
     }
-    (!has_comma || !has_point).then_some(plain)
+    Ok(plain)
+}
+
+/// Returns a cell that is no number, in one piece.
+fn joined(cell: &[u8]) -> Vec<u8> {
+    let is_joined = |byte: &u8| byte.is_ascii_whitespace() || b",;".contains(byte);
+    let joined = |byte: &u8| if is_joined(byte) { b'_' } else { *byte };
+    cell.iter().map(joined).collect()
+}
+
+/// Replaces the cell that the error of a plain text quotes by that of the file.
+pub(super) fn with_cell_of(bytes: &[u8], fault: MeshError) -> MeshError {
+    match fault {
+        MeshError::Line { line, reason } => {
+            let reason = with_quote_of(bytes, line, &reason).unwrap_or(reason);
+            MeshError::Line { line, reason }
+        }
+        fault => fault,
+    }
+}
+
+/// Returns a reason that begins with a cell of a line as it is in the file. `None` if it begins with no cell.
+fn with_quote_of(bytes: &[u8], line: u64, reason: &str) -> Option<String> {
+    let mut lines = text::raw_lines(bytes);
+    let (_, content) = lines.find(|(other, _)| *other == line)?;
+    let separator = separator_of(content).unwrap_or(b',');
+    cells(content, separator).iter().find_map(|cell| {
+        let rest = reason.strip_prefix(&text::quote(&joined(cell)))?;
+        Some(format!("{}{rest}", text::quote(cell)))
+    })
 }
 
 /// Returns the separator of a line: the first tab, comma or semicolon outside quotation marks.
@@ -58,10 +129,4 @@ fn cells(line: &[u8], separator: u8) -> Vec<Vec<u8>> {
     }
     let trimmed = cells.into_iter().map(|cell| cell.trim_ascii().to_vec());
     trimmed.collect()
-}
-
-/// Replaces the decimal comma of a number by a point. Returns `None` for other cells.
-fn pointed(cell: &[u8]) -> Option<Vec<u8>> {
-    let pointed = cell.contains(&b',').then(|| text::with_point(cell))?;
-    text::number(&pointed).is_some().then_some(pointed)
 }

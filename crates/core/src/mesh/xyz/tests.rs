@@ -118,7 +118,7 @@ fn unclear_commas_are_refused() {
     );
     assert_eq!(
         refused("1,5 2,5 3\n1,234,567 2 3\n"),
-        "line 2: \"1.234,567\" is not a number"
+        "line 2: \"1,234,567\" is not a number"
     );
 }
 
@@ -130,7 +130,7 @@ fn a_bad_line_is_named() {
         refused("a scan of March\n1 2 3\n"),
         "line 1: \"a\" is not a number"
     );
-    assert_eq!(refused("1,\"x\",3\n"), "line 1: \"\"x\"\" is not a number");
+    assert_eq!(refused("1,\"x\",3\n"), "line 1: \"x\" is not a number");
     assert_eq!(open("0\n"), Err(MeshError::NoVertices));
 }
 
@@ -285,7 +285,56 @@ fn a_named_separator_and_quoted_numbers_are_read() {
     }
     let (positions, missing) = with_missing("\"1,5\",\"\",\"2\"\n\"1\",\"2,5\",\"3\"\n");
     assert_eq!((positions, missing), (vec![[1.0, 2.5, 3.0]], 1));
-    assert!(refused("\"1,500\",\"2.5\",\"3\"\n").starts_with("line 1: "));
+    assert_eq!(
+        refused("\"1,500\",\"2.5\",\"3\"\n"),
+        "line 1: \"2.5\" has a point, but others have a comma"
+    );
+}
+
+#[test]
+fn points_and_commas_that_group_digits_are_read_and_others_are_named() {
+    let plain = "\"1,5\",\"2,5\",\"3\"\n".repeat(500);
+    for (text, last) in [
+        (
+            format!("{plain}\"1.234,5\",\"2,5\",\"3\"\n"),
+            [1234.5, 2.5, 3.0],
+        ),
+        (
+            "\"69.31\",\"1,000.54\",\"2\"\n".to_owned(),
+            [69.31, 1000.54, 2.0],
+        ),
+        (
+            "\"500.002,00\",\"2.300.001,50\",\"12,25\"\n".repeat(9),
+            [500_002.0, 2_300_001.5, 12.25],
+        ),
+        (
+            "\"1 234,5\";\"2 000\";\"3\"\n".to_owned(),
+            [1234.5, 2000.0, 3.0],
+        ),
+        (
+            "1.234,5;2.000,5;3.000,5\n".to_owned(),
+            [1234.5, 2000.5, 3000.5],
+        ),
+        (
+            "1,5;2,5;3,5\n1.234,5;2,5;3,5\n".to_owned(),
+            [1234.5, 2.5, 3.5],
+        ),
+    ] {
+        let read = open(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        assert_eq!(read.vertices.at(read.vertices.len() - 1), last, "{text}");
+    }
+    assert_eq!(
+        refused(&format!("{plain}\"1.2.3,5\",\"2,5\",\"3\"\n{plain}")),
+        "line 501: \"1.2.3,5\" is not a number"
+    );
+    assert_eq!(
+        refused(&format!("{plain}\"1.5\",\"2,5\",\"3\"\n")),
+        "line 501: \"1.5\" has a point, but others have a comma"
+    );
+    assert_eq!(
+        refused("\"X\",\"Y\",\"Z\"\n1 2.5 3\n4 x 6\n"),
+        "line 3: \"x\" is not a number"
+    );
 }
 
 #[test]
