@@ -373,7 +373,7 @@ fn what_is_left_out_of_the_scan_of_a_block_is_told_by_run_and_kept() {
     project(dir, &import).expect(0);
     let run = project(dir, &["--progress", "none", "run"]).expect(0);
     for sentence in [
-        "vertices without a position (NaN, infinite, above 1e15 or repeated 0 0 0) were left out with their faces: 3",
+        "vertices without a position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside) were left out with their faces: 3",
         "faces with fewer than three corners were left out: 2",
     ] {
         assert_eq!(run.err.matches(sentence).count(), 1, "{}", run.err);

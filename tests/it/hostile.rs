@@ -64,7 +64,7 @@ fn bad_meshes() -> Vec<Case> {
                 [0.0, 1.0, 0.0],
             ]])),
             "bad_input",
-            "1 of 3 vertices have no position (NaN, infinite, above 1e15 or repeated 0 0 0)",
+            "1 of 3 vertices have no position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside)",
         ),
         case("no_faces", mesh(stl(&[])), "bad_input", "has no faces"),
         case(

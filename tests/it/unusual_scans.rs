@@ -71,7 +71,7 @@ fn assert_says_losses(dir: &Path, form: &MeshForm, log: &str) {
     let shown = mocban(dir, &["-C", "p", "show", name]).expect(0).out;
     for (text, number) in [
         (
-            "vertices without a position (NaN, infinite, above 1e15 or repeated 0 0 0) were left out with their faces",
+            "vertices without a position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside) were left out with their faces",
             form.missing,
         ),
         (

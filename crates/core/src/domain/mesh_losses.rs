@@ -3,8 +3,8 @@
 /// What was left out of a mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct MeshLosses {
-    /// Number of vertices without a position: a coordinate is NaN, infinite or 1e15 or more, or several vertices without faces
-    /// are at the origin.
+    /// Number of vertices without a position: a coordinate is NaN, infinite or 1e15 or more, several vertices without faces
+    /// are at the origin, or many share a number that is far from the others.
     pub missing_vertices: u64,
     /// Number of faces with fewer than three corners in the file.
     pub incomplete_faces: u64,
@@ -15,7 +15,7 @@ impl MeshLosses {
     pub fn sentences(self) -> Vec<String> {
         let said = [
             (
-                "vertices without a position (NaN, infinite, above 1e15 or repeated 0 0 0) were left out with their faces",
+                "vertices without a position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside) were left out with their faces",
                 self.missing_vertices,
             ),
             (

@@ -90,7 +90,7 @@ pub enum MeshError {
     },
     /// Nothing is left without the vertices that have no position.
     #[error(
-        "{missing} of {vertices} vertices have no position (NaN, infinite, above 1e15 or repeated 0 0 0), and without them nothing is left"
+        "{missing} of {vertices} vertices have no position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside), and without them nothing is left"
     )]
     NothingLeft {
         /// Vertices without a position.

@@ -1,9 +1,11 @@
 //! What is left out of a mesh: vertices without a position, and faces without three corners.
 //!
 //! Scanners and converters write NaN for a point that they did not measure, 0 0 0 in organized clouds, and others a number
-//! that no scan has, such as 1e30 or the largest float.
+//! that no scan has, such as 1e30 or the largest float. Smaller numbers are found where
+//! many vertices share one that is far from the others.
 
 use super::error::MeshError;
+use super::far_values::FarValue;
 use super::{Mesh, Vertices};
 use crate::domain::MeshLosses;
 use crate::domain::cancel::polled;
@@ -61,7 +63,8 @@ impl PositionCheck {
         }
     }
 
-    /// Leaves out vertices without a position, and faces that use them. `incomplete_faces` were left out before.
+    /// Leaves out vertices without a position, and faces that use them. `incomplete_faces` were left out before; `far_values`
+    /// stand for missing positions.
     ///
     /// Several vertices at the origin have no position if no face uses them; one may be a point.
     ///
@@ -71,12 +74,14 @@ impl PositionCheck {
         self,
         mesh: Mesh,
         incomplete_faces: u64,
+        far_values: &[FarValue],
     ) -> Result<MeshRead, MeshError> {
         let losses = |missing_vertices| MeshLosses {
             missing_vertices,
             incomplete_faces,
         };
-        if self.are_all_positions && (self.origins < 2 || !has_unused_origin(&mesh)) {
+        let are_positions = self.are_all_positions && far_values.is_empty();
+        if are_positions && (self.origins < 2 || !has_unused_origin(&mesh)) {
             let losses = losses(0);
             return Ok(MeshRead { mesh, losses });
         }
@@ -84,7 +89,9 @@ impl PositionCheck {
             vertices,
             mut triangles,
         } = mesh;
-        let is_kept_vertex: Vec<bool> = polled(vertices.iter()).map(is_position).collect();
+        let is_kept =
+            |vertex| is_position(vertex) && far_values.iter().all(|value| !value.is_at(vertex));
+        let is_kept_vertex: Vec<bool> = polled(vertices.iter()).map(is_kept).collect();
         let mut uses = vec![Use::None; is_kept_vertex.len()];
         let is_points = triangles.is_empty();
         triangles = polled(triangles.iter().copied())
@@ -225,7 +232,7 @@ mod tests {
         };
         let check = PositionCheck::of(&mesh.vertices);
         check
-            .without_missing(mesh, 0)
+            .without_missing(mesh, 0, &[])
             .map(|read| (read.mesh, read.losses.missing_vertices))
     }
 
@@ -284,7 +291,7 @@ mod tests {
         let refused = faces.expect_err("no face").to_string();
         assert_eq!(
             refused,
-            "1 of 3 vertices have no position (NaN, infinite, above 1e15 or repeated 0 0 0), and without them nothing is left"
+            "1 of 3 vertices have no position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside), and without them nothing is left"
         );
     }
 }

@@ -5,6 +5,7 @@ mod clustering;
 mod decimal;
 mod error;
 mod extent;
+mod far_values;
 mod format;
 mod missing;
 mod obj;
@@ -36,8 +37,9 @@ use std::io::{Read, Seek};
 use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
 use crate::page_vec::PageVec;
+use far_values::find_far_values;
 use format::DetectedFormat;
-use missing::PositionCheck;
+use missing::{PositionCheck, is_position};
 
 /// Reads a mesh or point set from the bytes of a file, like [`read_from`].
 ///
@@ -73,7 +75,8 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
         (mesh, check, incomplete_faces)
     };
     let whole = |mesh| checked(mesh, 0);
-    let (mesh, check, incomplete_faces) = match DetectedFormat::of(bytes, name)? {
+    let format = DetectedFormat::of(bytes, name)?;
+    let (mesh, check, incomplete_faces) = match format {
         DetectedFormat::Obj => obj::read(bytes, limits).map(|(mesh, faces)| checked(mesh, faces)),
         DetectedFormat::Ply => ply::read(bytes, limits),
         DetectedFormat::StlBinary => {
@@ -86,7 +89,14 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
     if mesh.vertices.is_empty() {
         return Err(MeshError::NoVertices);
     }
-    check.without_missing(mesh, incomplete_faces)
+    let far_values = match format {
+        // Each triangle has corners of its own.
+        DetectedFormat::StlBinary | DetectedFormat::StlAscii => Vec::new(),
+        DetectedFormat::Obj | DetectedFormat::Ply | DetectedFormat::Xyz => {
+            find_far_values(&mesh.vertices, is_position)
+        }
+    };
+    check.without_missing(mesh, incomplete_faces, &far_values)
 }
 
 /// Some programs write this mark before text.
@@ -126,7 +136,7 @@ pub fn read_from(
     let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
         let (mesh, check) = stl::read_facets(&mut source, count, limits)?;
-        return Ok(check.without_missing(mesh, 0)?);
+        return Ok(check.without_missing(mesh, 0, &[])?);
     }
     let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
     Ok(read_bytes(&bytes, name, limits)?)

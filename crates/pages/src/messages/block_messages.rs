@@ -89,8 +89,8 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "nếu màu trông không đúng, hãy chuyển hình sang sRGB",
     ),
     (
-        "vertices without a position (NaN, infinite, above 1e15 or repeated 0 0 0) were left out with their faces: {}",
-        "số đỉnh không có vị trí (NaN, vô hạn, trên 1e15 hoặc 0 0 0 lặp lại) đã bị bỏ cùng các mặt của chúng: {0#}",
+        "vertices without a position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside) were left out with their faces: {}",
+        "số đỉnh không có vị trí (NaN, vô hạn, trên 1e15, 0 0 0 lặp lại hoặc một số lặp lại ở rất xa) đã bị bỏ cùng các mặt của chúng: {0#}",
     ),
     (
         "faces with fewer than three corners were left out: {}",

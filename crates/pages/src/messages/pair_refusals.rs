@@ -160,8 +160,8 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "tệp {0} còn {1#} byte sau các dòng mà phần đầu tệp ghi",
     ),
     (
-        "{} of {} vertices have no position (NaN, infinite, above 1e15 or repeated 0 0 0), and without them nothing is left",
-        "{0#} trong {1#} đỉnh không có vị trí (NaN, vô hạn, trên 1e15 hoặc 0 0 0 lặp lại), bỏ chúng đi thì không còn gì",
+        "{} of {} vertices have no position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside), and without them nothing is left",
+        "{0#} trong {1#} đỉnh không có vị trí (NaN, vô hạn, trên 1e15, 0 0 0 lặp lại hoặc một số lặp lại ở rất xa), bỏ chúng đi thì không còn gì",
     ),
     (
         "a face refers to a vertex that the file does not have",
