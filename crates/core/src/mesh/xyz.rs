@@ -1,6 +1,7 @@
 //! Reader of XYZ point sets: text files in which each line has the coordinates of a point.
 
 mod cells;
+mod first_column;
 mod grouped;
 mod layout;
 mod numbers;
@@ -11,6 +12,7 @@ mod tests;
 mod title;
 
 use super::{Mesh, MeshError, MeshLimits, text};
+use first_column::{check_first_column, is_scan_number};
 use layout::PointLayout;
 use numbers::{are_numbers, check_grid};
 
@@ -65,8 +67,13 @@ fn points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshError>
     let layout = PointLayout::of(bytes)?;
     let points = positions(bytes, &layout, limits)?;
     match layout.numbered() {
-        Some(numbered) if are_numbers(&points) => positions(bytes, &numbered, limits),
-        _ => check_grid(bytes, &layout, &points).map(|()| points),
+        Some(numbered) if are_numbers(&points) || is_scan_number(bytes, &layout, &points) => {
+            positions(bytes, &numbered, limits)
+        }
+        _ => {
+            check_first_column(bytes, &layout, &points)?;
+            check_grid(bytes, &layout, &points).map(|()| points)
+        }
     }
 }
 
@@ -107,7 +114,7 @@ impl SampledPoints {
             let points: Vec<_> = rows
                 .filter_map(|(_, row)| layout.position(row).ok())
                 .collect();
-            are_numbers(&points)
+            are_numbers(&points) || is_scan_number(head, &layout, &points)
         });
         Ok(Self {
             layout: numbered.unwrap_or(layout),

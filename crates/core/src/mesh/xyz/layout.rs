@@ -48,10 +48,10 @@ pub(super) struct PointLayout {
     /// The separator of cells if blanks within cells group digits.
     grouped: Option<u8>,
     /// Number of columns of most lines.
-    width: usize,
+    pub(super) width: usize,
     /// Whether a title names the columns.
     is_titled: bool,
-    /// Whether the first column may be the numbers of points.
+    /// Whether a column may precede the coordinates.
     may_be_numbered: bool,
     fast_parser: FastParser,
 }
@@ -113,9 +113,7 @@ impl PointLayout {
                 reason: reason.into(),
             });
         }
-        let number = layout.cells(sample[0]).next().and_then(number_with_comma);
-        let is_whole = number.is_some_and(|number| number.fract() == 0.0);
-        layout.may_be_numbered = layout.width > 3 && is_whole;
+        layout.may_be_numbered = layout.width > 3;
         if let Some((line, title)) = title {
             let widest = widths.into_iter().max().unwrap_or_default();
             layout.name_columns(&title, line, widest)?;
@@ -153,7 +151,7 @@ impl PointLayout {
     }
 
     /// Returns the number of columns of a line, without empty ones at its end.
-    fn width_of(&self, line: &[u8]) -> usize {
+    pub(super) fn width_of(&self, line: &[u8]) -> usize {
         let cells = self.cells(line).take(MAX_NAMES).enumerate();
         let filled = cells.filter(|(_, cell)| *cell != MISSING);
         filled.last().map_or(0, |(column, _)| column + 1)

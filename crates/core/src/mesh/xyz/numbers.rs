@@ -5,7 +5,7 @@ use crate::domain::cancel::polled;
 use crate::mesh::MeshError;
 
 /// Fewest points that show that a column holds their numbers.
-const NUMBERED_POINTS: usize = 10;
+pub(super) const NUMBERED_POINTS: usize = 10;
 /// Lines whose further columns are compared.
 const COMPARED_LINES: usize = 1000;
 
@@ -26,7 +26,8 @@ pub(super) fn are_numbers(points: &[[f64; 3]]) -> bool {
     are_distinct && (is_dense || [1, 2].into_iter().all(|axis| !is_whole(points, axis)))
 }
 
-fn is_whole(points: &[[f64; 3]], axis: usize) -> bool {
+/// Returns whether all coordinates along an axis are whole.
+pub(super) fn is_whole(points: &[[f64; 3]], axis: usize) -> bool {
     polled(points).all(|point| point[axis].fract() == 0.0)
 }
 
@@ -46,18 +47,11 @@ pub(super) fn check_grid(
     if points.len() < NUMBERED_POINTS || !is_whole(points, 0) || !is_whole(points, 1) {
         return Ok(());
     }
-    let positions = |layout: PointLayout| -> Vec<[f64; 3]> {
-        let rows = layout.rows(bytes).take(COMPARED_LINES);
-        rows.filter_map(|(_, row)| layout.position(row).ok())
-            .collect()
-    };
-    let found = positions(gridded);
+    let found = first_positions(bytes, &gridded);
     if found.len() < NUMBERED_POINTS || (0..3).any(|axis| is_whole(&found, axis)) {
         return Ok(());
     }
-    let is_unit = |[x, y, z]: &[f64; 3]| (x * x + y * y + z * z - 1.0).abs() < 0.02;
-    let normals = layout.of_normals().map(positions).unwrap_or_default();
-    if !normals.is_empty() && normals.iter().all(is_unit) {
+    if has_normals(bytes, layout) {
         return Ok(());
     }
     let reason = "its first two numbers may be a row and a column, or x and y; name the columns in a line before the points, such \
@@ -66,4 +60,18 @@ pub(super) fn check_grid(
         line: layout.first_point,
         reason: reason.into(),
     })
+}
+
+/// Returns whether normals follow the positions.
+pub(super) fn has_normals(bytes: &[u8], layout: &PointLayout) -> bool {
+    let is_unit = |[x, y, z]: &[f64; 3]| (x * x + y * y + z * z - 1.0).abs() < 0.02;
+    let normals = layout.of_normals();
+    let normals = normals.map(|layout| first_positions(bytes, &layout));
+    normals.is_some_and(|normals| !normals.is_empty() && normals.iter().all(is_unit))
+}
+
+fn first_positions(bytes: &[u8], layout: &PointLayout) -> Vec<[f64; 3]> {
+    let rows = layout.rows(bytes).take(COMPARED_LINES);
+    rows.filter_map(|(_, row)| layout.position(row).ok())
+        .collect()
 }
