@@ -311,6 +311,46 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "hãy ghi tên các cột trên một dòng trước các điểm, chẳng hạn `row col x y z`",
     ),
     (
+        "its first number may be x, or that of a point or a scan",
+        "số đầu có thể là x, hoặc số thứ tự của điểm hay của bản quét",
+    ),
+    (
+        "its first number may be x or a time",
+        "số đầu có thể là x hoặc thời gian",
+    ),
+    (
+        "name the columns in a line before the points, such as `n x y z`",
+        "hãy ghi tên các cột trên một dòng trước các điểm, chẳng hạn `n x y z`",
+    ),
+    (
+        "name the columns in a line before the points, such as `t x y z`",
+        "hãy ghi tên các cột trên một dòng trước các điểm, chẳng hạn `t x y z`",
+    ),
+    (
+        "it may lack the number that the others begin with",
+        "có thể dòng này thiếu số thứ tự mà các dòng khác có ở đầu",
+    ),
+    (
+        "blanks may group the digits of its numbers or separate them",
+        "dấu cách có thể tách nhóm chữ số hoặc tách các số",
+    ),
+    (
+        "write numbers such as \"1 234.5\" without blanks",
+        "hãy viết các số như \"1 234.5\" liền nhau, không có dấu cách",
+    ),
+    (
+        "a cell has a blank, but is not a number such as \"1 234\"",
+        "có ô chứa dấu cách nhưng không phải là số như \"1 234\"",
+    ),
+    (
+        "{} has a point, but others have a comma",
+        "{0} có dấu chấm, nhưng các số khác có dấu phẩy",
+    ),
+    (
+        "{} has a comma, but others have a point",
+        "{0} có dấu phẩy, nhưng các số khác có dấu chấm",
+    ),
+    (
         "no header of a PTX scan begins here",
         "không có phần đầu của bản quét PTX ở dòng này",
     ),

@@ -107,6 +107,14 @@ fn refusals_that_are_put_together_are_translated() {
             "m.xyz: dòng 6: dòng này có 4 cột, nhưng hầu hết các dòng có 3; hãy viết các số như \"1 234\" liền nhau, không có dấu cách",
         ),
         (
+            "m.xyz: line 1: \"2.5\" has a point, but others have a comma",
+            "m.xyz: dòng 1: \"2.5\" có dấu chấm, nhưng các số khác có dấu phẩy",
+        ),
+        (
+            "m.xyz: line 6: it has 3 columns, but most lines have 4; it may lack the number that the others begin with",
+            "m.xyz: dòng 6: dòng này có 3 cột, nhưng hầu hết các dòng có 4; có thể dòng này thiếu số thứ tự mà các dòng khác có ở đầu",
+        ),
+        (
             "m.ply: the PLY header is wrong: the file ends before end_header",
             "m.ply: phần đầu tệp PLY sai: tệp hết trước end_header",
         ),
