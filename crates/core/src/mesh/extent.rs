@@ -3,11 +3,13 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 use super::error::{MeshLimits, MeshReadError};
+use super::far_values::find_far_values;
 use super::format::DetectedFormat;
 use super::missing::is_position;
 use super::ply::VertexRows;
 use super::robust_bounds::Bounds;
 use super::stated_unit::stated_unit;
+use super::triangle_mesh::Vertices;
 use super::triangle_stream::binary_stl_triangles;
 use super::xyz::SampledPoints;
 use super::{stl, text};
@@ -80,10 +82,11 @@ pub(super) fn sampled(
     name: &str,
     limits: &MeshLimits,
 ) -> Result<MeshExtent, MeshReadError> {
+    let (positions, unit) = some_positions(file, (len, name), limits, FOR_SIZE)?;
     let mut seen = GrowingBox::default();
-    let unit = each_position(file, (len, name), limits, FOR_SIZE, &mut |position| {
-        seen.add(position);
-    })?;
+    positions
+        .into_iter()
+        .for_each(|position| seen.add(position));
     Ok(MeshExtent {
         sides: seen.sides(),
         is_exact: false,
@@ -91,9 +94,27 @@ pub(super) fn sampled(
     })
 }
 
+/// Returns vertices at some places of a file with a length and a name, without numbers that stand for a missing position, and the
+/// unit that the file names.
+pub(super) fn some_positions(
+    file: &mut (impl Read + Seek),
+    (len, name): (u64, &str),
+    limits: &MeshLimits,
+    spread: SampleSpread,
+) -> Result<(Vec<[f64; 3]>, Option<LengthUnit>), MeshReadError> {
+    let mut found = Vec::new();
+    let unit = each_position(file, (len, name), limits, spread, &mut |position| {
+        found.push(position);
+    })?;
+    let vertices: Vertices = found.into();
+    let far_values = find_far_values(&vertices, is_position);
+    let is_kept = |vertex: &[f64; 3]| far_values.iter().all(|value| !value.is_at(*vertex));
+    Ok((vertices.iter().filter(is_kept).collect(), unit))
+}
+
 /// Visits vertices at some places of a file with a length and a name. Returns the unit that the file names. Visits none if
 /// their places are not known, and leaves out repeated vertices at the origin, which have no position, except in an STL.
-pub(super) fn each_position(
+fn each_position(
     file: &mut (impl Read + Seek),
     (len, name): (u64, &str),
     limits: &MeshLimits,

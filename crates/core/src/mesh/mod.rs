@@ -175,7 +175,8 @@ pub fn visit_some_vertices(
 ) -> Result<(), MeshReadError> {
     limits.check_bytes(len)?;
     if len > extent::WHOLE_BYTES {
-        extent::each_position(file, (len, name), limits, extent::FOR_PICTURE, visit)?;
+        let (some, _) = extent::some_positions(file, (len, name), limits, extent::FOR_PICTURE)?;
+        some.into_iter().for_each(visit);
     } else {
         let mesh = read(&short_file(file)?, name, limits)?;
         mesh.vertices.iter().for_each(visit);

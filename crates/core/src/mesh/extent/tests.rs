@@ -5,7 +5,7 @@ use std::io::Cursor;
 use super::WHOLE_BYTES;
 use crate::domain::LengthUnit;
 use crate::mesh::write::MeshFormat;
-use crate::mesh::{Mesh, MeshExtent, MeshLimits, MeshReadError, extent};
+use crate::mesh::{Mesh, MeshExtent, MeshLimits, MeshReadError, extent, visit_some_vertices};
 
 /// A wavy sheet of 40 by 30 by at most 4.
 fn sheet(side: usize) -> Mesh {
@@ -102,6 +102,28 @@ fn repeated_origins_of_a_long_point_cloud_are_no_positions() {
         let obj = format!("v {}\n", text.trim_end().replace('\n', "\nv "));
         assert_sheet(long_sides(obj.as_bytes(), "a.obj"), "OBJ");
     }
+}
+
+#[test]
+fn numbers_for_missing_points_of_a_long_cloud_are_no_positions() {
+    let row = |k: usize, [x, y, z]: [f64; 3]| {
+        if k.is_multiple_of(50) {
+            "-9999 -9999 -9999\n".to_owned()
+        } else {
+            format!("{:.7} {:.7} {:.7}\n", x + 500.0, y + 500.0, z + 500.0)
+        }
+    };
+    let text = lines(420, row);
+    assert_sheet(long_sides(text.as_bytes(), "a.xyz"), "XYZ");
+    let limits = MeshLimits::SUGGESTED;
+    let mut seen = 0;
+    let mut add = |[x, ..]: [f64; 3]| {
+        assert!(x >= 500.0, "{x}");
+        seen += 1;
+    };
+    let mut file = Cursor::new(text.as_bytes());
+    visit_some_vertices(&mut file, text.len() as u64, "a.xyz", &limits, &mut add).expect("points");
+    assert!(seen > 1000, "{seen}");
 }
 
 #[test]
