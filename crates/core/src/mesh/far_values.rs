@@ -4,7 +4,7 @@ use super::triangle_mesh::Vertices;
 use crate::domain::cancel::polled;
 
 /// Vertices that are compared. More are only counted if one of these is far from the others.
-const SAMPLES: usize = 256;
+const SAMPLES: usize = 1024;
 /// Fewest vertices of a mesh in which some may stand for missing ones.
 const FEWEST_VERTICES: usize = 100;
 /// Fewest vertices that share a number that stands for a missing one, and their smallest share of all.
@@ -60,14 +60,11 @@ pub(super) fn find_far_values(
 
 /// Returns the extreme positions and heights of a sample that are far outside of the box around its other vertices.
 fn outside(sample: &[[f64; 3]]) -> Vec<FarValue> {
-    let sorted = [0, 1, 2].map(|axis| {
-        let mut along: Vec<f64> = sample.iter().map(|vertex| vertex[axis]).collect();
-        along.sort_unstable_by(f64::total_cmp);
-        along
-    });
-    let [Some(x), Some(y), Some(z)] = sorted.each_ref().map(|along| InnerRange::of(along)) else {
+    if sample.is_empty() {
         return Vec::new();
-    };
+    }
+    let along = |axis: usize| sample.iter().map(move |vertex| vertex[axis]);
+    let [x, y, z] = [0, 1, 2].map(|axis| InnerRange::of(along(axis)));
     let longest = [x, y, z].into_iter().map(InnerRange::length);
     let longest = longest.fold(0.0, f64::max);
     let mut found: Vec<FarValue> = z.far_ends(longest).map(FarValue::Height).collect();
@@ -89,17 +86,25 @@ struct InnerRange {
 }
 
 impl InnerRange {
-    /// Returns the range of sorted numbers. Of two numbers, the more frequent one is between.
-    fn of(sorted: &[f64]) -> Option<Self> {
-        let ends = [*sorted.first()?, *sorted.last()?];
-        let start = sorted.partition_point(|value| *value <= ends[0]);
-        let end = sorted.partition_point(|value| *value < ends[1]);
-        let inner = if start < end {
-            [sorted[start], sorted[end - 1]]
-        } else {
-            [ends[usize::from(2 * start < sorted.len())]; 2]
-        };
-        Some(Self { ends, inner })
+    /// Returns the range of some numbers. Of two different ones, the more frequent one is between.
+    fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let with = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+        let ends = values.clone().fold(none, with);
+        let (mut inner, mut at_ends) = (none, [0, 0]);
+        for value in values {
+            if value == ends[0] {
+                at_ends[0] += 1;
+            } else if value == ends[1] {
+                at_ends[1] += 1;
+            } else {
+                inner = with(inner, value);
+            }
+        }
+        if inner == none {
+            inner = [ends[usize::from(at_ends[1] > at_ends[0])]; 2];
+        }
+        Self { ends, inner }
     }
 
     fn length(self) -> f64 {

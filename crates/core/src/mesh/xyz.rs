@@ -111,10 +111,12 @@ impl SampledPoints {
         let layout = PointLayout::of(head)?;
         let numbered = layout.numbered().filter(|_| {
             let rows = layout.rows(head);
-            let points: Vec<_> = rows
-                .filter_map(|(_, row)| layout.position(row).ok())
-                .collect();
-            are_numbers(&points) || is_scan_number(head, &layout, &points)
+            let positions = rows.filter_map(|(_, row)| layout.position(row).ok());
+            let whole = positions.map(|point| (point[0].fract() == 0.0).then_some(point));
+            let points: Option<Vec<_>> = whole.collect();
+            points.is_some_and(|points| {
+                are_numbers(&points) || is_scan_number(head, &layout, &points)
+            })
         });
         Ok(Self {
             layout: numbered.unwrap_or(layout),
