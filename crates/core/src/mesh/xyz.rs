@@ -37,8 +37,8 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     })
 }
 
-/// Reads points, also with cells in quotation marks. Of two errors, returns that of the later line: what the line of the other
-/// one means was understood in the other way.
+/// Reads points, also with cells in quotation marks. Of two errors, returns that of the later line, because the way of reading
+/// that got there fits the file better.
 fn plain_or_quoted_points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshError> {
     let found = points(bytes, limits);
     let is_understood = match &found {
