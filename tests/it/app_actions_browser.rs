@@ -180,7 +180,7 @@ fn failed_pairs_get_another_unit_and_the_other_side() {
         "[...document.querySelectorAll('.examples img')].every((one) => one.complete && one.naturalWidth > 0)",
     );
     tab.screenshot("app_failed_groups");
-    tab.click("#failures a[href*='what=unit']", false);
+    tab.click("#failures a[href*='what=unit&class=']", false);
     tab.wait(&on_page("/p/p/correct"));
     let text = tab.eval("document.querySelector('#corrected').textContent");
     assert_eq!(text, "2 pairs: m-1, m-2");

@@ -84,9 +84,9 @@ pub(super) fn sampled(
 ) -> Result<MeshExtent, MeshReadError> {
     let (positions, unit) = some_positions(file, (len, name), limits, FOR_SIZE)?;
     let mut seen = GrowingBox::default();
-    positions
-        .into_iter()
-        .for_each(|position| seen.add(position));
+    for position in positions {
+        seen.add(position);
+    }
     Ok(MeshExtent {
         sides: seen.sides(),
         is_exact: false,

@@ -180,5 +180,7 @@ mod number_tests;
 mod refusal_tests;
 #[cfg(test)]
 mod source_sentences;
+#[cfg(all(test, unix))]
+mod system_tests;
 #[cfg(test)]
 mod tests;
