@@ -121,6 +121,6 @@ pub(super) const BLOCK_REFUSALS: &[(&str, &str)] = &[
     ),
     ("the tops mask {}", "mặt nạ đỉnh nét {!0}"),
     // Paths of files. They are the last rows, because other messages with paths begin like them.
-    ("there is {}/{}", "có tệp {0}/{1}"),
     ("there is {}.{}", "có tệp {0}.{1}"),
+    ("there is {}/{}", "có tệp {0}/{1}"),
 ];

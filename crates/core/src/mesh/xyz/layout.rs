@@ -104,7 +104,10 @@ impl PointLayout {
         layout.tabs = tab_columns(&sample, named);
         let widths: Vec<usize> = sample.iter().map(|line| layout.width_of(line)).collect();
         layout.width = most_frequent(&widths);
-        let is_pairs = |line: &&[u8]| are_grouped_pairs(layout.cells(line));
+        let has_clear_commas =
+            |line: &[u8]| layout.commas != CommaUse::Unclear || !line.contains(&b',');
+        let is_pairs =
+            |line: &&[u8]| has_clear_commas(line) && are_grouped_pairs(layout.cells(line));
         if layout.tabs.is_none() && sample.iter().all(is_pairs) {
             let reason = "blanks may group the digits of its numbers or separate them; write numbers such as \"1 234.5\" without \
                           blanks";

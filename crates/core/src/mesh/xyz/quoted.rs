@@ -58,13 +58,12 @@ fn with_points(bytes: &[u8], separator: u8) -> Result<Vec<u8>, MeshError> {
             if let Some(mark) = number.mark
                 && *common.get_or_insert(mark) != mark
             {
-                let [has, others] = if mark == b',' {
-                    ["comma", "point"]
-                } else {
-                    ["point", "comma"]
-                };
                 let cell = text::quote(&cell);
-                let reason = format!("{cell} has a {has}, but others have a {others}");
+                let reason = if mark == b',' {
+                    format!("{cell} has a comma, but others have a point")
+                } else {
+                    format!("{cell} has a point, but others have a comma")
+                };
                 return Err(MeshError::Line { line, reason });
             }
             plain.extend(number.text);
