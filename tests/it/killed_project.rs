@@ -127,6 +127,10 @@ impl<'a> KilledProject<'a> {
         let reply = act(next, path, body, |_| {});
         assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
         wait_until(what, || self.state() != self.before);
+        if self.action.makes_stale.is_some() {
+            // The run of its pair may begin later.
+            wait_until(what, || status(&project)["stale"] == 0);
+        }
         run_ends(&project);
         if let Some([page, _]) = self.action.said {
             let is_done = || {

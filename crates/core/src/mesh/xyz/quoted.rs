@@ -91,7 +91,7 @@ pub(super) fn with_cell_of(bytes: &[u8], fault: MeshError) -> MeshError {
     }
 }
 
-/// Returns a reason that begins with a cell of a line as it is in the file. `None` if it begins with no cell.
+/// Returns a reason that begins with a cell of a line as the file has it. `None` if it begins with no cell.
 fn with_quote_of(bytes: &[u8], line: u64, reason: &str) -> Option<String> {
     let mut lines = text::raw_lines(bytes);
     let (_, content) = lines.find(|(other, _)| *other == line)?;
