@@ -13,7 +13,7 @@ const POWERS_OF_TEN: [f64; 23] = [
 
 /// Parses a decimal number that a text begins with, and returns it with the rest of the text. Returns `None` if the text
 /// begins with another word than digits with at most one point, a minus sign and an exponent.
-#[inline]
+#[inline(always)]
 pub(super) fn parse(text: &[u8]) -> Option<(f64, &[u8])> {
     let is_negative = text.first() == Some(&b'-');
     let mut rest = &text[usize::from(is_negative)..];
