@@ -7,6 +7,7 @@ mod direction;
 #[cfg(test)]
 mod drawing;
 mod layout;
+mod measured_strokes;
 mod page_rules;
 #[cfg(test)]
 mod page_tests;
@@ -14,6 +15,7 @@ mod places;
 mod rows;
 mod rules;
 mod skew;
+mod stroke_parts;
 mod tall_notes;
 #[cfg(test)]
 mod tests;
@@ -22,7 +24,8 @@ mod text_image;
 use self::columns::find_columns;
 use self::direction::Upright;
 use self::layout::CELL_MM;
-use self::places::{CharacterPlace, Half, Strokes, measure, places};
+use self::measured_strokes::measure;
+use self::places::{CharacterPlace, Half, Strokes, places};
 use self::rows::{RowPitches, find_rows};
 use super::align::CarvedFace;
 use super::page_ink::PageInk;
