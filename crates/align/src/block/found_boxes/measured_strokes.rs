@@ -4,6 +4,7 @@ use super::layout::{CELL, Layout};
 use super::places::{CharacterPlace, Strokes};
 use super::stroke_parts::{NO_PLACE, Part, assign, for_runs};
 use super::text_image::{TextImage, Trust, add, correlation};
+use super::usual_room::{UsualRoom, usual_rooms};
 use crate::block::page_map::PageMap;
 use mocban_core::raster::Grid;
 use mocban_core::raster::components::ConnectedComponents;
@@ -37,12 +38,13 @@ impl LocalMap {
     }
 }
 
-/// Measures the strokes of each place.
+/// Measures the strokes of each place. `pitch` is the distance of two columns in cells.
 pub(super) fn measure(
     image: &TextImage,
     layout: &Layout,
     map: &PageMap,
     places: &[CharacterPlace],
+    pitch: f64,
 ) -> Vec<Strokes> {
     let (width, height) = (layout.cells.width(), layout.cells.height());
     let mut owners = Grid::new(width + 1, height + 1, NO_PLACE);
@@ -63,40 +65,54 @@ pub(super) fn measure(
             LocalMap::at(image, map, [middle(0), middle(1)])
         })
         .collect();
-    let mut strokes = vec![Strokes::EMPTY; places.len()];
-    for_runs(layout, &components, &owners, |label, owner, y, x0, x1| {
-        let number = match parts[label] {
-            Part::Speck => return,
-            Part::Of(number) => number,
-            Part::Divided if owner == NO_PLACE => return,
-            Part::Divided => usize::from(owner),
-        };
-        let found = &mut strokes[number];
-        found.area += x1 - x0;
-        let relief = &image.relief.row(y)[x0..x1];
-        found.relief += relief.iter().map(|r| u64::from(*r)).sum::<u64>();
-        if image.trust_at(x0, y) == Trust::Relief {
-            found.only_relief += x1 - x0;
-        }
-        let edges = [
-            x0 as f64 - 0.5,
-            y as f64 - 0.5,
-            x1 as f64 - 0.5,
-            y as f64 + 0.5,
-        ];
-        extend(&mut found.bounds, [edges[0], edges[1]]);
-        extend(&mut found.bounds, [edges[2], edges[3]]);
-        for corner in [[0, 1], [2, 1], [2, 3], [0, 3]] {
-            extend(
-                &mut found.page_bounds,
-                local[number].page(corner.map(|k| edges[k])),
-            );
-        }
-    });
+    let collect = |rooms: &[UsualRoom]| {
+        let mut strokes = vec![Strokes::EMPTY; places.len()];
+        for_runs(layout, &components, &owners, |label, owner, y, x0, x1| {
+            let part = &parts[label];
+            let number = match part.place {
+                Part::Speck => return,
+                Part::Of(number) => number,
+                Part::Divided if owner == NO_PLACE => return,
+                Part::Divided => usize::from(owner),
+            };
+            if !rooms[number].excludes(part) {
+                add_run(&mut strokes[number], image, &local[number], (y, x0, x1));
+            }
+        });
+        strokes
+    };
+    let all = collect(&vec![UsualRoom::ANY; places.len()]);
+    let mut strokes = collect(&usual_rooms(places, &all, &parts, pitch * CELL as f64));
     for (found, place) in strokes.iter_mut().zip(places) {
         (found.printed, found.likeness) = printed(image, layout, place);
     }
     strokes
+}
+
+/// Adds a run of pixels of a row: the row, the first column and the one after the last.
+fn add_run(
+    found: &mut Strokes,
+    image: &TextImage,
+    local: &LocalMap,
+    (y, x0, x1): (usize, usize, usize),
+) {
+    found.area += x1 - x0;
+    let relief = &image.relief.row(y)[x0..x1];
+    found.relief += relief.iter().map(|r| u64::from(*r)).sum::<u64>();
+    if image.trust_at(x0, y) == Trust::Relief {
+        found.only_relief += x1 - x0;
+    }
+    let edges = [
+        x0 as f64 - 0.5,
+        y as f64 - 0.5,
+        x1 as f64 - 0.5,
+        y as f64 + 0.5,
+    ];
+    extend(&mut found.bounds, [edges[0], edges[1]]);
+    extend(&mut found.bounds, [edges[2], edges[3]]);
+    for corner in [[0, 1], [2, 1], [2, 3], [0, 3]] {
+        extend(&mut found.page_bounds, local.page(corner.map(|k| edges[k])));
+    }
 }
 
 /// Returns the fraction of the relief in a place that is printed, 1 if there is none, and the correlation of both.

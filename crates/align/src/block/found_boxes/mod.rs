@@ -20,6 +20,7 @@ mod tall_notes;
 #[cfg(test)]
 mod tests;
 mod text_image;
+mod usual_room;
 
 use self::columns::find_columns;
 use self::direction::Upright;
@@ -92,7 +93,13 @@ pub fn find_boxes(face: &CarvedFace, page: &PageInk, map: &PageMap) -> Vec<Found
     }
     let (rows, pitches) = find_rows(&upright.layout, &columns);
     let places = places(&columns, &rows);
-    let strokes = measure(&upright.image, &upright.layout, map, &places);
+    let strokes = measure(
+        &upright.image,
+        &upright.layout,
+        map,
+        &places,
+        columns.pitch,
+    );
     let is_upside_down = upright.is_upside_down(&places, &strokes);
     numbered(
         &places,

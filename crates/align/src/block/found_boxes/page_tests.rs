@@ -86,6 +86,16 @@ fn characters_without_neighbours_are_whole() {
 }
 
 #[test]
+fn a_piece_of_a_rule_beside_a_character_leaves_its_box() {
+    let mut drawing = Drawing::full(|_, _| false);
+    let [left, top, right, _] = cell(3, 3);
+    let middle = f64::midpoint(left, right);
+    drawing.add([middle + 6.35, top + 2.0, middle + 6.75, top + 6.0]);
+    let (map, size) = upright();
+    drawing.check(&map, size);
+}
+
+#[test]
 fn a_tear_divides_no_character() {
     let mut drawing = Drawing::full(|_, _| false);
     let [left, _, right, _] = cell(3, 1);

@@ -22,6 +22,16 @@ pub(super) enum Part {
     Divided,
 }
 
+/// A connected part of the strokes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PlacedPart {
+    pub(super) place: Part,
+    /// First column and row of its pixels, and the ones after the last.
+    pub(super) bounds: [usize; 4],
+    /// Number of pixels.
+    pub(super) area: usize,
+}
+
 /// The owner of a cell outside all places.
 pub(super) const NO_PLACE: u16 = u16::MAX;
 
@@ -58,40 +68,66 @@ pub(super) fn assign(
     layout: &Layout,
     components: &ConnectedComponents,
     owners: &Grid<u16>,
-) -> Vec<Part> {
-    // Pixels of each part in each place, and the sum of the relief below them.
-    let mut shares: Vec<(Vec<(u16, usize)>, u64)> = Vec::new();
+) -> Vec<PlacedPart> {
+    let mut shares: Vec<PartShares> = Vec::new();
     for_runs(layout, components, owners, |label, owner, y, x0, x1| {
         if shares.len() <= label {
-            shares.resize(label + 1, (Vec::new(), 0));
+            shares.resize(label + 1, PartShares::default());
         }
-        let (places, relief) = &mut shares[label];
-        match places.iter_mut().find(|(place, _)| *place == owner) {
-            Some((_, count)) => *count += x1 - x0,
-            None => places.push((owner, x1 - x0)),
-        }
-        *relief += image.relief.row(y)[x0..x1]
-            .iter()
-            .map(|r| u64::from(*r))
-            .sum::<u64>();
+        let relief = image.relief.row(y)[x0..x1].iter();
+        shares[label].add(
+            owner,
+            [x0, y, x1, y + 1],
+            relief.map(|r| u64::from(*r)).sum(),
+        );
     });
-    let pixel = PIXEL_MM * PIXEL_MM;
-    shares
-        .into_iter()
-        .map(|(mut places, relief)| {
-            let area: usize = places.iter().map(|(_, count)| count).sum();
-            let is_shown = relief as f64 >= SHOWN * area as f64;
-            let least = if is_shown { SPECK_MM2 } else { LOOSE_SPECK_MM2 };
-            if (area as f64) * pixel < least {
-                return Part::Speck;
-            }
-            places.retain(|(place, _)| *place != NO_PLACE);
-            places.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-            match places[..] {
-                [] => Part::Speck,
-                [_, (_, second), ..] if second as f64 >= SHARED * area as f64 => Part::Divided,
-                [(place, _), ..] => Part::Of(usize::from(place)),
-            }
-        })
-        .collect()
+    shares.into_iter().map(PartShares::placed).collect()
+}
+
+/// Pixels of a part in each place.
+#[derive(Clone, Default)]
+struct PartShares {
+    places: Vec<(u16, usize)>,
+    /// Sum of the relief below them.
+    relief: u64,
+    bounds: [usize; 4],
+}
+
+impl PartShares {
+    /// Adds a run of pixels with this box.
+    fn add(&mut self, owner: u16, run: [usize; 4], relief: u64) {
+        let count = run[2] - run[0];
+        if self.places.is_empty() {
+            self.bounds = run;
+        }
+        for k in 0..2 {
+            self.bounds[k] = self.bounds[k].min(run[k]);
+            self.bounds[k + 2] = self.bounds[k + 2].max(run[k + 2]);
+        }
+        match self.places.iter_mut().find(|(place, _)| *place == owner) {
+            Some((_, sum)) => *sum += count,
+            None => self.places.push((owner, count)),
+        }
+        self.relief += relief;
+    }
+
+    fn placed(mut self) -> PlacedPart {
+        let area: usize = self.places.iter().map(|(_, count)| count).sum();
+        let is_shown = self.relief as f64 >= SHOWN * area as f64;
+        let least = if is_shown { SPECK_MM2 } else { LOOSE_SPECK_MM2 };
+        self.places.retain(|(place, _)| *place != NO_PLACE);
+        self.places
+            .sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        let place = match self.places[..] {
+            _ if area as f64 * PIXEL_MM * PIXEL_MM < least => Part::Speck,
+            [] => Part::Speck,
+            [_, (_, second), ..] if second as f64 >= SHARED * area as f64 => Part::Divided,
+            [(place, _), ..] => Part::Of(usize::from(place)),
+        };
+        PlacedPart {
+            place,
+            bounds: self.bounds,
+            area,
+        }
+    }
 }
