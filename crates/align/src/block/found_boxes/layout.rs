@@ -1,7 +1,7 @@
 //! The strokes of a page without frame and rules, and the part of the page inside the frame.
 
 use super::page_rules::PageRules;
-use super::rules::{Rule, find_solid};
+use super::rules::{Rule, find_solid, solid_parts};
 use super::text_image::{PIXEL_MM, TextImage, Trust};
 use mocban_core::raster::{Grid, Mask};
 
@@ -17,6 +17,10 @@ const BEYOND_FRAME: f64 = 0.02;
 const SOLID: f64 = 0.18;
 /// The same in other narrow columns.
 const SOLID_IN_COLUMN: f64 = 0.4;
+/// The same in columns of text, the least fraction of a mark that such squares cover, and its least size. Notes may be solid.
+const SOLID_IN_TEXT: f64 = 0.25;
+const SOLID_SHARE: f64 = 0.7;
+const SOLID_SIZE: f64 = 0.5;
 
 /// Strokes of a page, by which columns and rows are found.
 #[derive(Debug, Clone)]
@@ -93,11 +97,25 @@ impl Layout {
 
     /// Erases the ornaments of a column, from its first position across to the one after the last, in cells.
     pub(super) fn erase_ornaments(&mut self, across: [usize; 2], is_strip: bool) {
+        let side = if is_strip { SOLID } else { SOLID_IN_COLUMN };
+        self.erase(across, side, find_solid);
+    }
+
+    /// Erases the solid marks of a column of text, such as the ornaments of a strip that is as wide as the columns.
+    pub(super) fn erase_solid_parts(&mut self, across: [usize; 2]) {
+        let size = SOLID_SIZE * ((across[1] - across[0]) * CELL) as f64;
+        self.erase(across, SOLID_IN_TEXT, |part, side| {
+            solid_parts(part, side, SOLID_SHARE, (size * size) as usize)
+        });
+    }
+
+    /// Erases what `find` returns for the text of a column and a side of squares, in pixels. `side` is in widths of the
+    /// column.
+    fn erase(&mut self, across: [usize; 2], side: f64, find: impl Fn(&Mask, usize) -> Mask) {
         let [left, right] = across.map(|x| x * CELL);
         let height = self.rules.text.height();
         let part = Mask::from_fn(right - left, height, |x, y| self.rules.text.at(left + x, y));
-        let side = if is_strip { SOLID } else { SOLID_IN_COLUMN };
-        let solid = find_solid(&part, (side * (right - left) as f64) as usize);
+        let solid = find(&part, (side * (right - left) as f64) as usize);
         for y in 0..height {
             for x in (left..right).filter(|x| solid.at(x - left, y)) {
                 self.rules.text.set(x, y, false);

@@ -89,17 +89,13 @@ pub fn find_boxes(face: &CarvedFace, page: &PageInk, map: &PageMap) -> Vec<Found
             upright
                 .layout
                 .erase_ornaments(column.across, column.is_strip);
+        } else {
+            upright.layout.erase_solid_parts(column.across);
         }
     }
     let (rows, pitches) = find_rows(&upright.layout, &columns);
     let places = places(&columns, &rows);
-    let strokes = measure(
-        &upright.image,
-        &upright.layout,
-        map,
-        &places,
-        columns.pitch,
-    );
+    let strokes = measure(&upright.image, &upright.layout, map, &places, columns.pitch);
     let is_upside_down = upright.is_upside_down(&places, &strokes);
     numbered(
         &places,

@@ -21,6 +21,9 @@ const LINE_SPREAD_MM: f64 = 0.6;
 /// Width of the strokes beside the middle of a rule that belong to it, mm.
 const THIN_MM: f64 = 0.75;
 
+/// Least fraction of an ornament that is solid.
+const ORNAMENT_SHARE: f64 = 0.4;
+
 /// A straight rule along y.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rule {
@@ -176,6 +179,24 @@ pub(super) fn erase_thin(strokes: &mut Mask, erased: &mut Mask, rule: &Rule) {
 /// or the solid pixels alone if they are the smaller part.
 pub(super) fn find_solid(strokes: &Mask, side: usize) -> Mask {
     let solid = opened(strokes, side.max(1));
+    let mut found = parts_covered(strokes, &solid, ORNAMENT_SHARE, 0);
+    for (found, is_solid) in found.data_mut().iter_mut().zip(solid.data()) {
+        *found |= is_solid;
+    }
+    found
+}
+
+/// Returns the parts of at least an area, in pixels, of which squares of `side` pixels cover more than a fraction.
+pub(super) fn solid_parts(strokes: &Mask, side: usize, share: f64, least: usize) -> Mask {
+    let solid = opened(strokes, side.max(1));
+    parts_covered(strokes, &solid, share, least)
+}
+
+/// Returns the parts of at least an area, in pixels, of which a mask covers more than a fraction.
+fn parts_covered(strokes: &Mask, cover: &Mask, share: f64, least: usize) -> Mask {
+    if !cover.data().contains(&true) {
+        return cover.clone();
+    }
     let components = ConnectedComponents::label(strokes);
     let mut areas: Vec<[usize; 2]> = Vec::new();
     for y in 0..strokes.height() {
@@ -185,14 +206,14 @@ pub(super) fn find_solid(strokes: &Mask, side: usize) -> Mask {
                     areas.resize(label + 1, [0; 2]);
                 }
                 areas[label][0] += 1;
-                areas[label][1] += usize::from(solid.at(x, y));
+                areas[label][1] += usize::from(cover.at(x, y));
             }
         }
     }
     Mask::from_fn(strokes.width(), strokes.height(), |x, y| {
         components.label_at(x, y).is_some_and(|label| {
             let [all, part] = areas[label];
-            5 * part > 2 * all || solid.at(x, y)
+            all >= least && part as f64 > share * all as f64
         })
     })
 }
