@@ -3,11 +3,16 @@
 use super::layout::{CELL, Layout};
 use super::places::{CharacterPlace, Strokes};
 use super::stroke_parts::{NO_PLACE, Part, assign, for_runs};
-use super::text_image::{TextImage, Trust, add, correlation};
+use super::text_image::{PIXEL_MM, TextImage, Trust, add, correlation};
 use super::usual_room::{UsualRoom, usual_rooms};
 use crate::block::page_map::PageMap;
 use mocban_core::raster::Grid;
 use mocban_core::raster::components::ConnectedComponents;
+
+/// Least relief of a pixel that the block shows.
+const SHOWN_RELIEF: u8 = 64;
+/// Area of strokes beyond the usual room that the block does not show from which a mark lies on a character, mm^2.
+const FOREIGN_MM2: f64 = 0.5;
 
 /// An affine map from pixels of the frame to pixels of the page.
 struct LocalMap {
@@ -67,6 +72,9 @@ pub(super) fn measure(
         .collect();
     let collect = |rooms: &[UsualRoom]| {
         let mut strokes = vec![Strokes::EMPTY; places.len()];
+        // The strokes that the block shows within the usual room, and pixels beyond it that the block does not show.
+        let mut shown = strokes.clone();
+        let mut foreign = vec![0; places.len()];
         for_runs(layout, &components, &owners, |label, owner, y, x0, x1| {
             let part = &parts[label];
             let number = match part.place {
@@ -75,10 +83,27 @@ pub(super) fn measure(
                 Part::Divided if owner == NO_PLACE => return,
                 Part::Divided => usize::from(owner),
             };
-            if !rooms[number].excludes(part) {
-                add_run(&mut strokes[number], image, &local[number], (y, x0, x1));
+            let room = &rooms[number];
+            if room.excludes(part) {
+                return;
+            }
+            add_run(&mut strokes[number], image, &local[number], (y, x0, x1));
+            let relief = image.relief.row(y);
+            let is_inside = |x: &usize| usize::from(owner) == number && room.holds(*x);
+            let is_shown = |x: &usize| relief[*x] >= SHOWN_RELIEF;
+            let beyond = (x0..x1).filter(|x| !is_inside(x) && !is_shown(x));
+            foreign[number] += beyond.count();
+            let mut within = (x0..x1).filter(|x| is_inside(x) && is_shown(x));
+            if let Some(first) = within.next() {
+                let end = within.next_back().unwrap_or(first) + 1;
+                add_run(&mut shown[number], image, &local[number], (y, first, end));
             }
         });
+        for ((strokes, shown), foreign) in strokes.iter_mut().zip(shown).zip(foreign) {
+            if foreign as f64 * PIXEL_MM * PIXEL_MM > FOREIGN_MM2 && shown.area > 0 {
+                *strokes = shown;
+            }
+        }
         strokes
     };
     let all = collect(&vec![UsualRoom::ANY; places.len()]);

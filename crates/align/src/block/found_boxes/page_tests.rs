@@ -96,6 +96,27 @@ fn a_piece_of_a_rule_beside_a_character_leaves_its_box() {
 }
 
 #[test]
+fn a_mark_over_a_character_leaves_its_box() {
+    let mut drawing = Drawing::full(|_, _| false);
+    let [left, top, right, _] = cell(3, 3);
+    let middle = f64::midpoint(left, right);
+    drawing
+        .ink
+        .push([middle - 6.8, top + 6.0, middle + 6.8, top + 6.8]);
+    let (map, size) = upright();
+    drawing.check(&map, size);
+}
+
+#[test]
+fn solid_ornaments_in_a_wide_column_are_no_characters() {
+    let mut drawing = Drawing::full(|column, row| column == 3 && row == 3);
+    let [left, top, ..] = cell(3, 3);
+    drawing.add([left + 1.5, top + 1.0, left + 9.5, top + 9.0]);
+    let (map, size) = upright();
+    drawing.check(&map, size);
+}
+
+#[test]
 fn a_tear_divides_no_character() {
     let mut drawing = Drawing::full(|_, _| false);
     let [left, _, right, _] = cell(3, 1);

@@ -17,7 +17,7 @@ const THIN: f64 = 0.1;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct UsualRoom {
     /// Left and right edge.
-    pub(super) across: [f64; 2],
+    across: [f64; 2],
     /// Upper and lower edge for thin parts.
     along: [f64; 2],
     /// Largest area of a thin part per length.
@@ -31,6 +31,12 @@ impl UsualRoom {
         along: [f64::NEG_INFINITY, f64::INFINITY],
         thin: 0.0,
     };
+
+    /// Returns whether a position across lies within the edges.
+    pub(super) fn holds(&self, x: usize) -> bool {
+        let x = x as f64;
+        x > self.across[0] && x < self.across[1]
+    }
 
     /// Returns whether a part is no part of the character.
     pub(super) fn excludes(&self, part: &PlacedPart) -> bool {
