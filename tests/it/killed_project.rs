@@ -124,12 +124,13 @@ impl<'a> KilledProject<'a> {
     /// Sends an action to the next app, and returns what it has changed in the end.
     fn change(&self, next: &Page, path: &str, body: &Value) -> ActionOutcome {
         let (what, project) = (self.action.action, self.root().join("p"));
+        let stages = self.stages_of_stale();
         let reply = act(next, path, body, |_| {});
         assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
         wait_until(what, || self.state() != self.before);
-        if self.action.makes_stale.is_some() {
-            // The run of its pair may begin later.
-            wait_until(what, || status(&project)["stale"] == 0);
+        // The run of a stale pair may begin later.
+        if stages.is_some() {
+            wait_until(what, || self.stages_of_stale() != stages);
         }
         run_ends(&project);
         if let Some([page, _]) = self.action.said {
@@ -141,6 +142,13 @@ impl<'a> KilledProject<'a> {
         }
         mocban(&project, &["check"]).expect(0);
         self.outcome()
+    }
+
+    /// Returns the results of the stages of the pair that the action makes stale.
+    fn stages_of_stale(&self) -> Option<Value> {
+        let pair = self.action.makes_stale?;
+        let shown = mocban(&self.root().join("p"), &["show", pair, "--json"]).expect(0);
+        Some(shown.json()["stages"].clone())
     }
 
     fn outcome(&self) -> ActionOutcome {
