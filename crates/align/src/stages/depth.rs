@@ -229,9 +229,7 @@ mod tests {
 
     use super::{DepthError, DepthParams, NO_HIT, ResolutionBy, depth, quantize};
     use crate::stages::Scan;
-    use mocban_core::domain::{
-        Curvature, FitOutcome, LengthUnit, Rigid3, ScanRegion, SideEvidence,
-    };
+    use mocban_core::domain::{Curvature, FitOutcome, LengthUnit, Rigid3, ScanRegion, test_values};
     use mocban_core::mesh::Mesh;
     use mocban_core::raster::Grid;
 
@@ -261,27 +259,10 @@ mod tests {
     }
 
     fn flat_fit(curvature: Option<Curvature>) -> FitOutcome {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         FitOutcome {
-            plane_from_mesh: Rigid3::to_frame(
-                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-                [0.0; 3],
-            ),
             curvature,
-            curvature_height: 0.0,
-            inlier_ratio: 1.0,
-            rms: 0.0,
-            relief: 1.0,
-            side: SideEvidence {
-                winding: None,
-                flatness: 1.0,
-                confidence: 1.0,
-            },
-            region: None,
-            print_outline: None,
-            vertices: 0,
-            triangles: 0,
-            missing_vertices: None,
-            incomplete_faces: None,
+            ..test_values::flat_fit(Rigid3::to_frame(axes, [0.0; 3]))
         }
     }
 

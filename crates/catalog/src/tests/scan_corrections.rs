@@ -6,8 +6,8 @@ use super::blocks::{character, world};
 use super::{World, failed, fingerprints, name, row};
 use crate::{FailureAction, PairAttributes, RerunPolicy, ScanCorrection, StageCheckpoint};
 use mocban_core::domain::{
-    Failure, FailureClass, FitOutcome, JobStatus, LengthUnit, PairName, Rigid3, SideEvidence,
-    Stage, UNIT_CLAUSES,
+    Failure, FailureClass, JobStatus, LengthUnit, PairName, Rigid3, Stage, UNIT_CLAUSES,
+    test_values::flat_fit,
 };
 
 /// Lets the next pair fail at its first stage, and returns its name.
@@ -111,44 +111,23 @@ async fn the_other_side_is_that_which_was_not_said() {
 async fn the_other_side_is_that_which_fit_has_not_found() {
     for (up, expected) in [(1.0, true), (-1.0, false)] {
         let world = World::new(1).await;
+        // Axes of the plane in the scan.
+        let axes = [[1.0, 0.0, 0.0], [0.0, up, 0.0], [0.0, 0.0, up]];
+        let fit = flat_fit(Rigid3::to_frame(axes, [0.0; 3]));
         let set_fit = |done: &mut StageCheckpoint| {
             if done.stage == Stage::Fit {
-                done.outcome = json!(fit_with_up(up)).to_string();
+                done.outcome = json!(fit).to_string();
             }
         };
         world.finish_with(set_fit).await;
         let pairs = [name("p0")];
-        // Until the pair runs again, the same side is the other one.
+        // The second correction changes nothing: the stored fit, and so its other side, is still the same.
         for changed in [1, 0] {
             let found = correct(&world, &pairs, ScanCorrection::OtherSide).await;
             assert_eq!(found, changed);
             let side = attributes_of(&world, &pairs[0]).await.scanned_face_down;
             assert_eq!(side, Some(expected));
         }
-    }
-}
-
-/// Returns a fit whose plane has this z axis in the scan: 1 for up, -1 for down.
-fn fit_with_up(up: f64) -> FitOutcome {
-    let axes = [[1.0, 0.0, 0.0], [0.0, up, 0.0], [0.0, 0.0, up]];
-    FitOutcome {
-        plane_from_mesh: Rigid3::to_frame(axes, [0.0; 3]),
-        curvature: None,
-        curvature_height: 0.0,
-        inlier_ratio: 1.0,
-        rms: 0.1,
-        relief: 2.0,
-        side: SideEvidence {
-            winding: None,
-            flatness: 1.0,
-            confidence: 1.0,
-        },
-        region: None,
-        print_outline: None,
-        vertices: 3,
-        triangles: 1,
-        missing_vertices: None,
-        incomplete_faces: None,
     }
 }
 

@@ -1,6 +1,31 @@
 //! Plausible values for unit tests.
 
-use super::{Affine2, Disagreement, MetricOutcome, Scores, ThresholdMetric};
+use super::{
+    Affine2, Disagreement, FitOutcome, MetricOutcome, Rigid3, Scores, SideEvidence, ThresholdMetric,
+};
+
+/// Returns a sure fit of a flat block with a relief of one mesh unit, to the whole scan and the whole print.
+pub fn flat_fit(plane_from_mesh: Rigid3) -> FitOutcome {
+    FitOutcome {
+        plane_from_mesh,
+        curvature: None,
+        curvature_height: 0.0,
+        inlier_ratio: 1.0,
+        rms: 0.0,
+        relief: 1.0,
+        side: SideEvidence {
+            winding: None,
+            flatness: 1.0,
+            confidence: 1.0,
+        },
+        region: None,
+        print_outline: None,
+        vertices: 0,
+        triangles: 0,
+        missing_vertices: None,
+        incomplete_faces: None,
+    }
+}
 
 /// Returns an outcome with the given `IoU`, the matching Dice and no confidence.
 pub fn metric_outcome(metric: ThresholdMetric, iou: f64) -> MetricOutcome {

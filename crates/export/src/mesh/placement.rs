@@ -150,7 +150,7 @@ pub(super) mod tests {
     use super::{Levelling, MeshPlacement};
     use mocban_core::domain::{
         Affine2, Curvature, DepthScale, Disagreement, FitOutcome, LengthUnit, MetricOutcome,
-        Rigid3, ScanRegion, Scores, SideEvidence, ThresholdMetric,
+        Rigid3, ScanRegion, Scores, ThresholdMetric, test_values::flat_fit,
     };
 
     const SIZE: [usize; 2] = [200, 100];
@@ -162,25 +162,7 @@ pub(super) mod tests {
     }
 
     fn fit() -> FitOutcome {
-        FitOutcome {
-            plane_from_mesh: plane_from_mesh(),
-            curvature: None,
-            curvature_height: 0.0,
-            inlier_ratio: 1.0,
-            rms: 0.0,
-            relief: 1.0,
-            side: SideEvidence {
-                winding: None,
-                flatness: 1.0,
-                confidence: 1.0,
-            },
-            region: None,
-            print_outline: None,
-            vertices: 0,
-            triangles: 0,
-            missing_vertices: None,
-            incomplete_faces: None,
-        }
+        flat_fit(plane_from_mesh())
     }
 
     fn scale(unit: Option<LengthUnit>) -> DepthScale {

@@ -5,36 +5,21 @@ use super::{
     fit_numbers, metric_head,
 };
 use mocban_core::domain::{
-    Affine2, Curvature, DepthScale, LengthUnit, Rigid3, SideEvidence, ThresholdMetric,
+    Affine2, Curvature, DepthScale, LengthUnit, Rigid3, ThresholdMetric, test_values::flat_fit,
 };
 
 /// Returns what `show` prints about a plate of 50 mm with a relief of 2 mm, in a scan with this unit.
 fn stage_texts(unit: LengthUnit, known: bool) -> [String; 2] {
     let unit_mm = unit.mm();
     let unit = known.then_some(unit);
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let fit = FitOutcome {
-        plane_from_mesh: Rigid3([
-            [1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0, 0.0],
-            [0.0, 0.0, 0.0, 1.0],
-        ]),
         curvature: Some(Curvature([0.0; 6])),
         curvature_height: 0.4 / unit_mm,
         inlier_ratio: 0.75,
         rms: 0.0125 / unit_mm,
         relief: 2.0 / unit_mm,
-        side: SideEvidence {
-            winding: None,
-            flatness: 1.0,
-            confidence: 1.0,
-        },
-        region: None,
-        print_outline: None,
-        vertices: 4,
-        triangles: 2,
-        missing_vertices: None,
-        incomplete_faces: None,
+        ..flat_fit(Rigid3::to_frame(axes, [0.0; 3]))
     };
     let depth = DepthOutcome {
         width: 200,
