@@ -4,23 +4,13 @@ use std::ops::Range;
 
 use maud::{Markup, html};
 
+use super::pair_query::{
+    ALIGNED_PAIRS, ALL_PAIRS, FAILED_PAIRS, LOW_CONFIDENCE_PAIRS, RETIRED_PAIRS, UNFINISHED_PAIRS,
+};
 use crate::review::Language;
 use mocban_core::domain::ThresholdMetric;
 use mocban_report::Report;
 use mocban_results::number_format::format_count;
-
-/// Address of the list of all pairs, from the page of the report.
-pub(super) const ALL_PAIRS: &str = "pairs";
-/// Address of the list of aligned pairs.
-pub(super) const ALIGNED_PAIRS: &str = "pairs?state=aligned";
-/// Address of the list of results with a low confidence.
-pub(super) const LOW_CONFIDENCE_PAIRS: &str = "pairs?confidence=low&sort=confidence";
-/// Address of the list of failed pairs.
-pub(super) const FAILED_PAIRS: &str = "pairs?state=failed&view=table";
-/// Address of the list of pairs that are not finished.
-pub(super) const UNFINISHED_PAIRS: &str = "pairs?state=unfinished";
-/// Address of the list of retired pairs.
-pub(super) const RETIRED_PAIRS: &str = "pairs?state=retired";
 
 /// A count that a sentence of the report has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -23,6 +23,19 @@ pub(super) const JOINT_VERDICTS: [(&str, Verdict); 2] =
 /// State by which a list asks for retired pairs, which have no job.
 pub(super) const RETIRED: &str = "retired";
 
+/// Address of the list of all pairs, relative to the pages of a project.
+pub(super) const ALL_PAIRS: &str = "pairs";
+/// Address of the list of aligned pairs.
+pub(super) const ALIGNED_PAIRS: &str = "pairs?state=aligned";
+/// Address of the list of results with a low confidence.
+pub(super) const LOW_CONFIDENCE_PAIRS: &str = "pairs?confidence=low&sort=confidence";
+/// Address of the list of failed pairs.
+pub(super) const FAILED_PAIRS: &str = "pairs?state=failed&view=table";
+/// Address of the list of pairs that are not finished.
+pub(super) const UNFINISHED_PAIRS: &str = "pairs?state=unfinished";
+/// Address of the list of retired pairs.
+pub(super) const RETIRED_PAIRS: &str = "pairs?state=retired";
+
 /// Differences of IoU that a list can ask for.
 pub(super) const DIFFERENCES: [&str; 4] = ["0.01", "0.03", "0.1", "0.3"];
 

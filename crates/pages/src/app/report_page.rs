@@ -12,9 +12,9 @@ use super::components::{
     NavSection, empty, figure, frame, grouped, number_table, score, stored_message,
 };
 use super::failure::{AppFailure, AppResult};
-use super::linked_counts::{
-    ALIGNED_PAIRS, ALL_PAIRS, FAILED_PAIRS, LOW_CONFIDENCE_PAIRS, LinkedCounts, RETIRED_PAIRS,
-    UNFINISHED_PAIRS,
+use super::linked_counts::LinkedCounts;
+use super::pair_query::{
+    ALIGNED_PAIRS, ALL_PAIRS, FAILED_PAIRS, LOW_CONFIDENCE_PAIRS, RETIRED_PAIRS, UNFINISHED_PAIRS,
 };
 use super::run_blocks::failed_blocks_part;
 use super::sentence::without_commands;

@@ -12,6 +12,7 @@ use super::failure::AppResult;
 use super::home::free_space;
 use super::latest_results::latest_results;
 use super::looked_part::looked_part;
+use super::pair_query::{ALIGNED_PAIRS, ALL_PAIRS, FAILED_PAIRS, LOW_CONFIDENCE_PAIRS};
 use super::projects::OpenProject;
 use super::run_blocks::{
     blocks_text, cut_again_text, failed_block_list, failed_blocks, other_blocks_text,
@@ -80,13 +81,13 @@ fn figures(visit: &Visit, run: &RunState) -> Markup {
     let blocks_name = |number: u64| visit.form(number, ["block", "blocks"], "ván");
     html! {
         div.figures {
-            (figure(run.counts.pairs, visit.form(run.counts.pairs, ["pair", "pairs"], "cặp"), Some("pairs"), ""))
-            (figure(run.jobs(JobStatus::Done), visit.t("aligned", "đã căn chỉnh"), Some("pairs?state=aligned"), "good"))
-            (figure(run.jobs(JobStatus::Quarantined), visit.t("failed", "lỗi"), Some("pairs?state=failed&view=table"), "bad"))
+            (figure(run.counts.pairs, visit.form(run.counts.pairs, ["pair", "pairs"], "cặp"), Some(ALL_PAIRS), ""))
+            (figure(run.jobs(JobStatus::Done), visit.t("aligned", "đã căn chỉnh"), Some(ALIGNED_PAIRS), "good"))
+            (figure(run.jobs(JobStatus::Quarantined), visit.t("failed", "lỗi"), Some(FAILED_PAIRS), "bad"))
             (figure(waiting, visit.t("waiting", "đang chờ"), list("pairs?state=waiting"), ""))
             @if running > 0 || running_blocks == 0 { (figure(running, running_name, list("pairs?state=running"), "")) }
             @if running_blocks > 0 { (figure(running_blocks, &format!("{} {running_name}", blocks_name(running_blocks)), Some("blocks?state=waiting"), "")) }
-            (figure(run.counts.low_confidence, visit.t("low confidence", "độ tin cậy thấp"), Some("pairs?confidence=low&sort=confidence"), "warn"))
+            (figure(run.counts.low_confidence, visit.t("low confidence", "độ tin cậy thấp"), Some(LOW_CONFIDENCE_PAIRS), "warn"))
             (figure(judged, visit.form(judged, ["verdict", "verdicts"], "đánh giá"), Some("review"), ""))
             @if !run.blocks.is_empty() { (figure(blocks, blocks_name(blocks), Some("blocks"), "")) }
             @if failed_blocks > 0 { (figure(failed_blocks, visit.form(failed_blocks, ["block failed", "blocks failed"], "ván lỗi"), Some("blocks?state=failed"), "bad")) }
