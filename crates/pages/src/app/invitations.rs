@@ -193,14 +193,13 @@ impl Invitations {
 }
 
 fn refused(error: &ServerError) -> AppFailure {
-    let (ServerError::Listen { source, .. } | ServerError::Token(source)) = error;
-    let [_, why] = system_reasons(source);
-    let vietnamese = match error {
-        ServerError::Listen { address, .. } => {
-            format!("không mở được địa chỉ {}: {why}", address.ip())
+    let (what, source) = match error {
+        ServerError::Listen { address, source } => {
+            (format!("không mở được địa chỉ {}", address.ip()), source)
         }
-        ServerError::Token(_) => format!("không tạo được liên kết: {why}"),
+        ServerError::Token(source) => ("không tạo được liên kết".to_owned(), source),
     };
+    let [_, why] = system_reasons(source);
     let english = without_error_numbers(&error.to_string());
-    AppFailure::refused(Sentence::new(english, vietnamese))
+    AppFailure::refused(Sentence::new(english, format!("{what}: {why}")))
 }
