@@ -98,8 +98,10 @@ const MARKDOWN_PROGRAM: &str = "\n**Provenance**\n\n- Program: mocban ";
 
 #[cfg(test)]
 mod tests {
-    use super::{is_continued, is_report};
-    use crate::{ReportAccumulator, ReportFormat, render, test_fixtures};
+    use serde_json::json;
+
+    use super::{LABELS, PLAIN_PROGRAM, is_continued, is_report};
+    use crate::{ChangedSetting, ReportAccumulator, ReportFormat, render, test_fixtures};
     use mocban_results::TruthEvaluation;
 
     #[test]
@@ -140,5 +142,25 @@ mod tests {
         ] {
             assert!(!is_report(other.as_bytes()), "{other}");
         }
+    }
+
+    #[test]
+    fn no_line_of_a_full_report_counts_as_added() {
+        let mut report = test_fixtures::full_report();
+        let changed = ChangedSetting {
+            name: "register.min_confidence".to_owned(),
+            value: json!(0.25),
+            default: json!(0.5),
+        };
+        for used in &mut report.provenance.settings {
+            used.changed = Some(vec![changed.clone(); 3]);
+        }
+        for format in ReportFormat::ALL {
+            let text = render(&report, format);
+            assert!(!is_continued(text.as_bytes()), "{format}: {text}");
+        }
+        let text = render(&report, ReportFormat::Text);
+        let (_, end) = text.rsplit_once(PLAIN_PROGRAM).expect("the program");
+        assert!(end.lines().count() > LABELS.len(), "a line wraps: {end}");
     }
 }
