@@ -32,6 +32,20 @@ pub(super) struct PlacedPart {
     pub(super) area: usize,
 }
 
+impl PlacedPart {
+    /// Returns its left, upper, right and lower edge.
+    pub(super) fn edges(&self) -> [f64; 4] {
+        self.bounds.map(|edge| edge as f64 - 0.5)
+    }
+
+    /// Returns whether its area is at most `thin` pixels for each pixel of its longer side.
+    pub(super) fn is_thin(&self, thin: f64) -> bool {
+        let [left, top, right, bottom] = self.bounds;
+        let longer = (right - left).max(bottom - top);
+        self.area as f64 <= thin * longer as f64
+    }
+}
+
 /// The owner of a cell outside all places.
 pub(super) const NO_PLACE: u16 = u16::MAX;
 

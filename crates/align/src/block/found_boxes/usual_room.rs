@@ -40,11 +40,10 @@ impl UsualRoom {
 
     /// Returns whether a part is no part of the character.
     pub(super) fn excludes(&self, part: &PlacedPart) -> bool {
-        let [left, top, right, bottom] = part.bounds.map(|edge| edge as f64 - 0.5);
+        let [left, top, right, bottom] = part.edges();
         let is_beside = right <= self.across[0] || left >= self.across[1];
-        let longer = (right - left).max(bottom - top);
-        let is_thin = part.area as f64 <= self.thin * longer;
-        is_beside || (is_thin && (bottom <= self.along[0] || top >= self.along[1]))
+        let is_apart = bottom <= self.along[0] || top >= self.along[1];
+        is_beside || (is_apart && part.is_thin(self.thin))
     }
 }
 
@@ -173,11 +172,10 @@ fn middle(rows: &[RowStrokes], number: usize, widths: &[Option<f64>; 2]) -> Opti
 fn bodies(places: usize, parts: &[PlacedPart], thin: f64) -> Vec<[f64; 2]> {
     let mut bodies = vec![[f64::INFINITY, f64::NEG_INFINITY]; places];
     for part in parts {
-        let [left, top, right, bottom] = part.bounds.map(|edge| edge as f64 - 0.5);
-        let is_thin = part.area as f64 <= thin * (right - left).max(bottom - top);
         if let Part::Of(place) = part.place
-            && !is_thin
+            && !part.is_thin(thin)
         {
+            let [_, top, _, bottom] = part.edges();
             bodies[place] = [bodies[place][0].min(top), bodies[place][1].max(bottom)];
         }
     }
@@ -232,12 +230,12 @@ mod tests {
 
     #[test]
     fn strokes_beside_the_text_belong_to_no_character() {
-        for room in rooms(|row| row < 3) {
+        let rooms = rooms(|row| row < 3);
+        for room in &rooms {
             let [left, right] = room.across;
             assert!((left - 6.5).abs() < 1.0, "{left}");
             assert!((right - 92.5).abs() < 1.0, "{right}");
         }
-        let rooms = rooms(|row| row < 3);
         assert!(rooms[1].excludes(&part(1, [102, 90, 105, 140], 1.0)));
         assert!(!rooms[1].excludes(&part(1, [82, 90, 105, 140], 1.0)));
     }
