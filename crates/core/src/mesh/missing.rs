@@ -1,8 +1,8 @@
 //! What is left out of a mesh: vertices without a position, and faces without three corners.
 //!
 //! Scanners and converters write NaN for a point that they did not measure, 0 0 0 in organized clouds, and others a number
-//! that no scan has, such as 1e30 or the largest float. Smaller numbers are found where
-//! many vertices share one that is far from the others.
+//! that no scan has, such as 1e30 or the largest float. Smaller numbers are found where many vertices share one that is far
+//! from the others.
 
 use super::error::MeshError;
 use super::far_values::FarValue;

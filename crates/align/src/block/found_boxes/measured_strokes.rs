@@ -11,7 +11,7 @@ use mocban_core::raster::components::ConnectedComponents;
 
 /// Least relief of a pixel that the block shows.
 const SHOWN_RELIEF: u8 = 64;
-/// Area of strokes beyond the usual room that the block does not show from which a mark lies on a character, mm^2.
+/// A mark lies on a character if strokes of a larger area are beyond its usual room and the block does not show them, mm^2.
 const FOREIGN_MM2: f64 = 0.5;
 
 /// An affine map from pixels of the frame to pixels of the page.

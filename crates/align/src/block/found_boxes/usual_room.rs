@@ -3,14 +3,15 @@
 use super::places::{CharacterPlace, Strokes};
 use super::stroke_parts::{Part, PlacedPart};
 
-/// Position of the usual size of a character among the sizes of all, and the fewest sizes that say what is usual.
+/// Quantile of the sizes of all characters that is the usual size, and the fewest sizes from which it is taken.
 const USUAL: f64 = 0.65;
 const MIN_SIZES: usize = 8;
 /// Rows on both sides of a row that show where the middle of its column is.
 const NEAR_ROWS: usize = 4;
-/// What a character may lack or exceed the usual size by on each side, in pitches of columns.
+/// How much smaller or larger than usual a character may be on each side, in pitches of columns.
 const MARGIN: f64 = 0.08;
-/// Largest area of a piece of a rule along its longer side, in pitches of columns. One with a corner has twice its thickness.
+/// Largest thickness of a piece of a rule, in pitches of columns: its area divided by its longer side. For a piece with a corner,
+/// this is about twice the thickness of the rule.
 const THIN: f64 = 0.1;
 
 /// Limits of the strokes of a place, pixels.
@@ -20,7 +21,7 @@ pub(super) struct UsualRoom {
     across: [f64; 2],
     /// Upper and lower edge for thin parts.
     along: [f64; 2],
-    /// Largest area of a thin part per length.
+    /// Largest area of a thin part for each pixel of its longer side.
     thin: f64,
 }
 

@@ -19,7 +19,7 @@ const CHECKED_FACETS: usize = 128;
 const READ_FACETS: usize = 1280;
 /// Facets that show whether all facets of a body have some length.
 const COMPARED_FACETS: usize = 1000;
-/// Most attribute bytes of each facet that are recognized before other bytes.
+/// Most attribute bytes of each facet that are recognized if further bytes follow the last facet.
 const MAX_ATTRIBUTES: usize = 256;
 /// Parts of [`CHECKED_FACETS`] between two polls for a cancellation.
 const PARTS_PER_POLL: usize = 128;
@@ -164,7 +164,7 @@ fn uncounted(body: &[u8], count: u32) -> MeshError {
     }
 }
 
-/// Returns the length of facets with attributes, after which a body goes on. `None` if no length fits.
+/// Returns the length of facets with attributes in a body with further bytes after the last one. `None` if no length fits.
 fn longer_facets(body: &[u8], count: u32) -> Option<u64> {
     let count = count as usize;
     let most = body.len().checked_div(count)?.min(FACET + MAX_ATTRIBUTES);
