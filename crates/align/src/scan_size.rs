@@ -224,7 +224,7 @@ mod tests {
     use super::{advice, doubtful_characters, doubtful_surface, length_of, short_face, wrong_unit};
     use crate::stages::depth::DepthError;
     use crate::stages::fit::FitError;
-    use mocban_core::domain::{LengthUnit, UNIT_CLAUSES};
+    use mocban_core::domain::{Failure, FailureClass, LengthUnit};
     use mocban_core::mesh::Vertices;
 
     #[test]
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn failures_because_of_the_unit_have_a_clause_that_says_so() {
         let long = wrong_unit(12.5, Some(LengthUnit::M)).expect("12.5 m");
-        let names_unit = |message: &str| UNIT_CLAUSES.iter().any(|clause| message.contains(clause));
+        let names_unit = |message: &str| Failure::new(FailureClass::BadInput, message).names_unit();
         for message in [
             long,
             FitError::TooLarge(3).to_string(),
