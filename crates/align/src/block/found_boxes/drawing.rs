@@ -162,6 +162,12 @@ impl Drawing {
         find_boxes(&self.face(0.0), &self.page(page_from_face, size), &map)
     }
 
+    /// Checks names and boxes of all characters on an upright page.
+    pub(super) fn check_upright(&self) {
+        let (map, size) = upright();
+        self.check(&map, size);
+    }
+
     /// Checks names and boxes of all characters.
     pub(super) fn check(&self, page_from_face: &Affine2, size: [usize; 2]) {
         let found = self.found(page_from_face, size);

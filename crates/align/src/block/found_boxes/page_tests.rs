@@ -52,14 +52,12 @@ fn notes_as_high_as_characters_are_found_two_by_two() {
     drawing.characters.push(after.remove(0));
     tall_notes(&mut drawing, 2, 6, 6);
     drawing.characters.extend(after);
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]
 fn rules_in_pieces_belong_to_no_character() {
-    let (map, size) = upright();
-    with_broken_rules().check(&map, size);
+    with_broken_rules().check_upright();
 }
 
 #[test]
@@ -69,8 +67,7 @@ fn a_page_with_few_characters_has_the_columns_of_its_rules() {
         2 | 4 => row != 5,
         _ => !(2..4).contains(&row),
     };
-    let (map, size) = upright();
-    Drawing::full(is_blank).check(&map, size);
+    Drawing::full(is_blank).check_upright();
 }
 
 #[test]
@@ -81,8 +78,7 @@ fn characters_without_neighbours_are_whole() {
         let name = format!("c{column:02}-r01");
         drawing.character(name, [left, top, right, top + 13.0], 0.0);
     }
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]
@@ -91,8 +87,7 @@ fn a_piece_of_a_rule_beside_a_character_leaves_its_box() {
     let [left, top, right, _] = cell(3, 3);
     let middle = f64::midpoint(left, right);
     drawing.add([middle + 6.35, top + 2.0, middle + 6.75, top + 6.0]);
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]
@@ -103,8 +98,7 @@ fn a_mark_over_a_character_leaves_its_box() {
     drawing
         .ink
         .push([middle - 6.8, top + 6.0, middle + 6.8, top + 6.8]);
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]
@@ -112,8 +106,7 @@ fn solid_ornaments_in_a_wide_column_are_no_characters() {
     let mut drawing = Drawing::full(|column, row| column == 3 && row == 3);
     let [left, top, ..] = cell(3, 3);
     drawing.add([left + 1.5, top + 1.0, left + 9.5, top + 9.0]);
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]
@@ -122,8 +115,7 @@ fn a_tear_divides_no_character() {
     let [left, _, right, _] = cell(3, 1);
     let u = left + 0.3 * (right - left);
     drawing.ink.push([u, 0.0, u + 0.6, SIZE_MM[1]]);
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]

@@ -9,16 +9,14 @@ use mocban_core::domain::Affine2;
 
 #[test]
 fn characters_are_found_in_reading_order() {
-    let (map, size) = upright();
-    Drawing::full(|_, _| false).check(&map, size);
+    Drawing::full(|_, _| false).check_upright();
 }
 
 #[test]
 fn blanks_are_not_counted() {
-    let (map, size) = upright();
     // An indented column, a blank in a column, and a column that ends early.
     let blank = |column: u32, row: u32| matches!((column, row), (2, 1) | (3, 4) | (5, 3..));
-    Drawing::full(blank).check(&map, size);
+    Drawing::full(blank).check_upright();
 }
 
 #[test]
@@ -27,8 +25,7 @@ fn notes_are_found_two_by_two() {
     let after: Vec<_> = drawing.characters.split_off(7);
     drawing.notes(2, 2, 2, 7);
     drawing.characters.extend(after);
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]
@@ -59,8 +56,7 @@ fn specks_and_stains_are_no_characters() {
         .push([left + 6.0, top + 6.0, left + 6.3, top + 6.3]);
     // A stain on the margin.
     drawing.ink.push([0.2, 20.0, 1.8, 24.0]);
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]
@@ -139,8 +135,7 @@ fn text_without_rules_is_found() {
             drawing.character(format!("c{column:02}-r{row:02}"), cell(column, row), 0.0);
         }
     }
-    let (map, size) = upright();
-    drawing.check(&map, size);
+    drawing.check_upright();
 }
 
 #[test]
