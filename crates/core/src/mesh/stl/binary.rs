@@ -155,7 +155,7 @@ fn uncounted(body: &[u8], count: u32) -> MeshError {
             want,
         };
     }
-    if let Some(each) = longer_facets(body, count).filter(|_| !has_facets) {
+    if !has_facets && let Some(each) = longer_facets(body, count) {
         return MeshError::FacetBytes { bytes: each };
     }
     MeshError::BytesAfterRows {

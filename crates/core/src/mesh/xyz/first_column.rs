@@ -65,7 +65,7 @@ pub(super) fn check_first_column(
 /// Returns whether the three columns behind the first one may be coordinates: they vary and have fractions, and no normals
 /// follow what would be coordinates with the first one.
 fn has_coordinates_behind(bytes: &[u8], layout: &PointLayout) -> bool {
-    let Some(numbered) = layout.numbered() else {
+    let Some(numbered) = layout.numbered().filter(|_| !has_normals(bytes, layout)) else {
         return false;
     };
     let rows = polled(numbered.rows(bytes));
@@ -74,7 +74,6 @@ fn has_coordinates_behind(bytes: &[u8], layout: &PointLayout) -> bool {
         .collect();
     behind.len() >= NUMBERED_POINTS
         && (0..3).all(|axis| !is_whole(&behind, axis) && !is_constant(&behind, axis))
-        && !has_normals(bytes, layout)
 }
 
 fn is_constant(points: &[[f64; 3]], axis: usize) -> bool {

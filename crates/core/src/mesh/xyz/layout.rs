@@ -263,8 +263,7 @@ impl PointLayout {
         }
         let mut position = [0.0; 3];
         for (value, cell) in position.iter_mut().zip(coordinates) {
-            let number = text::number(&text::with_point(cell));
-            let number = number.or_else(|| number_with_grouping_points(cell));
+            let number = number_with_comma(cell).or_else(|| number_with_grouping_points(cell));
             *value = number.ok_or_else(|| text::not_a_number(cell))?;
         }
         Ok(position)
