@@ -66,15 +66,19 @@ fn plain_or_quoted_points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64;
 fn points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshError> {
     let layout = PointLayout::of(bytes)?;
     let points = positions(bytes, &layout, limits)?;
-    match layout.numbered() {
-        Some(numbered) if are_numbers(&points) || is_scan_number(bytes, &layout, &points) => {
-            positions(bytes, &numbered, limits)
-        }
-        _ => {
-            check_first_column(bytes, &layout, &points)?;
-            check_grid(bytes, &layout, &points).map(|()| points)
-        }
+    if let Some(numbered) = behind_numbers(bytes, &layout, &points) {
+        return positions(bytes, &numbered, limits);
     }
+    check_first_column(bytes, &layout, &points)?;
+    check_grid(bytes, &layout, &points).map(|()| points)
+}
+
+/// Returns the layout of coordinates behind a first column that has the numbers of points or the number of a scan. `None` if it
+/// has neither. `points` are read with this column as x.
+fn behind_numbers(bytes: &[u8], layout: &PointLayout, points: &[[f64; 3]]) -> Option<PointLayout> {
+    let numbered = layout.numbered()?;
+    let has_numbers = are_numbers(points) || is_scan_number(bytes, layout, points);
+    has_numbers.then_some(numbered)
 }
 
 fn positions(
@@ -109,14 +113,12 @@ impl SampledPoints {
         let header = ptx::header_bytes(head).unwrap_or_default();
         let head = &head[header..];
         let layout = PointLayout::of(head)?;
-        let numbered = layout.numbered().filter(|_| {
+        let numbered = layout.numbered().and_then(|_| {
             let rows = layout.rows(head);
             let positions = rows.filter_map(|(_, row)| layout.position(row).ok());
             let whole = positions.map(|point| (point[0].fract() == 0.0).then_some(point));
             let points: Option<Vec<_>> = whole.collect();
-            points.is_some_and(|points| {
-                are_numbers(&points) || is_scan_number(head, &layout, &points)
-            })
+            behind_numbers(head, &layout, &points?)
         });
         Ok(Self {
             layout: numbered.unwrap_or(layout),
