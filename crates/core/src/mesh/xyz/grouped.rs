@@ -3,19 +3,18 @@
 /// First cells of a line that show what its blanks mean.
 const FIRST_CELLS: usize = 3;
 
-/// A number with grouped digits.
+/// The number of a cell with a decimal point and without what groups its digits.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct GroupedNumber {
-    /// The number with a decimal point and without what groups its digits.
-    pub(super) plain: Vec<u8>,
-    /// The decimal mark, a point or a comma, as far as the number shows it.
+pub(super) struct PlainNumber {
+    pub(super) text: Vec<u8>,
+    /// The decimal mark of the cell, a point or a comma, as far as the cell shows it.
     pub(super) mark: Option<u8>,
 }
 
-impl GroupedNumber {
+impl PlainNumber {
     /// Recognizes a number with groups of three digits behind a first one of one to three, and perhaps a fraction. One
     /// group behind a point or a comma may be a fraction, so it is no grouped number unless a fraction follows.
-    pub(super) fn of(cell: &[u8]) -> Option<Self> {
+    pub(super) fn of_grouped(cell: &[u8]) -> Option<Self> {
         let sign = usize::from(matches!(cell.first(), Some(b'-' | b'+')));
         let (first, mut rest) = cell[sign..].split_at(digits(&cell[sign..]));
         let separator = *rest.first()?;
@@ -48,7 +47,7 @@ impl GroupedNumber {
             }
             _ => return None,
         };
-        (groups > 0).then_some(Self { plain, mark })
+        (groups > 0).then_some(Self { text: plain, mark })
     }
 }
 
@@ -88,7 +87,7 @@ pub(super) fn without_groups(line: &[u8], separator: u8) -> Option<Vec<u8>> {
         let cell = cell.trim_ascii();
         if !cell.contains(&b' ') {
             plain.extend_from_slice(cell);
-        } else if GroupedNumber::of(cell).is_some() {
+        } else if PlainNumber::of_grouped(cell).is_some() {
             plain.extend(cell.iter().filter(|byte| **byte != b' '));
         } else if nth < FIRST_CELLS {
             return None;
@@ -107,14 +106,14 @@ pub(super) fn are_grouped_pairs<'a>(cells: impl Iterator<Item = &'a [u8]>) -> bo
     let (pairs, _) = cells.as_chunks::<2>();
     let is_grouped = |[whole, group]: &[&[u8]; 2]| {
         let joined = [*whole, b" ", *group].concat();
-        GroupedNumber::of(&joined).is_some_and(|number| number.mark.is_some())
+        PlainNumber::of_grouped(&joined).is_some_and(|number| number.mark.is_some())
     };
     pairs.len() == 3 && pairs.iter().all(is_grouped)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{GroupedNumber, separator_of_grouped, without_groups};
+    use super::{PlainNumber, separator_of_grouped, without_groups};
 
     #[test]
     fn grouped_numbers_have_a_plain_form_and_a_decimal_mark() {
@@ -126,9 +125,13 @@ mod tests {
             ("12 345,6", "12345.6", Some(b',')),
             ("1'234.5", "1234.5", Some(b'.')),
         ] {
-            let plain = plain.as_bytes().to_vec();
-            let wanted = GroupedNumber { plain, mark };
-            assert_eq!(GroupedNumber::of(cell.as_bytes()), Some(wanted), "{cell}");
+            let text = plain.as_bytes().to_vec();
+            let wanted = PlainNumber { text, mark };
+            assert_eq!(
+                PlainNumber::of_grouped(cell.as_bytes()),
+                Some(wanted),
+                "{cell}"
+            );
         }
         for other in [
             "",
@@ -147,7 +150,7 @@ mod tests {
             "1.234.56",
             "1 234x",
         ] {
-            assert_eq!(GroupedNumber::of(other.as_bytes()), None, "{other}");
+            assert_eq!(PlainNumber::of_grouped(other.as_bytes()), None, "{other}");
         }
     }
 

@@ -6,7 +6,7 @@ use super::cells::{
     MISSING, cells, has_grouped_digits, outer_cells, plain_position, plain_tabbed_position,
     tab_cells, without_wide_spaces,
 };
-use super::grouped::{GroupedNumber, are_grouped_pairs, separator_of_grouped, without_groups};
+use super::grouped::{PlainNumber, are_grouped_pairs, separator_of_grouped, without_groups};
 use super::title::{MAX_NAMES, Title, is_comment, is_other_title};
 use crate::mesh::MeshError;
 use crate::mesh::text;
@@ -343,9 +343,9 @@ fn number_with_comma(cell: &[u8]) -> Option<f64> {
 
 /// Parses a number with a decimal comma whose digits are grouped by points.
 fn number_with_grouping_points(cell: &[u8]) -> Option<f64> {
-    let number = GroupedNumber::of(cell)?;
+    let number = PlainNumber::of_grouped(cell)?;
     (number.mark == Some(b','))
-        .then(|| text::number(&number.plain))
+        .then(|| text::number(&number.text))
         .flatten()
 }
 

@@ -1,31 +1,23 @@
 //! Points whose cells are in quotation marks, as spreadsheet programs write numbers with decimal commas.
 
-use super::grouped::GroupedNumber;
+use super::grouped::PlainNumber;
 use crate::domain::cancel::polled;
 use crate::domain::named_separator;
 use crate::mesh::{MeshError, text};
 
-/// A number of a cell with a decimal point.
-struct PlainNumber {
-    text: Vec<u8>,
-    /// The decimal mark of the cell, as far as it shows it.
-    mark: Option<u8>,
-}
-
-impl PlainNumber {
-    /// Returns the number of a cell that has a mark or grouped digits. `None` for other cells.
-    fn of(cell: &[u8]) -> Option<Self> {
-        if let Some(GroupedNumber { plain: text, mark }) = GroupedNumber::of(cell) {
-            return Some(Self { text, mark });
-        }
-        let has_comma = cell.contains(&b',');
-        if !has_comma && !cell.contains(&b'.') {
-            return None;
-        }
-        let text = text::with_point(cell);
-        let mark = Some(if has_comma { b',' } else { b'.' });
-        text::number(&text).map(|_| Self { text, mark })
+/// Returns the number of a cell that has a mark or grouped digits. `None` for other cells.
+fn plain_number(cell: &[u8]) -> Option<PlainNumber> {
+    let grouped = PlainNumber::of_grouped(cell);
+    if grouped.is_some() {
+        return grouped;
     }
+    let has_comma = cell.contains(&b',');
+    if !has_comma && !cell.contains(&b'.') {
+        return None;
+    }
+    let text = text::with_point(cell);
+    let mark = Some(if has_comma { b',' } else { b'.' });
+    text::number(&text).map(|_| PlainNumber { text, mark })
 }
 
 /// Returns the text of a file without quotation marks, with semicolons between cells, with decimal points and without what
@@ -51,7 +43,7 @@ fn with_points(bytes: &[u8], separator: u8) -> Result<Vec<u8>, MeshError> {
             if nth > 0 {
                 plain.push(b';');
             }
-            let Some(number) = PlainNumber::of(&cell) else {
+            let Some(number) = plain_number(&cell) else {
                 plain.extend(joined(&cell));
                 continue;
             };
