@@ -6,7 +6,8 @@ use super::png_chunks::{png_chunks, png_text};
 use super::tags::TaggedFile;
 use crate::raster::Grid;
 
-const ORIENTATION: u64 = 274;
+/// Number of the tag in TIFF and EXIF.
+pub(super) const ORIENTATION: u64 = 274;
 /// Begins a segment of XMP in a JPEG.
 const XMP_PREFIX: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
 const XMP_KEYWORD: &[u8] = b"XML:com.adobe.xmp";

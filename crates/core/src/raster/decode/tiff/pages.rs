@@ -2,7 +2,7 @@
 
 use crate::domain::FileKind;
 use crate::raster::decode::error::{DecodeError, broken};
-use crate::raster::decode::orientation::xmp_number;
+use crate::raster::decode::orientation::{ORIENTATION, xmp_number};
 use crate::raster::decode::tags::{TagDirectory, TagSource, TagValues, TaggedFile};
 
 /// Flags of `NewSubfileType`: a reduced copy of another page, and a mask.
@@ -19,7 +19,6 @@ const NEW_SUBFILE_TYPE: u64 = 254;
 const SUBFILE_TYPE: u64 = 255;
 const WIDTH: u64 = 256;
 const HEIGHT: u64 = 257;
-const ORIENTATION: u64 = 274;
 const SUB_DIRECTORIES: u64 = 330;
 const XMP: u64 = 700;
 
