@@ -1,5 +1,6 @@
 //! The cells of a line of points, and the fast parser of almost all lines.
 
+use super::grouped::digits;
 use crate::mesh::decimal;
 
 /// Stands in place of an empty cell: a coordinate is missing there.
@@ -107,8 +108,7 @@ pub(super) fn has_grouped_digits<'a>(cells: impl Iterator<Item = &'a [u8]>) -> b
     let mut is_after_group = false;
     for cell in cells {
         let unsigned = cell.strip_prefix(b"-").unwrap_or(cell);
-        let digits = unsigned.iter().take_while(|byte| byte.is_ascii_digit());
-        let digits = digits.count();
+        let digits = digits(unsigned);
         let is_whole = digits == unsigned.len();
         let is_group = digits == 3
             && unsigned.len() == cell.len()
@@ -156,18 +156,11 @@ pub(super) fn without_wide_spaces(line: &[u8]) -> Option<Vec<u8>> {
 
 /// Returns whether digits before a space and exactly three after it are those of one number.
 fn groups_digits(before: &[u8], after: &[u8]) -> bool {
-    let digits = before
-        .iter()
-        .rev()
-        .take_while(|byte| byte.is_ascii_digit())
-        .count();
-    let start = before.len() - digits;
+    let last = before.iter().rev();
+    let count = last.take_while(|byte| byte.is_ascii_digit()).count();
+    let start = before.len() - count;
     let is_fraction = start > 0 && matches!(before[start - 1], b'.' | b',');
-    let group = after
-        .iter()
-        .take_while(|byte| byte.is_ascii_digit())
-        .count();
-    digits > 0 && group == 3 && !is_fraction
+    count > 0 && digits(after) == 3 && !is_fraction
 }
 
 #[cfg(test)]

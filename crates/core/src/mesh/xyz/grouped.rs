@@ -52,7 +52,7 @@ impl PlainNumber {
 }
 
 /// Returns the number of digits that a text begins with.
-fn digits(text: &[u8]) -> usize {
+pub(super) fn digits(text: &[u8]) -> usize {
     text.iter().take_while(|byte| byte.is_ascii_digit()).count()
 }
 
