@@ -4,6 +4,7 @@ mod archive;
 mod cell_names;
 mod cell_text;
 mod error;
+mod format_code;
 mod hidden_rows;
 mod merged;
 mod number_format;

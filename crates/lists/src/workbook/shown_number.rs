@@ -1,7 +1,6 @@
 //! Numbers in formats with text of their own, such as `"B"000`: what a reader sees is the id, and the cell has only its number.
 
-/// Longest code of a format that Excel has, in characters.
-pub(super) const MAX_CODE_CHARS: usize = 255;
+use super::format_code::{CodeToken, GENERAL, MAX_CODE_CHARS, take_token};
 
 /// How a format of numbers shows the whole number of an id.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -68,55 +67,42 @@ impl ShownNumber {
             has_condition: false,
         };
         let mut rest = code;
-        while let Some(c) = rest.chars().next() {
+        loop {
             let general = rest.get(..GENERAL.len());
             if general.is_some_and(|word| word.eq_ignore_ascii_case(GENERAL)) {
                 parts.add_digits(0);
                 rest = &rest[GENERAL.len()..];
                 continue;
             }
-            rest = &rest[c.len_utf8()..];
-            match c {
+            let Some(token) = take_token(&mut rest) else {
+                break;
+            };
+            match token {
                 // The first section is that of positive numbers.
-                ';' => break,
-                '%' | 'E' | 'e' | '@' => return None,
-                '0' => parts.add_digits(1),
-                '#' | '?' => parts.add_digits(0),
-                ',' if parts.part == CodePart::Digits => {}
-                '.' if parts.part == CodePart::Digits => parts.is_divided = true,
-                '"' => {
-                    let (text, behind) = rest.split_once('"').unwrap_or((rest, ""));
-                    parts.add_text(text);
-                    rest = behind;
+                CodeToken::Character(';') => break,
+                CodeToken::Character('%' | 'E' | 'e' | '@') => return None,
+                CodeToken::Character('0') => parts.add_digits(1),
+                CodeToken::Character('#' | '?') => parts.add_digits(0),
+                CodeToken::Character(',') if parts.part == CodePart::Digits => {}
+                CodeToken::Character('.') if parts.part == CodePart::Digits => {
+                    parts.is_divided = true;
                 }
-                '[' => {
-                    let (inner, behind) = rest.split_once(']').unwrap_or((rest, ""));
+                CodeToken::Character(other) => parts.add_text(other.encode_utf8(&mut [0; 4])),
+                CodeToken::Text(text) => parts.add_text(text),
+                CodeToken::Brackets(inner) => {
                     // Other numbers are shown in another way.
                     parts.has_condition |= inner.starts_with(['<', '>', '=']);
                     // A currency, such as `[$€-407]`; all else is a colour or a condition.
                     let currency = inner.strip_prefix('$');
                     let currency = currency.and_then(|inner| inner.split('-').next());
                     parts.add_text(currency.unwrap_or_default());
-                    rest = behind;
                 }
-                '\\' | '_' | '*' => {
-                    let next = rest.chars().next().unwrap_or_default();
-                    let (character, behind) = rest.split_at(next.len_utf8().min(rest.len()));
-                    // The others only make room.
-                    if c == '\\' {
-                        parts.add_text(character);
-                    }
-                    rest = behind;
-                }
-                other => parts.add_text(other.encode_utf8(&mut [0; 4])),
+                CodeToken::Room => {}
             }
         }
         parts.shown(code)
     }
 }
-
-/// The number as it is, in a code.
-const GENERAL: &str = "General";
 
 impl CodeParts {
     fn shown(self, code: &str) -> Option<ShownNumber> {

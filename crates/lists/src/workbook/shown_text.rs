@@ -1,6 +1,6 @@
 //! Texts in formats with text of their own, such as `"B"@`: what a reader sees is the id, and the cell has only a part of it.
 
-use super::shown_number::MAX_CODE_CHARS;
+use super::format_code::{CodeToken, GENERAL, MAX_CODE_CHARS, take_token};
 
 /// How a format shows the text of an id.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl ShownText {
         } else {
             sections.pop().filter(|last| last.places > 0)?
         };
-        let is_general = section.before.trim().eq_ignore_ascii_case("general");
+        let is_general = section.before.trim().eq_ignore_ascii_case(GENERAL);
         let is_empty = section.before.trim().is_empty() && section.behind.trim().is_empty();
         // An empty section hides the text, which is then taken as it is.
         if is_empty && section.places < 2 || is_general && section.places == 0 {
@@ -81,28 +81,14 @@ fn sections_of(code: &str) -> Vec<FormatSection> {
     let mut sections = Vec::new();
     let mut section = FormatSection::default();
     let mut rest = code;
-    while let Some(c) = rest.chars().next() {
-        rest = &rest[c.len_utf8()..];
-        match c {
-            ';' => sections.push(std::mem::take(&mut section)),
-            '@' => section.places += 1,
-            '"' => {
-                let (text, behind) = rest.split_once('"').unwrap_or((rest, ""));
-                section.add(text);
-                rest = behind;
-            }
-            // A colour or a condition.
-            '[' => rest = rest.split_once(']').map_or("", |(_, behind)| behind),
-            '\\' | '_' | '*' => {
-                let next = rest.chars().next().unwrap_or_default();
-                let (character, behind) = rest.split_at(next.len_utf8().min(rest.len()));
-                // The others only make room.
-                if c == '\\' {
-                    section.add(character);
-                }
-                rest = behind;
-            }
-            other => section.add(other.encode_utf8(&mut [0; 4])),
+    while let Some(token) = take_token(&mut rest) {
+        match token {
+            CodeToken::Character(';') => sections.push(std::mem::take(&mut section)),
+            CodeToken::Character('@') => section.places += 1,
+            CodeToken::Character(other) => section.add(other.encode_utf8(&mut [0; 4])),
+            CodeToken::Text(text) => section.add(text),
+            // A colour or a condition, and blank room.
+            CodeToken::Brackets(_) | CodeToken::Room => {}
         }
     }
     sections.push(section);
