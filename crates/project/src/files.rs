@@ -149,10 +149,15 @@ pub(crate) const HEAD_BYTES: usize = 4096;
 
 /// Returns the first bytes of a regular file, or `None` if it is empty or cannot be read.
 pub fn head(path: &Path) -> Option<Vec<u8>> {
+    beginning(path, HEAD_BYTES)
+}
+
+/// Returns the first bytes of a regular file like [`head`], up to `most`.
+pub(crate) fn beginning(path: &Path, most: usize) -> Option<Vec<u8>> {
     let (file, _) = open_regular(path).ok()?;
-    let mut head = Vec::new();
-    file.take(HEAD_BYTES as u64).read_to_end(&mut head).ok()?;
-    (!head.is_empty()).then_some(head)
+    let mut bytes = Vec::new();
+    file.take(most as u64).read_to_end(&mut bytes).ok()?;
+    (!bytes.is_empty()).then_some(bytes)
 }
 
 /// Returns the kind of a regular file by its first bytes, or `None` if it is empty or cannot be read.

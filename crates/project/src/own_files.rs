@@ -1,14 +1,13 @@
 //! Files that a project needs, over which no output is written.
 
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use crate::empty_import::EMPTY_IMPORT_FILE;
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use crate::files::{HEAD_BYTES, is_backup};
+use crate::files::{HEAD_BYTES, beginning, is_backup};
 use mocban_catalog::Catalog;
-use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE, open_regular};
+use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};
 
 /// File of the lists of pairs that were saved in the app, in the project folder.
 pub const VIEWS_FILE: &str = "saved-views.json";
@@ -26,7 +25,7 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
 }
 
 /// Bytes of an earlier report by which it is recognized. No report is longer.
-const MAX_REPORT_BYTES: u64 = 64 << 20;
+const MAX_REPORT_BYTES: usize = 64 << 20;
 
 /// Refuses to write over a file that is not empty and that `is_ours` does not recognize by its first bytes. `what` is the
 /// output, such as `a log file of this program`. Anything but a regular file is left to the function that writes.
@@ -35,21 +34,19 @@ pub fn refuse_foreign_file(
     what: &str,
     is_ours: impl FnOnce(&[u8]) -> bool,
 ) -> Result<(), Refusal> {
-    refuse_foreign(path, what, HEAD_BYTES as u64, is_ours)
+    earlier_output(path, what, HEAD_BYTES, is_ours).map(drop)
 }
 
-/// Refuses to write a report over a file like [`refuse_foreign_file`], but passes the whole file to `is_report`: the program is
-/// named anywhere in a report. Refuses a report, too, if `is_continued` finds that somebody wrote at its end.
+/// Refuses to write a report over a file like [`refuse_foreign_file`], but passes the whole file to `is_report`: a report may
+/// name the program at its end. Refuses a report, too, if `is_continued` finds that somebody added text at its end.
 pub(crate) fn refuse_foreign_report(
     path: &Path,
     is_report: impl FnOnce(&[u8]) -> bool,
     is_continued: impl FnOnce(&[u8]) -> bool,
 ) -> Result<(), Refusal> {
     let what = "a report of this program";
-    refuse_foreign(path, what, MAX_REPORT_BYTES, is_report)?;
-    let earlier = path.metadata().is_ok_and(|meta| meta.is_file());
-    let earlier = earlier.then(|| beginning(path, MAX_REPORT_BYTES)).flatten();
-    if earlier.is_some_and(|earlier| !earlier.is_empty() && is_continued(&earlier)) {
+    let earlier = earlier_output(path, what, MAX_REPORT_BYTES, is_report)?;
+    if earlier.is_some_and(|earlier| is_continued(&earlier)) {
         return Err(Refusal::Usage(format!(
             "{} is a report to which somebody added text; choose another name, or remove it if you do not need it",
             path.display()
@@ -58,32 +55,28 @@ pub(crate) fn refuse_foreign_report(
     Ok(())
 }
 
-/// Refuses to write over a file that is not recognized by its first `most` bytes.
-fn refuse_foreign(
+/// Returns the first bytes of an earlier output, up to `most`, or `None` if there is nothing to write over. Refuses a file that
+/// is not recognized by them.
+fn earlier_output(
     path: &Path,
     what: &str,
-    most: u64,
+    most: usize,
     is_ours: impl FnOnce(&[u8]) -> bool,
-) -> Result<(), Refusal> {
+) -> Result<Option<Vec<u8>>, Refusal> {
     let is_free = path
         .metadata()
         .map_or(true, |meta| !meta.is_file() || meta.len() == 0);
-    // A file that cannot be read may be anything.
-    if is_free || beginning(path, most).is_some_and(|earlier| is_ours(&earlier)) {
-        return Ok(());
+    if is_free {
+        return Ok(None);
     }
-    Err(Refusal::Usage(format!(
-        "{} exists and is not {what}; choose another name, or remove it if you do not need it",
-        path.display()
-    )))
-}
-
-/// Returns the first bytes of a regular file, up to `most`, or `None` if it cannot be read.
-fn beginning(path: &Path, most: u64) -> Option<Vec<u8>> {
-    let (file, _) = open_regular(path).ok()?;
-    let mut bytes = Vec::new();
-    let read = file.take(most).read_to_end(&mut bytes);
-    read.ok().map(|_| bytes)
+    // A file that cannot be read may be anything.
+    let earlier = beginning(path, most).filter(|earlier| is_ours(earlier));
+    earlier.map(Some).ok_or_else(|| {
+        Refusal::Usage(format!(
+            "{} exists and is not {what}; choose another name, or remove it if you do not need it",
+            path.display()
+        ))
+    })
 }
 
 /// Returns what a path is to a project, such as `is a file of a project`, or `None` if no project needs it. The path need
