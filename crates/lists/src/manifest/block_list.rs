@@ -123,11 +123,8 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             continue;
         }
         let place = (line, text.delimiter);
+        let columns = (columns.as_slice(), whole_numbers);
         let draft = draft_of(place, columns, &record, &hint);
-        let draft = draft.and_then(|mut draft| {
-            whole_numbers.apply(&mut draft)?;
-            Ok(draft)
-        });
         rows.push(line, draft);
     }
     rows.finish()

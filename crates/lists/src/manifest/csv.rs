@@ -87,7 +87,7 @@ pub fn read_csv_as(
 /// Longest name of a column in bytes. Every row stores the names of its user-defined columns.
 const MAX_NAME_BYTES: usize = 1000;
 
-/// Returns the names of the columns of a header, without blanks at their ends, and of formulas that are texts these.
+/// Returns the names of the columns of a header, each read by [`plain_header`].
 pub(super) fn column_names<'r>(
     line: usize,
     record: &'r ::csv::ByteRecord,
@@ -220,10 +220,9 @@ impl CsvHeader {
         if is_blank(record) {
             return Ok(None);
         }
+        let columns = (self.columns.as_slice(), &self.whole_numbers);
         let place = (line, self.delimiter);
-        let mut draft = draft_of(place, &self.columns, record, &self.encoding_hint)?;
-        self.whole_numbers.apply(&mut draft)?;
-        Ok(Some(draft))
+        draft_of(place, columns, record, &self.encoding_hint).map(Some)
     }
 }
 
@@ -246,11 +245,11 @@ const MAX_FORMULA_CHARS: usize = 60;
 /// Returns the cells of a row on a line.
 ///
 /// # Errors
-/// Returns an error if the number of cells is wrong, a cell is not UTF-8, or one of a known column begins like a formula, or a
-/// path or a character has a line break.
+/// Returns an error if the number of cells is wrong, a cell is not UTF-8, one of a known column begins like a formula, a path
+/// or a character has a line break, or a whole number is too large to be exact.
 pub(super) fn draft_of(
     (line, delimiter): (usize, u8),
-    columns: &[ListedColumn],
+    (columns, whole_numbers): (&[ListedColumn], &WholeNumbers),
     record: &::csv::ByteRecord,
     encoding_hint: &str,
 ) -> Result<DraftRow, String> {
@@ -304,6 +303,7 @@ pub(super) fn draft_of(
             draft.meta.insert(name.clone(), cell.into());
         }
     }
+    whole_numbers.apply(&mut draft)?;
     Ok(draft)
 }
 
