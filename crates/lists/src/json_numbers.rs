@@ -31,11 +31,9 @@ pub fn unknown_number(line: &str, column: usize) -> Option<&'static str> {
 /// # Errors
 /// Returns an error if the number is so large that its last digits may be others than those written.
 pub fn number_text(number: &Number) -> Result<String, InexactNumber> {
-    match number.as_f64() {
-        Some(float) if number.is_f64() && float.abs() >= MAX_EXACT => {
-            Err(InexactNumber::new(&number.to_string()))
-        }
-        Some(whole) if number.is_f64() && whole.fract() == 0.0 => Ok((whole as i64).to_string()),
+    match number.as_f64().filter(|_| number.is_f64()) {
+        Some(float) if float.abs() >= MAX_EXACT => Err(InexactNumber::new(&number.to_string())),
+        Some(whole) if whole.fract() == 0.0 => Ok((whole as i64).to_string()),
         _ => Ok(number.to_string()),
     }
 }

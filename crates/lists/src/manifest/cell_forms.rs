@@ -7,7 +7,7 @@ use super::column_names::shown_column;
 use super::text::trimmed;
 
 /// Returns the text of a cell without blanks at its ends. A formula that is a text alone, such as `="0117"`, with which
-/// spreadsheet programs keep zeros, is this text; it has two quotation marks for one.
+/// spreadsheet programs keep zeros, is this text, in which two quotation marks stand for one.
 ///
 /// ```
 /// use mocban_lists::manifest::plain_cell;
@@ -18,10 +18,6 @@ use super::text::trimmed;
 /// ```
 pub fn plain_cell(cell: &str) -> Cow<'_, str> {
     let cell = trimmed(cell);
-    // Few cells are formulas.
-    if cell.as_bytes().first() != Some(&b'=') {
-        return Cow::Borrowed(cell);
-    }
     let inner = cell.strip_prefix("=\"");
     match inner.and_then(|rest| rest.strip_suffix('"')) {
         Some(inner) if !inner.contains('"') => Cow::Borrowed(trimmed(inner)),
@@ -45,7 +41,7 @@ pub(super) fn is_formula(cell: &str) -> bool {
     cell.len() > 1 && cell.starts_with('=')
 }
 
-/// What is unusual about a cell that is read as it is.
+/// What is unusual about a cell that is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum CellForm {
     /// It begins with an apostrophe and what a spreadsheet program would take for a number or a formula.

@@ -3,7 +3,7 @@
 use super::folder_file::{FolderFile, grouped};
 use mocban_core::domain::spelling::{fold_case, plain_form, quoted};
 
-/// Maximum number of similar files that a message or the warnings name; the others are counted.
+/// Maximum number of pairs with similar names that a message or the warnings name; the others are counted.
 const MAX_SIMILAR: usize = 3;
 
 /// Meshes and prints without each other whose ids differ only in accents or in zeros before a number.
