@@ -152,8 +152,8 @@ fn attributes_are_texts_in_order_of_preference() {
 
 #[test]
 fn whole_numbers_with_decimals_are_names_without() {
-    for (text, name) in [(BBOXES, "\"c01-r01\""), (VIA_2, "\"c01-r01\"")] {
-        let named = |number: &str| text.replacen(name, number, 1);
+    for text in [BBOXES, VIA_2, COCO] {
+        let named = |number: &str| text.replacen("\"c01-r01\"", number, 1);
         let labels = read_sample(&named("117.0"));
         assert!(
             labels
@@ -168,11 +168,6 @@ fn whole_numbers_with_decimals_are_names_without() {
             "box 1: the number 9007199254740992.0 is too large to be exact; correct or remove it";
         assert!(refused.to_string().contains(reason), "{refused}");
     }
-    let coco = COCO.replacen("\"name\":\"c01-r01\"", "\"name\":117.0", 1);
-    assert_eq!(
-        read_sample(&coco).boxes,
-        read_sample(&coco.replace("117.0", "117")).boxes
-    );
 }
 
 #[test]
