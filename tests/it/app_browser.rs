@@ -11,7 +11,8 @@ use crate::page::{Page, read_project};
 use crate::review_browser::{ITEM, judge, saved, shown_long_enough};
 use crate::waiting::wait_until;
 
-/// Longest way of the demo from an empty folder to its report on an idle computer. Only printed, because a busy one needs more.
+/// Longest time from an empty folder to the report of the demo on an idle computer. Printed and not checked, because a busy
+/// computer needs more.
 const DEMO_LIMIT: Duration = Duration::from_mins(5);
 
 /// Opens the app in a tab and returns the address of its home page.

@@ -289,8 +289,8 @@ impl Tab<'_> {
         [0, 1].map(|axis: usize| point[axis].as_f64().expect("a number"))
     }
 
-    /// Evaluates an expression that gives x and y once the page has its final layout: a sentence of another length changes
-    /// the size of pictures, which their positions follow in the next frame.
+    /// Evaluates an expression that gives x and y, after two frames: a sentence of another length resizes the pictures, and
+    /// positions in them follow in the next frame.
     #[track_caller]
     pub(crate) fn point_after_layout(&self, expression: &str) -> [f64; 2] {
         let frame = "new Promise((done) => requestAnimationFrame(() => setTimeout(done)))";

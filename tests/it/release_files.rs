@@ -1,4 +1,4 @@
-//! Checks that the archive of a release contains the files that the guides tell people to install from it.
+//! Checks that the archive of a release contains every file that the installation guides name.
 
 use std::collections::BTreeSet;
 

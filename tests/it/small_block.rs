@@ -16,7 +16,7 @@ pub(crate) fn demo_block(dir: &Path) {
     copy_of("a small block", dir, |dir| make(dir, "--block=small", "4"));
 }
 
-/// Like [`demo_block`], with a block of a whole page, whose work takes four times as long.
+/// Like [`demo_block`], with a block of a whole page, whose run takes two to three times the CPU time.
 pub(crate) fn demo_page(dir: &Path) {
     copy_of("a block of a page", dir, |dir| {
         make(dir, "--block=plain", "3");
