@@ -59,7 +59,7 @@ rm -rf "$1"
 /// The port in the name of a server's socket, unless it listens on a port of its own.
 const DEFAULT_PORT: u16 = 5432;
 
-/// Standard input and output of a script. It ends with this process, so nobody waits for it.
+/// Standard input and output of a script. The script ends with this process, so nobody waits for it.
 type ScriptPipes = (ChildStdin, BufReader<ChildStdout>);
 
 /// A running server.
@@ -192,7 +192,7 @@ fn is_ready((_, output): &mut ScriptPipes) -> bool {
 
 /// Returns the folder with the files of a new cluster, which all servers of this process copy.
 fn cluster(programs: &Path) -> &'static Path {
-    static MADE: OnceLock<(PathBuf, Mutex<ScriptPipes>)> = OnceLock::new();
+    static MADE: OnceLock<(PathBuf, ScriptPipes)> = OnceLock::new();
     let (dir, _) = MADE.get_or_init(|| {
         let dir = new_folder();
         let user = other_user(&dir);
@@ -202,7 +202,7 @@ fn cluster(programs: &Path) -> &'static Path {
         let mut pipes = started(&mut script);
         let is_made = is_ready(&mut pipes);
         assert!(is_made, "initdb failed: see {}", dir.display());
-        (dir, Mutex::new(pipes))
+        (dir, pipes)
     });
     dir
 }
