@@ -54,7 +54,7 @@ pub enum BlockKind {
     Stamped,
     /// Any of the faults of the kinds from `coarse` on at once, as in the scans of libraries.
     Library,
-    /// An intact small block with 30 to 90 characters.
+    /// An intact small block, usually with 30 to 70 characters.
     Small,
 }
 
