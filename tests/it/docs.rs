@@ -12,17 +12,7 @@ use serde_json::{Value, json};
 use crate::cli::{binary, mocban, shell};
 use crate::page::{Page, answer};
 use crate::review_page::check_answers;
-use crate::source_text::package_dir;
-
-/// Returns the Markdown files of a folder and its subfolders.
-fn pages(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).expect("a folder");
-    let paths = entries.map(|entry| entry.expect("an entry").path());
-    let (folders, mut files): (Vec<_>, Vec<_>) = paths.partition(|path| path.is_dir());
-    files.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
-    files.extend(folders.iter().flat_map(|folder| pages(folder)));
-    files
-}
+use crate::source_text::{files_with_extension, package_dir};
 
 /// What other pages need to know of a page.
 #[derive(Debug, Default)]
@@ -72,7 +62,7 @@ impl MarkdownPage {
 #[test]
 fn every_link_leads_to_a_file_and_a_heading() {
     let root = package_dir();
-    let mut files = pages(&root.join("docs"));
+    let mut files = files_with_extension(&root.join("docs"), "md");
     let at_top = [
         "README.md",
         "CONTRIBUTING.md",
@@ -122,7 +112,7 @@ fn the_book_lists_every_page() {
     let docs = package_dir().join("docs");
     let summary = MarkdownPage::read(&docs.join("SUMMARY.md"));
     let listed: BTreeSet<PathBuf> = summary.links.iter().map(|link| docs.join(link)).collect();
-    let mut all: BTreeSet<PathBuf> = pages(&docs).into_iter().collect();
+    let mut all: BTreeSet<PathBuf> = files_with_extension(&docs, "md").into_iter().collect();
     all.remove(&docs.join("SUMMARY.md"));
     assert_eq!(listed, all);
 }

@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use crate::cli::{Call, empty, mocban};
 use crate::made_once::copy_of;
+use crate::report::contents;
 
 /// The formats that this file compares in detail.
 const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset";
@@ -45,24 +46,6 @@ fn lines(file: &Path) -> Vec<Value> {
     text.lines()
         .map(|line| serde_json::from_str(line).expect("JSON"))
         .collect()
-}
-
-/// Returns every file below a folder with its bytes.
-fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![root.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let below = path.strip_prefix(root).expect("below").to_owned();
-                found.insert(below, fs::read(&path).expect("a file"));
-            }
-        }
-    }
-    found
 }
 
 /// Returns the files of the tar shards below a folder, by name.
