@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::cli::{binary, mocban};
+use crate::cli::{binary, mocban, status};
 use crate::page::{Page, Reply, read_project, send};
 use crate::waiting::wait_until;
 
@@ -180,7 +180,7 @@ fn an_address_leads_to_nothing_outside_the_folder() {
 fn the_newest_import_is_undone_unless_another_followed() {
     let (dir, page) = with_project();
     let project = dir.path().join("p");
-    let counted = || mocban(&project, &["status", "--json"]).expect(0).json()["pairs"].clone();
+    let counted = || status(&project)["pairs"].clone();
     let all = counted();
     let part = || text(&page.get("/p/p/last-import"));
     let at = part();
@@ -232,8 +232,7 @@ fn a_project_that_is_renamed_away_and_back_stays_usable() {
             let reply = act(&page, &format!("/p/p/actions/{action}"), &pair, |_| {});
             assert_eq!(reply.status, 200, "{action}: {}", text(&reply));
         }
-        let status = mocban(&here, &["status", "--json"]).expect(0).json();
-        assert_eq!(status["pairs"], 15);
+        assert_eq!(status(&here)["pairs"], 15);
     }
     mocban(&here, &["check"]).expect(0);
 }
@@ -264,15 +263,11 @@ fn only_the_page_itself_may_act() {
         let reply = act(&page, path, &body, set(name, value));
         assert_eq!(reply.status, status, "{name}: {value}");
     }
-    let status = || {
-        mocban(&dir.path().join("p"), &["status", "--json"])
-            .expect(0)
-            .json()
-    };
-    assert_eq!(status()["retired"], 0);
+    let project = dir.path().join("p");
+    assert_eq!(status(&project)["retired"], 0);
     let reply = act(&page, path, &body, |_| {});
     assert_eq!(reply.status, 200, "{}", text(&reply));
-    assert_eq!(status()["retired"], 1);
+    assert_eq!(status(&project)["retired"], 1);
     let wrong = act(&page, path, &json!({"pair": "nobody"}), |_| {});
     assert_eq!(wrong.status, 422);
     assert!(
@@ -302,8 +297,7 @@ fn folders_are_planned_before_and_stored_after_a_click() {
     let reply = act(&page, "/actions/import", &chosen, |_| {});
     assert_eq!(reply.status, 200, "{}", text(&reply));
     assert_eq!(reply.json()["go"], "p/new/");
-    let status = mocban(&dir.path().join("new"), &["status", "--json"]).expect(0);
-    assert_eq!(status.json()["pairs"], 15);
+    assert_eq!(status(&dir.path().join("new"))["pairs"], 15);
     assert_eq!(page.get("/p/new/").status, 200);
 }
 
@@ -340,8 +334,7 @@ fn a_kill_during_an_import_leaves_nothing_half_done() {
     let next = open_app(dir.path());
     let reply = act(&next, "/actions/import", &chosen, |_| {});
     assert_eq!(reply.status, 200, "{}", text(&reply));
-    let status = mocban(&dir.path().join("new"), &["status", "--json"]).expect(0);
-    assert_eq!(status.json()["pairs"], 15);
+    assert_eq!(status(&dir.path().join("new"))["pairs"], 15);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::accessible::{axe, no_faint_text, no_violation};
 use crate::app::app;
 use crate::browser::{Browser, Tab};
-use crate::cli::mocban;
+use crate::cli::{mocban, status};
 use crate::page::{Page, read_project};
 use crate::review_browser::{ITEM, judge, saved, shown_long_enough};
 use crate::waiting::wait_until;
@@ -74,7 +74,6 @@ fn the_demo_comes_to_its_report_without_a_typed_command() {
         judge(&tab, "KeyP");
     }
     saved(&tab);
-    let status = || mocban(&dir.path().join("mocban-demo"), &["status", "--json"]).expect(0);
     click(&tab, "header a", &on_page("/p/mocban-demo/"));
     click(&tab, "nav a[href$='/report']", &on_page("/report"));
     tab.wait("document.querySelector('#numbers table')");
@@ -85,8 +84,9 @@ fn the_demo_comes_to_its_report_without_a_typed_command() {
     tab.screenshot("app_report");
     let text = tab.eval("document.querySelector('#numbers').innerText");
     assert!(text.as_str().expect("text").contains("24"), "{text}");
-    assert_eq!(status().json()["jobs"]["done"], 24);
-    let judged = status().json()["verdicts"]["pass"].as_u64();
+    let status = status(&dir.path().join("mocban-demo"));
+    assert_eq!(status["jobs"]["done"], 24);
+    let judged = status["verdicts"]["pass"].as_u64();
     assert!(judged > Some(0), "{judged:?}");
 }
 
@@ -238,11 +238,8 @@ fn a_run_survives_the_app_and_is_stopped_from_the_next_one() {
     tab.wait("document.querySelector('#stop')");
     wait_until("the run is held", || hold.exists());
     page.kill();
-    let status = || {
-        let status = mocban(&dir.path().join("p"), &["status", "--json"]);
-        status.expect(0).json()
-    };
-    assert_eq!(status()["running"], true, "the run goes on");
+    let project = dir.path().join("p");
+    assert_eq!(status(&project)["running"], true, "the run goes on");
     let next = Page::of(app(dir.path()).args(["--lang", "en"]));
     let (tab, home) = enter(&browser, &next, [1280, 800]);
     tab.open(&format!("{home}p/p/"));
@@ -252,11 +249,11 @@ fn a_run_survives_the_app_and_is_stopped_from_the_next_one() {
     tab.wait("document.querySelector('#stop')?.textContent === 'Stop at once'");
     std::fs::remove_file(&hold).expect("the run waits");
     tab.wait("document.querySelector('#start')");
-    let stopped = status();
+    let stopped = status(&project);
     assert_eq!(stopped["running"], false);
     assert_eq!(stopped["jobs"]["leased"], 0);
     assert!(stopped["jobs"]["ready"].as_u64() > Some(0), "{stopped}");
-    mocban(&dir.path().join("p"), &["check"]).expect(0);
+    mocban(&project, &["check"]).expect(0);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::app::{act, app, open_app, text, with_project};
 use crate::app_export_zip::export;
-use crate::cli::mocban;
+use crate::cli::{mocban, status};
 use crate::page::{Page, Site, answer, read_project};
 use crate::waiting::wait_until;
 
@@ -25,12 +25,6 @@ fn done(page: &Page, path: &str, body: &Value) -> String {
     assert_eq!(reply.status, 200, "{}", text(&reply));
     let go = reply.json()["go"].as_str().expect("a page").to_owned();
     text(&page.get(&format!("/p/p/{go}")))
-}
-
-fn status(dir: &Path) -> Value {
-    mocban(&dir.join("p"), &["status", "--json"])
-        .expect(0)
-        .json()
 }
 
 /// Imports pairs with the files of the first one.
@@ -63,7 +57,7 @@ fn chosen_pairs_leave_every_count_and_come_back() {
         "{html}"
     );
     assert!(html.contains("<table"), "the list stays as it was");
-    assert_eq!(status(dir.path())["retired"], 2);
+    assert_eq!(status(&dir.path().join("p"))["retired"], 2);
     let again = act(&page, CHOSEN, &body, |_| {});
     assert_eq!(again.status, 422, "they changed meanwhile");
     assert!(
@@ -94,7 +88,7 @@ fn chosen_pairs_leave_every_count_and_come_back() {
         html.contains("Pairs that are in every count again: <b>2</b>"),
         "{html}"
     );
-    assert_eq!(status(dir.path())["retired"], 1);
+    assert_eq!(status(&dir.path().join("p"))["retired"], 1);
     let twice = act(&page, "/p/p/actions/restore", &undo, |_| {});
     assert_eq!(twice.status, 422, "{}", text(&twice));
     let html = text(&page.get(&format!("/p/p/pairs?done=retire&at={at}")));
@@ -145,7 +139,7 @@ fn a_retired_pair_is_listed_has_a_page_and_comes_back() {
         }
         let html = text(&page.get(&format!("/p/p/pair/{pair}/")));
         assert!(!html.contains("This pair is retired."), "{html}");
-        assert_eq!(status(dir.path())["retired"], 0);
+        assert_eq!(status(&dir.path().join("p"))["retired"], 0);
     }
     assert_eq!(act(&page, restore, &retire, |_| {}).status, 422, "twice");
     assert_eq!(act(&page, restore, &json!({}), |_| {}).status, 404);
@@ -187,7 +181,7 @@ fn only_the_page_itself_acts_on_known_pairs() {
     let body = json!({"purpose": "excel", "only": "all", "metric": "", "pairs": ["nobody"]});
     let reply = act(&page, "/p/p/actions/export", &body, |_| {});
     assert_eq!(reply.status, 422, "{}", text(&reply));
-    assert_eq!(status(dir.path())["retired"], 0);
+    assert_eq!(status(&dir.path().join("p"))["retired"], 0);
 }
 
 #[test]
@@ -230,7 +224,7 @@ fn a_guest_acts_on_no_pair() {
     let reply = guest.post("/api/answer", &large).expect("a reply");
     assert_eq!(reply.status, 413);
     assert!(text(&reply).contains("at most 16 KiB"), "{}", text(&reply));
-    assert_eq!(status(dir.path())["retired"], 0);
+    assert_eq!(status(&dir.path().join("p"))["retired"], 0);
 }
 
 #[test]
@@ -272,11 +266,11 @@ fn chosen_pairs_are_computed_again_unless_a_run_is_in_progress() {
         "{html}"
     );
     wait_until("the run has begun, and then ended", || {
-        attempts("upright-0002") > before[0] && status(dir.path())["running"] == false
+        attempts("upright-0002") > before[0] && status(&dir.path().join("p"))["running"] == false
     });
     let now = ["upright-0002", "upright-0003"].map(attempts);
     assert_eq!(now[1], before[1], "the others stay as they are");
-    assert_eq!(status(dir.path())["jobs"]["done"], 15);
+    assert_eq!(status(&dir.path().join("p"))["jobs"]["done"], 15);
 
     import_many(dir.path());
     let hold = dir.path().join("hold");
@@ -307,9 +301,13 @@ fn waiting_and_failed_ones_of_the_chosen_pairs_run() {
     import_more(dir.path(), ["late", "later"].map(str::to_owned));
     done(&page, CHOSEN, &chosen("resume", &["late", "upright-0001"]));
     wait_until("the pair is aligned", || {
-        status(dir.path())["jobs"]["done"] == 16
+        status(&dir.path().join("p"))["jobs"]["done"] == 16
     });
-    assert_eq!(status(dir.path())["jobs"]["ready"], 1, "one was not chosen");
+    assert_eq!(
+        status(&dir.path().join("p"))["jobs"]["ready"],
+        1,
+        "one was not chosen"
+    );
 }
 
 #[test]

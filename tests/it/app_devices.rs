@@ -6,7 +6,7 @@ use crate::app::app;
 use crate::app_browser::{enter, fits_width, on_page};
 use crate::app_controls::SHOWN;
 use crate::browser::{Browser, Tab};
-use crate::cli::mocban;
+use crate::cli::status;
 use crate::page::{Page, read_project};
 use crate::review_browser::{ITEM, accepts_an_answer, judge, saved, shown, shown_long_enough};
 
@@ -88,8 +88,7 @@ impl Curator<'_, '_> {
         let is_exported = format!("{on_export} && document.querySelector(`{file}`)");
         self.use_control("#export", &is_exported);
         assert!(dir.join("p/exports/excel").is_dir(), "the export is stored");
-        let status = mocban(&dir.join("p"), &["status", "--json"]).expect(0);
-        let status = status.json();
+        let status = status(&dir.join("p"));
         assert_eq!(status["jobs"]["done"], PAIRS);
         // Some of the items are attention checks, or come twice.
         let passed = status["verdicts"]["pass"].as_u64();

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::app::{act, text, with_project};
 use crate::app_uploads::encode;
-use crate::cli::mocban;
+use crate::cli::{mocban, status};
 use crate::page::{Page, Reply};
 
 /// Copies inputs of the shared project to other names.
@@ -287,8 +287,7 @@ fn a_person_names_the_columns_of_a_list() {
         fields["project"] = json!(project);
         let reply = import(&page, &fields);
         assert_eq!(reply.status, 200, "{}", text(&reply));
-        let pairs = mocban(&dir.join(project), &["status", "--json"]).expect(0);
-        assert_eq!(pairs.json()["pairs"], 1);
+        assert_eq!(status(&dir.join(project))["pairs"], 1);
         let wrong = page_of("&id_column=Number&mesh_column=Model&print_column=Image");
         assert!(wrong.contains("there is no column"), "{wrong}");
         assert!(!wrong.contains("Choose them:"), "said once: {wrong}");

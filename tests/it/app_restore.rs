@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::app::{act, app, open_app, text, token, with_project};
 use crate::app_kills::{HeldApp, UNTIL_KILLED};
 use crate::app_uploads::encode;
-use crate::cli::mocban;
+use crate::cli::{mocban, status};
 use crate::fault::{ENOSPC, Fault};
 use crate::page::{Page, Reply, read_project};
 use crate::waiting::wait_until;
@@ -57,9 +57,9 @@ fn ended(page: &Page, name: &str) -> String {
 }
 
 fn counts(project: &Path) -> (Value, usize) {
-    let status = mocban(project, &["status", "--json"]).expect(0).json();
+    let pairs = status(project)["pairs"].clone();
     let log = mocban(project, &["verdict", "log", "--json"]).expect(0);
-    (status["pairs"].clone(), log.out.lines().count())
+    (pairs, log.out.lines().count())
 }
 
 #[test]

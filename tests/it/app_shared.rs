@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::app::{act, html, open_app, text, with_project};
 use crate::app_choice::{chosen, import_more};
-use crate::cli::{binary_beside, mocban};
+use crate::cli::{binary_beside, mocban, status};
 use crate::odd::{as_other_user, set_mode, set_writable};
 use crate::page::{Page, read_project};
 use crate::waiting::wait_until;
@@ -28,10 +28,6 @@ pub(crate) fn app_as_other_user(folder: &Path) -> Command {
 fn two_apps_on_one_project_show_and_change_the_same() {
     let (dir, first) = with_project();
     let second = open_app(dir.path());
-    let status = || {
-        let status = mocban(&dir.path().join("p"), &["status", "--json"]);
-        status.expect(0).json()
-    };
     // Both change the project at the same time.
     std::thread::scope(|scope| {
         for (page, numbers) in [(&first, [1, 2, 3]), (&second, [4, 5, 6])] {
@@ -44,7 +40,7 @@ fn two_apps_on_one_project_show_and_change_the_same() {
             });
         }
     });
-    assert_eq!(status()["retired"], 6);
+    assert_eq!(status(&dir.path().join("p"))["retired"], 6);
     for (page, pair) in [(&first, "upright-0004"), (&second, "upright-0001")] {
         let shown = html(page, &format!("/p/p/pair/{pair}/"));
         assert!(shown.contains("This pair is retired."), "{shown}");

@@ -6,7 +6,7 @@ use crate::accessible::{axe, no_violation};
 use crate::app::app;
 use crate::app_browser::{enter, fits_width, looks_right};
 use crate::browser::{Browser, Tab};
-use crate::cli::mocban;
+use crate::cli::{mocban, status};
 use crate::page::{Page, read_project};
 use crate::small_block::demo_block;
 use crate::waiting::wait_until;
@@ -38,8 +38,9 @@ fn packed(files: &[PathBuf], to: &Path) {
 }
 
 fn imported(dir: &Path, project: &str) -> u64 {
-    let status = mocban(&dir.join(project), &["status", "--json"]).expect(0);
-    status.json()["pairs"].as_u64().expect("a number")
+    status(&dir.join(project))["pairs"]
+        .as_u64()
+        .expect("a number")
 }
 
 /// Imports what the page shows into a project.

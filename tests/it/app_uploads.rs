@@ -10,7 +10,7 @@ use mocban::workbook::test_helpers::archive;
 use serde_json::{Value, json};
 
 use crate::app::{act, app, open_app, text, token, with_project};
-use crate::cli::mocban;
+use crate::cli::status;
 #[cfg(target_os = "linux")]
 use crate::fault::{ENOSPC, Fault};
 use crate::page::{Page, Reply, send};
@@ -157,8 +157,7 @@ fn files_of_a_browser_get_a_new_folder_and_are_imported() {
     let chosen = json!({"project": "new", "meshes": folder, "prints": folder});
     let reply = act(&page, "/actions/import", &chosen, |_| {});
     assert_eq!(reply.status, 200, "{}", text(&reply));
-    let pairs = mocban(&dir.path().join("new"), &["status", "--json"]).expect(0);
-    assert_eq!(pairs.json()["pairs"], 2);
+    assert_eq!(status(&dir.path().join("new"))["pairs"], 2);
     assert_eq!(end(&page, &upload, "finish").status, 422, "it has ended");
 }
 
