@@ -11,8 +11,8 @@ use crate::page::{Page, read_project};
 use crate::review_browser::{ITEM, judge, saved, shown_long_enough};
 use crate::waiting::wait_until;
 
-/// Longest time from an empty folder to the report of the demo on an idle computer. Printed and not checked, because a busy
-/// computer needs more.
+/// Longest time from an empty folder to the report of the demo. It is no measurement of speed: the demo takes a small part of
+/// it, also on a busy computer.
 const DEMO_LIMIT: Duration = Duration::from_mins(5);
 
 /// Opens the app in a tab and returns the address of its home page.
@@ -77,10 +77,8 @@ fn the_demo_comes_to_its_report_without_a_typed_command() {
     click(&tab, "header a", &on_page("/p/mocban-demo/"));
     click(&tab, "nav a[href$='/report']", &on_page("/report"));
     tab.wait("document.querySelector('#numbers table')");
-    eprintln!(
-        "the demo took {:.0?}, and should take {DEMO_LIMIT:?} at most",
-        began.elapsed()
-    );
+    let took = began.elapsed();
+    assert!(took < DEMO_LIMIT, "the demo took {took:?}");
     tab.screenshot("app_report");
     let text = tab.eval("document.querySelector('#numbers').innerText");
     assert!(text.as_str().expect("text").contains("24"), "{text}");
