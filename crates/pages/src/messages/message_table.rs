@@ -352,8 +352,8 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
         "bản quét có bị lật gương, hay là mặt sau của bề mặt được quét?",
     ),
     (
-        "is it the print of another character?",
-        "đây có phải bản in của chữ khác không?",
+        "is it the print of another character, or is the sheet torn or folded?",
+        "đây có phải bản in của chữ khác không, hay tờ giấy bị rách hoặc gấp?",
     ),
     (
         "the scan shows {} separate pieces: does one file hold several characters or pieces?",

@@ -38,7 +38,10 @@ pub enum Observation {
 impl fmt::Display for Observation {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Nothing => write!(to, "is it the print of another character?"),
+            Self::Nothing => write!(
+                to,
+                "is it the print of another character, or is the sheet torn or folded?"
+            ),
             Self::Pieces(count) => write!(
                 to,
                 "the scan shows {count} separate pieces: does one file hold several characters or pieces?"

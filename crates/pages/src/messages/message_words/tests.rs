@@ -35,8 +35,8 @@ fn frequent_messages_are_translated_with_their_parts() {
             "bỏ qua, không đọc được cảnh 3D glTF: m/b.glb và 1 tệp khác; hãy mở chúng bằng MeshLab, Blender hoặc CloudCompare rồi xuất thành PLY",
         ),
         (
-            "data/prints/1.png: relief and print do not match: confidence 0.20 in the pose is below register.min_confidence 0.3; is it the print of another character?",
-            "data/prints/1.png: mặt khắc và bản in không khớp: độ tin cậy 0,20 của tư thế thấp hơn register.min_confidence 0,3; đây có phải bản in của chữ khác không?",
+            "data/prints/1.png: relief and print do not match: confidence 0.20 in the pose is below register.min_confidence 0.3; is it the print of another character, or is the sheet torn or folded?",
+            "data/prints/1.png: mặt khắc và bản in không khớp: độ tin cậy 0,20 của tư thế thấp hơn register.min_confidence 0,3; đây có phải bản in của chữ khác không, hay tờ giấy bị rách hoặc gấp?",
         ),
         (
             "m/1.stl: with the unit m, the scan is 12.7 m long; correct the unit (perhaps mm) in the list, and import it again",
