@@ -8,6 +8,7 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use super::failure::{AppFailure, AppResult};
+use super::process_end::reason_of_end;
 use super::sentence::{Sentence, system_reasons, without_commands};
 use super::state::AppState;
 use crate::messages;
@@ -109,16 +110,17 @@ fn failure(status: ExitStatus, messages: File) -> Option<Sentence> {
     if is_success(status) || status.code() == Some(ExitCode::Stopped as i32) {
         return None;
     }
-    if status.code().is_none() {
+    let bytes = last_bytes(messages).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes);
+    if let Some([english, vietnamese]) = reason_of_end(status, &text) {
         return Some(Sentence::new(
-            format!("The run ended before its work was done ({status}). Press Align to go on."),
+            format!("The run ended before its work was done: {english}. Press Align to go on."),
             format!(
-                "Lần chạy kết thúc trước khi làm xong ({status}). Hãy bấm Căn chỉnh để chạy tiếp."
+                "Lần chạy kết thúc trước khi làm xong: {vietnamese}. Hãy bấm Căn chỉnh để chạy tiếp."
             ),
         ));
     }
-    let text = last_bytes(messages).unwrap_or_default();
-    Some(why(&last_error(&String::from_utf8_lossy(&text))))
+    Some(why(&last_error(&text)))
 }
 
 fn why(message: &str) -> Sentence {
@@ -163,6 +165,12 @@ pub(super) async fn finish(program: &Path, args: &[&OsStr]) -> AppResult<()> {
         return Ok(());
     }
     let text = String::from_utf8_lossy(&output.stderr);
+    if let Some([english, vietnamese]) = reason_of_end(output.status, &text) {
+        return Err(AppFailure::refused(Sentence::new(
+            format!("the program ended before its work was done: {english}; try again"),
+            format!("chương trình kết thúc trước khi làm xong: {vietnamese}; hãy thử lại"),
+        )));
+    }
     Err(AppFailure::refused(Sentence::of_program(&last_error(
         &text,
     ))))

@@ -65,6 +65,7 @@ mod paper_page;
 mod pass_on;
 mod pictures;
 mod plan_cache;
+mod process_end;
 mod project_name;
 mod project_places;
 mod projects;

@@ -107,6 +107,12 @@ pub fn detach(command: &mut std::process::Command) {
     command.process_group(0);
 }
 
+/// Returns the number of the signal that ended a process, if one did.
+pub fn ending_signal(status: std::process::ExitStatus) -> Option<i32> {
+    use std::os::unix::process::ExitStatusExt as _;
+    status.signal()
+}
+
 /// Sends a process of this computer what Ctrl-C sends.
 ///
 /// # Errors

@@ -94,6 +94,11 @@ pub fn detach(command: &mut std::process::Command) {
     command.creation_flags(CREATE_NEW_PROCESS_GROUP);
 }
 
+/// Returns `None`: Windows has no signals, and ends a process that crashes with a negative code.
+pub const fn ending_signal(_status: std::process::ExitStatus) -> Option<i32> {
+    None
+}
+
 /// Returns an error: Windows sends Ctrl-C only to processes of the same terminal.
 ///
 /// # Errors
