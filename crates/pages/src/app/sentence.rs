@@ -112,7 +112,9 @@ impl Sentence {
 /// Returns what the system says of an error in English and Vietnamese.
 pub(super) fn system_reasons(error: &io::Error) -> [String; 2] {
     let english = without_error_numbers(&error.to_string());
-    let vietnamese = messages::vietnamese(&english).unwrap_or_else(|| english.clone());
+    let by_kind = || messages::reason_of_kind(error.kind()).map(str::to_owned);
+    let vietnamese = messages::vietnamese(&english).or_else(by_kind);
+    let vietnamese = vietnamese.unwrap_or_else(|| english.clone());
     [english, vietnamese]
 }
 
@@ -277,6 +279,11 @@ mod tests {
         assert_eq!(vietnamese, "ổ đĩa chỉ đọc được");
         let unknown = system_reasons(&io::Error::other("odd"));
         assert_eq!(unknown, ["odd", "odd"]);
+        // As a system says it whose language no table has.
+        let foreign = io::Error::new(io::ErrorKind::StorageFull, "Der Datenträger ist voll.");
+        let [english, vietnamese] = system_reasons(&foreign);
+        assert_eq!(english, "Der Datenträger ist voll.");
+        assert_eq!(vietnamese, "đĩa đã đầy");
         let error = ProjectError::from(read_only()).context("cannot write the backup p/b.sqlite");
         let sentence = Sentence::of_error(&error, Path::new("p"));
         assert_eq!(

@@ -15,8 +15,7 @@ use super::message_table::MESSAGES;
 use super::pair_refusals::PAIR_REFUSALS;
 use super::parser_messages::PARSER_MESSAGES;
 use super::review_messages::REVIEW_MESSAGES;
-use super::system_messages::SYSTEM_MESSAGES;
-use mocban_project::error::without_error_numbers;
+use super::system_messages::{SYSTEM_MESSAGES, with_known_reasons};
 
 /// A message with its Vietnamese text.
 type MessageRow = (&'static str, &'static str);
@@ -89,7 +88,7 @@ const OPEN_ENDED: &[MessageRow] = &[
 /// Returns a message of the program in Vietnamese if its beginning is known. Parts that are not known stay as they are, without
 /// the numbers of the system's errors.
 pub(crate) fn vietnamese(text: &str) -> Option<String> {
-    let text = without_error_numbers(text);
+    let text = with_known_reasons(text);
     let mut lines = text.lines();
     let first = line(lines.next()?)?;
     let rest = lines.map(|one| line(one).unwrap_or_else(|| one.to_owned()));
@@ -180,7 +179,7 @@ mod number_tests;
 mod refusal_tests;
 #[cfg(test)]
 mod source_sentences;
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod system_tests;
 #[cfg(test)]
 mod tests;

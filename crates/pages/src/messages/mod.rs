@@ -35,3 +35,4 @@ pub(crate) use message_words::vietnamese;
 pub(crate) use report_html::vietnamese_report;
 pub(crate) use report_words::report_text;
 pub(crate) use stage_words::stage_in_vietnamese;
+pub(crate) use system_messages::reason_of_kind;
