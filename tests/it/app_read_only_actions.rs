@@ -3,18 +3,21 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use serde_json::{Value, json};
 
-use crate::app::{act, html, text};
+use crate::app::{act, app, html, text};
 use crate::app_choice::chosen;
 use crate::app_controls::varied_project;
 use crate::app_killed_actions::{last_import, list_of, write_list};
 use crate::app_shared::app_as_other_user;
 use crate::block_view::finished_block;
+use crate::cli::shell;
 use crate::odd::{set_mode, set_writable};
 use crate::page::Page;
 use crate::report::contents;
+use crate::skipped::say_skipped;
 use crate::waiting::wait_until;
 
 /// What a refusal says of a place that cannot be written, in a language.
@@ -37,6 +40,42 @@ const SAID: [(&str, [&str; 3]); 2] = [
     ),
 ];
 
+/// Pages of [`varied_project`], and what each says of a place that cannot be written: what [`SAID`] has at this index.
+const PAGES: [(&str, Option<usize>); 21] = [
+    ("/", Some(1)),
+    ("/import", Some(1)),
+    ("/restore", Some(1)),
+    ("/p/p/", Some(0)),
+    ("/p/p/pairs", Some(0)),
+    ("/p/p/pairs?view=table&sort=confidence", Some(0)),
+    ("/p/p/pairs?state=retired", Some(0)),
+    ("/p/p/pair/upright-0000/", Some(0)),
+    ("/p/p/pair/broken/", Some(0)),
+    ("/p/p/pair/upright-0000/3d/", None),
+    ("/p/p/blocks", Some(0)),
+    ("/p/p/review", Some(0)),
+    ("/p/p/review/agreement", None),
+    ("/p/p/report", Some(0)),
+    ("/p/p/report/numbers", None),
+    ("/p/p/report/file/report.csv", None),
+    ("/p/p/last-import", None),
+    ("/p/p/export", Some(0)),
+    ("/p/p/settings", Some(0)),
+    ("/p/p/correct?what=unit&class=bad_input", Some(0)),
+    ("/p/p/health", Some(0)),
+];
+
+/// Returns a command on a folder that is mounted read-only for this command alone, where not even root can write. On Linux,
+/// every user may mount in a namespace of their own, unless an administrator forbids it.
+fn on_read_only_disk(command: &Command, folder: &Path) -> Command {
+    let mut mounted = shell(
+        "exec unshare -rm sh -c 'mount --bind \"$0\" \"$0\" && mount -o remount,bind,ro \"$0\" && exec \"$@\"' \"$0\" \"$@\"",
+    );
+    mounted.arg(folder).arg(command.get_program());
+    mounted.args(command.get_args());
+    mounted
+}
+
 /// A folder with a project `p`, neither of which can be written.
 struct ReadOnlyFolder {
     page: Page,
@@ -45,7 +84,30 @@ struct ReadOnlyFolder {
 }
 
 impl ReadOnlyFolder {
-    /// Opens the app on the folder.
+    /// Opens the app on a disk that is read-only. `None` if no such disk can be made.
+    fn mounted(dir: &Path) -> Option<Self> {
+        let dir = dir.canonicalize().expect("a path");
+        let written = dir.join("p/written");
+        let mut touch = Command::new("touch");
+        touch.arg(&written);
+        let tried = on_read_only_disk(&Command::new("true"), &dir).output();
+        if !tried.is_ok_and(|tried| tried.status.success()) {
+            say_skipped("unshare and mount are needed, and a user who may use them");
+            return None;
+        }
+        let refused = on_read_only_disk(&touch, &dir).output().expect("an end");
+        assert!(
+            !refused.status.success() && !written.exists(),
+            "{refused:?}"
+        );
+        let before = contents(&dir.join("p"));
+        let mut command = app(&dir);
+        command.args(["--lang", "en"]);
+        let page = Page::of(&mut on_read_only_disk(&command, &dir)).entered();
+        Some(Self { page, dir, before })
+    }
+
+    /// Opens the app on the folder, which its user may not write.
     fn open(dir: &Path) -> Self {
         let dir = dir.canonicalize().expect("a path");
         let before = contents(&dir.join("p"));
@@ -71,6 +133,72 @@ impl ReadOnlyFolder {
             }
         }
         html(&self.page, "/?language=en");
+    }
+
+    /// Sends every action on [`varied_project`], with what [`write_list`] has written.
+    fn refuses_all_actions(&self) {
+        let project = self.dir.join("p");
+        let review = |invite: &str| {
+            json!({
+                "reviewer": "lan", "metric": "density", "sample": "", "order": "random", "invite": invite,
+            })
+        };
+        let backup = project.join("backups/backup.sqlite");
+        self.refuses(&[
+            ("/p/p/actions/run", json!({"which": "all"})),
+            ("/p/p/actions/run", json!({"which": "failed"})),
+            ("/p/p/actions/retry", json!({"class": "bad_input"})),
+            ("/p/p/actions/retry", json!({"pair": "broken"})),
+            ("/p/p/actions/retire", json!({"pair": "upright-0001"})),
+            ("/p/p/actions/restore", json!({"pair": "upright-0007"})),
+            ("/p/p/actions/chosen", chosen("retire", &["upright-0002"])),
+            ("/p/p/actions/chosen", chosen("resume", &["broken"])),
+            ("/p/p/actions/chosen", chosen("compute", &["upright-0002"])),
+            (
+                "/p/p/actions/correct",
+                json!({"what": "unit", "unit": "m", "pair": "upright-0002", "shown": "1"}),
+            ),
+            (
+                "/p/p/actions/last-import",
+                last_import(&self.page, "retire"),
+            ),
+            ("/actions/import", list_of("p", &project)),
+            ("/actions/import", list_of("new", &project)),
+            ("/p/p/actions/view", view("save", "", "x")),
+            ("/p/p/actions/view", view("rename", "hỏng", "x")),
+            ("/p/p/actions/view", view("remove", "hỏng", "")),
+            (
+                "/p/p/actions/setting",
+                json!({"key": "run.workers", "value": "3"}),
+            ),
+            ("/p/p/actions/review", review("")),
+            ("/p/p/actions/review", review("yes")),
+            (
+                "/p/p/actions/export",
+                json!({"purpose": "excel", "only": "all", "metric": ""}),
+            ),
+            ("/p/p/actions/backup", json!({})),
+            ("/p/p/actions/backup", json!({"inputs": "yes"})),
+            ("/actions/demo", Value::Null),
+            (
+                "/actions/restore",
+                json!({"backup": backup, "name": "new", "inputs": ""}),
+            ),
+        ]);
+        // What only reads still works; a repair says on its page that it cannot be done.
+        for (what, part) in [
+            ("check", "All are sound"),
+            ("repair", "cannot be written to: check its rights"),
+        ] {
+            let reply = act(
+                &self.page,
+                "/p/p/actions/check",
+                &json!({ "what": what }),
+                |_| {},
+            );
+            assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
+            wait_until(part, || html(&self.page, "/p/p/health").contains(part));
+        }
     }
 }
 
@@ -99,68 +227,29 @@ fn no_action_changes_a_project_that_cannot_be_written() {
     varied_project(&dir);
     let project = dir.path().canonicalize().expect("a path").join("p");
     write_list(&project);
-    let folder = ReadOnlyFolder::open(dir.path());
-    let review = |invite: &str| {
-        json!({
-            "reviewer": "lan", "metric": "density", "sample": "", "order": "random", "invite": invite,
-        })
+    ReadOnlyFolder::open(dir.path()).refuses_all_actions();
+}
+
+#[test]
+fn a_project_on_a_read_only_disk_is_shown_and_stays_as_it_is() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    varied_project(&dir);
+    let project = dir.path().canonicalize().expect("a path").join("p");
+    write_list(&project);
+    let Some(folder) = ReadOnlyFolder::mounted(dir.path()) else {
+        return;
     };
-    let backup = project.join("backups/backup.sqlite");
-    folder.refuses(&[
-        ("/p/p/actions/run", json!({"which": "all"})),
-        ("/p/p/actions/run", json!({"which": "failed"})),
-        ("/p/p/actions/retry", json!({"class": "bad_input"})),
-        ("/p/p/actions/retry", json!({"pair": "broken"})),
-        ("/p/p/actions/retire", json!({"pair": "upright-0001"})),
-        ("/p/p/actions/restore", json!({"pair": "upright-0007"})),
-        ("/p/p/actions/chosen", chosen("retire", &["upright-0002"])),
-        ("/p/p/actions/chosen", chosen("resume", &["broken"])),
-        ("/p/p/actions/chosen", chosen("compute", &["upright-0002"])),
-        (
-            "/p/p/actions/correct",
-            json!({"what": "unit", "unit": "m", "pair": "upright-0002", "shown": "1"}),
-        ),
-        (
-            "/p/p/actions/last-import",
-            last_import(&folder.page, "retire"),
-        ),
-        ("/actions/import", list_of("p", &project)),
-        ("/actions/import", list_of("new", &project)),
-        ("/p/p/actions/view", view("save", "", "x")),
-        ("/p/p/actions/view", view("rename", "hỏng", "x")),
-        ("/p/p/actions/view", view("remove", "hỏng", "")),
-        (
-            "/p/p/actions/setting",
-            json!({"key": "run.workers", "value": "3"}),
-        ),
-        ("/p/p/actions/review", review("")),
-        ("/p/p/actions/review", review("yes")),
-        (
-            "/p/p/actions/export",
-            json!({"purpose": "excel", "only": "all", "metric": ""}),
-        ),
-        ("/p/p/actions/backup", json!({})),
-        ("/p/p/actions/backup", json!({"inputs": "yes"})),
-        ("/actions/demo", Value::Null),
-        (
-            "/actions/restore",
-            json!({"backup": backup, "name": "new", "inputs": ""}),
-        ),
-    ]);
-    // What only reads still works; a repair says on its page that it cannot be done.
-    for (what, part) in [
-        ("check", "All are sound"),
-        ("repair", "cannot be written to: check its rights"),
-    ] {
-        let reply = act(
-            &folder.page,
-            "/p/p/actions/check",
-            &json!({ "what": what }),
-            |_| {},
-        );
-        assert_eq!(reply.status, 200, "{what}: {}", text(&reply));
-        wait_until(part, || html(&folder.page, "/p/p/health").contains(part));
+    for (language, said) in SAID {
+        for (path, expected) in PAGES {
+            let join = if path.contains('?') { '&' } else { '?' };
+            let shown = html(&folder.page, &format!("{path}{join}language={language}"));
+            if let Some(index) = expected {
+                let part = said[index];
+                assert!(shown.contains(part), "{path}: {part}: {shown}");
+            }
+        }
     }
+    folder.refuses_all_actions();
 }
 
 #[test]
