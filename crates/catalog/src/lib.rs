@@ -98,6 +98,7 @@ pub use records::append_verdicts::{ImportedVerdicts, ListedVerdict};
 pub use records::faulty_rows::{FaultyRow, RowFault};
 pub use records::ignored_profiles::{IgnoredProfiles, ProfileCount};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, ImportTerms, PairChange};
+pub use records::joint_verdict::JointVerdict;
 pub use records::listed_names::ListedNames;
 pub use records::lost_values::{LostColumn, LostValues, has_value};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};

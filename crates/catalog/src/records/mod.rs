@@ -8,6 +8,7 @@ pub(crate) mod identity;
 pub(crate) mod ignored_profiles;
 pub(crate) mod import;
 pub(crate) mod input_paths;
+pub(crate) mod joint_verdict;
 pub(crate) mod judged_results;
 pub(crate) mod listed_names;
 pub(crate) mod lost_values;

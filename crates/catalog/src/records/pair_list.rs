@@ -6,6 +6,7 @@ use std::cmp::Ordering;
 use crate::db::conn::Conn;
 use crate::db::query::query_as;
 use crate::db::row::from_row;
+use crate::records::joint_verdict::{JointVerdict, earlier_verdicts, standing_of_verdicts};
 use crate::records::model::PairResults;
 use crate::records::reviewer_names::Spellings;
 use crate::records::status::{from_current_verdicts, person};
@@ -59,8 +60,8 @@ pub struct PairFilter {
     pub class: Option<FailureClass>,
     /// A verdict of a reviewer on the current result of the metric.
     pub verdict: Option<Verdict>,
-    /// Whether this verdict, a pass or a fail, must be the joint verdict of all reviewers, as a report counts it.
-    pub is_joint: bool,
+    /// What all reviewers together must say of this result.
+    pub joint: Option<JointVerdict>,
     /// Whether the current result of the metric must have a verdict, or must have none.
     pub is_judged: Option<bool>,
     /// Whether the result of the default metric must have a low confidence.
@@ -115,7 +116,6 @@ from_row! { ListedRow { id, confidence, iou, passes } }
 
 /// Selects pairs from a source with a column `id`, of which `?4` rows are read, and says whether they pass the filter.
 /// Retired pairs, which have no job, never do.
-/// A verdict is joint if no reviewer gave the opposite one, or if all adjudications of the conflict have this verdict.
 /// Sources use `?2` and `?3`, the key and the row id of the last pair of the page before; `?5` is the metric.
 macro_rules! listed {
     ($source:literal) => {
@@ -125,15 +125,12 @@ macro_rules! listed {
         AND (?10 IS NULL OR EXISTS (SELECT 1 ",
             from_current_verdicts!(),
             " AND v.pair = c.id AND v.metric = ?5 AND v.verdict = ?10))
-        AND (?16 = 0 OR 1 = (SELECT CASE
-            WHEN count(CASE WHEN v.verdict NOT IN (?10, 'unsure') THEN 1 END) = 0 THEN 1
-            WHEN count(CASE WHEN v.verdict = ?10 AND coalesce(v.review_order, '') <> 'adjudicate' THEN 1 END) > 0
-                AND count(CASE WHEN v.verdict NOT IN (?10, 'unsure') AND coalesce(v.review_order, '') <> 'adjudicate' THEN 1 END) > 0
-                AND count(CASE WHEN v.verdict = ?10 AND v.review_order = 'adjudicate' THEN 1 END) > 0
-                AND count(CASE WHEN v.verdict NOT IN (?10, 'unsure') AND v.review_order = 'adjudicate' THEN 1 END) = 0 THEN 1
-            ELSE 0 END ",
-            from_current_verdicts!(),
-            " AND v.pair = c.id AND v.metric = ?5))
+        AND (?16 = 0 OR (?16 >> (",
+            standing_of_verdicts!(),
+            ")) % 2 = 1)
+        AND (?17 = 0 OR j.status = 3 AND EXISTS (",
+            earlier_verdicts!(),
+            "))
         AND (?11 < 0 OR (?11 = 0) <> EXISTS (SELECT 1 ",
             from_current_verdicts!(),
             " AND v.pair = c.id AND v.metric = ?5))
@@ -201,9 +198,9 @@ pub(crate) fn statements() -> [(&'static str, &'static str); 12] {
 impl PairFilter {
     /// Returns the source that has the fewest pairs besides those of the list, in the order of import.
     const fn source(&self) -> &'static str {
-        if self.verdict.is_some() {
+        if self.given_verdict().is_some() {
             JUDGED
-        } else if matches!(self.is_judged, Some(true)) {
+        } else if self.joint.is_some() || matches!(self.is_judged, Some(true)) {
             JUDGED_BY_ANYBODY
         } else if self.class.is_some() {
             OF_CLASS
@@ -217,6 +214,14 @@ impl PairFilter {
             FAILED
         } else {
             ALL
+        }
+    }
+
+    /// Returns a verdict that somebody must have given on the current result.
+    const fn given_verdict(&self) -> Option<Verdict> {
+        match (self.verdict, self.joint) {
+            (None, Some(joint)) => joint.given(),
+            (verdict, _) => verdict,
         }
     }
 
@@ -287,7 +292,8 @@ impl<'l> ListReader<'l> {
         } else {
             after.id
         };
-        let verdict = filter.verdict.map(Verdict::name);
+        let verdict = filter.given_verdict().map(Verdict::name);
+        let is_stale = filter.joint == Some(JointVerdict::Stale);
         let query = query_as(source)
             .bind(self.renamed.as_str())
             .bind(after.key)
@@ -309,7 +315,8 @@ impl<'l> ListReader<'l> {
                     .differs
                     .map_or(0.0, |differs| differs.min_iou - ROUNDING),
             )
-            .bind(i64::from(filter.is_joint));
+            .bind(filter.joint.map_or(0, JointVerdict::standings))
+            .bind(i64::from(is_stale));
         query.fetch_all(conn).await
     }
 

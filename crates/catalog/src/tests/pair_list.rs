@@ -2,10 +2,12 @@
 
 use super::{CatalogPlace, World, fingerprints, name, row};
 use crate::{
-    ImportRow, ListedNames, MetricDifference, NewVerdict, PairCursor, PairFilter, PairOrder,
-    RerunPolicy, ReviewContext, StageCheckpoint,
+    ImportRow, JointVerdict, ListedNames, MetricDifference, NewVerdict, PairCursor, PairFilter,
+    PairOrder, RerunPolicy, ReviewContext, StageCheckpoint,
 };
-use mocban_core::domain::{FailureClass, JobStatus, ReviewOrder, Stage, ThresholdMetric, Verdict};
+use mocban_core::domain::{
+    ContentHash, FailureClass, JobStatus, ReviewOrder, Stage, ThresholdMetric, Verdict,
+};
 
 /// Imports `count` pairs of two blocks and gives the first `finished` of them results whose confidence falls and then rises.
 async fn world(count: usize, finished: usize) -> World {
@@ -200,19 +202,25 @@ async fn a_joint_verdict_is_undisputed_or_settled_by_adjudications() {
         let stored = world.catalog.verdict_set(vec![given], 9).await;
         stored.expect("a verdict");
     }
-    for (verdict, is_joint, expected) in [
-        (Verdict::Pass, false, &[0, 1, 2, 3, 4][..]),
-        (Verdict::Pass, true, &[0, 3]),
-        (Verdict::Fail, false, &[1, 2, 4]),
-        (Verdict::Fail, true, &[2]),
+    for (verdict, joint, expected) in [
+        (Some(Verdict::Pass), None, &[0, 1, 2, 3, 4][..]),
+        (None, Some(JointVerdict::Passed), &[0, 3]),
+        (Some(Verdict::Fail), None, &[1, 2, 4]),
+        (None, Some(JointVerdict::Failed), &[2]),
+        (None, Some(JointVerdict::Decided), &[0, 2, 3]),
+        (None, Some(JointVerdict::Conflict), &[1, 4]),
+        (None, Some(JointVerdict::Unsure), &[5]),
+        (None, Some(JointVerdict::Stale), &[]),
     ] {
         let filter = PairFilter {
-            verdict: Some(verdict),
-            is_joint,
+            verdict,
+            joint,
             ..PairFilter::default()
         };
-        let found = listed(&world, &filter, PairOrder::Imported, 2).await;
-        assert_eq!(found, expected, "{verdict} {is_joint}");
+        for order in [PairOrder::Imported, PairOrder::LowestIou] {
+            let found = listed(&world, &filter, order, 2).await;
+            assert_eq!(found, expected, "{verdict:?} {joint:?} {order}");
+        }
     }
     let judged = PairFilter {
         is_judged: Some(true),
@@ -220,6 +228,49 @@ async fn a_joint_verdict_is_undisputed_or_settled_by_adjudications() {
     };
     let found = listed(&world, &judged, PairOrder::Imported, 2).await;
     assert_eq!(found, [0, 1, 2, 3, 4, 5]);
+}
+
+#[tokio::test]
+async fn a_joint_verdict_is_stale_if_only_an_earlier_result_was_judged() {
+    let world = world(3, 3).await;
+    let judge = async |pair: &str| {
+        let given = NewVerdict {
+            pair: name(pair),
+            ..super::verdicts::verdict("ana", Verdict::Pass)
+        };
+        let stored = world.catalog.verdict_set(vec![given], 9).await;
+        stored.expect("a verdict");
+    };
+    judge("p000").await;
+    judge("p001").await;
+    let stale = PairFilter {
+        joint: Some(JointVerdict::Stale),
+        ..PairFilter::default()
+    };
+    assert!(
+        listed(&world, &stale, PairOrder::Imported, 2)
+            .await
+            .is_empty()
+    );
+    let (current, again) = (fingerprints([1; 4]), RerunPolicy::All(Stage::Register));
+    let requeued = world.catalog.requeue_stale(&current, None, again).await;
+    assert_eq!(requeued.expect("requeued"), 3);
+    let running = listed(&world, &stale, PairOrder::Imported, 2).await;
+    assert!(running.is_empty(), "they have no results: {running:?}");
+    for n in 0..3 {
+        let change = |done: &mut StageCheckpoint| {
+            set_scores(done, n);
+            for metric in &mut done.metrics {
+                metric.result_hash = ContentHash::of(b"another");
+            }
+        };
+        world.finish_with(change).await;
+    }
+    judge("p001").await;
+    assert_eq!(listed(&world, &stale, PairOrder::Imported, 2).await, [0]);
+    let undone = world.catalog.verdict_undo(Some("ana"), 10).await;
+    undone.expect("undone");
+    assert_eq!(listed(&world, &stale, PairOrder::Imported, 1).await, [0, 1]);
 }
 
 #[tokio::test]

@@ -4,10 +4,10 @@ use maud::{Markup, html};
 
 use super::components::choice;
 use super::number_text::with_decimal_sign;
-use super::pair_query::{DIFFERENCES, JOINT_VERDICTS, RETIRED};
+use super::pair_query::{DIFFERENCES, RETIRED};
 use super::retired_pairs::filter_name;
 use super::visit::Visit;
-use mocban_catalog::PairOrder;
+use mocban_catalog::{JointVerdict, PairOrder};
 use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict, one_line};
 
 /// Most blocks from which one is chosen without typing.
@@ -31,7 +31,7 @@ pub(super) fn filter_form(visit: &Visit, blocks: &[String], retired: u64) -> Mar
     let mut classes = classes.to_vec();
     classes.insert(0, ("", any));
     let mut verdicts = vec![("", any)];
-    verdicts.extend(JOINT_VERDICTS.map(|(name, one)| (name, visit.joint_verdict(one))));
+    verdicts.extend(JointVerdict::ALL.map(|one| (one.name(), visit.joint_verdict(one))));
     verdicts.extend(Verdict::ALL.map(|one| (one.name(), visit.given_by_somebody(one))));
     verdicts.push(("judged", visit.t("judged", "đã đánh giá")));
     verdicts.push(("none", visit.t("not judged", "chưa đánh giá")));

@@ -1,8 +1,8 @@
 //! The address of a list of pairs: its filter, its order and where its page begins.
 
 use super::address::PageQuery;
-use mocban_catalog::{MetricDifference, PairCursor, PairFilter, PairOrder};
-use mocban_core::domain::{JobStatus, ThresholdMetric, Verdict};
+use mocban_catalog::{JointVerdict, MetricDifference, PairCursor, PairFilter, PairOrder};
+use mocban_core::domain::{JobStatus, ThresholdMetric};
 
 /// States that a list can be filtered by, with the statuses of their jobs.
 const STATES: [(&str, &[JobStatus]); 5] = [
@@ -15,10 +15,6 @@ const STATES: [(&str, &[JobStatus]); 5] = [
         &[JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased],
     ),
 ];
-
-/// Values of the joint verdict of all reviewers in an address.
-pub(super) const JOINT_VERDICTS: [(&str, Verdict); 2] =
-    [("joint-pass", Verdict::Pass), ("joint-fail", Verdict::Fail)];
 
 /// State by which a list asks for retired pairs, which have no job.
 pub(super) const RETIRED: &str = "retired";
@@ -79,9 +75,6 @@ impl PairQuery {
         let state = query.get("state");
         let statuses = STATES.iter().find(|(name, _)| Some(*name) == state);
         let verdict = query.get("verdict");
-        let joint = JOINT_VERDICTS
-            .iter()
-            .find(|(name, _)| Some(*name) == verdict);
         let class = query.parsed("class");
         // Pairs without a result have no score by which they could be sorted.
         let has_results = class.is_none() && statuses.is_none_or(|(name, _)| *name == "aligned");
@@ -101,8 +94,8 @@ impl PairQuery {
             filter: PairFilter {
                 statuses: statuses.map_or_else(Vec::new, |(_, statuses)| statuses.to_vec()),
                 class,
-                verdict: joint.map_or_else(|| verdict?.parse().ok(), |(_, verdict)| Some(*verdict)),
-                is_joint: joint.is_some(),
+                verdict: query.parsed("verdict"),
+                joint: query.parsed::<JointVerdict>("verdict"),
                 is_judged: match verdict {
                     Some("none") => Some(false),
                     Some("judged") => Some(true),
@@ -173,12 +166,12 @@ pub(super) fn cursor_text(cursor: PairCursor) -> String {
 mod tests {
     use super::{PairQuery, cursor_text};
     use crate::app::address::PageQuery;
-    use mocban_catalog::{PairCursor, PairOrder};
+    use mocban_catalog::{JointVerdict, PairCursor, PairOrder};
     use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict};
 
     #[test]
     fn an_address_names_a_list() {
-        let of = |text| PairQuery::of(&PageQuery::parse(text));
+        let of = |text: &str| PairQuery::of(&PageQuery::parse(text));
         let after = PairCursor { key: -0.1, id: 7 };
         let text = format!(
             "verdict=none&sort=iou-down&metric=relief&view=table&after={}",
@@ -194,13 +187,13 @@ mod tests {
         assert_eq!((judged.verdict, judged.is_judged), (None, Some(true)));
         assert_eq!(of("state=unfinished").filter.statuses.len(), 3);
         assert!(of("state=retired").is_retired);
-        let joint = of("verdict=joint-fail").filter;
-        assert_eq!((joint.verdict, joint.is_joint), (Some(Verdict::Fail), true));
+        for joint in JointVerdict::ALL {
+            let text = format!("verdict={joint}");
+            let filter = of(&text).filter;
+            assert_eq!((filter.verdict, filter.joint), (None, Some(joint)));
+        }
         let given = of("verdict=fail").filter;
-        assert_eq!(
-            (given.verdict, given.is_joint),
-            (Some(Verdict::Fail), false)
-        );
+        assert_eq!((given.verdict, given.joint), (Some(Verdict::Fail), None));
         let failed = of("class=io&state=waiting&sort=iou");
         assert_eq!(failed.filter.class, Some(FailureClass::Io));
         assert_eq!(

@@ -2,6 +2,7 @@
 
 use super::visit::Visit;
 use crate::messages::stage_in_vietnamese;
+use mocban_catalog::JointVerdict;
 use mocban_core::domain::{
     BlockCharacterState, BlockStage, FailureClass, JobStatus, Reason, Stage, ThresholdMetric,
     Verdict,
@@ -38,16 +39,22 @@ impl Visit {
     }
 
     /// Returns the name of the joint verdict of all reviewers, which the report counts.
-    pub(super) const fn joint_verdict(&self, verdict: Verdict) -> &'static str {
+    pub(super) const fn joint_verdict(&self, verdict: JointVerdict) -> &'static str {
         match verdict {
-            Verdict::Pass => self.t("passed, as the report counts", "đạt, như báo cáo tính"),
-            Verdict::Fail => self.t(
+            JointVerdict::Passed => self.t("passed, as the report counts", "đạt, như báo cáo tính"),
+            JointVerdict::Failed => self.t(
                 "failed, as the report counts",
                 "không đạt, như báo cáo tính",
             ),
-            Verdict::Unsure => self.t(
-                "unsure, as the report counts",
-                "chưa chắc, như báo cáo tính",
+            JointVerdict::Decided => self.t(
+                "passed or failed, as the report counts",
+                "đạt hoặc không đạt, như báo cáo tính",
+            ),
+            JointVerdict::Conflict => self.t("reviewers disagree", "người đánh giá bất đồng"),
+            JointVerdict::Unsure => self.t("all were unsure", "mọi người đều chưa chắc"),
+            JointVerdict::Stale => self.t(
+                "only an earlier result was judged",
+                "chỉ có đánh giá cho lần tính trước",
             ),
         }
     }
