@@ -1,29 +1,33 @@
 //! The sentences of the headline on Acc: the value, what does not count, and what speaks against it.
 
+use super::counted_text::{CountedPairs, CountedText};
 use super::model::{MetricRow, Report};
+use mocban_catalog::JointVerdict;
 use mocban_core::domain::{ThresholdMetric, sanitize};
 use mocban_results::attention_checks::AttentionCheckRates;
-use mocban_results::number_format::{NumberStyle, counted};
 use mocban_results::number_format::{
-    format_count, format_interval, format_rate, format_share, joined,
+    NumberStyle, format_count, format_interval, format_rate, format_share,
 };
 use mocban_results::stats::Rate;
 
 /// Returns the sentences on Acc of the default metric, or of the first metric with an Acc, and on ground truth.
-pub(super) fn accuracy(report: &Report) -> String {
+pub(super) fn accuracy(report: &Report) -> CountedText {
     let by_default = report.row(ThresholdMetric::DEFAULT);
     let judged = report.row_with_acc();
     let mut sentence = match judged.and_then(|row| Some((row, row.acc?, row.acc_ci95?))) {
-        Some((row, acc, bounds)) => format!(
-            "Acc of {} is {} % ({}, {} interval): reviewers passed {} of {}.",
-            row.metric.title(),
-            format_share(acc),
-            format_interval(bounds, NumberStyle::Share),
-            report.interval.title(),
-            format_count(row.passed),
-            counted(row.passed + row.failed, "decided result"),
-        ) + &undecided(row)
-            + &inattentive(report),
+        Some((row, acc, bounds)) => {
+            let mut sentence = CountedText::from(format!(
+                "Acc of {} is {} % ({}, {} interval): reviewers passed ",
+                row.metric.title(),
+                format_share(acc),
+                format_interval(bounds, NumberStyle::Share),
+                report.interval.title(),
+            ));
+            sentence.append(decided(row));
+            sentence.append(undecided(row));
+            sentence.push(&inattentive(report));
+            sentence
+        }
         None if report.has_verdicts() => {
             let unsure: u64 = report.rows.iter().map(|row| row.unsure).sum();
             let conflicts: u64 = report.rows.iter().map(|row| row.conflicts).sum();
@@ -32,33 +36,61 @@ pub(super) fn accuracy(report: &Report) -> String {
                 all if all == unsure => "disagree about every judged result",
                 _ => "were unsure about every judged result, or disagree about it",
             };
-            format!("There is no Acc, because reviewers {why}.")
+            format!("There is no Acc, because reviewers {why}.").into()
         }
         None if report.rows.iter().any(|row| row.stale > 0) => {
-            "There is no Acc, because every verdict is on an earlier result.".to_owned()
+            "There is no Acc, because every verdict is on an earlier result.".into()
         }
         None => "Nobody has judged a result yet, so there is no Acc (`mocban review --reviewer NAME` starts judging)."
-            .to_owned(),
+            .into(),
     };
-    sentence.extend(judged.or(by_default).and_then(truth));
+    if let Some(truth) = judged.or(by_default).and_then(truth) {
+        sentence.push(&truth);
+    }
     sentence
 }
 
+/// Returns how many results were passed, of those that were passed or failed.
+fn decided(row: &MetricRow) -> CountedText {
+    let of_metric = |joint| CountedPairs::Judged(row.metric, joint);
+    let decided = row.passed + row.failed;
+    let counts = [
+        (row.passed, of_metric(JointVerdict::Passed)),
+        (decided, of_metric(JointVerdict::Decided)),
+    ];
+    let pattern = match decided {
+        1 => "{} of {} decided result.",
+        _ => "{} of {} decided results.",
+    };
+    CountedText::filled(pattern, &counts)
+}
+
 /// Returns the sentence on results that were judged and count neither as passed nor as failed, or an empty text.
-fn undecided(row: &MetricRow) -> String {
+fn undecided(row: &MetricRow) -> CountedText {
     let unsure = row.unsure - row.conflicts;
     let rest = [
-        (row.conflicts, "on which reviewers disagree"),
-        (unsure, "about which they were unsure"),
+        (
+            row.conflicts,
+            JointVerdict::Conflict,
+            " on which reviewers disagree",
+        ),
+        (
+            unsure,
+            JointVerdict::Unsure,
+            " about which they were unsure",
+        ),
     ];
-    let rest = rest.into_iter().filter(|(n, _)| *n > 0);
-    let rest: Vec<String> = rest
-        .map(|(n, what)| format!("{} {what}", format_count(n)))
-        .collect();
-    match rest.as_slice() {
-        [] => String::new(),
-        rest => format!(" Not counted: {}.", joined(rest)),
+    let rest = rest.into_iter().filter(|(n, _, _)| *n > 0);
+    let mut sentence = CountedText::default();
+    for (i, (n, joint, what)) in rest.enumerate() {
+        sentence.push(if i == 0 { " Not counted: " } else { " and " });
+        sentence.push_count(n, vec![CountedPairs::Judged(row.metric, joint)]);
+        sentence.push(what);
     }
+    if !sentence.is_empty() {
+        sentence.push(".");
+    }
+    sentence
 }
 
 /// Returns the sentence on reviewers who missed most planted faults, or an empty text.

@@ -59,7 +59,7 @@ pub async fn build_with(
         ..report.finish()
     };
     if let Some(sentence) = report.set_apart.sentence() {
-        report.warnings.insert(0, sentence + ".");
+        report.warnings.insert(0, (sentence + ".").into());
     }
     Ok(report)
 }

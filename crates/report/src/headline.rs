@@ -2,10 +2,9 @@
 //!
 //! A command in a sentence stands in backticks, which renderers turn into the code of their format.
 
-use std::fmt::Write as _;
-
 use super::accuracy_sentence::accuracy;
 use super::comparison::{Basis, Comparison, MIN_PAIRS, TOO_FEW_TO_ESTIMATE, sample_size};
+use super::counted_text::{CountedPairs, CountedText};
 use super::model::{BlockCounts, MetricRow, Report};
 use mocban_catalog::all_retired;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric};
@@ -13,71 +12,97 @@ use mocban_results::number_format::{format_count, format_p, joined};
 use mocban_results::stats::SIGNIFICANCE_LEVEL;
 
 /// Returns the paragraphs, in order. There are fewer than three if there are no results.
-pub(super) fn headline(report: &Report) -> Vec<String> {
+pub(super) fn headline(report: &Report) -> Vec<CountedText> {
     let blocks = report.block_progress.and_then(BlockCounts::unfinished);
     if report.pairs == 0 {
         let retired = all_retired(report.pairs, report.retired);
         let sentence = match (retired, blocks) {
-            (Some(retired), _) => {
-                format!(
-                    "There is nothing to report: {retired}; `mocban status --retired` says why."
-                )
-            }
-            (None, Some(blocks)) => format!("The project has no pairs yet: {blocks}."),
-            (None, None) => "The project has no pairs yet; `mocban import` adds them.".to_owned(),
+            (Some(clause), _) => nothing_to_report(&clause, report.retired),
+            (None, Some(blocks)) => format!("The project has no pairs yet: {blocks}.").into(),
+            (None, None) => "The project has no pairs yet; `mocban import` adds them.".into(),
         };
         return vec![sentence];
     }
     let mut aligned = aligned(report);
     if let Some(blocks) = blocks {
-        let _ = write!(aligned, " Characters are missing: {blocks}.");
+        aligned.push(&format!(" Characters are missing: {blocks}."));
     }
     let mut sentences = vec![aligned];
     if report.progress.done == 0 {
-        sentences.push(nothing_to_judge(report));
+        sentences.push(nothing_to_judge(report).into());
     } else {
         sentences.push(accuracy(report));
-        sentences.push(significance(report));
+        sentences.push(significance(report).into());
     }
     sentences
 }
 
+/// Returns the sentence on a project whose pairs are all retired, as a clause says.
+fn nothing_to_report(clause: &str, retired: u64) -> CountedText {
+    let mut sentence = CountedText::from("There is nothing to report: ");
+    let count = retired.to_string();
+    match clause.split_once(&count) {
+        Some((before, after)) => {
+            sentence.push(before);
+            sentence.push_text_of_count(&count, vec![CountedPairs::Retired]);
+            sentence.push(after);
+        }
+        None => sentence.push(clause),
+    }
+    sentence.push("; `mocban status --retired` says why.");
+    sentence
+}
+
 /// Returns the sentence on how many pairs are aligned, failed and not finished.
-fn aligned(report: &Report) -> String {
+fn aligned(report: &Report) -> CountedText {
     let progress = report.progress;
-    let [pairs, done] = [report.pairs, progress.done].map(format_count);
+    let done = (progress.done, CountedPairs::Aligned);
+    let pairs = (report.pairs, CountedPairs::All);
     let mut sentence = match (progress.done, report.pairs) {
-        (1, 1) => "The only pair is aligned".to_owned(),
-        (0, 1) => "The only pair is not aligned".to_owned(),
-        (0, _) => format!("None of the {pairs} pairs is aligned"),
-        (1, _) => format!("1 of {pairs} pairs is aligned"),
-        (2, 2) => "Both pairs are aligned".to_owned(),
-        (all, of) if all == of => format!("All {pairs} pairs are aligned"),
-        _ => format!("{done} of {pairs} pairs are aligned"),
+        (1, 1) => CountedText::from("The only pair is aligned"),
+        (0, 1) => CountedText::from("The only pair is not aligned"),
+        (0, _) => CountedText::filled("None of the {} pairs is aligned", &[pairs]),
+        (1, _) => CountedText::filled("{} of {} pairs is aligned", &[done, pairs]),
+        (2, 2) => CountedText::from("Both pairs are aligned"),
+        (all, of) if all == of => CountedText::filled("All {} pairs are aligned", &[done]),
+        _ => CountedText::filled("{} of {} pairs are aligned", &[done, pairs]),
     };
     let row = report.row(ThresholdMetric::DEFAULT);
-    sentence.extend(low_confidence(progress.done, row));
+    if let Some(clause) = low_confidence(progress.done, row) {
+        sentence.append(clause);
+    }
     let rest = [
-        (progress.failed, "failed", "failed"),
-        (progress.pending, "is not finished", "are not finished"),
+        (progress.failed, CountedPairs::Failed, ["failed"; 2]),
+        (
+            progress.pending,
+            CountedPairs::Unfinished,
+            ["is not finished", "are not finished"],
+        ),
     ];
     let rest = rest.into_iter().filter(|(n, _, _)| *n > 0);
-    let rest: Vec<String> = rest
-        .map(|(n, one, more)| format!("{} {}", format_count(n), if n == 1 { one } else { more }))
-        .collect();
-    sentence.extend((!rest.is_empty()).then(|| format!("; {}", rest.join(" and "))));
-    sentence + "."
+    for (i, (n, pairs, [one, more])) in rest.enumerate() {
+        sentence.push(if i == 0 { "; " } else { " and " });
+        sentence.push_count(n, vec![pairs]);
+        sentence.push(" ");
+        sentence.push(if n == 1 { one } else { more });
+    }
+    sentence.push(".");
+    sentence
 }
 
 /// Returns the clause on results of low confidence, or `None` if no result has a confidence.
-fn low_confidence(done: u64, row: Option<&MetricRow>) -> Option<String> {
+fn low_confidence(done: u64, row: Option<&MetricRow>) -> Option<CountedText> {
     let low = row?.low_confidence?;
     let below = format!("with a confidence below {}", MetricOutcome::LOW_CONFIDENCE);
     match (low, done) {
         (0, 1) => None,
-        (0, _) => Some(format!(", none {below}")),
-        (_, 1) => Some(format!(", {below}")),
-        _ => Some(format!(", {} {below}", format_count(low))),
+        (0, _) => Some(format!(", none {below}").into()),
+        (_, 1) => Some(format!(", {below}").into()),
+        _ => {
+            let mut clause = CountedText::filled(", {} ", &[(low, CountedPairs::LowConfidence)]);
+            clause.push(&below);
+            Some(clause)
+        }
     }
 }
 
@@ -220,7 +245,7 @@ fn without_basis(report: &Report) -> String {
 mod tests {
     use super::headline;
     use crate::test_fixtures::long_sentences;
-    use crate::{Report, ReportAccumulator, test_fixtures};
+    use crate::{CountedText, Report, ReportAccumulator, test_fixtures};
     use mocban_catalog::PairResults;
     use mocban_core::domain::ThresholdMetric::{Density, Ensemble};
     use mocban_core::domain::Verdict::{Fail, Pass};
@@ -240,7 +265,7 @@ mod tests {
         report.finish()
     }
 
-    fn of(pairs: &[PairResults]) -> Vec<String> {
+    fn of(pairs: &[PairResults]) -> Vec<CountedText> {
         let mut report = ReportAccumulator::default();
         for pair in pairs {
             report.add(pair, &TruthEvaluation::default());
@@ -404,7 +429,7 @@ mod tests {
         let (one, warnings) = sentence(&[("lan", 0, 5), ("minh", 5, 5)]);
         let ending = " lan noticed only 0 of 5 attention checks, so this Acc may be wrong.";
         assert!(one.ends_with(ending), "{one}");
-        let warned = |text: &String| text.starts_with("lan noticed 0 of 5 attention checks. ");
+        let warned = |text: &CountedText| text.starts_with("lan noticed 0 of 5 attention checks. ");
         assert_eq!(
             warnings.iter().filter(|text| warned(text)).count(),
             1,

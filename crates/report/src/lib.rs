@@ -12,6 +12,7 @@ mod adjudication;
 mod block_accuracy;
 mod build;
 mod comparison;
+mod counted_text;
 mod fail_reasons;
 mod headline;
 mod intervals;
@@ -36,6 +37,7 @@ pub use adjudication::AdjudicationRules;
 pub use block_accuracy::{BlockAccuracy, BoxAccuracy, PrecisionRecall};
 pub use build::{build, build_with};
 pub use comparison::{Basis, COMPARED_METRICS, Comparison};
+pub use counted_text::{CountedPairs, CountedText, TextPart};
 pub use fail_reasons::FailReasonCount;
 pub use model::{
     BlockCounts, FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA,

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::adjudication::AdjudicationRules;
 use super::block_accuracy::BlockAccuracy;
 use super::comparison::{Basis, Comparison};
+use super::counted_text::CountedText;
 use super::fail_reasons::FailReasonCount;
 use super::provenance::Provenance;
 use super::risk_coverage::RiskCoverageCurve;
@@ -17,7 +18,7 @@ use mocban_catalog::SetApart;
 use mocban_core::domain::{FailureClass, JobStatus, PairName, Reason, Stage, ThresholdMetric};
 use mocban_results::attention_checks::AttentionCheckRates;
 use mocban_results::manual_alignment::ManualAlignmentErrors;
-use mocban_results::number_format::{count_list, counted};
+use mocban_results::number_format::counted;
 use mocban_results::stats::IntervalMethod;
 
 /// Version of the JSON form.
@@ -30,7 +31,7 @@ pub struct Report {
     pub schema: u32,
     /// The answer in at most three sentences: how many pairs are aligned, Acc, and which differences are significant.
     /// Commands are in backticks.
-    pub headline: Vec<String>,
+    pub headline: Vec<CountedText>,
     /// Pairs in the project, in every state.
     pub pairs: u64,
     /// Retired pairs, which are in no other number.
@@ -73,7 +74,7 @@ pub struct Report {
     #[serde(skip_serializing_if = "SetApart::is_empty")]
     pub set_apart: SetApart,
     /// Caveats on the numbers, in whole sentences.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<CountedText>,
     /// What the numbers were computed from.
     pub provenance: Provenance,
 }
@@ -135,14 +136,6 @@ impl BlockCounts {
             .map(|(n, one, more)| format!("{} {}", counted(n, "block"), verb(n, one, more)))
             .collect();
         (!parts.is_empty()).then(|| parts.join(" and "))
-    }
-}
-
-impl PairProgress {
-    /// Returns the numbers of pairs without results, such as `2 failed, 1 not finished`. Returns `None` if all pairs
-    /// are done.
-    pub(super) fn without_results(self) -> Option<String> {
-        count_list([(self.failed, "failed"), (self.pending, "not finished")])
     }
 }
 

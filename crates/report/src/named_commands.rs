@@ -103,7 +103,8 @@ mod tests {
                 report.add(&pair, &TruthEvaluation::default());
             }
             let report = report.finish();
-            texts.extend(report.headline.into_iter().chain(report.warnings));
+            let said = report.headline.iter().chain(&report.warnings);
+            texts.extend(said.map(ToString::to_string));
         }
         let set_apart = SetApart {
             count: 1,

@@ -1,9 +1,10 @@
 //! Caveats on the numbers of a report, in whole sentences.
 
+use super::counted_text::{CountedPairs, CountedText};
 use super::model::{MetricRow, PairProgress};
 use super::score_bootstrap::BootstrapSkipped;
-use mocban_catalog::PairResults;
-use mocban_core::domain::sanitize;
+use mocban_catalog::{JointVerdict, PairResults};
+use mocban_core::domain::{ThresholdMetric, sanitize};
 use mocban_results::TruthEvaluation;
 use mocban_results::attention_checks::AttentionCheckRates;
 use mocban_results::number_format::NumberStyle::Score;
@@ -40,14 +41,16 @@ pub(super) fn warnings(
     truth: &TruthProblems,
     skipped: Option<BootstrapSkipped>,
     attention_checks: Option<&AttentionCheckRates>,
-) -> Vec<String> {
+) -> Vec<CountedText> {
     let mut warnings = Vec::new();
     warnings.extend(missing_pairs(progress));
-    warnings.extend(rows.iter().filter_map(impossible_dice));
-    warnings.extend(qualified_results(rows));
-    warnings.extend(unusable_truth(truth));
-    warnings.extend(skipped.map(bootstrap_skipped));
-    warnings.extend(attention_checks.into_iter().flat_map(missed_checks));
+    let impossible = rows.iter().filter_map(impossible_dice);
+    warnings.extend(impossible.map(CountedText::from));
+    warnings.extend(qualified_results(rows, progress.done));
+    let others = unusable_truth(truth).into_iter();
+    let others = others.chain(skipped.map(bootstrap_skipped));
+    let others = others.chain(attention_checks.into_iter().flat_map(missed_checks));
+    warnings.extend(others.map(CountedText::from));
     warnings
 }
 
@@ -78,13 +81,42 @@ fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {
     format!("Means have no intervals, and metrics are not compared by score. {why}")
 }
 
-fn missing_pairs(progress: PairProgress) -> Option<String> {
-    let missing = progress.failed + progress.pending;
-    let counts = progress.without_results()?;
+/// Returns a warning that names the pairs without results, or `None` if all pairs are done.
+fn missing_pairs(progress: PairProgress) -> Option<CountedText> {
+    let PairProgress {
+        done,
+        failed,
+        pending,
+    } = progress;
+    let missing = failed + pending;
+    // No list has both failed and unfinished pairs.
+    let listed = match (failed, pending) {
+        (0, 0) => return None,
+        (_, 0) => vec![CountedPairs::Failed],
+        (0, _) => vec![CountedPairs::Unfinished],
+        _ => Vec::new(),
+    };
+    let mut warning = CountedText::default();
+    warning.push_count(missing, listed);
+    warning.append(CountedText::filled(
+        " of {} ",
+        &[(done + missing, CountedPairs::All)],
+    ));
+    let noun = if done + missing == 1 { "pair" } else { "pairs" };
     let verb = if missing == 1 { "is" } else { "are" };
-    let pairs = counted(progress.done + missing, "pair");
-    let missing = format_count(missing);
-    Some(format!("{missing} of {pairs} {verb} in no row: {counts}."))
+    warning.push(&format!("{noun} {verb} in no row: "));
+    let counts = [
+        (failed, CountedPairs::Failed, " failed"),
+        (pending, CountedPairs::Unfinished, " not finished"),
+    ];
+    let counts = counts.into_iter().filter(|(n, _, _)| *n > 0);
+    for (i, (n, pairs, what)) in counts.enumerate() {
+        warning.push(if i == 0 { "" } else { ", " });
+        warning.push_count(n, vec![pairs]);
+        warning.push(what);
+    }
+    warning.push(".");
+    Some(warning)
 }
 
 /// Returns a warning if the mean Dice exceeds the largest value that the mean `IoU` allows.
@@ -105,50 +137,92 @@ fn impossible_dice(row: &MetricRow) -> Option<String> {
     })
 }
 
-/// Returns warnings that count stale verdicts, conflicts and mirrored results. Metrics with the same counts share one.
-fn qualified_results(rows: &[MetricRow]) -> Vec<String> {
-    let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
-    for (row, text) in rows
-        .iter()
-        .flat_map(|row| qualifications(row).map(move |text| (row, text)))
-    {
-        match groups.iter_mut().find(|(known, _)| *known == text) {
-            Some((_, titles)) => titles.push(row.metric.title()),
-            None => groups.push((text, vec![row.metric.title()])),
+/// How many results of a metric have a property.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Qualification {
+    results: u64,
+    count: u64,
+    /// The joint verdict of these results, if it is the property.
+    joint: Option<JointVerdict>,
+    verbs: [&'static str; 2],
+    what: &'static str,
+}
+
+/// Returns warnings that count stale verdicts, conflicts and mirrored results of `done` pairs. Metrics with the same counts
+/// share one.
+fn qualified_results(rows: &[MetricRow], done: u64) -> Vec<CountedText> {
+    let mut groups: Vec<(Qualification, Vec<ThresholdMetric>)> = Vec::new();
+    for row in rows {
+        for found in qualifications(row) {
+            match groups.iter_mut().find(|(known, _)| *known == found) {
+                Some((_, metrics)) => metrics.push(row.metric),
+                None => groups.push((found, vec![row.metric])),
+            }
         }
     }
-    let groups = groups.into_iter();
+    let groups = groups.iter();
     groups
-        .map(|(text, titles)| format!("{}: {text}", titles.join(", ")))
+        .map(|(found, metrics)| found.sentence(metrics, done))
         .collect()
 }
 
-/// Returns the counts of one metric, each as a sentence without the metric.
-fn qualifications(row: &MetricRow) -> impl Iterator<Item = String> + use<> {
+/// Returns the counts of one metric that are not 0.
+fn qualifications(row: &MetricRow) -> impl Iterator<Item = Qualification> + use<> {
     let mirrored = row.truth.as_ref().map_or(0, |truth| truth.mirrored);
     let counts = [
         (
             row.stale,
+            Some(JointVerdict::Stale),
             ["has", "have"],
             "a verdict on an earlier result only",
         ),
         (
             row.conflicts,
+            Some(JointVerdict::Conflict),
             ["is", "are"],
             "unsure because reviewers disagree",
         ),
         (
             mirrored,
+            None,
             ["is", "are"],
             "mirrored (angle error 180 degrees)",
         ),
     ];
-    let results = counted(row.n, "result");
-    let counts = counts.into_iter().filter(|(n, _, _)| *n > 0);
-    counts.map(move |(n, [one, more], what)| {
-        let verb = if n == 1 { one } else { more };
-        format!("of {results}, {} {verb} {what}.", format_count(n))
+    let results = row.n;
+    let counts = counts.into_iter().filter(|(count, ..)| *count > 0);
+    counts.map(move |(count, joint, verbs, what)| Qualification {
+        results,
+        count,
+        joint,
+        verbs,
+        what,
     })
+}
+
+impl Qualification {
+    /// Returns the sentence on metrics with these counts, in a project with `done` pairs.
+    fn sentence(&self, metrics: &[ThresholdMetric], done: u64) -> CountedText {
+        let titles: Vec<&str> = metrics.iter().map(|metric| metric.title()).collect();
+        let mut sentence = CountedText::from(format!("{}: of ", titles.join(", ")));
+        let aligned = (self.results == done).then_some(CountedPairs::Aligned);
+        sentence.push_count(self.results, aligned.into_iter().collect());
+        let noun = if self.results == 1 {
+            "result"
+        } else {
+            "results"
+        };
+        sentence.push(&format!(" {noun}, "));
+        let pairs = metrics.iter().filter_map(|metric| {
+            let joint = self.joint?;
+            Some(CountedPairs::Judged(*metric, joint))
+        });
+        sentence.push_count(self.count, pairs.collect());
+        let [one, more] = self.verbs;
+        let verb = if self.count == 1 { one } else { more };
+        sentence.push(&format!(" {verb} {}.", self.what));
+        sentence
+    }
 }
 
 fn unusable_truth(truth: &TruthProblems) -> Option<String> {
@@ -253,7 +327,7 @@ mod tests {
             row(ThresholdMetric::Ensemble, 1),
         ];
         assert_eq!(
-            qualified_results(&rows),
+            qualified_results(&rows, 587),
             [
                 "Non-luminous SSIM, Ensemble: of 587 results, 1 is unsure because reviewers disagree.",
                 "Pixel density: of 587 results, 2 are unsure because reviewers disagree.",

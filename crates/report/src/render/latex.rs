@@ -179,10 +179,11 @@ mod tests {
     fn a_report_has_no_overfull_boxes() {
         let mut full = test_fixtures::full_report();
         // A path and characters that the fonts of pdfLaTeX lack.
-        full.warnings.push(format!(
+        let warning = format!(
             "1 record is not used: chữ số 𡨸/{}.json, line 7.",
             "part_".repeat(30)
-        ));
+        );
+        full.warnings.push(warning.into());
         full.provenance.compare_with(|_| serde_json::Value::Null);
         check("pdflatex", &full);
         check("xelatex", &full);

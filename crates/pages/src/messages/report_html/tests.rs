@@ -323,7 +323,7 @@ fn attention_checks_and_damaged_rows() {
             first: vec!["row 3 of the table undo differs from its checksum".to_owned()],
         };
         let sentence = set_apart.sentence().expect("a row");
-        report.warnings.push(sentence + ".");
+        report.warnings.push((sentence + ".").into());
         check(&report, &Gallery::default());
     }
 }

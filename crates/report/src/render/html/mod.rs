@@ -220,7 +220,7 @@ mod tests {
                 first: vec!["row 3".to_owned()],
             };
             let sentence = set_apart.sentence().expect("a row");
-            report.warnings.push(sentence + ".");
+            report.warnings.push((sentence + ".").into());
             let page = page(&report, &Gallery::default(), &Cover::default());
             for said in [said, "row 3. In the app, the page Health lists them."] {
                 assert!(page.contains(said), "{said}: {page}");
