@@ -83,6 +83,9 @@ fn every_count_of_the_report_leads_to_its_pairs() {
         ("?verdict=judged&metric=density", 1),
         ("?verdict=joint-pass&metric=ensemble", 1),
         ("?verdict=joint-fail&metric=ensemble", 1),
+        ("?verdict=decided&metric=ensemble", 2),
+        ("?verdict=conflict&metric=ensemble", 1),
+        ("?verdict=joint-unsure&metric=ensemble", 1),
     ] {
         assert_eq!(of(address), Some(count), "{address}: {numbers:?}");
     }

@@ -12,15 +12,13 @@ use super::components::{
     NavSection, empty, figure, frame, grouped, number_table, score, stored_message,
 };
 use super::failure::{AppFailure, AppResult};
-use super::linked_counts::LinkedCounts;
+use super::linked_counts::linked_sentences;
 use super::pair_query::{
     ALIGNED_PAIRS, ALL_PAIRS, FAILED_PAIRS, LOW_CONFIDENCE_PAIRS, RETIRED_PAIRS, UNFINISHED_PAIRS,
 };
 use super::run_blocks::failed_blocks_part;
-use super::sentence::without_commands;
 use super::state::AppState;
 use super::visit::Visit;
-use crate::messages;
 use crate::on_thread::read_in_turn;
 use crate::report_language::report_page;
 use crate::review::Language;
@@ -28,7 +26,7 @@ use mocban_core::domain::{ThresholdMetric, one_line};
 use mocban_project::ProjectError;
 use mocban_project::location::now;
 use mocban_project::report::{ReportOptions, read, report};
-use mocban_report::{CommandPage, MetricRow, Report, ReportFormat, command_page};
+use mocban_report::{CommandPage, CountedText, MetricRow, Report, ReportFormat, command_page};
 use mocban_results::IntervalMethod;
 
 /// Formats that can be saved: format, extension, content type and name.
@@ -90,10 +88,11 @@ pub(super) async fn numbers(
 }
 
 fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
-    let counts_in_sentences = LinkedCounts::of(report, visit.language);
-    let sentences = |text: &str| counts_in_sentences.markup(&shown_sentences(visit, text));
+    let sentences = |text: &CountedText| {
+        html! { (linked_sentences(visit, text)) (remedy_link(visit, key, text)) }
+    };
     html! {
-        @for text in &report.headline { p { (sentences(text)) (remedy_link(visit, key, text)) } }
+        @for text in &report.headline { p { (sentences(text)) } }
         @if report.pairs + report.retired > 0 { (counts(visit, report)) }
         (failed_blocks_part(visit, "./", report.block_progress.map_or(0, |blocks| blocks.failed)))
         @if report.rows.iter().all(|row| row.n == 0) {
@@ -108,7 +107,7 @@ fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
         (reasons(visit, report))
         @if !report.warnings.is_empty() {
             h2 { (visit.t("What limits these numbers", "Những giới hạn của các con số này")) }
-            ul { @for text in &report.warnings { li { (sentences(text)) (remedy_link(visit, key, text)) } } }
+            ul { @for text in &report.warnings { li { (sentences(text)) } } }
         }
     }
 }
@@ -129,15 +128,6 @@ fn remedy_link(visit: &Visit, key: &str, text: &str) -> Markup {
         Some(CommandPage::Run | CommandPage::Failures) | None => None,
     };
     html! { @if let Some((address, name)) = link { " " a href=(address) { (name) } } }
-}
-
-/// Returns sentences of the report, which are in English, in the language of the page and without commands.
-fn shown_sentences(visit: &Visit, text: &str) -> String {
-    let plain = without_commands(text);
-    match visit.language {
-        Language::English => plain,
-        Language::Vietnamese => messages::report_text(&plain),
-    }
 }
 
 /// Returns the numbers of pairs that the sentences above have, with links to these pairs.

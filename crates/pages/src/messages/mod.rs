@@ -2,6 +2,7 @@
 
 mod block_messages;
 mod block_refusals;
+mod count_marks;
 mod foreign_messages;
 mod form_messages;
 mod held_messages;
@@ -29,6 +30,7 @@ mod source_texts;
 mod stage_words;
 mod system_messages;
 
+pub(crate) use count_marks::{marked_count, marked_parts, unmarked};
 pub(crate) use left_out_words::left_out_reasons;
 pub(crate) use message_parts::with_more;
 pub(crate) use message_words::vietnamese;

@@ -1,5 +1,6 @@
 //! Sentences of the report in Vietnamese. The report is made in English, so they are recognised by their wording.
 
+use super::count_marks::is_count_mark;
 use super::message_patterns::{day_first, filled_by, parts_of};
 use super::message_words::vietnamese;
 use super::report_answers::REPORT_ANSWERS;
@@ -7,7 +8,8 @@ use super::report_captions::REPORT_CAPTIONS;
 use super::report_table::{REPORT_COUNTED, REPORT_FRAME, REPORT_TERMS};
 use super::stage_words::stage_text;
 
-/// Returns a text of the report in Vietnamese: a term, or sentences. Words that are not known stay as they are.
+/// Returns a text of the report in Vietnamese: a term, or sentences. Words that are not known stay as they are, and so do marks
+/// of counts.
 pub(crate) fn report_text(text: &str) -> String {
     if let Some(known) = found(REPORT_TERMS, text).or_else(|| stage_text(text)) {
         return known.to_owned();
@@ -189,9 +191,11 @@ fn numbers(text: &str) -> String {
     said
 }
 
-/// Returns a number such as `1,024.5` with a decimal comma and thin spaces between thousands. `None` if it is none.
+/// Returns a number such as `1,024.5` with a decimal comma and thin spaces between thousands. `None` if it is none. Marks of a
+/// count stay around it.
 fn vietnamese_number(text: &str) -> Option<String> {
-    let (whole, decimals) = text.split_once('.').unwrap_or((text, "0"));
+    let plain = text.trim_matches(is_count_mark);
+    let (whole, decimals) = plain.split_once('.').unwrap_or((plain, "0"));
     let are_digits =
         |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let groups: Vec<&str> = whole.split(',').collect();
