@@ -109,7 +109,7 @@ UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
     AND id IN (SELECT id FROM worker ORDER BY id DESC LIMIT 33)";
 
 /// Selects the numbers of all locks of workers in this catalog. The key is that of `TRY_LOCK` in
-/// `queue/commit/server_commit.rs`.
+/// `queue/commit/write_connection.rs`.
 const WORKER_LOCKS: &str = "
 SELECT CAST(objid AS bigint) FROM pg_locks
 WHERE locktype = 'advisory' AND objsubid = 2 AND granted

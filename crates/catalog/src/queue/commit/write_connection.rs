@@ -1,6 +1,8 @@
 //! The write connection of a catalog. In SQLite, it checks before and after each commit whether another program deleted,
-//! replaced or cut the write-ahead log. In PostgreSQL, it reconnects when the server was unavailable.
+//! replaced or cut the write-ahead log. In PostgreSQL, it reconnects when the server was unavailable, and remembers the leases
+//! that this process has received, and the lock of its worker.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,11 +16,13 @@ use crate::db::error::{CatalogError, Result};
 use crate::db::log_watch::LogWatch;
 use crate::db::postgres::LOCK_FOR_ANY_PLAN;
 use crate::db::postgres_address::PostgresAddress;
-use crate::db::query::query;
+use crate::db::query::{query, query_scalar};
 use crate::db::retry_wait::RetryWait;
 use crate::db::transaction::BEGIN;
-use crate::queue::commit::server_commit::CatalogServerState;
-use mocban_core::domain::WorkerId;
+use crate::queue::claim_tracker::ClaimTracker;
+use crate::queue::lease::{Lease, leases};
+use crate::queue::pair_job::PairJob;
+use mocban_core::domain::{PairId, WorkerId};
 
 /// Time after a connection was given up in which no other is tried.
 const PAUSE_AFTER_GIVING_UP: Duration = Duration::from_secs(10);
@@ -293,4 +297,112 @@ pub(crate) async fn rollback(conn: &mut Conn) {
 
 async fn execute(conn: &mut Conn, sql: impl Into<Sql>) -> Result<()> {
     query(sql).execute(conn).await
+}
+
+/// What this process remembers of its requests to a server.
+#[derive(Debug, Default)]
+pub(crate) struct CatalogServerState {
+    pub(crate) leases: KnownLeases,
+    pub(crate) claim_tracker: ClaimTracker,
+    /// Whether the counters of all earlier slots were added up over this connection.
+    pub(crate) has_folded_all: bool,
+    worker_lock: WorkerLock,
+    pub(crate) retry_wait: Arc<RetryWait>,
+}
+
+/// Time after a reconnection or a failed claim during which unknown leases are searched for. A server may execute a commit
+/// of the broken connection until it notices that the connection is broken.
+const SEARCH_TIME: Duration = Duration::from_mins(2);
+
+/// Leases that this process has received from a server: their tokens by pair. The reply to a claim can be lost after its
+/// commit. Then the catalog contains leases that this process has not received, and its heartbeats keep them valid.
+#[derive(Debug, Default)]
+pub(crate) struct KnownLeases {
+    tokens: BTreeMap<PairId, i64>,
+    search_until: Option<Instant>,
+}
+
+impl KnownLeases {
+    /// Records that replies may have been lost.
+    pub(crate) fn replies_may_be_lost(&mut self) {
+        self.search_until = Some(Instant::now() + SEARCH_TIME);
+    }
+
+    /// Returns whether an earlier commit may have been stored although its reply was lost.
+    pub(crate) fn is_searching(&self) -> bool {
+        self.search_until
+            .is_some_and(|until| Instant::now() <= until)
+    }
+
+    /// Adds leases that a claim returned.
+    pub(crate) fn add(&mut self, leases: &[Lease]) {
+        let tokens = leases.iter().map(|lease| (lease.unit, lease.token));
+        self.tokens.extend(tokens);
+    }
+
+    /// Removes a lease that has ended. A later lease of the same pair stays.
+    pub(crate) fn remove(&mut self, lease: &Lease) {
+        if self.tokens.get(&lease.unit) == Some(&lease.token) {
+            self.tokens.remove(&lease.unit);
+        }
+    }
+
+    /// Returns the leases of a worker that this process has not received. Queries the server only for `SEARCH_TIME` after
+    /// a reconnection or a failed claim.
+    pub(crate) async fn unknown(&self, conn: &mut Conn, worker: WorkerId) -> Result<Vec<Lease>> {
+        if !self.is_searching() {
+            return Ok(Vec::new());
+        }
+        let mut leases = leases::<PairJob>(conn, worker).await?;
+        leases.retain(|lease| self.tokens.get(&lease.unit) != Some(&lease.token));
+        Ok(leases)
+    }
+}
+
+/// Takes the lock of a worker until the end of the session. Returns `false` if another session holds it, such as a broken
+/// connection of the same worker. `WORKER_LOCKS` in `lease_recovery.rs` has the same key.
+const TRY_LOCK: &str = "
+SELECT pg_try_advisory_lock(hashtext(current_setting('search_path')), CAST(?1 % 2147483648 AS integer))";
+
+/// The lock of a worker, as far as its connection knows. It shows others that the worker is connected, and the server releases
+/// it when the process dies. A lock that is free is only a hint: a connection may break while its worker lives.
+#[derive(Debug, Default)]
+struct WorkerLock {
+    worker: Option<WorkerId>,
+    is_held: bool,
+}
+
+impl WorkerLock {
+    /// Sets the worker whose lock is taken from now on.
+    fn set_worker(&mut self, worker: WorkerId) {
+        if self.worker != Some(worker) {
+            *self = Self {
+                worker: Some(worker),
+                is_held: false,
+            };
+        }
+    }
+
+    /// Records that the session has ended.
+    const fn session_ended(&mut self) {
+        self.is_held = false;
+    }
+
+    /// Takes the lock if it is not held. Otherwise, only finds out whether the connection works.
+    async fn take(&mut self, conn: &mut Conn) -> Result<()> {
+        let Some(worker) = self.worker else {
+            return Ok(());
+        };
+        if self.is_held {
+            let _: i64 = query_scalar("SELECT CAST(1 AS bigint)")
+                .fetch_one(conn)
+                .await?;
+        } else {
+            self.is_held = query_scalar(TRY_LOCK)
+                .bind(worker.0)
+                .fetch_one(conn)
+                .await?;
+        }
+        Ok(())
+    }
 }

@@ -14,8 +14,7 @@ use crate::db::busy_retry::retry_while_busy;
 use crate::db::conn::Work;
 use crate::db::error::{CatalogError, Result};
 use crate::db::error_kind::CatalogErrorKind;
-use crate::queue::commit::group_commit::{Batch, BatchReply, Request};
-use crate::queue::commit::server_commit;
+use crate::queue::commit::group_commit::{Batch, BatchReply, Request, commit_on_server};
 use crate::queue::commit::write_connection::{WriteConnection, rollback};
 
 /// Number of commits, with about 4 MiB of log, after which the log is checkpointed even if requests are pending.
@@ -240,7 +239,7 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
             let outcome = match server.as_deref_mut() {
                 Some(state) => {
                     let retry_wait = Arc::clone(&state.retry_wait);
-                    let commit = server_commit::commit(batch, conn, state);
+                    let commit = commit_on_server(batch, conn, state);
                     retry_wait.limit(commit).await
                 }
                 None => batch.apply(conn, false).await,
