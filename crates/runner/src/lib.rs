@@ -3,7 +3,7 @@
 //! [`run()`] prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
 //! `pair_task`, and the task a thread, which runs each `pair_stage` through `pair_pipeline`. The task hands computed
 //! stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what follows a
-//! failure. Whole blocks run before pairs, one at a time: `block/slot.rs` leases a block, `block/task.rs` runs its stages,
+//! failure. Whole blocks run before pairs, one at a time: `block/task.rs` leases a block and runs its stages,
 //! and `block/pipeline` reads their files. [`check`] compares a project with its catalog and repairs it. Every call fails
 //! if the catalog, an input or an artifact cannot be read or written. `# Errors` names other reasons.
 //!
@@ -49,10 +49,10 @@
 //! a new cut reset it: the stage runs on, and its next write is refused. If the connection to a server breaks, writes are
 //! sent again until a stop ends the waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
 //!
-//! Read 20 files to follow a lease. Pairs: `run_context.rs`, `worker_session.rs`, `scheduler.rs`, `prefetch.rs`, `pair_task.rs`,
+//! Read 18 files to follow a lease. Pairs: `run_context.rs`, `worker_session.rs`, `scheduler.rs`, `prefetch.rs`, `pair_task.rs`,
 //! `checkpointer.rs`; in the catalog `src/worker_requests.rs`, `src/lease_recovery.rs`, `queue/kind.rs`, `queue/lease.rs`,
-//! `queue/claim.rs`, `queue/checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL `commit/server_commit.rs`,
-//! `commit/write_connection.rs`, `queue/server_checkpoint.rs`. Blocks: `block/slot.rs`, `block/task.rs`, `block/checkpoint.rs`.
+//! `queue/claim.rs`, `queue/checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL `commit/write_connection.rs`,
+//! `queue/server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`.
 //!
 //! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled:
 //! inner loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs`

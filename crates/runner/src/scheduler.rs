@@ -7,8 +7,7 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use super::block::slot::{BlockRunCounts, BlockSlot};
-use super::block::task::BlockReport;
+use super::block::task::{BlockReport, BlockRunCounts, BlockSlot};
 use super::blocking::task_result;
 use super::error::RunError;
 use super::events::{CutPairs, RunEvent};

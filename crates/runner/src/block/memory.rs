@@ -3,8 +3,11 @@
 use std::io::Read as _;
 use std::path::PathBuf;
 
-use crate::input_reads::ReadItem;
+use crate::input_reads::{ReadItem, ReadLimits, read_each};
 use crate::memory_estimate::{mesh_bytes, print_pixels};
+use crate::options::RunOptions;
+use crate::run_context::RunContext;
+use crate::stop::StopLevel;
 use mocban_align::block::MAX_MAP_PIXELS;
 use mocban_catalog::BlockAttributes;
 use mocban_core::mesh::{STL_HEAD, binary_stl_triangles};
@@ -12,7 +15,7 @@ use mocban_core::raster;
 use mocban_store::{Input, Project};
 
 /// Bytes reserved for the height maps of both sides, their relief and the search for the page. Measured: 120 MB.
-pub(crate) const BLOCK_BYTES: u64 = 160 << 20;
+const BLOCK_BYTES: u64 = 160 << 20;
 /// Part of the length of a streamed scan that the meshes of its characters take while they are cut. Measured: 1/18,
 /// with scans of 0.25 and 1.3 GB.
 const STREAMED_SHARE: u64 = 16;
@@ -24,7 +27,7 @@ const MAP_PIXEL_BYTES: u64 = 16;
 
 /// Returns the memory for the height maps of a block in a run with a limit: a quarter of it, but not more than the
 /// largest maps take.
-pub(crate) fn map_bytes(memory: Option<u64>) -> u64 {
+fn map_bytes(memory: Option<u64>) -> u64 {
     let largest = MAX_MAP_PIXELS as u64 * MAP_PIXEL_BYTES;
     memory.map_or(largest, |bytes| largest.min(bytes / 4))
 }
@@ -34,13 +37,46 @@ pub(crate) fn max_map_pixels(memory: Option<u64>) -> usize {
     (map_bytes(memory) / MAP_PIXEL_BYTES) as usize
 }
 
+/// What the estimates of a run have in common.
+pub(crate) struct BlockMemory {
+    limits: raster::ImageLimits,
+    /// Memory for the height maps of a block, whose size is known only when its scan is read.
+    map_bytes: u64,
+}
+
+impl BlockMemory {
+    pub(crate) fn new(options: &RunOptions) -> Self {
+        Self {
+            limits: options.limits.image,
+            map_bytes: map_bytes(options.memory),
+        }
+    }
+
+    /// Estimates the memory that a block needs, in bytes. Reads the headers of its files.
+    pub(crate) async fn estimate(&self, context: &RunContext, attributes: &BlockAttributes) -> u64 {
+        let block = EstimatedBlock {
+            project: context.project.clone(),
+            attributes: attributes.clone(),
+            limits: self.limits,
+            map_bytes: self.map_bytes,
+        };
+        let limits = ReadLimits {
+            timeout: context.timing.read_timeout(),
+            stop: context.stop.clone(),
+            until: StopLevel::Drain,
+        };
+        let estimated = read_each(vec![block], &limits).await;
+        let estimated = estimated.into_iter().flatten().next();
+        estimated.unwrap_or(BLOCK_BYTES)
+    }
+}
+
 /// A block whose memory is estimated.
-pub(crate) struct EstimatedBlock {
-    pub(crate) project: Project,
-    pub(crate) attributes: BlockAttributes,
-    pub(crate) limits: raster::ImageLimits,
-    /// Memory for its height maps, whose size is known only when its scan is read.
-    pub(crate) map_bytes: u64,
+struct EstimatedBlock {
+    project: Project,
+    attributes: BlockAttributes,
+    limits: raster::ImageLimits,
+    map_bytes: u64,
 }
 
 impl ReadItem for EstimatedBlock {

@@ -5,5 +5,4 @@ pub(crate) mod checkpoint;
 pub(crate) mod inputs;
 pub(crate) mod memory;
 pub(crate) mod pipeline;
-pub(crate) mod slot;
 pub(crate) mod task;
