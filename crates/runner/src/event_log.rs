@@ -66,14 +66,14 @@ fn log_block_event(event: &RunEvent) {
             stage,
             warning,
         } => tracing::info!(%block, %stage, warning, "a stage warned"),
-        RunEvent::BlockDone {
-            block,
-            added,
-            changed,
-            unchanged,
-            retired,
-            ..
-        } => tracing::info!(%block, added, changed, unchanged, retired, "the block is done"),
+        RunEvent::BlockDone { block, cut, .. } => tracing::info!(
+            %block,
+            added = cut.added,
+            changed = cut.changed,
+            unchanged = cut.unchanged,
+            retired = cut.retired,
+            "the block is done"
+        ),
         RunEvent::BlockFailed {
             block,
             stage,

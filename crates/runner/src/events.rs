@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Serialize, Serializer};
 
 use super::stop::StopLevel;
-use mocban_catalog::StatusCounts;
+use mocban_catalog::{CutSummary, StatusCounts};
 use mocban_core::domain::{BlockName, BlockStage, Failure, PairName, Stage};
 
 /// Something that happened in a run.
@@ -99,18 +99,9 @@ pub enum RunEvent {
     BlockDone {
         /// The block.
         block: BlockName,
-        /// Pairs that are new.
-        added: u64,
-        /// Pairs that changed and run again.
-        changed: u64,
-        /// Pairs that stay as they are.
-        unchanged: u64,
-        /// Pairs that were retired because their boxes are gone.
-        retired: u64,
-        /// Retired and changed pairs with verdicts.
-        judged: u64,
-        /// Retired pairs that came back with their boxes.
-        restored: u64,
+        /// What the cut changed.
+        #[serde(flatten)]
+        cut: CutSummary,
         /// Stages that each new or changed pair has to run.
         stages: u64,
     },
@@ -177,20 +168,12 @@ pub struct CutPairs {
 impl CutPairs {
     /// Counts the pairs of a block that is cut.
     pub(super) const fn observe(&mut self, event: &RunEvent) {
-        if let RunEvent::BlockDone {
-            added,
-            changed,
-            retired,
-            judged,
-            restored,
-            ..
-        } = event
-        {
-            self.added += *added;
-            self.changed += *changed;
-            self.retired += *retired;
-            self.judged += *judged;
-            self.restored += *restored;
+        if let RunEvent::BlockDone { cut, .. } = event {
+            self.added += cut.added;
+            self.changed += cut.changed;
+            self.retired += cut.retired;
+            self.judged += cut.judged;
+            self.restored += cut.restored;
         }
     }
 }

@@ -68,6 +68,7 @@ impl BlockProgress {
 mod tests {
     use super::BlockProgress;
     use crate::cli::output::run_progress::RunProgress;
+    use mocban_catalog::CutSummary;
     use mocban_core::domain::{BlockName, BlockStage, Failure, FailureClass};
     use mocban_runner::RunEvent;
 
@@ -98,12 +99,10 @@ mod tests {
         assert_eq!(progress.percent(), 12);
         progress.observe(&RunEvent::BlockDone {
             block: block("b1"),
-            added: 3,
-            changed: 0,
-            unchanged: 0,
-            retired: 0,
-            judged: 0,
-            restored: 0,
+            cut: CutSummary {
+                added: 3,
+                ..CutSummary::default()
+            },
             stages: 4,
         });
         progress.observe(&stage_of("b2", BlockStage::Face));

@@ -189,15 +189,11 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<(String, String)> {
         RunEvent::Stopping { level, reason } => {
             plain(palette.paint(Tone::Warn, stopping_line(*level, reason)))
         }
-        RunEvent::BlockDone {
-            block,
-            added,
-            changed,
-            retired,
-            ..
-        } => plain(format!(
-            "block {block}: {} added, {changed} changed, {retired} retired",
-            count(*added, "pair")
+        RunEvent::BlockDone { block, cut, .. } => plain(format!(
+            "block {block}: {} added, {} changed, {} retired",
+            count(cut.added, "pair"),
+            cut.changed,
+            cut.retired
         )),
         RunEvent::BlockFailed {
             block,

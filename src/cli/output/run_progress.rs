@@ -55,12 +55,9 @@ impl RunProgress {
             }
             RunEvent::PairDone { .. } => self.done += 1,
             RunEvent::PairFailed { stage, skipped, .. } => self.fail(*stage, *skipped),
-            RunEvent::BlockDone {
-                added,
-                changed,
-                stages,
-                ..
-            } => self.add_pairs(added + changed, *stages),
+            RunEvent::BlockDone { cut, stages, .. } => {
+                self.add_pairs(cut.added + cut.changed, *stages);
+            }
             RunEvent::StageStarted { .. }
             | RunEvent::BlockStageStarted { .. }
             | RunEvent::BlockStageFinished { .. }

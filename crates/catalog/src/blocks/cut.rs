@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use serde::Serialize;
+
 use crate::Result;
 use crate::blocks::characters;
 use crate::blocks::model::{CutPair, NewCharacter};
@@ -20,7 +22,7 @@ use crate::records::similar_names;
 use mocban_core::domain::{BlockId, BlockName, PairId, PairName, RetireCause, Stage};
 
 /// What the cut of a block changed.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct CutSummary {
     /// Pairs that are new.
     pub added: u64,

@@ -17,7 +17,7 @@ use crate::run_context::{JobEnd, RunContext};
 use crate::stage_output::result_hash;
 use mocban_catalog::{
     BlockInputVersions, BlockJob, BlockProvenance, BlockWork, CheckpointOutcome, CutPair, CutReply,
-    CutSummary, FailureAction, InputVersion, Lease, NewCharacter, StageCheckpoint, StageFailure,
+    FailureAction, InputVersion, Lease, NewCharacter, StageCheckpoint, StageFailure,
 };
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{
@@ -195,12 +195,12 @@ async fn finish_cut(
     characters: Vec<NewCharacter>,
 ) -> Result<AfterStage, RunError> {
     let (catalog, lease) = (&context.catalog, &block.lease);
-    let summary = match stored!(catalog.finish_cut(
+    let cut = match stored!(catalog.finish_cut(
         lease.clone(),
         checkpoint.clone(),
         characters.clone()
     ))? {
-        CutReply::Stored(summary) => summary,
+        CutReply::Stored(cut) => cut,
         CutReply::Refused => return Ok(AfterStage::End(JobEnd::LeaseLost)),
         CutReply::NameTaken(taken) => {
             let text = format!(
@@ -211,24 +211,11 @@ async fn finish_cut(
                 .await;
         }
     };
-    let CutSummary {
-        added,
-        changed,
-        unchanged,
-        retired,
-        judged,
-        restored,
-    } = summary;
     let block = block.work.attributes.name;
     finished(context, &block, &checkpoint);
     context.emit(RunEvent::BlockDone {
         block,
-        added,
-        changed,
-        unchanged,
-        retired,
-        judged,
-        restored,
+        cut,
         stages: context.until.index() as u64 + 1,
     });
     Ok(AfterStage::End(JobEnd::Done))

@@ -402,7 +402,7 @@ async fn events_name_the_block_and_its_pairs() {
     fixture.run(&options(1)).await;
     let events = fixture.events.lock().expect("an unpoisoned lock");
     let done = events.iter().find_map(|event| match event {
-        RunEvent::BlockDone { added, stages, .. } => Some((*added, *stages)),
+        RunEvent::BlockDone { cut, stages, .. } => Some((cut.added, *stages)),
         _ => None,
     });
     assert_eq!(done, Some((2, 4)));
