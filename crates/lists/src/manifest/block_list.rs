@@ -7,8 +7,7 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 use super::block_columns::{COLUMNS, OPTIONAL, REQUIRED};
-use super::cell_errors::{FormulaErrors, id_error};
-use super::cell_forms::UnusualCells;
+use super::cell_errors::id_error;
 use super::changed_ids::ChangedIds;
 use super::column_names::missing_column;
 use super::csv::{ListedColumn, column_names, draft_of};
@@ -17,12 +16,10 @@ use super::draft::{
 };
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::json_rows;
-use super::row::RowIds;
+use super::row::ReadRows;
 use super::row_reader::{is_blank, row_reader};
 use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter, encoding_hint};
-use super::unnamed_values::UnnamedValues;
-use super::unread_columns::UnreadColumns;
 use super::whole_numbers::WholeNumbers;
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
@@ -112,8 +109,8 @@ pub fn read_blocks(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
                 renamed,
                 unread,
             } = columns_of(line, &names)?;
-            rows.renamed.extend(renamed);
-            rows.unread.add(unread);
+            rows.read.renamed.extend(renamed);
+            rows.read.unread_columns.add(unread);
             let names = names.into_iter().map(str::to_owned);
             let whole = WholeNumbers::find(bytes, text.delimiter, columns.iter().copied());
             header = Some((columns.into_iter().zip(names).collect(), whole));
@@ -141,8 +138,8 @@ pub fn read_block_json(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
             Ok(draft) if is_exported(&draft) => Err(EXPORTED.to_owned()),
             draft => draft,
         };
-        rows.renamed.extend(row.renamed);
-        rows.unread.add(row.unread);
+        rows.read.renamed.extend(row.renamed);
+        rows.read.unread_columns.add(row.unread);
         rows.push(row.line, draft);
     });
     if let Err(refused) = read {
@@ -165,12 +162,7 @@ fn is_exported(draft: &DraftRow) -> bool {
 #[derive(Default)]
 struct BlockRows {
     rows: Vec<BlockRow>,
-    renamed: BTreeMap<String, &'static str>,
-    unread: UnreadColumns,
-    ids: RowIds,
-    unnamed: UnnamedValues,
-    formula_errors: FormulaErrors,
-    unusual_cells: UnusualCells,
+    read: ReadRows,
     problems: ManifestError,
 }
 
@@ -179,14 +171,14 @@ impl BlockRows {
     fn push(&mut self, line: usize, mut draft: Result<DraftRow, String>) {
         let mut reasons = Vec::new();
         if let Ok(draft) = &mut draft {
-            self.unnamed.add(line, draft.unnamed);
-            self.unusual_cells.add(line, &draft.unusual);
-            self.formula_errors.leave_out(line, &mut draft.meta);
+            self.read.unnamed.add(line, draft.unnamed);
+            self.read.unusual_cells.add(line, &draft.unusual);
+            self.read.formula_errors.leave_out(line, &mut draft.meta);
         }
         match draft.map(|draft| row(draft, &mut reasons)) {
             Ok(Some(row)) => {
                 let name = row.name.as_pair();
-                if let Some(first) = self.ids.insert(name, line) {
+                if let Some(first) = self.read.ids.insert(name, line) {
                     reasons.push(first.reason("block", name.as_str()));
                 }
                 self.rows.push(row);
@@ -202,13 +194,8 @@ impl BlockRows {
     fn finish(self) -> Result<ReadBlocks, ManifestError> {
         let Self {
             rows,
-            renamed,
-            unread,
-            unnamed,
-            formula_errors,
-            unusual_cells,
+            read,
             problems,
-            ..
         } = self;
         if problems == ManifestError::default() && rows.is_empty() {
             return Err(of_list("the list contains no blocks").into());
@@ -218,14 +205,18 @@ impl BlockRows {
         for row in &rows {
             ids.add(row.line, row.name.as_str(), [&row.mesh, &row.page]);
         }
-        let of_cells = [unnamed.warning(), formula_errors.warning(), ids.warning()];
+        let of_cells = [
+            read.unnamed.warning(),
+            read.formula_errors.warning(),
+            ids.warning(),
+        ];
         let of_cells = of_cells.into_iter().flatten();
-        let of_cells = of_cells.chain(unusual_cells.warnings());
-        let of_cells = of_cells.chain(unread.warnings());
+        let of_cells = of_cells.chain(read.unusual_cells.warnings());
+        let of_cells = of_cells.chain(read.unread_columns.warnings());
         let warnings = of_cells.chain(similar_columns(&rows)).collect();
         Ok(ReadBlocks {
             rows,
-            renamed,
+            renamed: read.renamed,
             warnings,
         })
     }
