@@ -82,16 +82,18 @@ fn every_control_of_the_app_fits_a_finger() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     varied_project(&dir);
     let page = Page::of(&mut app(dir.path()));
-    let (tab, home) = enter(&browser, &page, [400, 800]);
-    for size in [[400, 800], [1024, 768]] {
+    let (tab, home) = enter(&browser, &page, [1024, 768]);
+    tab.use_fingers([1024, 768]);
+    // `app_phone` opens the same pages on a phone.
+    for path in PAGES {
+        tab.open(&format!("{home}{path}"));
+        tab.wait(SHOWN);
+        fits_fingers(&tab, path);
+        fits_width(&tab, path);
+    }
+    tab.screenshot("app_fingers_1024");
+    for size in [[1024, 768], [400, 800]] {
         tab.use_fingers(size);
-        for path in PAGES {
-            tab.open(&format!("{home}{path}"));
-            tab.wait(SHOWN);
-            fits_fingers(&tab, &format!("{path} {size:?}"));
-            fits_width(&tab, path);
-        }
-        tab.screenshot(&format!("app_fingers_{}", size[0]));
         tab.open(&format!("{home}p/p/pair/upright-0000/3d/"));
         tab.wait("document.querySelector('.scan-canvas canvas')");
         fits_fingers(&tab, &format!("3D {size:?}"));

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use crate::app::app;
-use crate::app_browser::enter;
+use crate::app_browser::{enter, fits_width};
 use crate::app_controls::{PAGES, SHOWN, fits_fingers, varied_project};
 use crate::browser::{Browser, Tab};
 use crate::page::Page;
@@ -54,7 +54,11 @@ fn every_page_fits_a_phone_in_both_languages() {
             let join = if path.contains('?') { '&' } else { '?' };
             tab.open(&format!("{home}{path}{join}language={language}"));
             tab.wait(SHOWN);
-            fits_phone(&tab, &format!("{path} {language}"));
+            let what = format!("{path} {language}");
+            // Before all parts of the page are opened, too.
+            fits_fingers(&tab, &what);
+            fits_width(&tab, &what);
+            fits_phone(&tab, &what);
         }
     }
 }

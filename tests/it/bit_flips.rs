@@ -120,19 +120,15 @@ fn every_flipped_bit_is_found_or_changes_no_output() {
 /// Asserts that commands which leave out a damaged row say so.
 #[track_caller]
 fn assert_states(project: &Project, says: &str) {
-    let log: &[&str] = if says.contains("verdict") {
-        &["verdict", "log"]
-    } else {
-        &["report"]
-    };
-    for command in [
-        log,
-        &["report"],
+    let log = says.contains("verdict").then_some(&["verdict", "log"][..]);
+    let commands = [
+        &["report"][..],
         &["report", "-f", "html"],
         &["export", "-o", "x"],
         &["contact-sheet"],
         &["agreement"],
-    ] {
+    ];
+    for command in log.into_iter().chain(commands) {
         let call = at(project, command).expect(0);
         assert!(call.err.contains(says), "{command:?}: {}", call.err);
     }

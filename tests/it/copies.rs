@@ -15,8 +15,8 @@ use crate::made_once::copy_folder;
 use crate::postgres_server::url;
 use crate::test_size::trials;
 
-/// Pairs of a list without files.
-const PAIRS: u64 = 3000;
+/// Pairs of a list without files, more than a copy reads at once.
+const PAIRS: u64 = 1500;
 
 /// Returns the address of a schema of its own, if there is a server.
 fn schema() -> Option<String> {

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use crate::block_view::finished_block;
 use crate::check::done;
 use crate::cli::{call, mocban};
+use crate::made_once::copy_of;
 use crate::processes::Running;
 use crate::resume::{project, results, run};
 use crate::small_block::few_labels_with;
@@ -22,6 +23,13 @@ struct ProjectCounts {
     report: [u64; 4],
     names: usize,
     exported: usize,
+}
+
+/// Copies a demo project `p` whose three pairs have results.
+fn three_pairs(dir: &Path) {
+    copy_of("three pairs with results", dir, |dir| {
+        mocban(dir, &["demo", "p", "--pairs", "3"]).expect(0);
+    });
 }
 
 fn number(value: &Value) -> u64 {
@@ -93,7 +101,7 @@ fn commands_on_a_project_whose_pairs_are_all_retired_say_so() {
 #[test]
 fn retired_pairs_are_in_no_count_and_come_back() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    mocban(dir.path(), &["demo", "p", "--pairs", "3"]).expect(0);
+    three_pairs(dir.path());
     let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
     let shown = |name: &str, args: &[&str]| {
         assert_call(name, dir.path(), &[&["-C", "p"], args].concat());
@@ -166,7 +174,7 @@ fn retired_pairs_are_in_no_count_and_come_back() {
 #[test]
 fn the_newest_import_is_undone_and_done_again() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    mocban(dir.path(), &["demo", "p", "--pairs", "3"]).expect(0);
+    three_pairs(dir.path());
     let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
     let pairs = || at(&["status", "--json"]).expect(0).json()["pairs"].clone();
     let list = fs::read_to_string(dir.path().join("p/data/manifest.csv")).expect("a list");
@@ -288,7 +296,7 @@ fn pairs_that_are_retired_during_a_run_come_back_whole_also_after_a_kill() {
 #[test]
 fn copies_backups_and_verdict_files_keep_retired_pairs_apart() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    mocban(dir.path(), &["demo", "p", "--pairs", "3"]).expect(0);
+    three_pairs(dir.path());
     let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
     at(&["verdict", "set", PAIRS[1], "pass", "--reviewer", "lan"]).expect(0);
     at(&["retire", PAIRS[1]]).expect(0);
