@@ -7,7 +7,7 @@ use crate::accessible::{axe, no_faint_text, no_violation};
 use crate::app::app;
 use crate::browser::{Browser, Tab};
 use crate::cli::{mocban, status};
-use crate::page::{Page, read_project};
+use crate::page::{Page, project_with_failure, read_project};
 use crate::review_browser::{ITEM, judge, saved, shown_long_enough};
 use crate::waiting::wait_until;
 
@@ -94,13 +94,7 @@ fn every_page_is_accessible_in_both_themes_and_logs_no_error() {
         return;
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    // A pair that failed, with its reason.
-    std::fs::write(project.dir().join("broken.stl"), "solid x").expect("written");
-    let list = "id,mesh,print,block\nbroken,broken.stl,data/prints/upright-0001.jpg,b 01\n";
-    std::fs::write(project.dir().join("more.csv"), list).expect("written");
-    mocban(project.dir(), &["import", "more.csv"]).expect(0);
-    mocban(project.dir(), &["run"]).expect(3);
+    project_with_failure(dir.path());
     let page = Page::of(&mut app(dir.path()));
     let (tab, home) = enter(&browser, &page, [1440, 900]);
     for (name, path) in [

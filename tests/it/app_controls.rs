@@ -1,5 +1,7 @@
 //! The controls of all pages of the app: each is large enough for a finger, and is reached with the key Tab.
 
+use std::path::Path;
+
 use serde_json::json;
 
 use crate::app::app;
@@ -7,7 +9,8 @@ use crate::app_browser::{enter, fits_width};
 use crate::block_view::{BLOCK_SHOWN, finished_block};
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
-use crate::page::{Page, read_project};
+use crate::made_once::copy_of;
+use crate::page::{Page, project_with_failure, read_project};
 use crate::review_browser::ITEM;
 
 /// Smallest width and height of a control in CSS pixels.
@@ -42,18 +45,18 @@ pub(crate) const PAGES: [&str; 22] = [
     "p/nowhere/",
 ];
 
-/// Makes a project with a failed and a retired pair, a saved view and a backup.
+/// Copies a project with a failed and a retired pair, a saved view and a backup.
 pub(crate) fn varied_project(dir: &tempfile::TempDir) {
-    let project = read_project(dir);
-    std::fs::write(project.dir().join("broken.stl"), "solid x").expect("written");
-    let list = "id,mesh,print,block\nbroken,broken.stl,data/prints/upright-0001.jpg,b 01\n";
-    std::fs::write(project.dir().join("more.csv"), list).expect("written");
-    mocban(project.dir(), &["import", "more.csv"]).expect(0);
-    mocban(project.dir(), &["run"]).expect(3);
-    mocban(project.dir(), &["retire", "upright-0007"]).expect(0);
+    copy_of("a varied project", dir.path(), make_varied);
+}
+
+fn make_varied(dir: &Path) {
+    let project = project_with_failure(dir);
+    let project = project.dir();
+    mocban(project, &["retire", "upright-0007"]).expect(0);
     let views = r#"{"views":[{"name":"hỏng","list":"state=failed"}]}"#;
-    std::fs::write(project.dir().join("saved-views.json"), views).expect("written");
-    mocban(project.dir(), &["backup", "backups/backup.sqlite"]).expect(0);
+    std::fs::write(project.join("saved-views.json"), views).expect("written");
+    mocban(project, &["backup", "backups/backup.sqlite"]).expect(0);
 }
 
 /// Fails if a control that is shown is smaller than a finger. A link within a sentence is as high as its line.

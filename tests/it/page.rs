@@ -2,13 +2,14 @@
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
 use mocban::store::Project;
 use serde_json::{Value, json};
 
-use crate::cli::{binary, call};
+use crate::cli::{binary, call, mocban};
 use crate::made_once::copy_of;
 use crate::resume::{project, run};
 use crate::waiting::{LONGEST, pause};
@@ -18,10 +19,28 @@ const PAIRS: &str = "15";
 
 /// Copies a project in which every pair has results. All tests copy the same project.
 pub(crate) fn read_project(dir: &tempfile::TempDir) -> Project {
-    copy_of("a project with results", dir.path(), |dir| {
+    project_with_results(dir.path())
+}
+
+fn project_with_results(dir: &Path) -> Project {
+    copy_of("a project with results", dir, |dir| {
         call(&mut run(&project(dir, "p", PAIRS), &[])).expect(0);
     });
-    Project::open(&dir.path().join("p")).expect("a project")
+    Project::open(&dir.join("p")).expect("a project")
+}
+
+/// Copies the project of [`read_project`] with the pair `broken` of `more.csv`, which failed. The settings are the usual ones,
+/// with which all pairs have run again.
+pub(crate) fn project_with_failure(dir: &Path) -> Project {
+    copy_of("a project with a failed pair", dir, |dir| {
+        let project = project_with_results(dir);
+        std::fs::write(project.dir().join("broken.stl"), "solid x").expect("written");
+        let list = "id,mesh,print,block\nbroken,broken.stl,data/prints/upright-0001.jpg,b 01\n";
+        std::fs::write(project.dir().join("more.csv"), list).expect("written");
+        mocban(project.dir(), &["import", "more.csv"]).expect(0);
+        mocban(project.dir(), &["run"]).expect(3);
+    });
+    Project::open(&dir.join("p")).expect("a project")
 }
 
 /// Options for a queue without planted faults and duplicates.
