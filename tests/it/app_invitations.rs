@@ -251,7 +251,7 @@ fn answers_of_a_guest_wait_while_another_project_is_in_its_place() {
     assert_eq!(sent.expect("a reply").status, 200);
 }
 
-/// Each decoded print has 69 MiB, so those of sixteen guests would need more than a gigabyte.
+/// Each decoded print has 69 MiB, so one for each of sixteen guests would need more than a gigabyte.
 #[cfg(target_os = "linux")]
 #[test]
 fn the_memory_of_the_app_does_not_grow_with_its_guests() {
@@ -268,7 +268,7 @@ fn the_memory_of_the_app_does_not_grow_with_its_guests() {
     std::thread::scope(|scope| {
         for guest in &guests {
             scope.spawn(move || {
-                for item in guest.queue() {
+                for item in guest.queue().into_iter().take(4) {
                     let id = item["id"].as_str().expect("an id");
                     let print = guest.get(&format!("/image/{id}/print"));
                     assert_eq!(print.status, 200, "{}", text(&print));

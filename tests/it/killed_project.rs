@@ -9,6 +9,7 @@ use crate::app_choice::chosen;
 use crate::app_kills::{HeldApp, LOG, UNTIL_KILLED};
 use crate::cli::{mocban, status};
 use crate::fault::Fault;
+use crate::made_once::copy_folder;
 use crate::page::{Page, read_project};
 use crate::project_dump::ProjectDump;
 use crate::waiting::{run_ends, wait_until};
@@ -76,7 +77,17 @@ impl KilledAction {
     }
 }
 
-/// A copy of the shared project in which an action is killed.
+/// Makes the project as it is before an action from a copy of the shared one.
+fn prepared(action: &KilledAction) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let project = dir.path().canonicalize().expect("a path").join("p");
+    mocban(&project, &["retire", "upright-0007"]).expect(0);
+    (action.prepare)(&project);
+    dir
+}
+
+/// A copy of a prepared project in which an action is killed.
 struct KilledProject<'a> {
     action: &'a KilledAction,
     dir: tempfile::TempDir,
@@ -85,12 +96,10 @@ struct KilledProject<'a> {
 }
 
 impl<'a> KilledProject<'a> {
-    fn of(action: &'a KilledAction) -> Self {
+    fn of(action: &'a KilledAction, prepared: &Path) -> Self {
         let dir = tempfile::tempdir().expect("a temporary directory");
-        read_project(&dir);
+        copy_folder(prepared, dir.path());
         let project = dir.path().canonicalize().expect("a path").join("p");
-        mocban(&project, &["retire", "upright-0007"]).expect(0);
-        (action.prepare)(&project);
         let before = (action.state)(&project);
         Self {
             action,
@@ -225,11 +234,13 @@ impl ActionOutcome {
 /// not killed.
 pub(crate) fn kill_each(actions: &[KilledAction]) {
     for action in actions {
-        let after = KilledProject::of(action).not_killed();
-        let found = KilledProject::of(action).kill_before();
+        let prepared = prepared(action);
+        let project = || KilledProject::of(action, prepared.path());
+        let after = project().not_killed();
+        let found = project().kill_before();
         found.must_equal(&after, action.action);
         if action.at[1] == LOG {
-            KilledProject::of(action).kill_after_transaction(&after);
+            project().kill_after_transaction(&after);
         }
     }
 }
