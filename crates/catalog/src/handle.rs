@@ -55,14 +55,8 @@ impl Catalog {
     /// # Errors
     /// Returns an error if the file does not exist or is not a catalog, or if a database operation fails.
     pub async fn open_read_only(path: &Path) -> Result<Self> {
-        Ok(Self {
-            readers: ReaderPool::Sqlite(open::reader_pool(path).await?),
-            inbox: None,
-            delay: CommitDelay::new(),
-            retry_wait: Arc::default(),
-            left_out: Arc::default(),
-            path: path.into(),
-        })
+        let readers = ReaderPool::Sqlite(open::reader_pool(path).await?);
+        Ok(Self::without_writer(readers, path))
     }
 
     /// Opens a backup read-only, as a file that nobody writes to. Makes no other file beside it.
@@ -70,14 +64,8 @@ impl Catalog {
     /// # Errors
     /// Returns an error if the file does not exist or is not a catalog, or if a database operation fails.
     pub async fn open_backup(path: &Path) -> Result<Self> {
-        Ok(Self {
-            readers: ReaderPool::Sqlite(open::immutable_pool(path).await?),
-            inbox: None,
-            delay: CommitDelay::new(),
-            retry_wait: Arc::default(),
-            left_out: Arc::default(),
-            path: path.into(),
-        })
+        let readers = ReaderPool::Sqlite(open::immutable_pool(path).await?);
+        Ok(Self::without_writer(readers, path))
     }
 
     /// Opens an existing file. If `allow_empty` is set, the file may have no bytes.
@@ -126,14 +114,19 @@ impl Catalog {
     /// As for [`Self::connect`].
     pub async fn connect_read_only(url: &str) -> Result<Self> {
         let address = PostgresAddress::parse(url)?;
-        Ok(Self {
-            readers: ReaderPool::Postgres(address.reader_pool(true).await?),
+        let readers = ReaderPool::Postgres(address.reader_pool(true).await?);
+        Ok(Self::without_writer(readers, Path::new(&address.text())))
+    }
+
+    fn without_writer(readers: ReaderPool, path: &Path) -> Self {
+        Self {
+            readers,
             inbox: None,
             delay: CommitDelay::new(),
             retry_wait: Arc::default(),
             left_out: Arc::default(),
-            path: Path::new(&address.text()).into(),
-        })
+            path: path.into(),
+        }
     }
 
     /// Starts the writer task.

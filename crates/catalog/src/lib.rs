@@ -55,13 +55,11 @@ pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;
 pub use audit::integrity::{CounterDrift, Drift};
 pub use blocks::block_job::BlockJob;
-pub use blocks::control_points::ControlPointsChange;
 pub use blocks::cut::{CutReply, CutSummary};
 pub use blocks::import::BlockImportSummary;
-pub use blocks::labels::BlockLabelsChange;
 pub use blocks::model::{
-    BlockAttributes, BlockInputVersions, BlockProvenance, BlockWork, CharacterMaps, CutOrigin,
-    CutPair, NewCharacter, StoredCharacter,
+    BlockAttributes, BlockChange, BlockInputVersions, BlockProvenance, BlockWork, CharacterMaps,
+    CutOrigin, CutPair, NewCharacter, StoredCharacter,
 };
 pub use blocks::queue::OutstandingBlocks;
 pub use blocks::records::{AuditedBlock, BlockDetail, BlockStageDetail, BlockState, KnownBlock};

@@ -1,5 +1,6 @@
 //! Stores the control points of blocks.
 
+use crate::blocks::model::BlockChange;
 use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::query::{query, query_scalar};
 use crate::db::transaction::in_transaction;
@@ -13,17 +14,6 @@ const STORED: &str = "SELECT control_points FROM block WHERE name = ?1";
 const UPDATE: &str = "
 UPDATE block SET control_points = ?2 WHERE name = ?1 AND control_points IS NOT DISTINCT FROM ?3 RETURNING id";
 
-/// What became of new control points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ControlPointsChange {
-    /// They are stored.
-    Stored,
-    /// Other points were stored since the caller read them. Nothing is changed.
-    Outdated,
-    /// There is no such block.
-    NoBlock,
-}
-
 impl Catalog {
     /// Stores the control points of a block, or removes them, if the stored ones still have the hash `read`; `None` stands
     /// for no points. So nobody replaces points that they have not seen. The next run finds out which stages are stale.
@@ -32,26 +22,26 @@ impl Catalog {
         block: &BlockName,
         read: Option<ContentHash>,
         points: Option<&ControlPoints>,
-    ) -> Result<ControlPointsChange> {
+    ) -> Result<BlockChange> {
         let text = points.map(serde_json::to_string).transpose()?;
         let name = block.to_string();
         in_transaction!(self, |conn| {
             let row = query(STORED).bind(&name).fetch_optional(&mut *conn);
             let Some(row) = row.await? else {
-                return Ok(ControlPointsChange::NoBlock);
+                return Ok(BlockChange::NoBlock);
             };
             let stored: Option<String> = row.get("control_points")?;
             let points = stored.as_deref().map(serde_json::from_str::<ControlPoints>);
             if points.transpose()?.map(|points| points.hash()) != read {
-                return Ok(ControlPointsChange::Outdated);
+                return Ok(BlockChange::Outdated);
             }
             let update = query_scalar(UPDATE).bind(&name).bind(&text).bind(&stored);
             let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
             let Some(id) = id else {
-                return Ok(ControlPointsChange::Outdated);
+                return Ok(BlockChange::Outdated);
             };
             checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
-            Ok(ControlPointsChange::Stored)
+            Ok(BlockChange::Stored)
         })
     }
 }

@@ -1,6 +1,7 @@
 //! Gives a block other labels.
 
 use crate::blocks::block_job::BlockJob;
+use crate::blocks::model::BlockChange;
 use crate::blocks::queue::uncounted;
 use crate::db::checksummed_table::ChecksummedTable;
 use crate::db::query::query_scalar;
@@ -16,17 +17,6 @@ const BLOCK_ID: &str = "SELECT id FROM block WHERE name = ?1";
 const UPDATE: &str = "
 UPDATE block SET labels_path = ?2, labels_stat = '' WHERE name = ?1 AND labels_path IS NOT DISTINCT FROM ?3 RETURNING id";
 
-/// The outcome of [`Catalog::set_block_labels`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BlockLabelsChange {
-    /// Their path is stored.
-    Stored,
-    /// The block has other labels than the caller has read. Nothing is changed.
-    Outdated,
-    /// There is no such block.
-    NoBlock,
-}
-
 impl Catalog {
     /// Replaces or removes the path of a block's labels, as an import of the block would, if the stored path still is `read`:
     /// nobody can replace labels that they have not seen. The next run finds out which stages are stale.
@@ -35,7 +25,7 @@ impl Catalog {
         block: &BlockName,
         read: Option<&str>,
         labels: Option<&str>,
-    ) -> Result<BlockLabelsChange> {
+    ) -> Result<BlockChange> {
         let block = block.clone();
         let [read, labels] = [read, labels].map(|path| path.map(str::to_owned));
         in_transaction!(self, |conn| {
@@ -45,15 +35,13 @@ impl Catalog {
             let Some(id) = id else {
                 let known = query_scalar(BLOCK_ID).bind(&name).fetch_optional(conn);
                 let known: Option<i64> = known.await?;
-                return Ok(
-                    known.map_or(BlockLabelsChange::NoBlock, |_| BlockLabelsChange::Outdated)
-                );
+                return Ok(known.map_or(BlockChange::NoBlock, |_| BlockChange::Outdated));
             };
             checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
             // What failed with the other labels is tried again.
             let failed = RetrySelection::<BlockJob>::Names(vec![block]);
             requeue::retry(conn, &failed, &mut uncounted()).await?;
-            Ok(BlockLabelsChange::Stored)
+            Ok(BlockChange::Stored)
         })
     }
 }

@@ -11,6 +11,17 @@ use mocban_core::domain::{
     ControlPoints, InputVersion, LengthUnit, PrintFromMesh,
 };
 
+/// What became of a change of a block's labels or control points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BlockChange {
+    /// It is stored.
+    Stored,
+    /// The block has others than the caller has read. Nothing is changed.
+    Outdated,
+    /// There is no such block.
+    NoBlock,
+}
+
 /// Attributes of a block as imported.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct BlockAttributes {

@@ -1,7 +1,7 @@
 //! Labels of blocks that are replaced on their page.
 
 use super::blocks::{attributes, block, character, world};
-use crate::BlockLabelsChange;
+use crate::BlockChange;
 use mocban_core::domain::BlockStage;
 
 #[tokio::test]
@@ -20,13 +20,13 @@ async fn only_labels_that_the_caller_has_read_are_replaced() {
     let (first, second) = (Some("b.json"), Some("labels/b-1.json"));
     for read in [None, second] {
         let outdated = set("b", read, second).await;
-        assert_eq!(outdated, BlockLabelsChange::Outdated);
+        assert_eq!(outdated, BlockChange::Outdated);
         assert_eq!(stored().await.as_deref(), first);
     }
-    assert_eq!(set("c", None, second).await, BlockLabelsChange::NoBlock);
+    assert_eq!(set("c", None, second).await, BlockChange::NoBlock);
     for [read, labels] in [[first, second], [second, None], [None, first]] {
         let stored_now = set("b", read, labels).await;
-        assert_eq!(stored_now, BlockLabelsChange::Stored);
+        assert_eq!(stored_now, BlockChange::Stored);
         assert_eq!(stored().await.as_deref(), labels);
     }
     assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
@@ -39,7 +39,7 @@ async fn a_block_without_labels_has_its_boxes_found_again() {
     assert_eq!(world.requeue_blocks([1; 4]).await, []);
     let (name, read) = (block("b"), attributes("b").labels_path);
     let set = world.catalog.set_block_labels(&name, read.as_deref(), None);
-    assert_eq!(set.await.expect("a reply"), BlockLabelsChange::Stored);
+    assert_eq!(set.await.expect("a reply"), BlockChange::Stored);
     let stale = world.requeue_blocks([1; 4]).await;
     let stages: Vec<BlockStage> = stale.into_iter().map(|(stage, _)| stage).collect();
     assert_eq!(stages, [BlockStage::Boxes]);

@@ -1,7 +1,7 @@
 //! Control points of blocks: what they make stale, and what keeps them.
 
 use super::blocks::{attributes, block, character, version, world};
-use crate::{BlockReason, ControlPointsChange};
+use crate::{BlockChange, BlockReason};
 use mocban_core::domain::{BlockSide, BlockStage, ControlPoint, ControlPoints};
 
 #[tokio::test]
@@ -11,7 +11,7 @@ async fn control_points_make_the_alignment_stale_only_for_their_files() {
     let set = async |read, points| {
         let name = block("b");
         let stored = world.catalog.set_control_points(&name, read, points);
-        assert_eq!(stored.await.expect("a reply"), ControlPointsChange::Stored);
+        assert_eq!(stored.await.expect("a reply"), BlockChange::Stored);
     };
     let chosen = |page: &str| ControlPoints {
         mesh: version("mesh").hash,
@@ -41,7 +41,7 @@ async fn control_points_make_the_alignment_stale_only_for_their_files() {
     let name = block("c");
     let unknown = world.catalog.set_control_points(&name, None, None).await;
     let unknown = unknown.expect("a reply");
-    assert_eq!(unknown, ControlPointsChange::NoBlock);
+    assert_eq!(unknown, BlockChange::NoBlock);
 }
 
 #[tokio::test]
@@ -68,19 +68,19 @@ async fn only_points_that_the_caller_has_read_are_replaced_or_removed() {
         let states = world.catalog.block_states().await.expect("a read");
         states.into_iter().next().expect("a block").control_points
     };
-    assert_eq!(set(None, Some(&first)).await, ControlPointsChange::Stored);
+    assert_eq!(set(None, Some(&first)).await, BlockChange::Stored);
     for (read, points) in [
         (None, Some(&second)),
         (Some(&second), Some(&first)),
         (None, None),
         (Some(&second), None),
     ] {
-        assert_eq!(set(read, points).await, ControlPointsChange::Outdated);
+        assert_eq!(set(read, points).await, BlockChange::Outdated);
         assert_eq!(stored().await.as_ref(), Some(&first));
     }
     let replaced = set(Some(&first), Some(&second)).await;
-    assert_eq!(replaced, ControlPointsChange::Stored);
-    assert_eq!(set(Some(&second), None).await, ControlPointsChange::Stored);
+    assert_eq!(replaced, BlockChange::Stored);
+    assert_eq!(set(Some(&second), None).await, BlockChange::Stored);
     assert_eq!(stored().await, None);
     assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
 }
@@ -96,12 +96,12 @@ async fn a_block_that_was_aligned_from_control_points_is_current_until_they_are_
     };
     let name = block("b");
     let set = world.catalog.set_control_points(&name, None, Some(&points));
-    assert_eq!(set.await.expect("a reply"), ControlPointsChange::Stored);
+    assert_eq!(set.await.expect("a reply"), BlockChange::Stored);
     world.finish_block(vec![character("c1", "1")]).await;
     assert_eq!(world.requeue_blocks([1; 4]).await, []);
     let read = Some(points.hash());
     let set = world.catalog.set_control_points(&name, read, None);
-    assert_eq!(set.await.expect("a reply"), ControlPointsChange::Stored);
+    assert_eq!(set.await.expect("a reply"), BlockChange::Stored);
     let stale = [(BlockStage::Align, BlockReason::ControlPoints)];
     assert_eq!(world.requeue_blocks([1; 4]).await, stale);
 }

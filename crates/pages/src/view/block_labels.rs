@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::block_access::BlockAccess;
 use crate::on_thread::{on_thread, read_on_thread};
-use mocban_catalog::{BlockLabelsChange, Catalog};
+use mocban_catalog::{BlockChange, Catalog};
 use mocban_core::domain::ContentHash;
 use mocban_export::block_view::{BoxEdits, EditableBoxes};
 use mocban_project::{ProjectError, ProjectResult, block_labels};
@@ -118,9 +118,9 @@ impl BlockAccess {
         let read = boxes.labels_path();
         let changed = catalog.set_block_labels(&self.block, read, labels.as_deref());
         match changed.await? {
-            BlockLabelsChange::Stored => Ok(BoxesSaved::Saved),
-            BlockLabelsChange::Outdated => Ok(BoxesSaved::OthersSaved),
-            BlockLabelsChange::NoBlock => {
+            BlockChange::Stored => Ok(BoxesSaved::Saved),
+            BlockChange::Outdated => Ok(BoxesSaved::OthersSaved),
+            BlockChange::NoBlock => {
                 let text = format!("block {} was removed meanwhile", self.block);
                 Err(ProjectError::unexpected(text))
             }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::block_access::BlockAccess;
 use crate::on_thread::{on_thread, read_on_thread};
-use mocban_catalog::{Catalog, ControlPointsChange};
+use mocban_catalog::{BlockChange, Catalog};
 use mocban_core::domain::{ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, replaced_file};
 use mocban_project::{ProjectError, ProjectResult};
@@ -74,9 +74,9 @@ impl BlockAccess {
             return Ok(PointsSaved::FileReplaced(path));
         }
         match catalog.set_control_points(block, read, points).await? {
-            ControlPointsChange::Stored => Ok(PointsSaved::Saved),
-            ControlPointsChange::Outdated => Ok(PointsSaved::OthersSaved),
-            ControlPointsChange::NoBlock => {
+            BlockChange::Stored => Ok(PointsSaved::Saved),
+            BlockChange::Outdated => Ok(PointsSaved::OthersSaved),
+            BlockChange::NoBlock => {
                 let text = format!("block {block} was removed meanwhile");
                 Err(ProjectError::unexpected(text))
             }

@@ -107,18 +107,12 @@ impl Finding {
             | ChecksummedTable::Answer
             | ChecksummedTable::AnswerUndo
             | ChecksummedTable::ManualAlignment
-            | ChecksummedTable::ManualAlignmentUndo
-                if may_set_apart =>
-            {
-                "it is not counted, and `check --repair` sets it apart; a backup may hold what was there before"
-            }
-            ChecksummedTable::Verdict
-            | ChecksummedTable::VerdictUndo
-            | ChecksummedTable::Answer
-            | ChecksummedTable::AnswerUndo
-            | ChecksummedTable::ManualAlignment
             | ChecksummedTable::ManualAlignmentUndo => {
-                "it is not counted, and the owner of the catalog can set it apart with `check --repair`"
+                if may_set_apart {
+                    "it is not counted, and `check --repair` sets it apart; a backup may hold what was there before"
+                } else {
+                    "it is not counted, and the owner of the catalog can set it apart with `check --repair`"
+                }
             }
         };
         let name = faulty.pair.as_ref();
