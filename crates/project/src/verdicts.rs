@@ -29,25 +29,14 @@ pub enum RecordedVerdict {
     Stale,
 }
 
-/// Records a verdict on the current result of a pair, which `verdict` makes for the name of that pair. Returns the verdict,
-/// and whether it is new: the same one may have been recorded before. A new reviewer whose name is similar to that of another
-/// is refused unless `is_new_allowed`.
+/// Records a verdict on the current result of a pair, which `verdict` makes for the name of that pair; with `judged`, only if it
+/// is the hash of the current result of the metric. Returns the verdict, and what became of it. A new reviewer whose name is
+/// similar to that of another is refused unless `is_new_allowed`.
 ///
 /// # Errors
 /// Returns an error if the pair does not exist or has no result, the verdict is invalid, the user of the database may not
 /// record it, or the catalog fails.
 pub async fn record(
-    pair: &str,
-    verdict: impl FnOnce(PairName) -> NewVerdict,
-    is_new_allowed: bool,
-    location: &Location,
-) -> ProjectResult<(NewVerdict, bool)> {
-    let (verdict, recorded) = record_on(pair, None, verdict, is_new_allowed, location).await?;
-    Ok((verdict, recorded == RecordedVerdict::New))
-}
-
-/// Records a verdict like [`record`], but only if `judged` is the hash of the current result of its metric.
-pub async fn record_on(
     pair: &str,
     judged: Option<ContentHash>,
     verdict: impl FnOnce(PairName) -> NewVerdict,
@@ -75,25 +64,12 @@ pub async fn record_on(
 }
 
 /// Records a verdict that settles a conflict: on those current results of a pair that are in an open conflict, as
-/// `review --adjudicate` does. Returns the verdict, and the metrics of these results.
+/// `review --adjudicate` does; with `judged`, only on the result with this hash. Returns the verdict, and the metrics of these
+/// results: none, and nothing is recorded, if no current result has the hash.
 ///
 /// # Errors
 /// As for [`record`]; also if there is no such result, or the reviewer has judged it.
 pub async fn settle(
-    pair: &str,
-    verdict: impl FnOnce(PairName) -> NewVerdict,
-    is_new_allowed: bool,
-    location: &Location,
-) -> ProjectResult<(NewVerdict, Vec<ThresholdMetric>)> {
-    settle_on(pair, None, verdict, is_new_allowed, location).await
-}
-
-/// Records a verdict like [`settle`], but only on the result with the hash `judged`, if it is given. If no current result
-/// has it, nothing is recorded, and no metric is returned.
-///
-/// # Errors
-/// As for [`settle`].
-pub async fn settle_on(
     pair: &str,
     judged: Option<ContentHash>,
     verdict: impl FnOnce(PairName) -> NewVerdict,

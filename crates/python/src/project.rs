@@ -218,10 +218,10 @@ impl NativeProject {
                 at: None,
             };
             if !adjudicate {
-                let recorded = verdicts::record_on(&id, judged, new, new_reviewer, &location);
+                let recorded = verdicts::record(&id, judged, new, new_reviewer, &location);
                 return Ok(recorded.await?.1);
             }
-            let settled = verdicts::settle_on(&id, judged, new, new_reviewer, &location);
+            let settled = verdicts::settle(&id, judged, new, new_reviewer, &location);
             let is_stale = settled.await?.1.is_empty();
             Ok([RecordedVerdict::New, RecordedVerdict::Stale][usize::from(is_stale)])
         })?;

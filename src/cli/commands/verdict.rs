@@ -16,7 +16,7 @@ use mocban_core::domain::shell::shell_quoted;
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
 use mocban_project::files::{self, ListFile};
 use mocban_project::verdict_words;
-use mocban_project::verdicts::{self, VerdictFileImport, VerdictLog};
+use mocban_project::verdicts::{self, RecordedVerdict, VerdictFileImport, VerdictLog};
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_system::time_text::{duration, local};
 
@@ -127,15 +127,15 @@ async fn set(args: VerdictSetArgs, context: &Context) -> ProjectResult<ExitCode>
         },
         at: None,
     };
+    let (pair, is_new_allowed) = (&args.pair, args.new_reviewer);
     if args.adjudicate {
-        let settled =
-            verdicts::settle(&args.pair, verdict, args.new_reviewer, &context.location).await?;
-        context.info(&settled_text(&settled));
+        let settled = verdicts::settle(pair, None, verdict, is_new_allowed, &context.location);
+        context.info(&settled_text(&settled.await?));
         return Ok(ExitCode::Done);
     }
-    let (new, is_new) =
-        verdicts::record(&args.pair, verdict, args.new_reviewer, &context.location).await?;
-    context.info(&if is_new {
+    let recorded = verdicts::record(pair, None, verdict, is_new_allowed, &context.location);
+    let (new, recorded) = recorded.await?;
+    context.info(&if recorded == RecordedVerdict::New {
         set_text(&new)
     } else {
         format!("{} is already recorded", verdict_text(&new))
