@@ -11,9 +11,7 @@ use crate::app_export_zip::{export, export_table};
 use crate::app_uploads::{begun, encode, end, put};
 use crate::block_correction::refused_block;
 use crate::cli::mocban;
-
-/// A run with the settings of the shared project, with which only changed and new pairs run.
-const RUN: [&str; 3] = ["run", "--set", "depth.longest_px=96"];
+use crate::resume::RUN_SMALL;
 
 /// Stores a verdict on the ensemble's result of a pair.
 fn judge(project: &Path, pair: &str, verdict: &str, reviewer: &str, more: &[&str]) {
@@ -272,7 +270,7 @@ fn a_file_of_a_failed_pair_is_replaced_by_one_of_its_name() {
     let mesh = project.join("data/meshes/upright-0000.ply");
     let sound = std::fs::read(&mesh).expect("a mesh");
     std::fs::write(&mesh, "solid x").expect("written");
-    mocban(&project, &RUN).expect(3);
+    mocban(&project, &RUN_SMALL).expect(3);
     let failed = html(&page, "/p/p/pair/upright-0000/");
     assert!(
         failed.contains("import?project=p&amp;mend=upright-0000"),
@@ -306,7 +304,7 @@ fn a_pair_without_a_result_shows_what_its_stages_have_made() {
     let list = "id,mesh,print\nblank,data/meshes/upright-0001.ply,blank.png\n";
     std::fs::write(project.join("more.csv"), list).expect("written");
     mocban(&project, &["import", "more.csv"]).expect(0);
-    mocban(&project, &RUN).expect(3);
+    mocban(&project, &RUN_SMALL).expect(3);
     let shown = html(&page, "/p/p/pair/blank/");
     assert!(shown.contains("data-layer=\"relief\""), "{shown}");
     assert!(!shown.contains("data-layer=\"overlay\""), "{shown}");

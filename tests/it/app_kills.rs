@@ -15,6 +15,7 @@ use crate::cli::{mocban, status};
 use crate::fault::Fault;
 use crate::page::{Page, read_project, send};
 use crate::project_dump::ProjectDump;
+use crate::resume::RUN_SMALL;
 use crate::small_block::stored_block;
 use crate::waiting::{run_ends, wait_until};
 
@@ -88,7 +89,7 @@ fn a_killed_repair_leaves_the_damage_and_is_done_by_the_next_app() {
     wait_until("the repair is done", || {
         text(&next.get("/p/p/health")).contains("All damage was mended")
     });
-    mocban(&project, &["run", "-q"]).expect(0);
+    mocban(&project, &RUN_SMALL).expect(0);
     mocban(&project, &["check"]).expect(0);
     assert_eq!(status(&project)["jobs"]["done"], results);
 }

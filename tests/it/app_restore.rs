@@ -10,6 +10,7 @@ use crate::app_uploads::encode;
 use crate::cli::{mocban, status};
 use crate::fault::{ENOSPC, Fault};
 use crate::page::{Page, Reply, read_project};
+use crate::resume::RUN_SMALL;
 use crate::waiting::wait_until;
 
 /// The file in which a restored catalog is written.
@@ -126,7 +127,7 @@ fn a_backup_is_shown_and_becomes_a_project() {
     }
     assert_eq!(counts(&root.join("again")), (json!(15), 4));
     // Only the depth maps and masks are computed again.
-    mocban(&root.join("again"), &["run", "-q"]).expect(0);
+    mocban(&root.join("again"), &RUN_SMALL).expect(0);
     mocban(&root.join("again"), &["check"]).expect(0);
     mocban(&root.join("p"), &["check"]).expect(0);
 }

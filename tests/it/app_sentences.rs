@@ -9,6 +9,7 @@ use crate::block_view::finished_block;
 use crate::check::sql;
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
+use crate::resume::RUN_SMALL;
 use crate::waiting::{LONGEST, pause, wait_until};
 use mocban::store::Project;
 
@@ -217,7 +218,7 @@ fn lost_files_of_results_are_computed_again_after_a_button() {
     start("lost");
     let mended = wait_for(&page, "/p/p/health", "All damage was mended. Press Align");
     assert!(!mended.contains("compute-lost"), "{mended}");
-    mocban(&project, &["run", "-q"]).expect(0);
+    mocban(&project, &RUN_SMALL).expect(0);
     mocban(&project, &["check"]).expect(0);
 }
 

@@ -13,6 +13,8 @@ use crate::made_once::{copy_folder, copy_of};
 
 /// Small depth maps, because these tests are not about the alignment.
 const SMALL_DEPTH: [&str; 2] = ["--set", "depth.longest_px=96"];
+/// A run with small depth maps. Other settings would compute all pairs of a project that ran with these again.
+pub(crate) const RUN_SMALL: [&str; 4] = ["run", "-q", SMALL_DEPTH[0], SMALL_DEPTH[1]];
 
 /// Every failpoint from the claim to the commit, ordered so that work on six pairs reaches each one. If a stage is
 /// given, it is completed first, so that the next stage is claimed and stored by itself. Failpoints at file writes come
