@@ -3,7 +3,7 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 use super::error::{MeshLimits, MeshReadError};
-use super::far_values::find_far_values;
+use super::far_values::{CORNERS_OF_VERTEX, FarValues, find_far_values};
 use super::format::DetectedFormat;
 use super::missing::is_position;
 use super::ply::VertexRows;
@@ -103,36 +103,60 @@ pub(super) fn some_positions(
     spread: SampleSpread,
 ) -> Result<(Vec<[f64; 3]>, Option<LengthUnit>), MeshReadError> {
     let mut found = Vec::new();
-    let unit = each_position(file, (len, name), limits, spread, &mut |position| {
+    let (unit, repeats) = each_position(file, (len, name), limits, spread, &mut |position| {
         found.push(position);
     })?;
     let vertices: Vertices = found.into();
-    let far_values = find_far_values(&vertices, is_position);
-    let is_kept = |vertex: &[f64; 3]| far_values.iter().all(|value| !value.is_at(*vertex));
+    let far_values = find_far_values(&vertices, repeats, is_position);
+    let is_kept = |vertex: &[f64; 3]| !far_values.are_at(*vertex);
     Ok((vertices.iter().filter(is_kept).collect(), unit))
 }
 
-/// Visits vertices at some places of a file with a length and a name. Returns the unit that the file names. Visits none if
-/// their places are not known, and leaves out repeated vertices at the origin, which have no position, except in an STL.
+/// Finds what stands for missing positions in a binary STL with some triangles, at places spread over the file.
+///
+/// # Errors
+/// Returns an error if the file cannot be read.
+pub fn far_values_of_stl(file: &mut (impl Read + Seek), triangles: u32) -> io::Result<FarValues> {
+    let len = stl::HEADER as u64 + stl::FACET as u64 * u64::from(triangles);
+    let mut found = Vec::new();
+    each_corner(file, len, FOR_SIZE, &mut |corner| found.push(corner))?;
+    let vertices = Vertices::Single(found.into());
+    Ok(find_far_values(&vertices, CORNERS_OF_VERTEX, is_position))
+}
+
+/// Visits the corners of facets at some places of a binary STL of `len` bytes.
+fn each_corner(
+    file: &mut (impl Read + Seek),
+    len: u64,
+    spread: SampleSpread,
+    visit: &mut dyn FnMut([f32; 3]),
+) -> io::Result<()> {
+    let facets = [stl::HEADER as u64, len];
+    each_part(file, facets, stl::FACET as u64, spread, |part| {
+        let (facets, _) = part.as_chunks::<{ stl::FACET }>();
+        facets.iter().flat_map(stl::corners).for_each(&mut *visit);
+    })
+}
+
+/// Visits vertices at some places of a file with a length and a name. Returns the unit that the file names, and about how
+/// often each vertex is in the file. Visits none if their places are not known, and leaves out repeated vertices at the
+/// origin, which have no position, except in an STL.
 fn each_position(
     file: &mut (impl Read + Seek),
     (len, name): (u64, &str),
     limits: &MeshLimits,
     spread: SampleSpread,
     visit: &mut dyn FnMut([f64; 3]),
-) -> Result<Option<LengthUnit>, MeshReadError> {
+) -> Result<(Option<LengthUnit>, usize), MeshReadError> {
     let mut head = Vec::new();
     file.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
     let unit = stated_unit(&head);
     if let Some(count) = binary_stl_triangles(&head, len, name)? {
         limits.check_triangles(u64::from(count))?;
-        let facets = [stl::HEADER as u64, len];
-        each_part(file, facets, stl::FACET as u64, spread, |part| {
-            let (facets, _) = part.as_chunks::<{ stl::FACET }>();
-            let corners = facets.iter().flat_map(stl::corners);
-            corners.for_each(|corner| visit(corner.map(f64::from)));
+        each_corner(file, len, spread, &mut |corner| {
+            visit(corner.map(f64::from));
         })?;
-        return Ok(unit);
+        return Ok((unit, CORNERS_OF_VERTEX));
     }
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&head);
     let lines = TextLines {
@@ -165,7 +189,7 @@ fn each_position(
                 let position = after_keyword(line, b"vertex");
                 position.into_iter().for_each(&mut *visit);
             })?;
-            return Ok(unit);
+            return Ok((unit, CORNERS_OF_VERTEX));
         }
         DetectedFormat::Xyz => {
             let points = SampledPoints::of(whole_lines(text, lines.line_end, true))?;
@@ -183,7 +207,7 @@ fn each_position(
     if origins == 1 {
         visit([0.0; 3]);
     }
-    Ok(unit)
+    Ok((unit, 1))
 }
 
 /// Returns the position that follows a keyword at the beginning of a line.

@@ -10,6 +10,8 @@ const FEWEST_VERTICES: usize = 100;
 /// Fewest vertices that share a number that stands for a missing one, and their smallest share of all.
 const FEWEST_MISSING: usize = 8;
 const LEAST_SHARE: usize = 1000;
+/// Corners of triangles that meet at a vertex, about, if each triangle has corners of its own.
+pub(super) const CORNERS_OF_VERTEX: usize = 6;
 /// Distance of such a number from the box around the other vertices, as a multiple of its longest side.
 const FAR: f64 = 10.0;
 
@@ -32,15 +34,28 @@ impl FarValue {
     }
 }
 
+/// What stands for a missing position in one mesh.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FarValues(pub(super) Vec<FarValue>);
+
+impl FarValues {
+    /// Returns whether a vertex has no position.
+    pub(super) fn are_at(&self, vertex: [f64; 3]) -> bool {
+        self.0.iter().any(|value| value.is_at(vertex))
+    }
+}
+
 /// Finds what stands for missing positions: a number far outside of the box around the other vertices that many vertices
 /// have, exactly, in all coordinates or as their height. Others that are no positions, as `is_position` says, do not count.
+/// Each vertex is there about `repeats` times.
 pub(super) fn find_far_values(
     vertices: &Vertices,
+    repeats: usize,
     is_position: impl Fn([f64; 3]) -> bool,
-) -> Vec<FarValue> {
+) -> FarValues {
     let count = vertices.len();
-    if count < FEWEST_VERTICES {
-        return Vec::new();
+    if count < FEWEST_VERTICES * repeats {
+        return FarValues::default();
     }
     // Even distances would meet the rows of a grid in stripes. Multiples of the golden ratio spread without a pattern.
     let place = |nth: usize| {
@@ -50,12 +65,12 @@ pub(super) fn find_far_values(
     let sample = (0..SAMPLES.min(count)).map(|nth| vertices.at(place(nth)));
     let sample: Vec<[f64; 3]> = sample.filter(|vertex| is_position(*vertex)).collect();
     let mut found = outside(&sample);
-    let fewest = FEWEST_MISSING.max(count / LEAST_SHARE);
+    let fewest = (FEWEST_MISSING * repeats).max(count / LEAST_SHARE);
     found.retain(|value| {
         let equal = polled(vertices.iter()).filter(|vertex| value.is_at(*vertex));
         equal.take(fewest).count() == fewest
     });
-    found
+    FarValues(found)
 }
 
 /// Returns the extreme positions and heights of a sample that are far outside of the box around its other vertices.
@@ -122,9 +137,10 @@ impl InnerRange {
 
 #[cfg(test)]
 mod tests {
-    use super::{FarValue, find_far_values};
+    use super::{CORNERS_OF_VERTEX, FarValue, find_far_values};
     use crate::mesh::missing::is_position;
-    use crate::mesh::{MeshLimits, Vertices, read_from};
+    use crate::mesh::write::MeshFormat;
+    use crate::mesh::{Mesh, MeshLimits, MeshRead, Vertices, read_from};
 
     /// Returns a relief of 30 by 20 by 2 with flat ground.
     fn relief() -> Vec<[f64; 3]> {
@@ -137,7 +153,7 @@ mod tests {
 
     fn found(more: &[[f64; 3]]) -> Vec<FarValue> {
         let vertices: Vertices = [relief(), more.to_vec()].concat().into();
-        find_far_values(&vertices, is_position)
+        find_far_values(&vertices, 1, is_position).0
     }
 
     #[test]
@@ -169,9 +185,69 @@ mod tests {
         assert_eq!(found(&specks), []);
         assert_eq!(found(&[[-9999.0; 3]; 5]), []);
         let few: Vertices = vec![[0.0, 1.0, 2.0]; 50].into();
-        assert_eq!(find_far_values(&few, is_position), []);
+        assert_eq!(find_far_values(&few, 1, is_position).0, []);
         let one: Vertices = vec![[0.0, 1.0, 2.0]; 500].into();
-        assert_eq!(find_far_values(&one, is_position), []);
+        assert_eq!(find_far_values(&one, 1, is_position).0, []);
+    }
+
+    /// Returns a relief of 3,042 triangles. Vertices are elsewhere where `moved` says so.
+    fn surface(moved: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Mesh {
+        let vertices = relief().into_iter().enumerate();
+        let vertices: Vec<[f64; 3]> = vertices.map(|(k, vertex)| moved(k, vertex)).collect();
+        let cells = (0..39 * 39).map(|k| k / 39 * 40 + k % 39);
+        let faces = cells.flat_map(|k| [[k, k + 1, k + 40], [k + 1, k + 41, k + 40]]);
+        let triangles = faces.map(|face| face.map(|corner| corner as u32));
+        Mesh {
+            vertices: vertices.into(),
+            triangles: triangles.collect(),
+        }
+    }
+
+    /// Writes a mesh as an STL and reads it.
+    fn through_stl(mesh: &Mesh, format: MeshFormat) -> MeshRead {
+        let bytes = format.encode(mesh);
+        let len = bytes.len() as u64;
+        let read = read_from(&mut bytes.as_slice(), len, "a.stl", &MeshLimits::SUGGESTED);
+        read.expect("reads")
+    }
+
+    #[test]
+    fn facets_with_a_corner_at_such_a_number_are_left_out_of_an_stl() {
+        let height = |k: usize, [x, y, z]: [f64; 3]| [x, y, if k % 50 == 7 { -9999.0 } else { z }];
+        let all = |k: usize, vertex| if k % 50 == 7 { [99999.0; 3] } else { vertex };
+        for mesh in [surface(height), surface(all)] {
+            let is_missing = |corner: &u32| corner % 50 == 7;
+            let missing = mesh.triangles.iter().flatten().filter(|at| **at % 50 == 7);
+            let missing = missing.count() as u64;
+            let whole = mesh.triangles.iter();
+            let whole = whole.filter(|face| !face.iter().any(is_missing)).count();
+            for format in [MeshFormat::StlBinary, MeshFormat::StlAscii] {
+                let read = through_stl(&mesh, format);
+                assert_eq!(read.losses.missing_vertices, missing, "{format:?}");
+                assert_eq!(read.mesh.triangles.len(), whole, "{format:?}");
+                assert_eq!(read.mesh.vertices.len(), 3 * whole, "{format:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_far_vertex_of_an_stl_keeps_its_facets() {
+        let spike = |k: usize, vertex| {
+            if k == 700 {
+                [9.0, 7.0, -9999.0]
+            } else {
+                vertex
+            }
+        };
+        let mesh = surface(spike);
+        let corners = mesh.triangles.as_flattened().iter();
+        assert_eq!(
+            corners.filter(|corner| **corner == 700).count(),
+            CORNERS_OF_VERTEX
+        );
+        let read = through_stl(&mesh, MeshFormat::StlBinary);
+        assert_eq!(read.losses.missing_vertices, 0);
+        assert_eq!(read.mesh.triangles.len(), mesh.triangles.len());
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! from the others.
 
 use super::error::MeshError;
-use super::far_values::FarValue;
+use super::far_values::FarValues;
 use super::{Mesh, Vertices};
 use crate::domain::MeshLosses;
 use crate::domain::cancel::polled;
@@ -74,13 +74,13 @@ impl PositionCheck {
         self,
         mesh: Mesh,
         incomplete_faces: u64,
-        far_values: &[FarValue],
+        far_values: &FarValues,
     ) -> Result<MeshRead, MeshError> {
         let losses = |missing_vertices| MeshLosses {
             missing_vertices,
             incomplete_faces,
         };
-        let are_positions = self.are_all_positions && far_values.is_empty();
+        let are_positions = self.are_all_positions && far_values.0.is_empty();
         if are_positions && (self.origins < 2 || !has_unused_origin(&mesh)) {
             let losses = losses(0);
             return Ok(MeshRead { mesh, losses });
@@ -89,8 +89,7 @@ impl PositionCheck {
             vertices,
             mut triangles,
         } = mesh;
-        let is_kept =
-            |vertex| is_position(vertex) && far_values.iter().all(|value| !value.is_at(vertex));
+        let is_kept = |vertex| is_position(vertex) && !far_values.are_at(vertex);
         let is_kept_vertex: Vec<bool> = polled(vertices.iter()).map(is_kept).collect();
         let mut uses = vec![Use::None; is_kept_vertex.len()];
         let is_points = triangles.is_empty();
@@ -218,6 +217,7 @@ enum Use {
 #[cfg(test)]
 mod tests {
     use super::PositionCheck;
+    use crate::mesh::far_values::FarValues;
     use crate::mesh::{Mesh, MeshError, Vertices};
 
     const NAN: [f64; 3] = [1.0, f64::NAN, 0.0];
@@ -232,7 +232,7 @@ mod tests {
         };
         let check = PositionCheck::of(&mesh.vertices);
         check
-            .without_missing(mesh, 0, &[])
+            .without_missing(mesh, 0, &FarValues::default())
             .map(|read| (read.mesh, read.losses.missing_vertices))
     }
 

@@ -25,7 +25,8 @@ mod xyz;
 
 pub use arrays::{MeshArrayError, PositionSlice};
 pub use error::{MeshError, MeshLimits, MeshReadError};
-pub use extent::MeshExtent;
+pub use extent::{MeshExtent, far_values_of_stl};
+pub use far_values::FarValues;
 pub use missing::MeshRead;
 pub use triangle_mesh::{Mesh, Vertices};
 pub use triangle_stream::{
@@ -37,7 +38,7 @@ use std::io::{Read, Seek};
 use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
 use crate::page_vec::PageVec;
-use far_values::find_far_values;
+use far_values::{CORNERS_OF_VERTEX, find_far_values};
 use format::DetectedFormat;
 use missing::{PositionCheck, is_position};
 
@@ -89,13 +90,11 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
     if mesh.vertices.is_empty() {
         return Err(MeshError::NoVertices);
     }
-    let far_values = match format {
-        // Each triangle has corners of its own.
-        DetectedFormat::StlBinary | DetectedFormat::StlAscii => Vec::new(),
-        DetectedFormat::Obj | DetectedFormat::Ply | DetectedFormat::Xyz => {
-            find_far_values(&mesh.vertices, is_position)
-        }
+    let repeats = match format {
+        DetectedFormat::StlBinary | DetectedFormat::StlAscii => CORNERS_OF_VERTEX,
+        DetectedFormat::Obj | DetectedFormat::Ply | DetectedFormat::Xyz => 1,
     };
+    let far_values = find_far_values(&mesh.vertices, repeats, is_position);
     check.without_missing(mesh, incomplete_faces, &far_values)
 }
 
@@ -136,7 +135,8 @@ pub fn read_from(
     let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
         let (mesh, check) = stl::read_facets(&mut source, count, limits)?;
-        return Ok(check.without_missing(mesh, 0, &[])?);
+        let far_values = find_far_values(&mesh.vertices, CORNERS_OF_VERTEX, is_position);
+        return Ok(check.without_missing(mesh, 0, &far_values)?);
     }
     let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
     Ok(read_bytes(&bytes, name, limits)?)

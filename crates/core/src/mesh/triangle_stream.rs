@@ -3,6 +3,7 @@
 use std::io::Read;
 
 use super::error::{MeshError, MeshLimits, MeshReadError};
+use super::far_values::FarValues;
 use super::format::has_extension;
 use super::missing::is_position;
 use super::stl;
@@ -77,14 +78,15 @@ pub const STL_HEAD: usize = stl::HEADER;
 
 /// Passes over the facets of a binary STL, which is read a part at a time.
 ///
-/// `source` starts after the header. Leaves out facets with a corner that has no position, and returns the number of such
-/// corners.
+/// `source` starts after the header, and `far_values` stand for missing positions. Leaves out facets with a corner that has no
+/// position, and returns the number of such corners.
 ///
 /// # Errors
 /// Returns an error if the file ends early or `visit` returns one.
 pub fn pass_over_binary_stl(
     source: &mut impl Read,
     count: u32,
+    far_values: &FarValues,
     limits: &MeshLimits,
     visit: &mut dyn FnMut(&[Triangle]) -> Result<(), MeshReadError>,
 ) -> Result<u64, MeshReadError> {
@@ -107,7 +109,7 @@ pub fn pass_over_binary_stl(
             let corners = stl::corners(facet).map(|corner| corner.map(f64::from));
             let absent = corners
                 .iter()
-                .filter(|corner| !is_position(**corner))
+                .filter(|corner| !is_position(**corner) || far_values.are_at(**corner))
                 .count();
             missing += absent as u64;
             if absent == 0 {
@@ -122,9 +124,12 @@ pub fn pass_over_binary_stl(
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
     use super::{STL_HEAD, binary_stl_triangles, pass_over_binary_stl};
+    use crate::mesh::far_values::FarValues;
     use crate::mesh::write::MeshFormat;
-    use crate::mesh::{Mesh, MeshError, MeshLimits};
+    use crate::mesh::{Mesh, MeshError, MeshLimits, far_values_of_stl, read_from};
 
     /// The first bytes of a binary STL with 300,000 triangles, whose header is a text.
     fn head() -> Vec<u8> {
@@ -184,8 +189,35 @@ mod tests {
             Ok(())
         };
         let mut facets = &bytes[STL_HEAD..];
-        let missing = pass_over_binary_stl(&mut facets, 3, &MeshLimits::SUGGESTED, &mut visit);
+        let far_values = FarValues::default();
+        let limits = MeshLimits::SUGGESTED;
+        let missing = pass_over_binary_stl(&mut facets, 3, &far_values, &limits, &mut visit);
         assert_eq!(missing.expect("reads"), 3);
         assert_eq!(visited, [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]]]);
+    }
+
+    #[test]
+    fn facets_at_a_repeated_number_far_outside_are_left_out_as_of_a_whole_file() {
+        let corner = |k: usize| {
+            let [x, y] = [k % 60, k / 60].map(|at| at as f64);
+            [x, y, if k.is_multiple_of(40) { -9999.0 } else { 1.0 }]
+        };
+        let vertices: Vec<[f64; 3]> = (0..3000).map(corner).collect();
+        let mesh = Mesh::from_soup(vertices.into());
+        let bytes = MeshFormat::StlBinary.encode(&mesh);
+        let limits = MeshLimits::SUGGESTED;
+        let len = bytes.len() as u64;
+        let whole = read_from(&mut bytes.as_slice(), len, "a.stl", &limits).expect("reads");
+        assert_eq!(whole.losses.missing_vertices, 75);
+        let far_values = far_values_of_stl(&mut Cursor::new(&bytes), 1000).expect("a file");
+        let mut visited = 0;
+        let mut visit = |batch: &[_]| {
+            visited += batch.len();
+            Ok(())
+        };
+        let mut facets = &bytes[STL_HEAD..];
+        let missing = pass_over_binary_stl(&mut facets, 1000, &far_values, &limits, &mut visit);
+        assert_eq!(missing.expect("reads"), 75);
+        assert_eq!(visited, whole.mesh.triangles.len());
     }
 }

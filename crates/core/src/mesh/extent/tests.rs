@@ -127,6 +127,19 @@ fn numbers_for_missing_points_of_a_long_cloud_are_no_positions() {
 }
 
 #[test]
+fn facets_at_numbers_for_missing_points_of_a_long_stl_are_no_positions() {
+    let mut mesh = sheet(420);
+    for k in (0..mesh.vertices.len()).step_by(50) {
+        let [x, y, _] = mesh.vertices.at(k);
+        mesh.vertices.set(k, [x, y, -9999.0]);
+    }
+    for format in [MeshFormat::StlBinary, MeshFormat::StlAscii] {
+        let name = format!("{format:?}");
+        assert_sheet(long_sides(&format.encode(&mesh), "a.stl"), &name);
+    }
+}
+
+#[test]
 fn whole_coordinates_of_a_long_binary_ply_are_read() {
     let mesh = sheet(900);
     let count = mesh.vertices.len();

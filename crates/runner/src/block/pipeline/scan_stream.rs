@@ -9,8 +9,8 @@ use crate::block_stages::{BlockFile, BlockStageError};
 use mocban_align::block::BlockError;
 use mocban_core::domain::MeshLosses;
 use mocban_core::mesh::{
-    self, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,
-    binary_stl_triangles, pass_over_binary_stl,
+    self, FarValues, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,
+    binary_stl_triangles, far_values_of_stl, pass_over_binary_stl,
 };
 
 /// Bytes that are read at a time.
@@ -26,8 +26,8 @@ pub(crate) struct ScanStream<'a> {
 }
 
 enum ScanSource {
-    /// A binary STL and its number of triangles.
-    Stl(File, u32),
+    /// A binary STL, its number of triangles, and what stands for missing positions in it.
+    Stl(File, u32, FarValues),
     /// All triangles.
     Mesh(Mesh),
 }
@@ -50,7 +50,8 @@ impl<'a> ScanStream<'a> {
                 .take(STL_HEAD as u64)
                 .read_to_end(&mut head)?;
             if let Some(count) = binary_stl_triangles(&head, scan.size(), scan.name())? {
-                return Ok(ScanSource::Stl(file, count));
+                let far_values = far_values_of_stl(&mut file, count)?;
+                return Ok(ScanSource::Stl(file, count, far_values));
             }
             file.seek(SeekFrom::Start(0))?;
             let mut source = BufReader::with_capacity(BUFFER, Stoppable(&mut file, stop));
@@ -85,10 +86,11 @@ impl TriangleStream for ScanStream<'_> {
         visit: &mut dyn FnMut(&[Triangle]) -> Result<(), MeshReadError>,
     ) -> Result<(), MeshReadError> {
         match &mut self.source {
-            ScanSource::Stl(file, count) => {
+            ScanSource::Stl(file, count, far_values) => {
                 file.seek(SeekFrom::Start(STL_HEAD as u64))?;
                 let mut source = Stoppable(file, self.stop);
-                let missing = pass_over_binary_stl(&mut source, *count, self.limits, visit)?;
+                let missing =
+                    pass_over_binary_stl(&mut source, *count, far_values, self.limits, visit)?;
                 self.losses.missing_vertices = missing;
                 Ok(())
             }
