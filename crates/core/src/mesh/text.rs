@@ -146,6 +146,16 @@ pub(super) fn not_a_number(word: &[u8]) -> String {
     format!("{} is not a number{advice}", quote(word))
 }
 
+/// Says that a number has a decimal mark, a point or a comma, and others have the other one.
+pub(super) fn other_decimal_mark(word: &[u8], mark: u8) -> String {
+    let said = match mark {
+        b',' => "has a comma, but others have a point",
+        _ => "has a point, but others have a comma",
+    };
+    let word = quote(word);
+    format!("{word} {said}; write all numbers with the same decimal mark")
+}
+
 /// Ends the reasons of files that end within a line.
 pub(super) const CUT_OFF: &str = "the file seems to be cut off";
 

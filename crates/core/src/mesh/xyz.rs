@@ -3,6 +3,8 @@
 mod cells;
 mod first_column;
 mod grouped;
+#[cfg(test)]
+mod grouped_tests;
 mod layout;
 mod numbers;
 mod ptx;

@@ -351,6 +351,10 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "{0} có dấu phẩy, nhưng các số khác có dấu chấm",
     ),
     (
+        "write all numbers with the same decimal mark",
+        "hãy viết mọi số với cùng một dấu thập phân",
+    ),
+    (
         "no header of a PTX scan begins here",
         "không có phần đầu của bản quét PTX ở dòng này",
     ),

@@ -2,6 +2,8 @@
 
 /// First cells of a line that show what its blanks mean.
 const FIRST_CELLS: usize = 3;
+/// Apostrophes that group digits: that of ASCII, and the typographic one in UTF-8 and in Windows-1252.
+const APOSTROPHES: [&[u8]; 3] = [b"'", b"\xe2\x80\x99", b"\x92"];
 
 /// The number of a cell with a decimal point and without what groups its digits.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,9 +35,8 @@ impl PlainNumber {
             groups += 1;
         }
         let is_mark = matches!(separator, b'.' | b',');
-        let other = |mark: u8| if mark == b',' { b'.' } else { b',' };
         let mark = match *rest {
-            [] if groups > 1 || !is_mark => is_mark.then(|| other(separator)),
+            [] if groups > 1 || !is_mark => is_mark.then(|| other_mark(separator)),
             [mark @ (b'.' | b','), ref fraction @ ..]
                 if mark != separator
                     && !fraction.is_empty()
@@ -49,6 +50,62 @@ impl PlainNumber {
         };
         (groups > 0).then_some(Self { text: plain, mark })
     }
+}
+
+/// Returns the comma for a point, and the point for a comma.
+pub(super) const fn other_mark(mark: u8) -> u8 {
+    if mark == b',' { b'.' } else { b',' }
+}
+
+/// Returns a line without the apostrophes that group the digits of its numbers. `None` if it has none.
+pub(super) fn without_apostrophes(line: &[u8]) -> Option<Vec<u8>> {
+    // The first bytes of the apostrophes.
+    memchr::memchr3(b'\'', b'\xe2', b'\x92', line)?;
+    let is_end = |byte: &u8| byte.is_ascii_whitespace() || b",;".contains(byte);
+    let mut plain = Vec::with_capacity(line.len());
+    let mut is_grouped = false;
+    for part in line.split_inclusive(is_end) {
+        let end = part.iter().position(is_end).unwrap_or(part.len());
+        let (cell, separator) = part.split_at(end);
+        if let Some(number) = number_with_apostrophes(cell) {
+            plain.extend(number.text);
+            is_grouped = true;
+        } else {
+            plain.extend_from_slice(cell);
+        }
+        plain.extend_from_slice(separator);
+    }
+    is_grouped.then_some(plain)
+}
+
+/// Returns the number of a cell whose digits apostrophes group. `None` for other cells.
+fn number_with_apostrophes(cell: &[u8]) -> Option<PlainNumber> {
+    let mut usual = Vec::with_capacity(cell.len());
+    let mut rest = cell;
+    while let Some((first, after)) = rest.split_first() {
+        let behind = APOSTROPHES.iter().find_map(|mark| rest.strip_prefix(*mark));
+        usual.push(if behind.is_some() { b'\'' } else { *first });
+        rest = behind.unwrap_or(after);
+    }
+    let number = PlainNumber::of_grouped(&usual)?;
+    usual.contains(&b'\'').then_some(number)
+}
+
+/// Returns whether commas behind numbers with apostrophes may separate numbers or be decimal commas: `1'234,5,2'345,6`.
+/// Fewer than four cells are the coordinates.
+pub(super) fn has_unclear_commas(line: &[u8]) -> bool {
+    let is_possible = line.contains(&b',') && !line.contains(&b'.');
+    if !is_possible || without_apostrophes(line).is_none() {
+        return false;
+    }
+    let cells: Vec<&[u8]> = line.split(|byte| *byte == b',').collect();
+    let may_be_one = |pair: &[&[u8]]| {
+        let fraction = pair[1].trim_ascii_end();
+        number_with_apostrophes(pair[0].trim_ascii_start()).is_some()
+            && !fraction.is_empty()
+            && digits(fraction) == fraction.len()
+    };
+    cells.len() > FIRST_CELLS && cells.windows(2).any(may_be_one)
 }
 
 /// Returns the number of digits that a text begins with.
@@ -113,7 +170,9 @@ pub(super) fn are_grouped_pairs<'a>(cells: impl Iterator<Item = &'a [u8]>) -> bo
 
 #[cfg(test)]
 mod tests {
-    use super::{PlainNumber, separator_of_grouped, without_groups};
+    use super::{
+        PlainNumber, has_unclear_commas, separator_of_grouped, without_apostrophes, without_groups,
+    };
 
     #[test]
     fn grouped_numbers_have_a_plain_form_and_a_decimal_mark() {
@@ -151,6 +210,42 @@ mod tests {
             "1 234x",
         ] {
             assert_eq!(PlainNumber::of_grouped(other.as_bytes()), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn apostrophes_between_groups_of_digits_are_removed() {
+        for (line, plain) in [
+            ("14'293,45 -24'808,22", Some("14293,45 -24808,22")),
+            ("1'234'567.5;2;3", Some("1234567.5;2;3")),
+            ("14\u{2019}293.45\t2\t3", Some("14293.45\t2\t3")),
+            ("1'234 it's 1'23", Some("1234 it's 1'23")),
+            ("1.5'000 1''234 '1'234'", None),
+            ("1 2 3", None),
+        ] {
+            let found = without_apostrophes(line.as_bytes());
+            assert_eq!(
+                found,
+                plain.map(|plain| plain.as_bytes().to_vec()),
+                "{line}"
+            );
+        }
+        let found = without_apostrophes(b"14\x92293,45");
+        assert_eq!(found, Some(b"14293,45".to_vec()));
+    }
+
+    #[test]
+    fn commas_behind_apostrophes_may_be_unclear() {
+        for (line, is_unclear) in [
+            ("14'293,45,24'808,22,18'742,57", true),
+            ("14'293,24'808,742,255", true),
+            ("14'293,24'808,742", false),
+            ("14'293.4,24'808.2,742,255", false),
+            ("14'293, 45, 24'808, 22", false),
+            ("14'293,24'808,18'742,2'255", false),
+            ("1,2,3,4", false),
+        ] {
+            assert_eq!(has_unclear_commas(line.as_bytes()), is_unclear, "{line}");
         }
     }
 

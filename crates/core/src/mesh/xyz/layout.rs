@@ -6,11 +6,17 @@ use super::cells::{
     MISSING, cells, has_grouped_digits, outer_cells, plain_position, plain_tabbed_position,
     tab_cells, without_wide_spaces,
 };
-use super::grouped::{PlainNumber, are_grouped_pairs, separator_of_grouped, without_groups};
+use super::grouped::{
+    PlainNumber, are_grouped_pairs, has_unclear_commas, separator_of_grouped, without_apostrophes,
+    without_groups,
+};
 use super::title::{MAX_NAMES, Title, is_comment, is_other_title};
 use crate::mesh::MeshError;
 use crate::mesh::text;
 
+/// Why a line whose commas may do both is refused.
+const UNCLEAR_COMMAS: &str =
+    "its commas may separate numbers or be part of them; write spaces between numbers";
 /// Lines of points that show how cells are separated.
 const SAMPLED_LINES: usize = 1000;
 
@@ -207,15 +213,19 @@ impl PointLayout {
         plain.map_or_else(|| self.odd_position(row), Ok)
     }
 
-    /// Returns a line in which no blank groups digits. `None` if a cell has another blank.
+    /// Returns a line in which no apostrophe or blank groups digits. `None` if a cell has another blank.
     fn ungrouped<'a>(&self, line: &'a [u8]) -> Option<Cow<'a, [u8]>> {
+        let line = without_apostrophes(line).map_or(Cow::Borrowed(line), Cow::Owned);
         match self.grouped {
-            Some(separator) => without_groups(line, separator).map(Cow::Owned),
-            None => Some(Cow::Borrowed(line)),
+            Some(separator) => without_groups(&line, separator).map(Cow::Owned),
+            None => Some(line),
         }
     }
 
     fn odd_position(&self, row: &[u8]) -> Result<[f64; 3], String> {
+        if self.commas == CommaUse::Separator && has_unclear_commas(row) {
+            return Err(UNCLEAR_COMMAS.into());
+        }
         let row = self.ungrouped(row).ok_or_else(|| {
             "a cell has a blank, but is not a number such as \"1 234\"".to_owned()
         })?;
@@ -228,9 +238,7 @@ impl PointLayout {
 
     fn position_of_cells(&self, line: &[u8]) -> Result<[f64; 3], String> {
         if self.commas == CommaUse::Unclear && line.contains(&b',') {
-            let reason =
-                "its commas may separate numbers or be part of them; write spaces between numbers";
-            return Err(reason.into());
+            return Err(UNCLEAR_COMMAS.into());
         }
         if self.fast_parser != FastParser::None {
             self.check_cells(line, self.width_of(line))?;
@@ -256,7 +264,7 @@ impl PointLayout {
         }
         let points = coordinates.map(|cell| {
             let has_point = cell.contains(&b'.') && text::parse::<f64>(cell).is_some();
-            has_point.then(|| format!("{} has a point, but others have a comma", text::quote(cell)))
+            has_point.then(|| text::other_decimal_mark(cell, b'.'))
         });
         if let Some(reason) = points.into_iter().flatten().next() {
             return Err(reason);
@@ -351,6 +359,8 @@ fn number_with_grouping_points(cell: &[u8]) -> Option<f64> {
 
 /// Returns what the commas of a point mean; `None` if it has none.
 fn comma_use(line: &[u8]) -> Option<CommaUse> {
+    let plain = memchr::memchr(b',', line).and_then(|_| without_apostrophes(line));
+    let line = plain.as_deref().unwrap_or(line);
     let first_comma = line.iter().position(|byte| *byte == b',')?;
     let mut words = line
         .split(|byte| is_outer_separator(*byte))

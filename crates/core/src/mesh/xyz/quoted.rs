@@ -1,13 +1,17 @@
 //! Points whose cells are in quotation marks, as spreadsheet programs write numbers with decimal commas.
 
-use super::grouped::PlainNumber;
+use super::grouped::{PlainNumber, digits, other_mark, without_apostrophes};
 use crate::domain::cancel::polled;
 use crate::domain::named_separator;
 use crate::mesh::{MeshError, text};
 
-/// Returns the number of a cell that has a mark or grouped digits. `None` for other cells.
-fn plain_number(cell: &[u8]) -> Option<PlainNumber> {
+/// Returns the number of a cell that has a mark or grouped digits. `None` for other cells. `grouping` is the mark, a point or a
+/// comma, that groups digits in the file, if that is known.
+fn plain_number(cell: &[u8], grouping: Option<u8>) -> Option<PlainNumber> {
+    let plain = without_apostrophes(cell);
+    let cell = plain.as_deref().unwrap_or(cell);
     let grouped = PlainNumber::of_grouped(cell);
+    let grouped = grouped.or_else(|| of_one_group(cell, grouping?));
     if grouped.is_some() {
         return grouped;
     }
@@ -20,6 +24,32 @@ fn plain_number(cell: &[u8]) -> Option<PlainNumber> {
     text::number(&text).map(|_| PlainNumber { text, mark })
 }
 
+/// Returns the number of a cell such as `1,234`, in which a mark that groups digits stands before its only group.
+fn of_one_group(cell: &[u8], grouping: u8) -> Option<PlainNumber> {
+    let at = cell.iter().position(|byte| *byte == grouping)?;
+    let (whole, group) = (&cell[..at], &cell[at + 1..]);
+    let unsigned = whole.strip_prefix(b"-").unwrap_or(whole);
+    let is_grouped = matches!(unsigned.len(), 1..=3)
+        && digits(unsigned) == unsigned.len()
+        && unsigned[0] != b'0'
+        && group.len() == 3
+        && digits(group) == 3;
+    is_grouped.then(|| PlainNumber {
+        text: [whole, group].concat(),
+        mark: Some(other_mark(grouping)),
+    })
+}
+
+/// Returns the mark, a point or a comma, that groups digits in the first number with several groups, or with one and a fraction.
+fn grouping_mark(bytes: &[u8], separator: u8) -> Option<u8> {
+    let of_cell = |cell: &Vec<u8>| {
+        let grouping = other_mark(PlainNumber::of_grouped(cell)?.mark?);
+        cell.contains(&grouping).then_some(grouping)
+    };
+    let mut lines = text::raw_lines(bytes);
+    lines.find_map(|(_, line)| cells(line, separator).iter().find_map(of_cell))
+}
+
 /// Returns the text of a file without quotation marks, with semicolons between cells, with decimal points and without what
 /// groups digits, line by line. Returns `None` if no cell is in quotation marks.
 ///
@@ -28,10 +58,15 @@ fn plain_number(cell: &[u8]) -> Option<PlainNumber> {
 pub(super) fn plain_text(bytes: &[u8]) -> Option<Result<Vec<u8>, MeshError>> {
     let mut quoted = text::raw_lines(bytes).filter(|(_, line)| line.contains(&b'"'));
     let separator = quoted.find_map(|(_, line)| separator_of(line))?;
-    Some(with_points(bytes, separator))
+    let plain = with_points(bytes, separator, None);
+    // Numbers such as `1,234` have the mark of others if marks of that kind group digits.
+    Some(plain.or_else(|fault| {
+        let grouping = grouping_mark(bytes, separator).ok_or(fault)?;
+        with_points(bytes, separator, Some(grouping))
+    }))
 }
 
-fn with_points(bytes: &[u8], separator: u8) -> Result<Vec<u8>, MeshError> {
+fn with_points(bytes: &[u8], separator: u8, grouping: Option<u8>) -> Result<Vec<u8>, MeshError> {
     let mut plain = Vec::with_capacity(bytes.len());
     let mut common = None;
     for (line, content) in text::raw_lines(bytes) {
@@ -43,19 +78,14 @@ fn with_points(bytes: &[u8], separator: u8) -> Result<Vec<u8>, MeshError> {
             if nth > 0 {
                 plain.push(b';');
             }
-            let Some(number) = plain_number(&cell) else {
+            let Some(number) = plain_number(&cell, grouping) else {
                 plain.extend(joined(&cell));
                 continue;
             };
             if let Some(mark) = number.mark
                 && *common.get_or_insert(mark) != mark
             {
-                let cell = text::quote(&cell);
-                let reason = if mark == b',' {
-                    format!("{cell} has a comma, but others have a point")
-                } else {
-                    format!("{cell} has a point, but others have a comma")
-                };
+                let reason = text::other_decimal_mark(&cell, mark);
                 return Err(MeshError::Line { line, reason });
             }
             plain.extend(number.text);

@@ -2,11 +2,11 @@
 
 use crate::mesh::{Mesh, MeshError, MeshLimits, Vertices, read, read_from};
 
-fn open(text: &str) -> Result<Mesh, MeshError> {
+pub(super) fn open(text: &str) -> Result<Mesh, MeshError> {
     read(text.as_bytes(), "scan.xyz", &MeshLimits::SUGGESTED)
 }
 
-fn refused(text: &str) -> String {
+pub(super) fn refused(text: &str) -> String {
     open(text).expect_err(text).to_string()
 }
 
@@ -114,7 +114,7 @@ fn unclear_commas_are_refused() {
     }
     assert_eq!(
         refused("1,5 2,5 3\n1.5 2 3\n"),
-        "line 2: \"1.5\" has a point, but others have a comma"
+        "line 2: \"1.5\" has a point, but others have a comma; write all numbers with the same decimal mark"
     );
     assert_eq!(
         refused("1,5 2,5 3\n1,234,567 2 3\n"),
@@ -287,7 +287,7 @@ fn a_named_separator_and_quoted_numbers_are_read() {
     assert_eq!((positions, missing), (vec![[1.0, 2.5, 3.0]], 1));
     assert_eq!(
         refused("\"1,500\",\"2.5\",\"3\"\n"),
-        "line 1: \"2.5\" has a point, but others have a comma"
+        "line 1: \"2.5\" has a point, but others have a comma; write all numbers with the same decimal mark"
     );
 }
 
@@ -329,7 +329,7 @@ fn points_and_commas_that_group_digits_are_read_and_others_are_named() {
     );
     assert_eq!(
         refused(&format!("{plain}\"1.5\",\"2,5\",\"3\"\n")),
-        "line 501: \"1.5\" has a point, but others have a comma"
+        "line 501: \"1.5\" has a point, but others have a comma; write all numbers with the same decimal mark"
     );
     assert_eq!(
         refused("\"X\",\"Y\",\"Z\"\n1 2.5 3\n4 x 6\n"),

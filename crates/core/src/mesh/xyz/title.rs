@@ -1,6 +1,7 @@
 //! Lines before the points: titles that name columns, counts, units and comments.
 
 use super::cells::cells;
+use super::grouped::without_apostrophes;
 use crate::domain::named_separator;
 use crate::mesh::text;
 
@@ -16,6 +17,7 @@ pub(in crate::mesh) fn is_data_or_title(line: &[u8]) -> bool {
         || is_count(line)
         || named_separator(line).is_some()
         || text::position(cells(line)).is_ok()
+        || without_apostrophes(line).is_some_and(|plain| text::position(cells(&plain)).is_ok())
 }
 
 /// Returns whether a line is empty or a comment.

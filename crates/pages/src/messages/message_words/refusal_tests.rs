@@ -107,8 +107,8 @@ fn refusals_that_are_put_together_are_translated() {
             "m.xyz: dòng 6: dòng này có 4 cột, nhưng hầu hết các dòng có 3; hãy viết các số như \"1 234\" liền nhau, không có dấu cách",
         ),
         (
-            "m.xyz: line 1: \"2.5\" has a point, but others have a comma",
-            "m.xyz: dòng 1: \"2.5\" có dấu chấm, nhưng các số khác có dấu phẩy",
+            "m.xyz: line 1: \"2.5\" has a point, but others have a comma; write all numbers with the same decimal mark",
+            "m.xyz: dòng 1: \"2.5\" có dấu chấm, nhưng các số khác có dấu phẩy; hãy viết mọi số với cùng một dấu thập phân",
         ),
         (
             "m.xyz: line 6: it has 3 columns, but most lines have 4; it may lack the number that the others begin with",
