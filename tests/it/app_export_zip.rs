@@ -229,8 +229,9 @@ fn rest(mut stream: TcpStream) -> usize {
 fn a_download_is_cut_off_if_the_export_is_replaced_or_loses_a_file() {
     let (dir, page) = with_project();
     let folder = table_folder(dir.path(), &page);
-    // The next export replaces only files that this one wrote.
+    // The next export replaces only files that this one wrote, and without checksums also changed ones.
     zeros(&folder.join("pairs.csv"), 40 << 20);
+    fs::remove_file(folder.join("checksums.txt")).expect("removed");
     let (stream, length, _) = begin(&page);
     assert_eq!(rest(stream), length, "an unchanged export is sent whole");
     let (stream, length, _) = begin(&page);
@@ -242,6 +243,30 @@ fn a_download_is_cut_off_if_the_export_is_replaced_or_loses_a_file() {
     export_table(&page);
     assert!(rest(stream) < length);
     assert_eq!(download(&page).status, 200, "the new export is whole");
+}
+
+#[test]
+fn an_edited_export_is_kept_and_the_page_says_so_in_both_languages() {
+    let (dir, page) = with_project();
+    let table = table_folder(dir.path(), &page).join("pairs.csv");
+    fs::write(&table, "my corrections\n").expect("written");
+    let body = json!({"purpose": "excel", "only": "all", "metric": ""});
+    let reply = act(&page, "/p/p/actions/export", &body, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    wait_until("the export is refused", || {
+        html(&page, "/p/p/export").contains("data-task=\"failed\"")
+    });
+    for (path, said) in [
+        ("/p/p/export", "was changed after it was written"),
+        ("/p/p/export?language=vi", "đã bị sửa sau khi ghi"),
+    ] {
+        let shown = html(&page, path);
+        assert!(shown.contains(said), "{path}: {shown}");
+    }
+    assert_eq!(
+        fs::read_to_string(&table).expect("a table"),
+        "my corrections\n"
+    );
 }
 
 #[test]

@@ -315,7 +315,7 @@ fn an_export_replaces_one_of_another_format_and_nothing_else() {
         .collect();
     assert_eq!(
         names,
-        BTreeSet::from(["csv".into(), "export.json".into(), "parquet".into()])
+        BTreeSet::from(["checksums.txt", "csv", "export.json", "parquet"].map(Into::into))
     );
     fs::write(out.join("csv/notes.txt"), "mine").expect("written");
     let before = contents(&out);
@@ -328,4 +328,30 @@ fn an_export_replaces_one_of_another_format_and_nothing_else() {
         refused.err
     );
     assert!(before == contents(&out), "the folder was changed");
+}
+
+#[test]
+fn an_export_replaces_no_file_that_somebody_edited() {
+    let dir = project();
+    let out = dir.path().join("out");
+    let args = ["--to", "csv", "-o", "out"];
+    for _ in 0..2 {
+        export(dir.path(), &args).expect(0);
+    }
+    let table = out.join("pairs.csv");
+    let mut edited = fs::read(&table).expect("a table");
+    let last = edited.len() - 2;
+    edited[last] = b'7';
+    fs::write(&table, &edited).expect("written");
+    let before = contents(&out);
+    let refused = export(dir.path(), &args).expect(2);
+    let said = "out/pairs.csv was changed after it was written, so its folder is not replaced; move the file elsewhere";
+    assert!(refused.err.contains(said), "{}", refused.err);
+    assert!(before == contents(&out), "the folder was changed");
+    fs::rename(&table, dir.path().join("mine.csv")).expect("moved");
+    export(dir.path(), &args).expect(0);
+    assert_eq!(
+        fs::read(dir.path().join("mine.csv")).expect("a table"),
+        edited
+    );
 }

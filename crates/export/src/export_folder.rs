@@ -20,6 +20,11 @@ pub enum FolderError {
         "{0} is not part of an export, so its folder is not replaced; choose an empty or new folder"
     )]
     NotAnExport(PathBuf),
+    /// Somebody edited a file of an earlier export.
+    #[error(
+        "{0} was changed after it was written, so its folder is not replaced; move the file elsewhere, or choose another folder"
+    )]
+    Changed(PathBuf),
     /// A file is where the folder should be.
     #[error("{0} is a file; name a folder for the export")]
     IsFile(PathBuf),
@@ -39,7 +44,7 @@ pub enum FolderError {
 impl Explained for FolderError {
     fn code(&self) -> ErrorCode {
         match self {
-            Self::NotAnExport(_) | Self::IsFile(_) => ErrorCode::Usage,
+            Self::NotAnExport(_) | Self::Changed(_) | Self::IsFile(_) => ErrorCode::Usage,
             Self::Replace(error) => error.code(),
             Self::Io { .. } => ErrorCode::Unexpected,
         }
@@ -61,9 +66,14 @@ impl Folder {
         self.0.path()
     }
 
+    /// Returns the folder that will be replaced.
+    pub(super) fn target(&self) -> &Path {
+        self.0.target()
+    }
+
     /// Returns whether finishing would replace an earlier export.
     pub(super) fn replaces(&self) -> Result<bool, FolderError> {
-        let manifest = self.0.target().join(MANIFEST);
+        let manifest = self.target().join(MANIFEST);
         manifest.try_exists().map_err(at(&manifest))
     }
 
@@ -74,7 +84,7 @@ impl Folder {
     /// occurs before the target is replaced, the target is kept.
     pub(super) fn finish(self) -> Result<Leftover, FolderError> {
         // Somebody may have put files into the target while the export was written.
-        refuse_foreign(self.0.target())?;
+        refuse_foreign(self.target())?;
         Ok(self.0.finish()?)
     }
 }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::block_lines::{BLOCKS_FILE, write_blocks};
+use super::checksums::{CHECKSUMS, refuse_edited, write_checksums};
 use super::export_folder::{Folder, FolderError, write_below};
 use super::export_logs::write_logs;
 use super::exporter_error::ExportError;
@@ -67,7 +68,8 @@ impl ExportSummary {
 }
 
 /// Exports the pairs of a project to a folder, which must be new, empty or an earlier export. Replaces an earlier
-/// export. One format is written to the folder itself; of several, each is written to a folder of its name in it.
+/// export, unless somebody edited a file of it. One format is written to the folder itself; of several, each is written to a
+/// folder of its name in it.
 ///
 /// If the files of a pair cannot be read, its record and the summary state so, and the other pairs are exported. Such an
 /// incomplete export never replaces an earlier export: the new one is discarded. Nothing is written if the options
@@ -105,7 +107,12 @@ pub async fn export(
         },
         options,
     };
-    let mut run = ExportRun::begin(project, dir, formats, context, plan)?;
+    let mut run = {
+        let (project, dir, formats) = (project.clone(), dir.to_owned(), formats.to_vec());
+        let token = ThreadToken::current();
+        let begin = move || ExportRun::begin(&project, &dir, &formats, context, plan);
+        tokio::task::spawn_blocking(move || token.scope(begin)).await??
+    };
     run.summary.set_apart = SetApart::of(damaged);
     run.summary.pairs.set_apart = run.summary.set_apart.count;
     let mut pages = catalog.result_pages(PAGE);
@@ -172,6 +179,8 @@ impl ExportRun {
         plan: Option<SplitPlan>,
     ) -> Result<Self, FolderError> {
         let folder = Folder::begin(dir)?;
+        // The folder is locked, so no other export replaces its target meanwhile.
+        refuse_edited(folder.target())?;
         let context = Arc::new(context);
         let mut outputs = Vec::new();
         for format in formats {
@@ -304,7 +313,7 @@ impl ExportRun {
         Ok(())
     }
 
-    /// Completes the shared files, writes the READMEs and the manifest, and replaces the target.
+    /// Completes the shared files, writes the READMEs, the manifest and the checksums, and replaces the target.
     fn finish(mut self) -> Result<ExportSummary, FolderError> {
         let root = self.folder.path().to_owned();
         let mut summary = self.summary;
@@ -336,7 +345,7 @@ impl ExportRun {
             let paths = names.iter().map(|name| format!("{}{name}", output.prefix));
             self.files.extend(paths);
         }
-        self.files.insert(MANIFEST.to_owned());
+        self.files.extend([CHECKSUMS, MANIFEST].map(str::to_owned));
         let formats: Vec<_> = self.outputs.iter().map(|output| output.format).collect();
         let (context, files) = (&self.context, &self.files);
         let manifest = ExportManifest::new(
@@ -351,6 +360,9 @@ impl ExportRun {
         self.outputs.clear();
         summary.kept_earlier = !summary.is_complete() && self.folder.replaces()?;
         if !summary.kept_earlier {
+            write_checksums(&root)?;
+            // Somebody may have edited the target while the export was written.
+            refuse_edited(self.folder.target())?;
             let leftover = self.folder.finish()?;
             summary.leftover = leftover.map(|(path, error)| (path, error.to_string()));
         }

@@ -3,7 +3,8 @@
 //! - `exporter.rs` reads pages of pairs, encodes them on all cores, and appends them in the order of the catalog
 //! - `record.rs` has the fields of a pair that all formats share, `record_fields.rs` their units and frames,
 //!   `pair_pictures.rs` reads inputs and artifacts when a format needs them
-//! - `formats/` has the formats, which implement `format_writer.rs`; `manifest.rs` recognizes an earlier export
+//! - `formats/` has the formats, which implement `format_writer.rs`; `manifest.rs` recognizes an earlier export, and
+//!   `checksums.rs` finds what somebody edited in it
 //! - `alignment_files.rs` encodes the pictures of one pair that has no project
 //! - `block_lines.rs`, `block_grid.rs` and `page_labels.rs` write whole blocks, their maps and their boxes
 //! - `pictures` and `contact_sheet.rs` draw overlays and sheets; `block_view` draws any part of a page, of its relief, or of
@@ -16,14 +17,15 @@
 //! Every call fails if the catalog, an input or an artifact cannot be read, or the output cannot be written. `# Errors` names
 //! other reasons, and what an error leaves behind.
 //!
-//! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs (except for labels of whole pages, and names of files for
-//! a ZIP archive), and an earlier export is replaced as a whole or not at all.
+//! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs (except for labels of whole
+//! pages, and names of files for a ZIP archive and for checksums), and an earlier export is replaced as a whole or not at all.
 
 mod alignment_files;
 mod annotations;
 mod block_grid;
 mod block_lines;
 pub mod block_view;
+mod checksums;
 mod contact_sheet;
 mod export_folder;
 mod export_logs;

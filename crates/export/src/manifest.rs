@@ -1,7 +1,7 @@
 //! The manifest of an export, `export.json`, by which an earlier export is recognized.
 //!
 //! It lists the path of every file below the folder, with `*` in place of ids of pairs. An export replaces a folder only
-//! if the folder's manifest lists all its files, so that nothing else is ever lost.
+//! if the folder's manifest lists all its files, and none was changed (see `checksums.rs`), so that nothing else is ever lost.
 
 use std::collections::BTreeSet;
 use std::fs;

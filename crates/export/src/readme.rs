@@ -17,7 +17,8 @@ const COORDINATES: &str = include_str!("../../../docs/reference/coordinates.md")
 
 const CITATION: &str = "\
 Cite the program as mocban (version above), and the method that it extends as arXiv:2411.05524. `export.json` holds all
-settings, so that the export can be made again.
+settings, so that the export can be made again. `checksums.txt` beside it has the BLAKE3 hash of each file
+(`b3sum --check checksums.txt`): an export replaces no file that somebody changed.
 ";
 
 /// Returns the README of an export in one format.

@@ -1,7 +1,11 @@
 //! BLAKE3 hashes that identify contents: input files, artifacts, fingerprints, results.
 
+use std::io::{self, Read};
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use super::cancel::PolledReader;
 
 /// A 256-bit BLAKE3 hash; 64 lower-case hexadecimal digits in text.
 ///
@@ -11,6 +15,8 @@ use serde::{Deserialize, Serialize};
 /// let hash = ContentHash::of(b"mocban");
 /// assert_eq!(hash.to_hex().parse(), Ok(hash));
 /// assert!(hash.to_hex().starts_with(&hash.short()));
+/// assert_eq!(ContentHash::of_source(&b"mocban"[..])?, hash);
+/// # Ok::<(), std::io::Error>(())
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
@@ -25,6 +31,16 @@ impl ContentHash {
     /// Computes the hash of the bytes.
     pub fn of(bytes: &[u8]) -> Self {
         Self(*blake3::hash(bytes).as_bytes())
+    }
+
+    /// Computes the hash of all bytes of a source, which is read a part at a time.
+    ///
+    /// # Errors
+    /// Returns an error if the source cannot be read.
+    pub fn of_source(source: impl Read) -> io::Result<Self> {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(PolledReader(source))?;
+        Ok(Self(*hasher.finalize().as_bytes()))
     }
 
     /// Wraps the 32 bytes of a hash, as the catalog stores them.

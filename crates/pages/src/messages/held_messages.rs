@@ -47,6 +47,22 @@ pub(super) const HELD_MESSAGES: &[(&str, &str)] = &[
         "hãy chờ tiến trình đó kết thúc, hoặc chọn tên khác",
     ),
     (
+        "{} is not part of an export, so its folder is not replaced",
+        "{0} không thuộc bản xuất nào nên thư mục chứa nó không bị thay thế",
+    ),
+    (
+        "choose an empty or new folder",
+        "hãy chọn thư mục trống hoặc thư mục mới",
+    ),
+    (
+        "{} was changed after it was written, so its folder is not replaced",
+        "{0} đã bị sửa sau khi ghi nên thư mục chứa nó không bị thay thế",
+    ),
+    (
+        "move the file elsewhere, or choose another folder",
+        "hãy chuyển tệp đó sang nơi khác, hoặc chọn thư mục khác",
+    ),
+    (
         "the earlier folder is {}, and the next call of this command restores it",
         "thư mục trước đó là {0}, và lần sau khi làm lại việc này, thư mục đó được khôi phục",
     ),

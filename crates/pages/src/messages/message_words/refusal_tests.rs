@@ -222,3 +222,17 @@ fn failures_of_a_run_are_translated() {
         ),
     ]);
 }
+
+#[test]
+fn refusals_of_edited_exports_are_translated() {
+    assert_translated(&[
+        (
+            "/x/p/exports/excel/pairs.csv was changed after it was written, so its folder is not replaced; move the file elsewhere, or choose another folder",
+            "/x/p/exports/excel/pairs.csv đã bị sửa sau khi ghi nên thư mục chứa nó không bị thay thế; hãy chuyển tệp đó sang nơi khác, hoặc chọn thư mục khác",
+        ),
+        (
+            "/x/p/exports/excel/notes.txt is not part of an export, so its folder is not replaced; choose an empty or new folder",
+            "/x/p/exports/excel/notes.txt không thuộc bản xuất nào nên thư mục chứa nó không bị thay thế; hãy chọn thư mục trống hoặc thư mục mới",
+        ),
+    ]);
+}
