@@ -195,16 +195,42 @@ fn reports_sheets_and_logs_replace_only_their_own_earlier_files() {
     }
     at(&project, &["report", "--format", "text", "-o", &report]).expect(0);
     at(&project, &["report", "-o", &sheet]).expect(2);
-    for name in ["added.md", "added.csv"] {
-        let output = path(name);
-        at(&project, &["report", "-o", &output]).expect(0);
-        let mut content = std::fs::read(&output).expect("a report");
-        content.extend_from_slice(b"seen by lan\n");
-        std::fs::write(&output, &content).expect("written");
-        let refused = at(&project, &["report", "-o", &output]).expect(2);
-        let is_said = refused.err.contains("somebody added text");
-        assert!(is_said, "{name}: {}", refused.err);
-        assert_eq!(std::fs::read(&output).expect("a file"), content, "{name}");
+}
+
+#[test]
+fn reports_that_somebody_changed_are_kept_and_named() {
+    let dir = empty();
+    let project = done(dir.path());
+    for name in ["a.md", "a.csv", "a.txt", "a.tex", "a.json", "a.html"] {
+        let path = dir.path().join(name);
+        let output = path.display().to_string();
+        let report = || at(&project, &["report", "-o", &output]);
+        report().expect(0);
+        let written = std::fs::read(&path).expect("a report");
+        report().expect(0);
+        assert!(written == std::fs::read(&path).expect("a report"), "{name}");
+        let text = String::from_utf8(written).expect("UTF-8");
+        // A number in the middle, and text at the end.
+        let digit = text
+            .rfind("mocban 0.")
+            .or_else(|| text.rfind("0."))
+            .expect("a number");
+        let digit = digit + text[digit..].find('0').expect("a digit");
+        let mut edited = text.clone();
+        edited.replace_range(digit..=digit, "7");
+        let mut changed = vec![edited];
+        if name != "a.json" {
+            changed.push(format!("{text}seen by lan\n"));
+        }
+        for content in changed {
+            std::fs::write(&path, &content).expect("written");
+            let refused = report().expect(2);
+            let said =
+                format!("{name} is a report that somebody changed after it was written; choose");
+            assert!(refused.err.contains(&said), "{name}: {}", refused.err);
+            let kept = std::fs::read(&path).expect("a report");
+            assert!(kept == content.as_bytes(), "{name}");
+        }
     }
 }
 

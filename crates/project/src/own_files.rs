@@ -38,21 +38,34 @@ pub fn refuse_foreign_file(
 }
 
 /// Refuses to write a report over a file like [`refuse_foreign_file`], but passes the whole file to `is_report`: a report may
-/// name the program at its end. Refuses a report, too, if `is_continued` finds that somebody added text at its end.
+/// name the program at its end. Refuses a report, too, if `is_changed` finds by its checksum that somebody changed it, or, of
+/// a report without a checksum, if `is_continued` finds that somebody added text at its end.
 pub(crate) fn refuse_foreign_report(
     path: &Path,
     is_report: impl FnOnce(&[u8]) -> bool,
+    is_changed: impl FnOnce(&[u8]) -> Option<bool>,
     is_continued: impl FnOnce(&[u8]) -> bool,
 ) -> Result<(), Refusal> {
     let what = "a report of this program";
-    let earlier = earlier_output(path, what, MAX_REPORT_BYTES, is_report)?;
-    if earlier.is_some_and(|earlier| is_continued(&earlier)) {
-        return Err(Refusal::Usage(format!(
+    let Some(earlier) = earlier_output(path, what, MAX_REPORT_BYTES, is_report)? else {
+        return Ok(());
+    };
+    match is_changed(&earlier) {
+        Some(true) => Err(changed_output(path, "a report")),
+        None if is_continued(&earlier) => Err(Refusal::Usage(format!(
             "{} is a report to which somebody added text; choose another name, or remove it if you do not need it",
             path.display()
-        )));
+        ))),
+        Some(false) | None => Ok(()),
     }
-    Ok(())
+}
+
+/// Refuses an output of this program, such as `a report`, that somebody changed.
+pub(crate) fn changed_output(path: &Path, what: &str) -> Refusal {
+    Refusal::Usage(format!(
+        "{} is {what} that somebody changed after it was written; choose another name, or remove it if you do not need it",
+        path.display()
+    ))
 }
 
 /// Returns the first bytes of an earlier output, up to `most`, or `None` if there is nothing to write over. Refuses a file that
@@ -199,14 +212,22 @@ mod tests {
         let content = [vec![b' '; HEAD_BYTES], end.to_vec()].concat();
         std::fs::write(&path, content).expect("written");
         let is_ours = |bytes: &[u8]| bytes.ends_with(end);
-        assert!(refuse_foreign_report(&path, is_ours, |_| false).is_ok());
-        let refused = refuse_foreign_report(&path, is_ours, |_| true).expect_err("added text");
-        assert!(
-            refused.to_string().contains("somebody added text"),
-            "{refused}"
-        );
+        for (checksum, is_continued, said) in [
+            (None, false, None),
+            (None, true, Some("somebody added text")),
+            (Some(false), true, None),
+            (Some(true), false, Some("somebody changed")),
+        ] {
+            let checked = refuse_foreign_report(&path, is_ours, |_| checksum, |_| is_continued);
+            let refused = checked.err().map(|refused| refused.to_string());
+            let is_right = match (&refused, said) {
+                (Some(refused), Some(said)) => refused.contains(said),
+                (refused, said) => refused.is_none() && said.is_none(),
+            };
+            assert!(is_right, "{refused:?} {said:?}");
+        }
         std::fs::write(&path, "").expect("written");
-        assert!(refuse_foreign_report(&path, is_ours, |_| true).is_ok());
+        assert!(refuse_foreign_report(&path, is_ours, |_| Some(true), |_| true).is_ok());
         std::fs::write(&path, [vec![b' '; HEAD_BYTES], end.to_vec()].concat()).expect("written");
         assert!(refuse_foreign_file(&path, "a log", is_ours).is_err());
     }

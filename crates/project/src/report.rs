@@ -11,7 +11,8 @@ use crate::status::warn_about_stale;
 use mocban_config::{Sources, load};
 use mocban_export::{GallerySelection, draw_gallery};
 use mocban_report::{
-    Cover, Report, ReportFormat, build, build_with, is_continued, is_report, page, render,
+    Cover, Report, ReportFormat, build, build_with, is_changed, is_continued, is_report, page,
+    render,
 };
 use mocban_results::IntervalMethod;
 use mocban_store::Project;
@@ -53,7 +54,7 @@ pub async fn report(
     let (project, catalog) = location.open_read_only().await?;
     if let Some(path) = output {
         refuse_used_file(path, &project, &catalog).await?;
-        refuse_foreign_report(path, is_report, is_continued)?;
+        refuse_foreign_report(path, is_report, is_changed, is_continued)?;
     }
     warn_about_stale(&catalog, location, listener).await?;
     let _work = LongWork::begin(listener, "reading the results");

@@ -45,8 +45,8 @@ pub use model::{
 pub use named_commands::{CommandPage, NAMED_COMMANDS, NamedCommand, command_page};
 pub use provenance::{ChangedSetting, Provenance, UsedSettings};
 pub use render::{
-    Cover, MAX_PAGE_BYTES, RESERVED_BYTES, ReportFormat, agreement_text, is_continued, is_report,
-    page, render, summary,
+    Cover, MAX_PAGE_BYTES, RESERVED_BYTES, ReportFormat, agreement_text, is_changed, is_continued,
+    is_report, page, render, summary, with_checksum,
 };
 pub use report_error::ReportError;
 pub use risk_coverage::{

@@ -15,7 +15,7 @@ use mocban_pages::review::Language;
 use mocban_project::files;
 use mocban_project::report::{self, RenderedReport, ReportOptions};
 use mocban_project::{ExitCode, ProjectResult, Refusal};
-use mocban_report::{Report, ReportFormat, quality_gate, render, summary};
+use mocban_report::{Report, ReportFormat, quality_gate, render, summary, with_checksum};
 use mocban_results::IntervalMethod;
 
 /// Arguments of `report`.
@@ -100,7 +100,8 @@ pub(crate) async fn report(args: ReportArgs, context: &Context) -> ProjectResult
     }
     match output {
         Some(path) => {
-            files::write_output(path, text.as_bytes(), args.allow_missing || is_complete)?;
+            let file = with_checksum(&text);
+            files::write_output(path, file.as_bytes(), args.allow_missing || is_complete)?;
             context.info(&format!("the report is in {}", path.display()));
         }
         None if format == ReportFormat::Json => streams::print_json_text(&text)?,

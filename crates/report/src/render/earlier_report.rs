@@ -27,15 +27,15 @@ pub fn is_report(bytes: &[u8]) -> bool {
         text.windows(part.len())
             .any(|found| found == part.as_bytes())
     };
-    text.starts_with(csv::HEADER.as_bytes())
+    text.starts_with(csv::HEADER.trim_end().as_bytes())
         || text.starts_with(latex::PREAMBLE.as_bytes())
         || text.starts_with(b"<!DOCTYPE html>") && has(html::GENERATOR)
         || has(PLAIN_PROGRAM)
         || has(MARKDOWN_PROGRAM)
 }
 
-/// Returns whether somebody added something at the end of a report: each format ends in its own way, and CSV has nothing but
-/// rows of numbers. Changes in other places are not found.
+/// Returns whether somebody added something at the end of a report without a checksum, as earlier versions wrote them: each
+/// format ends in its own way, and CSV has nothing but rows of numbers. Changes in other places are not found.
 pub fn is_continued(report: &[u8]) -> bool {
     // JSON with anything behind it is no report.
     if report.trim_ascii_start().starts_with(b"{") {
@@ -94,7 +94,7 @@ fn is_csv_row(line: &str) -> bool {
 /// The line of a report as text that names the program.
 const PLAIN_PROGRAM: &str = "\nProgram      mocban ";
 /// The same in Markdown, with its title.
-const MARKDOWN_PROGRAM: &str = "\n**Provenance**\n\n- Program: mocban ";
+pub(super) const MARKDOWN_PROGRAM: &str = "\n**Provenance**\n\n- Program: mocban ";
 
 #[cfg(test)]
 mod tests {

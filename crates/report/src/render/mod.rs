@@ -6,6 +6,7 @@ mod code_spans;
 mod comparison_tables;
 mod csv;
 mod earlier_report;
+mod file_checksum;
 mod html;
 mod latex;
 mod latex_text;
@@ -24,6 +25,7 @@ use mocban_results::gallery::Gallery;
 
 pub use agreement_text::agreement_text;
 pub use earlier_report::{is_continued, is_report};
+pub use file_checksum::{is_changed, with_checksum};
 pub use html::{Cover, MAX_PAGE_BYTES, RESERVED_BYTES, page};
 pub use text::summary;
 
