@@ -1,25 +1,57 @@
 //! Draws many pairs, or a whole block, on one PNG.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use crate::blocking::blocking;
 use crate::error::ProjectResult;
 use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::exit::Refusal;
-use crate::files;
+use crate::files::{self, HEAD_BYTES};
 use crate::location::Location;
-use crate::own_files::{refuse_foreign_file, refuse_used_file};
+use crate::own_files::{changed_output, refuse_foreign_file, refuse_used_file};
 use crate::selection;
 use crate::status::all_retired;
 use mocban_catalog::Catalog;
-use mocban_core::domain::ThresholdMetric;
-use mocban_core::raster::png_rgb8_of;
+use mocban_core::domain::{ContentHash, ThresholdMetric};
+use mocban_core::raster::{Grid, png_rgb8_of, split_png_text, with_png_text};
 use mocban_export::block_view::BlockView;
 use mocban_export::{ContactSheet, ContactSheetOptions, draw_contact_sheet};
-use mocban_store::Project;
+use mocban_store::{Project, open_regular};
 
 /// What the pictures name as their program, and what an earlier one is recognized by.
 const SOFTWARE: &str = "mocban contact-sheet";
+
+/// The text chunk with the hash of all other bytes.
+const CHECKSUM: &str = "Checksum";
+
+/// Encodes a picture of this module.
+fn sheet_png(picture: &Grid<[u8; 3]>) -> Vec<u8> {
+    let png = png_rgb8_of(picture, SOFTWARE);
+    with_png_text(&png, CHECKSUM, &ContentHash::of(&png).to_hex())
+}
+
+/// Refuses to write over a file that is no picture of this module, or that somebody changed. Pictures of earlier versions have
+/// no checksum and are replaced.
+fn refuse_other_file(path: &Path) -> Result<(), Refusal> {
+    refuse_foreign_file(path, "a contact sheet of this program", is_sheet)?;
+    if is_changed(path) == Some(true) {
+        return Err(changed_output(path, "a contact sheet"));
+    }
+    Ok(())
+}
+
+/// Returns whether a picture has other bytes than were written. `None` if it has no checksum.
+fn is_changed(path: &Path) -> Option<bool> {
+    let (mut file, _) = open_regular(path).ok()?;
+    let mut head = Vec::new();
+    let limited = file.by_ref().take(HEAD_BYTES as u64).read_to_end(&mut head);
+    limited.ok()?;
+    let (without, stored) = split_png_text(&head, CHECKSUM)?;
+    let is_usual = with_png_text(&without, CHECKSUM, &stored) == head;
+    let hash = ContentHash::of_source(without.as_slice().chain(file));
+    Some(!is_usual || !hash.is_ok_and(|hash| hash.to_hex() == stored))
+}
 
 /// Returns whether the first bytes of a file are those of a picture of this module.
 fn is_sheet(bytes: &[u8]) -> bool {
@@ -44,7 +76,7 @@ pub async fn contact_sheet(
     let path = output.map_or_else(|| project.dir().join("sheet.png"), Path::to_owned);
     refuse_used_file(&path, &project, &catalog).await?;
     files::require_png(output)?;
-    refuse_foreign_file(&path, "a contact sheet of this program", is_sheet)?;
+    refuse_other_file(&path)?;
     let metric = options.metric;
     let options = ContactSheetOptions {
         pairs: selection::some_or_all(&catalog, pairs).await?,
@@ -70,7 +102,7 @@ pub async fn contact_sheet(
         warn(listener, text);
     }
     let is_complete = allow_missing || sheet.problems.is_empty();
-    let written = files::write_output(&path, &png_rgb8_of(&sheet.picture, SOFTWARE), is_complete);
+    let written = files::write_output(&path, &sheet_png(&sheet.picture), is_complete);
     files::or_elsewhere(written, output)?;
     Ok((path, sheet))
 }
@@ -97,7 +129,7 @@ pub async fn block_sheet(
     let path = output.map_or_else(|| project.dir().join(default()), Path::to_owned);
     refuse_used_file(&path, &project, &catalog).await?;
     files::require_png(output)?;
-    refuse_foreign_file(&path, "a contact sheet of this program", is_sheet)?;
+    refuse_other_file(&path)?;
     let work = LongWork::begin(listener, "drawing the page");
     let view = block_view(block, metric, &project, &catalog, location).await?;
     let draw = move || {
@@ -106,7 +138,7 @@ pub async fn block_sheet(
         } else {
             view.draw_boxes()
         };
-        (png_rgb8_of(&picture, SOFTWARE), view.characters.len())
+        (sheet_png(&picture), view.characters.len())
     };
     let drawn = blocking(draw).await;
     drop(work);
@@ -131,14 +163,40 @@ pub async fn block_view(
 
 #[cfg(test)]
 mod tests {
-    use super::{SOFTWARE, is_sheet};
+    use super::{SOFTWARE, is_changed, is_sheet, refuse_other_file, sheet_png};
     use mocban_core::raster::{Grid, png_rgb8, png_rgb8_of};
 
     #[test]
     fn a_sheet_is_recognized_and_a_page_is_not() {
         let grid = Grid::new(3, 2, [250, 240, 9]);
+        assert!(is_sheet(&sheet_png(&grid)));
         assert!(is_sheet(&png_rgb8_of(&grid, SOFTWARE)));
         assert!(!is_sheet(&png_rgb8(&grid)));
         assert!(!is_sheet(SOFTWARE.as_bytes()));
+    }
+
+    #[test]
+    fn a_change_at_any_byte_of_a_sheet_is_found() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("sheet.png");
+        let grid = Grid::from_fn(90, 60, |x, y| [(x * y % 251) as u8, (x ^ y) as u8, 9]);
+        let png = sheet_png(&grid);
+        assert_eq!(png, sheet_png(&grid));
+        std::fs::write(&path, &png).expect("written");
+        assert_eq!(is_changed(&path), Some(false));
+        refuse_other_file(&path).expect("as it was written");
+        for at in (0..png.len()).step_by(png.len() / 50) {
+            let mut edited = png.clone();
+            edited[at] ^= 1;
+            std::fs::write(&path, &edited).expect("written");
+            assert_ne!(is_changed(&path), Some(false), "byte {at}");
+        }
+        std::fs::write(&path, [&png[..], b"more"].concat()).expect("written");
+        let refused = refuse_other_file(&path).expect_err("longer").to_string();
+        let said = "sheet.png is a contact sheet that somebody changed after it was written";
+        assert!(refused.contains(said), "{refused}");
+        std::fs::write(&path, png_rgb8_of(&grid, SOFTWARE)).expect("written");
+        assert_eq!(is_changed(&path), None);
+        refuse_other_file(&path).expect("a sheet of an earlier version");
     }
 }

@@ -10,6 +10,7 @@ mod grid;
 mod mask;
 mod minmax_pyramid;
 pub mod otsu;
+mod png_text;
 mod resample;
 mod resize;
 mod supersample;
@@ -32,6 +33,7 @@ pub use encode::{
 };
 pub use grid::Grid;
 pub use mask::{Mask, MaskOverlap, PixelBox};
+pub use png_text::{split_png_text, with_png_text};
 pub use resample::{resample, resample_transposed};
 pub use resize::{catmull_rom, enlarge, mask_of_print, reduce};
 pub use warp_depth::warp_depth;
