@@ -1,4 +1,4 @@
-//! The checksums of an export, by which files that somebody edited or added are found before they are replaced.
+//! The checksums of the files in an export or another folder of outputs, by which files that somebody edited or added are found before they are replaced.
 //!
 //! `b3sum --check` reads them: each line has the BLAKE3 hash of a file and its path.
 
@@ -14,14 +14,17 @@ use mocban_core::domain::ContentHash;
 use mocban_core::domain::cancel::poll;
 
 /// Name of the file with the checksums.
-pub(super) const CHECKSUMS: &str = "checksums.txt";
+pub const CHECKSUMS: &str = "checksums.txt";
 /// Files whose checksums are computed at a time.
 const PART: usize = 256;
 /// Longest line that is read, in bytes.
 const MAX_LINE: u64 = 8 << 10;
 
-/// Writes the checksums of all files below the folder of an export.
-pub(super) fn write_checksums(root: &Path) -> Result<(), FolderError> {
+/// Writes the checksums of all files below a folder.
+///
+/// # Errors
+/// Returns an error if a file cannot be read or the checksums not be written.
+pub fn write_checksums(root: &Path) -> Result<(), FolderError> {
     let mut lines = SharedFile::create(root, CHECKSUMS)?;
     visit_files(root, &mut |names: &[String]| {
         for part in names.chunks(PART) {
@@ -41,7 +44,10 @@ pub(super) fn write_checksums(root: &Path) -> Result<(), FolderError> {
 
 /// Refuses an earlier export of which somebody edited a file, or to which somebody added one. Exports of earlier versions have
 /// no checksums and are not refused. Files that were removed are no loss.
-pub(super) fn refuse_edited(target: &Path) -> Result<(), FolderError> {
+///
+/// # Errors
+/// Returns an error that names the file, or if a file cannot be read.
+pub fn refuse_edited(target: &Path) -> Result<(), FolderError> {
     match edited_file(target)? {
         Some(EditedFile::Changed(path)) => Err(FolderError::Changed(path)),
         Some(EditedFile::Added(path)) => Err(FolderError::NotAnExport(path)),

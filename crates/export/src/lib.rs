@@ -63,6 +63,7 @@ mod zip_folder;
 mod zip_listing;
 
 pub use alignment_files::{ALIGNMENT_FILES, alignment_files};
+pub use checksums::{CHECKSUMS, refuse_edited, write_checksums};
 pub use contact_sheet::{
     ContactSheet, ContactSheetOptions, ContactSheetOrder, DrawError, draw_contact_sheet,
 };

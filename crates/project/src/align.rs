@@ -253,6 +253,7 @@ pub fn alignment_folder(dir: &Path) -> ProjectResult<GeneratedFolder<'_>> {
         dir,
         content: "alignment",
         marker: (NUMBERS, "\"print_from_mesh\""),
+        keeps_changes: true,
     };
     let names = ALIGNMENT_FILES.iter().chain([&NUMBERS]);
     folder.refuse_foreign(&names.map(Path::new).collect::<Vec<_>>())?;

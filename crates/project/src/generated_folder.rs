@@ -7,6 +7,7 @@ use crate::error::{ProjectResult, WithContext as _};
 use crate::exit::Refusal;
 use crate::files;
 use crate::own_files::refuse_project_file;
+use mocban_export::{CHECKSUMS, refuse_edited, write_checksums};
 use mocban_store::{Leftover, ReplacementFolder, create_folders};
 
 /// A folder and what it is for.
@@ -18,6 +19,8 @@ pub struct GeneratedFolder<'a> {
     pub content: &'a str,
     /// The file by which an earlier folder is recognized, and a text that it has.
     pub marker: (&'a str, &'a str),
+    /// Whether files that somebody changed are kept. The folder then has checksums.
+    pub keeps_changes: bool,
 }
 
 impl GeneratedFolder<'_> {
@@ -37,15 +40,29 @@ impl GeneratedFolder<'_> {
         };
         self.refuse_foreign(&names)?;
         let folder = ReplacementFolder::begin(self.dir).with_context(failed)?;
+        // Under the lock, so that no other process replaces the folder meanwhile.
+        self.refuse_changed(folder.target())?;
         for (path, bytes) in files {
             let path = folder.path().join(path);
             let parent = path.parent().unwrap_or(folder.path());
             create_folders(parent).with_context(failed)?;
             fs::write(path, bytes).with_context(failed)?;
         }
+        if self.keeps_changes {
+            write_checksums(folder.path()).with_context(failed)?;
+        }
         // Somebody may have put files there in the meantime.
         self.refuse_foreign(&names)?;
+        self.refuse_changed(folder.target())?;
         folder.finish().with_context(failed)
+    }
+
+    /// Refuses an earlier folder in which somebody changed a file.
+    fn refuse_changed(self, target: &Path) -> ProjectResult<()> {
+        if self.keeps_changes {
+            refuse_edited(target)?;
+        }
+        Ok(())
     }
 
     /// Refuses a folder that holds anything but files with these paths, files of these names without the marker of an earlier
@@ -63,7 +80,9 @@ impl GeneratedFolder<'_> {
         if !self.dir.is_dir() {
             return Err(Refusal::Usage(format!("{shown} is not a directory")).into());
         }
-        let mut foreign = foreign_file(self.dir, Path::new(""), names)?;
+        let checksums = self.keeps_changes.then(|| Path::new(CHECKSUMS));
+        let names: Vec<&Path> = names.iter().copied().chain(checksums).collect();
+        let mut foreign = foreign_file(self.dir, Path::new(""), &names)?;
         if foreign.is_none() && !self.is_marked() {
             // Without a marker, every file is foreign.
             foreign = foreign_file(self.dir, Path::new(""), &[])?;
@@ -113,7 +132,7 @@ fn foreign_file(dir: &Path, inner: &Path, names: &[&Path]) -> ProjectResult<Opti
 
 #[cfg(test)]
 mod tests {
-    use super::GeneratedFolder;
+    use super::{CHECKSUMS, GeneratedFolder};
 
     #[test]
     fn files_with_the_names_of_a_generated_folder_are_kept_unless_it_is_marked() {
@@ -122,6 +141,7 @@ mod tests {
             dir: &dir.path().join("out"),
             content: "alignment",
             marker: ("numbers.json", "\"schema\""),
+            keeps_changes: true,
         };
         let files = [
             ("numbers.json", b"{\"schema\": 1}".to_vec()),
@@ -130,6 +150,18 @@ mod tests {
         for _ in 0..2 {
             folder.write(&files).expect("a new or an earlier folder");
         }
+        let overlay = folder.dir.join("overlay.png");
+        std::fs::write(&overlay, "mine").expect("written");
+        let refused = folder.write(&files).expect_err("a changed file");
+        let reason = "overlay.png was changed after it was written";
+        assert!(refused.to_string().contains(reason), "{refused}");
+        assert_eq!(std::fs::read(&overlay).expect("a file"), b"mine");
+        let replaced = GeneratedFolder {
+            keeps_changes: false,
+            ..folder
+        };
+        std::fs::remove_file(folder.dir.join(CHECKSUMS)).expect("removed");
+        replaced.write(&files).expect("changes are not kept");
         std::fs::remove_file(folder.dir.join("numbers.json")).expect("removed");
         std::fs::write(folder.dir.join("overlay.png"), "mine").expect("written");
         for numbers in [None, Some("[]")] {

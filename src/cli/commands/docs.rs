@@ -31,6 +31,7 @@ pub(crate) fn docs(args: DocsArgs, context: &Context) -> ProjectResult<ExitCode>
         dir: &dir,
         content: "documentation",
         marker: (INDEX, "content=\"mocban docs\""),
+        keeps_changes: false,
     };
     if let Some((path, error)) = folder.write(&web_files())? {
         let path = path.display();
