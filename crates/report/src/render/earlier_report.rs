@@ -34,8 +34,8 @@ pub fn is_report(bytes: &[u8]) -> bool {
         || has(MARKDOWN_PROGRAM)
 }
 
-/// Returns whether somebody added something at the end of a report without a checksum, as earlier versions wrote them: each
-/// format ends in its own way, and CSV has nothing but rows of numbers. Changes in other places are not found.
+/// Returns whether somebody added something at the end of a report without a checksum: each format ends in its own way, and
+/// CSV has nothing but rows of numbers. Changes in other places are not found.
 pub fn is_continued(report: &[u8]) -> bool {
     // JSON with anything behind it is no report.
     if report.trim_ascii_start().starts_with(b"{") {
