@@ -101,6 +101,15 @@ impl CatalogError {
                 "the user of the database may not do this ({}); connect as a user with more rights, or ask the administrator for another role of the catalog",
                 root_cause(self)
             ),
+            // SQLite does not write to a file that was renamed.
+            Some(CatalogErrorKind::ReadOnly)
+                if matches!(project.join(CATALOG_FILE).try_exists(), Ok(false)) =>
+            {
+                format!(
+                    "{} was renamed, moved or removed during this command, so nothing more was written there; run the command again with the new path",
+                    project.display()
+                )
+            }
             Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => {
                 Self::NotWritable(path.into()).to_string()
             }
@@ -173,7 +182,32 @@ fn root_cause(error: &CatalogError) -> String {
 mod tests {
     use std::path::Path;
 
-    use super::{CatalogError, ErrorCode, Explained as _, LockOwner, locked};
+    use super::{CATALOG_FILE, CatalogError, ErrorCode, Explained as _, LockOwner, locked};
+
+    #[cfg(unix)]
+    #[tokio::test]
+    async fn a_catalog_whose_folder_was_renamed_is_not_called_read_only() {
+        use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
+        use sqlx::{Connection as _, query};
+
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let [old, new] = ["old", "new"].map(|name| dir.path().join(name));
+        std::fs::create_dir(&old).expect("a folder");
+        let options = SqliteConnectOptions::new()
+            .filename(old.join(CATALOG_FILE))
+            .create_if_missing(true);
+        let mut conn = SqliteConnection::connect_with(&options)
+            .await
+            .expect("a database");
+        let created = query("CREATE TABLE t (a)").execute(&mut conn).await;
+        created.expect("a table");
+        std::fs::rename(&old, new).expect("renamed");
+        let refused = query("INSERT INTO t VALUES (1)").execute(&mut conn).await;
+        let error = CatalogError::from(refused.expect_err("another path"));
+        let advice = error.advice(&old).expect("advice");
+        let said = format!("{} was renamed, moved or removed", old.display());
+        assert!(advice.starts_with(&said), "{error}: {advice}");
+    }
 
     #[test]
     fn a_message_that_says_what_to_do_needs_no_advice() {
