@@ -65,7 +65,7 @@ fn align(
     })?;
     let plane = times
         .book(Part::Fit, || {
-            pipeline::fit(&scan, Some(&print), None, settings)
+            pipeline::fit(&scan, Some(&print), None, None, settings)
         })
         .map_err(StageError::from)?;
     let plane = &*fit.insert(plane);

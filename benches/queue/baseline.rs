@@ -90,7 +90,7 @@ impl Worker {
         let input = self.project.input(&pair.print_path);
         let print = read_input(&input, images.max_bytes, "limits.image.max_bytes")?;
         let print = Print::from(raster::decode(&print.bytes, images)?);
-        let fit = pipeline::fit(&scan, Some(&print), pair.scanned_face_down, settings)?;
+        let fit = pipeline::fit(&scan, Some(&print), pair.scanned_face_down, None, settings)?;
         let depth = depth::depth(&scan, &fit, pair.unit, &settings.depth)?;
         drop(scan);
         writes.push(self.write(vec![raster::png_grey16(&depth.levels)]));

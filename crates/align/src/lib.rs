@@ -11,7 +11,7 @@
 //! `fit` reads the print too, to decide which side of the mesh is carved: on 740 generated pairs, the relief alone decided
 //! it for 13 %, and other evidence for at most 2 % more. For the others, `fit` and `depth` would process both sides, with
 //! 25 % more CPU time. [`stages::pipeline`] shows both methods side by side. A pair that was cut from a block gets the pose
-//! that the block expects ([`mocban_core::domain::AlignmentPrior`]).
+//! that the block expects ([`mocban_core::domain::AlignmentPrior`]), and a single stroke the normal of the block.
 //!
 //! Loops over vertices, triangles or pixels poll the cancellation of their thread ([`mocban_core::domain::cancel`]).
 

@@ -41,7 +41,7 @@ pub(crate) fn fit_surface(
     let image = print.map(NativePrint::image);
     let fitted = compute(py, None, move || {
         let image = image.map(|image| image());
-        fit(&scan, image.as_deref(), scanned_face_down, &stages)
+        fit(&scan, image.as_deref(), scanned_face_down, None, &stages)
     })?;
     let fitted = fitted
         .map_err(|error| no_result(py, error.class(), &error.to_string(), mesh.path.as_deref()))?;

@@ -10,6 +10,7 @@ use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
 use super::stage_output::{self, PairStageError, PairStageOutput, png};
 use mocban_align::scan_size;
+use mocban_align::stages::fit::ExpectedFace;
 use mocban_align::stages::normalize::{Normalized, PrintMasks};
 use mocban_align::stages::register::ExpectedPose;
 use mocban_align::stages::{ScanHints, Settings, StageError, depth, pipeline};
@@ -84,7 +85,9 @@ impl PairPipeline {
             None
         };
         let face_down = pair.attributes.scanned_face_down;
-        let outcome = pipeline::fit(&scan, print.as_ref(), face_down, &self.settings)
+        let face = expected_face(pair)?;
+        let settings = &self.settings;
+        let outcome = pipeline::fit(&scan, print.as_ref(), face_down, face.as_ref(), settings)
             .map_err(|error| in_file(pair, &error.into(), length))?;
         let hints = ScanHints {
             unit: pair.attributes.unit,
@@ -181,17 +184,10 @@ fn expected_pose(
     pair: &PairContext,
     depth: &DepthMap,
 ) -> Result<Option<ExpectedPose>, PairStageError> {
-    let Some(prior) = &pair.attributes.prior else {
+    let Some(prior) = alignment_prior(pair)? else {
         return Ok(None);
     };
     let fit = StageInputs::fit(pair)?;
-    let prior: AlignmentPrior = serde_json::from_str(prior).map_err(|error| {
-        let text = format!(
-            "the expected alignment of {}: {error}",
-            pair.attributes.name
-        );
-        PairStageError::failed(FailureClass::Bug, text)
-    })?;
     let scale = &depth.scale.depth_from_plane;
     let pose = prior
         .print_from_mesh
@@ -200,6 +196,30 @@ fn expected_pose(
         print_from_depth,
         confidence: prior.confidence,
     }))
+}
+
+/// Returns the face that the scan of the block shows around the character; `None` for a pair that was not cut from one.
+fn expected_face(pair: &PairContext) -> Result<Option<ExpectedFace>, PairStageError> {
+    let prior = alignment_prior(pair)?;
+    Ok(prior.map(|prior| {
+        let [.., [x, y, z, _]] = prior.print_from_mesh.0;
+        ExpectedFace { normal: [x, y, z] }
+    }))
+}
+
+/// Returns what the registration of the block expects; `None` for a pair that was not cut from one.
+fn alignment_prior(pair: &PairContext) -> Result<Option<AlignmentPrior>, PairStageError> {
+    let Some(prior) = &pair.attributes.prior else {
+        return Ok(None);
+    };
+    let prior = serde_json::from_str(prior).map_err(|error| {
+        let text = format!(
+            "the expected alignment of {}: {error}",
+            pair.attributes.name
+        );
+        PairStageError::failed(FailureClass::Bug, text)
+    })?;
+    Ok(Some(prior))
 }
 
 /// Returns the failure of a stage on the likelier of the two files. `length` is that of the scan in its unit, or 0 if it

@@ -41,7 +41,7 @@ fn check_all(settings: &Settings, least_polls: [u64; 4]) {
     let fitted = check("fit", of_fit, || {
         // Scan and print keep what they compute on first use.
         let (scan, print) = (Scan::from(mesh.clone()), Print::from(image.clone()));
-        pipeline::fit(&scan, Some(&print), None, settings).expect("a plane")
+        pipeline::fit(&scan, Some(&print), None, None, settings).expect("a plane")
     });
     let map = check("depth", of_depth, || {
         let scan = Scan::from(mesh.clone());

@@ -12,7 +12,7 @@
 use std::num::NonZeroU64;
 
 use super::depth::{self, DepthError};
-use super::fit::{self, FitError};
+use super::fit::{self, ExpectedFace, FitError};
 use super::normalize::{self, NormalizeError, Normalized};
 use super::paper_method;
 use super::print::Print;
@@ -72,7 +72,8 @@ impl Settings {
     }
 }
 
-/// Finds the character plane and the carved side of a mesh. The manifest may give `scanned_face_down`.
+/// Finds the character plane and the carved side of a mesh. The manifest may give `scanned_face_down`. `expected` is the face
+/// that the scan of a whole block shows around the character; the method of the paper does not use it.
 ///
 /// # Errors
 /// Returns an error if no plane is found or nothing is carved.
@@ -80,11 +81,16 @@ pub fn fit(
     scan: &Scan,
     print: Option<&Print>,
     scanned_face_down: Option<bool>,
+    expected: Option<&ExpectedFace>,
     settings: &Settings,
 ) -> Result<FitOutcome, FitError> {
-    let mut outcome = match settings.pipeline.method {
-        AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
-        AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
+    let params = &settings.fit;
+    let mut outcome = match (settings.pipeline.method, expected) {
+        (AlignmentMethod::Default, None) => fit::fit(scan, print, scanned_face_down, params),
+        (AlignmentMethod::Default, Some(face)) => {
+            fit::fit_in_block(scan, print, scanned_face_down, face, params)
+        }
+        (AlignmentMethod::Paper, _) => paper_method::fit::fit(scan, params),
     }?;
     outcome.missing_vertices = NonZeroU64::new(scan.losses().missing_vertices);
     outcome.incomplete_faces = NonZeroU64::new(scan.losses().incomplete_faces);
@@ -201,7 +207,7 @@ impl AlignedPair {
         hints: ScanHints,
         settings: &Settings,
     ) -> Result<Self, StageError> {
-        let fit = fit(scan, Some(print), hints.scanned_face_down, settings)?;
+        let fit = fit(scan, Some(print), hints.scanned_face_down, None, settings)?;
         let depth = depth::depth(scan, &fit, hints.unit, &settings.depth)?;
         let normalized = match &fit.print_outline {
             Some(outline) => normalize(&depth, &print.clone().within(Some(outline)), settings),

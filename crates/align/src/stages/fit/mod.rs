@@ -7,8 +7,10 @@
 //! all sides and parts of the scan are tried (`wider_search`), and parts of the print (`part_search`). The likeliest of
 //! them are registered (`trials`), until one is sure. The outcome of `wider_search` always has a region, which is the
 //! part of the scan that the depth map shows. The outcome of `part_search` has an outline, which is the part of the
-//! print that shows the character. The paper's own fit is in `paper_method::fit`.
+//! print that shows the character. If a pair was cut from a block and its strokes do not determine a plane, the block's
+//! normal decides (`block_face`). The paper's own fit is in `paper_method::fit`.
 
+mod block_face;
 mod carved_side;
 mod directions;
 mod height_samples;
@@ -26,14 +28,15 @@ mod trials;
 mod upper_surface;
 mod wider_search;
 
+pub use block_face::fit_in_block;
 pub(super) use height_samples::quantile;
-pub use params::{FitError, FitParams};
+pub use params::{ExpectedFace, FitError, FitParams};
 pub(super) use pca::{Axes, frame};
 pub use upper_surface::fit;
 
 /// Raised by every change of the code that may change results. A candidate may be registered (`trials`), so the
 /// fingerprint of this stage holds the revisions of the later stages too.
-pub const REVISION: u32 = 27;
+pub const REVISION: u32 = 28;
 
 #[cfg(test)]
 mod tests;

@@ -25,6 +25,13 @@ pub struct FitParams {
     pub min_relief: f64,
 }
 
+/// The carved face around a character, as the scan of the whole block shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpectedFace {
+    /// Direction out of the block, in the frame of the mesh. Its length does not matter.
+    pub normal: [f64; 3],
+}
+
 /// Why the fit stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {

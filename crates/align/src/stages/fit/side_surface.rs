@@ -89,15 +89,31 @@ pub(super) fn fit_view(
     may_curve: bool,
     effort: FitEffort,
 ) -> Option<FittedSide> {
+    let (heights, view) = rendered(indexed, frame, effort)?;
+    fit_heights(indexed, frame, &heights, view, may_curve, effort)
+}
+
+/// Fits the height of the stroke tops of one side, whose normal is known: the z axis of the frame. Returns `None` in the
+/// same cases as [`fit_view`].
+pub(super) fn fit_known_normal(indexed: &IndexedSurface, frame: &Rigid3) -> Option<FittedSide> {
+    let (heights, view) = rendered(indexed, frame, FINE)?;
+    let samples = HeightSamples::new(&heights, &view)?;
+    let surface = samples.fit_height();
+    Some(FittedView::with_surface(*frame, samples, view, surface).into_side())
+}
+
+/// Renders one side. Returns `None` if the mesh is empty or overlaps too often.
+fn rendered(
+    indexed: &IndexedSurface,
+    frame: &Rigid3,
+    effort: FitEffort,
+) -> Option<(Grid<f32>, Viewport)> {
     if indexed.is_empty() {
         return None;
     }
     let view = Viewport::around(indexed.bounds(frame), effort.px, false);
     let heights = indexed.render(frame, &view);
-    if indexed.overlaps_too_often() {
-        return None;
-    }
-    fit_heights(indexed, frame, &heights, view, may_curve, effort)
+    (!indexed.overlaps_too_often()).then_some((heights, view))
 }
 
 /// Fits the stroke tops of a rendering. Rotates the view and fits again until the view is perpendicular to the tops, or
@@ -135,6 +151,15 @@ struct FittedView {
 impl FittedView {
     fn of(frame: Rigid3, samples: HeightSamples, view: Viewport, may_curve: bool) -> Self {
         let surface = samples.fit(may_curve);
+        Self::with_surface(frame, samples, view, surface)
+    }
+
+    fn with_surface(
+        frame: Rigid3,
+        samples: HeightSamples,
+        view: Viewport,
+        surface: Surface,
+    ) -> Self {
         Self {
             frame,
             view,

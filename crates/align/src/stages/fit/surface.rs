@@ -5,6 +5,7 @@
 
 use super::height_samples::{HeightSamples, quantile};
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
+use super::pca::Axes;
 use crate::stages::pose::SoftMask;
 use mocban_core::raster::components::ConnectedComponents;
 use mocban_core::raster::{Grid, Mask};
@@ -52,6 +53,8 @@ const SPARSE: f64 = 0.2;
 const SOFT_SPAN: f64 = 0.5;
 /// Ratio of supports by which a curved surface must beat the plane.
 const BOW_GAIN: f64 = 1.04;
+/// Precision of a slope that is known, for each point. It exceeds the evidence of the points by far.
+const KNOWN_SLOPE: f64 = 1e9;
 
 /// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in units of the extent, and how well it fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,13 +71,8 @@ pub(super) struct Surface {
 impl HeightSamples {
     /// Fits a surface to the stroke tops. Returns a plane, unless `allow_bow` is set and a curved surface fits better.
     pub(super) fn fit(&self, allow_bow: bool) -> Surface {
-        let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
         let priors = self.priors(self.mean_plane, BOW_SIGMA);
-        let few_priors = self.priors_of_few(&priors);
-        let mut start = self.mean_plane;
-        for _ in 0..ENVELOPE_PASSES {
-            start = self.few.solve::<3>(&start, envelope, &few_priors);
-        }
+        let start = self.envelope(self.mean_plane, &priors);
         let plane = self.narrow::<3>(start, &priors);
         if !allow_bow {
             return plane;
@@ -91,6 +89,31 @@ impl HeightSamples {
         } else {
             plane
         }
+    }
+
+    /// Fits the height of the stroke tops alone, if the view is perpendicular to them. Returns a plane without slope.
+    pub(super) fn fit_height(&self) -> Surface {
+        let mut priors = OPEN;
+        for slope in &mut priors[1..3] {
+            slope.precision = KNOWN_SLOPE * self.points.len() as f64;
+        }
+        let mean = self.points.solve::<3>(&[0.0; 6], |_| 1.0, &priors);
+        let found = self.narrow::<3>(self.envelope(mean, &priors), &priors);
+        let [height, ..] = found.coefficients;
+        Surface {
+            coefficients: [height, 0.0, 0.0, 0.0, 0.0, 0.0],
+            ..found
+        }
+    }
+
+    /// Raises a plane to the upper heights: the start of the narrow passes.
+    fn envelope(&self, mut plane: Coefficients, priors: &[Prior; 6]) -> Coefficients {
+        let weight = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
+        let few_priors = self.priors_of_few(priors);
+        for _ in 0..ENVELOPE_PASSES {
+            plane = self.few.solve::<3>(&plane, weight, &few_priors);
+        }
+        plane
     }
 
     /// Refines a surface with a shrinking window below it.
@@ -235,6 +258,18 @@ impl HeightSamples {
         let precision = OFF_TOP_WEIGHT * all.len() as f64;
         let priors = plane_of(&all, &OPEN).map(|mean| Prior { mean, precision });
         plane_of(&tops, &priors)
+    }
+
+    /// Returns the standard deviation of the places of the character's own tops, along the direction in which they spread
+    /// least, as a fraction of the extent. Returns NaN if there are no tops.
+    pub(super) fn spread_of_tops(&self, surface: &Surface) -> f64 {
+        let own = self.own_tops(&surface.coefficients);
+        let tops: Vec<([f64; 3], f64)> = (self.points.iter().zip(&self.places))
+            .filter(|(_, place)| own.data()[**place])
+            .map(|([u, v, _], _)| ([u, v, 0.0], 1.0))
+            .collect();
+        let [_, across, _] = Axes::of_points(tops.iter().copied()).variances;
+        across.sqrt()
     }
 
     /// Returns the mask of the tops away from the edge of the mesh, or of all tops if too few remain.

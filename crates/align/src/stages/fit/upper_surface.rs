@@ -100,15 +100,15 @@ pub fn fit(
 }
 
 /// What is fitted, with the frame from which both sides are seen.
-struct Fitting<'a> {
-    scan: &'a Scan,
-    params: &'a FitParams,
-    start: Rigid3,
+pub(super) struct Fitting<'a> {
+    pub(super) scan: &'a Scan,
+    pub(super) params: &'a FitParams,
+    pub(super) start: Rigid3,
 }
 
 impl Fitting<'_> {
     /// Returns the result of the stage for a side of the whole scan.
-    fn of_whole(&self, fine: &FittedSide, evidence: SideEvidence) -> FitOutcome {
+    pub(super) fn of_whole(&self, fine: &FittedSide, evidence: SideEvidence) -> FitOutcome {
         let mesh = self.scan.mesh();
         // The rest of the scan is not the face: side walls, a foot or a table below it, or debris above it.
         let is_part = fine.samples.is_cropped || wider_search::has_debris_above(fine);

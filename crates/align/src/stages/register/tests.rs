@@ -362,7 +362,7 @@ fn a_pose_that_the_block_expects_is_kept_unless_it_contradicts_the_print() {
     let picture = decode(&pair.print, &ImageLimits::SUGGESTED).expect("an image");
     let side = picture.rgb.width().max(picture.rgb.height()) as f64;
     let (scan, picture, settings) = (Scan::from(pair.mesh), Print::from(picture), settings());
-    let plane = pipeline::fit(&scan, Some(&picture), None, &settings).expect("a plane");
+    let plane = pipeline::fit(&scan, Some(&picture), None, None, &settings).expect("a plane");
     let map = depth::depth(&scan, &plane, None, &settings.depth).expect("a map");
     let normalized = pipeline::normalize(&map, &picture, &settings).expect("masks");
     let found = |expected: Option<ExpectedPose>| {
