@@ -17,6 +17,8 @@ use mocban_core::domain::{FitOutcome, SideEvidence};
 /// A surface agrees with the block if the angle between their normals, in radians, is smaller than this. On two generated
 /// blocks, characters of several strokes reached 0.024.
 const MAX_ANGLE: f64 = 0.07;
+/// No block bends so much over its length that a normal at one of its characters differs by this angle, in radians.
+const IMPOSSIBLE_ANGLE: f64 = 0.35;
 /// A surface that agrees with the block is bent by at most this fraction of the relief.
 const MAX_BEND: f64 = 0.2;
 /// Tops that spread less than this fraction of the extent, in their narrowest direction, are one stroke: along the normal
@@ -40,7 +42,7 @@ pub fn fit_in_block(
 ) -> Result<FitOutcome, FitError> {
     let found = fit(scan, print, scanned_face_down, params);
     let is_final = match &found {
-        Ok(found) => agrees(found, face) || !is_narrow(scan, found),
+        Ok(found) => !is_doubtful(scan, found, face),
         Err(error) => !matches!(error, FitError::NoSurface(_) | FitError::NoRelief { .. }),
     };
     if is_final {
@@ -49,11 +51,13 @@ pub fn fit_in_block(
     along_face(scan, face, params).map_or(found, Ok)
 }
 
-/// Returns whether a surface has about the block's normal and is nearly flat. Blocks bend by less over one character.
-fn agrees(found: &FitOutcome, face: &ExpectedFace) -> bool {
+/// Returns whether a surface contradicts the block, and its own tops do not show that it is right.
+fn is_doubtful(scan: &Scan, found: &FitOutcome, face: &ExpectedFace) -> bool {
     let [.., [x, y, z, _], _] = found.plane_from_mesh.0;
     let angle = Vector3::new(x, y, z).angle(&Vector3::from(face.normal));
-    angle < MAX_ANGLE && found.curvature_height <= MAX_BEND * found.relief
+    let is_bent = found.curvature_height > MAX_BEND * found.relief;
+    let agrees = angle < MAX_ANGLE && !is_bent;
+    !agrees && (angle > IMPOSSIBLE_ANGLE || is_narrow(scan, found))
 }
 
 /// Returns whether the tops of a surface are so narrow that they may be one stroke or one of its walls.
