@@ -69,7 +69,7 @@ fn is_narrow(scan: &Scan, found: &FitOutcome) -> bool {
 /// Fits the height of the tops along the block's normal. Returns `None` if nothing is carved there, or if the tops are
 /// more than one stroke.
 fn along_face(scan: &Scan, face: &ExpectedFace, params: &FitParams) -> Option<FitOutcome> {
-    let normal = Vector3::from(face.normal).try_normalize(0.0)?;
+    let normal = Vector3::<f64>::from(face.normal).try_normalize(0.0)?;
     let indexed = scan.indexed();
     let centre = Axes::of_surface(scan.mesh(), indexed).centre;
     let start = frame(normal, centre);

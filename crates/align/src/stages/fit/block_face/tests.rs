@@ -23,8 +23,8 @@ fn distance_to_stroke(x: f64, y: f64) -> f64 {
     bar.min(end)
 }
 
-/// Returns a mesh of the stroke that ends near the ground around it, as a block cuts it. Its walls are about as high as
-/// the mesh is wide.
+/// Returns the mesh of the stroke, with little ground around it, as it is cut from a block. It is about as high as wide, so
+/// its principal axes do not show the normal.
 fn one_stroke(world: &SyntheticSheet) -> Mesh {
     let mut mesh = Mesh::default();
     let [columns, rows] = COUNTS;
@@ -104,7 +104,7 @@ fn the_block_decides_the_plane_of_a_single_stroke() {
         assert_eq!(found.curvature, None);
         let [_, _, height] = found.plane_from_mesh.apply(world.place(-2.0, 0.0, 0.0));
         assert!(height.abs() < 0.1, "{height} mm");
-        assert!((0.8..3.2).contains(&found.relief), "{}", found.relief);
+        assert!((0.4..3.2).contains(&found.relief), "{}", found.relief);
     }
 }
 
@@ -146,7 +146,7 @@ fn several_strokes_decide_their_plane_against_the_block() {
     let (print, _) = print(14.0, 2.0);
     let params = settings().fit;
     let own = fit(&scan, Some(&print), None, &params).expect("a plane");
-    let aside = Vector3::from(world.place(1.0, 0.0, 0.0));
+    let aside = Vector3::<f64>::from(world.place(1.0, 0.0, 0.0));
     for lean in [0.0, 0.1, 0.2] {
         let face = ExpectedFace {
             normal: (world.normal() + aside * lean).into(),
