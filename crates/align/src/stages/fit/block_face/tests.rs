@@ -23,7 +23,7 @@ fn distance_to_stroke(x: f64, y: f64) -> f64 {
     bar.min(end)
 }
 
-/// Returns the mesh of the stroke, with little ground around it, as it is cut from a block. It is about as high as wide, so
+/// Returns the mesh of the stroke with little ground around it, cut from its block. It is about as high as wide, so
 /// its principal axes do not show the normal.
 fn one_stroke(world: &SyntheticSheet) -> Mesh {
     let mut mesh = Mesh::default();
