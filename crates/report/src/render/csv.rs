@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::comparison::Basis;
 use crate::model::{MetricRow, Report};
 use crate::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT};
-use mocban_core::domain::Reason;
+use mocban_core::domain::{Reason, ThresholdMetric};
 
 /// The columns.
 pub(super) const HEADER: &str = "metric,quantity,n,value,low,high\r\n";
@@ -31,6 +31,29 @@ pub(super) fn render(report: &Report) -> String {
         }
     }
     text
+}
+
+/// Returns whether lines are rows of a report: metrics and quantities in their order, with four numbers of which some may be
+/// missing.
+pub(super) fn are_rows<'a>(mut lines: impl Iterator<Item = &'a str>) -> bool {
+    let quantities = quantities();
+    let place = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [metric, name, numbers @ ..] = cells.as_slice() else {
+            return None;
+        };
+        let metric: ThresholdMetric = metric.parse().ok()?;
+        let quantity = quantities.iter().position(|known| known.name == *name)?;
+        let is_number = |cell: &&str| cell.is_empty() || cell.parse::<f64>().is_ok();
+        (numbers.len() == 4 && numbers.iter().all(is_number)).then_some((metric, quantity))
+    };
+    let mut last = None;
+    lines.all(|line| {
+        let found = place(line);
+        let is_next = found.is_some() && found > last;
+        last = found;
+        is_next
+    })
 }
 
 /// Returns the line of a quantity, or `None` if it does not exist.

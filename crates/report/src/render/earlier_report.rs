@@ -4,6 +4,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use super::provenance_lines::{LABEL_WIDTH, LABELS};
+use super::text::WIDTH;
 use super::{csv, html, latex};
 
 /// Fields of every report in JSON.
@@ -17,78 +18,133 @@ struct JsonReport {
     _provenance: IgnoredAny,
 }
 
-/// Returns whether a file is a report, in any format.
+/// Returns whether a file is a report, in any format. Ends of lines do not count: other programs change them.
 pub fn is_report(bytes: &[u8]) -> bool {
-    let text = bytes.trim_ascii_start();
-    if text.starts_with(b"{") {
-        return serde_json::from_slice::<JsonReport>(text).is_ok();
+    let text = plain_text(&String::from_utf8_lossy(bytes));
+    let text = text.trim_start();
+    if text.starts_with('{') {
+        return serde_json::from_str::<JsonReport>(text).is_ok();
     }
-    let has = |part: &str| {
-        text.windows(part.len())
-            .any(|found| found == part.as_bytes())
-    };
-    text.starts_with(csv::HEADER.trim_end().as_bytes())
-        || text.starts_with(latex::PREAMBLE.as_bytes())
-        || text.starts_with(b"<!DOCTYPE html>") && has(html::GENERATOR)
-        || has(PLAIN_PROGRAM)
-        || has(MARKDOWN_PROGRAM)
+    text.starts_with(csv::HEADER.trim_end())
+        || text.starts_with(latex::PREAMBLE)
+        || text.starts_with("<!DOCTYPE html>") && text.contains(html::GENERATOR)
+        || text.contains(PLAIN_PROGRAM)
+        || text.contains(MARKDOWN_PROGRAM)
 }
 
-/// Returns whether somebody added something at the end of a report without a checksum: each format ends in its own way, and
-/// CSV has nothing but rows of numbers. Changes in other places are not found.
+/// Returns a text without a byte order mark and with the ends of lines of Unix.
+fn plain_text(text: &str) -> String {
+    text.trim_start_matches('\u{feff}').replace('\r', "")
+}
+
+/// Returns whether somebody added something before or behind a report without a checksum, or a row to one in CSV: each format
+/// begins and ends in its own way. Changes inside text and Markdown are not found.
 pub fn is_continued(report: &[u8]) -> bool {
-    // JSON with anything behind it is no report.
-    if report.trim_ascii_start().starts_with(b"{") {
-        return false;
-    }
     let Ok(text) = std::str::from_utf8(report) else {
         return true;
     };
+    let text = plain_text(text);
     let text = text.trim();
+    // JSON with anything behind it is no report.
+    if text.starts_with('{') {
+        return false;
+    }
     let is_whole = if let Some(rows) = text.strip_prefix(csv::HEADER.trim_end()) {
-        rows.lines().skip(1).all(is_csv_row)
+        csv::are_rows(rows.lines().skip(1))
     } else if text.starts_with(latex::PREAMBLE) {
         let last = text.rsplit("\\begin{table}").next().unwrap_or_default();
         last.contains("\\label{tab:mocban-provenance}") && last.ends_with("\\end{table}")
     } else if text.starts_with("<!DOCTYPE html>") {
         text.ends_with("</html>")
     } else if let Some((_, end)) = text.rsplit_once(MARKDOWN_PROGRAM) {
-        let is_item = |line: &str| {
-            let mut labels = LABELS.iter();
-            let item = line.strip_prefix("- ").unwrap_or_default();
-            labels.any(|label| {
-                let rest = item.strip_prefix(label);
-                rest.is_some_and(|rest| rest.starts_with(": "))
-            })
-        };
-        end.lines().skip(1).all(is_item)
+        begins_like_report(text) && has_markdown_end(end)
     } else if let Some((_, end)) = text.rsplit_once(PLAIN_PROGRAM) {
-        // A long line goes on below its text.
-        let is_wrapped = |line: &str| line.starts_with(&" ".repeat(LABEL_WIDTH + 1));
-        let is_item = |line: &str| {
-            let mut labels = LABELS.iter();
-            labels.any(|label| line.starts_with(&format!("{label:<LABEL_WIDTH$} ")))
-        };
-        let mut lines = end.lines().skip(1);
-        lines.all(|line| is_item(line) || is_wrapped(line))
+        begins_like_report(text) && has_plain_end(end)
     } else {
         false
     };
     !is_whole
 }
 
-/// Returns whether a line is a row of a report in CSV: two names and four numbers, of which some may be missing.
-fn is_csv_row(line: &str) -> bool {
-    let cells: Vec<&str> = line.split(',').collect();
-    let [metric, quantity, numbers @ ..] = cells.as_slice() else {
-        return false;
-    };
-    let is_name = |name: &str| {
-        let mut bytes = name.bytes();
-        !name.is_empty() && bytes.all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
-    };
-    let is_number = |cell: &&str| cell.is_empty() || cell.parse::<f64>().is_ok();
-    is_name(metric) && is_name(quantity) && numbers.len() == 4 && numbers.iter().all(is_number)
+/// Returns whether a text begins with the first sentence of a report, such as `2 of 4 pairs are aligned`.
+fn begins_like_report(text: &str) -> bool {
+    let start: String = text.chars().take(MAX_START).collect();
+    // Counts are written with commas, and text is broken at blanks.
+    let is_digit = |c: char| c.is_ascii_digit() || c == ',';
+    let words = start.split_whitespace().map(|word| {
+        let is_count = word.starts_with(is_digit) && word.chars().all(is_digit);
+        if is_count { "N" } else { word }
+    });
+    let start = words.collect::<Vec<_>>().join(" ");
+    FIRST_WORDS.iter().any(|words| start.starts_with(words))
+}
+
+/// Characters in which the first words of a report have ended.
+const MAX_START: usize = 120;
+
+/// Beginnings of reports, with `N` for counts.
+const FIRST_WORDS: [&str; 8] = [
+    "The only pair is ",
+    "None of the N pairs is ",
+    "N of N pairs is aligned",
+    "N of N pairs are aligned",
+    "Both pairs are aligned",
+    "All N pairs are aligned",
+    "The project has no pairs yet",
+    "There is nothing to report: ",
+];
+
+/// Returns whether the last lines of a report in Markdown, from the version on, are as they were written.
+fn has_markdown_end(end: &str) -> bool {
+    let labels = end.lines().skip(1).map(|line| {
+        let item = line.strip_prefix("- ")?;
+        label_at(|label| {
+            item.strip_prefix(label)
+                .is_some_and(|rest| rest.starts_with(": "))
+        })
+    });
+    labels
+        .collect::<Option<Vec<usize>>>()
+        .is_some_and(|labels| are_in_order(&labels))
+}
+
+/// Returns whether the last lines of a report as text, from the version on, are as they were written. A long line goes on
+/// below its text.
+fn has_plain_end(end: &str) -> bool {
+    let mut labels = Vec::new();
+    let mut lines = end.lines();
+    let mut last = lines.next().unwrap_or_default();
+    for line in lines {
+        let found = label_at(|label| line.starts_with(&format!("{label:<LABEL_WIDTH$} ")));
+        match (found, line.strip_prefix(&" ".repeat(LABEL_WIDTH + 1))) {
+            (Some(label), _) => labels.push(label),
+            (None, Some(rest)) if is_wrapped(last, rest) => {}
+            (None, _) => return false,
+        }
+        last = line;
+    }
+    are_in_order(&labels)
+}
+
+/// Returns whether the first word of a line had no room in the line before it.
+fn is_wrapped(before: &str, line: &str) -> bool {
+    // A sign of percent stays on the line of its number.
+    let line = line.replace(" %", "\u{a0}%");
+    let word = line.split(' ').next().unwrap_or_default();
+    !word.is_empty() && before.chars().count() + 1 + word.chars().count() > WIDTH
+}
+
+/// Returns the position of the label that a line has.
+fn label_at(has: impl Fn(&str) -> bool) -> Option<usize> {
+    LABELS.iter().position(|label| has(label))
+}
+
+/// Returns whether labels behind that of the program have the order of a report, in which only settings are repeated.
+fn are_in_order(labels: &[usize]) -> bool {
+    let is_repeated = |label: usize| LABELS[label] == "Settings";
+    let mut pairs = labels.windows(2);
+    labels.first() != Some(&0)
+        && pairs.all(|pair| pair[0] < pair[1] || pair[0] == pair[1] && is_repeated(pair[0]))
 }
 
 /// The line of a report as text that names the program.
@@ -125,9 +181,27 @@ mod tests {
                     "\n- My note\n",
                     "a,b,c\n",
                     "<p>Note</p>\n",
+                    "              My note\n",
+                    "ensemble,comment,1,2,3,4\n",
+                    "ensemble,results,1,2,,\n",
+                    "Results      my note\n",
+                    "- Results: my note\n",
                 ] {
                     let continued = format!("{text}{note}");
                     assert!(is_continued(continued.as_bytes()), "{format}: {note}");
+                }
+                let below = format!("My note\n\n{text}");
+                let file = below.as_bytes();
+                assert!(!is_report(file) || is_continued(file), "{format}: {below}");
+                let unix = text.replace('\r', "");
+                for saved in [
+                    unix.clone(),
+                    unix.replace('\n', "\r\n"),
+                    unix.replace('\n', "\r\r\n"),
+                    format!("\u{feff}{text}"),
+                ] {
+                    assert!(is_report(saved.as_bytes()), "{format}: {saved:?}");
+                    assert!(!is_continued(saved.as_bytes()), "{format}: {saved:?}");
                 }
             }
         }

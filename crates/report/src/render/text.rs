@@ -11,7 +11,7 @@ use mocban_core::domain::{one_line, visible};
 use mocban_results::number_format::format_count;
 
 /// Columns of the terminal.
-const WIDTH: usize = 80;
+pub(super) const WIDTH: usize = 80;
 /// Most failed pairs that are listed per class.
 const MAX_LISTED: usize = 5;
 
