@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use mocban_core::domain::NO_BREAK_SPACES;
-use mocban_core::domain::spelling::{composed, plain_form};
+use mocban_core::domain::spelling::{composed, edit_distance, plain_form};
 use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
 use unicode_normalization::UnicodeNormalization as _;
 
@@ -116,7 +116,8 @@ impl SimilarFiles {
     }
 }
 
-/// Returns the entry of a folder whose name is that given, or those whose names are nearest to it, in order.
+/// Returns the entry of a folder whose name is that given, or those that differ from it in the same way, first those in which
+/// the fewest letters differ.
 fn similar_entries(folder: &Path, name: &str) -> Vec<String> {
     // The folder of a bare file name is empty.
     let Ok(entries) = std::fs::read_dir(Path::new(".").join(folder)) else {
@@ -138,13 +139,16 @@ fn similar_entries(folder: &Path, name: &str) -> Vec<String> {
             () => None,
         }
     };
-    let ranked = names.filter_map(|entry| Some((rank(&entry)?, entry)));
-    let mut ranked: Vec<(u8, String)> = ranked.collect();
+    let ranked = names.filter_map(|entry| {
+        let rank = rank(&entry)?;
+        Some((rank, edit_distance(&entry, name), entry))
+    });
+    let mut ranked: Vec<(u8, usize, String)> = ranked.collect();
     ranked.sort();
-    let nearest = ranked.first().map(|(rank, _)| *rank);
+    let nearest = ranked.first().map(|(rank, _, _)| *rank);
     let ranked = ranked.into_iter();
-    let nearest = ranked.take_while(|(rank, _)| Some(*rank) == nearest);
-    nearest.map(|(_, entry)| entry).collect()
+    let nearest = ranked.take_while(|(rank, _, _)| Some(*rank) == nearest);
+    nearest.map(|(_, _, entry)| entry).collect()
 }
 
 /// Returns whether a part of a path begins like an absolute path of Windows, such as `C:\scans\1.stl`, on another system.
@@ -224,20 +228,25 @@ mod tests {
     }
 
     #[test]
-    fn all_files_that_are_equally_near_are_similar() {
+    fn all_files_that_differ_in_the_same_way_are_similar_and_the_nearest_is_first() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         for name in ["0117.stl", "00117.stl", "117.ply", "118.stl"] {
             fs::write(dir.path().join(name), "").expect("written");
         }
         let similar = |name: &str| similar_files(&dir.path().join(name));
-        assert_eq!(similar("117.stl"), ["00117.stl", "0117.stl"]);
-        assert_eq!(similar("117.obj"), ["00117.stl", "0117.stl", "117.ply"]);
+        assert_eq!(similar("117.stl"), ["0117.stl", "00117.stl"]);
+        assert_eq!(similar("117.obj"), ["117.ply", "0117.stl", "00117.stl"]);
         assert_eq!(similar("0118.stl"), ["118.stl"]);
         for folder in ["7", "07"] {
             fs::create_dir(dir.path().join(folder)).expect("a folder");
             fs::write(dir.path().join(folder).join("a.stl"), "").expect("written");
         }
         fs::write(dir.path().join("07/à.stl"), "").expect("written");
+        for name in ["000017.stl", "00017.stl", "0017.stl", "017.stl"] {
+            fs::write(dir.path().join(name), "").expect("written");
+        }
+        let nearest_first = ["017.stl", "0017.stl", "00017.stl", "000017.stl"];
+        assert_eq!(similar("17.stl"), nearest_first);
         assert_eq!(similar("007/a.stl"), ["07/a.stl", "7/a.stl"]);
         assert_eq!(similar("07/á.stl"), ["a.stl", "à.stl"]);
         assert_eq!(similar("007/b.stl"), [""; 0]);

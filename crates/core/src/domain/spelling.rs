@@ -117,6 +117,18 @@ pub fn hint<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> String
     }
 }
 
+/// Returns the number of letters that are other ones, missing, added, or swapped with their neighbour in a name, compared with
+/// another one, both in composed form.
+///
+/// ```
+/// use mocban_core::domain::spelling::edit_distance;
+///
+/// assert_eq!(edit_distance("17.stl", "0017.stl"), 2);
+/// ```
+pub fn edit_distance(a: &str, b: &str) -> usize {
+    strsim::osa_distance(&composed(a), &composed(b))
+}
+
 fn distance_if_similar(typed: &str, name: &str) -> Option<usize> {
     let longer = typed.chars().count().max(name.chars().count());
     let allowed = (longer / 3).max(1);
