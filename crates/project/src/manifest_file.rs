@@ -16,8 +16,8 @@ use crate::pair_choices::{PairChoices, RowsHash};
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ContentHash, FileKind, LengthUnit, PairName, first_names, sanitize};
 use mocban_lists::manifest::{
-    ChangedIds, ChosenColumns, ListedFolder, ManifestError, ManifestRow, MisspeltColumns,
-    PairingChanges, ReadRows, RowIds, pair_folders, read_csv_as, read_jsonl,
+    ChangedIds, ChosenColumns, DecimalIds, ListedFolder, ManifestError, ManifestRow,
+    MisspeltColumns, PairingChanges, ReadRows, RowIds, pair_folders, read_csv_as, read_jsonl,
 };
 use mocban_store::Project;
 
@@ -106,9 +106,11 @@ impl Listing {
         let (mut misspelt, mut unread) = (MisspeltColumns::default(), UnreadRows::default());
         let left_out: BTreeSet<String> = choices.changes.left_out.iter().cloned().collect();
         let (mut repeated, mut ids) = (RepeatedFiles::default(), ChangedIds::default());
+        let mut decimal_ids = DecimalIds::default();
         let mut each = |row: ManifestRow| {
             misspelt.add(&row);
             ids.add(row.line, row.name.as_str(), [&row.mesh, &row.print]);
+            decimal_ids.add(row.line, row.name.as_str());
             unread.add(&row);
             if !left_out.contains(row.name.as_str()) {
                 repeated.add(row.line, row.name.as_str(), &row.mesh, &row.print);
@@ -125,6 +127,7 @@ impl Listing {
         warnings.extend(read.unusual_cells.warnings());
         warnings.extend(read.unread_columns.warnings());
         warnings.extend(ids.warning());
+        warnings.extend(decimal_ids.warning(&read.ids));
         match unread.warnings() {
             Ok(unread) => warnings.extend(unread),
             Err(sentences) if refused.is_none() => return Err(refuse(file, &sentences).into()),

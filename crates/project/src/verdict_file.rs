@@ -22,7 +22,7 @@ use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{
     CsvText, LineCounter, NotText, as_utf8, fits_header, is_array, later_header, plain_cell,
-    plain_header, trimmed,
+    plain_header, trimmed, whole_part,
 };
 use mocban_lists::quotes::check_quotes;
 use mocban_system::time_text::{day, duration};
@@ -32,6 +32,8 @@ use mocban_system::time_text::{day, duration};
 pub struct VerdictList {
     text: ListText,
     layout: VerdictLayout,
+    /// Pairs that are meant by other names.
+    meant: Arc<BTreeMap<PairName, PairName>>,
 }
 
 /// How the rows are written.
@@ -83,11 +85,39 @@ impl VerdictList {
             decoded => decoded.into_owned(),
         };
         let text = ListText(Arc::new(text));
-        Ok(Self { text, layout })
+        let meant = Arc::default();
+        Ok(Self {
+            text,
+            layout,
+            meant,
+        })
+    }
+
+    /// Returns the list with other names of pairs, each by its name in the list.
+    #[must_use]
+    pub fn with_meant(self, meant: BTreeMap<PairName, PairName>) -> Self {
+        let meant = Arc::new(meant);
+        Self { meant, ..self }
     }
 
     /// Parses the rows.
     pub fn rows(&self) -> VerdictRows {
+        let rows = self.written_rows();
+        if self.meant.is_empty() {
+            return rows;
+        }
+        let meant = Arc::clone(&self.meant);
+        Box::new(rows.map(move |row| {
+            let mut row = row?;
+            if let Some(name) = meant.get(&row.listed.verdict.pair) {
+                row.listed.verdict.pair.clone_from(name);
+            }
+            Ok(row)
+        }))
+    }
+
+    /// Parses the rows with the names as written.
+    fn written_rows(&self) -> VerdictRows {
         let text = self.text.clone();
         match self.layout {
             VerdictLayout::JsonLines => Box::new(json_rows(text)),
@@ -202,6 +232,28 @@ pub fn unknown_pairs(
         RefusedLine::new(line.copied().unwrap_or_default(), &reason)
     });
     refused.collect()
+}
+
+/// Returns the pairs that some names are likely to mean, each by its name: Python writes whole numbers with `.0` if a value of
+/// their column is missing.
+pub fn without_decimals(unknown: &[PairName]) -> BTreeMap<PairName, PairName> {
+    let meant = unknown.iter().filter_map(|name| {
+        let whole = PairName::new(whole_part(name.as_str())?).ok()?;
+        Some((name.clone(), whole))
+    });
+    meant.collect()
+}
+
+/// Returns a warning about pairs that are meant by names with `.0`. `first_lines` has the first line of each name.
+pub fn decimal_names(
+    meant: &BTreeMap<PairName, PairName>,
+    first_lines: &BTreeMap<PairName, usize>,
+) -> Option<String> {
+    let lines = meant.keys().filter_map(|name| first_lines.get(name));
+    let (count, line) = (meant.len(), lines.min()?);
+    Some(format!(
+        "whole numbers that are written with .0: {count}, the first in column \"pair\" on line {line}; they are read without it, as in JSON and XLSX"
+    ))
 }
 
 /// Returns a warning about fields that are not read. They are given with the first line of each.
@@ -386,6 +438,8 @@ fn csv_error(error: &csv::Error, text: &ListText) -> RefusedLine {
 mod array_tests;
 #[cfg(test)]
 mod column_tests;
+#[cfg(test)]
+mod decimal_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

@@ -153,15 +153,15 @@ pub async fn import(
     let outcome = "no verdict was recorded";
     let is_jsonl = files::is_jsonl(file, &bytes);
     let list = VerdictList::new(bytes, is_jsonl).map_err(|error| error.in_file(file, outcome))?;
+    let (list, names, decimal_names) = with_known_names(list, &catalog).await?;
     let NamesInList {
         first_lines,
         reviewers,
         mut refused,
         unread,
         day_first,
-    } = NamesInList::read(&list);
-    let names: Vec<_> = first_lines.keys().cloned().collect();
-    let unknown = catalog.unknown_names(&names).await?;
+    } = names;
+    let unknown = unknown_in(&first_lines, &catalog).await?;
     if !unknown.is_empty() {
         let known = catalog.pair_names().await?;
         refused.extend(verdict_file::unknown_pairs(&first_lines, &unknown, &known));
@@ -197,13 +197,42 @@ pub async fn import(
         )
     });
     let unread = verdict_file::unread_fields(&unread);
-    let read = [day_first, unread].into_iter().flatten();
+    let read = [day_first, decimal_names, unread].into_iter().flatten();
     let read = read.map(|text| format!("{}: {text}", file.display()));
     Ok(VerdictFileImport {
         counts,
         first_older,
         warnings: read.collect(),
     })
+}
+
+/// Returns a list in which unknown names such as `117.0` stand for the known pairs that they mean, its names, and a warning
+/// about the former.
+async fn with_known_names(
+    list: VerdictList,
+    catalog: &Catalog,
+) -> ProjectResult<(VerdictList, NamesInList, Option<String>)> {
+    let names = NamesInList::read(&list);
+    let mut meant = verdict_file::without_decimals(&unknown_in(&names.first_lines, catalog).await?);
+    let wanted: Vec<PairName> = meant.values().cloned().collect();
+    let unknown: BTreeSet<PairName> = catalog.unknown_names(&wanted).await?.into_iter().collect();
+    meant.retain(|_, name| !unknown.contains(name));
+    if meant.is_empty() {
+        return Ok((list, names, None));
+    }
+    let warning = verdict_file::decimal_names(&meant, &names.first_lines);
+    let list = list.with_meant(meant);
+    let names = NamesInList::read(&list);
+    Ok((list, names, warning))
+}
+
+/// Returns the names in a list that no pair has.
+async fn unknown_in(
+    first_lines: &BTreeMap<PairName, usize>,
+    catalog: &Catalog,
+) -> ProjectResult<Vec<PairName>> {
+    let names: Vec<_> = first_lines.keys().cloned().collect();
+    Ok(catalog.unknown_names(&names).await?)
 }
 
 /// Names in a list of verdicts, and its refused lines.

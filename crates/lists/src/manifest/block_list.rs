@@ -11,6 +11,7 @@ use super::cell_errors::id_error;
 use super::changed_ids::ChangedIds;
 use super::column_names::missing_column;
 use super::csv::{ListedColumn, column_names, draft_of};
+use super::decimal_ids::DecimalIds;
 use super::draft::{
     DraftRow, MAX_PATH_BYTES, check_length, check_meta, record, refuse_cell_errors,
 };
@@ -201,14 +202,16 @@ impl BlockRows {
             return Err(of_list("the list contains no blocks").into());
         }
         problems.check(false)?;
-        let mut ids = ChangedIds::default();
+        let (mut ids, mut decimal_ids) = (ChangedIds::default(), DecimalIds::default());
         for row in &rows {
             ids.add(row.line, row.name.as_str(), [&row.mesh, &row.page]);
+            decimal_ids.add(row.line, row.name.as_str());
         }
         let of_cells = [
             read.unnamed.warning(),
             read.formula_errors.warning(),
             ids.warning(),
+            decimal_ids.warning(&read.ids),
         ];
         let of_cells = of_cells.into_iter().flatten();
         let of_cells = of_cells.chain(read.unusual_cells.warnings());

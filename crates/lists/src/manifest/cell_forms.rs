@@ -52,6 +52,8 @@ pub(super) enum CellForm {
     Formula,
     /// It is a whole number with the decimals `.0`, and is read without them.
     WholeNumber,
+    /// It is a word for a missing value among whole numbers, and is read as empty.
+    MissingValue,
 }
 
 impl CellForm {
@@ -116,6 +118,10 @@ impl UnusualCells {
                 CellForm::WholeNumber => format!(
                     "whole numbers that are written with .0: {count}, the first in column {column} on line {line}; they are \
                      read without it, as in JSON and XLSX"
+                ),
+                CellForm::MissingValue => format!(
+                    "words for missing values beside whole numbers: {count}, the first in column {column} on line {line}; they \
+                     are read as empty cells"
                 ),
             }
         })

@@ -9,6 +9,7 @@ mod changed_ids;
 mod chosen_columns;
 mod column_names;
 mod csv;
+mod decimal_ids;
 mod draft;
 mod error;
 mod folder_file;
@@ -35,6 +36,7 @@ pub use cell_errors::{FormulaErrors, cell_error, formula_error};
 pub use cell_forms::{UnusualCells, plain_cell, plain_header};
 pub use changed_ids::ChangedIds;
 pub use chosen_columns::ChosenColumns;
+pub use decimal_ids::DecimalIds;
 pub use error::ManifestError;
 pub use folders::{
     FolderPairs, ListedFolder, MESH_EXTENSIONS, PRINT_EXTENSIONS, PairingChanges,
@@ -51,3 +53,4 @@ pub(crate) use row::{is_id_or_path_column, is_text_column};
 pub use text::{CsvText, LineCounter, NotText, as_utf8, trimmed};
 pub use unnamed_values::UnnamedValues;
 pub use unread_columns::UnreadColumns;
+pub use whole_numbers::whole_part;

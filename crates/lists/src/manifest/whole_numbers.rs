@@ -1,5 +1,5 @@
-//! Ids of CSV that are whole numbers with the decimals `.0`. Python writes them so if a value
-//! of the column is missing.
+//! Ids of CSV that are whole numbers with the decimals `.0`. Python writes them so if a value of the column is missing, and
+//! may write a word such as `nan` for it.
 
 use ::csv::ByteRecord;
 use memchr::memmem;
@@ -9,13 +9,25 @@ use super::draft::DraftRow;
 use super::row_reader::row_reader;
 use super::text::trimmed;
 use crate::json_numbers::{InexactNumber, MAX_EXACT};
+use mocban_core::domain::spelling::quoted;
 
 /// Columns whose numbers are names.
 const NAMES: [&str; 3] = ["id", "block", "character"];
 
-/// Columns of names in which all values are whole numbers with `.0`.
+/// Words that programs for tables write for a missing value.
+const MISSING: [&str; 8] = ["nan", "NaN", "NA", "N/A", "n/a", "<NA>", "None", "null"];
+
+/// Columns of names in which all values are whole numbers with `.0`, or stand for missing values.
 #[derive(Debug, Default)]
-pub(super) struct WholeNumbers(Vec<&'static str>);
+pub(super) struct WholeNumbers(Vec<NameColumn>);
+
+/// A column of names.
+#[derive(Debug)]
+struct NameColumn {
+    name: &'static str,
+    /// Whether rows may have the same name, or none. Numbers without `.0` may stand beside the others then.
+    is_of_groups: bool,
+}
 
 impl WholeNumbers {
     /// Finds such columns of a list by the standard names of its columns.
@@ -28,11 +40,17 @@ impl WholeNumbers {
         if memmem::find(list, b".0").is_none() {
             return Self::default();
         }
-        let names = columns.enumerate();
+        let names: Vec<_> = columns.enumerate().collect();
+        // In a list of blocks, the block is the id.
+        let has_id = names.iter().any(|(_, name)| *name == Some("id"));
+        let names = names.into_iter();
         let names = names.filter_map(|(at, name)| Some((at, name?)));
-        let mut found: Vec<(usize, &'static str, bool)> = names
-            .filter(|(_, name)| NAMES.contains(name))
-            .map(|(at, name)| (at, name, false))
+        let names = names.filter(|(_, name)| NAMES.contains(name));
+        let mut found: Vec<(usize, NameColumn, bool)> = names
+            .map(|(at, name)| {
+                let is_of_groups = has_id && name != "id";
+                (at, NameColumn { name, is_of_groups }, false)
+            })
             .collect();
         let mut reader = row_reader(list, delimiter);
         let mut record = ByteRecord::new();
@@ -46,7 +64,7 @@ impl WholeNumbers {
             if std::mem::take(&mut is_header) {
                 continue;
             }
-            found.retain_mut(|(at, _, has_numbers)| {
+            found.retain_mut(|(at, column, has_numbers)| {
                 let cell = record.get(*at).unwrap_or_default();
                 let Ok(cell) = std::str::from_utf8(cell) else {
                     return false;
@@ -54,22 +72,38 @@ impl WholeNumbers {
                 let cell = trimmed(cell);
                 let is_number = whole_part(cell).is_some();
                 *has_numbers |= is_number;
-                is_number || cell.is_empty()
+                is_number
+                    || cell.is_empty()
+                    || MISSING.contains(&cell)
+                    || column.is_of_groups && is_whole(cell)
             });
         }
         let found = found.into_iter().filter(|(_, _, has_numbers)| *has_numbers);
-        Self(found.map(|(_, name, _)| name).collect())
+        Self(found.map(|(_, column, _)| column).collect())
     }
 
-    /// Takes the decimals off the numbers of a row in these columns.
+    /// Takes the decimals off the numbers of a row in these columns, and words for missing values out of columns whose values
+    /// may be missing.
     ///
     /// # Errors
-    /// Returns an error if a number is too large to be exact.
+    /// Returns an error if a number is too large to be exact, or an id is missing.
     pub(super) fn apply(&self, draft: &mut DraftRow) -> Result<(), String> {
-        for name in &self.0 {
+        for NameColumn { name, is_of_groups } in &self.0 {
             let Some(cell) = draft.cells.get_mut(name) else {
                 continue;
             };
+            if MISSING.contains(&cell.as_str()) {
+                if !is_of_groups {
+                    let cell = quoted(cell);
+                    return Err(format!(
+                        "column {name} has {cell}, a word for a missing value; write the name"
+                    ));
+                }
+                draft.cells.remove(name);
+                let form = CellForm::MissingValue;
+                draft.unusual.push((form, (*name).to_owned()));
+                continue;
+            }
             let Some(whole) = whole_part(cell).map(str::to_owned) else {
                 continue;
             };
@@ -89,16 +123,26 @@ impl WholeNumbers {
     }
 }
 
-/// Returns a whole number without its decimals, as Python writes it, such as `117` of `117.0`.
-fn whole_part(text: &str) -> Option<&str> {
-    let whole = text.strip_suffix(".0")?;
-    let digits = whole.strip_prefix('-').unwrap_or(whole);
-    let is_number = match digits.as_bytes() {
-        [b'0'] => digits.len() == whole.len(),
+/// Returns a whole number without its decimals, as Python writes it.
+///
+/// ```
+/// use mocban_lists::manifest::whole_part;
+///
+/// assert_eq!(whole_part("117.0"), Some("117"));
+/// assert_eq!(whole_part("0117.0"), None);
+/// ```
+pub fn whole_part(text: &str) -> Option<&str> {
+    text.strip_suffix(".0").filter(|whole| is_whole(whole))
+}
+
+/// Returns whether a text is a whole number as Python writes it.
+fn is_whole(text: &str) -> bool {
+    let digits = text.strip_prefix('-').unwrap_or(text);
+    match digits.as_bytes() {
+        [b'0'] => digits.len() == text.len(),
         [b'0', ..] | [] => false,
         bytes => bytes.iter().all(u8::is_ascii_digit),
-    };
-    is_number.then_some(whole)
+    }
 }
 
 #[cfg(test)]
@@ -153,6 +197,34 @@ mod tests {
             let expected = ids.map(|id| id.trim_start_matches("=\"").trim_end_matches('"'));
             assert_eq!(read, expected);
             assert_eq!(warnings, [""; 0]);
+        }
+    }
+
+    #[test]
+    fn words_for_missing_values_beside_numbers_are_no_names() {
+        let list = "id,mesh,print,block,character\n1.0,a,a,3.0,nan\n2.0,b,b,nan,b\n4.0,c,c,5,nan\n";
+        let rows = parse_csv(list.as_bytes()).expect("a list");
+        let blocks: Vec<_> = rows.iter().map(|row| row.block.as_deref()).collect();
+        assert_eq!(blocks, [Some("3"), None, Some("5")]);
+        assert_eq!(rows[0].character.as_deref(), Some("nan"), "a text");
+        let (_, warnings) = read(list);
+        assert_eq!(
+            warnings[1..],
+            [
+                "words for missing values beside whole numbers: 1, the first in column \"block\" on line 3; they are read as \
+                 empty cells"
+            ]
+        );
+        for (list, column) in [
+            ("id,mesh,print\n1.0,a,a\nnan,b,b\n", "id"),
+            ("block,mesh,page\n1.0,a,a\nnan,b,b\n", "block"),
+        ] {
+            let pairs = parse_csv(list.as_bytes()).expect_err("no id").to_string();
+            let blocks = read_blocks(list.as_bytes()).expect_err("no id").to_string();
+            let reason = format!(
+                "line 3: column {column} has \"nan\", a word for a missing value; write the name"
+            );
+            assert!([pairs, blocks].contains(&reason), "{reason}");
         }
     }
 

@@ -269,6 +269,24 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "they are read without it, as in JSON and XLSX",
         "phần này được bỏ khi đọc, như với JSON và XLSX",
     ),
+    (
+        "words for missing values beside whole numbers: {}, the first in column {} on line {}",
+        "số ô có từ chỉ giá trị thiếu giữa các số nguyên: {0#}, ô đầu tiên ở cột {1}, dòng {2}",
+    ),
+    ("they are read as empty cells", "chúng được đọc như ô trống"),
+    (
+        "column {} has {}, a word for a missing value",
+        "cột {0} có {1}, là từ chỉ giá trị thiếu",
+    ),
+    ("write the name", "hãy ghi tên"),
+    (
+        "ids that differ from another one only by .0: {}, the first {} on line {}",
+        "số mã chỉ khác một mã khác ở phần .0: {0#}, mã đầu tiên là {1}, ở dòng {2}",
+    ),
+    (
+        "correct them if both mean one",
+        "hãy sửa nếu cả hai chỉ là một",
+    ),
     ("write it as text", "hãy viết nó dạng văn bản"),
     (
         "write it as text, in quotation marks",
