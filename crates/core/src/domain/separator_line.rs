@@ -10,6 +10,62 @@ pub fn separator_line(list: &[u8]) -> Option<(u8, usize)> {
     Some((named_separator(&head[..end])?, end))
 }
 
+/// Most lines, with blank ones, among which the separator is named.
+const MAX_LINES: usize = 16;
+
+/// The first lines of a list that name its separator, of which there may be several, with blank lines before and between them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SeparatorLines {
+    /// The separator that the last one names.
+    pub separator: u8,
+    /// The line breaks before the last one.
+    pub breaks: Vec<u8>,
+    /// The number of bytes before the line break of the last one.
+    pub end: usize,
+}
+
+impl SeparatorLines {
+    /// Finds the lines.
+    ///
+    /// ```
+    /// use mocban_core::domain::SeparatorLines;
+    ///
+    /// let found = SeparatorLines::find(b"\r\nsep=;\r\na;b").expect("a separator");
+    /// assert_eq!((found.separator, &*found.breaks, found.end), (b';', b"\r\n".as_slice(), 7));
+    /// ```
+    pub fn find(list: &[u8]) -> Option<Self> {
+        let (mut found, mut breaks, mut at) = (None, Vec::new(), 0);
+        for _ in 0..MAX_LINES {
+            let rest = &list[at..];
+            let named = separator_line(rest);
+            let line = named.map(|(_, end)| end).or_else(|| blank_line(rest));
+            let Some(line) = line else {
+                break;
+            };
+            let end = at + line;
+            if let Some((separator, _)) = named {
+                let breaks = breaks.clone();
+                found = Some(Self {
+                    separator,
+                    breaks,
+                    end,
+                });
+            }
+            let is_pair = list[end..].starts_with(b"\r\n");
+            at = end + if is_pair { 2 } else { 1 };
+            breaks.extend_from_slice(&list[end..at]);
+        }
+        found
+    }
+}
+
+/// Returns the number of bytes before the line break of a first line that is blank.
+fn blank_line(list: &[u8]) -> Option<usize> {
+    let head = &list[..list.len().min(MAX_LINE_BYTES)];
+    let end = head.iter().position(|byte| b"\r\n".contains(byte))?;
+    head[..end].trim_ascii().is_empty().then_some(end)
+}
+
 /// Returns the separator that a line without its line break names. Blanks and case do not matter. The line may be in quotation
 /// marks, and separators of empty cells may follow, as a program writes them that saved the line as a cell. Nothing after the
 /// equals sign stands for a tab that was removed with the blanks.

@@ -12,7 +12,7 @@ use super::model::{LabelFormat, Labels, PageFile};
 use super::page_fit::fit_to_page;
 use super::region::{PageRegions, shown};
 use crate::json_numbers::unknown_number;
-use mocban_core::domain::{FileKind, UniqueKeys, sanitize, separator_line};
+use mocban_core::domain::{FileKind, SeparatorLines, UniqueKeys, sanitize};
 
 /// Largest file that is read, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
@@ -82,7 +82,7 @@ fn parse_lines(
     page: &PageFile<'_>,
 ) -> Result<(LabelFormat, PageRegions), LabelsProblem> {
     let first_line = text.lines().next().unwrap_or_default();
-    let below = without_separator_line(text);
+    let below = &*without_separator_lines(text);
     let header = below.trim_start().lines().next().unwrap_or_default();
     if via_csv::is_header(header) {
         Ok((LabelFormat::ViaCsv, via_csv::read(below, page)?))
@@ -93,9 +93,17 @@ fn parse_lines(
     }
 }
 
-/// Returns a text without the content of a first line that names the separator for Excel, such as `sep=;`. No line moves.
-fn without_separator_line(text: &str) -> &str {
-    separator_line(text.as_bytes()).map_or(text, |(_, end)| &text[end..])
+/// Returns a text without the content of first lines that name the separator for Excel, such as `sep=;`. No line moves.
+fn without_separator_lines(text: &str) -> Cow<'_, str> {
+    match SeparatorLines::find(text.as_bytes()) {
+        None => Cow::Borrowed(text),
+        Some(SeparatorLines { breaks, end, .. }) if breaks.is_empty() => {
+            Cow::Borrowed(&text[end..])
+        }
+        Some(SeparatorLines { breaks, end, .. }) => {
+            Cow::Owned(String::from_utf8_lossy(&breaks).into_owned() + &text[end..])
+        }
+    }
 }
 
 /// Returns a text in which each line ends with a line feed. Old programs for the Macintosh end lines with a carriage return

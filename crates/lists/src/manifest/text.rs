@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use memchr::memchr_iter;
 
-use mocban_core::domain::separator_line;
+use mocban_core::domain::SeparatorLines;
 
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -54,22 +54,22 @@ pub struct CsvText<'t> {
 
 impl<'t> CsvText<'t> {
     /// Decodes a list and finds its separator: the one that a first line such as `sep=;` names for Excel, if the header has
-    /// it, or `delimiter`. The content of that line, and blanks before quoted cells, are left out; no line moves.
+    /// it, or `delimiter`. The content of such lines, and blanks before quoted cells, are left out; no line moves.
     ///
     /// # Errors
     /// Returns an error if the bytes are not text.
     pub fn new(bytes: &'t [u8]) -> Result<Self, NotText> {
         let mut bytes = as_utf8(bytes)?;
-        let named = separator_line(&bytes);
-        if let Some((_, end)) = named {
+        let named = SeparatorLines::find(&bytes);
+        if let Some(SeparatorLines { breaks, end, .. }) = &named {
             bytes = match bytes {
-                Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[end..]),
-                Cow::Owned(bytes) => Cow::Owned(bytes[end..].to_vec()),
+                Cow::Borrowed(bytes) if breaks.is_empty() => Cow::Borrowed(&bytes[*end..]),
+                bytes => Cow::Owned([breaks.as_slice(), &bytes[*end..]].concat()),
             };
         }
         // A spreadsheet program may have saved the list with another separator since the line was written.
         let is_used = |named: &u8| header(&bytes).contains(named);
-        let named = named.map(|(separator, _)| separator);
+        let named = named.map(|lines| lines.separator);
         let delimiter = named.filter(is_used).unwrap_or_else(|| delimiter(&bytes));
         if let Some(changed) = without_blanks_before_quotes(&bytes, delimiter) {
             bytes = Cow::Owned(changed);
@@ -272,6 +272,11 @@ mod tests {
             let (text, separator) = text(list);
             assert_eq!((text.trim(), separator), ("a;b,c,d", ';'), "{list}");
             assert_eq!(text.lines().count(), 2, "lines are counted as in the file");
+        }
+        for list in ["sep=,\nsep=;\na;b,c,d\n", "\r\nsep=;\na;b,c,d\n"] {
+            let (text, separator) = text(list);
+            assert_eq!((text.trim(), separator), ("a;b,c,d", ';'), "{list}");
+            assert_eq!(text.lines().count(), 3, "lines are counted as in the file");
         }
         assert_eq!(text("sep=;x\na,b\n").1, ';');
         assert_eq!(text("sep=,\r\n\na;b;c\n1;2,5;3\n").1, ';');

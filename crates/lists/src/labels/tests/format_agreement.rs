@@ -233,6 +233,7 @@ fn a_line_with_the_separator_and_old_line_ends_do_not_change_csv() {
     for text in [
         format!("sep=,\n{VIA_CSV}"),
         format!("\"sep=,\"\n{VIA_CSV}"),
+        format!("sep=;\n\nsep=,\n{VIA_CSV}"),
         format!("Sep = ,\r\n{}", VIA_CSV.replace('\n', "\r\n")),
         VIA_CSV.replace('\n', "\r"),
     ] {
