@@ -3,21 +3,15 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::exit::Refusal;
-use super::input_list::is_inputs_folder;
 use super::input_paths::in_existing_form;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use mocban_core::domain::spelling::quoted;
 use mocban_core::domain::{ErrorCode, FileKind, pointer_of, sanitize};
-use mocban_export::EXPORT_MANIFEST;
-use mocban_lists::relative_path::SYSTEM_FOLDERS;
 use mocban_lists::workbook::{is_workbook, read_sheet};
-use mocban_store::{
-    CATALOG_FILE, Project, create_folders, open_regular, read_file_or_pipe, read_up_to,
-    write_atomic,
-};
+use mocban_store::{create_folders, open_regular, read_file_or_pipe, read_up_to, write_atomic};
 
 /// Longest list that is read, in bytes.
 const MAX_LIST_BYTES: u64 = 512 << 20;
@@ -233,40 +227,6 @@ pub fn or_elsewhere(written: ProjectResult<()>, named: Option<&Path>) -> Project
     }
 }
 
-/// Lists the files of a directory and of the folders in it. Leaves out hidden folders, links to folders, exports, scans and
-/// prints of backups, and the folder of results of a project.
-pub fn list_below(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let (mut files, mut folders) = (Vec::new(), vec![dir.to_owned()]);
-    while let Some(folder) = folders.pop() {
-        let refuse = |error: std::io::Error| match error.kind() {
-            ErrorKind::NotADirectory => {
-                Refusal::Usage(format!("{} is not a directory", folder.display()))
-            }
-            _ => refusal(&folder, &error, "there is no directory", "cannot list"),
-        };
-        let results = Project::at(&folder).artifacts_dir();
-        let is_project = folder.join(CATALOG_FILE).exists();
-        if folder != dir && (folder.join(EXPORT_MANIFEST).exists() || is_inputs_folder(&folder)) {
-            continue;
-        }
-        for entry in std::fs::read_dir(&folder).map_err(refuse)? {
-            let entry = entry.map_err(refuse)?;
-            let (path, name) = (entry.path(), entry.file_name());
-            let is_skipped = name.as_encoded_bytes().starts_with(b".")
-                || SYSTEM_FOLDERS.iter().any(|skipped| name == *skipped)
-                || is_project && path == results;
-            // The listing has the type already; only a link must be followed.
-            match entry.file_type() {
-                Ok(kind) if kind.is_dir() && is_skipped => {}
-                Ok(kind) if kind.is_dir() => folders.push(path),
-                Ok(kind) if kind.is_symlink() && path.is_dir() => {}
-                _ => files.push(path),
-            }
-        }
-    }
-    Ok(files)
-}
-
 /// Returns whether a file holds JSON Lines. If its extension is unknown, the first character decides.
 pub fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     let extension = file.extension().and_then(|extension| extension.to_str());
@@ -322,7 +282,7 @@ impl RefusedLine {
 }
 
 /// Refuses a path that does not exist (`missing`) or cannot be used (`failed`).
-fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> Refusal {
+pub(crate) fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> Refusal {
     let shown = path.display();
     Refusal::Usage(match error.kind() {
         ErrorKind::NotFound => format!("{missing} {shown}"),
@@ -334,43 +294,7 @@ fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> 
 mod tests {
     use std::path::Path;
 
-    use super::{is_jsonl, list_below, require_png, write_output};
-
-    #[test]
-    fn files_in_folders_are_listed_without_hidden_folders_and_results() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        for path in [
-            "1.stl",
-            "b1/stl/1.stl",
-            ".git/1.stl",
-            "__MACOSX/1.stl",
-            "artifacts/1.stl",
-            "p/catalog.sqlite",
-            "p/artifacts/00/1.png",
-            "p/data/1.stl",
-            "out/export.json",
-            "out/1.png",
-        ] {
-            let path = dir.path().join(path);
-            std::fs::create_dir_all(path.parent().expect("a folder")).expect("created");
-            std::fs::write(path, "").expect("written");
-        }
-        let mut found = list_below(dir.path()).expect("listed");
-        found.sort();
-        let expected = [
-            "1.stl",
-            "artifacts/1.stl",
-            "b1/stl/1.stl",
-            "p/catalog.sqlite",
-            "p/data/1.stl",
-        ];
-        assert_eq!(found, expected.map(|path| dir.path().join(path)));
-        let refused = list_below(&dir.path().join("1.stl")).expect_err("a file");
-        assert!(
-            refused.to_string().ends_with("1.stl is not a directory"),
-            "{refused}"
-        );
-    }
+    use super::{is_jsonl, require_png, write_output};
 
     #[test]
     fn a_folder_and_other_formats_than_png_are_no_outputs_of_pictures() {

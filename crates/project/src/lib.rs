@@ -58,6 +58,7 @@ pub mod export_forecast;
 pub mod failures;
 pub mod file_headers;
 pub mod files;
+pub mod folder_files;
 pub mod generated_folder;
 mod growing_list;
 pub mod hosts;

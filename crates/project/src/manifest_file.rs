@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
+use super::folder_files::list_below;
 use super::input_paths::in_existing_form;
 use super::missing_files::locate_file;
 use super::pointer_files::FileSearches;
@@ -175,7 +176,7 @@ impl Listing {
     ) -> ProjectResult<Self> {
         let listed = |root: &Path| {
             let root = in_existing_form(root);
-            files::list_below(&root).map(|files| ListedFolder { root, files })
+            list_below(&root).map(|files| ListedFolder { root, files })
         };
         let (mesh_folder, print_folder) = (listed(meshes)?, listed(prints)?);
         let mut unread = UnreadFiles::of_folder(&mesh_folder.files, FileKind::mesh_advice);

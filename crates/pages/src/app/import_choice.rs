@@ -19,7 +19,8 @@ use mocban_lists::manifest::{
     read_head,
 };
 use mocban_project::ProjectError;
-use mocban_project::files::{is_jsonl, list_below};
+use mocban_project::files::is_jsonl;
+use mocban_project::folder_files::list_below;
 use mocban_project::import_blocks::{BlockSource, ImportedBlock, ListedItems};
 use mocban_project::import_pairs::PairSource;
 use mocban_project::import_plan::{ImportPlan, plan_import};

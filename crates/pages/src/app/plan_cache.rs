@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use mocban_core::domain::ContentHash;
 use mocban_core::locked;
 use mocban_project::ProjectResult;
-use mocban_project::files::list_below;
+use mocban_project::folder_files::list_below;
 use mocban_project::import_pairs::PairSource;
 use mocban_project::import_plan::ImportPlan;
 
