@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::folder_files::list_below;
+use super::folder_files::{links_sentence, list_with_links};
 use super::input_paths::in_existing_form;
 use super::missing_files::locate_file;
 use super::pointer_files::FileSearches;
@@ -176,14 +176,20 @@ impl Listing {
     ) -> ProjectResult<Self> {
         let listed = |root: &Path| {
             let root = in_existing_form(root);
-            list_below(&root).map(|files| ListedFolder { root, files })
+            let found = list_with_links(&root)?;
+            let files = found.files;
+            Ok::<_, Refusal>((ListedFolder { root, files }, found.links))
         };
-        let (mesh_folder, print_folder) = (listed(meshes)?, listed(prints)?);
+        let (mesh_folder, links) = listed(meshes)?;
+        let (print_folder, more_links) = listed(prints)?;
         let mut unread = UnreadFiles::of_folder(&mesh_folder.files, FileKind::mesh_advice);
         unread.append(UnreadFiles::of_folder(
             &print_folder.files,
             FileKind::image_advice,
         ));
+        unread
+            .sentences
+            .extend(links_sentence([links, more_links].concat()));
         let refuse_both = |problems: ManifestError| {
             let lines = [&[problems.to_string()][..], &unread.sentences].concat();
             refuse(meshes, &lines.join("\n"))

@@ -9,6 +9,19 @@ use mocban_lists::manifest::ManifestRow;
 /// Begins the sentences of a folder, whose other files are imported without these.
 const IGNORED: &str = "ignored, ";
 
+/// Extensions of archives.
+const ARCHIVES: [(&str, FileKind); 6] = [
+    ("zip", FileKind::Other("a ZIP archive")),
+    ("7z", FileKind::Other("a 7-Zip archive")),
+    ("rar", FileKind::Other("a RAR archive")),
+    ("tar", FileKind::Other("a TAR archive")),
+    ("tgz", FileKind::Other("a gzip archive")),
+    ("gz", FileKind::Other("a gzip archive")),
+];
+
+/// What to do with an archive.
+const UNPACK: &str = "unpack it, and import the files in it";
+
 /// Files in formats that are not read, by their names.
 pub(crate) struct UnreadFiles {
     pub(crate) paths: BTreeSet<PathBuf>,
@@ -32,7 +45,9 @@ impl UnreadFiles {
             BTreeMap::new();
         for path in files {
             let kind = unread_kind(path);
-            if let Some((kind, advice)) = kind.and_then(|kind| Some((kind, advice(kind)?))) {
+            if let Some((kind, advice)) =
+                kind.and_then(|kind| Some((kind, advice_on(kind, advice)?)))
+            {
                 let format = formats.entry(kind.name());
                 let (_, _, paths) = format.or_insert((kind, advice, Vec::new()));
                 paths.push(path);
@@ -57,11 +72,21 @@ impl UnreadFiles {
         found
     }
 
-    /// Adds the files of another folder.
+    /// Adds the files of another folder, which may be the same one.
     pub(crate) fn append(&mut self, mut other: Self) {
         self.paths.append(&mut other.paths);
+        other
+            .sentences
+            .retain(|sentence| !self.sentences.contains(sentence));
         self.sentences.append(&mut other.sentences);
     }
+}
+
+/// Returns what to do with files of a kind; `advice` knows meshes or images.
+fn advice_on(kind: FileKind, advice: fn(FileKind) -> Option<String>) -> Option<String> {
+    let is_archive = ARCHIVES.iter().any(|(_, archive)| *archive == kind);
+    let unpack = || UNPACK.to_owned();
+    is_archive.then(unpack).or_else(|| advice(kind))
 }
 
 /// Returns advice whose command is for all files with an extension such as `*.bmp`, with the extensions of these files as they
@@ -80,7 +105,12 @@ fn with_patterns(advice: &str, paths: &[&PathBuf]) -> String {
 
 fn unread_kind(path: &Path) -> Option<FileKind> {
     let extension = path.extension().and_then(|extension| extension.to_str());
-    extension.and_then(FileKind::of_unread_extension)
+    extension.and_then(|extension| {
+        let mut archives = ARCHIVES.into_iter();
+        let archive = archives.find(|(name, _)| extension.eq_ignore_ascii_case(name));
+        let unread = || FileKind::of_unread_extension(extension);
+        archive.map(|(_, kind)| kind).or_else(unread)
+    })
 }
 
 /// The rows of a list with files in formats that are not read.
@@ -96,7 +126,8 @@ impl UnreadRows {
     /// Looks at the paths of a row.
     pub(crate) fn add(&mut self, row: &ManifestRow) {
         let is_unread = |path: &Path, advice: fn(FileKind) -> Option<String>| {
-            unread_kind(path).and_then(advice).is_some()
+            let kind = unread_kind(path);
+            kind.and_then(|kind| advice_on(kind, advice)).is_some()
         };
         let mesh = is_unread(&row.mesh, FileKind::mesh_advice);
         let print = is_unread(&row.print, FileKind::image_advice);
@@ -142,10 +173,14 @@ mod tests {
         for name in ["a.bmp", "b.BMP", "c.bmp", "d.pdf", "notes.txt"] {
             write(prints.join(name));
         }
-        for name in ["a.stl", "b.glb", "c.GLTF", "d.bmp"] {
+        for name in ["a.stl", "b.glb", "c.GLTF", "d.bmp", "e.ZIP"] {
             write(meshes.join(name));
         }
         let sentences = [
+            format!(
+                "ignored, a ZIP archive is not read: {}; unpack it, and import the files in it",
+                meshes.join("e.ZIP").display()
+            ),
             format!(
                 "ignored, a glTF scene is not read: {} and 1 more; open them in MeshLab, Blender or CloudCompare and \
                  export them as PLY",

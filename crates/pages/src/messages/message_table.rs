@@ -91,6 +91,18 @@ pub(super) const MESSAGES: &[(&str, &str)] = &[
     ),
     ("{} is not read: {}", "không đọc được {0}: {1}"),
     (
+        "unpack it, and import the files in it",
+        "hãy giải nén rồi nhập các tệp bên trong",
+    ),
+    (
+        "ignored, links to folders: {}",
+        "bỏ qua, các liên kết đến thư mục: {0}",
+    ),
+    (
+        "import the folders from their own place",
+        "hãy nhập các thư mục đó từ chính chỗ của chúng",
+    ),
+    (
         "open them in {} and export them as PLY",
         "hãy mở chúng bằng {0} rồi xuất thành PLY",
     ),
