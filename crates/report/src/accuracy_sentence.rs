@@ -50,7 +50,7 @@ pub(super) fn accuracy(report: &Report) -> CountedText {
     sentence
 }
 
-/// Returns how many results were passed, of those that were passed or failed.
+/// Returns how many of the decided results were passed.
 fn decided(row: &MetricRow) -> CountedText {
     let of_metric = |joint| CountedPairs::Judged(row.metric, joint);
     let decided = row.passed + row.failed;
