@@ -47,6 +47,18 @@ fn columns_are_those_that_the_title_names() {
         "# id x y z\n7 1 2.5 3\n3 4 5 6.25\n",
         "Point ID,X,Y,Z\n7,1,2.5,3\n3,4,5,6.25\n",
         "r;g;b;X;Y;Z\n0;0;0;1;2,5;3\n0;0;0;4;5;6,25\n",
+        "Nr;Rechts;Hoch;Höhe\n7;1;2,5;3\n3;4;5;6,25\n",
+        "E,N,H\n1,2.5,3\n4,5,6.25\n",
+        "n e h\n2.5 1 3\n5 4 6.25\n",
+        "n e n h\n7 1 2.5 3\n3 4 5 6.25\n",
+        "Northing,Easting,Elevation\n2.5,1,3\n5,4,6.25\n",
+        "# t x y z\n0.5 1 2.5 3\n0.25 4 5 6.25\n",
+        "// scan x y z\n7 1 2.5 3\n3 4 5 6.25\n",
+        "# scan row col x y z\n1 7 8 1 2.5 3\n1 3 9 4 5 6.25\n",
+        "# columns: x y z\n1 2.5 3 7\n4 5 6.25 3\n",
+        "# scan: x y z\n1 2.5 3 7\n4 5 6.25 3\n",
+        "X [millimeters] Y [millimeters] Z [millimeters]\n1 2.5 3\n4 5 6.25\n",
+        "x y z\ninches inches inches\n1 2.5 3\n4 5 6.25\n",
     ] {
         assert_points(text);
     }

@@ -7,9 +7,77 @@ use crate::mesh::text;
 
 /// Most cells of a title that are read.
 pub(super) const MAX_NAMES: usize = 64;
-/// Columns that may precede the coordinates in a commented title.
-const NUMBER_NAMES: [&str; 8] = ["id", "no", "nr", "n", "index", "number", "num", "point"];
-const UNITS: [&str; 5] = ["mm", "cm", "m", "in", "inch"];
+/// Columns that may precede the coordinates in a commented title: numbers of points and scans, and times.
+const NUMBER_NAMES: [&str; 26] = [
+    "id",
+    "no",
+    "nr",
+    "n",
+    "index",
+    "number",
+    "num",
+    "point",
+    "pt",
+    "pkt",
+    "punkt",
+    "pointid",
+    "stt",
+    "t",
+    "time",
+    "timestamp",
+    "gps",
+    "gpstime",
+    "scan",
+    "station",
+    "frame",
+    "profile",
+    "line",
+    "row",
+    "col",
+    "column",
+];
+/// Names of x, y and z, also those of surveys. A name ends at its first letter that is no ASCII, so that `H` is that of `Höhe`.
+/// The name `n`, which may be that of a number, comes last.
+const AXIS_NAMES: [&[&str]; 3] = [
+    &[
+        "x",
+        "easting",
+        "rechtswert",
+        "rechts",
+        "east",
+        "est",
+        "ost",
+        "e",
+    ],
+    &["y", "northing", "hochwert", "hoch", "north", "nord", "n"],
+    &[
+        "z",
+        "elevation",
+        "altitude",
+        "height",
+        "hoehe",
+        "elev",
+        "alt",
+        "h",
+    ],
+];
+const UNITS: [&str; 15] = [
+    "mm",
+    "cm",
+    "m",
+    "in",
+    "inch",
+    "inches",
+    "millimeter",
+    "millimeters",
+    "millimetre",
+    "millimetres",
+    "centimeters",
+    "centimetres",
+    "meter",
+    "meters",
+    "metres",
+];
 
 /// Returns whether a file that begins with this line may be a point set.
 pub(in crate::mesh) fn is_data_or_title(line: &[u8]) -> bool {
@@ -55,26 +123,49 @@ pub(super) struct Title {
 }
 
 impl Title {
-    /// Returns the columns that a line names. A comment names them only if x, y and z are its first words, or follow the
-    /// name of a column of numbers.
+    /// Returns the columns that a line names. A comment names them only if x, y and z are its first words, or follow a colon or
+    /// the names of columns of numbers.
     pub(super) fn of(line: &[u8]) -> Option<Self> {
+        let is_comment = is_comment(line);
+        let colon = line.iter().position(|byte| *byte == b':');
+        let behind = colon.filter(|_| is_comment).map(|at| &line[at + 1..]);
+        let behind = behind.and_then(|behind| Self::of_names(behind, is_comment));
+        behind.or_else(|| Self::of_names(line, is_comment))
+    }
+
+    fn of_names(line: &[u8], is_comment: bool) -> Option<Self> {
         let is_delimited = line.iter().any(|byte| b",;\t".contains(byte));
         let is_name = |name: &String| is_delimited || !UNITS.contains(&&**name);
         let names: Vec<String> = names(line).filter(is_name).collect();
-        let mut columns = [0; 3];
-        for (column, wanted) in columns.iter_mut().zip(["x", "y", "z"]) {
-            *column = names.iter().position(|name| name == wanted)?;
-        }
-        let is_comment = is_comment(line);
-        let has_number = NUMBER_NAMES.contains(&&*names[0]);
+        let columns = axis_columns(&names)?;
+        let first = columns.into_iter().min().unwrap_or_default();
         let last = columns.into_iter().max().unwrap_or_default();
-        let is_title = !is_comment || last == 2 + usize::from(has_number);
+        let mut before = names[..first].iter();
+        let are_numbers = before.all(|name| NUMBER_NAMES.contains(&&**name));
+        let is_title = !is_comment || (are_numbers && last == first + 2);
         is_title.then_some(Self {
             columns,
             width: names.len(),
             is_comment,
         })
     }
+}
+
+/// Returns the columns of x, y and z. The first column may be that of a number although it has the name of an axis.
+fn axis_columns(names: &[String]) -> Option<[usize; 3]> {
+    let find = |names: &[String]| {
+        let column = |known: &[&str]| {
+            let mut known = known.iter();
+            known.find_map(|known| names.iter().position(|name| name == known))
+        };
+        let [x, y, z] = AXIS_NAMES.map(column);
+        Some([x?, y?, z?])
+    };
+    let (first, rest) = names.split_first()?;
+    let is_number = NUMBER_NAMES.contains(&&**first);
+    let behind = is_number.then(|| find(rest)).flatten();
+    let behind = behind.map(|columns: [usize; 3]| columns.map(|column| column + 1));
+    behind.or_else(|| find(names))
 }
 
 /// Returns the names in a title in lower case: the letters and digits that its cells begin with, without quotes, brackets
