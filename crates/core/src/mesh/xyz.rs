@@ -5,6 +5,7 @@ mod first_column;
 mod grouped;
 #[cfg(test)]
 mod grouped_tests;
+mod height_grid;
 mod layout;
 mod numbers;
 mod ptx;

@@ -311,6 +311,14 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "hãy ghi tên các cột trên một dòng trước các điểm, chẳng hạn `row col x y z`",
     ),
     (
+        "a grid of heights begins here",
+        "đây là lưới độ cao, không phải các điểm",
+    ),
+    (
+        "save it as points, with x, y and z of each in a line",
+        "hãy lưu thành các điểm, mỗi dòng có x, y và z của một điểm",
+    ),
+    (
         "its first number may be x, or that of a point or a scan",
         "số đầu có thể là x, hoặc số thứ tự của điểm hay của bản quét",
     ),

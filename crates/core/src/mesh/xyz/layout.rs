@@ -10,6 +10,7 @@ use super::grouped::{
     PlainNumber, are_grouped_pairs, has_unclear_commas, separator_of_grouped, without_apostrophes,
     without_groups,
 };
+use super::height_grid;
 use super::title::{MAX_NAMES, Title, is_comment, is_other_title};
 use crate::mesh::MeshError;
 use crate::mesh::text;
@@ -66,7 +67,7 @@ impl PointLayout {
     /// Determines the layout from the title and the first points, and from the first point with a comma.
     ///
     /// # Errors
-    /// Returns an error if the title has more columns than the points.
+    /// Returns an error if the title has more columns than the points, or if the lines are those of a grid of heights.
     pub(super) fn of(bytes: &[u8]) -> Result<Self, MeshError> {
         let mut lines = text::raw_lines(bytes);
         let (mut title, mut first) = (None, None);
@@ -93,6 +94,7 @@ impl PointLayout {
         let Some((first_point, first)) = first else {
             return Ok(layout);
         };
+        height_grid::check_header(first_point, first)?;
         layout.first_point = first_point;
         let later = lines.map(|(_, raw)| raw);
         let later = later.filter(|raw| !is_comment(raw.trim_ascii()));
@@ -110,6 +112,9 @@ impl PointLayout {
         layout.tabs = tab_columns(&sample, named);
         let widths: Vec<usize> = sample.iter().map(|line| layout.width_of(line)).collect();
         layout.width = most_frequent(&widths);
+        if named.is_none() {
+            height_grid::check_width(first_point, layout.width)?;
+        }
         let has_clear_commas =
             |line: &[u8]| layout.commas != CommaUse::Unclear || !line.contains(&b',');
         let is_pairs =
