@@ -15,7 +15,7 @@ mod tests;
 mod title;
 
 use super::{Mesh, MeshError, MeshLimits, text};
-use first_column::{check_first_column, is_scan_number};
+use first_column::{check_first_column, is_one_number};
 use layout::PointLayout;
 use numbers::{are_numbers, check_grid};
 
@@ -76,11 +76,11 @@ fn points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshError>
     check_grid(bytes, &layout, &points).map(|()| points)
 }
 
-/// Returns the layout of coordinates behind a first column that has the numbers of points or the number of a scan. `None` if it
-/// has neither. `points` are read with this column as x.
+/// Returns the layout of coordinates behind a first column that has the numbers of points, or one number. `None` if it has
+/// neither. `points` are read with this column as x.
 fn behind_numbers(bytes: &[u8], layout: &PointLayout, points: &[[f64; 3]]) -> Option<PointLayout> {
     let numbered = layout.numbered()?;
-    let has_numbers = are_numbers(points) || is_scan_number(bytes, layout, points);
+    let has_numbers = are_numbers(points) || is_one_number(bytes, layout, points);
     has_numbers.then_some(numbered)
 }
 
@@ -119,8 +119,12 @@ impl SampledPoints {
         let numbered = layout.numbered().and_then(|_| {
             let rows = layout.rows(head);
             let positions = rows.filter_map(|(_, row)| layout.position(row).ok());
-            let whole = positions.map(|point| (point[0].fract() == 0.0).then_some(point));
-            let points: Option<Vec<_>> = whole.collect();
+            let mut first = None;
+            let possible = positions.map(|point| {
+                let is_first = point[0] == *first.get_or_insert(point[0]);
+                (is_first || point[0].fract() == 0.0).then_some(point)
+            });
+            let points: Option<Vec<_>> = possible.collect();
             behind_numbers(head, &layout, &points?)
         });
         Ok(Self {

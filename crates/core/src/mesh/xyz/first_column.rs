@@ -11,10 +11,9 @@ const FIRST_POINTS: usize = 64;
 /// Most places at which numbers of points begin anew or have gaps. The rows of a grid have more.
 const MOST_BREAKS: usize = 9;
 
-/// Returns whether the first column, read as x, is one number, such as that of a scan, before coordinates.
-pub(super) fn is_scan_number(bytes: &[u8], layout: &PointLayout, points: &[[f64; 3]]) -> bool {
+/// Returns whether the first column, read as x, is one number before coordinates, such as that of a scan or its time.
+pub(super) fn is_one_number(bytes: &[u8], layout: &PointLayout, points: &[[f64; 3]]) -> bool {
     points.len() >= NUMBERED_POINTS
-        && points[0][0].fract() == 0.0
         && is_constant(points, 0)
         && has_coordinates_behind(bytes, layout)
 }
@@ -176,7 +175,10 @@ mod tests {
             assert_eq!(open(&text).expect_err(&text), said);
             assert_eq!(open(&format!("n x y z\n{text}")).as_ref(), Ok(&wanted));
         }
-        assert_eq!(open(&rows(&|_| "7 ".to_owned())), Ok(wanted));
+        for one in ["7 ", "7.0 ", "0.5 "] {
+            let text = rows(&|_| one.to_owned());
+            assert_eq!(open(&text).as_ref(), Ok(&wanted), "{one}");
+        }
         let whole = |k: usize| format!("{} {} {} {}\n", k % 40, 7 * k % 31, k / 8, k * k % 13);
         let whole: String = (0..60).map(whole).collect();
         assert_eq!(open(&whole).expect_err("whole numbers"), said);
