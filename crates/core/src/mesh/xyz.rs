@@ -12,10 +12,11 @@ mod ptx;
 mod quoted;
 #[cfg(test)]
 mod tests;
+mod time_order;
 mod title;
 
 use super::{Mesh, MeshError, MeshLimits, text};
-use first_column::{check_first_column, is_one_number};
+use first_column::{check_first_column, check_lacking_numbers, is_one_number};
 use layout::PointLayout;
 use numbers::{are_numbers, check_grid};
 
@@ -68,9 +69,11 @@ fn plain_or_quoted_points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64;
 
 fn points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshError> {
     let layout = PointLayout::of(bytes)?;
+    check_lacking_numbers(bytes, &layout)?;
     let points = positions(bytes, &layout, limits)?;
     if let Some(numbered) = behind_numbers(bytes, &layout, &points) {
-        return positions(bytes, &numbered, limits);
+        let points = positions(bytes, &numbered, limits)?;
+        return check_grid(bytes, &numbered, &points).map(|()| points);
     }
     check_first_column(bytes, &layout, &points)?;
     check_grid(bytes, &layout, &points).map(|()| points)

@@ -311,6 +311,18 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "hãy ghi tên các cột trên một dòng trước các điểm, chẳng hạn `row col x y z`",
     ),
     (
+        "its first three numbers may be those of a scan or point, a row and a column",
+        "ba số đầu có thể là số của bản quét hay điểm, hàng và cột",
+    ),
+    (
+        "name the columns in a line before the points, such as `scan row col x y z`",
+        "hãy ghi tên các cột trên một dòng trước các điểm, chẳng hạn `scan row col x y z`",
+    ),
+    (
+        "it may begin with a number that the others lack",
+        "có thể dòng này có ở đầu số thứ tự mà các dòng khác không có",
+    ),
+    (
         "a grid of heights begins here",
         "đây là lưới độ cao, không phải các điểm",
     ),

@@ -1,8 +1,9 @@
 //! A first column of points without a title that may be no coordinate although it does not number all points: it has gaps or
-//! begins anew, or it is the number of a scan or a time.
+//! begins anew, some lines lack it, or it is the number of a scan or a time.
 
 use super::layout::PointLayout;
 use super::numbers::{NUMBERED_POINTS, has_normals, is_whole};
+use super::time_order::is_time_order;
 use crate::domain::cancel::polled;
 use crate::mesh::MeshError;
 
@@ -18,6 +19,48 @@ pub(super) fn is_one_number(bytes: &[u8], layout: &PointLayout, points: &[[f64; 
         && has_coordinates_behind(bytes, layout)
 }
 
+/// Lines that show whether some lack the first number.
+const COMPARED_LINES: usize = 1000;
+
+/// Refuses lines of which some begin with a whole number and others do not have it.
+///
+/// # Errors
+/// Returns an error that names the first line of the rarer kind.
+pub(super) fn check_lacking_numbers(bytes: &[u8], layout: &PointLayout) -> Result<(), MeshError> {
+    let Some([narrow, wide]) = layout.uneven_widths() else {
+        return Ok(());
+    };
+    let (mut numbers, mut fractions) = (Vec::new(), Vec::new());
+    let mut wholes = 0;
+    for (line, row) in polled(layout.rows(bytes).take(COMPARED_LINES)) {
+        let width = layout.width_of(row);
+        let Some(first) = layout.first_number(row).filter(|_| width >= narrow) else {
+            continue;
+        };
+        match (width == wide, first.fract() == 0.0) {
+            (true, true) => numbers.push(line),
+            (false, false) => fractions.push(line),
+            (true, false) => return Ok(()),
+            (false, true) => wholes += 1,
+        }
+    }
+    if numbers.len().min(fractions.len()) < NUMBERED_POINTS || fractions.len() < wholes {
+        return Ok(());
+    }
+    let (line, reason) = if layout.width == wide {
+        let reason = format!(
+            "it has {narrow} columns, but most lines have {wide}; it may lack the number that the others begin with"
+        );
+        (fractions[0], reason)
+    } else {
+        let reason = format!(
+            "it has {wide} columns, but most lines have {narrow}; it may begin with a number that the others lack"
+        );
+        (numbers[0], reason)
+    };
+    Err(MeshError::Line { line, reason })
+}
+
 /// Refuses points whose first column may be x, or the numbers of points or scans, or times.
 ///
 /// # Errors
@@ -31,7 +74,7 @@ pub(super) fn check_first_column(
         return Ok(());
     }
     let is_whole = is_mostly_whole(points);
-    let is_likely = is_whole || are_times(points);
+    let is_likely = is_whole || is_time_order(points);
     if !is_likely || !(counts_up(points) || has_coordinates_behind(bytes, layout)) {
         return Ok(());
     }
@@ -96,24 +139,6 @@ fn counts_up(points: &[[f64; 3]]) -> bool {
     breaks.take(MOST_BREAKS + 1).count() <= MOST_BREAKS.min(points.len() / NUMBERED_POINTS)
 }
 
-/// Returns whether numbers grow as a clock does: never less than before, and mostly by about the same.
-fn are_times(points: &[[f64; 3]]) -> bool {
-    let mut pairs = polled(points.windows(2));
-    if !pairs.all(|pair| pair[0][0] <= pair[1][0]) {
-        return false;
-    }
-    let steps = polled(points.windows(2)).map(|pair| pair[1][0] - pair[0][0]);
-    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
-    if 2 * steps.len() < points.len() {
-        return false;
-    }
-    let middle = steps.len() / 2;
-    let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let is_usual = |step: &&f64| (0.5 * usual..=1.5 * usual).contains(*step);
-    let regular = polled(&steps).filter(is_usual).count();
-    10 * regular >= 8 * steps.len()
-}
-
 #[cfg(test)]
 mod tests {
     use crate::mesh::{MeshLimits, Vertices, read};
@@ -160,6 +185,35 @@ mod tests {
                 ))
             );
         }
+    }
+
+    #[test]
+    fn many_lines_without_their_number_are_named() {
+        let text = rows(&|k| {
+            if k.is_multiple_of(3) {
+                String::new()
+            } else {
+                format!("{k} ")
+            }
+        });
+        let said = "line 1: it has 3 columns, but most lines have 4; it may lack the number that the others begin with";
+        assert_eq!(open(&text), Err(said.to_owned()));
+        let text = rows(&|k| {
+            if k % 3 == 1 {
+                format!("{k} ")
+            } else {
+                String::new()
+            }
+        });
+        let said = "line 2: it has 4 columns, but most lines have 3; it may begin with a number that the others lack";
+        assert_eq!(open(&text), Err(said.to_owned()));
+        // A colour that only some points have.
+        let row = |k: usize| {
+            let [x, y, z] = position(k);
+            format!("{x} {y} {z}{}\n", [" 7", ""][k % 2])
+        };
+        let text: String = (0..60).map(row).collect();
+        assert_eq!(open(&text), Ok((0..60).map(position).collect()));
     }
 
     #[test]

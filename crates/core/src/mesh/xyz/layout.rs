@@ -56,6 +56,8 @@ pub(super) struct PointLayout {
     grouped: Option<u8>,
     /// Number of columns of most lines.
     pub(super) width: usize,
+    /// Least and largest number of columns of lines that may be points.
+    widths: [usize; 2],
     /// Whether a title names the columns.
     is_titled: bool,
     /// Whether a column may precede the coordinates.
@@ -87,6 +89,7 @@ impl PointLayout {
             tabs: None,
             grouped: None,
             width: 0,
+            widths: [0; 2],
             is_titled: false,
             may_be_numbered: false,
             fast_parser: FastParser::None,
@@ -112,6 +115,8 @@ impl PointLayout {
         layout.tabs = tab_columns(&sample, named);
         let widths: Vec<usize> = sample.iter().map(|line| layout.width_of(line)).collect();
         layout.width = most_frequent(&widths);
+        let of_points = || widths.iter().copied().filter(|width| *width >= 3);
+        layout.widths = [of_points().min(), of_points().max()].map(Option::unwrap_or_default);
         if named.is_none() {
             height_grid::check_width(first_point, layout.width)?;
         }
@@ -177,17 +182,35 @@ impl PointLayout {
         self.may_be_numbered.then_some(layout)
     }
 
-    /// Returns the layout of a file whose first two columns are the row and the column of a point. `None` if there are too
-    /// few columns, or if a title names them.
-    pub(super) fn gridded(self) -> Option<Self> {
-        let layout = self.with_columns([2, 3, 4]);
-        (self.width > 4 && !self.is_titled).then_some(layout)
+    /// Returns the layout of a file in which some whole numbers, such as the row and the column of a point, stand where this
+    /// layout has x. `None` if there are too few columns, or if a title names them.
+    pub(super) fn behind(self, numbers: usize) -> Option<Self> {
+        let x = self.columns[0] + numbers;
+        let layout = self.with_columns([x, x + 1, x + 2]);
+        (self.width > x + 2 && !self.is_titled).then_some(layout)
+    }
+
+    /// Returns the columns of x, y and z.
+    pub(super) const fn columns(&self) -> [usize; 3] {
+        self.columns
+    }
+
+    /// Returns both numbers of columns if some lines have one more than others and no title names them.
+    pub(super) fn uneven_widths(&self) -> Option<[usize; 2]> {
+        let [narrow, wide] = self.widths;
+        (narrow + 1 == wide && !self.is_titled).then_some(self.widths)
+    }
+
+    /// Returns the number that a row begins with.
+    pub(super) fn first_number(&self, row: &[u8]) -> Option<f64> {
+        self.cells(row).next().and_then(number_with_comma)
     }
 
     /// Returns the layout of normals that follow the position, if there are enough columns.
     pub(super) fn of_normals(self) -> Option<Self> {
-        let layout = self.with_columns([3, 4, 5]);
-        (self.width > 5).then_some(layout)
+        let first = self.columns[0] + 3;
+        let layout = self.with_columns([first, first + 1, first + 2]);
+        (self.width > first + 2).then_some(layout)
     }
 
     /// Returns the rows from the first point on, with the numbers of their lines.

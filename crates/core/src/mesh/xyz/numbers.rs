@@ -1,4 +1,5 @@
-//! Columns before the coordinates of points without a title: the numbers of points, or a row and a column of each.
+//! Columns before the coordinates of points without a title: the numbers of points and scans, or a row and a column of each
+//! point.
 
 use super::layout::PointLayout;
 use crate::domain::cancel::polled;
@@ -31,8 +32,8 @@ pub(super) fn is_whole(points: &[[f64; 3]], axis: usize) -> bool {
     polled(points).all(|point| point[axis].fract() == 0.0)
 }
 
-/// Refuses points that may have a row and a column before their coordinates: the first two columns are whole, and the three
-/// after them are not and have no normal.
+/// Refuses points that may have a row and a column, and perhaps the number of a scan or point, before their coordinates: the
+/// first columns are whole, and the three after them are not and have no normal.
 ///
 /// # Errors
 /// Returns an error that names the first point.
@@ -41,25 +42,43 @@ pub(super) fn check_grid(
     layout: &PointLayout,
     points: &[[f64; 3]],
 ) -> Result<(), MeshError> {
-    let Some(gridded) = layout.gridded() else {
-        return Ok(());
-    };
     if points.len() < NUMBERED_POINTS || !is_whole(points, 0) || !is_whole(points, 1) {
         return Ok(());
     }
+    let has_three = is_whole(points, 2);
+    if has_three && !(counts(points, 1) || counts(points, 2)) {
+        return Ok(());
+    }
+    let Some(gridded) = layout.behind(if has_three { 3 } else { 2 }) else {
+        return Ok(());
+    };
     let found = first_positions(bytes, &gridded);
     if found.len() < NUMBERED_POINTS || (0..3).any(|axis| is_whole(&found, axis)) {
         return Ok(());
     }
-    if has_normals(bytes, layout) {
+    let is_colour = |position: &[f64; 3]| position.iter().all(|value| (0.0..=1.0).contains(value));
+    if has_normals(bytes, layout) || (has_three && found.iter().all(is_colour)) {
         return Ok(());
     }
-    let reason = "its first two numbers may be a row and a column, or x and y; name the columns in a line before the points, such \
-                  as `row col x y z`";
+    let is_numbered = layout.columns()[0] > 0;
+    let reason = if has_three || is_numbered {
+        "its first three numbers may be those of a scan or point, a row and a column; name the columns in a line before the \
+         points, such as `scan row col x y z`"
+    } else {
+        "its first two numbers may be a row and a column, or x and y; name the columns in a line before the points, such as \
+         `row col x y z`"
+    };
     Err(MeshError::Line {
         line: layout.first_point,
         reason: reason.into(),
     })
+}
+
+/// Returns whether a coordinate mostly changes by one from point to point, as the row or the column does.
+fn counts(points: &[[f64; 3]], axis: usize) -> bool {
+    let pairs = polled(points.windows(2));
+    let steps = pairs.filter(|pair| (pair[1][axis] - pair[0][axis]).abs() == 1.0);
+    2 * steps.count() >= points.len()
 }
 
 /// Returns whether normals follow the positions.

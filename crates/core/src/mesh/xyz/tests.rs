@@ -390,6 +390,21 @@ fn a_row_and_a_column_before_coordinates_are_refused_unless_they_are_named() {
     }
     let named = open(&format!("row col x y z\n{}", rows(""))).expect("reads");
     assert_eq!(named.vertices.at(5), [1.25, 1.5, 1.5]);
+    // The number of a scan or a point precedes both.
+    let numbers: [fn(usize) -> usize; 3] = [|_| 1, |k| 1 + k / 6, |k| k];
+    for number in numbers {
+        let lines = rows("");
+        let numbered = lines.lines().enumerate();
+        let numbered = numbered.map(|(k, line)| format!("{} {line}\n", number(k)));
+        let numbered: String = numbered.collect();
+        assert_eq!(
+            refused(&numbered),
+            "line 1: its first three numbers may be those of a scan or point, a row and a column; name the columns in a line before \
+             the points, such as `scan row col x y z`"
+        );
+        let named = open(&format!("scan row col x y z\n{numbered}")).expect("reads");
+        assert_eq!(named.vertices.at(5), [1.25, 1.5, 1.5]);
+    }
     // Heights on a grid with normals or colours.
     for more in ["0.48 0.64 0.6", "255 0 0"] {
         let row = |k: usize| format!("{} {} 1.5 {more}\n", k / 4, k % 4);
