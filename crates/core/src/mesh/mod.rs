@@ -77,6 +77,12 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
     };
     let whole = |mesh| checked(mesh, 0);
     let format = DetectedFormat::of(bytes, name)?;
+    let bytes = match format {
+        DetectedFormat::Obj | DetectedFormat::StlAscii | DetectedFormat::Xyz => {
+            text::without_end_mark(bytes)
+        }
+        DetectedFormat::Ply | DetectedFormat::StlBinary => bytes,
+    };
     let (mesh, check, incomplete_faces) = match format {
         DetectedFormat::Obj => obj::read(bytes, limits).map(|(mesh, faces)| checked(mesh, faces)),
         DetectedFormat::Ply => ply::read(bytes, limits),

@@ -37,6 +37,21 @@ pub(super) fn raw_lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
     (1..).zip(lines)
 }
 
+/// The byte that ended text files in CP/M and DOS.
+const END_MARK: u8 = 0x1a;
+
+/// Returns a text without the byte that ends text files in DOS, and without white space behind it.
+pub(super) fn without_end_mark(bytes: &[u8]) -> &[u8] {
+    let mut text = bytes.trim_ascii_end();
+    if text.last() != Some(&END_MARK) {
+        return bytes;
+    }
+    while let [before @ .., END_MARK] = text {
+        text = before;
+    }
+    text
+}
+
 /// Returns whether more of the first lines end in CR than in LF or CRLF, as in files of classic Mac OS.
 pub(super) fn is_classic_mac(bytes: &[u8]) -> bool {
     let mut head = &bytes[..bytes.len().min(HEAD_BYTES)];

@@ -16,6 +16,8 @@ mod time_order;
 mod title;
 
 use super::{Mesh, MeshError, MeshLimits, text};
+use crate::domain::cancel::polled;
+use crate::domain::named_separator;
 use first_column::{check_first_column, check_lacking_numbers, is_one_number};
 use layout::PointLayout;
 use numbers::{are_numbers, check_grid};
@@ -24,13 +26,17 @@ pub(super) use title::{is_comment, is_data_or_title};
 
 /// Bytes of the shortest line: three digits, two spaces, a line end.
 const SHORTEST_LINE: usize = 6;
+/// Lines at the beginning of which one may name the separator of cells.
+const TITLE_LINES: usize = 8;
 
 /// Reads the positions and ignores further columns such as normals and colours. Numbers may be separated by white
-/// space, commas or semicolons, and may have decimal commas. Lines before the first point may be comments, the number of
-/// points or the names of the columns. A first column with numbers of points is ignored. An empty cell is a missing
-/// coordinate. The headers of PTX scans are applied.
+/// space, commas, semicolons or what a line such as `sep=|` names, and may have decimal commas. Lines before the first point
+/// may be comments, the number of points or the names of the columns. A first column with numbers of points is ignored. An
+/// empty cell is a missing coordinate. The headers of PTX scans are applied.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     text::check_lines(bytes)?;
+    let separated = odd_separator(bytes).map(|odd| with_semicolons(bytes, odd));
+    let bytes = separated.as_deref().unwrap_or(bytes);
     let found = match ptx::points(bytes, limits) {
         Some(points) => points?,
         None => plain_or_quoted_points(bytes, limits)?,
@@ -39,6 +45,20 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
         vertices: found.into(),
         ..Mesh::default()
     })
+}
+
+/// Returns the separator that a line at the beginning of a file names, if it is none of the usual ones.
+fn odd_separator(bytes: &[u8]) -> Option<u8> {
+    let mut lines = text::lines(bytes).take(TITLE_LINES);
+    let named = lines.find_map(|(_, line)| named_separator(line))?;
+    let is_odd = named.is_ascii_punctuation() && !b",;.+-'\"#%/=".contains(&named);
+    is_odd.then_some(named)
+}
+
+/// Returns a text with semicolons in place of another separator.
+fn with_semicolons(bytes: &[u8], separator: u8) -> Vec<u8> {
+    let usual = |byte: &u8| if *byte == separator { b';' } else { *byte };
+    polled(bytes).map(usual).collect()
 }
 
 /// Reads points, also with cells in quotation marks. Of two errors, returns that of the later line, because the way of reading
@@ -93,11 +113,22 @@ fn positions(
     limits: &MeshLimits,
 ) -> Result<Vec<[f64; 3]>, MeshError> {
     let mut points = Vec::with_capacity((bytes.len() / SHORTEST_LINE).min(1 << 16));
+    let mut scan_end = None;
     for (line, row) in layout.rows(bytes) {
-        let point = layout.position(row);
-        let point = point.map_err(|reason| MeshError::Line { line, reason })?;
-        limits.check_vertices(points.len() as u64 + 1)?;
-        points.push(point);
+        match layout.position(row) {
+            Ok(point) => {
+                limits.check_vertices(points.len() as u64 + 1)?;
+                points.push(point);
+            }
+            Err(reason) => {
+                // The next scan of a PTS file begins with its count where the one before it ends.
+                let have = points.len() as u64;
+                let end = scan_end.or_else(|| title::stated_count(bytes, layout.first_point));
+                let count = title::count_of(row).filter(|_| end == Some(have));
+                let count = count.ok_or(MeshError::Line { line, reason })?;
+                scan_end = Some(have.saturating_add(count));
+            }
+        }
     }
     Ok(points)
 }
@@ -106,6 +137,8 @@ fn positions(
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SampledPoints {
     layout: PointLayout,
+    /// The separator of cells, if it is none of the usual ones.
+    odd_separator: Option<u8>,
     /// Bytes at the beginning of the file that have no points, although their lines look like some.
     pub(super) header_bytes: u64,
 }
@@ -118,6 +151,9 @@ impl SampledPoints {
     pub(super) fn of(head: &[u8]) -> Result<Self, MeshError> {
         let header = ptx::header_bytes(head).unwrap_or_default();
         let head = &head[header..];
+        let odd_separator = odd_separator(head);
+        let separated = odd_separator.map(|odd| with_semicolons(head, odd));
+        let head = separated.as_deref().unwrap_or(head);
         let layout = PointLayout::of(head)?;
         let numbered = layout.numbered().and_then(|_| {
             let rows = layout.rows(head);
@@ -132,13 +168,15 @@ impl SampledPoints {
         });
         Ok(Self {
             layout: numbered.unwrap_or(layout),
+            odd_separator,
             header_bytes: header as u64,
         })
     }
 
     /// Returns the position in a line. `None` if it has none, such as a title.
     pub(super) fn position(&self, raw: &[u8]) -> Option<[f64; 3]> {
-        let row = self.layout.row(raw)?;
+        let separated = self.odd_separator.map(|odd| with_semicolons(raw, odd));
+        let row = self.layout.row(separated.as_deref().unwrap_or(raw))?;
         self.layout.position(row).ok()
     }
 }

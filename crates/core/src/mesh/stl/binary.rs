@@ -75,8 +75,8 @@ pub(crate) fn truncated(have: u64, count: u32) -> MeshError {
     }
 }
 
-/// Reads a binary STL. Ignores normals, attributes, text after the last triangle, and other trailing bytes that are too few
-/// for a triangle.
+/// Reads a binary STL. Ignores normals, attributes, text or NUL after the last triangle, and other trailing bytes that are
+/// too few for a triangle.
 pub(crate) fn read_binary(
     bytes: &[u8],
     limits: &MeshLimits,
@@ -110,11 +110,18 @@ pub(crate) fn read_binary(
     facets.into_mesh()
 }
 
-/// Returns whether the bytes after the facets are text. The floats of a facet never are.
+/// Returns whether the bytes after the facets are text, which may have NUL, or are all NUL. The floats of a facet never are
+/// text.
 fn is_text_after(body: &[u8], count: u32) -> bool {
-    let is_text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
     let after = body.get(FACET * count as usize..).unwrap_or_default();
-    count > 0 && !after.is_empty() && polled(after).all(is_text)
+    let zeros = polled(after).filter(|byte| **byte == 0).count();
+    let has_text = 2 * zeros < after.len();
+    let mut lines = polled(after.split(|byte| matches!(byte, 0 | b'\n')));
+    let is_text = |line: &[u8]| {
+        let is_usual = |c: char| !c.is_control() || c.is_ascii_whitespace();
+        std::str::from_utf8(line).is_ok_and(|line| line.chars().all(is_usual))
+    };
+    count > 0 && !after.is_empty() && (zeros == after.len() || (has_text && lines.all(is_text)))
 }
 
 /// Returns the facets of a body in which the last two bytes of each are the length of attributes after it. Returns `None`

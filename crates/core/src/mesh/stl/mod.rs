@@ -111,6 +111,26 @@ mod tests {
     }
 
     #[test]
+    fn text_of_any_script_and_zeros_after_the_last_triangle_are_ignored() {
+        let usual = open(&odd_facets(20, &[])).expect("reads");
+        for tail in [
+            "mộc bản, 經版\r\n".repeat(20).as_bytes(),
+            &"quét".repeat(10).as_bytes()[..50],
+            &b"made by x\0\0\0".repeat(25),
+            &[0; 1000],
+            &[0; 70],
+        ] {
+            let bytes = [&odd_facets(20, &[])[..], tail].concat();
+            assert_eq!(open(&bytes).as_ref(), Ok(&usual), "{tail:?}");
+        }
+        // Facets of small whole numbers are no text, although their bytes are letters and zeros.
+        let corners = [[2.0, 3.0, 8.0], [3.0, 2.0, 8.0], [2.0, 2.0, 2.0]].repeat(24);
+        let mut more = binary(b"", &corners);
+        more[80] = 20;
+        assert!(matches!(open(&more), Err(MeshError::Uncounted { .. })));
+    }
+
+    #[test]
     fn long_triangles_that_are_cut_off_are_truncated() {
         let bytes = odd_facets(20, &[7; 4]);
         let said = |bytes: &[u8]| open(bytes).expect_err("refused").to_string();

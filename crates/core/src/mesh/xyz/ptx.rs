@@ -1,6 +1,6 @@
 //! Reader of PTX: scans on a grid, each with a header that moves its points to a common frame.
 
-use super::title::is_count;
+use super::title::count_of;
 use crate::mesh::text;
 use crate::mesh::{MeshError, MeshLimits};
 
@@ -29,7 +29,7 @@ impl PtxHeader {
             return None;
         }
         Some(Self {
-            points: count(columns)?.checked_mul(count(rows)?)?,
+            points: count_of(columns)?.checked_mul(count_of(rows)?)?,
             matrix,
         })
     }
@@ -45,10 +45,29 @@ impl PtxHeader {
     }
 }
 
-/// Returns the number that is alone in a line.
-fn count(line: &[u8]) -> Option<u64> {
-    let is_number = !line.is_empty() && is_count(line);
-    is_number.then(|| text::parse(line)).flatten()
+/// Returns the error of a scan that ends early.
+fn truncated(what: &str, have: u64, want: u64) -> MeshError {
+    MeshError::Truncated {
+        format: "PTX scan",
+        what: what.into(),
+        have,
+        want,
+    }
+}
+
+/// Returns the number of whole lines if a header ends with or within them; `None` if they begin no header.
+fn cut_header_lines(lines: &[&[u8]]) -> Option<u64> {
+    let fits = |(nth, line): (usize, &&[u8])| match nth {
+        0 | 1 => count_of(line).is_some(),
+        2..=5 => numbers::<3>(line).is_some(),
+        _ => numbers::<4>(line).is_some(),
+    };
+    let whole = lines
+        .iter()
+        .enumerate()
+        .take_while(|line| fits(*line))
+        .count();
+    (whole > 0 && whole + 1 >= lines.len()).then_some(whole as u64)
 }
 
 /// Returns the numbers of a line that has `N` of them and nothing else.
@@ -93,28 +112,27 @@ fn all_points(bytes: &[u8], limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshEr
     while let Some((line, _)) = lines.peek().copied() {
         let header = lines.by_ref().take(HEADER_LINES).map(|(_, line)| line);
         let header: Vec<&[u8]> = header.collect();
-        let header = PtxHeader::of(&header).ok_or_else(|| MeshError::Line {
-            line,
-            reason: "no header of a PTX scan begins here; the scan before it may have more points than its header says"
-                .into(),
+        let header = PtxHeader::of(&header).ok_or_else(|| {
+            let is_end = lines.peek().is_none();
+            match cut_header_lines(&header).filter(|_| is_end) {
+                Some(have) => truncated("lines of its header", have, HEADER_LINES as u64),
+                None => MeshError::Line {
+                    line,
+                    reason: "no header of a PTX scan begins here; the scan before it may have more points than its header says"
+                        .into(),
+                },
+            }
         })?;
         limits.check_vertices(header.points.saturating_add(points.len() as u64))?;
         for have in 0..header.points {
-            let truncated = || MeshError::Truncated {
-                format: "PTX scan",
-                what: "vertices".into(),
-                have,
-                want: header.points,
-            };
-            let (line, content) = lines.next().ok_or_else(truncated)?;
+            let cut = || truncated("vertices", have, header.points);
+            let (line, content) = lines.next().ok_or_else(cut)?;
             let position = text::position(text::words(content)).map_err(|reason| {
-                // Two lines of one number each begin the header of the next scan.
-                let next = lines.peek().map(|(_, next)| *next);
-                let is_header = [Some(content), next]
-                    .iter()
-                    .all(|of| of.and_then(count).is_some());
-                if is_header {
-                    truncated()
+                // Lines of one number each begin the header of the next scan, perhaps behind the rest of a line.
+                let next = lines.peek().map(|(_, next)| *next).unwrap_or_default();
+                let is_second = count_of(content).is_some() && numbers::<3>(next).is_some();
+                if count_of(next).is_some() || is_second {
+                    cut()
                 } else {
                     MeshError::Line { line, reason }
                 }
@@ -166,10 +184,25 @@ mod tests {
         );
         let followed = open(&format!("{cut}{text}"));
         assert_eq!(followed.expect_err("cut"), open(cut).expect_err("cut"));
+        let within_line = open(&format!("{cut}0.25 0.\n{text}"));
+        assert_eq!(within_line.expect_err("cut"), open(cut).expect_err("cut"));
+        let joined = open(&format!("{cut}0.25 0.{text}"));
+        assert_eq!(joined.expect_err("cut"), open(cut).expect_err("cut"));
         let more = open(&format!("{text}1 2 3 0.5\n")).expect_err("more");
         assert!(
             more.starts_with("line 15: no header of a PTX scan begins here; "),
             "{more}"
         );
+        let header = "2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n0 0 0 1\n";
+        let ends = header.match_indices('\n').map(|(at, _)| at + 1);
+        for (lines, end) in (1..10).zip(ends) {
+            for more in ["", "0 0.5 "] {
+                let said = open(&format!("{text}{}{more}", &header[..end])).expect_err("cut");
+                let wanted = format!(
+                    "the PTX scan is truncated: it holds {lines} of 10 lines of its header"
+                );
+                assert_eq!(said, wanted, "{more:?}");
+            }
+        }
     }
 }

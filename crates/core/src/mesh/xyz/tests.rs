@@ -40,6 +40,25 @@ fn titles_counts_comments_and_further_columns_are_ignored() {
 }
 
 #[test]
+fn a_count_may_precede_each_scan_and_an_end_mark_may_follow() {
+    for text in [
+        "1\n1 2.5 3\n1\n4 5 6.25\n",
+        "1\n1 2.5 3 -20 255 0 0\n1\n4 5 6.25 -20 255 0 0\n",
+        "1\n1;2,5;3\n1\n4;5;6,25\n",
+        "1\n1\t2.5\t3\n1\n4\t5\t6.25\n",
+        "1 2.5 3\n4 5 6.25\n\x1a",
+        "1 2.5 3\r\n4 5 6.25\r\n\x1a\r\n",
+        "1 2.5 3\n4 5 6.25\x1a\x1a",
+    ] {
+        assert_points(text);
+    }
+    for text in ["2\n1 2.5 3\n1\n4 5 6.25\n", "1 2.5 3\n1\n4 5 6.25\n"] {
+        let said = refused(text);
+        assert!(said.ends_with(": 1 of 3 coordinates"), "{said}");
+    }
+}
+
+#[test]
 fn columns_are_those_that_the_title_names() {
     for text in [
         "z,y,x\n3,2.5,1\n6.25,5,4\n",
@@ -292,6 +311,10 @@ fn a_named_separator_and_quoted_numbers_are_read() {
         "sep=,\n1,\"2,5\",3\n4,5,\"6,25\"\n",
         "name,x,y,z\n\"a, b\",1,2.5,3\n\"c\",4,5,6.25\n",
         "\"1,0\";\"2,5\";\"3,0\"\n\"4,0\";\"5,0\";\"6,25\"\n",
+        "sep=|\n1|2.5|3\n4|5|6.25\n",
+        "sep=|\nX|Y|Z\n1|2,5|3\n4|5|6,25\n",
+        "sep=|\n\"1,0\"|\"2,5\"|\"3\"\n\"4\"|\"5\"|\"6,25\"\n",
+        "\nsep=:\nsep=:\n1:2.5:3\n4:5:6.25\n",
     ] {
         assert_points(text);
     }

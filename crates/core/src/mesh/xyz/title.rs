@@ -94,8 +94,22 @@ pub(in crate::mesh) fn is_comment(line: &[u8]) -> bool {
 }
 
 /// Returns whether a line is a number of points.
-pub(super) fn is_count(line: &[u8]) -> bool {
+fn is_count(line: &[u8]) -> bool {
     line.iter().all(u8::is_ascii_digit)
+}
+
+/// Returns the number of points that a line has alone.
+pub(super) fn count_of(line: &[u8]) -> Option<u64> {
+    let line = line.trim_ascii();
+    (!line.is_empty() && is_count(line))
+        .then(|| text::parse(line))
+        .flatten()
+}
+
+/// Returns the number of points that a line before the first one states.
+pub(super) fn stated_count(bytes: &[u8], first_point: u64) -> Option<u64> {
+    let mut before = text::lines(bytes).take_while(|(line, _)| *line < first_point);
+    before.find_map(|(_, line)| count_of(line))
 }
 
 /// Returns whether a line before the points is a count of them, units, a separator or a quoted text, which has no numbers if
