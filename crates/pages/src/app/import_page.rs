@@ -253,12 +253,13 @@ pub(super) fn counts_text(visit: &Visit, counts: &FileCounts) -> String {
     format!("{}{more}", parts.join(", "))
 }
 
-/// Returns links to the folders in which files are chosen.
+/// Returns links to the folders in which files are chosen. They keep all other choices of the page.
 pub(super) fn root_links(visit: &Visit, roots: &PickerRoots) -> Markup {
+    let at = |root: &Path| visit.query.with("path", &root.to_string_lossy()).text();
     html! {
         p.muted.row { (visit.t("Start at", "Bắt đầu từ")) ":"
             @for root in roots.all() {
-                " " a href={ (visit.here) "?path=" (encoded(&root.to_string_lossy())) } { (one_line(&root.to_string_lossy())) }
+                " " a href={ (visit.here) (at(root)) } { (one_line(&root.to_string_lossy())) }
             }
         }
     }
@@ -389,6 +390,36 @@ async fn store(
             let summary = import_pairs(import, location, &()).await?.summary;
             let listed = summary.added + summary.unchanged + summary.changed.len() as u64;
             Ok(listed > 0 && summary.still_retired == listed)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PageQuery, PickerRoots, root_links};
+    use crate::app::address::encoded;
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+
+    #[test]
+    fn links_to_other_folders_keep_what_was_chosen() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let root = dir.path().canonicalize().expect("a path");
+        let roots = PickerRoots::new(dir.path());
+        for choices in [
+            "project=b%2004&mend=ch%E1%BB%AF%201&path=%2Fa",
+            "backup=%2Fb.sqlite&inputs=%2Fc&path=%2Fa",
+        ] {
+            let query = PageQuery::parse(choices);
+            let expected = query.with("path", &root.to_string_lossy());
+            let visit = Visit {
+                query,
+                ..Visit::in_language(Language::English)
+            };
+            let links = root_links(&visit, &roots).into_string();
+            let href = format!("href=\"./{}\"", expected.text().replace('&', "&amp;"));
+            assert!(links.contains(&href), "{href}: {links}");
+            assert!(expected.text().contains(&encoded(&root.to_string_lossy())));
         }
     }
 }
