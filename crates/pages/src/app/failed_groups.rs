@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::address::encoded;
 use super::components::{action_form, grouped, stored_message};
-use super::remedies::{pair_remedy, unit_link};
+use super::remedies::{import_address, pair_remedy, unit_link};
 use super::scan_correction::ScanQuestion;
 use super::visit::Visit;
 use mocban_catalog::{Catalog, PairFilter, PairOrder, PairResults, Result};
@@ -130,7 +130,7 @@ fn example(visit: &Visit, key: &str, class: FailureClass, pair: &PairResults) ->
             @if is_of_file && !is_cut(pair) {
                 p.row {
                     @if let Some(link) = unit_link(visit, "", pair) { (link) }
-                    a href={ (visit.root) "import?project=" (encoded(key)) "&mend=" (encoded(name)) } aria-label={ (replace) ": " (one_line(name)) } { (replace) }
+                    a href=(import_address(visit, key, Some(name))) aria-label={ (replace) ": " (one_line(name)) } { (replace) }
                 }
             }
         }

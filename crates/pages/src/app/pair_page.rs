@@ -12,7 +12,7 @@ use super::failure::AppResult;
 use super::pair_history::{history, verdict_line};
 use super::pair_numbers::numbers;
 use super::paper_method::{PAPER, is_comparable};
-use super::remedies::{failed_part, pair_remedy, unit_link};
+use super::remedies::{failed_part, import_address, pair_remedy, unit_link};
 use super::retired_pairs::retired_band;
 use super::scan_correction::ScanQuestion;
 use super::sentence::Sentence;
@@ -331,7 +331,7 @@ fn pair_actions(visit: &Visit, key: &str, detail: &PairDetail) -> Markup {
     html! {
         section.actions {
             @if failed {
-                a.button #mend href={ (visit.root) "import?project=" (encoded(key)) "&mend=" (encoded(name)) } {
+                a.button #mend href=(import_address(visit, key, Some(name))) {
                     (visit.t("Replace the scan or the print", "Thay bản quét hoặc bản in"))
                 }
             }

@@ -84,14 +84,26 @@ pub(super) fn pair_remedy(
     let missing = messages.filter(|stored| stored.failure.message.ends_with(NOT_THERE));
     let missing = missing.count();
     let all_missing = missing > 0 && missing == examples.len();
+    // Pairs that were cut from a block are mended with it.
+    let mended = examples.iter().find(|pair| pair.attributes.prior.is_none());
+    let mended = mended.map(|pair| pair.attributes.name.as_str());
     remedy(
         visit,
-        key,
+        &import_address(visit, key, mended),
         origin,
         class,
         (!all_missing).then(|| visit.remedy(class)),
         missing > 0,
     )
+}
+
+/// Returns the address of the import into a project, which says how a file of a pair is replaced if one is given.
+pub(super) fn import_address(visit: &Visit, key: &str, mended: Option<&str>) -> String {
+    let address = format!("{}import?project={}", visit.root, encoded(key));
+    match mended {
+        Some(pair) => format!("{address}&mend={}", encoded(pair)),
+        None => address,
+    }
 }
 
 /// Returns the link to the page that sets the unit of a pair's scan, if the pair failed because of it. A pair that was cut
@@ -125,12 +137,14 @@ pub(super) fn block_remedy(
     };
     let is_missing = message.ends_with(NOT_THERE);
     let general = (!is_missing).then(|| visit.block_remedy(stage, class));
-    remedy(visit, key, origin, class, general, is_missing)
+    let import = import_address(visit, key, None);
+    remedy(visit, &import, origin, class, general, is_missing)
 }
 
+/// Returns what helps, with a link to the import at an address if it helps.
 fn remedy(
     visit: &Visit,
-    key: &str,
+    import: &str,
     origin: FileOrigin,
     class: FailureClass,
     general: Option<&str>,
@@ -144,7 +158,7 @@ fn remedy(
         @if is_missing { p { (origin.missing(visit)) } }
         @if let Some(correction) = correction { p { (correction) } }
         @if has_import {
-            p.row { a href={ (visit.root) "import?project=" (encoded(key)) } { (visit.t("Import", "Nhập dữ liệu")) } }
+            p.row { a href=(import) { (visit.t("Import", "Nhập dữ liệu")) } }
         }
     }
 }
@@ -170,11 +184,12 @@ pub(super) fn failed_part(
 
 #[cfg(test)]
 mod tests {
-    use super::{FileOrigin, failed_part, remedy};
+    use super::{FileOrigin, failed_part, import_address, pair_remedy, remedy};
     use crate::app::visit::Visit;
     use crate::review::Language;
     use mocban_catalog::PairAttributes;
     use mocban_core::domain::{FailureClass, PairName, Stage};
+    use mocban_results::test_fixtures as fixtures;
     use serde_json::Map;
 
     fn attributes(character: Option<&str>) -> PairAttributes {
@@ -205,9 +220,10 @@ mod tests {
             (Language::Vietnamese, "danh sách"),
         ] {
             let visit = Visit::in_language(language);
+            let import = import_address(&visit, "a b", None);
             for (class, is_missing) in cases {
                 let [listed, unknown] = origins.map(|origin| {
-                    remedy(&visit, "a b", origin, class, None, is_missing).into_string()
+                    remedy(&visit, &import, origin, class, None, is_missing).into_string()
                 });
                 assert!(listed.contains(word), "{listed}");
                 assert!(!unknown.contains(word), "{unknown}");
@@ -215,6 +231,19 @@ mod tests {
                     assert!(shown.contains("import?project=a%20b"), "{shown}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn an_import_for_failed_pairs_says_how_a_file_is_replaced() {
+        let message = "1.png: the image is empty";
+        let failed = fixtures::failed("chữ 1", FailureClass::BadInput, message);
+        let visit = Visit::in_language(Language::English);
+        for examples in [&[&failed][..], &[&failed, &failed]] {
+            let shown = pair_remedy(&visit, "a b", FailureClass::BadInput, examples);
+            let shown = shown.into_string();
+            let link = "href=\"./import?project=a%20b&amp;mend=ch%E1%BB%AF%201\"";
+            assert!(shown.contains(link), "{shown}");
         }
     }
 
