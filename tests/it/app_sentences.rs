@@ -138,6 +138,45 @@ fn an_address_without_a_page_is_explained_in_the_language_of_the_page() {
 }
 
 #[test]
+fn a_project_a_pair_or_a_block_that_is_not_there_is_named() {
+    let (dir, page) = with_project();
+    let paths = ["/p/q/", "/p/p/pair/nothere/", "/p/p/block/nothere/"];
+    for (language, said) in [
+        (
+            "en",
+            [
+                "The folder of the project q is not in",
+                "This project has no pair nothere.",
+                "This project has no block nothere.",
+            ],
+        ),
+        (
+            "vi",
+            [
+                "Thư mục của dự án q không có trong",
+                "Dự án này không có cặp nothere.",
+                "Dự án này không có ván nothere.",
+            ],
+        ),
+    ] {
+        for (path, part) in paths.into_iter().zip(said) {
+            let reply = page.get(&format!("{path}?language={language}"));
+            let shown = text(&reply);
+            assert_eq!(reply.status, 404, "{path}: {shown}");
+            assert!(shown.contains(part), "{path}: {shown}");
+        }
+    }
+    // The project is moved away while its page is open.
+    std::fs::rename(dir.path().join("p"), dir.path().join("moved")).expect("renamed");
+    let run = json!({"jobs": "", "which": "all"});
+    let reply = act(&page, "/p/p/actions/run", &run, |_| {});
+    let error = reply.json()["error"].to_string();
+    assert_eq!(reply.status, 404, "{error}");
+    let part = "Thư mục của dự án p không có trong";
+    assert!(error.contains(part), "{error}");
+}
+
+#[test]
 fn damage_is_mended_by_a_button() {
     let (dir, page) = with_project();
     let project = Project::open(&dir.path().join("p")).expect("a project");

@@ -14,6 +14,7 @@ use super::components::{
     NavSection, action_form, frame, grouped, metadata, scan_file, score, stored_message,
 };
 use super::failure::{AppFailure, AppResult};
+use super::missing_names::no_block;
 use super::pass_on::{in_chosen_language, pass_on, path_below};
 use super::projects::OpenProject;
 use super::read_only::refuse_read_only;
@@ -44,9 +45,9 @@ pub(super) async fn page(
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
     let name = block.parse::<BlockName>().ok();
-    let name = name.ok_or_else(AppFailure::not_found)?;
+    let name = name.ok_or_else(|| no_block(&block))?;
     let detail = open.catalog.block(&name).await?;
-    let detail = detail.ok_or_else(AppFailure::not_found)?;
+    let detail = detail.ok_or_else(|| no_block(&block))?;
     let characters = open.catalog.block_characters(&name).await?;
     let missing = details::missing_block_files(&open.project, &detail.state.attributes).await;
     let body = html! {
@@ -98,9 +99,9 @@ pub(super) async fn pages(
 /// Reads a block and returns its pages.
 async fn opened(state: &AppState, open: &Arc<OpenProject>, block: &str) -> AppResult<axum::Router> {
     let name = block.parse::<BlockName>().ok();
-    let name = name.ok_or_else(AppFailure::not_found)?;
+    let name = name.ok_or_else(|| no_block(block))?;
     if open.catalog.block(&name).await?.is_none() {
-        return Err(AppFailure::not_found());
+        return Err(no_block(block));
     }
     let open = Arc::clone(open);
     let location = open.location();

@@ -9,6 +9,7 @@ use maud::{Markup, html};
 use super::address::encoded;
 use super::components::{NavSection, action_form, frame, metadata, scan_file, stored_message};
 use super::failure::AppResult;
+use super::missing_names::no_pair;
 use super::pair_history::{history, verdict_line};
 use super::pair_numbers::numbers;
 use super::paper_method::{PAPER, is_comparable};
@@ -43,7 +44,7 @@ pub(super) async fn page(
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
     let Ok(name) = pair.parse::<PairName>() else {
-        return Err(super::failure::AppFailure::not_found());
+        return Err(no_pair(&pair));
     };
     if let Some(retired) = open.catalog.retired_pair(&name).await? {
         let neighbours = open.catalog.pair_neighbours(&name).await?;
@@ -61,9 +62,12 @@ pub(super) async fn page(
         let title = one_line(name.as_str());
         return Ok(frame(&visit, &title, Some(&key), NavSection::Pairs, &body));
     }
+    if open.catalog.pair(&name).await?.is_none() {
+        return Err(no_pair(&pair));
+    }
     let found = details::read(&pair, &open.catalog, &open.location()).await?;
     let Details::Pair(overview) = found else {
-        return Err(super::failure::AppFailure::not_found());
+        return Err(no_pair(&pair));
     };
     let name = overview.detail.results.attributes.name.clone();
     let neighbours = open.catalog.pair_neighbours(&name).await?;

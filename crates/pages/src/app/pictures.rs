@@ -9,6 +9,7 @@ use maud::html;
 
 use super::encoded_picture::{Encoded, JPEG, PICTURE_SIDE, jpeg};
 use super::failure::{AppFailure, AppResult};
+use super::missing_names::no_pair;
 use super::projects::OpenProject;
 use super::state::AppState;
 use mocban_catalog::PairResults;
@@ -109,9 +110,9 @@ pub(super) async fn scan(
 
 /// Reads a pair by its name in an address.
 pub(super) async fn results(open: &OpenProject, pair: &str) -> AppResult<PairResults> {
-    let name: PairName = pair.parse().map_err(|_invalid| AppFailure::not_found())?;
+    let name: PairName = pair.parse().map_err(|_invalid| no_pair(pair))?;
     let detail = open.catalog.pair(&name).await?;
-    Ok(detail.ok_or_else(AppFailure::not_found)?.results)
+    Ok(detail.ok_or_else(|| no_pair(pair))?.results)
 }
 
 /// Draws a picture. `None` if there is none, because a file cannot be read or the pair has no result yet.

@@ -50,9 +50,10 @@ fn catalog_file(dir: &Path) -> Option<platform::FileId> {
 }
 
 impl OpenProject {
-    /// Returns whether the project still has the catalog that was opened.
+    /// Returns whether the project is still there, with the catalog that was opened.
     pub(super) fn is_current(&self) -> bool {
-        catalog_file(&self.dir) == self.file
+        // A project whose catalog is on a server has no file of it.
+        catalog_file(&self.dir) == self.file && (self.file.is_some() || self.dir.is_dir())
     }
 
     /// Returns whether another one has the same catalog.

@@ -7,9 +7,10 @@ use std::sync::{Arc, Mutex};
 
 use super::chosen_sets::ChosenSets;
 use super::failed_runs::FailedRuns;
-use super::failure::{AppFailure, AppResult};
+use super::failure::AppResult;
 use super::invitations::Invitations;
 use super::looked_inputs::LookedInputs;
+use super::missing_names::no_project;
 use super::open_pages::OpenPages;
 use super::paper_method::PaperMethod;
 use super::plan_cache::PlanCache;
@@ -120,7 +121,7 @@ impl AppState {
         let mut found = blocking(move || find(&folder)).await?.into_iter();
         let Some(found) = found.find(|found| found.key == key) else {
             locked(&self.projects).remove(key);
-            return Err(AppFailure::not_found());
+            return Err(no_project(key, &self.options.folder));
         };
         self.open_found(found).await
     }
