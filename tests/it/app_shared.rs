@@ -122,12 +122,12 @@ fn a_project_on_a_read_only_disk_is_shown_and_says_why_nothing_changes() {
         (
             "/p/p/actions/retire",
             json!({"pair": "upright-0001"}),
-            "cannot be written to: check its rights",
+            "This project is read-only",
         ),
         (
             CHOSEN,
             chosen("retire", &["upright-0002"]),
-            "cannot be written to: check its rights",
+            "This project is read-only",
         ),
         (
             "/p/p/actions/setting",
@@ -171,11 +171,8 @@ fn a_review_of_a_read_only_catalog_is_refused_before_the_first_answer() {
     let start = json!({"reviewer": "lan", "metric": "density", "sample": "", "order": "random"});
     let reply = act(&page, "/p/p/actions/review", &start, |_| {});
     let said = text(&reply);
-    assert_eq!(reply.status, 503, "{said}");
-    assert!(
-        said.contains("cannot be written to: check its rights"),
-        "{said}"
-    );
+    assert_eq!(reply.status, 422, "{said}");
+    assert!(said.contains("This project is read-only"), "{said}");
     for (language, part) in [("en", "is read-only"), ("vi", "chỉ đọc được")] {
         let shown = html(&page, &format!("/p/p/review?language={language}"));
         assert!(shown.contains(part), "{shown}");

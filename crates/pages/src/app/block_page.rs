@@ -35,6 +35,8 @@ use mocban_project::{details, input_warnings};
 const SHOWN_CHARACTERS: usize = 1000;
 /// Path of the action that stores nothing, below the pages of a block.
 const TRY: &str = "correct/try";
+/// Pages on which a person changes the block, below its pages. Nobody draws there what cannot be stored.
+const EDITORS: [&str; 2] = ["correct", "boxes"];
 /// Most events of the history that are shown.
 const SHOWN_EVENTS: usize = 50;
 
@@ -79,7 +81,8 @@ pub(super) async fn pages(
         Err(plain) => return Ok(plain.into_response()),
     };
     let open = state.open(key).await?;
-    if request.method() == Method::POST && path_below(&request) != TRY {
+    let (is_change, below) = (request.method() == Method::POST, path_below(&request));
+    if EDITORS.contains(&below) || (is_change && below != TRY) {
         refuse_read_only(&state, Some(key)).await?;
     }
     // Only reviews have a third part.
@@ -136,7 +139,7 @@ fn state_part(visit: &Visit, key: &str, detail: &BlockDetail) -> Markup {
             div.notice.bad {
                 p { b { (visit.class(stored.failure.class)) } " (" (visit.block_stage(stored.stage)) "): " (stored_message(visit, &stored.failure.message)) }
                 (block_remedy(visit, key, &state.attributes, stored.stage, (stored.failure.class, stored.failure.message.as_str())))
-                @if stored.stage == BlockStage::Boxes {
+                @if stored.stage == BlockStage::Boxes && visit.read_only.is_none() {
                     p { a href="view/boxes" { (visit.t("Edit the boxes on the page", "Sửa khung chữ trên trang in")) } }
                 }
             }
@@ -160,7 +163,7 @@ fn ways(visit: &Visit, detail: &BlockDetail) -> Markup {
             @if has(BlockStage::Align) {
                 a.button href="view/" { (visit.t("Scan and page over each other", "Xem bản quét chồng lên trang in")) }
             }
-            @if has(BlockStage::Align) || is_refused {
+            @if visit.read_only.is_none() && (has(BlockStage::Align) || is_refused) {
                 a.button href="view/correct" { (visit.t("Align by places you choose", "Căn chỉnh theo các điểm tự chọn")) }
                 a.button href="view/boxes" { (visit.t("Edit boxes", "Sửa khung chữ")) }
             }

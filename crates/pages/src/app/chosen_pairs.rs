@@ -194,6 +194,10 @@ pub(super) async fn change(
     ActionBody(body): ActionBody<ChosenBody>,
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
+    // The choice for a review is stored in no project.
+    if !matches!(body.change, ChosenChange::Review) {
+        refuse_read_only(&state, Some(&key)).await?;
+    }
     let chosen = require_pairs(&open, &body.pairs).await?;
     let names: Vec<String> = chosen.iter().map(PairName::to_string).collect();
     let list = without_done(&PageQuery::parse(&body.list));
@@ -224,7 +228,6 @@ pub(super) async fn change(
 
 /// Computes the results of pairs again.
 async fn compute(state: &AppState, open: &OpenProject, names: Vec<String>) -> AppResult<()> {
-    refuse_read_only(state, Some(&open.key)).await?;
     refuse_during_run(open).await?;
     let args = ["--rerun", "all"].map(str::to_owned);
     child_run::start(state, &open.dir, &args, &names).await

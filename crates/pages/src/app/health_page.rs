@@ -18,6 +18,7 @@ use super::failure::AppResult;
 use super::home::free_space;
 use super::number_text::english_count;
 use super::projects::is_project;
+use super::read_only::refuse_read_only;
 use super::restore_page::restore_address;
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -118,8 +119,12 @@ pub(super) async fn start_check(
 ) -> AppResult<Json<Value>> {
     let open = state.open(&key).await?;
     let accept_missing = body.what == "lost";
+    let repair = accept_missing || body.what == "repair";
+    if repair {
+        refuse_read_only(&state, Some(&key)).await?;
+    }
     let options = CheckOptions {
-        repair: accept_missing || body.what == "repair",
+        repair,
         accept_missing,
         ..CheckOptions::default()
     };

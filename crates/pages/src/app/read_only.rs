@@ -1,8 +1,13 @@
 //! Places in which nothing can be stored, so that pages say it before anybody types.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use axum::extract::{FromRequestParts as _, RawPathParams, Request, State};
 use axum::http::StatusCode;
+use axum::http::request::Parts;
+use axum::middleware::Next;
+use axum::response::Response;
 
 use super::failure::{AppFailure, AppResult};
 use super::sentence::Sentence;
@@ -27,6 +32,26 @@ pub(super) async fn refuse_read_only(state: &AppState, project: Option<&str>) ->
         Some(place) => Err(AppFailure::refused(place.sentence())),
         None => Ok(()),
     }
+}
+
+/// Refuses the actions behind it in a project in which nothing can be stored.
+pub(super) async fn guard_writing(
+    State(state): State<Arc<AppState>>,
+    request: Request,
+    next: Next,
+) -> AppResult<Response> {
+    let (mut head, body) = request.into_parts();
+    let project = project_of(&mut head, &state).await;
+    refuse_read_only(&state, project.as_deref()).await?;
+    Ok(next.run(Request::from_parts(head, body)).await)
+}
+
+/// Returns the name of the project in the address of a request.
+pub(super) async fn project_of(head: &mut Parts, state: &Arc<AppState>) -> Option<String> {
+    let segments = RawPathParams::from_request_parts(head, state).await.ok()?;
+    let mut segments = segments.iter();
+    let project = segments.find(|(name, _)| *name == "project");
+    project.map(|(_, key)| key.to_owned())
 }
 
 /// Refuses to write an output to a folder of a project, which need not exist yet, if nothing can be stored there. A database of

@@ -6,6 +6,7 @@ use axum::routing::{any, get, post};
 use axum::{Router, middleware};
 
 use super::failure::AppFailure;
+use super::read_only::guard_writing;
 use super::state::{AppOptions, AppState};
 use super::{
     assets, backup_card, block_page, blocks_page, chosen_pairs, export_page, export_size,
@@ -18,10 +19,23 @@ use super::{
 /// Returns the routes of the app, for a server.
 pub fn app_pages(options: AppOptions) -> Router {
     let state = Arc::new(AppState::new(options));
+    let action = "/p/{project}/actions";
     let pair = "/p/{project}/pair/{pair}";
     let block = "/p/{project}/block/{block}";
     let review = "/p/{project}/review/{reviewer}/{choice}";
+    let guard = middleware::from_fn_with_state(Arc::clone(&state), guard_writing);
     Router::new()
+        .route(&format!("{action}/last-import"), post(last_import::change))
+        .route(&format!("{action}/setting"), post(settings_page::store))
+        .route(&format!("{action}/run"), post(run_actions::run))
+        .route(&format!("{action}/view"), post(view_bar::change))
+        .route(&format!("{action}/restore"), post(chosen_pairs::restore))
+        .route(&format!("{action}/retry"), post(run_actions::retry))
+        .route(&format!("{action}/retire"), post(run_actions::retire))
+        .route(&format!("{action}/correct"), post(scan_correction::correct))
+        .route(&format!("{action}/review"), post(review_page::start))
+        // Guards the actions above, which change a project. Others write files, or may change nothing: they look by themselves.
+        .route_layer(guard)
         .route("/", get(home::page))
         .route("/assets/{name}", get(assets::asset))
         .route("/p/{project}/", get(run_page::page))
@@ -56,10 +70,6 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route("/uploads/{upload}", get(upload_actions::progress))
         .route("/uploads/{upload}/{path}", post(upload_actions::receive))
         .route("/p/{project}/last-import", get(last_import::part))
-        .route(
-            "/p/{project}/actions/last-import",
-            post(last_import::change),
-        )
         .route("/actions/demo", post(run_actions::demo))
         .route("/p/{project}/report", get(report_page::page))
         .route("/p/{project}/report/numbers", get(report_page::numbers))
@@ -76,27 +86,16 @@ pub fn app_pages(options: AppOptions) -> Router {
             get(export_page::download),
         )
         .route("/p/{project}/settings", get(settings_page::page))
-        .route("/p/{project}/actions/setting", post(settings_page::store))
         .route("/p/{project}/health", get(health_page::page))
         .route("/p/{project}/actions/check", post(health_page::start_check))
         .route("/p/{project}/actions/backup", post(backup_card::start))
         .route("/p/{project}/backup.sqlite", get(backup_card::download))
         .route("/p/{project}/health/inputs", get(backup_card::size_part))
-        .route("/p/{project}/actions/run", post(run_actions::run))
         .route("/p/{project}/pairs/listed", get(chosen_pairs::listed))
         .route("/p/{project}/pairs/view/{name}", get(view_bar::view))
-        .route("/p/{project}/actions/view", post(view_bar::change))
         .route("/p/{project}/actions/chosen", post(chosen_pairs::change))
-        .route("/p/{project}/actions/restore", post(chosen_pairs::restore))
         .route("/p/{project}/actions/stop", post(run_actions::stop))
-        .route("/p/{project}/actions/retry", post(run_actions::retry))
-        .route("/p/{project}/actions/retire", post(run_actions::retire))
         .route("/p/{project}/correct", get(scan_correction::page))
-        .route(
-            "/p/{project}/actions/correct",
-            post(scan_correction::correct),
-        )
-        .route("/p/{project}/actions/review", post(review_page::start))
         .route(
             "/p/{project}/actions/invitation",
             post(invitation_cards::change),

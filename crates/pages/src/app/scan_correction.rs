@@ -17,7 +17,6 @@ use super::components::{NavSection, action_form, choice, frame, grouped, unit_na
 use super::failure::{AppFailure, AppResult};
 use super::pictures::results;
 use super::projects::OpenProject;
-use super::read_only::refuse_read_only;
 use super::run_actions::{refuse_during_run, runs};
 use super::sentence::Sentence;
 use super::state::AppState;
@@ -222,7 +221,6 @@ pub(super) async fn correct(
             "trong lúc đó đã có các cặp khác bị lỗi nên chưa thay đổi gì: hãy tải lại trang và xem các cặp đó",
         )));
     }
-    refuse_read_only(&state, Some(&key)).await?;
     refuse_during_run(&open).await?;
     let ids: Vec<String> = names.iter().map(PairName::to_string).collect();
     let location = open.location();

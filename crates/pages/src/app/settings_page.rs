@@ -13,7 +13,6 @@ use super::action_body::ActionBody;
 use super::address::PageQuery;
 use super::components::{NavSection, action_form, frame, grouped};
 use super::failure::{AppFailure, AppResult};
-use super::read_only::refuse_read_only;
 use super::sentence::Sentence;
 use super::setting_words::is_hidden;
 use super::state::AppState;
@@ -123,12 +122,12 @@ fn change_part(visit: &Visit, change: &SettingChange) -> Markup {
                 p { code { (before.value) } " → " code { (after.value) } }
                 p { b { (grouped(change.stale)) } " " (visit.form(change.stale, ["pair would be computed again by the next run.", "pairs would be computed again by the next run."], "cặp sẽ được tính lại trong lần chạy sau.")) }
                 @if change.changes_method { p.notice #two-methods { (two_methods(visit)) } }
-                (action_form("actions/setting", "inline", &html! {
+                @if visit.read_only.is_none() { (action_form("actions/setting", "inline", &html! {
                     input type="hidden" name="key" value=(after.key);
                     input type="hidden" name="value" value=(visit.query.get("value").unwrap_or_default());
                     button.primary #save { (visit.t("Save", "Lưu")) }
                     a href=(visit.here) { (visit.t("Cancel", "Hủy")) }
-                }))
+                })) }
             }
         }
     }
@@ -217,7 +216,6 @@ pub(super) async fn store(
         return Err(AppFailure::not_found());
     }
     let open = state.open(&key).await?;
-    refuse_read_only(&state, Some(&key)).await?;
     let (catalog, location) = (open.catalog.clone(), open.location());
     let go = PageQuery::default().with("saved", &body.key).text();
     let stored = on_thread(async move || {

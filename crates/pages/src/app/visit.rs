@@ -3,13 +3,13 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
-use axum::extract::{FromRequestParts, RawPathParams};
+use axum::extract::FromRequestParts;
 use axum::http::header;
 use axum::http::request::Parts;
 
 use super::address::PageQuery;
 use super::number_text;
-use super::read_only::ReadOnlyPlace;
+use super::read_only::{ReadOnlyPlace, project_of};
 use super::state::AppState;
 use crate::local_server::AccessControl;
 use crate::review::Language;
@@ -104,11 +104,8 @@ impl FromRequestParts<Arc<AppState>> for Visit {
         state: &Arc<AppState>,
     ) -> Result<Self, Self::Rejection> {
         let visit = Self::of(parts, state);
-        let segments = RawPathParams::from_request_parts(parts, state).await.ok();
-        let mut segments = segments.iter().flatten();
-        let of_path = segments.find(|(name, _)| *name == "project");
-        let project = of_path.map(|(_, key)| key);
-        let project = project.or_else(|| visit.query.get("project"));
+        let of_path = project_of(parts, state).await;
+        let project = of_path.as_deref().or_else(|| visit.query.get("project"));
         let read_only = ReadOnlyPlace::find(state, project).await;
         Ok(Self { read_only, ..visit })
     }
