@@ -2,12 +2,12 @@
 
 use serde_json::json;
 
-use crate::app::{act, open_app, text, token, with_project};
+use crate::app::{act, app, open_app, text, token, with_project};
 use crate::app_kills::{HeldApp, UNTIL_KILLED};
 use crate::app_uploads::encode;
 use crate::backup::files as names;
 use crate::fault::Fault;
-use crate::page::read_project;
+use crate::page::{Page, read_project};
 use crate::waiting::wait_until;
 
 #[test]
@@ -60,6 +60,24 @@ fn scans_and_prints_are_saved_beside_the_backup_and_restored() {
         state()
     );
     assert!(root.join("again/inputs/data/meshes").is_dir());
+}
+
+#[test]
+fn an_app_of_a_relative_folder_names_whole_paths() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let root = dir.path().canonicalize().expect("a path");
+    let mut command = app("./".as_ref());
+    command.args(["--lang", "en"]).current_dir(&root);
+    let page = Page::of(&mut command).entered();
+    let form = json!({"inputs": "yes"});
+    let reply = act(&page, "/p/p/actions/backup", &form, |_| {});
+    assert_eq!(reply.status, 200, "{}", text(&reply));
+    let copies = root.join("p/backups/backup.sqlite.inputs");
+    let said = format!("prints are in {}", copies.display());
+    wait_until("the backup names its copies", || {
+        text(&page.get("/p/p/health")).contains(&said)
+    });
 }
 
 #[test]

@@ -53,6 +53,8 @@ pub(crate) async fn app(args: AppArgs, context: &Context) -> ProjectResult<ExitC
             format!("cannot listen on {address}; name an address of this computer")
         })?;
     }
+    // Pages name the files in it with their whole paths. Links in the path stay as the user knows them.
+    let folder = std::path::absolute(&folder).unwrap_or(folder);
     let whole = folder.canonicalize();
     let name = whole
         .unwrap_or_else(|_| folder.clone())
