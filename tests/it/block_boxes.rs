@@ -108,6 +108,36 @@ fn boxes_are_checked_before_they_are_stored() {
     assert!(text.contains("few.json  missing"), "{text}");
 }
 
+#[test]
+fn a_block_with_saved_boxes_waits_for_the_next_run() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    finished_block(dir.path());
+    let page = open_app(dir.path());
+    let pages = [
+        ("/p/p/block/b1/", "href=\"../../\">"),
+        ("/p/p/blocks", "href=\"./\">"),
+    ];
+    for (path, _) in pages {
+        let shown = html(&page, path);
+        assert!(!shown.contains("id=\"changed-blocks\""), "{path}: {shown}");
+    }
+    let edits = json!({"removed": [0], "edited": []});
+    let body = json!({"shown": shown(&page)["shown"], "edits": edits});
+    let saved = act(&page, &format!("{BOXES}/save"), &body, |_| {});
+    assert_eq!(saved.status, 200, "{}", text(&saved));
+    for (language, said) in [
+        ("en", "of 1 block were changed after its last run"),
+        ("vi", "của 1 ván đã đổi sau lần chạy trước"),
+    ] {
+        for (path, link) in pages {
+            let shown = html(&page, &format!("{path}?language={language}"));
+            for part in ["id=\"changed-blocks\"", said, link] {
+                assert!(shown.contains(part), "{path}: {part}: {shown}");
+            }
+        }
+    }
+}
+
 /// Returns where a place of the page is on the screen, once the page has its final layout.
 pub(crate) fn on_screen(tab: &Tab<'_>, [x, y]: [f64; 2]) -> [f64; 2] {
     tab.point_after_layout(&format!(

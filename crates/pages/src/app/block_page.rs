@@ -19,6 +19,7 @@ use super::pass_on::{in_chosen_language, pass_on, path_below};
 use super::projects::OpenProject;
 use super::read_only::refuse_read_only;
 use super::remedies::block_remedy;
+use super::run_blocks::{changed_names, changed_part};
 use super::sentence::Sentence;
 use super::state::AppState;
 use super::visit::Visit;
@@ -52,9 +53,13 @@ pub(super) async fn page(
     let detail = detail.ok_or_else(|| no_block(&block))?;
     let characters = open.catalog.block_characters(&name).await?;
     let missing = details::missing_block_files(&open.project, &detail.state.attributes).await;
+    // Other pages say why settings cannot be read.
+    let changed = changed_names(&open, std::slice::from_ref(&detail.state)).await;
+    let changed = changed.unwrap_or_default();
     let body = html! {
         nav.pager { a href="../../blocks" { (visit.t("All blocks", "Tất cả các ván")) } }
         (state_part(&visit, &key, &detail))
+        (changed_part(&visit, "../../", changed.len() as u64))
         (ways(&visit, &detail))
         (stages(&visit, &detail))
         (character_list(&visit, &name, &characters, &missing))

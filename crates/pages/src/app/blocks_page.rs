@@ -1,5 +1,6 @@
 //! The list of the whole blocks of a project.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use axum::extract::{Path, State};
@@ -9,10 +10,11 @@ use maud::{Markup, html};
 use super::address::encoded;
 use super::components::{NavSection, empty, figure, frame, grouped, stored_message};
 use super::failure::AppResult;
+use super::run_blocks::{changed_names, changed_part};
 use super::state::AppState;
 use super::visit::Visit;
 use mocban_catalog::BlockState;
-use mocban_core::domain::{BlockStage, JobStatus, one_line};
+use mocban_core::domain::{BlockName, BlockStage, JobStatus, one_line};
 
 /// Most blocks that are listed.
 const SHOWN: usize = 1000;
@@ -53,10 +55,13 @@ pub(super) async fn page(
             chosen.is_none_or(|(_, statuses)| statuses.contains(&block.status))
         };
         let shown: Vec<&BlockState> = blocks.iter().filter(is_shown).collect();
+        // Other pages say why settings cannot be read.
+        let changed = changed_names(&open, &blocks).await.unwrap_or_default();
         html! {
             (figures(&visit, &blocks))
+            (changed_part(&visit, "./", changed.len() as u64))
             @if chosen.is_some() { nav.pager { a href=(visit.here) { (visit.t("All blocks", "Tất cả các ván")) } } }
-            (table(&visit, &shown))
+            (table(&visit, &shown, &changed))
         }
     };
     let title = visit.t("Blocks", "Các ván");
@@ -106,7 +111,7 @@ fn figures(visit: &Visit, blocks: &[BlockState]) -> Markup {
     }
 }
 
-fn table(visit: &Visit, blocks: &[&BlockState]) -> Markup {
+fn table(visit: &Visit, blocks: &[&BlockState], changed: &BTreeSet<BlockName>) -> Markup {
     let label = visit.t("Blocks", "Các ván");
     html! {
         div.scroll tabindex="0" role="region" aria-label=(label) {
@@ -118,7 +123,7 @@ fn table(visit: &Visit, blocks: &[&BlockState]) -> Markup {
                     th.number scope="col" { (visit.t("Uncertain place", "Vị trí chưa chắc")) }
                     th.number scope="col" { (visit.t("Left out", "Bỏ qua")) }
                 } }
-                tbody { @for block in blocks.iter().take(SHOWN) { (row(visit, block)) } }
+                tbody { @for block in blocks.iter().take(SHOWN) { (row(visit, block, changed.contains(&block.attributes.name))) } }
             }
         }
         @if blocks.len() > SHOWN {
@@ -127,13 +132,14 @@ fn table(visit: &Visit, blocks: &[&BlockState]) -> Markup {
     }
 }
 
-fn row(visit: &Visit, block: &BlockState) -> Markup {
+fn row(visit: &Visit, block: &BlockState, is_changed: bool) -> Markup {
     let name = block.attributes.name.as_str();
     html! {
         tr {
             th scope="row" { a href={ "block/" (encoded(name)) "/" } { (one_line(name)) } }
             td {
                 (state_badge(visit, block))
+                @if is_changed { " · " span.warn { (visit.t("changed after its last run", "đã đổi sau lần chạy trước")) } }
                 @if let Some(stored) = &block.failure { " " span.bad { (stored_message(visit, &stored.failure.message)) } }
             }
             td.number { @if block.characters > 0 {

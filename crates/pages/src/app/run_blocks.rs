@@ -6,10 +6,12 @@ use maud::{Markup, html};
 
 use super::address::encoded;
 use super::components::{grouped, stored_message};
+use super::failure::{AppFailure, AppResult};
 use super::number_text::english_count;
+use super::projects::OpenProject;
 use super::visit::Visit;
 use crate::review::Language;
-use mocban_catalog::Catalog;
+use mocban_catalog::{BlockState, Catalog};
 use mocban_core::domain::{BlockName, JobStatus, one_line};
 use mocban_project::ProjectResult;
 use mocban_project::block_status::BlockStatus;
@@ -48,16 +50,63 @@ pub(super) async fn outdated_blocks(
     options: &RunOptions,
     blocks: &BlockStatus,
 ) -> ProjectResult<u64> {
+    Ok(outdated_names(catalog, options, &blocks.0).await?.len() as u64)
+}
+
+/// Returns the names of these blocks.
+async fn outdated_names(
+    catalog: &Catalog,
+    options: &RunOptions,
+    blocks: &[BlockState],
+) -> ProjectResult<BTreeSet<BlockName>> {
     if blocks.is_empty() {
-        return Ok(0);
+        return Ok(BTreeSet::new());
     }
     let planned = planned_blocks(catalog, options).await?;
-    let planned: BTreeSet<BlockName> = planned.into_iter().map(|entry| entry.block).collect();
-    let outdated = blocks.0.iter().filter(|state| {
-        matches!(state.status, JobStatus::Done | JobStatus::Quarantined)
-            && planned.contains(&state.attributes.name)
-    });
-    Ok(outdated.count() as u64)
+    let mut planned: BTreeSet<BlockName> = planned.into_iter().map(|entry| entry.block).collect();
+    let settled = blocks
+        .iter()
+        .filter(|state| matches!(state.status, JobStatus::Done | JobStatus::Quarantined));
+    let settled: BTreeSet<&BlockName> = settled.map(|state| &state.attributes.name).collect();
+    planned.retain(|name| settled.contains(name));
+    Ok(planned)
+}
+
+/// Returns the finished or failed blocks that were changed since their last run, as far as the catalog knows.
+pub(super) async fn changed_names(
+    open: &OpenProject,
+    blocks: &[BlockState],
+) -> AppResult<BTreeSet<BlockName>> {
+    let options = mocban_project::run::options(&open.settings()?.config);
+    let outdated = outdated_names(&open.catalog, &options, blocks).await;
+    let mut names = outdated.map_err(|error| AppFailure::of(error, &open.dir))?;
+    let moved = blocks.iter().filter(|state| state.other_files);
+    names.extend(moved.map(|state| state.attributes.name.clone()));
+    Ok(names)
+}
+
+/// Says on the page of a block, or above a list with such blocks, that the next run works on what was changed. `run` is the
+/// relative address of the page that starts it.
+pub(super) fn changed_part(visit: &Visit, run: &str, blocks: u64) -> Markup {
+    let text = match (visit.language, blocks) {
+        (Language::English, 1) => {
+            "Boxes, chosen places, files or settings of 1 block were changed after its last run. The next run looks at them, and cuts the block again if they differ."
+                .to_owned()
+        }
+        (Language::English, _) => format!(
+            "Boxes, chosen places, files or settings of {} blocks were changed after their last run. The next run looks at them, and cuts the blocks again if they differ.",
+            grouped(blocks)
+        ),
+        (Language::Vietnamese, _) => format!(
+            "Khung chữ, điểm tự chọn, tệp hoặc thiết lập của {} ván đã đổi sau lần chạy trước. Lần chạy tới sẽ xem lại và cắt lại ván nếu chúng khác đi.",
+            grouped(blocks)
+        ),
+    };
+    html! {
+        @if blocks > 0 {
+            p.notice.warn #changed-blocks { (text) " " a href=(run) { (visit.t("Run", "Căn chỉnh")) } }
+        }
+    }
 }
 
 /// Returns the stages of the blocks in progress and how many blocks are done, such as `b04: registration with the page,
