@@ -60,6 +60,22 @@ SELECT v.verdict, count(*) ",
 GROUP BY v.verdict"
 );
 
+/// Counts verdicts on pairs that wait or run, whose results are not known yet. Only the newest verdict of each reviewer on a metric
+/// counts. `?1` is as in `from_current_verdicts`.
+const WAITING_VERDICTS: &str = concat!(
+    "
+SELECT count(*) FROM job AS j JOIN verdict AS v ON v.pair = j.pair
+WHERE j.status < 3 AND v.id = (
+    SELECT max(n.id) FROM verdict AS n
+    WHERE n.pair = v.pair AND n.metric = v.metric AND ",
+    person!("n"),
+    " = ",
+    person!("v"),
+    "
+        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act)
+        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))"
+);
+
 /// Completed pairs whose result of the default metric has a low confidence.
 pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
@@ -70,6 +86,14 @@ SELECT count(*) FROM job AS j CROSS JOIN pair AS p ON p.id = j.pair
 WHERE j.dirty = 1 AND j.status = 3 AND (p.mesh_stat = '' OR p.print_stat = '')";
 
 impl Catalog {
+    /// Returns the number of verdicts on pairs that wait or run. They count again once the same results are there.
+    pub async fn waiting_verdicts(&self) -> Result<u64> {
+        let mut conn = self.read_conn().await?;
+        let renamed = Spellings::read(&mut conn).await?.renamed();
+        let waiting = query_scalar(WAITING_VERDICTS).bind(renamed);
+        waiting.fetch_one(&mut conn).await
+    }
+
     /// Returns the counts of the `status` command. Results count as stale if their fingerprint is not among
     /// `fingerprints`, or if their inputs have changed.
     pub async fn status(&self, fingerprints: &Fingerprints) -> Result<StatusCounts> {

@@ -5,7 +5,7 @@ use super::blocks::{attributes, block, character, world};
 use super::{World, fingerprints, name, row};
 use crate::{
     CatalogError, CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, LastImport,
-    ListedRetiredPair, RetiredPair, StatusCounts,
+    ListedRetiredPair, RerunPolicy, RetiredPair, StatusCounts,
 };
 use mocban_core::domain::{BlockStage, JobStatus, PairName, RetireCause, Stage, Verdict};
 
@@ -36,6 +36,28 @@ async fn replace(world: &World, ids: &[&str]) -> ImportSummary {
         .expect("imported");
     world.assert_counters().await;
     summary
+}
+
+#[tokio::test]
+async fn verdicts_wait_for_the_results_of_their_pairs() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    judge(&world, "p0").await;
+    let waiting = async || world.catalog.waiting_verdicts().await.expect("a read");
+    assert_eq!(waiting().await, 0);
+    let other = fingerprints([2, 1, 1, 1]);
+    let requeued = world
+        .catalog
+        .requeue_stale(&other, None, RerunPolicy::Changed);
+    assert!(requeued.await.expect("requeued") > 0);
+    assert_eq!(waiting().await, 1);
+    let names = [name("p0")];
+    world
+        .catalog
+        .retire_pairs(&names, 9)
+        .await
+        .expect("retired");
+    assert_eq!(waiting().await, 0, "a retired pair is in no count");
 }
 
 #[tokio::test]

@@ -34,6 +34,10 @@ struct ProjectState {
     counts: StatusCounts,
     is_running: bool,
     failed_blocks: u64,
+    /// Number of blocks that wait for a run.
+    waiting_blocks: u64,
+    /// Number of verdicts on pairs whose results the next run makes.
+    waiting_verdicts: u64,
     /// Number of blocks that a run would work on or works on.
     open_blocks: u64,
     /// Number of finished pairs and blocks that an import gave other files. The next run compares their content.
@@ -94,7 +98,15 @@ async fn read(state: &AppState, key: String) -> Overview {
             } else {
                 outdated_blocks(&open.catalog, &options, &blocks).await?
             };
+            // Without pairs that wait, no verdict waits.
+            let waiting_verdicts = if outstanding(&counts) > 0 {
+                open.catalog.waiting_verdicts().await?
+            } else {
+                0
+            };
             Ok::<_, mocban_project::ProjectError>(ProjectState {
+                waiting_blocks: blocks.waiting(),
+                waiting_verdicts,
                 other_files: counts.other_files + blocks.other_files(),
                 counts,
                 is_running: running,
@@ -144,6 +156,7 @@ fn card(visit: &Visit, project: &Overview) -> Markup {
                 Err(failure) => p.notice.bad { (failure.text(visit.language)) },
                 Ok(found) => {
                     (summary(visit, &found.counts, found.is_running))
+                    (waiting_part(visit, &href, found))
                     (failed_blocks_part(visit, &href, found.failed_blocks))
                     @if let Some(time) = project.last_change {
                         p.muted { (visit.t("Last result", "Kết quả mới nhất")) ": " (visit.time(time)) }
@@ -171,16 +184,34 @@ fn summary(visit: &Visit, counts: &StatusCounts, running: bool) -> Markup {
     }
 }
 
+/// Says which blocks and verdicts of a project wait for a run. `base` is the relative address of the project.
+fn waiting_part(visit: &Visit, base: &str, found: &ProjectState) -> Markup {
+    let (blocks, verdicts) = (found.waiting_blocks, found.waiting_verdicts);
+    html! {
+        @if blocks > 0 && !found.is_running {
+            p { a href={ (base) "blocks?state=waiting" } { (grouped(blocks)) " " (visit.form(blocks, ["block", "blocks"], "ván")) } " "
+                (visit.form(blocks, ["waits for a run.", "wait for a run."], "đang chờ chạy.")) }
+        }
+        @if verdicts > 0 {
+            p { (grouped(verdicts)) " " (visit.form(verdicts, ["verdict waits for the result of its pair.", "verdicts wait for the results of their pairs."], "đánh giá đang chờ kết quả của cặp.")) }
+        }
+    }
+}
+
+/// Returns the number of pairs that wait, run or back off. Without a run, leases are those of an interrupted one.
+fn outstanding(counts: &StatusCounts) -> u64 {
+    let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
+    let open = [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased].map(jobs);
+    open.iter().sum()
+}
+
 /// Names what a project needs next.
 fn next_step(visit: &Visit, found: &ProjectState) -> &'static str {
     let counts = &found.counts;
     let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
-    // Without a run, leases are those of an interrupted one.
-    let outstanding = [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased].map(jobs);
-    let outstanding: u64 = outstanding.iter().sum();
     if found.is_running {
         visit.t("Watch the run", "Xem tiến trình")
-    } else if outstanding + counts.stale > 0 {
+    } else if outstanding(counts) + counts.stale > 0 {
         visit.t("Align the pairs", "Căn chỉnh các cặp")
     } else if found.open_blocks > 0 {
         visit.t("Align the blocks", "Căn chỉnh các ván")
@@ -190,5 +221,67 @@ fn next_step(visit: &Visit, found: &ProjectState) -> &'static str {
         visit.t("See what failed", "Xem các mục lỗi")
     } else {
         visit.t("Open", "Mở")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::{Overview, ProjectState, card};
+    use crate::app::visit::Visit;
+    use crate::review::Language;
+    use mocban_catalog::StatusCounts;
+
+    #[test]
+    fn blocks_and_verdicts_that_wait_are_named() {
+        let counts = StatusCounts {
+            schema: 1,
+            pairs: 0,
+            retired: 0,
+            jobs: BTreeMap::new(),
+            stages: BTreeMap::new(),
+            stale: 0,
+            other_files: 0,
+            low_confidence: 0,
+            verdicts: BTreeMap::new(),
+        };
+        let project = |waiting_blocks, waiting_verdicts| Overview {
+            key: "p".to_owned(),
+            state: Ok(ProjectState {
+                counts: counts.clone(),
+                is_running: false,
+                failed_blocks: 0,
+                waiting_blocks,
+                waiting_verdicts,
+                open_blocks: waiting_blocks,
+                other_files: 0,
+            }),
+            last_change: None,
+        };
+        for (language, parts) in [
+            (
+                Language::English,
+                [
+                    "blocks?state=waiting\">1 block</a> waits for a run.",
+                    "15 verdicts wait for the results of their pairs.",
+                ],
+            ),
+            (
+                Language::Vietnamese,
+                [
+                    "blocks?state=waiting\">1 ván</a> đang chờ chạy.",
+                    "15 đánh giá đang chờ kết quả của cặp.",
+                ],
+            ),
+        ] {
+            let visit = Visit::in_language(language);
+            let shown = card(&visit, &project(1, 15)).into_string();
+            let idle = card(&visit, &project(0, 0)).into_string();
+            for part in parts {
+                assert!(shown.contains(part), "{part}: {shown}");
+            }
+            assert!(!idle.contains("state=waiting"), "{idle}");
+        }
     }
 }

@@ -236,7 +236,9 @@ fn finished(
     let [pairs, verdicts] = [restored.pairs, restored.verdicts].map(grouped);
     let mut lines = vec![[
         format!(
-            "{pairs} pairs and {verdicts} verdicts were restored. A backup has no depth maps and masks: press Align on the page Run to compute them again."
+            "{} and {} were restored. A backup has no depth maps and masks: press Align on the page Run to compute them again.",
+            english_count(restored.pairs, ["pair", "pairs"]),
+            english_count(restored.verdicts, ["verdict", "verdicts"])
         ),
         format!(
             "Đã khôi phục {pairs} cặp và {verdicts} đánh giá. Bản sao lưu không có bản đồ độ sâu và mặt nạ: hãy bấm Căn chỉnh ở trang Căn chỉnh để tính lại."
