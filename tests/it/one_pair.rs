@@ -135,7 +135,7 @@ fn paper_preset_has_only_its_three_metrics() {
     let warnings = report["warnings"].as_array().expect("a list");
     let is_of_one_pair = |warning: &Value| {
         let text = warning.as_str().expect("a sentence");
-        text.ends_with("needs at least 10 blocks, and there are 1.")
+        text.ends_with("needs at least 10 blocks, and there is 1.")
     };
     assert!(warnings.iter().all(is_of_one_pair), "{warnings:?}");
     assert_eq!(report["risk_coverage"], serde_json::json!([]));

@@ -73,6 +73,10 @@ fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {
             format_count(MAX_UNITS as u64),
             by.plural()
         ),
+        BootstrapSkipped::TooFew { units: 1, by } => format!(
+            "An interval needs at least {MIN_UNITS} {}, and there is 1.",
+            by.plural()
+        ),
         BootstrapSkipped::TooFew { units, by } => format!(
             "An interval needs at least {MIN_UNITS} {}, and there are {units}.",
             by.plural()
@@ -255,6 +259,11 @@ mod tests {
             few.ends_with(" An interval needs at least 10 blocks, and there are 5."),
             "{few}"
         );
+        let one = bootstrap_skipped(BootstrapSkipped::TooFew {
+            units: 1,
+            by: ResamplingUnit::Block,
+        });
+        assert!(one.ends_with(" 10 blocks, and there is 1."), "{one}");
         let many = bootstrap_skipped(BootstrapSkipped::TooMany(ResamplingUnit::Block));
         assert!(
             many.contains(" There are more than 100,000 blocks"),

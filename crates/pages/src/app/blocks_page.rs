@@ -137,7 +137,7 @@ fn row(visit: &Visit, block: &BlockState, is_changed: bool) -> Markup {
     html! {
         tr {
             th scope="row" { a href={ "block/" (encoded(name)) "/" } { (one_line(name)) } }
-            td {
+            td.reason[block.failure.is_some()] {
                 (state_badge(visit, block))
                 @if is_changed { " · " span.warn { (visit.t("changed after its last run", "đã đổi sau lần chạy trước")) } }
                 @if let Some(stored) = &block.failure { " " span.bad { (stored_message(visit, &stored.failure.message)) } }

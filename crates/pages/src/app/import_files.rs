@@ -184,7 +184,7 @@ fn table(visit: &Visit, headers: &[FileHeaders], units: &[Option<ScanUnit>]) -> 
                 @match &one.scan {
                     Ok(extent) => {
                         td { (size(visit, extent, *unit)) }
-                        td.muted {
+                        td.muted.reason {
                             (why_unit(visit, one.files.kind, extent, *unit))
                             @if let Some(other) = other_unit(one, *unit) {
                                 "; " (visit.t("as long as its page if the unit is", "dài bằng trang in nếu đơn vị là")) " " (unit_name(visit, other))
@@ -381,6 +381,8 @@ mod tests {
             table(&visit, &[heads], &units).into_string()
         });
         assert!(doubted.contains(" px · 400 mm"), "{doubted}");
+        // The column is wide enough for several words a line.
+        assert!(doubted.contains("class=\"muted reason\""), "{doubted}");
         assert!(
             doubted.contains("; as long as its page if the unit is cm"),
             "{doubted}"

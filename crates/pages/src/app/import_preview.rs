@@ -173,10 +173,19 @@ pub(super) fn warning(visit: &Visit, line: &str) -> String {
     let line = &without_commands(line);
     let [mesh_alone, print_alone, other] = IGNORED;
     let beginnings = [
-        (mesh_alone, [mesh_alone, "Bỏ qua, bản quét không có bản in"]),
+        (
+            mesh_alone,
+            [
+                "ignored, scan without print",
+                "Bỏ qua, bản quét không có bản in",
+            ],
+        ),
         (
             print_alone,
-            [print_alone, "Bỏ qua, bản in không có bản quét"],
+            [
+                "ignored, print without scan",
+                "Bỏ qua, bản in không có bản quét",
+            ],
         ),
         // A scan may lie in the folder of the prints.
         (

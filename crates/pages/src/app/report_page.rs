@@ -6,7 +6,7 @@ use axum::extract::{Path, State};
 use axum::response::{Html, Response};
 use maud::{Markup, html};
 
-use super::address::encoded;
+use super::address::{PageQuery, encoded};
 use super::attachment::attachment;
 use super::components::{
     NavSection, empty, figure, frame, grouped, number_table, score, stored_message,
@@ -22,11 +22,14 @@ use super::visit::Visit;
 use crate::on_thread::read_in_turn;
 use crate::report_language::report_page;
 use crate::review::Language;
-use mocban_core::domain::{ThresholdMetric, one_line};
+use mocban_catalog::JointVerdict;
+use mocban_core::domain::{ReviewOrder, ThresholdMetric, one_line};
 use mocban_project::ProjectError;
 use mocban_project::location::now;
 use mocban_project::report::{ReportOptions, read, report};
-use mocban_report::{CommandPage, CountedText, MetricRow, Report, ReportFormat, command_page};
+use mocban_report::{
+    CommandPage, CountedPairs, CountedText, MetricRow, Report, ReportFormat, TextPart, command_page,
+};
 use mocban_results::IntervalMethod;
 
 /// Formats that can be saved: format, extension, content type and name.
@@ -89,7 +92,7 @@ pub(super) async fn numbers(
 
 fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
     let sentences = |text: &CountedText| {
-        html! { (linked_sentences(visit, text)) (remedy_link(visit, key, text)) }
+        html! { (linked_sentences(visit, text)) (settle_link(visit, text)) (remedy_link(visit, key, text)) }
     };
     html! {
         @for text in &report.headline { p { (sentences(text)) } }
@@ -128,6 +131,35 @@ fn remedy_link(visit: &Visit, key: &str, text: &str) -> Markup {
         Some(CommandPage::Run | CommandPage::Failures) | None => None,
     };
     html! { @if let Some((address, name)) = link { " " a href=(address) { (name) } } }
+}
+
+/// Returns the link to the review that settles the disagreements that sentences count. Its address is relative to that of the
+/// report.
+fn settle_link(visit: &Visit, text: &CountedText) -> Markup {
+    let parts = text.parts();
+    let counted = parts.iter().flat_map(|part| match part {
+        TextPart::Count(_, pairs) => *pairs,
+        TextPart::Words(_) => &[],
+    });
+    let metrics: Vec<ThresholdMetric> = counted
+        .filter_map(|pairs| match pairs {
+            CountedPairs::Judged(metric, JointVerdict::Conflict) => Some(*metric),
+            _ => None,
+        })
+        .collect();
+    // With all metrics, an image that several of them gave is shown once.
+    let metric = match metrics.as_slice() {
+        [metric] => metric.name(),
+        _ => "",
+    };
+    let settle = PageQuery::default()
+        .with("order", ReviewOrder::Adjudicate.name())
+        .with("metric", metric);
+    html! {
+        @if !metrics.is_empty() {
+            " " a href={ "review" (settle.text()) } { (visit.t("Settle the disagreements", "Giải quyết bất đồng")) }
+        }
+    }
 }
 
 /// Returns the numbers of pairs that the sentences above have, with links to these pairs.
@@ -209,7 +241,7 @@ fn reasons(visit: &Visit, report: &Report) -> Markup {
                 li { p {
                     a href={ "pairs?view=table&state=failed&class=" (group.class) } { (grouped(group.count)) }
                     " · " (visit.class(group.class))
-                    @if let Some(first) = group.pairs.first() { span.muted { " (" (stored_message(visit, &first.error)) ")" } }
+                    @if let Some(first) = group.pairs.first() { span.muted { " (" @if group.count > 1 { (visit.t("for example", "ví dụ")) ": " } (stored_message(visit, &first.error)) ")" } }
                 } }
             } }
         }
@@ -248,11 +280,54 @@ pub(super) async fn download(
 
 #[cfg(test)]
 mod tests {
-    use super::remedy_link;
+    use super::{reasons, remedy_link, settle_link};
     use crate::app::visit::Visit;
     use crate::messages;
     use crate::review::Language;
-    use mocban_report::{CommandPage, NAMED_COMMANDS};
+    use mocban_catalog::PairResults;
+    use mocban_core::domain::{FailureClass, Verdict};
+    use mocban_report::{CommandPage, NAMED_COMMANDS, Report, ReportAccumulator};
+    use mocban_results::TruthEvaluation;
+    use mocban_results::test_fixtures::{done, failed};
+
+    fn report(pairs: &[PairResults]) -> Report {
+        let mut report = ReportAccumulator::default();
+        for pair in pairs {
+            report.add(pair, &TruthEvaluation::default());
+        }
+        report.finish()
+    }
+
+    #[test]
+    fn counted_disagreements_lead_to_the_review_that_settles_them() {
+        let [pass, fail] = [Verdict::Pass, Verdict::Fail];
+        let report = report(&[done("a", 0.75, &[pass]), done("b", 0.75, &[pass, fail])]);
+        let visit = Visit::in_language(Language::English);
+        let links = |text| settle_link(&visit, text).into_string();
+        let of_one = "review?order=adjudicate&amp;metric=ensemble\">Settle the disagreements";
+        let headline = links(&report.headline[1]);
+        assert!(headline.contains(of_one), "{headline}");
+        assert_eq!(links(&report.headline[0]), "");
+        let of_all = "review?order=adjudicate\">";
+        let warnings: String = report.warnings.iter().map(links).collect();
+        assert!(warnings.contains(of_all), "{warnings}");
+    }
+
+    #[test]
+    fn the_reason_of_one_of_several_pairs_is_an_example() {
+        let error = |name: &str| failed(name, FailureClass::BadInput, "1.png has no ink");
+        for (language, example) in [
+            (Language::English, " (for example: "),
+            (Language::Vietnamese, " (ví dụ: "),
+        ] {
+            let visit = Visit::in_language(language);
+            let of = |pairs: &[PairResults]| reasons(&visit, &report(pairs)).into_string();
+            let one = of(&[error("a")]);
+            assert!(!one.contains(example), "{one}");
+            let two = of(&[error("a"), error("b")]);
+            assert!(two.contains(example), "{two}");
+        }
+    }
 
     #[test]
     fn a_sentence_with_a_command_has_a_link_instead() {

@@ -219,11 +219,11 @@ fn other_files_text(visit: &Visit, run: &RunState) -> Option<String> {
     match (visit.language, number) {
         (_, 0) => None,
         (Language::English, 1) => Some(
-            "1 aligned pair has another mesh or print in the list than before: the next run looks at its files."
+            "1 aligned pair has another scan or print in the list than before: the next run looks at its files."
                 .to_owned(),
         ),
         (Language::English, _) => Some(format!(
-            "{pairs} aligned pairs have another mesh or print in the list than before: the next run looks at them."
+            "{pairs} aligned pairs have another scan or print in the list than before: the next run looks at them."
         )),
         (Language::Vietnamese, _) => Some(format!(
             "{pairs} cặp đã căn chỉnh có bản quét hoặc bản in khác trong danh sách so với trước: lần chạy tới sẽ xem lại các tệp đó."

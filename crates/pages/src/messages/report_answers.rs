@@ -274,6 +274,10 @@ pub(super) const REPORT_ANSWERS: &[(&str, &str)] = &[
         "Có hơn {0} nên sai số lấy mẫu không đáng kể.",
     ),
     (
+        "An interval needs at least {}, and there is {}.",
+        "Một khoảng tin cậy cần ít nhất {0}, hiện có {1}.",
+    ),
+    (
         "An interval needs at least {}, and there are {}.",
         "Một khoảng tin cậy cần ít nhất {0}, hiện có {1}.",
     ),
