@@ -74,7 +74,7 @@ fn an_app_of_a_relative_folder_names_whole_paths() {
     let reply = act(&page, "/p/p/actions/backup", &form, |_| {});
     assert_eq!(reply.status, 200, "{}", text(&reply));
     let copies = root.join("p/backups/backup.sqlite.inputs");
-    let said = format!("prints are in {}", copies.display());
+    let said = format!(" are in {},", copies.display());
     wait_until("the backup names its copies", || {
         text(&page.get("/p/p/health")).contains(&said)
     });

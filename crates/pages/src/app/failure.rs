@@ -27,7 +27,7 @@ pub(super) struct AppFailure {
 }
 
 impl AppFailure {
-    /// There is no such page, project or pair.
+    /// There is no such page.
     pub(super) const fn not_found() -> Self {
         Self {
             status: StatusCode::NOT_FOUND,

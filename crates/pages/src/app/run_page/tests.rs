@@ -154,7 +154,7 @@ fn pairs_with_other_files_in_the_list_are_named_in_both_languages() {
     for (language, text) in [
         (
             Language::English,
-            "2 aligned pairs have another mesh or print",
+            "2 aligned pairs have another scan or print",
         ),
         (
             Language::Vietnamese,
