@@ -15,12 +15,13 @@ use super::decimal_ids::DecimalIds;
 use super::draft::{
     DraftRow, MAX_PATH_BYTES, check_length, check_meta, record, refuse_cell_errors,
 };
+use super::encoding_hint::encoding_hint;
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::json_rows;
 use super::row::ReadRows;
 use super::row_reader::{is_blank, row_reader};
 use super::similar_columns::SimilarColumns;
-use super::text::{CsvText, LineCounter, encoding_hint};
+use super::text::{CsvText, LineCounter};
 use super::whole_numbers::WholeNumbers;
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;

@@ -11,6 +11,7 @@ mod column_names;
 mod csv;
 mod decimal_ids;
 mod draft;
+mod encoding_hint;
 mod error;
 mod folder_file;
 mod folders;
