@@ -24,7 +24,23 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
         let text = format!("{} {}", path.display(), pointer_of("file"));
         return Err(Refusal::Usage(text));
     }
+    if let Some(document) = locked_document(path) {
+        let text = format!(
+            "{} is the lock file of an open document; name the document {document} instead",
+            path.display()
+        );
+        return Err(Refusal::Usage(text));
+    }
     Ok(bytes)
+}
+
+/// Returns the name of the document that has a file as its lock file. Office programs write one beside an open document;
+/// Excel leaves out the first letters of some names.
+fn locked_document(path: &Path) -> Option<String> {
+    let name = path.file_name()?.to_str()?;
+    let of_libre_office = || name.strip_prefix(".~lock.")?.strip_suffix('#');
+    let document = name.strip_prefix("~$").or_else(of_libre_office)?;
+    Some(document.to_owned())
 }
 
 /// Reads a list from the standard input, like [`read`].
@@ -294,7 +310,19 @@ pub(crate) fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed
 mod tests {
     use std::path::Path;
 
-    use super::{is_jsonl, require_png, write_output};
+    use super::{is_jsonl, read_list, require_png, write_output};
+
+    #[test]
+    fn lock_files_of_office_programs_are_named() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        for name in ["~$list.xlsx", ".~lock.list.xlsx#"] {
+            let path = dir.path().join(name);
+            std::fs::write(&path, b"\x05Admin  ").expect("written");
+            let refused = read_list(&path, None).expect_err("a lock file").to_string();
+            let end = "is the lock file of an open document; name the document list.xlsx instead";
+            assert!(refused.ends_with(end), "{refused}");
+        }
+    }
 
     #[test]
     fn a_folder_and_other_formats_than_png_are_no_outputs_of_pictures() {

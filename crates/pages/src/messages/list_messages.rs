@@ -7,6 +7,14 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "the text is UTF-16 and truncated or damaged",
         "văn bản UTF-16 bị cắt cụt hoặc bị hỏng",
     ),
+    (
+        "{} is the lock file of an open document",
+        "{0} là tệp khóa của một tài liệu đang mở",
+    ),
+    (
+        "name the document {} instead",
+        "hãy chọn tài liệu {0} thay cho tệp này",
+    ),
     ("save it as UTF-8", "hãy lưu lại ở dạng UTF-8"),
     (
         "this is a workbook of an old format or with a password, or an archive",
@@ -31,6 +39,18 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     (
         "it seems to be GB 18030 (Chinese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
         "có vẻ là GB 18030 (tiếng Trung): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+    ),
+    (
+        "it seems to be Big5 (Chinese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+        "có vẻ là Big5 (tiếng Trung): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+    ),
+    (
+        "it seems to be Shift-JIS (Japanese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+        "có vẻ là Shift-JIS (tiếng Nhật): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+    ),
+    (
+        "it seems to be TCVN3 (Vietnamese): convert the list to UTF-8, such as with UniKey",
+        "có vẻ là TCVN3 (tiếng Việt): hãy chuyển danh sách sang UTF-8, chẳng hạn bằng UniKey",
     ),
     ("the list is not UTF-8", "danh sách không phải là UTF-8"),
     (
