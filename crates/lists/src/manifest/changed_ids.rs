@@ -16,11 +16,16 @@ const MONTHS: [&str; 12] = [
 /// Years of dates. Other numbers of four digits are likely those of an inventory.
 const YEARS: RangeInclusive<u32> = 1900..=2100;
 
+/// Least number that spreadsheet programs shorten.
+const LONG_NUMBER: f64 = 1e11;
+/// Number of decimals of a power of ten that are too many for an id.
+const MANY_DECIMALS: usize = 3;
+
 /// Finds ids in the forms in which spreadsheet programs write dates and powers of ten: `1-Nov`, `Nov-01`, `01-Thg11`,
 /// `2026-11-01`, `01.11.2026` and `1.00E+05`.
 ///
 /// An id is right if the path of its mesh or print has it, as in `scans/2026-11-01.stl`. Of the others, there is a warning if a
-/// path has what an id was made of, such as `1-11.stl` for `1-Nov`, or if at least two ids have such a form and other ids do
+/// path has what an id was made of, such as `1-11.stl` for `1-Nov`, if an id is a shortened long number, or if at least two ids have such a form and other ids do
 /// not. Dates in numbers do not count as two if another id has a year and two numbers, too, as in `1999.12.05` and `1999.13.01`.
 ///
 /// So there is no warning about a list whose ids are all dates, and none about `1E5`, which no program writes for a power of ten.
@@ -42,7 +47,7 @@ struct IdsOfForm {
     count: usize,
     /// The first ones with their lines.
     first: Vec<(usize, String)>,
-    /// Whether a path has what one of them was made of.
+    /// Whether a path has what one of them was made of, or one is a shortened number.
     is_proved: bool,
 }
 
@@ -69,10 +74,11 @@ impl ChangedIds {
         if paths.iter().any(|path| path.contains(&folded)) {
             return;
         }
-        let is_proved = paths.iter().any(|path| {
+        let has_origin = paths.iter().any(|path| {
             let path = path.rsplit_once('.').map_or(&**path, |(stem, _)| stem);
             path.split(['/', '\\']).any(|name| form.is_made_of(name))
         });
+        let is_proved = has_origin || form.is_shortened();
         let ids = if form.is_numeric() {
             &mut self.numeric
         } else {
@@ -144,6 +150,11 @@ impl SpreadsheetForm {
                 ..
             }
         )
+    }
+
+    /// Returns whether this is a long number of which a program left out digits, such as `1.23457E+11`: no id has such a form.
+    fn is_shortened(self) -> bool {
+        matches!(self, Self::Power { value, decimals } if value >= LONG_NUMBER && decimals >= MANY_DECIMALS)
     }
 
     /// Returns whether a program may write this form for the end of a name.

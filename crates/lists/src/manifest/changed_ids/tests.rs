@@ -36,6 +36,26 @@ fn several_dates_and_powers_among_other_ids_are_counted() {
 }
 
 #[test]
+fn shortened_long_numbers_need_no_other_sign() {
+    for (rows, start) in [
+        (
+            &[("1.23457E+11", "a.stl"), ("1,23458E+11", "b.stl")][..],
+            "2 ids look like ",
+        ),
+        (
+            &[("1.23457E+11", "a.stl"), ("B", "b.stl")],
+            "the id \"1.23457E+11\" on line 2 looks like ",
+        ),
+    ] {
+        let found = warning(rows);
+        let is_found = found.as_ref().is_some_and(|text| text.starts_with(start));
+        assert!(is_found, "{found:?}");
+    }
+    assert_eq!(warning(&[("1.23457E+11", "1.23457E+11.stl")]), None);
+    assert_eq!(warning(&[("1.5E+11", "a.stl"), ("B", "b.stl")]), None);
+}
+
+#[test]
 fn a_file_shows_what_an_id_was_made_of() {
     for (id, mesh) in [
         ("1-Nov", "m/1-11.stl"),
