@@ -141,6 +141,17 @@ fn files_of_other_programs_are_no_scripts_and_no_logs() {
         let after = std::fs::read(dir.path().join(name)).expect("a file");
         assert_eq!(after, before, "{args:?}");
     }
+    // A script with another line is kept.
+    let script = dir.path().join("changed");
+    let complete = || mocban(dir.path(), &["completions", "bash", "-o", "changed"]);
+    complete().expect(0);
+    let mut changed = std::fs::read_to_string(&script).expect("a script");
+    changed += "alias m=mocban\n";
+    std::fs::write(&script, &changed).expect("written");
+    let refused = complete().expect(2);
+    let said = "changed is a completion script for bash that somebody changed";
+    assert!(refused.err.contains(said), "{}", refused.err);
+    assert_eq!(std::fs::read_to_string(&script).ok(), Some(changed));
     // An earlier script and an earlier log stay in use.
     for _ in 0..2 {
         for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {

@@ -95,6 +95,7 @@ pub mod reviewers;
 mod row_spool;
 pub mod run;
 pub mod scan_corrections;
+pub mod script_checksum;
 pub mod selection;
 pub mod sheets;
 pub mod status;

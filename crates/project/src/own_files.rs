@@ -6,6 +6,7 @@ use crate::empty_import::EMPTY_IMPORT_FILE;
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::files::{HEAD_BYTES, beginning, is_backup};
+use crate::script_checksum::is_changed;
 use mocban_catalog::Catalog;
 use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};
 
@@ -26,6 +27,8 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
 
 /// Bytes of an earlier report by which it is recognized. No report is longer.
 const MAX_REPORT_BYTES: usize = 64 << 20;
+/// Bytes of an earlier script that are compared with its checksum. No script is longer.
+const MAX_SCRIPT_BYTES: usize = 16 << 20;
 
 /// Refuses to write over a file that is not empty and that `is_ours` does not recognize by its first bytes. `what` is the
 /// output, such as `a log file of this program`. Anything but a regular file is left to the function that writes.
@@ -57,6 +60,18 @@ pub(crate) fn refuse_foreign_report(
             path.display()
         ))),
         Some(false) | None => Ok(()),
+    }
+}
+
+/// Refuses to write a script over a file like [`refuse_foreign_file`], and over a script that somebody changed.
+pub fn refuse_foreign_script(
+    path: &Path,
+    what: &str,
+    is_ours: impl FnOnce(&[u8]) -> bool,
+) -> Result<(), Refusal> {
+    match earlier_output(path, what, MAX_SCRIPT_BYTES, is_ours)? {
+        Some(earlier) if is_changed(&earlier) => Err(changed_output(path, what)),
+        Some(_) | None => Ok(()),
     }
 }
 

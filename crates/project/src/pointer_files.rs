@@ -61,20 +61,22 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let mut pointers = PointerFiles::default();
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n";
+        let marked = format!("\u{feff}{pointer}");
         for (name, content) in [
             ("a.stl", "solid a"),
             ("b.stl", pointer),
             ("b.png", pointer),
             ("c.png", ""),
+            ("c.json", marked.as_str()),
         ] {
             let path = dir.path().join(name);
             std::fs::write(&path, content).expect("written");
             let meta = path.metadata().expect("a file");
             pointers.add(&path, &meta);
         }
-        let warning = pointers.warning().expect("two pointers");
+        let warning = pointers.warning().expect("three pointers");
         let first = dir.path().join("b.stl");
-        let text = format!("labels: 2, the first {}; fetch them", first.display());
+        let text = format!("labels: 3, the first {}; fetch them", first.display());
         assert!(warning.contains(&text), "{warning}");
         assert_eq!(PointerFiles::default().warning(), None);
     }

@@ -12,7 +12,8 @@ use crate::cli::output::streams;
 use mocban_project::details::names_with_prefix;
 use mocban_project::files;
 use mocban_project::location::Location;
-use mocban_project::own_files::{refuse_foreign_file, refuse_project_file};
+use mocban_project::own_files::{refuse_foreign_script, refuse_project_file};
+use mocban_project::script_checksum::with_checksum;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_system::failpoint::time_scale;
 
@@ -56,8 +57,8 @@ pub(crate) async fn completions(
     let is_ours =
         |earlier: &[u8]| first_line(&String::from_utf8_lossy(earlier)) == first_line(&script);
     let what = format!("a completion script for {}", args.shell);
-    refuse_foreign_file(path, &what, is_ours)?;
-    files::write_output(path, script.as_bytes(), true)?;
+    refuse_foreign_script(path, &what, is_ours)?;
+    files::write_output(path, with_checksum(&script).as_bytes(), true)?;
     Ok(ExitCode::Done)
 }
 

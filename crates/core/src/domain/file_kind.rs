@@ -133,6 +133,15 @@ pub fn pointer_of(needed: &str) -> String {
 impl FileKind {
     /// Returns the type of a file that begins with these bytes.
     pub fn of(bytes: &[u8]) -> Self {
+        // Programs for text add a byte order mark to pointers that they save.
+        let is_pointer = |text: &[u8]| {
+            let mut signatures = SIGNATURES.iter();
+            signatures
+                .any(|(signature, kind)| *kind == Self::LfsPointer && text.starts_with(signature))
+        };
+        if bytes.strip_prefix(b"\xef\xbb\xbf").is_some_and(is_pointer) {
+            return Self::LfsPointer;
+        }
         if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
             return Self::OtherImage("a WebP image");
         }

@@ -25,8 +25,9 @@ const MANY_DECIMALS: usize = 3;
 /// `2026-11-01`, `01.11.2026` and `1.00E+05`.
 ///
 /// An id is right if the path of its mesh or print has it, as in `scans/2026-11-01.stl`. Of the others, there is a warning if a
-/// path has what an id was made of, such as `1-11.stl` for `1-Nov`, if an id is a shortened long number, or if at least two ids have such a form and other ids do
-/// not. Dates in numbers do not count as two if another id has a year and two numbers, too, as in `1999.12.05` and `1999.13.01`.
+/// path has what an id was made of, such as `1-11.stl` for `1-Nov`, if an id is a shortened long number, or if at least two ids
+/// have such a form and other ids do not. Dates in numbers do not count as two if another id has a year and two numbers, too, as
+/// in `1999.12.05` and `1999.13.01`.
 ///
 /// So there is no warning about a list whose ids are all dates, and none about `1E5`, which no program writes for a power of ten.
 #[derive(Debug, Default)]

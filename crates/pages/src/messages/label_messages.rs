@@ -193,6 +193,14 @@ pub(super) const LABEL_MESSAGES: &[(&str, &str)] = &[
     ("it has no element Page", "không có phần tử Page"),
     ("it has several elements Page", "có nhiều phần tử Page"),
     (
+        "1 element is not divided as others are, and taken as a character: {}",
+        "1 phần tử không được chia nhỏ như các phần tử khác và được coi là chữ: {0}",
+    ),
+    (
+        "1 element is not divided as others are, and left out, because it holds several characters: {}",
+        "1 phần tử không được chia nhỏ như các phần tử khác và đã bị bỏ vì chứa nhiều chữ: {0}",
+    ),
+    (
         "{} elements are not divided as others are, and taken as characters: {}",
         "{0#} phần tử không được chia nhỏ như các phần tử khác và được coi là chữ: {1}",
     ),

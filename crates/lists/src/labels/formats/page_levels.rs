@@ -40,24 +40,34 @@ pub(super) fn characters(found: Vec<PageElement>) -> (Vec<LabelRegion>, Vec<Stri
     let (taken, large): (Vec<_>, Vec<_>) = found.into_iter().partition(is_character);
     let larger = taken.iter().filter(|one| one.level > smallest);
     let warnings = [
-        warning(larger, "taken as characters"),
+        warning(larger, ["taken as a character", "taken as characters"]),
         warning(
             large.iter(),
-            "left out, because they hold several characters",
+            [
+                "left out, because it holds several characters",
+                "left out, because they hold several characters",
+            ],
         ),
     ];
     let regions = taken.into_iter().map(|one| one.region).collect();
     (regions, warnings.into_iter().flatten().collect())
 }
 
-fn warning<'e>(elements: impl Iterator<Item = &'e PageElement>, outcome: &str) -> Option<String> {
+/// Returns a warning about elements, if there are any; `outcomes` say what became of one and of several.
+fn warning<'e>(
+    elements: impl Iterator<Item = &'e PageElement>,
+    [one, outcome]: [&str; 2],
+) -> Option<String> {
     let shown = elements.map(|one| format!("{} {}", LEVELS[one.level], one.region.shown()));
     let shown: Vec<String> = shown.collect();
     let names = list(&shown);
-    (!shown.is_empty()).then(|| {
-        format!(
-            "{} elements are not divided as others are, and {outcome}: {names}",
-            shown.len()
-        )
-    })
+    match shown.len() {
+        0 => None,
+        1 => Some(format!(
+            "1 element is not divided as others are, and {one}: {names}"
+        )),
+        count => Some(format!(
+            "{count} elements are not divided as others are, and {outcome}: {names}"
+        )),
+    }
 }
