@@ -116,8 +116,8 @@ impl SimilarFiles {
     }
 }
 
-/// Returns the entry of a folder whose name is that given, or those that differ from it in the same way, first those in which
-/// the fewest letters differ.
+/// Returns the entry of a folder with this name, or the entries whose names differ from it in the same way. Names that differ in
+/// the fewest letters come first.
 fn similar_entries(folder: &Path, name: &str) -> Vec<String> {
     // The folder of a bare file name is empty.
     let Ok(entries) = std::fs::read_dir(Path::new(".").join(folder)) else {

@@ -2,7 +2,7 @@
 
 use crate::mesh::MeshError;
 
-/// Fewest columns of a grid without a header. Points with so many have a title.
+/// Fewest columns of a grid without a header. Points with that number of columns have a title.
 const GRID_COLUMNS: usize = 32;
 /// First words of the headers of grids: those of ESRI, Surfer and others.
 const HEADER_WORDS: [&str; 4] = ["ncols", "nrows", "dsaa", "cellsize"];
