@@ -3,7 +3,8 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 use super::error::{MeshLimits, MeshReadError};
-use super::far_values::{CORNERS_OF_VERTEX, FarValues, find_far_values};
+use super::extreme_vertices::ExtremeVertices;
+use super::far_values::{FarValues, VertexKind, find_far_values};
 use super::format::DetectedFormat;
 use super::missing::is_position;
 use super::ply::VertexRows;
@@ -103,11 +104,12 @@ pub(super) fn some_positions(
     spread: SampleSpread,
 ) -> Result<(Vec<[f64; 3]>, Option<LengthUnit>), MeshReadError> {
     let mut found = Vec::new();
-    let (unit, repeats) = each_position(file, (len, name), limits, spread, &mut |position| {
+    let (unit, kind) = each_position(file, (len, name), limits, spread, &mut |position| {
         found.push(position);
     })?;
     let vertices: Vertices = found.into();
-    let far_values = find_far_values(&vertices, repeats, is_position);
+    let extremes = ExtremeVertices::of(&vertices, is_position);
+    let far_values = find_far_values(&vertices, kind, &extremes, is_position);
     let is_kept = |vertex: &[f64; 3]| !far_values.are_at(*vertex);
     Ok((vertices.iter().filter(is_kept).collect(), unit))
 }
@@ -121,7 +123,13 @@ pub fn far_values_of_stl(file: &mut (impl Read + Seek), triangles: u32) -> io::R
     let mut found = Vec::new();
     each_corner(file, len, FOR_SIZE, &mut |corner| found.push(corner))?;
     let vertices = Vertices::Single(found.into());
-    Ok(find_far_values(&vertices, CORNERS_OF_VERTEX, is_position))
+    let extremes = ExtremeVertices::of(&vertices, is_position);
+    Ok(find_far_values(
+        &vertices,
+        VertexKind::Corners,
+        &extremes,
+        is_position,
+    ))
 }
 
 /// Visits the corners of facets at some places of a binary STL of `len` bytes.
@@ -138,16 +146,16 @@ fn each_corner(
     })
 }
 
-/// Visits vertices at some places of a file with a length and a name. Returns the unit that the file names, and about how
-/// often each vertex is in the file. Visits none if their places are not known, and leaves out repeated vertices at the
-/// origin, which have no position, except in an STL.
+/// Visits vertices at some places of a file with a length and a name. Returns the unit that the file names, and what the
+/// vertices are. Visits none if their places are not known, and leaves out repeated vertices at the origin, which have no
+/// position, except in an STL.
 fn each_position(
     file: &mut (impl Read + Seek),
     (len, name): (u64, &str),
     limits: &MeshLimits,
     spread: SampleSpread,
     visit: &mut dyn FnMut([f64; 3]),
-) -> Result<(Option<LengthUnit>, usize), MeshReadError> {
+) -> Result<(Option<LengthUnit>, VertexKind), MeshReadError> {
     let mut head = Vec::new();
     file.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
     let unit = stated_unit(&head);
@@ -156,7 +164,7 @@ fn each_position(
         each_corner(file, len, spread, &mut |corner| {
             visit(corner.map(f64::from));
         })?;
-        return Ok((unit, CORNERS_OF_VERTEX));
+        return Ok((unit, VertexKind::Corners));
     }
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&head);
     let lines = TextLines {
@@ -189,7 +197,7 @@ fn each_position(
                 let position = after_keyword(line, b"vertex");
                 position.into_iter().for_each(&mut *visit);
             })?;
-            return Ok((unit, CORNERS_OF_VERTEX));
+            return Ok((unit, VertexKind::Corners));
         }
         DetectedFormat::Xyz => {
             let points = SampledPoints::of(whole_lines(text, lines.line_end, true))?;
@@ -207,7 +215,7 @@ fn each_position(
     if origins == 1 {
         visit([0.0; 3]);
     }
-    Ok((unit, 1))
+    Ok((unit, VertexKind::Shared))
 }
 
 /// Returns the position that follows a keyword at the beginning of a line.

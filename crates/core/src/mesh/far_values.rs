@@ -1,19 +1,44 @@
 //! Numbers below 1e15 that stand for a missing position, such as -9999 in all coordinates or in the height alone.
 
+use super::extreme_vertices::ExtremeVertices;
+use super::inner_range::InnerRange;
 use super::triangle_mesh::Vertices;
 use crate::domain::cancel::polled;
 
-/// Vertices that are compared. More are only counted if one of these is far from the others.
+/// Vertices that are compared with the extreme ones.
 const SAMPLES: usize = 1024;
 /// Fewest vertices of a mesh in which some may stand for missing ones.
 const FEWEST_VERTICES: usize = 100;
-/// Fewest vertices that share a number that stands for a missing one, and their smallest share of all.
+/// Fewest vertices that share a number that stands for a missing one.
 const FEWEST_MISSING: usize = 8;
-const LEAST_SHARE: usize = 1000;
 /// Corners of triangles that meet at a vertex, about, if each triangle has corners of its own.
-pub(super) const CORNERS_OF_VERTEX: usize = 6;
+const CORNERS_OF_VERTEX: usize = 6;
 /// Distance of such a number from the box around the other vertices, as a multiple of its longest side.
 const FAR: f64 = 10.0;
+/// Distance of a box from the origin, as a multiple of its longest side or in the unit of the mesh, within which far numbers
+/// such as -9999 are farther from the origin.
+const NEAR: f64 = 2.0;
+const NEAR_UNITS: f64 = 8000.0;
+/// Absolute heights that stand for missing ones even if they are nearer.
+const KNOWN_HEIGHTS: [f64; 8] = [
+    99.0, 999.0, 9999.0, 99_999.0, 999_999.0, 32_767.0, 32_768.0, 65_535.0,
+];
+/// Least gap between such a height and others, and between height 0 and others of points, as a share of the longest side.
+const KNOWN_GAP: f64 = 0.02;
+const ZERO_GAP: f64 = 0.5;
+/// Least share of vertices at such a height, as one in so many.
+const KNOWN_SHARE: usize = 1000;
+
+/// What the vertices of a mesh are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum VertexKind {
+    /// Corners of triangles, each of which has corners of its own.
+    Corners,
+    /// Corners that triangles may share.
+    Shared,
+    /// Points without triangles.
+    Points,
+}
 
 /// What vertices without a position have in common.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,14 +71,20 @@ impl FarValues {
 }
 
 /// Finds what stands for missing positions: a number far outside of the box around the other vertices that many vertices
-/// have, exactly, in all coordinates or as their height. Others that are no positions, as `is_position` says, do not count.
-/// Each vertex is there about `repeats` times.
+/// have, exactly, in all coordinates or as their height. If there is none, a height that usually stands for a missing one may
+/// be nearer: -99, -999 and so on, and 0 in points without faces. Others that are no positions, as `is_position` says, do not
+/// count. `extremes` are vertices that may be far outside.
 pub(super) fn find_far_values(
     vertices: &Vertices,
-    repeats: usize,
+    kind: VertexKind,
+    extremes: &ExtremeVertices,
     is_position: impl Fn([f64; 3]) -> bool,
 ) -> FarValues {
     let count = vertices.len();
+    let repeats = match kind {
+        VertexKind::Corners => CORNERS_OF_VERTEX,
+        VertexKind::Shared | VertexKind::Points => 1,
+    };
     if count < FEWEST_VERTICES * repeats {
         return FarValues::default();
     }
@@ -63,28 +94,34 @@ pub(super) fn find_far_values(
         ((share * count as f64) as usize).min(count - 1)
     };
     let sample = (0..SAMPLES.min(count)).map(|nth| vertices.at(place(nth)));
-    let sample: Vec<[f64; 3]> = sample.filter(|vertex| is_position(*vertex)).collect();
-    let mut found = outside(&sample);
-    let fewest = (FEWEST_MISSING * repeats).max(count / LEAST_SHARE);
-    found.retain(|value| {
+    let sample = sample.chain(extremes.all());
+    let mut sample: Vec<[f64; 3]> = sample.filter(|vertex| is_position(*vertex)).collect();
+    let mut ranges = AxisRanges::of(&sample);
+    if !ranges.is_near_origin() {
+        // Extreme vertices need not be those farthest from the origin.
+        sample.extend(ExtremeVertices::of(vertices, &is_position).all());
+        ranges = AxisRanges::of(&sample);
+    }
+    let has = |value: &FarValue, fewest: usize| {
         let equal = polled(vertices.iter()).filter(|vertex| value.is_at(*vertex));
         equal.take(fewest).count() == fewest
-    });
+    };
+    let fewest = FEWEST_MISSING * repeats;
+    let mut found = outside(&sample, &ranges);
+    found.retain(|value| has(value, fewest));
+    if found.is_empty() {
+        let heights = ranges.known_heights(kind == VertexKind::Points);
+        found.extend(heights.map(FarValue::Height));
+        found.retain(|value| has(value, fewest.max(count / KNOWN_SHARE)));
+    }
     FarValues(found)
 }
 
 /// Returns the extreme positions and heights of a sample that are far outside of the box around its other vertices.
-fn outside(sample: &[[f64; 3]]) -> Vec<FarValue> {
-    if sample.is_empty() {
-        return Vec::new();
-    }
-    let along = |axis: usize| sample.iter().map(move |vertex| vertex[axis]);
-    let [x, y, z] = [0, 1, 2].map(|axis| InnerRange::of(along(axis)));
-    let longest = [x, y, z].into_iter().map(InnerRange::length);
-    let longest = longest.fold(0.0, f64::max);
-    let mut found: Vec<FarValue> = z.far_ends(longest).map(FarValue::Height).collect();
-    for (axis, range) in [x, y].into_iter().enumerate() {
-        for end in range.far_ends(longest) {
+fn outside(sample: &[[f64; 3]], ranges: &AxisRanges) -> Vec<FarValue> {
+    let mut found: Vec<FarValue> = ranges.far_ends(2).map(FarValue::Height).collect();
+    for axis in [0, 1] {
+        for end in ranges.far_ends(axis) {
             let vertex = sample.iter().find(|vertex| vertex[axis] == end);
             let vertex = vertex.filter(|vertex| found.iter().all(|value| !value.is_at(**vertex)));
             found.extend(vertex.map(|vertex| FarValue::Position(*vertex)));
@@ -93,52 +130,75 @@ fn outside(sample: &[[f64; 3]]) -> Vec<FarValue> {
     found
 }
 
-/// The ends of some numbers, and the range of those between them.
-#[derive(Debug, Clone, Copy)]
-struct InnerRange {
-    ends: [f64; 2],
-    inner: [f64; 2],
+/// The inner ranges along the axes.
+#[derive(Debug, Clone)]
+struct AxisRanges {
+    axes: [InnerRange; 3],
+    /// The range of heights without any of its ends.
+    heights: [f64; 2],
+    /// The longest side of the box.
+    longest: f64,
 }
 
-impl InnerRange {
-    /// Returns the range of some numbers. Of two different ones, the more frequent one is between.
-    fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
-        let none = [f64::INFINITY, f64::NEG_INFINITY];
-        let with = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
-        let ends = values.clone().fold(none, with);
-        let (mut inner, mut at_ends) = (none, [0, 0]);
-        for value in values {
-            if value == ends[0] {
-                at_ends[0] += 1;
-            } else if value == ends[1] {
-                at_ends[1] += 1;
+impl AxisRanges {
+    fn of(sample: &[[f64; 3]]) -> Self {
+        let along = |axis: usize| sample.iter().map(move |vertex| vertex[axis]);
+        let mut axes = [0, 1, 2].map(|axis| InnerRange::of(&along(axis)));
+        let longest = |axes: &[InnerRange; 3]| {
+            let lengths = axes.iter().map(InnerRange::length);
+            lengths.fold(0.0, f64::max)
+        };
+        let heights = axes[2].inner();
+        let first = longest(&axes);
+        for axis in &mut axes {
+            axis.extend_by(first);
+        }
+        Self {
+            longest: longest(&axes),
+            heights,
+            axes,
+        }
+    }
+
+    /// Returns the numbers along an axis that are far outside of the box.
+    fn far_ends(&self, axis: usize) -> impl Iterator<Item = f64> {
+        let room = if self.longest > 0.0 {
+            FAR * self.longest
+        } else {
+            f64::INFINITY
+        };
+        self.axes[axis].ends_beyond(room)
+    }
+
+    /// Returns heights that usually stand for missing ones, if there is a gap between them and the others that is longer than
+    /// the range of these.
+    fn known_heights(&self, are_points: bool) -> impl Iterator<Item = f64> {
+        let [low, high] = self.heights;
+        let longest = self.axes[0].length().max(self.axes[1].length());
+        self.axes[2].ends().filter(move |end| {
+            let gap = (low - end).max(end - high);
+            let share = if KNOWN_HEIGHTS.contains(&end.abs()) {
+                KNOWN_GAP
+            } else if are_points && *end == 0.0 {
+                ZERO_GAP
             } else {
-                inner = with(inner, value);
-            }
-        }
-        if inner == none {
-            inner = [ends[usize::from(at_ends[1] > at_ends[0])]; 2];
-        }
-        Self { ends, inner }
+                f64::INFINITY
+            };
+            gap > high - low && gap > share * longest
+        })
     }
 
-    fn length(self) -> f64 {
-        self.inner[1] - self.inner[0]
-    }
-
-    /// Returns the ends that are far from the numbers between them. `longest` is the longest side of the box.
-    fn far_ends(self, longest: f64) -> impl Iterator<Item = f64> {
-        let [low, high] = self.inner;
-        let room = FAR * longest;
-        let is_far = move |end: &f64| longest > 0.0 && (*end < low - room || *end > high + room);
-        self.ends.into_iter().filter(is_far)
+    /// Returns whether numbers far outside of the box are also farther from the origin than the box.
+    fn is_near_origin(&self) -> bool {
+        let most = NEAR_UNITS.max(NEAR * self.longest);
+        self.axes.iter().all(|range| range.largest() <= most)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{CORNERS_OF_VERTEX, FarValue, find_far_values};
-    use crate::mesh::missing::is_position;
+    use super::{CORNERS_OF_VERTEX, FarValue, VertexKind, find_far_values};
+    use crate::mesh::missing::{PositionCheck, is_position};
     use crate::mesh::write::MeshFormat;
     use crate::mesh::{Mesh, MeshLimits, MeshRead, Vertices, read_from};
 
@@ -153,7 +213,12 @@ mod tests {
 
     fn found(more: &[[f64; 3]]) -> Vec<FarValue> {
         let vertices: Vertices = [relief(), more.to_vec()].concat().into();
-        find_far_values(&vertices, 1, is_position).0
+        find(&vertices)
+    }
+
+    fn find(vertices: &Vertices) -> Vec<FarValue> {
+        let check = PositionCheck::of(vertices);
+        find_far_values(vertices, VertexKind::Shared, &check.extremes, is_position).0
     }
 
     #[test]
@@ -185,9 +250,54 @@ mod tests {
         assert_eq!(found(&specks), []);
         assert_eq!(found(&[[-9999.0; 3]; 5]), []);
         let few: Vertices = vec![[0.0, 1.0, 2.0]; 50].into();
-        assert_eq!(find_far_values(&few, 1, is_position).0, []);
+        assert_eq!(find(&few), []);
         let one: Vertices = vec![[0.0, 1.0, 2.0]; 500].into();
-        assert_eq!(find_far_values(&one, 1, is_position).0, []);
+        assert_eq!(find(&one), []);
+    }
+
+    #[test]
+    fn few_of_many_and_two_numbers_are_found() {
+        let all = |more: &[[f64; 3]], shift: f64| -> Vertices {
+            let relief = relief().repeat(40).into_iter();
+            let shifted = relief.map(|[x, y, z]| [x + shift, y + shift, z]);
+            shifted.chain(more.iter().copied()).collect()
+        };
+        for shift in [0.0, 5e5] {
+            let few = [[shift, shift, -9999.0]; 8];
+            assert_eq!(find(&all(&few, shift)), [FarValue::Height(-9999.0)]);
+            assert_eq!(find(&all(&few[1..], shift)), []);
+        }
+        let two = [vec![[-9999.0; 3]; 3000], vec![[-32768.0; 3]; 9]].concat();
+        let found = find(&all(&two, 0.0));
+        let wanted = [-32768.0, -9999.0].map(FarValue::Height);
+        assert_eq!(found, wanted);
+    }
+
+    #[test]
+    fn usual_numbers_for_missing_heights_are_found_behind_a_gap() {
+        let with = |value: f64, scale: f64, lift: f64| -> Vertices {
+            let relief = relief().into_iter();
+            let lifted = relief.map(|[x, y, z]| [x, y, z + lift].map(|value| value * scale));
+            let missing = (0..40).map(|k| [f64::from(k) * scale, 9.0 * scale, value]);
+            lifted.chain(missing).collect()
+        };
+        for (value, scale) in [
+            (-99.0, 1.0),
+            (-999.0, 10.0),
+            (-9999.0, 1000.0),
+            (-32768.0, 1000.0),
+        ] {
+            let found = find(&with(value, scale, 0.0));
+            assert_eq!(found, [FarValue::Height(value)], "{value}");
+            assert_eq!(find(&with(value + 0.5, scale, 0.0)), [], "{value}");
+        }
+        let zeros = with(0.0, 1.0, 30.0);
+        let found = |kind| {
+            let check = PositionCheck::of(&zeros);
+            find_far_values(&zeros, kind, &check.extremes, is_position).0
+        };
+        assert_eq!(found(VertexKind::Points), [FarValue::Height(0.0)]);
+        assert_eq!(found(VertexKind::Shared), []);
     }
 
     /// Returns a relief of 3,042 triangles. Vertices are elsewhere where `moved` says so.

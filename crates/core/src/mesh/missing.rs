@@ -1,10 +1,11 @@
 //! What is left out of a mesh: vertices without a position, and faces without three corners.
 //!
 //! Scanners and converters write NaN for a point that they did not measure, 0 0 0 in organized clouds, and others a number
-//! that no scan has, such as 1e30 or the largest float. Smaller numbers are found where many vertices share one that is far
-//! from the others.
+//! that no scan has, such as 1e30 or the largest float. Smaller numbers are found where several vertices share one that is
+//! far from the others, or one that is usual for missing heights.
 
 use super::error::MeshError;
+use super::extreme_vertices::ExtremeVertices;
 use super::far_values::FarValues;
 use super::{Mesh, Vertices};
 use crate::domain::MeshLosses;
@@ -13,6 +14,9 @@ use crate::domain::cancel::polled;
 /// Absolute values from this on, about 1e15, stand for a missing coordinate. No scan is so large in any unit: 1 m has 1e9
 /// nanometres. The number is a power of two, so that it is the same in single precision.
 const MISSING_FROM: f64 = (1_u64 << 50) as f64;
+
+/// How far from the largest absolute value that was seen one stays unnoticed.
+const ROOM: f64 = 1.125;
 
 /// A mesh as read.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +33,11 @@ pub(super) struct PositionCheck {
     are_all_positions: bool,
     /// Number of vertices at the origin.
     origins: u64,
+    /// Absolute values below this one are not noticed. It grows a few times, so that almost all vertices are compared with it
+    /// alone.
+    bound: f64,
+    /// The extreme ones of the vertices that were noticed, of which others are at most [`ROOM`] times as far from the origin.
+    pub(super) extremes: ExtremeVertices,
 }
 
 impl PositionCheck {
@@ -36,6 +45,8 @@ impl PositionCheck {
     pub(super) const NONE: Self = Self {
         are_all_positions: true,
         origins: 0,
+        bound: 0.0,
+        extremes: ExtremeVertices::NONE,
     };
 
     /// Checks all vertices of a mesh.
@@ -50,15 +61,31 @@ impl PositionCheck {
 
     /// Checks some more vertices that faces use.
     pub(super) fn add_used<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
+        if !are_below(positions, T::rounded(self.bound)) {
+            self.add_far(positions);
+        }
+    }
+
+    /// Checks some more vertices, of which one is outside of the bound.
+    #[cold]
+    fn add_far<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
         self.are_all_positions &= are_positions(positions);
+        let vertices = positions
+            .iter()
+            .map(|position| position.map(Into::<f64>::into));
+        for vertex in vertices.filter(|vertex| is_position(*vertex)) {
+            self.extremes.add(vertex);
+        }
+        self.bound = (ROOM * self.extremes.largest()).min(MISSING_FROM);
     }
 
     /// Checks some more vertices.
     #[inline]
     pub(super) fn add<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
+        let bound = T::rounded(self.bound);
         let values = positions.as_flattened().iter();
-        if !values.fold(true, |usual, value| usual & value.is_usual()) {
-            self.are_all_positions &= are_positions(positions);
+        if !values.fold(true, |usual, value| usual & value.is_usual(bound)) {
+            self.add_used(positions);
             self.origins += origins(positions);
         }
     }
@@ -139,10 +166,16 @@ pub(super) trait CoordinateValue: Copy + Into<f64> + PartialEq + Default {
     /// Returns whether a value does not stand for a missing coordinate.
     fn is_coordinate(self) -> bool;
 
-    /// Returns whether a value is a coordinate other than 0.
+    /// Returns a number in the precision of coordinates.
+    fn rounded(value: f64) -> Self;
+
+    /// Returns whether an absolute value is below a bound.
+    fn is_below(self, bound: Self) -> bool;
+
+    /// Returns whether a value is not 0 and below a bound.
     #[inline]
-    fn is_usual(self) -> bool {
-        (self != Self::default()) & self.is_coordinate()
+    fn is_usual(self, bound: Self) -> bool {
+        (self != Self::default()) & self.is_below(bound)
     }
 }
 
@@ -151,12 +184,32 @@ impl CoordinateValue for f32 {
     fn is_coordinate(self) -> bool {
         self.abs() < MISSING_FROM as Self
     }
+
+    #[inline]
+    fn rounded(value: f64) -> Self {
+        value as Self
+    }
+
+    #[inline]
+    fn is_below(self, bound: Self) -> bool {
+        self.abs() < bound
+    }
 }
 
 impl CoordinateValue for f64 {
     #[inline]
     fn is_coordinate(self) -> bool {
         self.abs() < MISSING_FROM
+    }
+
+    #[inline]
+    fn rounded(value: f64) -> Self {
+        value
+    }
+
+    #[inline]
+    fn is_below(self, bound: Self) -> bool {
+        self.abs() < bound
     }
 }
 
@@ -165,6 +218,13 @@ impl CoordinateValue for f64 {
 pub(super) fn are_positions<T: CoordinateValue>(positions: &[[T; 3]]) -> bool {
     let values = positions.as_flattened().iter();
     values.fold(true, |all, value| all & value.is_coordinate())
+}
+
+/// Returns whether the absolute values of all coordinates are below a bound.
+#[inline(never)] // Like `are_positions`.
+fn are_below<T: CoordinateValue>(positions: &[[T; 3]], bound: T) -> bool {
+    let values = positions.as_flattened().iter();
+    values.fold(true, |all, value| all & value.is_below(bound))
 }
 
 /// Returns the number of positions at the origin.

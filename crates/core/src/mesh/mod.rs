@@ -5,8 +5,10 @@ mod clustering;
 mod decimal;
 mod error;
 mod extent;
+mod extreme_vertices;
 mod far_values;
 mod format;
+mod inner_range;
 mod missing;
 mod obj;
 mod ply;
@@ -38,7 +40,7 @@ use std::io::{Read, Seek};
 use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
 use crate::page_vec::PageVec;
-use far_values::{CORNERS_OF_VERTEX, find_far_values};
+use far_values::{VertexKind, find_far_values};
 use format::DetectedFormat;
 use missing::{PositionCheck, is_position};
 
@@ -96,11 +98,12 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
     if mesh.vertices.is_empty() {
         return Err(MeshError::NoVertices);
     }
-    let repeats = match format {
-        DetectedFormat::StlBinary | DetectedFormat::StlAscii => CORNERS_OF_VERTEX,
-        DetectedFormat::Obj | DetectedFormat::Ply | DetectedFormat::Xyz => 1,
+    let kind = match format {
+        DetectedFormat::StlBinary | DetectedFormat::StlAscii => VertexKind::Corners,
+        _ if mesh.triangles.is_empty() => VertexKind::Points,
+        DetectedFormat::Obj | DetectedFormat::Ply | DetectedFormat::Xyz => VertexKind::Shared,
     };
-    let far_values = find_far_values(&mesh.vertices, repeats, is_position);
+    let far_values = find_far_values(&mesh.vertices, kind, &check.extremes, is_position);
     check.without_missing(mesh, incomplete_faces, &far_values)
 }
 
@@ -141,7 +144,12 @@ pub fn read_from(
     let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
         let (mesh, check) = stl::read_facets(&mut source, count, limits)?;
-        let far_values = find_far_values(&mesh.vertices, CORNERS_OF_VERTEX, is_position);
+        let far_values = find_far_values(
+            &mesh.vertices,
+            VertexKind::Corners,
+            &check.extremes,
+            is_position,
+        );
         return Ok(check.without_missing(mesh, 0, &far_values)?);
     }
     let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
