@@ -31,13 +31,7 @@ fn unit_of(line: &[u8]) -> Option<LengthUnit> {
 }
 
 fn named_unit(name: &str) -> Option<LengthUnit> {
-    match name {
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(LengthUnit::Mm),
-        "cm" | "centimeter" | "centimeters" | "centimetre" | "centimetres" => Some(LengthUnit::Cm),
-        "m" | "meter" | "meters" | "metre" | "metres" => Some(LengthUnit::M),
-        "inch" | "inches" => Some(LengthUnit::In),
-        _ => None,
-    }
+    LengthUnit::named(name).ok()
 }
 
 #[cfg(test)]

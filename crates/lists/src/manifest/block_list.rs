@@ -282,7 +282,7 @@ fn row(mut draft: DraftRow, reasons: &mut Vec<String>) -> Option<BlockRow> {
     };
     let unit = cells
         .get("unit")
-        .map(|cell| any_case::<LengthUnit>(cell))
+        .map(|cell| LengthUnit::named(cell))
         .transpose();
     let side = cells.get("side").map(|cell| side(cell)).transpose();
     let name = record(name, reasons);

@@ -9,7 +9,7 @@ use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
 use mocban_core::domain::spelling::{plain_form, quoted};
-use mocban_core::domain::{LengthUnit, PairName, PairNameError, any_case, sanitize, value_text};
+use mocban_core::domain::{LengthUnit, PairName, PairNameError, sanitize, value_text};
 
 /// The cells of one row by lower-case column name, and its other columns, without empty cells.
 #[derive(Debug, Default)]
@@ -152,7 +152,7 @@ fn complete(
     let unit = draft
         .cells
         .remove("unit")
-        .map(|cell| any_case::<LengthUnit>(&cell));
+        .map(|cell| LengthUnit::named(&cell));
     let face_down = draft
         .cells
         .remove("scanned_face_down")

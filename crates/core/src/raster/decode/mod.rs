@@ -125,11 +125,13 @@ fn decode_png(
     let mut memory = image::Limits::no_limits();
     memory.max_alloc = Some(limits.max_decoder_bytes());
     reader.limits(memory);
-    let mut decoder = reader.into_decoder().map_err(|error| png_error(&error))?;
+    let mut decoder = reader
+        .into_decoder()
+        .map_err(|error| png_error(&error, bytes))?;
     // The decoder skips a profile that it cannot decompress, and reads one behind the palette.
     let profile = png_colour_chunk(bytes, *b"iCCP")
         .map(|_| decoder.icc_profile().ok().flatten().unwrap_or_default());
-    let pixels = DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error))?;
+    let pixels = DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error, bytes))?;
     let profile = profile.map(|bytes| FileProfile {
         bytes,
         is_of_inks: false,
@@ -137,13 +139,16 @@ fn decode_png(
     Ok((pixels, profile))
 }
 
-fn png_error(error: &ImageError) -> DecodeError {
+/// Bytes at the end of a PNG that are not all zero. Those of a file that was not written to its end may be.
+const PNG_END: usize = 12;
+
+fn png_error(error: &ImageError, bytes: &[u8]) -> DecodeError {
     let reason = error.to_string();
     let early_end = match error {
         ImageError::IoError(io) => io.kind() == std::io::ErrorKind::UnexpectedEof,
         _ => reason.contains("unexpected end of file") || reason.contains("UnexpectedEof"),
     };
-    if early_end {
+    if early_end || bytes.ends_with(&[0; PNG_END]) {
         return DecodeError::Truncated(FileKind::Png);
     }
     broken(FileKind::Png, &reason)
@@ -349,8 +354,14 @@ mod tests {
                     assert!(has_pixels && cut == picture, "{format:?} of {len} bytes");
                 }
             }
-            let error = decode(&whole[..whole.len() / 2], &LIMITS);
+            let half = &whole[..whole.len() / 2];
+            let error = decode(half, &LIMITS);
             assert_eq!(error, Err(DecodeError::Truncated(kind)), "{format:?}");
+            if kind == FileKind::Png {
+                let zeros = vec![0; whole.len() - half.len()];
+                let error = decode(&[half, &zeros].concat(), &LIMITS);
+                assert_eq!(error, Err(DecodeError::Truncated(kind)));
+            }
         }
     }
 
