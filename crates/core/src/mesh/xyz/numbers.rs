@@ -42,7 +42,11 @@ pub(super) fn check_grid(
     layout: &PointLayout,
     points: &[[f64; 3]],
 ) -> Result<(), MeshError> {
-    if points.len() < NUMBERED_POINTS || !is_whole(points, 0) || !is_whole(points, 1) {
+    if layout.behind(2).is_none()
+        || points.len() < NUMBERED_POINTS
+        || !is_whole(points, 0)
+        || !is_whole(points, 1)
+    {
         return Ok(());
     }
     let has_three = is_whole(points, 2);
