@@ -9,7 +9,7 @@ use crate::cli::output::digits::{
 use crate::cli::output::table::columns;
 use clap::Args;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
-use mocban_core::domain::{LengthUnit, any_case};
+use mocban_core::domain::LengthUnit;
 use mocban_project::align::{self, AlignInput, FileAlignment, side};
 use mocban_project::{ExitCode, ProjectResult};
 
@@ -25,7 +25,7 @@ pub(crate) struct AlignArgs {
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Unit of the mesh: mm, cm, m or in [default: unknown]
-    #[arg(long, value_parser = any_case::<LengthUnit>)]
+    #[arg(long, value_parser = LengthUnit::named)]
     pub(crate) unit: Option<LengthUnit>,
     /// Whether the carved face points towards -z of the mesh [default: found out]
     #[arg(long, value_name = "BOOL")]

@@ -10,7 +10,7 @@ use super::import_blocks::{self, BlockArgs};
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use crate::cli::output::terminal::Terminal;
-use mocban_core::domain::{LengthUnit, any_case};
+use mocban_core::domain::LengthUnit;
 use mocban_project::import_blocks::{ListedItems, import_blocks};
 use mocban_project::import_pairs::{
     AllowedChanges, ImportOutcome, PairImport, PairSource, import_pairs,
@@ -44,7 +44,7 @@ pub(crate) struct ImportArgs {
     #[command(flatten)]
     pub(crate) block: BlockArgs,
     /// Unit of the meshes in --meshes or of --block: mm, cm, m or in
-    #[arg(long, conflicts_with = "file", value_parser = any_case::<LengthUnit>)]
+    #[arg(long, conflicts_with = "file", value_parser = LengthUnit::named)]
     pub(crate) unit: Option<LengthUnit>,
     /// True alignments, one JSON object per line; the report then gives the errors against them
     #[arg(long, value_name = "FILE")]

@@ -125,8 +125,8 @@ fn problems_name_line_and_column() {
             "\"Top\" is not a side (front, back)",
         ),
         (
-            "block,mesh,page,unit\nb,m,p,Inch\n",
-            "\"Inch\" is not a unit (mm, cm, m, in)",
+            "block,mesh,page,unit\nb,m,p,Foot\n",
+            "\"Foot\" is not a unit (mm, cm, m, in)",
         ),
         ("block,mesh,page\na/b,m,p\n", "an id has no slashes"),
         ("block,mesh,page\n", "the list contains no blocks"),
