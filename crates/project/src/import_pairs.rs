@@ -133,8 +133,8 @@ pub async fn import_pairs(
     let spooled = blocking(move || {
         token.scope(|| spool(&listing, &looked_at, import.allowed, &import.choices))
     });
-    let (rows, missing, pointers) = spooled.await??;
-    warnings.extend(pointers);
+    let (rows, missing, unusable) = spooled.await??;
+    warnings.extend(unusable);
     let (rows, terms) = (
         Arc::new(Mutex::new(rows)),
         ImportTerms {
@@ -184,8 +184,8 @@ async fn store_in(
     Ok(stored?)
 }
 
-/// Looks at the files of all rows. Returns the rows as they are stored, the missing files, and a warning about pointers of
-/// Git LFS.
+/// Looks at the files of all rows. Returns the rows as they are stored, the missing files, and warnings about files that
+/// cannot be inputs.
 ///
 /// # Errors
 /// Returns an error if files are missing that must exist, if the path of a file cannot be stored, or if there is no space
@@ -195,13 +195,13 @@ fn spool(
     project: &Project,
     allowed: AllowedChanges,
     choices: &PairChoices,
-) -> ProjectResult<(RowSpool, MissingFiles, Option<String>)> {
+) -> ProjectResult<(RowSpool, MissingFiles, Vec<String>)> {
     let failed = || "cannot write a temporary file for the list".to_owned();
     let mut spool = RowSpool::new().with_context(failed)?;
     let mut missing = MissingFiles::default();
     let mut outcome = Ok(());
     let mut count = 0_u64;
-    let ListedRows { hash, pointers } = listing.rows(project, |mut row, lines| {
+    let ListedRows { hash, unusable } = listing.rows(project, |mut row, lines| {
         poll();
         count += 1;
         choices.add_block(&mut row);
@@ -228,7 +228,7 @@ fn spool(
     if missing.count > 0 && !allowed.missing {
         return Err(missing.refusal().into());
     }
-    Ok((spool, missing, pointers))
+    Ok((spool, missing, unusable))
 }
 
 /// Reads what a source names, as a person has chosen.

@@ -92,7 +92,7 @@ pub fn plan_import(
     let (mut pairs, mut planned, mut has_blocks) = (0, Vec::new(), false);
     let mut missing = MissingFiles::default();
     let mut columns = ColumnHasher::default();
-    let ListedRows { hash, pointers } = listing.rows(&project, |mut row, lines| {
+    let ListedRows { hash, unusable } = listing.rows(&project, |mut row, lines| {
         poll();
         has_blocks |= row.block.is_some();
         choices.add_block(&mut row);
@@ -126,7 +126,7 @@ pub fn plan_import(
         missing,
         alone: listing.alone,
         no_pair: listing.no_pair.map(|why| why.to_string()),
-        warnings: listing.warnings.into_iter().chain(pointers).collect(),
+        warnings: listing.warnings.into_iter().chain(unusable).collect(),
         renamed: listing.renamed,
     })
 }

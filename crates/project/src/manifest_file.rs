@@ -57,8 +57,8 @@ pub struct Listing {
 pub struct ListedRows {
     /// A hash of the rows as they are listed.
     pub hash: ContentHash,
-    /// A warning about files that are pointers of Git LFS.
-    pub pointers: Option<String>,
+    /// Warnings about files that cannot be inputs, such as pointers of Git LFS.
+    pub unusable: Vec<String>,
 }
 
 /// Where the rows come from.
@@ -278,7 +278,7 @@ impl Listing {
         };
         ListedRows {
             hash,
-            pointers: searches.pointers.warning(),
+            unusable: searches.pointers.warnings(),
         }
     }
 }
@@ -427,7 +427,7 @@ mod tests {
         let read = listing.rows(&Project::at(dir.path()), |_, lines| {
             assert!(lines.is_empty(), "{lines:?}");
         });
-        let warning = read.pointers.expect("three pointers");
+        let warning = read.unusable.concat();
         assert!(warning.contains("labels: 3, the first"), "{warning}");
     }
 

@@ -1,4 +1,5 @@
-//! Files of a list in whose place are pointers of Git LFS, because their content was not fetched.
+//! Files of a list that cannot be inputs: pointers of Git LFS, in whose place the content was not fetched, empty files,
+//! archives, and files that cannot be read.
 
 use std::fs::Metadata;
 use std::path::Path;
@@ -11,6 +12,8 @@ use mocban_core::domain::{FileKind, sanitize};
 const MAX_POINTER_BYTES: u64 = 1024;
 /// Longest path in a message, in characters.
 const MAX_PATH_CHARS: usize = 300;
+/// Largest number of files that are opened although they are too long for pointers: a disk may be slow.
+const MAX_OPENED: usize = 500;
 
 /// What is found out while the files of a list are looked at.
 #[derive(Debug, Default)]
@@ -19,36 +22,93 @@ pub(crate) struct FileSearches {
     pub(crate) pointers: PointerFiles,
 }
 
-/// Pointers of Git LFS.
+/// Pointers of Git LFS, and other files that cannot be inputs.
 #[derive(Debug, Default)]
 pub(crate) struct PointerFiles {
+    pointers: CountedFiles,
+    empty: CountedFiles,
+    archives: CountedFiles,
+    unreadable: CountedFiles,
+    /// Number of longer files that were opened.
+    opened: usize,
+}
+
+/// Files of a kind.
+#[derive(Debug, Default)]
+struct CountedFiles {
     count: usize,
     /// The path of the first one, as a message shows it.
     first: String,
 }
 
+impl CountedFiles {
+    fn add(&mut self, path: &Path) {
+        if self.count == 0 {
+            self.first = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
+        }
+        self.count += 1;
+    }
+}
+
 impl PointerFiles {
     /// Looks at a file.
     pub(crate) fn add(&mut self, path: &Path, meta: &Metadata) {
-        // Inputs are longer, so few files are opened.
-        let may_be_pointer = meta.is_file() && meta.len() <= MAX_POINTER_BYTES;
-        if may_be_pointer && kind(path) == Some(FileKind::LfsPointer) {
-            if self.count == 0 {
-                self.first = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
+        if !meta.is_file() {
+            return;
+        }
+        if meta.len() == 0 {
+            self.empty.add(path);
+            return;
+        }
+        let may_be_pointer = meta.len() <= MAX_POINTER_BYTES;
+        if !may_be_pointer {
+            if self.opened == MAX_OPENED {
+                return;
             }
-            self.count += 1;
+            self.opened += 1;
+        }
+        match kind(path) {
+            None => self.unreadable.add(path),
+            Some(FileKind::LfsPointer) if may_be_pointer => self.pointers.add(path),
+            Some(FileKind::Other(name)) if name.ends_with(" archive") => self.archives.add(path),
+            Some(_) => {}
         }
     }
 
-    /// Returns a warning, if there are any.
-    pub(crate) fn warning(&self) -> Option<String> {
-        let Self { count, first } = self;
-        (*count > 0).then(|| {
-            format!(
-                "files that are pointers of Git LFS and do not hold scans, prints or labels: {count}, the first {first}; fetch them with \
-                 `git lfs pull` before the run"
-            )
-        })
+    /// Returns a warning for each kind of files that was found.
+    pub(crate) fn warnings(&self) -> Vec<String> {
+        let sentence = |files: &CountedFiles, [what, advice]: [&str; 2]| {
+            let CountedFiles { count, first } = files;
+            (*count > 0).then(|| format!("{what}: {count}, the first {first}; {advice}"))
+        };
+        let sentences = [
+            sentence(
+                &self.pointers,
+                [
+                    "files that are pointers of Git LFS and do not hold scans, prints or labels",
+                    "fetch them with `git lfs pull` before the run",
+                ],
+            ),
+            sentence(
+                &self.empty,
+                ["files that are empty", "replace them before the run"],
+            ),
+            sentence(
+                &self.archives,
+                [
+                    "files that are archives",
+                    "unpack them, and import the files in them",
+                ],
+            ),
+            sentence(
+                &self.unreadable,
+                [
+                    "files that may not be read",
+                    "allow reading them before the run",
+                ],
+            ),
+        ];
+        sentences.into_iter().flatten().collect()
     }
 }
 
@@ -57,7 +117,7 @@ mod tests {
     use super::PointerFiles;
 
     #[test]
-    fn pointers_are_counted_with_the_first() {
+    fn files_that_cannot_be_inputs_are_counted_with_the_first() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let mut pointers = PointerFiles::default();
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n";
@@ -68,16 +128,28 @@ mod tests {
             ("b.png", pointer),
             ("c.png", ""),
             ("c.json", marked.as_str()),
+            ("d.stl", "PK\u{3}\u{4}  "),
         ] {
             let path = dir.path().join(name);
             std::fs::write(&path, content).expect("written");
             let meta = path.metadata().expect("a file");
             pointers.add(&path, &meta);
         }
-        let warning = pointers.warning().expect("three pointers");
-        let first = dir.path().join("b.stl");
-        let text = format!("labels: 3, the first {}; fetch them", first.display());
-        assert!(warning.contains(&text), "{warning}");
-        assert_eq!(PointerFiles::default().warning(), None);
+        let place = |name: &str| dir.path().join(name).display().to_string();
+        let [first, empty, archive] = ["b.stl", "c.png", "d.stl"].map(place);
+        assert_eq!(
+            pointers.warnings(),
+            [
+                format!(
+                    "files that are pointers of Git LFS and do not hold scans, prints or labels: 3, the first {first}; fetch them \
+                     with `git lfs pull` before the run"
+                ),
+                format!("files that are empty: 1, the first {empty}; replace them before the run"),
+                format!(
+                    "files that are archives: 1, the first {archive}; unpack them, and import the files in them"
+                ),
+            ]
+        );
+        assert_eq!(PointerFiles::default().warnings(), [""; 0]);
     }
 }

@@ -74,6 +74,30 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
     ),
     // Files that were not fetched.
     (
+        "files that are empty: {}, the first {}",
+        "số tệp trống: {0#}, tệp đầu tiên là {1}",
+    ),
+    (
+        "replace them before the run",
+        "hãy thay chúng trước khi chạy",
+    ),
+    (
+        "files that are archives: {}, the first {}",
+        "số tệp là tệp nén: {0#}, tệp đầu tiên là {1}",
+    ),
+    (
+        "unpack them, and import the files in them",
+        "hãy giải nén rồi nhập các tệp bên trong",
+    ),
+    (
+        "files that may not be read: {}, the first {}",
+        "số tệp không được phép đọc: {0#}, tệp đầu tiên là {1}",
+    ),
+    (
+        "allow reading them before the run",
+        "hãy cho phép đọc chúng trước khi chạy",
+    ),
+    (
         "files that are pointers of Git LFS and do not hold scans, prints or labels: {}, the first {}",
         "số tệp là con trỏ của Git LFS, không chứa bản quét, bản in hay nhãn: {0#}, tệp đầu tiên là {1}",
     ),
