@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use mocban_core::domain::FileKind;
+use mocban_core::domain::spelling::quoted;
 use mocban_lists::manifest::ManifestRow;
 
 /// Begins the sentences of a folder, whose other files are imported without these.
@@ -120,6 +121,9 @@ pub(crate) struct UnreadRows {
     prints: BTreeSet<PathBuf>,
     /// Whether a row has files that may be read.
     has_others: bool,
+    /// Number of rows with one file as mesh and print, and the id and line of the first.
+    with_one_file: usize,
+    first_with_one: Option<(String, usize)>,
 }
 
 impl UnreadRows {
@@ -138,9 +142,14 @@ impl UnreadRows {
             self.prints.insert(row.print.clone());
         }
         self.has_others |= !mesh && !print;
+        if row.mesh == row.print {
+            self.with_one_file += 1;
+            let first = || (row.name.as_str().to_owned(), row.line);
+            self.first_with_one.get_or_insert_with(first);
+        }
     }
 
-    /// Returns one warning per format.
+    /// Returns one warning per format, and one about rows with one file as mesh and print.
     ///
     /// # Errors
     /// Returns the sentences as an error if no row can be read.
@@ -148,6 +157,13 @@ impl UnreadRows {
         let mut found = UnreadFiles::of(&self.meshes, "", FileKind::mesh_advice);
         found.append(UnreadFiles::of(&self.prints, "", FileKind::image_advice));
         if self.has_others || found.sentences.is_empty() {
+            let count = self.with_one_file;
+            found.sentences.extend(self.first_with_one.map(|(id, line)| {
+                let id = quoted(&id);
+                format!(
+                    "pairs with one file as mesh and print: {count}, the first {id} on line {line}; name a scan and an image"
+                )
+            }));
             Ok(found.sentences)
         } else {
             Err(found.sentences.join("\n"))
@@ -160,6 +176,7 @@ mod tests {
     use std::path::PathBuf;
 
     use crate::manifest_file::Listing;
+    use crate::pair_choices::PairChoices;
     use mocban_lists::manifest::PairingChanges;
 
     #[test]
@@ -213,6 +230,19 @@ mod tests {
         assert_eq!(
             warnings,
             [&[format!("ignored, {other}")][..], &sentences].concat()
+        );
+    }
+
+    #[test]
+    fn a_file_that_is_mesh_and_print_is_named() {
+        let list = b"id,mesh,print\na,a.stl,a.png\nb,b.stl,b.stl\nc,c.stl,c.stl\n".to_vec();
+        let file = PathBuf::from("pairs.csv");
+        let listing = Listing::from_bytes(&file, list, &PairChoices::default());
+        let warning = "pairs with one file as mesh and print: 2, the first \"b\" on line 3; name a scan and an image";
+        let warnings = listing.expect("a list").warnings;
+        assert!(
+            warnings.iter().any(|found| found == warning),
+            "{warnings:?}"
         );
     }
 }

@@ -74,6 +74,14 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
     ),
     // Files that were not fetched.
     (
+        "pairs with one file as mesh and print: {}, the first {} on line {}",
+        "số cặp dùng một tệp cho cả bản quét và bản in: {0#}, cặp đầu tiên là {1}, ở dòng {2}",
+    ),
+    (
+        "name a scan and an image",
+        "hãy ghi một bản quét và một hình",
+    ),
+    (
         "files that are empty: {}, the first {}",
         "số tệp trống: {0#}, tệp đầu tiên là {1}",
     ),
