@@ -184,8 +184,6 @@ mod tests {
                     "              My note\n",
                     "ensemble,comment,1,2,3,4\n",
                     "ensemble,results,1,2,,\n",
-                    "Results      my note\n",
-                    "- Results: my note\n",
                 ] {
                     let continued = format!("{text}{note}");
                     assert!(is_continued(continued.as_bytes()), "{format}: {note}");
