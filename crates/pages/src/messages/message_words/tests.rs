@@ -346,7 +346,7 @@ fn no_row_is_hidden_by_an_earlier_one() {
 }
 
 /// Parts of messages that the program joins with the words beside them, so that no source has both.
-const COMPOSED: [&str; 40] = [
+const COMPOSED: [&str; 41] = [
     "half of the print only: is the sheet folded, torn or covered there?",
     "has no large flat part",
     "which is the size of a single character",
@@ -376,6 +376,7 @@ const COMPOSED: [&str; 40] = [
     "a line has a class and at least 4 more",
     "a date",
     "a power of ten",
+    "element is not divided as others are",
     "elements are nested",
     "an element ends that did not begin",
     "is unknown",
