@@ -5,8 +5,8 @@ const VIETNAMESE_TONES: [u8; 5] = [0xcc, 0xd2, 0xde, 0xec, 0xf2];
 /// Bytes of Đ, Ơ and Ư and their small letters in Windows-1258. In Windows-1252 they are Ð, Õ and Ý.
 const VIETNAMESE_LETTERS: [u8; 6] = [0xd0, 0xf0, 0xd5, 0xf5, 0xdd, 0xfd];
 
-/// Bytes of small letters of TCVN3 that are signs in Windows-1252 and 1258, but for those that stand behind words there, such
-/// as the registered sign.
+/// Bytes of small letters of TCVN3 that are signs in Windows-1252 and 1258. Signs that stand behind words there, such as the
+/// registered sign, are left out.
 const TCVN3_SIGNS: [u8; 13] = [
     0xa8, 0xaa, 0xab, 0xac, 0xb5, 0xb6, 0xb7, 0xb8, 0xb9, 0xbb, 0xbc, 0xbd, 0xbe,
 ];
