@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::files::kind;
 use super::input_paths::SimilarFiles;
+use super::unread_files::archive_kind;
 use mocban_core::domain::{FileKind, sanitize};
 
 /// Longest pointer in bytes. The specification of Git LFS demands fewer than 1024.
@@ -70,7 +71,12 @@ impl PointerFiles {
         match kind(path) {
             None => self.unreadable.add(path),
             Some(FileKind::LfsPointer) if may_be_pointer => self.pointers.add(path),
-            Some(FileKind::Other(name)) if name.ends_with(" archive") => self.archives.add(path),
+            // Those with the name of an archive are named by `unread_files`.
+            Some(FileKind::Other(name))
+                if name.ends_with(" archive") && archive_kind(path).is_none() =>
+            {
+                self.archives.add(path);
+            }
             Some(_) => {}
         }
     }
@@ -129,6 +135,7 @@ mod tests {
             ("c.png", ""),
             ("c.json", marked.as_str()),
             ("d.stl", "PK\u{3}\u{4}  "),
+            ("e.zip", "PK\u{3}\u{4}  "),
         ] {
             let path = dir.path().join(name);
             std::fs::write(&path, content).expect("written");

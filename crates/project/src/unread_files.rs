@@ -106,12 +106,16 @@ fn with_patterns(advice: &str, paths: &[&PathBuf]) -> String {
 
 fn unread_kind(path: &Path) -> Option<FileKind> {
     let extension = path.extension().and_then(|extension| extension.to_str());
-    extension.and_then(|extension| {
-        let mut archives = ARCHIVES.into_iter();
-        let archive = archives.find(|(name, _)| extension.eq_ignore_ascii_case(name));
-        let unread = || FileKind::of_unread_extension(extension);
-        archive.map(|(_, kind)| kind).or_else(unread)
-    })
+    let unread = || extension.and_then(FileKind::of_unread_extension);
+    archive_kind(path).or_else(unread)
+}
+
+/// Returns the kind of an archive by its name.
+pub(crate) fn archive_kind(path: &Path) -> Option<FileKind> {
+    let extension = path.extension()?;
+    let mut archives = ARCHIVES.into_iter();
+    let archive = archives.find(|(name, _)| extension.eq_ignore_ascii_case(name));
+    archive.map(|(_, kind)| kind)
 }
 
 /// The rows of a list with files in formats that are not read.
