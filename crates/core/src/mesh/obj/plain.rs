@@ -125,6 +125,10 @@ impl<'a> PlainReader<'a> {
             *value = text.number()?;
         }
         self.vertices.push(position);
+        if let [b'\n', ..] = text.0 {
+            self.rest = text.0;
+            return Some(());
+        }
         let (mut words, mut len, mut was_space) = (0, 0, true);
         for byte in text.0 {
             match byte {
