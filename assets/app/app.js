@@ -19,18 +19,34 @@ function keptName(form) {
   return form.closest("[data-chosen]")?.dataset.chosen;
 }
 
+/** Adds fields to an address. */
+function addFields(address, fields) {
+  for (const field of fields) {
+    const value = field.type === "checkbox" && !field.checked ? "" : field.value;
+    if (value) address.searchParams.set(field.name, value);
+    else address.searchParams.delete(field.name);
+  }
+}
+
 /** Keeps fields of a refused form in the address, so that they stay if the page is loaded again, as a refusal may ask. */
 function keepInAddress(form) {
   const kept = [...form.querySelectorAll("[data-in-address]")];
   if (kept.length === 0) return;
   const here = new URL(location.href);
-  for (const field of kept) {
-    const value = field.type === "checkbox" && !field.checked ? "" : field.value;
-    if (value) here.searchParams.set(field.name, value);
-    else here.searchParams.delete(field.name);
-  }
+  addFields(here, kept);
   history.replaceState(null, "", here);
 }
+
+// Links to the same page, such as those to other folders, keep what was typed. What was confirmed holds for these files only.
+document.addEventListener("click", (event) => {
+  const link = event.target.closest("a[href]");
+  const typed = document.querySelectorAll("[data-in-address]:not([type=checkbox])");
+  if (!link || typed.length === 0) return;
+  const to = new URL(link.href);
+  if (to.pathname !== location.pathname || to.origin !== location.origin) return;
+  addFields(to, typed);
+  link.href = to;
+});
 
 document.addEventListener("submit", async (event) => {
   const form = event.target;
@@ -122,7 +138,8 @@ async function refresh(mustReload) {
   }
   if (!mustReload && isInUse(part)) return;
   const response = await fetch(location.href, PAGE).catch(() => null);
-  offline.hidden = response?.ok === true;
+  // An error is an answer, too: what causes it is said after the next action.
+  offline.hidden = response !== null;
   if (!response?.ok) return;
   const page = new DOMParser().parseFromString(await response.text(), "text/html");
   // The language was changed on another page.

@@ -110,7 +110,7 @@ fn numbers_part(visit: &Visit, key: &str, report: &Report) -> Markup {
         (reasons(visit, report))
         @if !report.warnings.is_empty() {
             h2 { (visit.t("What limits these numbers", "Những giới hạn của các con số này")) }
-            ul { @for text in &report.warnings { li { (sentences(text)) } } }
+            ul { @for text in &report.warnings { li { p { (sentences(text)) } } } }
         }
     }
 }
