@@ -285,6 +285,11 @@ fn a_file_of_a_failed_pair_is_replaced_by_one_of_its_name() {
     );
     let hint = html(&page, "/import?project=p&mend=upright-0000");
     assert!(hint.contains("<code>upright-0000.ply</code>"), "{hint}");
+    // A project that is gone has no pair to mend, and a new one no pages.
+    let gone = page.get("/import?project=gone&mend=upright-0000");
+    assert_eq!(gone.status, 404, "{}", text(&gone));
+    let fresh = html(&page, "/import?project=gone");
+    assert!(!fresh.contains("p/gone/pairs"), "{fresh}");
     let folder = dir.path().join("x");
     std::fs::create_dir(&folder).expect("a folder");
     std::fs::write(folder.join("upright-0000.ply"), sound).expect("written");

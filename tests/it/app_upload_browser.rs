@@ -106,7 +106,7 @@ fn files_and_a_zip_are_chosen_in_a_browser_and_become_pairs() {
     assert!(dir.join("uploads/quét/chữ số 1.ply").is_file());
     // What was typed stays when another folder is opened.
     tab.wait("document.body?.dataset.ready");
-    tab.eval("document.querySelector('#project').value = 'gõ rồi', document.querySelector(\"main a[href*='path=']\").click(), null");
+    tab.eval("document.querySelector('#project').value = 'gõ rồi', document.querySelector(\"main tbody a[href*='path=']\").click(), null");
     tab.wait("document.body?.dataset.ready && location.search.includes('path=')");
     tab.wait("document.querySelector('#project')?.value === 'gõ rồi'");
     let problems = browser.take_problems();

@@ -20,6 +20,7 @@ use super::import_columns::{KEPT_COLUMNS, columns_part};
 use super::import_matches::{with_change, without_change};
 use super::import_partners::{ImportPartners, mending_part};
 use super::import_preview::{changes_part, plan_part, warning};
+use super::missing_names::no_project;
 use super::plan_cache::PlanCache;
 use super::project_places::ProjectPlaces;
 use super::projects::FoundProject;
@@ -94,6 +95,9 @@ pub(super) async fn page(
         _ => ColumnChanges::default(),
     };
     let mended = visit.query.parsed::<PairName>("mend");
+    if mended.is_some() && known.is_none() {
+        return Err(no_project(&chosen.project, &state.options.folder));
+    }
     let body = html! {
         @if let Some(failure) = &refused { p.notice.bad role="alert" { (failure.text(visit.language)) } }
         @if visit.query.get("compare").is_some() {
@@ -115,7 +119,7 @@ pub(super) async fn page(
         (root_links(&visit, &roots))
     };
     let title = visit.t("Import", "Nhập dữ liệu");
-    let project = Some(chosen.project.as_str()).filter(|name| !name.is_empty());
+    let project = known.is_some().then_some(chosen.project.as_str());
     Ok(frame(&visit, title, project, NavSection::Import, &body))
 }
 
