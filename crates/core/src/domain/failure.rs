@@ -8,7 +8,7 @@ use super::enum_names;
 /// Ends the message of an input file that does not exist, behind its path.
 pub const NOT_THERE: &str = " is not there";
 
-/// Clauses that tell failures because of the unit of a scan from others: the message of each such failure has one of them.
+/// If a pair fails because of the unit of its scan, the message has one of these clauses. No other message has one.
 pub const UNIT_CLAUSES: [&str; 3] = [
     "correct the unit",
     "check the unit",

@@ -117,8 +117,8 @@ pub fn hint<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> String
     }
 }
 
-/// Returns the number of letters that are other ones, missing, added, or swapped with their neighbour in a name, compared with
-/// another one, both in composed form.
+/// Returns how many letters must be replaced, added, removed or swapped with their neighbour to turn one name into the other,
+/// both in composed form.
 ///
 /// ```
 /// use mocban_core::domain::spelling::edit_distance;

@@ -11,12 +11,12 @@ const SAMPLES: usize = 1024;
 const FEWEST_VERTICES: usize = 100;
 /// Fewest vertices that share a number that stands for a missing one.
 const FEWEST_MISSING: usize = 8;
-/// Corners of triangles that meet at a vertex, about, if each triangle has corners of its own.
+/// About how many corners lie at a vertex if each triangle has corners of its own.
 const CORNERS_OF_VERTEX: usize = 6;
 /// Distance of such a number from the box around the other vertices, as a multiple of its longest side.
 const FAR: f64 = 10.0;
-/// Distance of a box from the origin, as a multiple of its longest side or in the unit of the mesh, within which far numbers
-/// such as -9999 are farther from the origin.
+/// Far numbers such as -9999 are farther from the origin than a box whose numbers are at most this large, as a multiple of its
+/// longest side or in the unit of the mesh.
 const NEAR: f64 = 2.0;
 const NEAR_UNITS: f64 = 8000.0;
 /// Absolute heights that stand for missing ones even if they are nearer.
@@ -26,8 +26,8 @@ const KNOWN_HEIGHTS: [f64; 8] = [
 /// Least gap between such a height and others, and between height 0 and others of points, as a share of the longest side.
 const KNOWN_GAP: f64 = 0.02;
 const ZERO_GAP: f64 = 0.5;
-/// Least share of vertices at such a height, as one in so many.
-const KNOWN_SHARE: usize = 1000;
+/// At least one in this number of vertices is at such a height if it stands for missing ones.
+const VERTICES_PER_KNOWN: usize = 1000;
 
 /// What the vertices of a mesh are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,8 +72,8 @@ impl FarValues {
 
 /// Finds what stands for missing positions: a number far outside of the box around the other vertices that many vertices
 /// have, exactly, in all coordinates or as their height. If there is none, a height that usually stands for a missing one may
-/// be nearer: -99, -999 and so on, and 0 in points without faces. Others that are no positions, as `is_position` says, do not
-/// count. `extremes` are vertices that may be far outside.
+/// be nearer: -99, -999 and so on, and 0 in points without faces. Vertices that are no positions, as `is_position` says, do
+/// not count. `extremes` are vertices that may be far outside.
 pub(super) fn find_far_values(
     vertices: &Vertices,
     kind: VertexKind,
@@ -112,7 +112,7 @@ pub(super) fn find_far_values(
     if found.is_empty() {
         let heights = ranges.known_heights(kind == VertexKind::Points);
         found.extend(heights.map(FarValue::Height));
-        found.retain(|value| has(value, fewest.max(count / KNOWN_SHARE)));
+        found.retain(|value| has(value, fewest.max(count / VERTICES_PER_KNOWN)));
     }
     FarValues(found)
 }

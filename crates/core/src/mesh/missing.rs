@@ -15,7 +15,7 @@ use crate::domain::cancel::polled;
 /// nanometres. The number is a power of two, so that it is the same in single precision.
 const MISSING_FROM: f64 = (1_u64 << 50) as f64;
 
-/// How far from the largest absolute value that was seen one stays unnoticed.
+/// Absolute values below this multiple of the largest one that was noticed are not noticed.
 const ROOM: f64 = 1.125;
 
 /// A mesh as read.
@@ -36,7 +36,7 @@ pub(super) struct PositionCheck {
     /// Absolute values below this one are not noticed. It grows a few times, so that almost all vertices are compared with it
     /// alone.
     bound: f64,
-    /// The extreme ones of the vertices that were noticed, of which others are at most [`ROOM`] times as far from the origin.
+    /// The extreme ones of the vertices that were noticed. All others are at most [`ROOM`] times as far from the origin.
     pub(super) extremes: ExtremeVertices,
 }
 

@@ -21,15 +21,15 @@ const MAX_ANGLE: f64 = 0.07;
 const IMPOSSIBLE_ANGLE: f64 = 0.35;
 /// A surface that agrees with the block is bent by at most this fraction of the relief.
 const MAX_BEND: f64 = 0.2;
-/// Tops that spread less than this fraction of the extent, in their narrowest direction, are one stroke: along the normal
-/// of the block, and along that of the fit, where a wall of the stroke may count as tops. On two generated blocks, one
-/// stroke had 0.024 along the normal of the block, another character 0.087, and the other 584 at least 0.116.
+/// Tops, seen along the normal of the block, are one stroke if they spread less than this fraction of the extent in their
+/// narrowest direction. On two generated blocks, one stroke had 0.024, another character 0.087, and the other 584 at least
+/// 0.116.
 const ONE_STROKE: f64 = 0.08;
+/// The same for tops seen along the normal of the fit, where a wall of the stroke may count as tops.
 const ONE_WALL: f64 = 0.11;
 
-/// Fits the surface of the stroke tops of a character that was cut from a block. `face` decides the normal if the fit
-/// disagrees with it or finds no carving, and if the tops are a single stroke. Otherwise, returns what [`fit`] returns for
-/// the same arguments.
+/// Fits the surface of the stroke tops of a character that was cut from a block. If [`fit`] disagrees with `face` or finds
+/// no carving, and the tops are a single stroke, `face` decides the normal. Otherwise, returns what [`fit`] returns.
 ///
 /// # Errors
 /// Returns an error if the vertices span no surface, neither side shows a surface, or nothing is carved.

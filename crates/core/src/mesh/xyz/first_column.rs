@@ -11,6 +11,8 @@ use crate::mesh::MeshError;
 const FIRST_POINTS: usize = 64;
 /// Most places at which numbers of points begin anew or have gaps. The rows of a grid have more.
 const MOST_BREAKS: usize = 9;
+/// Lines that show whether some lack the first number.
+const COMPARED_LINES: usize = 1000;
 
 /// Returns whether the first column, read as x, is one number before coordinates, such as that of a scan or its time.
 pub(super) fn is_one_number(bytes: &[u8], layout: &PointLayout, points: &[[f64; 3]]) -> bool {
@@ -18,9 +20,6 @@ pub(super) fn is_one_number(bytes: &[u8], layout: &PointLayout, points: &[[f64; 
         && is_constant(points, 0)
         && has_coordinates_behind(bytes, layout)
 }
-
-/// Lines that show whether some lack the first number.
-const COMPARED_LINES: usize = 1000;
 
 /// Refuses lines of which some begin with a whole number and others do not have it.
 ///

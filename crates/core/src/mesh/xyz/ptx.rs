@@ -55,7 +55,8 @@ fn truncated(what: &str, have: u64, want: u64) -> MeshError {
     }
 }
 
-/// Returns the number of whole lines if a header ends with or within them; `None` if they begin no header.
+/// Returns the number of whole lines of a header that is cut off behind or within its last line; `None` if the lines begin no
+/// header.
 fn cut_header_lines(lines: &[&[u8]]) -> Option<u64> {
     let fits = |(nth, line): (usize, &&[u8])| match nth {
         0 | 1 => count_of(line).is_some(),
