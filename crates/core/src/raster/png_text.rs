@@ -2,12 +2,14 @@
 
 use flate2::Crc;
 
+use super::decode::{png_chunks, png_text};
+
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// Bytes of the signature and the chunk of the header.
 const HEADER: usize = 33;
 /// Bytes of a chunk without its data: length, type and checksum.
 const CHUNK: usize = 12;
-const TEXT: &[u8] = b"tEXt";
+const TEXT: [u8; 4] = *b"tEXt";
 
 /// Returns a PNG with a text chunk behind its header. `keyword` and `text` are ASCII.
 ///
@@ -20,7 +22,7 @@ const TEXT: &[u8] = b"tEXt";
 /// assert_eq!(split_png_text(&titled, "Author"), None);
 /// ```
 pub fn with_png_text(png: &[u8], keyword: &str, text: &str) -> Vec<u8> {
-    let data = [TEXT, keyword.as_bytes(), b"\0", text.as_bytes()].concat();
+    let data = [&TEXT[..], keyword.as_bytes(), b"\0", text.as_bytes()].concat();
     let length = (data.len() - TEXT.len()) as u32;
     let mut crc = Crc::new();
     crc.update(&data);
@@ -35,21 +37,17 @@ pub fn split_png_text(beginning: &[u8], keyword: &str) -> Option<(Vec<u8>, Strin
     if !beginning.starts_with(SIGNATURE) {
         return None;
     }
-    loop {
-        let rest = beginning.get(at..)?;
-        let length = u32::from_be_bytes(*rest.first_chunk()?) as usize;
-        let size = length.checked_add(CHUNK)?;
-        let chunk = rest.get(..size)?;
-        let data = &chunk[4..4 + TEXT.len() + length];
-        if let Some(text) = data.strip_prefix(TEXT)
-            && let Some(text) = text.strip_prefix(keyword.as_bytes())
-            && let Some(text) = text.strip_prefix(b"\0")
+    for (kind, content) in png_chunks(beginning) {
+        let end = at + CHUNK + content.len();
+        if kind == TEXT
+            && let Some((_, text)) = png_text(kind, content, &[keyword.as_bytes()])
         {
-            let without = [&beginning[..at], &rest[size..]].concat();
-            return Some((without, String::from_utf8_lossy(text).into_owned()));
+            let without = [&beginning[..at], beginning.get(end..)?].concat();
+            return Some((without, String::from_utf8_lossy(&text).into_owned()));
         }
-        at += size;
+        at = end;
     }
+    None
 }
 
 #[cfg(test)]

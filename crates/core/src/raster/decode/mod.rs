@@ -32,6 +32,7 @@ use tags::TagFileWindow;
 pub use error::DecodeError;
 pub use header_size::header_size;
 pub use limits::ImageLimits;
+pub(super) use png_chunks::{png_chunks, png_text};
 pub use print_image::{PrintImage, profile_warning};
 pub use resolution::{file_dpi, stated_dpi};
 pub use samples::{PrintSamples, SampleSlice};

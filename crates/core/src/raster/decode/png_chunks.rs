@@ -11,7 +11,7 @@ use crate::domain::cancel::PollCounter;
 const MAX_TEXT_BYTES: u64 = 1 << 22;
 
 /// Returns kind and content of each chunk that is complete, before and after the pixels.
-pub(super) fn png_chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
+pub(in crate::raster) fn png_chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
     let mut counter = PollCounter::default();
     let mut at = 8;
     std::iter::from_fn(move || {
@@ -43,7 +43,7 @@ pub(super) fn png_colour_chunk(bytes: &[u8], wanted: [u8; 4]) -> Option<&[u8]> {
 
 /// Returns the keyword and the text of a text chunk with one of the keywords. Returns `None` for other chunks, and if the text
 /// cannot be decompressed.
-pub(super) fn png_text<'b>(
+pub(in crate::raster) fn png_text<'b>(
     kind: [u8; 4],
     content: &'b [u8],
     keywords: &[&[u8]],
