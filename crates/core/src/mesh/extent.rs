@@ -108,8 +108,7 @@ pub(super) fn some_positions(
         found.push(position);
     })?;
     let vertices: Vertices = found.into();
-    let extremes = ExtremeVertices::of(&vertices, is_position);
-    let far_values = find_far_values(&vertices, kind, &extremes, is_position);
+    let far_values = far_values_of(&vertices, kind);
     let is_kept = |vertex: &[f64; 3]| !far_values.are_at(*vertex);
     Ok((vertices.iter().filter(is_kept).collect(), unit))
 }
@@ -123,13 +122,12 @@ pub fn far_values_of_stl(file: &mut (impl Read + Seek), triangles: u32) -> io::R
     let mut found = Vec::new();
     each_corner(file, len, FOR_SIZE, &mut |corner| found.push(corner))?;
     let vertices = Vertices::Single(found.into());
-    let extremes = ExtremeVertices::of(&vertices, is_position);
-    Ok(find_far_values(
-        &vertices,
-        VertexKind::Corners,
-        &extremes,
-        is_position,
-    ))
+    Ok(far_values_of(&vertices, VertexKind::Corners))
+}
+
+fn far_values_of(vertices: &Vertices, kind: VertexKind) -> FarValues {
+    let extremes = ExtremeVertices::of(vertices, is_position);
+    find_far_values(vertices, kind, &extremes, is_position)
 }
 
 /// Visits the corners of facets at some places of a binary STL of `len` bytes.

@@ -6,7 +6,7 @@
 
 use super::error::MeshError;
 use super::extreme_vertices::ExtremeVertices;
-use super::far_values::FarValues;
+use super::far_values::{VertexKind, find_far_values};
 use super::{Mesh, Vertices};
 use crate::domain::MeshLosses;
 use crate::domain::cancel::polled;
@@ -90,8 +90,7 @@ impl PositionCheck {
         }
     }
 
-    /// Leaves out vertices without a position, and faces that use them. `incomplete_faces` were left out before; `far_values`
-    /// stand for missing positions.
+    /// Leaves out vertices without a position, and faces that use them. `incomplete_faces` were left out before.
     ///
     /// Several vertices at the origin have no position if no face uses them; one may be a point.
     ///
@@ -100,13 +99,14 @@ impl PositionCheck {
     pub(super) fn without_missing(
         self,
         mesh: Mesh,
+        kind: VertexKind,
         incomplete_faces: u64,
-        far_values: &FarValues,
     ) -> Result<MeshRead, MeshError> {
         let losses = |missing_vertices| MeshLosses {
             missing_vertices,
             incomplete_faces,
         };
+        let far_values = find_far_values(&mesh.vertices, kind, &self.extremes, is_position);
         let are_positions = self.are_all_positions && far_values.0.is_empty();
         if are_positions && (self.origins < 2 || !has_unused_origin(&mesh)) {
             let losses = losses(0);
@@ -277,7 +277,7 @@ enum Use {
 #[cfg(test)]
 mod tests {
     use super::PositionCheck;
-    use crate::mesh::far_values::FarValues;
+    use crate::mesh::far_values::VertexKind;
     use crate::mesh::{Mesh, MeshError, Vertices};
 
     const NAN: [f64; 3] = [1.0, f64::NAN, 0.0];
@@ -292,7 +292,7 @@ mod tests {
         };
         let check = PositionCheck::of(&mesh.vertices);
         check
-            .without_missing(mesh, 0, &FarValues::default())
+            .without_missing(mesh, VertexKind::Shared, 0)
             .map(|read| (read.mesh, read.losses.missing_vertices))
     }
 

@@ -40,9 +40,9 @@ use std::io::{Read, Seek};
 use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
 use crate::page_vec::PageVec;
-use far_values::{VertexKind, find_far_values};
+use far_values::VertexKind;
 use format::DetectedFormat;
-use missing::{PositionCheck, is_position};
+use missing::PositionCheck;
 
 /// Reads a mesh or point set from the bytes of a file, like [`read_from`].
 ///
@@ -103,8 +103,7 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
         _ if mesh.triangles.is_empty() => VertexKind::Points,
         DetectedFormat::Obj | DetectedFormat::Ply | DetectedFormat::Xyz => VertexKind::Shared,
     };
-    let far_values = find_far_values(&mesh.vertices, kind, &check.extremes, is_position);
-    check.without_missing(mesh, incomplete_faces, &far_values)
+    check.without_missing(mesh, kind, incomplete_faces)
 }
 
 /// Some programs write this mark before text.
@@ -144,13 +143,7 @@ pub fn read_from(
     let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
         let (mesh, check) = stl::read_facets(&mut source, count, limits)?;
-        let far_values = find_far_values(
-            &mesh.vertices,
-            VertexKind::Corners,
-            &check.extremes,
-            is_position,
-        );
-        return Ok(check.without_missing(mesh, 0, &far_values)?);
+        return Ok(check.without_missing(mesh, VertexKind::Corners, 0)?);
     }
     let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
     Ok(read_bytes(&bytes, name, limits)?)
