@@ -78,6 +78,7 @@ fn columns_are_those_that_the_title_names() {
         "# scan: x y z\n1 2.5 3 7\n4 5 6.25 3\n",
         "X [millimeters] Y [millimeters] Z [millimeters]\n1 2.5 3\n4 5 6.25\n",
         "x y z\ninches inches inches\n1 2.5 3\n4 5 6.25\n",
+        "x (metre) y (metre) z (metre)\n1 2.5 3\n4 5 6.25\n",
     ] {
         assert_points(text);
     }

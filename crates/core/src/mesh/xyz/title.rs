@@ -2,7 +2,7 @@
 
 use super::cells::cells;
 use super::grouped::without_apostrophes;
-use crate::domain::named_separator;
+use crate::domain::{LengthUnit, named_separator};
 use crate::mesh::text;
 
 /// Most cells of a title that are read.
@@ -61,23 +61,6 @@ const AXIS_NAMES: [&[&str]; 3] = [
         "h",
     ],
 ];
-const UNITS: [&str; 15] = [
-    "mm",
-    "cm",
-    "m",
-    "in",
-    "inch",
-    "inches",
-    "millimeter",
-    "millimeters",
-    "millimetre",
-    "millimetres",
-    "centimeters",
-    "centimetres",
-    "meter",
-    "meters",
-    "metres",
-];
 
 /// Returns whether a file that begins with this line may be a point set.
 pub(in crate::mesh) fn is_data_or_title(line: &[u8]) -> bool {
@@ -115,7 +98,7 @@ pub(super) fn stated_count(bytes: &[u8], first_point: u64) -> Option<u64> {
 /// Returns whether a line before the points is a count of them, units, a separator or a quoted text, which has no numbers if
 /// the columns are named before it.
 pub(super) fn is_other_title(line: &[u8], is_named: bool) -> bool {
-    let is_units = names(line).count() >= 3 && names(line).all(|name| UNITS.contains(&&*name));
+    let is_units = names(line).count() >= 3 && names(line).all(|name| is_unit(&name));
     let is_quoted = matches!(line.first(), Some(b'"' | b'\''));
     let mut unquoted = line.to_vec();
     unquoted.retain(|byte| !matches!(byte, b'"' | b'\''));
@@ -149,7 +132,7 @@ impl Title {
 
     fn of_names(line: &[u8], is_comment: bool) -> Option<Self> {
         let is_delimited = line.iter().any(|byte| b",;\t".contains(byte));
-        let is_name = |name: &String| is_delimited || !UNITS.contains(&&**name);
+        let is_name = |name: &String| is_delimited || !is_unit(name);
         let names: Vec<String> = names(line).filter(is_name).collect();
         let columns = axis_columns(&names)?;
         let first = columns.into_iter().min().unwrap_or_default();
@@ -180,6 +163,10 @@ fn axis_columns(names: &[String]) -> Option<[usize; 3]> {
     let behind = is_number.then(|| find(rest)).flatten();
     let behind = behind.map(|columns: [usize; 3]| columns.map(|column| column + 1));
     behind.or_else(|| find(names))
+}
+
+fn is_unit(name: &str) -> bool {
+    LengthUnit::named(name).is_ok()
 }
 
 /// Returns the names in a title in lower case: the letters and digits that its cells begin with, without quotes, brackets
